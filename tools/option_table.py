@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from coneflat.apps.cli.main import cli
-from coneflat.apps.cli.options import flag_of, shown_default
+from coneflat.apps.cli.options import flag_name, shown_default
 from coneflat.apps.quads.options import QuadOptions
 from coneflat.options import declarations, kinds
 from coneflat.options.declared import (
@@ -49,7 +49,7 @@ def _flag_table(group: type, command: str = "flatten") -> str:
         if each.flag and not _is_shared(each, group)
     ]
     return _table(
-        group, "option", rows, lambda name: f"`{flag_of(name)}`" if declarations(group)[name].flag else ""
+        group, "option", rows, lambda name: f"`{flag_name(name)}`" if declarations(group)[name].flag else ""
     )
 
 
@@ -93,7 +93,7 @@ def _flags(name: str, command: str) -> str:
         if param.name == name
         for opts in (*param.opts, *(other for other in param.secondary_opts if other.startswith("--no-")))
     ]
-    return ", ".join(f"`{flag}`" for flag in spellings or [flag_of(name)])
+    return ", ".join(f"`{flag}`" for flag in spellings or [flag_name(name)])
 
 
 def _words(kind: kinds.Kind) -> list[str]:

@@ -1,1 +1,1 @@
-"""What is made of the package: the command line, batches, comparisons, the studio."""
+"""Applications of the package: the command line, batches, quads, comparisons, the viewer and the studio."""

@@ -1,7 +1,7 @@
-"""Compiling the kernels ahead: `python -m coneflat.apps.ahead`.
+"""Ahead-of-time compilation of the kernels: `python -m coneflat.apps.ahead`.
 
-Kernels are compiled when first called and kept beside their sources from then on (see `coneflat.base.compiled`), which
-makes the first flattening of an installation wait for half a minute. The build does this for it (hatch_build.py).
+Kernels are compiled at the first call and cached next to their sources (see `coneflat.base.compiled`), which takes half
+a minute in the first flattening of an installation. The build runs this module in advance (hatch_build.py).
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ TAU = 2 * np.pi
 
 
 def compile_kernels() -> None:
-    """Flatten small meshes of every kind, so that every kernel that flattening uses is compiled."""
+    """Flatten small meshes of several types, so that every kernel is compiled."""
     flatten(sample_path(), charts="atlas")
     flatten(sample_path(), cones="greedy", method="linear")
     for mesh in (_tube(closed=True), _tube(closed=False)):
         flatten(*mesh)
         flatten(*mesh, cones="greedy")
     points, faces = _tube(closed=True)
-    flatten(points * [10, 1, 1], faces)  # has triangles to be flipped
-    # has triangles to be cut: six of them have no room for 7 pi
+    flatten(points * [10, 1, 1], faces)  # This has edges to be flipped.
+    # This has triangles to be split: six of them cannot hold an angle of 7 pi.
     flatten(points, faces, cones={0: -5 * np.pi, **dict.fromkeys(range(100, 600, 100), np.pi)})
-    # large enough for what fine meshes alone take
+    # This is large enough for the kernels of fine meshes.
     flatten(*_tube(closed=True, around=120, across=60), cones={0: np.pi / 2, 3630: -np.pi / 2})
     flatten(*_tube(closed=True), quantise=np.pi / 2)
     measure_quads(quads(*_tube(closed=True), quads=300))
@@ -37,7 +37,7 @@ def compile_kernels() -> None:
 
 
 def _tube(closed: bool, around: int = 40, across: int = 24) -> tuple[FloatArray, IntArray]:
-    """Return a bumpy torus, or the part of it that a rectangle of its parameters covers, bent to a spiral."""
+    """Return a torus with bumps, or the part of it over a rectangle of its parameters, which is a disk."""
     u, v = np.meshgrid(np.arange(around), np.arange(across), indexing="ij")
     a, b = TAU * u / around, TAU * v / across
     radius = 0.4 + 0.05 * np.sin(3 * a) * np.cos(2 * b)

@@ -14,7 +14,7 @@ from click.testing import CliRunner
 import coneflat
 from coneflat.apps.cli.main import cli
 from coneflat.apps.studio.choices import Choices, Cone, command_line, python_lines
-from coneflat.apps.studio.project import Project, hash_of, read_project
+from coneflat.apps.studio.project import Project, file_hash, read_project
 from coneflat.apps.studio.steps import History
 from coneflat.errors import OptionError, ProjectError, StudioError
 
@@ -22,8 +22,8 @@ CONES = (3, 60, 200, 410, 500)
 
 
 def some_choices():
-    chosen = Choices().placed(CONES).angled(60, math.radians(270)).locked(200, True)
-    return chosen.with_option("stretch", 0.25).cut((1, 2, 9)).keep_whole((7, 8))
+    chosen = Choices().placed(CONES).with_angle(60, math.radians(270)).locked(200, True)
+    return chosen.with_option("stretch", 0.25).cut((1, 2, 9)).with_kept((7, 8))
 
 
 @pytest.fixture
@@ -39,9 +39,9 @@ class TestChoices:
         assert chosen.keywords() == {"cones": {5: None, 7: None}}
 
     def test_an_angle_is_what_is_left_of_a_turn(self):
-        chosen = Choices().placed([4, 9]).angled(9, math.radians(270))
+        chosen = Choices().placed([4, 9]).with_angle(9, math.radians(270))
         assert chosen.keywords() == {"cones": {4: None, 9: pytest.approx(math.pi / 2)}}
-        assert chosen.angled(9, None).keywords() == {"cones": {4: None, 9: None}}
+        assert chosen.with_angle(9, None).keywords() == {"cones": {4: None, 9: None}}
 
     def test_a_search_goes_around_what_is_locked(self):
         chosen = Choices().placed([4, 9, 12]).locked(9, True).with_option("cone_count", 8)
@@ -51,12 +51,12 @@ class TestChoices:
         assert chosen.locked(9, False).cones == ()
 
     def test_edges_of_paths_are_pairs(self):
-        words = Choices().cut((4, 2, 9)).cut((2, 4)).keep_whole((7, 8)).keywords()
+        words = Choices().cut((4, 2, 9)).cut((2, 4)).with_kept((7, 8)).keywords()
         assert words["seams"].tolist() == [[2, 4], [2, 9]]
         assert words["no_seams"].tolist() == [[7, 8]]
 
     def test_a_path_is_erased_by_any_of_its_edges(self):
-        chosen = Choices().cut((4, 2, 9)).keep_whole((7, 8))
+        chosen = Choices().cut((4, 2, 9)).with_kept((7, 8))
         assert chosen.erased(9, 2).cuts == ()
         assert chosen.erased(8, 7).kept == ()
         with pytest.raises(StudioError, match="no path was drawn along the edge 4-9"):
@@ -70,7 +70,11 @@ class TestChoices:
             (lambda c: c.moved(5, 6), StudioError, "vertex 5 is not a cone"),
             (lambda c: c.removed(5), StudioError, "vertex 5 is not a cone"),
             (lambda c: c.locked(5, True), StudioError, "vertex 5 is not a cone"),
-            (lambda c: c.angled(4, -1.0), StudioError, "a positive angle of at most 720 degrees, not -57.2"),
+            (
+                lambda c: c.with_angle(4, -1.0),
+                StudioError,
+                "a positive angle of at most 720 degrees, not -57.2",
+            ),
             (lambda c: c.cut((4,)), StudioError, "a path leads from one vertex to others"),
             (lambda c: c.cut((4, 4)), StudioError, "a path leads from one vertex to others"),
             (lambda c: c.with_option("progress", print), OptionError, "the studio sets no option 'progress'"),
@@ -114,7 +118,7 @@ class TestHistory:
 class TestProject:
     def test_it_comes_back(self, tmp_path, mesh):
         (tmp_path / "sub").mkdir()
-        project = Project(tmp_path / "ball.obj", hash_of(tmp_path / "ball.obj"), some_choices())
+        project = Project(tmp_path / "ball.obj", file_hash(tmp_path / "ball.obj"), some_choices())
         project.save(tmp_path / "sub" / "p.json")
         assert json.loads((tmp_path / "sub" / "p.json").read_text())["mesh"]["path"] == "../ball.obj"
         found = read_project(tmp_path / "sub" / "p.json")
@@ -123,7 +127,7 @@ class TestProject:
         found.check_mesh()
 
     def test_another_mesh_is_noticed(self, tmp_path, mesh):
-        project = Project(tmp_path / "ball.obj", hash_of(tmp_path / "ball.obj"), Choices())
+        project = Project(tmp_path / "ball.obj", file_hash(tmp_path / "ball.obj"), Choices())
         (tmp_path / "ball.obj").write_text("v 0 0 0\n")
         with pytest.raises(ProjectError, match="is not the mesh that the project was made with"):
             project.check_mesh()
@@ -161,7 +165,7 @@ class TestProject:
 class TestReplay:
     def test_the_command_line_means_what_is_chosen(self, tmp_path, mesh, monkeypatch):
         monkeypatch.chdir(tmp_path)
-        chosen = Choices().placed(CONES).angled(60, math.radians(270)).with_option("charts", "one")
+        chosen = Choices().placed(CONES).with_angle(60, math.radians(270)).with_option("charts", "one")
         words = command_line("ball.obj", "p.json", chosen).split()[1:]
         assert CliRunner().invoke(cli, [*words, "-o", "a.npz"]).exit_code == 0
         names: dict = {}
@@ -178,7 +182,7 @@ class TestReplay:
 
     def test_a_project_has_its_own_options(self, tmp_path, mesh):
         path = tmp_path / "p.json"
-        Project(tmp_path / "ball.obj", hash_of(tmp_path / "ball.obj"), Choices()).save(path)
+        Project(tmp_path / "ball.obj", file_hash(tmp_path / "ball.obj"), Choices()).save(path)
         given = {"--stretch 1": "--stretch", "x.obj": "MESH", "--paper": "--paper", "--strict": "--repair"}
         for more, what in given.items():
             done = CliRunner().invoke(cli, ["flatten", "--project", str(path), *more.split()])

@@ -22,10 +22,10 @@ from studio_browsing import (  # noqa: F401
 
 import coneflat
 from coneflat.apps.cli.main import cli
-from coneflat.apps.studio.child import Bench, with_whole
+from coneflat.apps.studio.child import JobRunner, with_all_triangles
 from coneflat.apps.studio.choices import Choices
 from coneflat.apps.studio.paint import Region
-from coneflat.apps.studio.project import hash_of
+from coneflat.apps.studio.project import file_hash
 from coneflat.apps.view.page.content import Model
 
 
@@ -343,8 +343,8 @@ def into_ball(places):
 
 
 def test_the_whole_mesh_goes_beside_what_is_shown(ball):
-    bench = Bench()
-    job = {"mesh": str(ball), "sha256": hash_of(ball), "choices": Choices().as_plain()}
+    bench = JobRunner()
+    job = {"mesh": str(ball), "sha256": file_hash(ball), "choices": Choices().as_plain()}
 
     def arrays(**more):
         head, body = bench.flatten({**job, **more}, lambda stage, fraction: None, lambda head, body: None)
@@ -361,5 +361,5 @@ def test_the_whole_mesh_goes_beside_what_is_shown(ball):
     assert found["whole_places"].reshape(-1, 3) == pytest.approx(into_ball(vertices), abs=1e-6)
     np.testing.assert_array_equal(found["whole_numbers"], np.arange(len(vertices)) + 1)
     model = Model.of(bench.result)
-    head, _ = with_whole({"arrays": []}, b"", model, bench.result)
+    head, _ = with_all_triangles({"arrays": []}, b"", model, bench.result)
     assert [each["name"] for each in head["arrays"]] == ["whole_places", "whole_faces", "whole_numbers"]

@@ -7,9 +7,9 @@ import pytest
 import shapes
 
 import coneflat
-from coneflat.apps.studio.child import TO_COME, Bench
+from coneflat.apps.studio.child import PLACEHOLDER, JobRunner
 from coneflat.apps.studio.choices import Choices
-from coneflat.apps.studio.known import Known, with_prints
+from coneflat.apps.studio.known import SentPictures, with_hashes
 from coneflat.apps.studio.session import Session
 from coneflat.apps.view.page.payload import pack
 
@@ -78,7 +78,7 @@ class TestFirstViews:
 def test_a_first_view_comes_before_the_layout_and_has_no_numbers(tmp_path):
     path = shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(3))
     events = []
-    bench = Bench(early_from=1000)
+    bench = JobRunner(early_from=1000)
     job = {"mesh": str(path), "sha256": "", "choices": Choices().as_plain()}
     for choices in (Choices(), Choices().with_option("stretch", 0.5)):
         job["choices"] = choices.as_plain()
@@ -94,13 +94,13 @@ def test_a_first_view_comes_before_the_layout_and_has_no_numbers(tmp_path):
         fractions = [event[1] for event in events if event[0] != "shown"]
         assert fractions == sorted(fractions)
         _, first, early_body = events[names.index("shown")]
-        assert {value for _, value, _ in first["head"]["rows"]} == {TO_COME}
-        assert TO_COME not in {value for _, value, _ in head["head"]["rows"]}
+        assert {value for _, value, _ in first["head"]["rows"]} == {PLACEHOLDER}
+        assert PLACEHOLDER not in {value for _, value, _ in head["head"]["rows"]}
         assert first["found"] == head["found"]
         assert len(early_body)
         result = coneflat.flatten(path, **choices.keywords())
         np.testing.assert_array_equal(bench.result.uv, result.uv)
-    small = Bench(early_from=2000)
+    small = JobRunner(early_from=2000)
     events.clear()
     small.flatten(job, lambda *_: None, lambda *given: events.append(given))
     assert not events
@@ -112,7 +112,7 @@ class TestKnownArrays:
     @staticmethod
     def picture(**arrays):
         listed, block = pack({name: np.array(values) for name, values in arrays.items()})
-        return with_prints({"arrays": listed}, block), block
+        return with_hashes({"arrays": listed}, block), block
 
     @staticmethod
     def arrays_of(picture, others=None):
@@ -130,7 +130,7 @@ class TestKnownArrays:
         return found
 
     def test_only_those_that_changed_are_told(self):
-        known = Known()
+        known = SentPictures()
         first = known.numbered(self.picture(places=[1.0, 2.0], tints=np.uint8([1, 2, 3]), uv=[0.5]))
         second = known.numbered(self.picture(places=[1.0, 2.0], tints=np.uint8([1, 2, 4]), uv=[0.5]))
         whole = known.without(0, second)

@@ -79,12 +79,16 @@ class TestRegion:
 class TestPaint:
     def test_the_last_stroke_counts(self):
         paint = (
-            Paint().stroked("importance", region(range(10)), 10).stroked("importance", region([3, 4]), 100)
+            Paint()
+            .with_stroke("importance", region(range(10)), 10)
+            .with_stroke("importance", region([3, 4]), 100)
         )
         assert paint.weights() == {**dict.fromkeys([0, 1, 2, 5, 6, 7, 8, 9], 10.0), 3: 100.0, 4: 100.0}
-        assert paint.stroked("importance", region(range(10)), 1) == Paint()
-        paint = paint.stroked("no_cone", region([1, 2]), None).stroked("no_seam", region([2, 3]), None)
-        bare = paint.stroked("erase", region([2]), None)
+        assert paint.with_stroke("importance", region(range(10)), 1) == Paint()
+        paint = paint.with_stroke("no_cone", region([1, 2]), None).with_stroke(
+            "no_seam", region([2, 3]), None
+        )
+        bare = paint.with_stroke("erase", region([2]), None)
         assert (bare.no_cone, bare.no_seam) == (region([1]), region([3]))
         assert 2 not in bare.weights()
 
@@ -100,7 +104,7 @@ class TestPaint:
     )
     def test_what_makes_no_sense(self, layer, weight, message):
         with pytest.raises((StudioError, OptionError), match=message):
-            Paint().stroked(layer, region([1]), weight)
+            Paint().with_stroke(layer, region([1]), weight)
 
     def test_what_it_means(self):
         chosen = Choices().painted("no_cone", region([1, 2])).painted("no_seam", region([5, 6]))
@@ -108,12 +112,12 @@ class TestPaint:
         words = chosen.keywords()
         assert words.pop("no_seams").tolist() == [5, 6]
         assert words == {"forbidden_cones": [1, 2], "weights": {8: 10.0}}
-        assert chosen.keep_whole((7, 8)).keywords()["no_seams"].tolist() == [5, 6, 7, 8]
+        assert chosen.with_kept((7, 8)).keywords()["no_seams"].tolist() == [5, 6, 7, 8]
         # Cones that were put somewhere by hand are there on purpose.
         by_hand = chosen.placed([1, 9])
         assert "forbidden_cones" not in by_hand.keywords()
-        assert by_hand.angled(9, 1.0).keywords()["weights"] == {8: 10.0}
-        assert "weights" not in by_hand.angled(9, 1.0).angled(1, 1.0).keywords()
+        assert by_hand.with_angle(9, 1.0).keywords()["weights"] == {8: 10.0}
+        assert "weights" not in by_hand.with_angle(9, 1.0).with_angle(1, 1.0).keywords()
 
 
 class TestStories:

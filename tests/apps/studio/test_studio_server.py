@@ -41,7 +41,7 @@ def session(tmp_path):
 
 @pytest.fixture
 def stranger(session, monkeypatch):
-    monkeypatch.setattr("coneflat.apps.studio.server.MOST_UPLOADED", MOST)
+    monkeypatch.setattr("coneflat.apps.studio.server.MAX_UPLOAD_BYTES", MOST)
     return TestClient(studio_app(session, TOKEN, PORT), base_url=BASE)
 
 

@@ -19,7 +19,7 @@ from click.testing import CliRunner
 import coneflat
 from coneflat.apps.cli.main import cli
 from coneflat.apps.studio.choices import Choices
-from coneflat.apps.studio.project import Project, hash_of, read_project
+from coneflat.apps.studio.project import Project, file_hash, read_project
 from coneflat.apps.studio.session import Session
 from coneflat.apps.studio.worker import read_frame, write_frame
 from coneflat.errors import OptionError, ProjectError, StudioError
@@ -165,7 +165,7 @@ class TestSession:
     def test_a_dropped_project_names_no_mesh_elsewhere(self, session, tmp_path_factory, tmp_path):
         other = tmp_path_factory.mktemp("other")
         shapes.write_obj(other / "secret.obj", *shapes.sphere(1))
-        Project(other / "secret.obj", hash_of(other / "secret.obj"), Choices()).save(tmp_path / "p.json")
+        Project(other / "secret.obj", file_hash(other / "secret.obj"), Choices()).save(tmp_path / "p.json")
         with pytest.raises(ProjectError, match="lies outside the session's folder"):
             session.open_named("p.json")
 

@@ -13,7 +13,7 @@ import shapes
 
 import coneflat
 from coneflat.apps.studio.choices import Choices
-from coneflat.apps.studio.messages import CONTROLS, in_page, misplaced, within
+from coneflat.apps.studio.messages import CONTROLS, misplaced_warning, page_message, vertices_in
 from coneflat.apps.studio.paint import Region
 from coneflat.apps.studio.session import Session
 from coneflat.base.defaults import MAX_CONE_ANGLE
@@ -42,16 +42,16 @@ class TestPlaces:
         some = np.flatnonzero(np.random.default_rng(7).random(400) < 0.4).tolist()
         region = Region.of_runs((vertex, vertex) for vertex in some)
         every = list(range(-3, 410))
-        assert within(region, every) == [v for v in every if v in set(some)]
-        assert within(Region(), every) == []
+        assert vertices_in(region, every) == [v for v in every if v in set(some)]
+        assert vertices_in(Region(), every) == []
 
     def test_one_and_several(self):
         painted = Choices().painted("no_cone", Region("3-9 20"))
-        assert misplaced(painted) == ()
-        assert misplaced(painted.added(10)) == ()
-        (one,) = misplaced(painted.added(9))
+        assert misplaced_warning(painted) == ()
+        assert misplaced_warning(painted.added(10)) == ()
+        (one,) = misplaced_warning(painted.added(9))
         assert one.startswith("1 cone set by hand or locked lies where none are to be, as painted: vertex 9.")
-        (two,) = misplaced(painted.added(20).added(10).added(3))
+        (two,) = misplaced_warning(painted.added(20).added(10).added(3))
         assert "2 cones set by hand or locked lie where none are to be, as painted: vertices 3, 20." in two
 
     def test_they_are_told_at_once_and_noted(self, session):
@@ -72,11 +72,11 @@ class TestPlaces:
 
 class TestAngles:
     def test_none_is_wider_than_a_search_may_have_them(self):
-        chosen = Choices().placed([4, 9]).angled(9, math.radians(720))
+        chosen = Choices().placed([4, 9]).with_angle(9, math.radians(720))
         assert chosen.cones[1].angle == MAX_CONE_ANGLE
         for angle in (0.0, math.radians(721), math.radians(3000), math.inf, math.nan):
             with pytest.raises(StudioError, match="a positive angle of at most 720 degrees, not"):
-                chosen.angled(4, angle)
+                chosen.with_angle(4, angle)
             with pytest.raises(StudioError, match="a positive angle of at most 720 degrees, not"):
                 chosen.added(5, angle)
         plain = chosen.as_plain()
@@ -126,7 +126,7 @@ class TestWords:
         ],
     )
     def test_options_are_named_as_the_page_has_them(self, message, said):
-        assert in_page(message) == said
+        assert page_message(message) == said
 
     def test_no_flag_that_has_a_control_is_left(self):
         """In none of the messages of the package."""
@@ -137,6 +137,6 @@ class TestWords:
         assert {"--repair", "--distortion"} <= flags
         for flag in flags:
             name = flag[2:].replace("-", "_")
-            assert in_page(f"try {flag}.") == (
+            assert page_message(f"try {flag}.") == (
                 f"try “{CONTROLS[name]}”." if name in CONTROLS else f"try {flag} of coneflat flatten."
             )

@@ -1,4 +1,4 @@
-"""Many meshes: in local processes or on a Dask cluster, with a summary, and over what fails."""
+"""Batches: many meshes are flattened in local processes or on a Dask cluster, and summarised in a table."""
 
 from .jobs import Job, find_jobs
 from .run import BatchSummary, run_batch

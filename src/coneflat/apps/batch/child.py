@@ -1,4 +1,4 @@
-"""A process that flattens: `python -m coneflat.apps.batch.child` reads jobs and writes rows, a line each."""
+"""The worker process of a batch, `python -m coneflat.apps.batch.child`: reads jobs, writes rows, one per line."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .jobs import COLUMNS
 
 
 def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
-    """Flatten a mesh file to a file and return the row of the summary; errors become rows, too."""
+    """Flatten a mesh file, write the result, and return its row of the summary; errors give a row, too."""
     from ... import ConeflatError, flatten
     from ...io import read_joined, write_measured
     from ...measure import REPORTED, breaches, parse_requirements
@@ -40,14 +40,14 @@ def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
 
 
 def serve(requests: IO[str], answers: IO[str]) -> None:
-    """Answer jobs until there are no more."""
+    """Read jobs until the end of the input, and write the row of each."""
     for line in requests:
         answers.write(json.dumps(flatten_file(json.loads(line))) + "\n")
         answers.flush()
 
 
 def main() -> None:
-    """Serve over standard input and output, which libraries that print of themselves do not get at."""
+    """Serve over standard input and output; what libraries print is redirected to standard error."""
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     serve(sys.stdin, answers)

@@ -1,4 +1,4 @@
-"""What a batch is to do: a mesh, where its result goes, and how to know that it is done."""
+"""Jobs of a batch: a mesh file, the file of its result, and a checksum that shows whether it is up to date."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any
 from ...errors import OptionError
 from ...io import find_meshes
 
-# What the summary tells of a mesh, from its report.
+# Keys of the report that the summary contains.
 COLUMNS = (
     "vertices", "triangles", "cones", "curvature_error_max", "qc_mean", "qc_max", "area_std", "area_distortion",
     "flipped", "charts", "seam_length", "seam_mismatch_max", "rotation_deviation", "uv_scale",
@@ -27,10 +27,10 @@ class Job:
 
     Attributes:
         mesh, output: absolute paths.
-        options: keyword arguments of `coneflat.flatten`, as JSON has them.
+        options: keyword arguments of `coneflat.flatten`, as JSON values.
         weld: merge vertices at the same position; None for the default, see `coneflat.io.read.read_joined`.
-        mark: what changes when the mesh file, the options or the version do; "" where there is no such file.
-        required: what measures must be, such as "flipped=0"; a mesh that does not meet it has failed.
+        mark: checksum of the size and time of the mesh file, the options and the version; "" if the file is missing.
+        required: conditions on measures, such as "flipped=0"; a mesh that does not meet them has failed.
     """
 
     mesh: str
@@ -53,20 +53,20 @@ def find_jobs(
     weld: bool | None,
     required: tuple[str, ...] = (),
 ) -> list[Job]:
-    """Return a job for each mesh that the patterns name, in the order of their paths.
+    """Return a job for each mesh that matches the patterns, sorted by path.
 
     Args:
         patterns: files, folders (every mesh in them), or patterns with *, ? and ** for any depth.
-        folder: where results go, under the meshes' own names.
-        ending: of the results, such as ".obj".
+        folder: folder of the results, which are named like the meshes.
+        ending: extension of the results, such as ".obj".
         options, weld, required: see `Job`.
 
     Raises:
         OptionError: a pattern matches nothing, or a result would overwrite a mesh.
         MeshFileError: a folder cannot be read.
     """
-    # A file counts once, by its own name or, where only links to it are given, by the first of these: stores name
-    # their files by checksums.
+    # A file counts once. If it is given by links only, the name of the first link is used, because content-addressed
+    # stores name their files by checksums.
     found: dict[str, str] = {}
     for pattern in patterns:
         for path in find_meshes(pattern):
@@ -85,19 +85,19 @@ def find_jobs(
 
 
 def _names(meshes: list[str], ending: str) -> list[str]:
-    """Return a name for each result: the mesh's own, with as much of its path as it takes to be the only one."""
+    """Return a unique name for each result: the name of the mesh, with as much of its path as needed."""
     paths = [Path(mesh) for mesh in meshes]
     names = [path.stem for path in paths]
     for depth in range(max((len(path.parts) for path in paths), default=0)):
-        twice = {name for name, count in Counter(name.lower() for name in names).items() if count > 1}
-        if not twice:
+        repeated = {name for name, count in Counter(name.lower() for name in names).items() if count > 1}
+        if not repeated:
             break
-        # First the kind of file tells them apart, then the folders.
+        # The file extension is added first, then folders.
         names = [
-            _longer(path, depth) if name.lower() in twice else name
+            _extended_name(path, depth) if name.lower() in repeated else name
             for path, name in zip(paths, names, strict=True)
         ]
-    # What differs by upper and lower case alone, or runs together, is numbered.
+    # Names that are still equal, or differ in upper and lower case only, are numbered.
     taken: set[str] = set()
     for i, name in enumerate(names):
         count = 1
@@ -108,7 +108,7 @@ def _names(meshes: list[str], ending: str) -> list[str]:
     return [name + ending for name in names]
 
 
-def _longer(path: Path, depth: int) -> str:
+def _extended_name(path: Path, depth: int) -> str:
     kind = f"{path.stem}_{path.suffix[1:].lower()}"
     folders = path.parent.relative_to(path.anchor).parts
     return "_".join([*folders[max(len(folders) - depth, 0) :], kind])
@@ -119,7 +119,7 @@ def _mark(mesh: str, options: Mapping[str, Any], weld: bool | None, required: tu
 
     try:
         about = os.stat(mesh)
-    except (OSError, ValueError):  # A link that leads nowhere: reading it says so.
+    except (OSError, ValueError):  # A broken link: reading it reports the error.
         return ""
     text = json.dumps(
         [about.st_size, about.st_mtime_ns, dict(options), weld, required, __version__], sort_keys=True

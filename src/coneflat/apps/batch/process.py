@@ -1,7 +1,7 @@
-"""A batch in processes on this machine, each of which flattens one mesh after the other, with a time limit for each.
+"""Batches in processes on this machine or on a cluster; each process flattens one mesh at a time, with a time limit.
 
-Python has the threads that wait for them. The processes are ours, since those of its pools cannot be ended one by one,
-take the whole pool down when they die, and run the caller's script once more.
+Threads of this process wait for them. Process pools of Python are not used: their processes cannot be ended singly, one
+that dies breaks the whole pool, and they import the script of the caller again.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ...errors import OptionError
 from ...io import remove_unfinished
 from .jobs import Job
 
-# Each process computes on one core: there are as many processes as cores.
+# Each process uses one thread, because there are as many processes as cores.
 ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
 )
@@ -34,7 +34,7 @@ COMMAND = [sys.executable, "-m", "coneflat.apps.batch.child"]
 def rows_of_processes(
     jobs: Sequence[Job], processes: int, limit: float | None
 ) -> Iterator[tuple[Job, dict[str, Any]]]:
-    """Yield jobs with their rows as they are done."""
+    """Yield jobs with their rows, in the order in which they end."""
     children = [Child() for _ in range(processes)]
     idle: SimpleQueue[Child] = SimpleQueue()
     for child in children:
@@ -44,7 +44,7 @@ def rows_of_processes(
         child = idle.get()
         try:
             return child.flatten(job, limit)
-        except Exception as error:  # One mesh has failed, not the batch.
+        except Exception as error:  # Only this mesh has failed, not the batch.
             child.end()
             return failed(job, f"internal error: {type(error).__name__}: {error}")
         finally:
@@ -56,18 +56,18 @@ def rows_of_processes(
             for future in as_completed(futures):
                 yield futures[future], future.result()
         finally:
-            # Also when the one who asks has had enough, or was interrupted.
+            # This is also reached if the caller stops early or is interrupted.
             pool.shutdown(wait=False, cancel_futures=True)
             while any(future.running() for future in futures):
                 for child in children:
                     child.kill()
-                time.sleep(0.05)  # seconds: one may just be starting
+                time.sleep(0.05)  # seconds; a process may be starting
             for child in children:
                 child.end()
 
 
 def failed(job: Job, error: str, seconds: float | None = None) -> dict[str, Any]:
-    """Return the row of a job that has no result."""
+    """Return the row of a job that failed."""
     return {
         "mesh": job.mesh,
         "output": job.output,
@@ -77,8 +77,8 @@ def failed(job: Job, error: str, seconds: float | None = None) -> dict[str, Any]
     }
 
 
-def _end_of(code: int) -> str:
-    """Return how a process with an exit code ended."""
+def _exit_text(code: int) -> str:
+    """Return a text that says how a process with this exit code ended."""
     if code >= 0:
         return f"ended with code {code}"
     try:
@@ -88,24 +88,24 @@ def _end_of(code: int) -> str:
 
 
 class Child:
-    """A process that is started when there is something to do, and again after it was ended or has died."""
+    """A worker process that is started for its first job, and again after it was ended or has died."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[str] | None = None
 
     def flatten(self, job: Job, limit: float | None) -> dict[str, Any]:
-        """Return the row of a job; a process that takes longer than the limit, seconds, is ended."""
+        """Return the row of a job; the process is ended if it takes longer than the limit in seconds."""
         start = time.perf_counter()
         try:
             process = self._started()
-        except OSError as error:  # No memory for another process, say.
+        except OSError as error:  # For example, there is no memory for another process.
             return failed(job, f"no process could be started: {error.strerror or error}")
         timer = threading.Timer(threading.TIMEOUT_MAX if limit is None else limit, process.kill)
         line = ""
         timer.start()
         assert process.stdin is not None
         assert process.stdout is not None
-        with suppress(OSError):  # It may die before it takes the job.
+        with suppress(OSError):  # It may die before it reads the job.
             process.stdin.write(job.as_json() + "\n")
             process.stdin.flush()
             line = process.stdout.readline()
@@ -120,20 +120,20 @@ class Child:
         if limit is not None and seconds >= limit:
             why = f"it took longer than {limit:g} s"
         else:
-            why = f"its process {_end_of(process.returncode)}, for want of memory perhaps"
+            why = f"its process {_exit_text(process.returncode)}, possibly because memory ran out"
         return failed(job, why, round(seconds, 3))
 
     def end(self) -> None:
-        """End the process, whatever it does; for the thread that uses it."""
+        """End the process in any state; called by the thread that uses it."""
         if self._process is not None:
             self._process.kill()
-            # Closes the pipes, where a job may still be stuck.
+            # This closes the pipes, which may still contain a job.
             with suppress(OSError, ValueError):
                 self._process.communicate()
             self._process = None
 
     def kill(self) -> None:
-        """End the process from another thread; the one that uses it finds it dead."""
+        """End the process from another thread; the thread that uses it notices that it has died."""
         process = self._process
         if process is not None:
             process.kill()
@@ -152,26 +152,26 @@ class Child:
         return self._process
 
 
-# Workers that may be lost under one mesh before it counts as failed: it may be the mesh that kills them.
-LOSSES = 3
-# Seconds in which a scheduler must answer: one that is there takes a fraction of one.
-PATIENCE = 4.0
+# Number of times that a mesh is tried again after its worker was lost; the mesh may be the cause of the loss.
+RETRIES = 3
+# Seconds within which a scheduler must answer; it normally takes a fraction of one.
+ANSWER_SECONDS = 4.0
 
-_own = threading.local()
+_local = threading.local()
 
 
 def flatten_here(job: Job, limit: float | None) -> dict[str, Any]:
-    """Flatten in a child process of this thread of a worker, which can be ended at the time limit."""
-    if not hasattr(_own, "child"):
-        _own.child = Child()
-    row: dict[str, Any] = _own.child.flatten(job, limit)
+    """Flatten in a child process, one for each thread of a worker, which is ended at the time limit."""
+    if not hasattr(_local, "child"):
+        _local.child = Child()
+    row: dict[str, Any] = _local.child.flatten(job, limit)
     return row
 
 
 def rows_of_cluster(
     jobs: Sequence[Job], address: str, limit: float | None
 ) -> Iterator[tuple[Job, dict[str, Any]]]:
-    """Yield jobs with their rows as they are done; work of lost workers is done again by others.
+    """Yield jobs with their rows, in the order in which they end; jobs of lost workers are assigned to others.
 
     Raises:
         OptionError: no cluster can be reached at the address, or Dask is not installed.
@@ -182,12 +182,12 @@ def rows_of_cluster(
         raise OptionError("a Dask cluster needs distributed: pip install 'coneflat[dask]'") from error
     try:
         _require_scheduler(address)
-        client = Client(address, timeout=PATIENCE, set_as_default=False)
-    except Exception as error:  # The library has many ways to fail at an address that is none.
+        client = Client(address, timeout=ANSWER_SECONDS, set_as_default=False)
+    except Exception as error:  # The library raises many types of errors for a wrong address.
         why = " ".join(str(error).split()) or type(error).__name__
         raise OptionError(f"no Dask scheduler answers at {address}: {why}") from error
     with client:
-        futures = {client.submit(flatten_here, job, limit, pure=False, retries=LOSSES): job for job in jobs}
+        futures = {client.submit(flatten_here, job, limit, pure=False, retries=RETRIES): job for job in jobs}
         try:
             for future in as_completed(futures, loop=client.loop):
                 job = futures[future]
@@ -195,23 +195,23 @@ def rows_of_cluster(
                 if lost is None:
                     yield job, future.result()
                 else:
-                    yield job, failed(job, f"the cluster gave up: {type(lost).__name__}: {lost}")
+                    yield job, failed(job, f"the cluster failed: {type(lost).__name__}: {lost}")
         finally:
             client.cancel(list(futures))
 
 
 def _require_scheduler(address: str) -> None:
-    """Raise an error if no scheduler answers at an address; a client would go on trying, and fail again at the end."""
+    """Raise an error if no scheduler answers at an address; a client would keep trying, and fail again when closed."""
     import asyncio
 
     from distributed.comm import connect
 
-    async def knock() -> None:
-        comm = await connect(address, timeout=PATIENCE)
+    async def request() -> None:
+        comm = await connect(address, timeout=ANSWER_SECONDS)
         try:
             await comm.write({"op": "identity", "reply": True})
             await comm.read()
         finally:
             comm.abort()
 
-    asyncio.run(asyncio.wait_for(knock(), PATIENCE))
+    asyncio.run(asyncio.wait_for(request(), ANSWER_SECONDS))

@@ -1,4 +1,4 @@
-"""Running a batch: what is done is written down, a line per mesh, and made into a summary."""
+"""Running a batch: a journal records each mesh that is done, and a summary is written at the end."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from ...errors import MeshFileError, OptionError
 from ...io import atomic_write, check_target, make_folder
 from .jobs import COLUMNS, Job
 
-#: Called with the row of each mesh that has been worked on, how many there are so far, and how many there will be.
+#: Function that is called with the row of each completed mesh, the number completed so far, and the total number.
 Listener = Callable[[dict[str, Any], int, int], None]
 
 
 @dataclass(frozen=True)
 class BatchSummary:
-    """What came of a batch.
+    """The results of a batch.
 
     Attributes:
         rows: one per mesh, in the order of the jobs.
-        skipped: meshes that were done before.
-        notes: what is to be said of the batch as a whole, one sentence each.
+        skipped: number of meshes that were done in an earlier run.
+        notes: notes on the batch as a whole, one sentence each.
     """
 
     rows: tuple[dict[str, Any], ...]
@@ -36,7 +36,7 @@ class BatchSummary:
 
     @property
     def failed(self) -> int:
-        """The number of meshes without a result."""
+        """Return the number of meshes without a result."""
         return sum(row["status"] != "done" for row in self.rows)
 
 
@@ -51,27 +51,27 @@ def run_batch(
     summary: Path | None = None,
     listener: Listener | None = None,
 ) -> BatchSummary:
-    """Flatten many meshes; those that fail do not stop the rest.
+    """Flatten many meshes and return a summary; a mesh that fails does not stop the others.
 
-    A journal in the folder remembers each mesh as soon as it is done, so a batch that was cut off, or that has new
-    meshes or options, goes on from there. The summary is written in any case.
+    A journal in the folder records each mesh as soon as it is done. A batch that was interrupted, or that has new
+    meshes or options, continues from there. The summary is written in any case.
 
     Args:
-        jobs: see `find_jobs`.
-        folder: of the results.
-        processes: on this machine; None: as many as there are cores.
-        limit: seconds per mesh, after which it has failed; None, or infinity, for none.
-        dask: address of a Dask scheduler, to work on its cluster instead; its workers must see the same files.
-        redo: work on meshes that are done, too.
-        summary: a .csv file; None: summary.csv in the folder.
-        listener: called as results come in.
+        jobs: the meshes, see `find_jobs`.
+        folder: folder of the results.
+        processes: number of processes on this machine; None for the number of cores.
+        limit: time limit per mesh in seconds; None or infinity for no limit.
+        dask: address of a Dask scheduler, to use its cluster instead; its workers must have access to the same files.
+        redo: also flatten meshes that are done.
+        summary: path of a .csv file; None for summary.csv in the folder.
+        listener: called with each result.
 
     Raises:
-        OptionError: an argument makes no sense.
-        MeshFileError: something cannot be written.
+        OptionError: an argument is not valid.
+        MeshFileError: a file cannot be read or written.
     """
     if processes is not None and processes < 1:
-        raise OptionError(f"there must be at least one process, not {processes}")
+        raise OptionError(f"expected at least one process, got {processes}")
     if limit is not None and not limit > 0:
         raise OptionError(f"the time limit must be positive, not {limit:g} s")
     if limit is not None and limit > threading.TIMEOUT_MAX:
@@ -109,16 +109,16 @@ def _rows(
 
 
 HEADINGS = ("mesh", "status", "error", "output", "seconds", *COLUMNS, "notes")
-# What every row says.
+# Keys that every row must have.
 NEEDED = ("mesh", "output", "status")
 
 
 class Journal:
-    """The file in the results' folder that a further run starts from.
+    """The file in the folder of the results from which a further run continues.
 
     Attributes:
         rows: the last row of each result.
-        broken: the number of lines that are not rows, such as the last one of a run that was cut off.
+        broken: number of lines that are not valid rows, such as the last line of an interrupted run.
 
     Raises:
         MeshFileError: the file cannot be read or written.
@@ -144,7 +144,7 @@ class Journal:
         return expected[2] is not None and (row.get("mark"), row.get("status"), row.get("size")) == expected
 
     def add(self, job: Job, row: Mapping[str, Any]) -> None:
-        """Write a row down, before anything else is done."""
+        """Append a row to the file immediately."""
         row = {**row, "mark": job.mark, "size": _size(job.output)}
         self.rows[job.output] = row
         try:
@@ -161,7 +161,7 @@ def _size(path: str) -> int | None:
 
 
 def _row(line: bytes) -> dict[str, Any] | None:
-    """Return the row of a line; None for one that is broken."""
+    """Return the row in a line of the journal; None if it is not valid."""
     try:
         row = json.loads(line)
     except (ValueError, RecursionError):
@@ -170,19 +170,19 @@ def _row(line: bytes) -> dict[str, Any] | None:
 
 
 def check_summary(path: Path) -> None:
-    """Raise an error if a summary cannot be written.
+    """Raise an error if the summary cannot be written.
 
     Raises:
-        OptionError: it cannot have this ending.
+        OptionError: the file does not end in .csv.
         MeshFileError: its folder is missing, or writing is not permitted.
     """
     if path.suffix.lower() != ".csv":
-        raise OptionError(f"a summary is a .csv file, not {path.name}")
+        raise OptionError(f"the summary must be a .csv file, not {path.name}")
     check_target(path)
 
 
 def write_summary(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Write a table with a row per mesh as CSV."""
+    """Write a CSV table with one row per mesh."""
     rows = [
         {name: printable(each) if isinstance(each, str) else each for name, each in row.items()}
         for row in rows

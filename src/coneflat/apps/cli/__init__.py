@@ -1,1 +1,1 @@
-"""The command line: one file per command."""
+"""The `coneflat` command, with one module per subcommand."""

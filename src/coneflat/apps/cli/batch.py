@@ -14,13 +14,13 @@ from ...base import plural, printable
 from ...options import FORMATS, Options, read_options
 from .options import (
     check_combinations,
-    chosen,
     flag,
-    flag_of,
+    flag_name,
     keywords,
     option_flags,
     paper_option,
     path_flag,
+    pop_flags,
 )
 from .shared import GroupedCommand, input_options, require_option, verbosity_options
 
@@ -30,13 +30,13 @@ class BatchFlags:
     """Output.
 
     Attributes:
-        out: Folder for the results, the journal and the summary; it is made if need be.
-        format: What to write.
-        summary: A .csv file.  [default: summary.csv in --out]
-        jobs: Processes on this machine.  [default: as many as there are cores]
-        time_limit: Seconds per mesh, after which it has failed.
-        dask: Work on the cluster of this Dask scheduler, tcp://host:8786 say.
-        redo: Flatten again what is done.
+        out: Folder for the results, the journal and the summary; created if it does not exist.
+        format: File format of the results.
+        summary: File for the summary table, .csv.  [default: summary.csv in --out]
+        jobs: Number of processes on this machine.  [default: the number of cores]
+        time_limit: Time limit per mesh in seconds.
+        dask: Address of a Dask scheduler whose cluster is used, for example tcp://host:8786.
+        redo: Also flatten meshes that are done.
     """
 
     out: Path = path_flag(required=True)
@@ -66,9 +66,9 @@ def batch(
     verbosity: str | None,
     **given: Any,
 ) -> None:
-    """Flatten all meshes that the patterns name: files, folders, or *, ? and ** in quotes.
+    """Flatten all meshes that match the patterns: files, folders, or names with *, ? and ** in quotes.
 
-    A mesh that fails does not stop the rest; a further run goes on with what is not done.
+    A mesh that fails does not stop the others. A further run continues with the meshes that are not done.
 
     \b
     Examples:
@@ -82,23 +82,23 @@ def batch(
     from .run import Console
 
     check_combinations(context)
-    flags = chosen(given, BatchFlags)
+    flags = pop_flags(given, BatchFlags)
     if flags.jobs is not None and flags.dask is not None:
-        raise click.UsageError("the cluster has its own processes: leave out --jobs", context)
+        raise click.UsageError("--jobs has no effect with --dask: leave out --jobs", context)
     options = keywords(given)
     _refuse_vertices(context, options)
     parse_requirements(required, REPORTED)
-    read_options(options)  # Says what makes no sense before the work.
+    read_options(options)  # Options are checked before the work starts.
     todo = find_jobs(patterns, flags.out.absolute(), f".{flags.format}", options, weld, required)
     make_folder(flags.out)
     rows = []
     with Console(verbosity) as console:
 
-        def tell(row: dict[str, Any], done: int, count: int) -> None:
+        def report(row: dict[str, Any], done: int, count: int) -> None:
             rows.append(row)
-            what, *more = _lines(row, console.verbose)
+            first, *more = _lines(row, console.verbose)
             console.say(
-                [f"{done:>{len(str(count))}}/{count}  {printable(Path(row['mesh']).name)}  {what}", *more]
+                [f"{done:>{len(str(count))}}/{count}  {printable(Path(row['mesh']).name)}  {first}", *more]
             )
             console.progress(f"{done} of {plural(count, 'mesh', 'meshes')}", done / count)
 
@@ -112,7 +112,7 @@ def batch(
             dask=flags.dask,
             redo=flags.redo,
             summary=flags.summary,
-            listener=tell,
+            listener=report,
         )
         before = f", {found.skipped:,} of them before" if found.skipped else ""
         failed = f"; {found.failed:,} failed" if found.failed else ""
@@ -125,7 +125,7 @@ def batch(
 
 
 def _lines(row: dict[str, Any], verbose: bool) -> Iterator[str]:
-    """Yield what became of a mesh; if verbose, also where the result is, and the notes on it."""
+    """Yield the lines on a mesh: its measures or error; if verbose, also the path of the result and the notes."""
     if row["status"] != "done":
         yield f"failed: {printable(row['error'])}"
         return
@@ -137,7 +137,7 @@ def _lines(row: dict[str, Any], verbose: bool) -> Iterator[str]:
 
 
 def _slowest(rows: Sequence[dict[str, Any]], elapsed: float) -> Iterator[str]:
-    """Yield where the time went, if anything was done."""
+    """Yield a line with the time of the batch and of the slowest meshes, if any was flattened."""
     took = sorted(((row["seconds"] or 0.0, printable(Path(row["mesh"]).name)) for row in rows), reverse=True)
     if took:
         longest = ", ".join(f"{name} {seconds:.1f}" for seconds, name in took[:3])
@@ -145,13 +145,13 @@ def _slowest(rows: Sequence[dict[str, Any]], elapsed: float) -> Iterator[str]:
 
 
 def _refuse_vertices(context: click.Context, options: dict[str, Any]) -> None:
-    """Refuse what names the vertices of one mesh."""
+    """Raise an error if an option refers to the vertices of one mesh."""
     for name, what in (
-        ("cones", "vertices that are cones fit one mesh"),
-        ("boundary", "corners fit one mesh"),
-        ("seams", "a file of seams fits one mesh: say input"),
-        ("weights", "a file of weights fits one mesh: name a property, or color"),
-        ("seam_weights", "a file of weights fits one mesh: name a property"),
+        ("cones", "a list of vertices fits one mesh only"),
+        ("boundary", "a list of corners fits one mesh only"),
+        ("seams", "a file of seams fits one mesh only: write input"),
+        ("weights", "a file of weights fits one mesh only: give the name of a property, or color"),
+        ("seam_weights", "a file of weights fits one mesh only: give the name of a property"),
     ):
         if not isinstance(options.get(name, ""), str):
-            raise click.UsageError(f"{what}, in {flag_of(name)}", context)
+            raise click.UsageError(f"{flag_name(name)}: {what}", context)

@@ -12,7 +12,7 @@ import click
 
 from ...base import DISTORTION, MOST_CONES, plural
 from ...options import FindOptions
-from .options import chosen, flag, is_given, keywords, option_flags, path_flag
+from .options import flag, is_given, keywords, option_flags, path_flag, pop_flags
 from .shared import GroupedCommand, input_options, verbosity_options
 
 if TYPE_CHECKING:
@@ -25,10 +25,10 @@ class ConeFlags:
     """Output.
 
     Attributes:
-        output: File to write the cones to, VERTEX CURVATURE on each line, for flatten --cones.
-        curve: A table and a picture of the area distortion against the number of cones.
-        most: With --curve: the largest number of cones.
-        picture: With --curve: the picture to write.  [default: MESH's name with _cones, as .png]
+        output: File for the cones, one line VERTEX CURVATURE for each, which flatten --cones reads.
+        curve: Print a table, and draw a picture, of the area distortion against the number of cones.
+        most: Largest number of cones of the curve.
+        picture: File for the picture of the curve.  [default: MESH's name with _cones, as .png]
     """
 
     output: Path | None = path_flag()
@@ -37,7 +37,7 @@ class ConeFlags:
     picture: Path | None = path_flag()
 
 
-@click.command(cls=GroupedCommand, short_help="Find cones, or show what how many of them gain.")
+@click.command(cls=GroupedCommand, short_help="Find cones, or show the distortion for each number of cones.")
 @click.argument("mesh", type=click.Path(path_type=Path))
 @option_flags(FindOptions)
 @option_flags(ConeFlags)
@@ -47,7 +47,7 @@ class ConeFlags:
 def cones(
     context: click.Context, /, mesh: Path, weld: bool | None, verbosity: str | None, **given: Any
 ) -> None:
-    """Find the cones of MESH's largest component, without flattening it.
+    """Find the cones of the largest component of MESH, without flattening it.
 
     \b
     Examples:
@@ -59,14 +59,14 @@ def cones(
     from ..view import check_figure, make_figure, new_figure, save_figure
     from .run import FLATTENED, READ, Console
 
-    flags, options = chosen(given, ConeFlags), keywords(given, FindOptions)
+    flags, options = pop_flags(given, ConeFlags), keywords(given, FindOptions)
     picture = None
     if flags.curve:
-        new_figure(1, 1)  # says what is missing before the work
+        new_figure(1, 1)  # A missing package is reported before the work starts.
         picture = check_figure(flags.picture or Path(f"{mesh.stem}_cones.png"))
     for name in () if flags.curve else ("picture", "most"):
         if is_given(context, name):
-            raise click.UsageError(f"only --curve takes --{name}: add it, or leave out --{name}", context)
+            raise click.UsageError(f"--{name} is for --curve only: add it, or leave out --{name}", context)
     if flags.output is not None:
         check_target(flags.output)
     with Console(verbosity) as console:
@@ -106,9 +106,12 @@ def _curve_lines(curve: ConeCurve, wanted: float) -> Iterator[str]:
 
 
 def _cone_lines(cones: FoundCones, allowed: float | None) -> Iterator[str]:
-    """Yield a line for each cone; allowed: the distortion that was to be reached, if one was."""
+    """Yield a line for each cone, and the distortion.
+
+    allowed: largest area distortion allowed; None if the number of cones was given.
+    """
     for vertex, curvature in zip(cones.vertices, cones.curvatures, strict=True):
         yield f"vertex {vertex:8d}  curvature {curvature / math.pi:+.4f} pi"
     yield f"{plural(len(cones.vertices), 'cone')}, area distortion {cones.distortion:.4f}"
     if allowed is not None and cones.distortion > allowed * (1 + 1e-9):
-        yield f"note: above the {allowed:g} allowed: no better was found within the bounds given"
+        yield f"note: the area distortion is above {allowed:g}: no better cones were found within the bounds"

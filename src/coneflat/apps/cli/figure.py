@@ -10,8 +10,8 @@ import click
 
 from ...errors import OptionError
 from ..quads.options import QUADS
-from .options import chosen, eye_of, flag, flag_of, is_given, option_flags, path_flag
-from .shared import again_option, checking, color_option, input_options, up_option, verbosity_options
+from .options import flag, flag_name, is_given, option_flags, parse_eye, path_flag, pop_flags
+from .shared import again_option, color_option, input_options, repair_keywords, up_option, verbosity_options
 
 if TYPE_CHECKING:
     from ... import QuadMesh
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 KINDS = ("layout", "checker", "quality", "cones", "curvature", "color", "curve", "quads")
 
 _VIEWS = ("checker", "quality", "color", "cones", "curvature")
-#: The kinds that an option means something for.
-_TAKEN_BY = {
+#: The kinds of figures on which an option has an effect.
+_KINDS_OF_OPTION = {
     "eye": (*_VIEWS, "quads"),
     "up": (*_VIEWS, "quads"),
     "colors": ("quality", "color", "curvature"),
@@ -40,24 +40,25 @@ class FigureFlags:
 
     Attributes:
         kind: layout: the charts in the unit square.  checker: the model with a checkerboard.  quality: distortion of
-            angles and scale.  color: numbers of your own.  cones: cones and seams on the model.  curvature: before and
-            after.  curve: distortion against the number of cones.  quads: the model made into quads.
+            angles and scale.  color: your own values, given by --color.  cones: cones and seams on the model.
+            curvature: the curvature before and after flattening.  curve: area distortion against the number of cones.
+            quads: the model as quads.
         output: File to write: .png, .svg or .pdf.  [default: MESH's name with _KIND, as .png]
-        eye: Where to look from: front, back, left, right, top, bottom, two of them for three quarters, or a direction
-            X,Y,Z; repeat for several views.  [default: front-right]
-        size: Inches.  [default: what it needs]
-        dpi: Dots per inch of pictures.
-        colors: Of quality, color and curvature: a colour map of matplotlib.
-        cells: Of the checkerboard: so many in a row as long as the root of the area.
-        color_charts: Of the layout: a colour for each chart.
-        most: Of the curve: the largest number of cones.
-        quads: Of quads: about how many.
-        title: A line above all.
+        eye: Direction from which the model is seen: front, back, left, right, top, bottom, two of these for a
+            three-quarter view, or a vector X,Y,Z; repeat for several views.  [default: front-right]
+        size: Size in inches.  [default: depends on the content]
+        dpi: Resolution in dots per inch.
+        colors: Colour map of matplotlib, for quality, color and curvature.
+        cells: Number of checkerboard squares along the square root of the surface area.
+        color_charts: Give each chart of the layout its own colour.
+        most: Largest number of cones of the curve.
+        quads: Approximate number of quads.
+        title: Title above the figure.
     """
 
     kind: str = flag("layout", type=click.Choice(KINDS))
     output: Path | None = path_flag()
-    eye: tuple[Any, ...] = flag((), type=eye_of, metavar="EYE", multiple=True)
+    eye: tuple[Any, ...] = flag((), type=parse_eye, metavar="EYE", multiple=True)
     size: tuple[float, float] | None = flag(type=float, nargs=2, metavar="WIDTH HEIGHT")
     dpi: float = flag(300.0, type=float)
     colors: str | None = flag(metavar="NAME")
@@ -89,7 +90,9 @@ def figure(
     verbosity: str | None,
     **given: Any,
 ) -> None:
-    """Draw MESH for print: the UVs that it has, or those of a result (.npz); without any it is flattened first.
+    """Draw a figure of MESH and its UVs for print.
+
+    MESH is a mesh or a result (.npz). A mesh without UVs is flattened first.
 
     \b
     Examples:
@@ -101,14 +104,14 @@ def figure(
     """
     from ... import cone_curve
     from ..view import Look, check_figure, make_figure, new_figure, own_quantity, save_figure
-    from .run import FLATTENED, READ, Console, archive_of, open_result
+    from .run import FLATTENED, READ, Console, archive_path, open_result
 
-    flags = chosen(given, FigureFlags)
+    flags = pop_flags(given, FigureFlags)
     kind = "color" if color is not None and not is_given(context, "kind") else flags.kind
     if color is None and kind == "color":
         raise click.UsageError("--kind color needs --color", context)
     _check_combinations(context, kind)
-    # What can fail at the end is looked at before the work.
+    # Errors that writing would raise are reported before the work starts.
     new_figure(1, 1)
     output = check_figure(flags.output or Path(f"{mesh.stem}_{kind}.png"))
     look: dict[str, Any] = {"up": up, "eyes": flags.eye or ("front-right",)}
@@ -124,7 +127,7 @@ def figure(
             console.say(f"note: {note}" for note in notes)
             with console.stage("cones", READ):
                 part = console.part(READ, FLATTENED)
-                shown = cone_curve(surface, most=flags.most, progress=part, **checking(repair))
+                shown = cone_curve(surface, most=flags.most, progress=part, **repair_keywords(repair))
         elif kind == "quads":
             count = flags.quads if is_given(context, "quads") else None
             shown, notes = _quads(mesh, console, count, repair=repair, weld=weld)
@@ -132,7 +135,7 @@ def figure(
         else:
             shown = open_result(mesh, console, again=again, repair=repair, weld=weld)
             if color is not None:
-                look["own"] = own_quantity(shown, color, archive_of(mesh))
+                look["own"] = own_quantity(shown, color, archive_path(mesh))
             console.say(f"note: {note}" for note in shown.notes)
         with console.stage("draw", FLATTENED):
             save_figure(make_figure(shown, kind, **look), output)
@@ -140,7 +143,7 @@ def figure(
 
 
 def _surface(file: Path, weld: bool | None) -> tuple[Any, tuple[str, ...]]:
-    """Return what a search for cones takes, a mesh file as it is, of a result its mesh; and notes on reading it."""
+    """Return the mesh of a mesh file or a result, and the notes on reading it."""
     from ... import read_flattening
     from ...io import read_joined
 
@@ -154,7 +157,7 @@ def _surface(file: Path, weld: bool | None) -> tuple[Any, tuple[str, ...]]:
 def _quads(
     file: Path, console: Console, count: int | None, *, repair: bool, weld: bool | None
 ) -> tuple[QuadMesh, tuple[str, ...]]:
-    """Return the quads that a .npz file holds, or those of a mesh; and notes on them."""
+    """Return the quads in a .npz file, or those computed from a mesh, and the notes on them."""
     from ... import quads
     from ...io import read_joined
     from ..quads.files import read_quads
@@ -163,21 +166,21 @@ def _quads(
     with console.stage("read", 0.0):
         if file.suffix.lower() == ".npz":
             if count is not None:
-                raise OptionError(f"{file} holds quads: leave out --quads")
+                raise OptionError(f"{file} contains quads already: leave out --quads")
             found = read_quads(file)
             return found, found.notes
         joined = read_joined(file, weld)
-    found = quads(joined.mesh, quads=count, progress=console.part(READ, FLATTENED), **checking(repair))
+    found = quads(joined.mesh, quads=count, progress=console.part(READ, FLATTENED), **repair_keywords(repair))
     console.seconds.update(found.seconds)
     return found, joined.notes_of(found.notes)
 
 
 def _check_combinations(context: click.Context, kind: str) -> None:
-    """Refuse options that would have no effect."""
-    for name, kinds in _TAKEN_BY.items():
+    """Raise an error if an option would have no effect."""
+    for name, kinds in _KINDS_OF_OPTION.items():
         if kind not in kinds and is_given(context, name):
             raise click.UsageError(
-                f"--kind {kind} takes no {flag_of(name)}: only {', '.join(kinds)} do", context
+                f"{flag_name(name)} has no effect with --kind {kind}, only with {', '.join(kinds)}", context
             )
 
 
@@ -188,17 +191,17 @@ def _check_combinations(context: click.Context, kind: str) -> None:
     type=click.Path(path_type=Path),
     default=Path("coneflat-demo"),
     show_default=True,
-    help="Folder to write to; made if it is missing.",
+    help="Folder for the files; created if it does not exist.",
 )
 @verbosity_options
 def demo(output: Path, verbosity: str | None) -> None:
-    """Flatten the sample that comes with coneflat; write the textured mesh, its report and a picture."""
+    """Flatten the sample model of coneflat, and write the textured mesh, its report and a picture."""
     from ... import sample_path
     from ...io import make_folder
     from ..view import demo_figure, new_figure, save_figure
     from .run import FLATTENED, Console, flatten_file, save
 
-    new_figure(1, 1)  # says what is missing before the work
+    new_figure(1, 1)  # A missing package is reported before the work starts.
     make_folder(output)
     mesh, report, picture = (output / f"sample.{ending}" for ending in ("obj", "json", "png"))
     with Console(verbosity) as console:

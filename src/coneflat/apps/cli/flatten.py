@@ -12,14 +12,14 @@ import click
 from ...options import FORMATS, Options, declarations
 from .options import (
     check_combinations,
-    chosen,
     flag,
-    flag_of,
+    flag_name,
     is_given,
     keywords,
     option_flags,
     paper_option,
     path_flag,
+    pop_flags,
 )
 from .shared import GroupedCommand, check_required, input_options, require_option, verbosity_options
 
@@ -33,11 +33,11 @@ class FileFlags:
 
     Attributes:
         output: File to write: .obj, .ply, .glb or .npz; - for standard output.  [default: MESH's name with _uv, as
-            .obj; of standard input -]
-        format: Of standard output, and without -o: what to write.  [default: obj]
-        texture: Of a .glb: the texture that it carries, a checkerboard or an image file.
-        project: In place of MESH and of all that says how it is flattened: a project of `coneflat studio`, .json.
-        report: Write all measures to this JSON file.
+            .obj; - if MESH is -]
+        format: File format for standard output, or if -o is not given.  [default: obj]
+        texture: Texture of a .glb: a checkerboard, or an image file.
+        project: A project of `coneflat studio` (.json), in place of MESH and its options.
+        report: JSON file for all measures.
     """
 
     output: Path | None = path_flag()
@@ -69,7 +69,9 @@ def flatten(
     verbosity: str | None,
     **given: Any,
 ) -> None:
-    """Flatten MESH (.obj, .ply, .stl, .off, .gltf, .glb; - for standard input) and write it with UV coordinates.
+    """Flatten MESH and write it with UV coordinates.
+
+    MESH is a file (.obj, .ply, .stl, .off, .gltf, .glb), or - for standard input.
 
     \b
     Examples:
@@ -83,19 +85,19 @@ def flatten(
     """
     if context.args:
         raise click.UsageError(
-            f"flatten takes one mesh, and there are {1 + len(context.args)}: `coneflat batch "
+            f"expected one mesh, got {1 + len(context.args)}: `coneflat batch "
             f"{mesh} {context.args[0]} ... --out FOLDER` flattens many",
             context,
         )
     from ...io import PIPE, check_output, check_target
     from ...measure import REPORTED, parse_requirements
-    from .run import Console, flatten_file, kept_apart, require_distinct, save
+    from .run import Console, flatten_file, redirect_prints, require_distinct, save
 
     requirements = parse_requirements(required, REPORTED)
     check_combinations(context)
-    flags, noted = chosen(given, FileFlags), None
+    flags, add_notes = pop_flags(given, FileFlags), None
     if flags.project is not None:
-        mesh, options, noted = of_project(context, flags.project)
+        mesh, options, add_notes = project_arguments(context, flags.project)
     elif mesh is None:
         raise click.MissingParameter(ctx=context, param_hint="'MESH'", param_type="argument")
     else:
@@ -104,32 +106,32 @@ def flatten(
     named = PIPE if mesh == PIPE else Path(f"{mesh.stem}_uv{ending}")
     output = named if flags.output is None else flags.output
     if flags.format is not None and output.suffix.lower() not in ("", ending):
-        raise click.UsageError(f"{output} is no {ending} file: leave out --format", context)
-    # What can fail at the end is looked at before the work.
+        raise click.UsageError(f"{output} is not a {ending} file: leave out --format", context)
+    # Errors that writing would raise are reported before the work starts.
     check_output(Path(f"stdout{ending}") if output == PIPE else output, flags.texture)
     if flags.report is not None:
         check_target(flags.report)
     require_distinct({"input": mesh, "output": output, "report": flags.report})
-    with kept_apart(output) as stdout, Console(verbosity) as console:
+    with redirect_prints(output) as stdout, Console(verbosity) as console:
         result = flatten_file(mesh, console, options, weld)
-        result = result if noted is None else noted(result)
+        result = result if add_notes is None else add_notes(result)
         result = save(result, console, output, flags.report, flags.texture, stdout, ending)
         written = [path for path in (output, flags.report) if path is not None and path != PIPE]
         console.finish(written, result)
     check_required(requirements, result.report(), str(output))
 
 
-def of_project(
+def project_arguments(
     context: click.Context, project: Path
 ) -> tuple[Path, dict[str, Any], Callable[[Flattening], Flattening]]:
-    """Return the mesh of a project, the keyword arguments of `coneflat.flatten` that it holds, and what notes them."""
-    from ..studio.messages import noted
+    """Return the mesh of a project, its keyword arguments of `coneflat.flatten`, and a function that adds its notes."""
+    from ..studio.messages import with_warnings
     from ..studio.project import read_project
 
     for name in (*declarations(Options), "mesh", "paper", "weld"):
         if name in context.params and is_given(context, name):
-            what = "MESH" if name == "mesh" else flag_of(name)
-            raise click.UsageError(f"a project has its own mesh and options: leave out {what}", context)
+            what = "MESH" if name == "mesh" else flag_name(name)
+            raise click.UsageError(f"a project contains mesh and options: leave out {what}", context)
     opened = read_project(project)
     opened.check_mesh()
-    return opened.mesh, opened.choices.keywords(), lambda result: noted(result, opened.choices)
+    return opened.mesh, opened.choices.keywords(), lambda result: with_warnings(result, opened.choices)

@@ -1,4 +1,4 @@
-"""The `coneflat` command: its subcommands, and what becomes of errors."""
+"""The `coneflat` command: its subcommands, and the handling of errors and signals."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ INTERNAL_ERROR = 1
 SIGNALLED = 128
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="coneflat")
 def cli() -> None:
-    """Flatten triangle meshes into the plane, conformally and by themselves."""
+    """Flatten triangle meshes into the plane: conformal UV maps with automatic cones and seams."""
 
 
 for command in (flatten, batch, quads, measure, cones, figure, view, studio, compare, paper, demo):
@@ -38,15 +38,16 @@ for command in (flatten, batch, quads, measure, cones, figure, view, studio, com
 
 
 def main() -> NoReturn:
-    """Run the command; every failure is one line on stderr and a nonzero exit code."""
+    """Run the command; every failure prints one line to stderr and gives a nonzero exit code."""
     _open_streams()
     for name in ("SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)  # Windows has no SIGHUP.
         if number is not None and signal.getsignal(number) == signal.SIG_DFL:
             signal.signal(number, _interrupt)
-    # Imports make half a million objects and no garbage: looking for it at every 700th is a tenth of a short run.
+    # Imports allocate half a million objects and no garbage. Garbage collection after every 700 objects, the
+    # default, takes a tenth of the time of a short run.
     gc.set_threshold(100_000, 50, 50)
-    # Starting threads that are never to be used takes OpenBLAS, of which numpy and SciPy have one each, as long.
+    # numpy and SciPy have an OpenBLAS each, which takes as long to start threads that are never used.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         code = cli.main(standalone_mode=False)
@@ -60,11 +61,11 @@ def main() -> NoReturn:
     except (KeyboardInterrupt, click.exceptions.Abort) as error:
         code = _fail_interrupted(error)
     except BrokenPipeError:
-        # The reader of our output is gone, as in `coneflat ... | head`; keep the shutdown quiet, too.
+        # The reader of the output has ended, as in `coneflat ... | head`. The shutdown must not print an error.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = INTERNAL_ERROR
     except OSError as error:
-        # Files are read and written under errors of our own; what is left is the terminal or pipe.
+        # Errors of files are raised as ConeflatError, so this one is from the terminal or a pipe.
         code = _fail(f"cannot print: {error.strerror or error}", INTERNAL_ERROR)
     except MemoryError:
         code = _fail("not enough memory for this mesh", INTERNAL_ERROR)
@@ -80,7 +81,7 @@ def main() -> NoReturn:
                 "(CONEFLAT_DEBUG=1 shows where)",
                 INTERNAL_ERROR,
             )
-    # At its end, Python would look for garbage among all objects, three times: a tenth of a short run.
+    # At exit, Python collects garbage among all objects three times: a tenth of the time of a short run.
     gc.freeze()
     sys.exit(code if isinstance(code, int) else 0)
 

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from ...measure import Row
 
 
-@click.command(short_help="Measure the UVs that a file has, of any tool.")
+@click.command(short_help="Measure the UVs of a file, made by any tool.")
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--report", type=click.Path(path_type=Path), help="Write all measures to this JSON file.")
+@click.option("--report", type=click.Path(path_type=Path), help="JSON file for all measures.")
 @click.option("--json", "as_json", is_flag=True, help="Print all measures as JSON instead of a table.")
 @require_option
 @input_options
@@ -31,7 +31,7 @@ def measure(
     weld: bool | None,
     verbosity: str | None,
 ) -> None:
-    """Measure the UVs of FILE: a mesh with UVs (.obj, .ply, .gltf, .glb), whatever wrote it, or a result (.npz).
+    """Measure the UVs of FILE: a mesh with UVs (.obj, .ply, .gltf, .glb) of any program, or a result (.npz).
 
     \b
     Examples:
@@ -66,7 +66,7 @@ def measure(
 
 
 def rows_of_measures(measured: UVMeasures) -> list[Row]:
-    """Return the rows of the table of measures of UVs."""
+    """Return the rows (name, value, meaning) of the table of measures of UVs."""
     from ...measure import map_rows, number_text, packing_row
     from .run import FIRST_ROWS
 
@@ -76,15 +76,15 @@ def rows_of_measures(measured: UVMeasures) -> list[Row]:
         missing = f"; {counts['triangles_without_uv']:,} without UVs"
     tiles = "" if counts["tiles"] == 1 else f" of {counts['tiles']:,} unit squares with charts"
     return [
-        ("triangles", f"{counts['triangles']:,}", f"of {counts['polygons']:,} polygons, as fans{missing}"),
+        ("triangles", f"{counts['triangles']:,}", f"of {counts['polygons']:,} polygons as fans{missing}"),
         *(of_map.pop(name) for name in FIRST_ROWS if name in of_map),
         *(of_map.pop(name) for name in ("area distortion", "degenerate")),
         packing_row(counts["packing_efficiency"], tiles),
-        ("outside", f"{counts['outside']:,}", "triangles that reach out of the unit square"),
+        ("outside", f"{counts['outside']:,}", "triangles that are not inside the unit square"),
         *of_map.values(),
         (
             "angle error",
             number_text(counts["angle_sum_error"], ".1e"),
-            "radians missing around points inside charts, the most",
+            "largest angle error around a point inside a chart, radians",
         ),
     ]

@@ -1,4 +1,4 @@
-"""The commands' flags, made from the declarations of the options."""
+"""The options of the commands, created from the declarations of the options."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from ... import options as declared
 from ...errors import OptionError
 from ...options import ConeOptions, Declaration, Kind, MetricOptions, Number, Options, declarations, option
 from . import values
-from .shared import Grouped, checking
+from .shared import RARE, RARE_TITLE, Grouped, repair_keywords
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 G = TypeVar("G")
 
-#: Options that `shared.input_options` adds.
-OF_INPUT = ("repair", "strict")
-#: Other spellings of flags.
+#: Names of the options that `shared.input_options` adds.
+INPUT_NAMES = ("repair", "strict")
+#: Further spellings of options.
 SPELLINGS = {"quantise": ("--quantize",), "quads": ("--faces",), "output": ("-o",)}
 
 paper_option = click.option(
@@ -31,33 +31,33 @@ paper_option = click.option(
     cls=Grouped,
     group="Metric",
     is_flag=True,
-    help="The method exactly as published (Ben-Chen et al. 2008), one chart per component.",
+    help="Use the method exactly as published (Ben-Chen et al. 2008), with one chart per component.",
 )
 
 
 @dataclass(frozen=True)
-class As(Kind):
-    """What click makes of a text.
+class ClickKind(Kind):
+    """The kind of an option of a command that click converts from text.
 
     Attributes:
-        more: arguments of `click.option`.
+        more: further arguments of `click.option`.
     """
 
     more: Mapping[str, Any]
 
 
 def flag(default: Any = None, **more: Any) -> Any:
-    """Return a field of a group that a command alone has; more: arguments of `click.option`."""
-    return option(default, As(more))
+    """Return a field of an option that only a command has; more: arguments of `click.option`."""
+    return option(default, ClickKind(more))
 
 
 def path_flag(default: Path | None = None, **more: Any) -> Any:
-    """Return a field of such a group that is a path."""
+    """Return a field of an option that only a command has and that is a path."""
     return flag(default, type=click.Path(path_type=Path), **more)
 
 
 def _angle(value: Any) -> float:
-    """Return radians from 1.57, pi/2, 0.1pi, 90deg or inf."""
+    """Return an angle in radians from 1.57, pi/2, 0.1pi, 90deg or inf."""
     try:
         return math.inf if value.strip().lower() == "inf" else values.parse_angle(value)
     except OptionError as error:
@@ -65,15 +65,15 @@ def _angle(value: Any) -> float:
 
 
 def _strength(value: Any) -> float:
-    """Return a number."""
+    """Return the strength as a number."""
     try:
         return float(value)
     except ValueError as error:
-        raise click.BadParameter(f"{value!r} is not a strength: write a number after it, 1 say") from error
+        raise click.BadParameter(f"{value!r} is not a number; write a strength such as 1") from error
 
 
 def _direction(value: Any) -> tuple[float, float, float]:
-    """Return three coordinates from z, -y or 0,0.5,1."""
+    """Return a (3,) direction from z, -y or 0,0.5,1."""
     text = value.strip().lower()
     axis = "xyz".find(text[-1:])
     if axis >= 0 and text[:-1] in ("", "+", "-"):
@@ -86,25 +86,25 @@ def _direction(value: Any) -> tuple[float, float, float]:
     return (one, two, three)
 
 
-def eye_of(value: Any) -> Any:
-    """Return three numbers from 1,0.5,2, or words such as front-right."""
+def parse_eye(value: Any) -> Any:
+    """Return three numbers from 1,0.5,2; or the text itself if it is words such as front-right."""
     try:
         return tuple(float(number) for number in value.split(",")) if "," in value else value
     except ValueError as error:
         raise click.BadParameter(f"{value!r} is not a direction; write 1,0.5,2 or front-right") from error
 
 
-def flag_of(name: str) -> str:
-    """Return the flag of an option."""
+def flag_name(name: str) -> str:
+    """Return the flag of an option, such as "--max-cones" of "max_cones"."""
     return "--" + name.replace("_", "-")
 
 
 def option_flags(group: type, *, one_mesh: bool = True) -> Callable[[Command], Command]:
-    """Return a decorator that adds the flags of a group of options to a command.
+    """Return a decorator that adds a group of options to a command.
 
-    one_mesh: also those that name vertices of one mesh.
+    one_mesh: also add options that refer to vertices of one mesh.
     """
-    added = [each for each in declarations(group).values() if each.flag and each.name not in OF_INPUT]
+    added = [each for each in declarations(group).values() if each.flag and each.name not in INPUT_NAMES]
 
     def decorate(command: Command) -> Command:
         for each in reversed(added):
@@ -115,18 +115,18 @@ def option_flags(group: type, *, one_mesh: bool = True) -> Callable[[Command], C
 
 
 def _may_fit_any_mesh(declaration: Declaration) -> bool:
-    """Whether an option has values that make sense for several meshes: words do, vertices do not."""
+    """Return whether an option has values that apply to several meshes: words do, vertices do not."""
     return not declaration.one_mesh or bool(getattr(declaration.kind, "words", ()))
 
 
 def _flag(declaration: Declaration) -> Callable[[Command], Command]:
-    """Return what adds one flag; its value is None, or an empty tuple, where it is not given."""
+    """Return a decorator that adds one option; its value is None, or an empty tuple, if it is not given."""
     kind, name = declaration.kind, declaration.name
-    more, spelled, doc = dict[str, Any](), flag_of(name), declaration.doc
+    more, spelled, doc = dict[str, Any](), flag_name(name), declaration.doc
     if declaration.default is True:
         spelled += f"/--no-{spelled[2:]}"
     match kind:
-        case As():
+        case ClickKind():
             more = dict(kind.more)
         case declared.Flag():
             more = {"is_flag": True, "default": None}
@@ -151,14 +151,17 @@ def _flag(declaration: Declaration) -> Callable[[Command], Command]:
             more = {"multiple": True, "metavar": "|".join((*kind.words, "FILE"))}
         case declared.Weights():
             more = {"metavar": "NAME|FILE"}
+    title = declaration.group
+    if name in RARE:
+        title, doc = RARE_TITLE, doc.split(". ")[0].rstrip(".") + "."
     shown = shown_default(declaration)
     doc += f"  [default: {shown}]" if shown else ""
     names = (spelled, *SPELLINGS.get(name, ()), name)
-    return click.option(*names, cls=Grouped, group=declaration.group, help=doc, **more)
+    return click.option(*names, cls=Grouped, group=title, help=doc, **more)
 
 
 def shown_default(declaration: Declaration) -> str:
-    """Return an option's default as tables show it; "" where it stands for none."""
+    """Return the default of an option as a text; "" if there is none."""
     value = declaration.default
     if value is None or value is False or value == ():
         return ""
@@ -171,33 +174,33 @@ def shown_default(declaration: Declaration) -> str:
 
 
 def keywords(params: Mapping[str, Any], group: type = Options) -> dict[str, Any]:
-    """Return the keyword arguments of `coneflat.flatten` that a command line gives, with what `--repair` means.
+    """Return the keyword arguments of `coneflat.flatten` for the parameters of a command.
 
     Args:
-        params: the command's.
-        group: the options that it has.
+        params: the parameters of the command, among them "repair".
+        group: the group of options to read.
 
     Raises:
-        OptionError: vertices or weights are not what they should be.
+        OptionError: a value cannot be parsed.
         MeshFileError: a file of them cannot be read.
     """
     given = dict(PAPER) if params.get("paper") else {}
     for name, declaration in declarations(group).items():
         value = params.get(name)
-        if name not in OF_INPUT and value is not None and value != ():
+        if name not in INPUT_NAMES and value is not None and value != ():
             given[name] = _value(declaration, value)
-    return {**given, **checking(params["repair"])}
+    return {**given, **repair_keywords(params["repair"])}
 
 
-def chosen(params: dict[str, Any], group: type[G]) -> G:
-    """Return a group of a command's own flags, which are taken out of its parameters."""
+def pop_flags(params: dict[str, Any], group: type[G]) -> G:
+    """Remove the options of a group from the parameters of a command, and return the group."""
     given = {name: params.pop(name) for name in declarations(cast(type, group))}
     return group(**{name: value for name, value in given.items() if value is not None and value != ()})
 
 
 def _value(declaration: Declaration, value: Any) -> Any:
-    """Return what a flag's texts mean."""
-    kind, flag = declaration.kind, flag_of(declaration.name)
+    """Return the value that the texts of an option stand for."""
+    kind, flag = declaration.kind, flag_name(declaration.name)
     match kind:
         case declared.Vertices():
             return tuple(dict.fromkeys(v for text in value for v in values.read_vertices(flag, text)))
@@ -206,7 +209,7 @@ def _value(declaration: Declaration, value: Any) -> Any:
         case declared.WordOrVertices():
             words = [text for text in value if text.replace("-", "").isalpha() and not values.is_file(text)]
             if words and len(value) > 1:
-                raise OptionError(f"{flag} {words[0]} is one choice, and {value[0]}, {value[1]} are two")
+                raise OptionError(f"{flag} takes one choice, got {value[0]} and {value[1]}")
             return words[0] if words else values.read_vertex_map(flag, kind.noun, value)
         case declared.Edges():
             return _edges(flag, kind, value)
@@ -229,7 +232,7 @@ def _edges(flag: str, kind: declared.Edges, texts: Sequence[str]) -> Any:
 
 
 def check_combinations(context: click.Context) -> None:
-    """Refuse options that would have no effect."""
+    """Raise an error if an option would have no effect."""
     params = context.params
     cones = params["cones"][0] if params["cones"] else "auto"
     method = params["method"] or "exact"
@@ -240,23 +243,23 @@ def check_combinations(context: click.Context) -> None:
     given = cones not in declared.CONES
     rules = [
         (params["paper"], of_method, "--paper fixes the method"),
-        (given, search, "with cones given there is nothing to search"),
-        (cones == "none", search, "--cones none searches for none"),
-        (cones == "greedy", only["sparse"], "--cones greedy has no such choice"),
-        (params["cone_count"] is not None, ("distortion", "max_cones"), "the number of cones is given"),
-        (method != "exact", only["exact"], f"--method {method} has no such choice"),
+        (given, search, "there is no search if the cones are given"),
+        (cones == "none", search, "there is no search with --cones none"),
+        (cones == "greedy", only["sparse"], "--cones greedy does not take this option"),
+        (params["cone_count"] is not None, ("distortion", "max_cones"), "--cone-count is given"),
+        (method != "exact", only["exact"], f"--method {method} does not take this option"),
     ]
     refuse(context, rules)
 
 
 def refuse(context: click.Context, rules: Iterable[tuple[Any, Iterable[str], str]]) -> None:
-    """Refuse flags that are given: for each rule that applies, of some names, for a reason."""
+    """Raise an error if an option is given that a rule excludes; rules: (applies, names of options, reason)."""
     for applies, names, reason in rules:
         for name in names if applies else ():
             if is_given(context, name):
-                raise click.UsageError(f"{reason}: leave out {flag_of(name)}", context)
+                raise click.UsageError(f"{reason}: leave out {flag_name(name)}", context)
 
 
 def is_given(context: click.Context, name: str) -> bool:
-    """Whether an option stands at the command line."""
+    """Return whether an option is given on the command line."""
     return context.get_parameter_source(name) is ParameterSource.COMMANDLINE

@@ -10,10 +10,10 @@ import click
 
 from ... import PAPER
 from ...options import FindOptions, declarations
-from .options import chosen, eye_of, flag, is_given, keywords, option_flags, path_flag, refuse
+from .options import flag, is_given, keywords, option_flags, parse_eye, path_flag, pop_flags, refuse
 from .shared import GroupedCommand, input_options, up_option, verbosity_options
 
-#: What `compare` writes.
+#: Files that `compare` writes.
 COMPARED = ("compare.md", "compare.csv", "layouts.png", "quality.png")
 
 
@@ -22,10 +22,11 @@ class SightFlags:
     """Output.
 
     Attributes:
-        eye: Where to look from in pictures: front, back, left, right, top, bottom, two of them, or X,Y,Z.
+        eye: Direction from which pictures show the model: front, back, left, right, top, bottom, two of these, or
+            X,Y,Z.
     """
 
-    eye: Any = flag("front-right", type=eye_of, metavar="EYE")
+    eye: Any = flag("front-right", type=parse_eye, metavar="EYE")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,10 +34,10 @@ class CompareFlags(SightFlags):
     """Output.
 
     Attributes:
-        output: Folder for the table (Markdown and CSV) and the pictures.  [default: the table is printed only]
-        methods: Methods to compare, with commas between.  [default: all without a /]
+        output: Folder for the table (Markdown and CSV) and the pictures.  [default: none; the table is printed]
+        methods: Methods to compare, separated by commas.  [default: all whose name contains no /]
         no_peers: Leave out other packages (libigl, xatlas, uvunwrap).
-        paper: The cones of the published method (greedy, epsilon 1).
+        paper: Use the cones of the published method (greedy, epsilon 1).
     """
 
     output: Path | None = path_flag()
@@ -50,13 +51,13 @@ class PaperFlags(SightFlags):
     """Output.
 
     Attributes:
-        output: Folder for tables (Markdown and CSV) and figures.
+        output: Folder for the tables (Markdown and CSV) and the figures.
     """
 
     output: Path = path_flag(default=Path("paper"))
 
 
-@click.command(cls=GroupedCommand, short_help="Flatten a mesh by all methods, with the same cones and cut.")
+@click.command(cls=GroupedCommand, short_help="Compare all methods on a mesh, with the same cones and cut.")
 @click.argument("mesh", type=click.Path(path_type=Path))
 @option_flags(FindOptions)
 @option_flags(CompareFlags)
@@ -67,7 +68,7 @@ class PaperFlags(SightFlags):
 def compare(
     context: click.Context, /, mesh: Path, up: str, weld: bool | None, verbosity: str | None, **given: Any
 ) -> None:
-    """Flatten MESH by all methods, and by other packages that are installed, and tell how they compare.
+    """Flatten MESH by all methods, and by other packages that are installed, and compare the results.
 
     \b
     Examples:
@@ -80,11 +81,11 @@ def compare(
     from ..peers.run import compare_methods, comparison_csv, comparison_lines, comparison_markdown
     from .run import FLATTENED, READ, Console
 
-    flags = chosen(given, CompareFlags)
-    refuse(context, [(flags.paper, declarations(FindOptions), "--paper says which cones")])
+    flags = pop_flags(given, CompareFlags)
+    refuse(context, [(flags.paper, declarations(FindOptions), "--paper fixes the cones")])
     for name in ("eye", "up") if flags.output is None else ():
         if is_given(context, name):
-            raise click.UsageError(f"pictures need a folder: give -o, or leave out --{name}", context)
+            raise click.UsageError(f"--{name} is for pictures: add -o, or leave out --{name}", context)
     options = {**keywords(given, FindOptions), **(PAPER if flags.paper else {})}
     methods = METHODS if flags.methods is None else tuple(name.strip() for name in flags.methods.split(","))
     if flags.output is not None:
@@ -107,7 +108,7 @@ def compare(
         console.say(f"note: {note}" for note in source.notes())
         if not found.drawn:
             why = "; ".join(f"{entry.method}: {entry.note}" for entry in found.entries)
-            raise MetricError(f"no method came to a layout: {why}")
+            raise MetricError(f"no method found a layout: {why}")
         written: list[Path] = []
         if flags.output is not None:
             with console.stage("draw", FLATTENED):
@@ -124,9 +125,10 @@ def compare(
 @up_option
 @verbosity_options
 def paper(meshes: tuple[Path, ...], up: str, verbosity: str | None, **given: Any) -> None:
-    """Run the experiments of the paper (Section 5) on MESHES, files or folders, its numbers beside ours.
+    """Run the experiments of the paper (Section 5) on MESHES, and print its numbers next to those of coneflat.
 
-    Models are known by their names: fandisk, rocker-arm, foot, gargoyle, elephant, horse, hand, torso, isi-horse.
+    MESHES are files or folders. Models are recognised by their names: fandisk, rocker-arm, foot, gargoyle, elephant,
+    horse, hand, torso, isi-horse.
 
     \b
     Examples:
@@ -139,7 +141,7 @@ def paper(meshes: tuple[Path, ...], up: str, verbosity: str | None, **given: Any
     from ..peers.pictures import Sight, open_folder, write_folder
     from .run import FLATTENED, Console
 
-    flags = chosen(given, PaperFlags)
+    flags = pop_flags(given, PaperFlags)
     sight = Sight(flags.eye, up)
     for mesh in meshes:
         find_meshes(str(mesh))

@@ -12,7 +12,7 @@ import click
 
 from ...options import ConeBounds, ConeNumber, declarations, read_options
 from ..quads.options import QuadOptions
-from .options import chosen, is_given, keywords, option_flags, path_flag, refuse
+from .options import is_given, keywords, option_flags, path_flag, pop_flags, refuse
 from .shared import GroupedCommand, input_options, verbosity_options
 
 if TYPE_CHECKING:
@@ -25,12 +25,12 @@ class QuadFlags:
     """Output.
 
     Attributes:
-        output: File of quads to write: .obj, .ply, .glb or .npz.  [default: MESH's name with _quads, as .obj; none if
-            another file is named]
-        grid: File to write the integer grid to that quads are made of: .obj, with texture coordinates in squares of the
-            grid, or .npz.
-        view: Page to write, .html, that shows the quads, their irregular vertices, and the rectangles that they form.
-        report: Write all measures to this JSON file.
+        output: File for the quads: .obj, .ply, .glb or .npz.  [default: MESH's name with _quads, as .obj; none if
+            --grid or --view is given]
+        grid: File for the integer grid that the quads are extracted from: .obj, with texture coordinates in units of
+            grid squares, or .npz.
+        view: Page (.html) that shows the quads, their irregular vertices, and the rectangles that they form.
+        report: JSON file for all measures.
     """
 
     output: Path | None = path_flag()
@@ -39,7 +39,7 @@ class QuadFlags:
     report: Path | None = path_flag()
 
 
-@click.command(cls=GroupedCommand, short_help="Turn a mesh into quads.")
+@click.command(cls=GroupedCommand, short_help="Convert a mesh to a quad mesh.")
 @click.argument("mesh", type=click.Path(path_type=Path))
 @option_flags(QuadOptions)
 @option_flags(QuadFlags)
@@ -49,9 +49,9 @@ class QuadFlags:
 def quads(
     context: click.Context, /, mesh: Path, weld: bool | None, verbosity: str | None, **given: Any
 ) -> None:
-    """Turn MESH (.obj, .ply, .stl, .off, .gltf, .glb) into quads alone, with few irregular vertices.
+    """Convert MESH to a mesh of quads only, with few irregular vertices.
 
-    MESH may be a grid, too, as --grid writes it to .npz.
+    MESH is a file (.obj, .ply, .stl, .off, .gltf, .glb), or an integer grid (.npz) that --grid has written.
 
     \b
     Examples:
@@ -70,12 +70,12 @@ def quads(
     from .run import FLATTENED, READ, Console, require_distinct, write_report
 
     _check_combinations(context, mesh)
-    flags, options = chosen(given, QuadFlags), keywords(given, QuadOptions)
+    flags, options = pop_flags(given, QuadFlags), keywords(given, QuadOptions)
     read_options(options, QuadOptions)
     output, grid, view = flags.output, flags.grid, flags.view
     if output is None and grid is None and view is None:
         output = Path(f"{mesh.stem}_quads.obj")
-    # What can fail at the end is looked at before the work.
+    # Errors that writing would raise are reported before the work starts.
     files = {"output": output, "grid": grid, "view": view, "report": flags.report}
     checks = (check_quads_output, check_grid_output, check_page, check_target)
     for path, check in zip(files.values(), checks, strict=True):
@@ -84,53 +84,53 @@ def quads(
     require_distinct({"input": mesh, **files})
     rounds = {"smooth": options.pop("smooth")} if "smooth" in options else {}
     with Console(verbosity) as console:
-        whole = _grid_of(mesh, console, options, weld)
+        grid_map = _read_grid(mesh, console, options, weld)
         found = measures = None
         if output is not None or view is not None:
-            found = find_quads(whole, progress=console.part(READ, FLATTENED), **rounds)
+            found = find_quads(grid_map, progress=console.part(READ, FLATTENED), **rounds)
             console.seconds.update(found.seconds)
             with console.stage("measure", FLATTENED):
                 measures = measure_quads(found)
         with console.stage("write", FLATTENED):
             if grid is not None:
-                whole.save(grid)
+                grid_map.save(grid)
             if found is not None and output is not None:
                 found.save(output)
             if found is not None and view is not None:
                 write_page(page_of_quads(found, name=mesh.name), view)
-        told = list((whole if found is None else found).notes)
+        notes = list((grid_map if found is None else found).notes)
         if flags.report is not None:
             measured = {} if measures is None else measures.report()
-            rest = {"grid": whole.report(), "seconds": dict(console.seconds), "notes": told}
+            rest = {"grid": grid_map.report(), "seconds": dict(console.seconds), "notes": notes}
             write_report(flags.report, {**measured, **rest})
-        console.say(f"note: {note}" for note in told)
+        console.say(f"note: {note}" for note in notes)
         console.finish([path for path in files.values() if path is not None])
-        console.table([*_grid_rows(whole), *(() if measures is None else measures.rows())])
+        console.table([*_grid_rows(grid_map), *(() if measures is None else measures.rows())])
 
 
 def _check_combinations(context: click.Context, mesh: Path) -> None:
-    """Refuse options that would have no effect."""
+    """Raise an error if an option would have no effect."""
     if is_given(context, "quads") and is_given(context, "size"):
-        raise click.UsageError("--quads (--faces) and --size say the same: give one", context)
+        raise click.UsageError("--quads (--faces) and --size exclude each other: leave out one", context)
     searched = [*declarations(ConeBounds), *declarations(ConeNumber), "max_cones"]
     given = context.params["cones"] not in ((), ("auto",))
     refuse(
         context,
         [
-            (is_given(context, "cone_count"), ["distortion", "max_cones"], "the number of cones is given"),
-            (given, searched, "with cones given there is nothing to search"),
+            (is_given(context, "cone_count"), ["distortion", "max_cones"], "--cone-count is given"),
+            (given, searched, "there is no search if the cones are given"),
         ],
     )
     if mesh.suffix.lower() != ".npz":
         return
     for parameter in context.command.params:
-        kept = ("mesh", "output", "grid", "view", "smooth", "report", "verbosity")
-        if parameter.name not in kept and parameter.name is not None and is_given(context, parameter.name):
+        allowed = ("mesh", "output", "grid", "view", "smooth", "report", "verbosity")
+        if parameter.name not in allowed and parameter.name is not None and is_given(context, parameter.name):
             raise click.UsageError(f"{mesh} is a grid: leave out {parameter.opts[0]}", context)
 
 
-def _grid_of(mesh: Path, console: Console, options: dict[str, Any], weld: bool | None) -> IntegerGrid:
-    """Return the grid of a mesh file, with notes on reading it, or the grid that a file holds."""
+def _read_grid(mesh: Path, console: Console, options: dict[str, Any], weld: bool | None) -> IntegerGrid:
+    """Return the integer grid of a mesh file, or the one in a .npz file."""
     from ... import integer_grid
     from ...io import read_joined
     from ..quads.files import read_grid
@@ -146,12 +146,12 @@ def _grid_of(mesh: Path, console: Console, options: dict[str, Any], weld: bool |
 
 
 def _grid_rows(grid: IntegerGrid) -> Iterator[tuple[str, str, str]]:
-    """Yield what is printed of a grid: measure, value, meaning."""
+    """Yield the rows (name, value, meaning) of the table of a grid."""
     moved = f"; rounding moved cones by {grid.move_rms:.2f} squares, {grid.move_max:.2f} at most"
     yield (
         "square",
         f"{grid.size:.4g}",
-        f"its side in model units{moved if math.isfinite(grid.move_rms) else ''}",
+        f"side of a grid square in model units{moved if math.isfinite(grid.move_rms) else ''}",
     )
     if math.isfinite(grid.qc_mean):
         yield (

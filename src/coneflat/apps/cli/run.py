@@ -1,4 +1,4 @@
-"""From a file to a result, and to files, with progress on stderr, and what came out on stdout."""
+"""Reading, flattening and writing for commands, with progress on stderr and a summary on stdout."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ from ...base import Progress as Listener
 from ...base import Stopwatch
 from ...errors import OptionError
 from ...io import PIPE, Joined, as_written, atomic_write, has_uv, read_joined, write_measured, write_stream
-from .shared import QUIET, VERBOSE, checking
+from .shared import QUIET, VERBOSE, repair_keywords
 
 if TYPE_CHECKING:
     from rich.progress import Progress
 
 READ, FLATTENED = 0.03, 0.92
-"""Fractions of the whole that are done when the mesh is read, and when it is flattened, about."""
+"""Approximate fractions of all work that are completed when the mesh has been read, and when it is flattened."""
 
-AGAIN = "--again flattens the mesh anew"
+AGAIN = "--again flattens the mesh again"
 
-PATIENCE = 1.0  # seconds between the plain lines that say what is going on, and before the first of them
-#: What an artist asks first, in this order; the other rows are printed if verbose.
+INTERVAL = 1.0  # Seconds between lines of progress, and before the first one.
+#: The rows that are always printed, in this order; the others are printed if verbose.
 FIRST_ROWS = ("charts", "overlap", "flipped", "texel density", "seam length", "QC distortion", "cones")
 
 
 class Console:
-    """Progress while a command runs, what came out when it is done; nothing if quiet.
+    """Output of a command: progress while it runs and a summary when it is done; nothing if quiet.
 
-    Progress is a bar in a terminal, else a line about every second, also within long steps; what is done, or fails,
-    within the first second says nothing of it. If verbose, it is a line for every step.
+    Progress is a bar in a terminal, otherwise about one line per second, also within long steps, and none within the
+    first second. If verbose, it is one line per step.
 
     Attributes:
         seconds: wall time of each stage.
@@ -54,9 +54,9 @@ class Console:
         self.seconds = self._stages.seconds
         self._start = time.perf_counter()
         self._last_line = 0.0
-        self._now = ("", 0.0)
+        self._current = ("", 0.0)
         self._lock = threading.Lock()
-        self._over = threading.Event()
+        self._is_finished = threading.Event()
         self._bar: Progress | None = None
         if verbosity is None and sys.stderr.isatty():
             self._bar = _bar()
@@ -66,56 +66,56 @@ class Console:
         if self._bar:
             self._bar.start()
         elif not self.quiet and not self.verbose:
-            threading.Thread(target=self._remind, daemon=True).start()
+            threading.Thread(target=self._repeat_progress, daemon=True).start()
         return self
 
     def __exit__(self, *_: object) -> None:
         with self._lock:
-            self._over.set()
+            self._is_finished.set()
         if self._bar:
             self._bar.stop()
 
     @property
     def elapsed(self) -> float:
-        """Seconds since the start."""
+        """Return the seconds since the start."""
         return time.perf_counter() - self._start
 
     def progress(self, stage: str, fraction: float) -> None:
-        """Show what is being done, and the fraction of the whole that is done."""
+        """Show the current stage and the completed fraction of all work."""
         if self._bar:
             self._bar.update(self._task, description=stage, completed=fraction)
             return
         with self._lock:
-            self._now = (stage, fraction)
-            if not self.quiet and (self.verbose or self.elapsed - self._last_line > PATIENCE):
-                self._tell()
+            self._current = (stage, fraction)
+            if not self.quiet and (self.verbose or self.elapsed - self._last_line > INTERVAL):
+                self._print_progress()
 
-    def _tell(self) -> None:
-        stage, fraction = self._now
+    def _print_progress(self) -> None:
+        stage, fraction = self._current
         self._last_line = self.elapsed
         click.echo(f"{self.elapsed:6.1f} s  {fraction:4.0%}  {stage}", err=True)
 
-    def _remind(self) -> None:
-        """Say again what is being done, where nothing has been said for a while."""
-        while not self._over.wait(PATIENCE / 4):
-            with self._lock, suppress(OSError, ValueError):  # Whoever was to read it may be gone.
-                late = self.elapsed - self._last_line > (2 * PATIENCE if self._last_line else PATIENCE)
-                if late and self._now[0] and not self._over.is_set():
-                    self._tell()
+    def _repeat_progress(self) -> None:
+        """Print the progress again if nothing has been printed for a while."""
+        while not self._is_finished.wait(INTERVAL / 4):
+            with self._lock, suppress(OSError, ValueError):  # The reader may have closed the stream.
+                late = self.elapsed - self._last_line > (2 * INTERVAL if self._last_line else INTERVAL)
+                if late and self._current[0] and not self._is_finished.is_set():
+                    self._print_progress()
 
     def part(self, begin: float, end: float) -> Listener:
-        """Return a listener to a part of the work, which makes up these fractions of the whole."""
+        """Return a listener for a part of the work, from fraction `begin` to fraction `end` of all work."""
         return lambda stage, fraction: self.progress(stage, begin + (end - begin) * fraction)
 
     @contextmanager
     def stage(self, name: str, done: float) -> Iterator[None]:
-        """Show and time a stage, at the beginning of which so much of the whole is done."""
+        """Show and time a stage; `done` is the completed fraction of all work at its beginning."""
         self._stages.done = done
         with self._stages(name):
             yield
 
     def say(self, lines: Iterable[str]) -> None:
-        """Print lines of what came out."""
+        """Print lines to stdout, unless quiet."""
         if self.quiet:
             return
         if self._bar:
@@ -127,9 +127,9 @@ class Console:
             self._bar.start()
 
     def finish(self, written: Sequence[Path], result: Flattening | None = None) -> None:
-        """Print the notes on a result if there is one, what was written, its measures, and where the time went."""
+        """Print the notes on a result, if given, the files written, its measures, and the time of each stage."""
         with self._lock:
-            self._over.set()
+            self._is_finished.set()
         if self._bar:
             self._bar.stop()
             self._bar = None
@@ -139,14 +139,14 @@ class Console:
         if result is not None:
             self.table(self._result_rows(result))
         if self.seconds:
-            self.say([f"time           {self._spent()}"])
+            self.say([f"time           {self._time_text()}"])
 
-    def _spent(self) -> str:
+    def _time_text(self) -> str:
         each = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in self.seconds.items())
         return f"{sum(self.seconds.values()):.2f} s: {each}"
 
     def _result_rows(self, result: Flattening) -> list[tuple[str, str, str]]:
-        """Return what an artist wants to know; if verbose, all measures and how the result was found."""
+        """Return the main measures; if verbose, all measures and the statistics of the solvers."""
         from ..view import shown_rows
 
         rows = {row[0]: row for row in shown_rows(result)}
@@ -182,21 +182,21 @@ def _bar() -> Progress:
 def _lines_of_table(rows: Sequence[tuple[str, str, str]]) -> Iterator[str]:
     """Yield the lines of a table as wide as the terminal, or 110; its last column is wrapped.
 
-    Outside a terminal click leaves the styles out.
+    click removes the styles if stdout is not a terminal.
     """
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 110
     names, values = (max((len(row[column]) for row in rows), default=0) for column in (0, 1))
     rest = max(width - names - values - 4, 20)
     for name, value, meaning in rows:
         first, *more = textwrap.wrap(meaning, rest) or [""]
-        told = click.style(f"{name:{names}}", bold=True), f"{value:{values}}", click.style(first, dim=True)
-        yield "  ".join(told if first else told[:2]).rstrip()
+        cells = click.style(f"{name:{names}}", bold=True), f"{value:{values}}", click.style(first, dim=True)
+        yield "  ".join(cells if first else cells[:2]).rstrip()
         yield from (" " * (names + values + 4) + click.style(line, dim=True) for line in more)
 
 
 @contextmanager
-def kept_apart(output: Path) -> Iterator[IO[bytes] | None]:
-    """Yield standard output if the result goes there, and let everything else that is printed go to stderr."""
+def redirect_prints(output: Path) -> Iterator[IO[bytes] | None]:
+    """Yield stdout if the result is written there, and redirect everything else that is printed to stderr."""
     if output != PIPE:
         yield None
         return
@@ -208,9 +208,9 @@ def kept_apart(output: Path) -> Iterator[IO[bytes] | None]:
 def open_result(
     file: Path, console: Console, *, again: bool = False, repair: bool = True, weld: bool | None = None
 ) -> Flattening:
-    """Return the result that a .npz file holds, the UVs of a mesh, or the mesh flattened without overlaps.
+    """Return the result in a .npz file, the UVs of a mesh file as a result, or else the mesh flattened.
 
-    again: flatten a mesh that has UVs, too.
+    again: also flatten a mesh that has UVs.
     """
     with console.stage("read", 0.0):
         if file.suffix.lower() == ".npz":
@@ -222,26 +222,26 @@ def open_result(
         with console.stage("measure", READ):
             own = own_flattening(source, strict=not repair)
         if own is not None:
-            return replace(own, notes=(f"Shown are the UVs that {file.name} has; {AGAIN}.", *own.notes))
-    return flatten_joined(source, console, {"charts": "atlas", **checking(repair)})
+            return replace(own, notes=(f"The UVs of {file.name} are shown; {AGAIN}.", *own.notes))
+    return flatten_joined(source, console, {"charts": "atlas", **repair_keywords(repair)})
 
 
-def archive_of(file: Path) -> Path | None:
-    """Return the file if it is a result's archive, which may have arrays more."""
+def archive_path(file: Path) -> Path | None:
+    """Return the path if it is that of an archive (.npz), which may contain further arrays; else None."""
     return file if file.suffix.lower() == ".npz" else None
 
 
 def flatten_file(
     mesh: Path, console: Console, options: Mapping[str, Any], weld: bool | None = None
 ) -> Flattening:
-    """Return the result of a mesh file, and show how it is made."""
+    """Read and flatten a mesh file, show the progress, and return the result."""
     with console.stage("read", 0.0):
         source = read_joined(mesh, weld)
     return flatten_joined(source, console, options)
 
 
 def flatten_joined(source: Joined, console: Console, options: Mapping[str, Any]) -> Flattening:
-    """Return the result of a mesh that was read, and show how it is made."""
+    """Flatten a mesh that has been read, show the progress, and return the result."""
     result = flatten(source.mesh, progress=console.part(READ, FLATTENED), **source.renamed(options))
     console.seconds.update(result.seconds)
     return replace(result, notes=source.notes_of(result.notes))
@@ -256,15 +256,15 @@ def save(
     stdout: IO[bytes] | None = None,
     ending: str = ".obj",
 ) -> Flattening:
-    """Write a result and its report, and return it as it was written, with the time that everything took.
+    """Write a result and its report, and return it as it was written, with the times of all stages.
 
-    stdout: where the result goes, as of an ending, instead of to the output.
+    stdout: stream to write to instead of `output`, in the format given by `ending`.
     """
     with console.stage("write", FLATTENED):
         if stdout is None:
             result = write_measured(result, output, texture)
         else:
-            # Whole or not at all, as files are.
+            # Like files, the result is written completely or not at all.
             content = BytesIO()
             result = as_written(write_stream(result, content, ending, texture), ending)
             stdout.write(content.getbuffer())
@@ -276,14 +276,14 @@ def save(
 
 
 def write_report(path: Path, report: Mapping[str, Any]) -> None:
-    """Write measures as JSON."""
+    """Write a report as JSON."""
     with atomic_write(path, "w") as file:
         json.dump(report, file, indent=2)
         file.write("\n")
 
 
 def require_distinct(files: Mapping[str, Path | None]) -> None:
-    """Raise OptionError if two names mean one file, of which one would overwrite the other."""
+    """Raise OptionError if two paths are the same file, so that one would overwrite the other."""
     seen: dict[str, str] = {}
     for role, path in files.items():
         if path is None or path == PIPE:
@@ -291,6 +291,6 @@ def require_distinct(files: Mapping[str, Path | None]) -> None:
         where = os.path.normcase(os.path.realpath(path))
         if where in seen:
             raise OptionError(
-                f"{path} is the {seen[where]} and the {role}: choose another name for one of them"
+                f"{path} is both the {seen[where]} and the {role}: choose another name for one of them"
             )
         seen[where] = role

@@ -1,4 +1,4 @@
-"""Options that several commands have."""
+"""Options that several commands share, and the layout of the help."""
 
 from __future__ import annotations
 
@@ -15,14 +15,18 @@ if TYPE_CHECKING:
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-#: Titles of groups of flags in the help.
-GROUPS = ("Quads", "Cones", "Metric", "Seams", "Atlas", "Input", "Output")
-#: Exit code where what `--require` asks for is not met.
+#: Rarely used options, which the help lists at the end, each with the first sentence of its description.
+RARE = ("max_cones", "required_cones", "forbidden_cones", "weights", "min_cone_angle", "max_cone_angle")
+RARE = (*RARE, "no_seams", "hide_seams", "seam_weights", "tiles", "threads")
+RARE_TITLE = "Less common options (details: docs/reference/command-line.md)"
+#: Titles of groups of options in the help.
+GROUPS = ("Quads", "Cones", "Metric", "Seams", "Atlas", "Input", "Output", RARE_TITLE)
+#: Exit code if a condition of `--require` is not met.
 NOT_MET = 3
 
 
 class Grouped(click.Option):
-    """A flag that the help lists under the title of a group."""
+    """An option that the help lists under the title of a group."""
 
     def __init__(self, *args: Any, group: str, **more: Any) -> None:
         super().__init__(*args, **more)
@@ -30,19 +34,19 @@ class Grouped(click.Option):
 
 
 class GroupedCommand(click.Command):
-    """A command whose help lists its flags in groups; those without one are of the output."""
+    """A command whose help lists its options in groups; options without a group are listed under Output."""
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the flags, group by group."""
+        """Write the options, group by group."""
         groups: dict[str, list[tuple[str, str]]] = {title: [] for title in GROUPS}
         for param in self.get_params(ctx):
             record = param.get_help_record(ctx) if isinstance(param, click.Option) else None
             if record is not None:
-                groups[getattr(param, "group", GROUPS[-1])].append(record)
+                groups[getattr(param, "group", "Output")].append(record)
         for title, records in groups.items():
             if records:
                 with formatter.section(title):
-                    formatter.write_dl(records)
+                    formatter.write_dl(records, col_max=26)
 
 
 up_option = click.option(
@@ -50,7 +54,7 @@ up_option = click.option(
     type=click.Choice(["x", "y", "z"]),
     default="y",
     show_default=True,
-    help="The model's upward axis in pictures.",
+    help="Upward axis of the model in pictures.",
 )
 
 _INPUT = (
@@ -60,22 +64,22 @@ _INPUT = (
         cls=Grouped,
         group="Input",
         default=True,
-        help="Repair what is not manifold (split edges and vertices, drop degenerate faces, cut one-sided surfaces), "
-        "with a note; or refuse it, and triangles without area, too.  [default: repair]",
+        help="Repair a mesh that is not manifold, with a note: split edges and vertices, drop degenerate faces, cut "
+        "one-sided surfaces. Or reject it, and triangles without area, too.  [default: repair]",
     ),
     click.option(
         "--weld/--no-weld",
         cls=Grouped,
         group="Input",
         default=None,
-        help="Merge all vertices at the same position, or none.  [default: all in STL and glTF; in others those along "
-        "borders that coincide]",
+        help="Merge all vertices at the same position, or none.  [default: all in STL and glTF; in other formats "
+        "those on boundaries that coincide]",
     ),
 )
 
 
 def input_options(command: Command) -> Command:
-    """Add the options that say what to do with a mesh that is not quite one: `repair` and `weld`."""
+    """Add the options `repair` and `weld` of meshes with defects to a command."""
     for option in reversed(_INPUT):
         command = option(command)
     return command
@@ -84,8 +88,8 @@ def input_options(command: Command) -> Command:
 color_option = click.option(
     "--color",
     metavar="NAME|FILE",
-    help="Numbers of your own, as colours with a scale: a property of the vertices of a .ply, an array of a result "
-    ".npz, or FILE.npy, FILE.npz:NAME; one for each vertex or triangle.",
+    help="Your own values, shown as colours with a scale: the name of a vertex property of a .ply or of an array in a "
+    "result (.npz); or FILE.npy or FILE.npz:NAME, with one value per vertex or triangle.",
 )
 
 most_option = click.option(
@@ -93,16 +97,16 @@ most_option = click.option(
     type=click.IntRange(1),
     default=MOST_TRIANGLES,
     show_default=True,
-    help="Thin a larger mesh to so many, for display only.",
+    help="Number of triangles to which a larger mesh is reduced, for display only.",
 )
 
 again_option = click.option(
-    "--again", is_flag=True, help="Flatten a mesh that has UVs, too, instead of showing these."
+    "--again", is_flag=True, help="Also flatten a mesh that has UVs, instead of showing these."
 )
 
 
-def checking(repair: bool) -> dict[str, Any]:
-    """Return what `--repair` or `--strict` mean as keyword arguments of `coneflat.flatten`."""
+def repair_keywords(repair: bool) -> dict[str, Any]:
+    """Return the keyword arguments of `coneflat.flatten` for `--repair` or `--strict`."""
     return {"repair": repair, "strict": not repair}
 
 
@@ -111,15 +115,15 @@ require_option = click.option(
     "required",
     metavar="MEASURE=VALUE",
     multiple=True,
-    help=f"Exit with code {NOT_MET} unless measures of the report are so: flipped=0,overlap=0 or qc_mean<=1.05; also "
-    "<, >, >=.",
+    help=f"Exit with code {NOT_MET} if the report does not meet this condition; examples: flipped=0,overlap=0 and "
+    "qc_mean<=1.05; also <, >, >=.",
 )
 
 
 def check_required(requirements: Iterable[Requirement], measures: dict[str, Any], written: str = "") -> None:
-    """Say which requirements measures do not meet, and end with the exit code for that.
+    """Print the requirements that are not met, if any, and exit with code NOT_MET.
 
-    written: what has been written nevertheless.
+    written: name of the file that has been written nevertheless.
     """
     from ...measure import breaches
 
@@ -137,10 +141,10 @@ QUIET, VERBOSE = "quiet", "verbose"
 
 
 def verbosity_options(command: Command) -> Command:
-    """Add -v and -q, of which the last counts; the command's `verbosity` is VERBOSE, QUIET or None."""
+    """Add -v and -q to a command, whose `verbosity` is then VERBOSE, QUIET or None; the last one given applies."""
     for short, long, value, meaning in (
-        ("-q", "--quiet", QUIET, "Print nothing but errors."),
-        ("-v", "--verbose", VERBOSE, "Print every step as it begins, and how the result was found."),
+        ("-q", "--quiet", QUIET, "Print errors only."),
+        ("-v", "--verbose", VERBOSE, "Print each step, and all measures."),
     ):
         command = click.option(short, long, "verbosity", flag_value=value, default=None, help=meaning)(
             command

@@ -1,4 +1,4 @@
-"""Values as they are written for the commands: vertices, curvatures, pairs, weights, angles, and files of these."""
+"""Parsers for the values of options: vertices, curvatures, pairs, weights, angles, and files of these."""
 
 from __future__ import annotations
 
@@ -22,15 +22,16 @@ _UNITS = {"pi": math.pi, "π": math.pi, "deg": math.pi / 180, "°": math.pi / 18
 
 
 def read_vertex_map(flag: str, noun: str, texts: Sequence[str]) -> dict[int, float | None]:
-    """Return vertex -> curvature (radians, None where it is to be computed).
+    """Return a map from vertex to curvature in radians; None for curvatures that must be computed.
 
     Args:
-        flag: the option's name.
-        noun: "cone" or "corner".
-        texts: each VERTEX[:CURVATURE], several of them with commas, or a file with VERTEX [CURVATURE] on each line.
+        flag: name of the option, for messages.
+        noun: "cone" or "corner", for messages.
+        texts: each is VERTEX[:CURVATURE], several of these separated by commas, or a file with one VERTEX [CURVATURE]
+            per line.
 
     Raises:
-        OptionError: what stands there is neither, or a vertex is named twice.
+        OptionError: a text cannot be parsed, or a vertex is given twice.
         MeshFileError: the file cannot be read.
     """
     given: dict[int, float | None] = {}
@@ -40,7 +41,7 @@ def read_vertex_map(flag: str, noun: str, texts: Sequence[str]) -> dict[int, flo
             vertex = int(parts[0])
         except ValueError as error:
             raise OptionError(
-                f"{where} {text!r} is not VERTEX or VERTEX:CURVATURE, nor a file that is there"
+                f"{where} {text!r} is not VERTEX or VERTEX:CURVATURE, and there is no such file"
             ) from error
         if vertex in given:
             raise OptionError(f"{where} vertex {vertex} is given as a {noun} twice")
@@ -49,22 +50,22 @@ def read_vertex_map(flag: str, noun: str, texts: Sequence[str]) -> dict[int, flo
 
 
 def _entries(flag: str, noun: str, texts: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """Yield what names a vertex, and where it stands."""
+    """Yield the text of each entry, and its place for messages."""
     for word in texts:
         if not is_file(word):
             yield from ((text.strip(), flag) for text in word.split(","))
             continue
         lines = [line.split("#", 1)[0].strip() for line in _lines(Path(word))]
         if not any(lines):
-            raise OptionError(f"{word} holds no {noun}s")
+            raise OptionError(f"{word} contains no {noun}s")
         yield from ((text, f"{word}, line {number}:") for number, text in enumerate(lines, 1) if text)
 
 
 def read_vertices(option: str, text: str) -> tuple[int, ...]:
-    """Return vertices from "3,17,8", or from a text file of such.
+    """Return the vertices of a text like "3,17,8", or of a text file.
 
     Raises:
-        OptionError: it is neither.
+        OptionError: the text cannot be parsed, and there is no such file.
         MeshFileError: the file cannot be read.
     """
     if is_file(text):
@@ -78,10 +79,10 @@ def read_vertices(option: str, text: str) -> tuple[int, ...]:
 
 
 def read_pairs(name: str) -> IntArray:
-    """Return (k, 2) the two vertices on each line of a text file.
+    """Return the (k, 2) pairs of vertices in a text file with one pair per line.
 
     Raises:
-        OptionError: a line holds something else.
+        OptionError: a line is not a pair of vertices.
         MeshFileError: the file cannot be read.
     """
     import numpy as np
@@ -95,25 +96,25 @@ def read_pairs(name: str) -> IntArray:
             raise OptionError(f"{path}, line {number}: {text!r} is not a pair of vertices")
         pairs.append([int(word) for word in re.findall(r"[0-9]+", text)])
     if not pairs:
-        raise OptionError(f"{path} holds no pairs of vertices")
+        raise OptionError(f"{path} contains no pairs of vertices")
     return np.array(pairs, dtype=np.int64)
 
 
 def read_vertices_or_pairs(option: str, texts: Sequence[str]) -> IntArray:
-    """Return vertices (k,) from "3,17,8" or files of such, or pairs (k, 2) from files with two on each line.
+    """Return (k,) vertices from texts like "3,17,8" or files of these, or (k, 2) pairs from files with one per line.
 
     Raises:
-        OptionError: it is neither, or both are given.
+        OptionError: a text cannot be parsed, or both vertices and pairs are given.
         MeshFileError: a file cannot be read.
     """
     import numpy as np
 
-    of_pairs = [text for text in texts if is_file(text) and _holds_pairs(Path(text))]
-    if not of_pairs:
+    pair_files = [text for text in texts if is_file(text) and _holds_pairs(Path(text))]
+    if not pair_files:
         return np.array([v for text in texts for v in read_vertices(option, text)], dtype=np.int64)
-    if len(of_pairs) < len(texts):
+    if len(pair_files) < len(texts):
         raise OptionError(f"{option} takes vertices or pairs of them, not both")
-    return np.concatenate([read_pairs(text) for text in of_pairs])
+    return np.concatenate([read_pairs(text) for text in pair_files])
 
 
 def _holds_pairs(path: Path) -> bool:
@@ -122,7 +123,7 @@ def _holds_pairs(path: Path) -> bool:
 
 
 def read_weights(text: str) -> str | FloatArray:
-    """Return the numbers of a file, or the text, which then is the name of a property.
+    """Return the numbers in a file; or the text itself, which is then the name of a property.
 
     Raises:
         MeshFileError: the file cannot be read.
@@ -143,26 +144,26 @@ def read_weights(text: str) -> str | FloatArray:
 
 
 def parse_angle(text: str) -> float:
-    """Return radians from "1.57", "pi/2", "-0.5pi", "90deg".
+    """Return an angle in radians from "1.57", "pi/2", "-0.5pi" or "90deg".
 
     Raises:
-        OptionError: it is none of these.
+        OptionError: the text is none of these.
     """
     return parse_curvature(text, "", "angle")
 
 
 def parse_curvature(text: str, where: str, noun: str = "curvature") -> float:
-    """Return radians from "1.57", "pi/2", "-0.5pi", "90deg".
+    """Return a curvature in radians from "1.57", "pi/2", "-0.5pi" or "90deg".
 
     Raises:
-        OptionError: it is none of these.
+        OptionError: the text is none of these.
     """
     place = f"{where}: " if where else ""
     match = _CURVATURE.fullmatch(text.strip())
     number = match["number"] if match else ""
     unit = match["unit"].lower() if match and match["unit"] else None
     if match is None or (number in ("", "+", "-") and unit not in ("pi", "π")):
-        raise OptionError(f"{place}{text.strip()!r} is no {noun}; write 1.57, pi/2, -0.5pi or 90deg")
+        raise OptionError(f"{place}{text.strip()!r} is not a valid {noun}; write 1.57, pi/2, -0.5pi or 90deg")
     factor = float(number + "1" if number in ("", "+", "-") else number)
     divisor = float(match["by"] or 1)
     if divisor == 0:
@@ -179,7 +180,7 @@ def _lines(path: Path) -> list[str]:
 
 
 def is_file(text: str) -> bool:
-    """Whether an option's value names a file that is there."""
+    """Return whether the value of an option is the path of an existing file."""
     try:
         return Path(text).is_file()
     except (OSError, ValueError):

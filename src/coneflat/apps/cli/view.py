@@ -1,4 +1,4 @@
-"""`coneflat view` and `coneflat studio`: pages in the browser."""
+"""`coneflat view` and `coneflat studio`: the pages in the browser."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from ...options import SHOWS
-from .options import chosen, flag, option_flags, path_flag
+from .options import flag, option_flags, path_flag, pop_flags
 from .shared import (
     QUIET,
     VERBOSE,
@@ -27,9 +27,9 @@ class ViewFlags:
     """Output.
 
     Attributes:
-        output: Page to write, .html.  [default: FILE's name with _view, opened in the browser]
-        texture: PNG, JPEG, GIF or WebP picture to lay on the model.
-        show: What the page shows first.  [default: checker, or picture with --texture]
+        output: Page to write, .html.  [default: FILE's name with _view; it is opened in the browser]
+        texture: Image for the model: PNG, JPEG, GIF or WebP.
+        show: Display mode at the start.  [default: checker, or picture with --texture]
     """
 
     output: Path | None = path_flag()
@@ -55,11 +55,10 @@ def view(
     verbosity: str | None,
     **given: Any,
 ) -> None:
-    """Write a page, one HTML file, that shows FILE and its layout side by side.
+    """Write a page that shows FILE and its layout side by side.
 
-    FILE is a result, .npz as `coneflat flatten` writes it, quads, as `coneflat quads` does, or a mesh (.obj, .ply,
-    .stl, .off, .gltf, .glb): the UVs that it has are shown; without, it is flattened first with default options,
-    without overlaps.
+    FILE is a mesh (.obj, .ply, .stl, .off, .gltf, .glb) or a result (.npz) of `coneflat flatten` or `coneflat quads`. A
+    mesh without UVs is flattened first, with default options. The page is a single HTML file.
 
     \b
     Examples:
@@ -74,10 +73,10 @@ def view(
     from ..quads.files import holds_quads, read_quads
     from ..quads.page import page_of_quads
     from ..view import check_page, open_page, own_quantity, page_of, write_page
-    from .run import FLATTENED, Console, archive_of, open_result
+    from .run import FLATTENED, Console, archive_path, open_result
 
-    # What can fail at the end is looked at before the work.
-    flags = chosen(given, ViewFlags)
+    # Errors that writing would raise are reported before the work starts.
+    flags = pop_flags(given, ViewFlags)
     page = check_page(Path(f"{file.stem}_view.html") if flags.output is None else flags.output)
     if flags.texture is not None:
         read_picture(flags.texture)
@@ -86,7 +85,7 @@ def view(
         result = None
         if holds_quads(file):
             if color is not None:
-                raise click.UsageError("quads are shown without colours of your own: leave out --color")
+                raise click.UsageError("--color has no effect on quads: leave it out")
             with console.stage("read", 0.0):
                 quads = read_quads(file)
             with console.stage("page", FLATTENED):
@@ -95,7 +94,7 @@ def view(
             result = open_result(file, console, again=again, repair=repair, weld=weld)
             with console.stage("page", FLATTENED):
                 if color is not None:
-                    look["color"] = own_quantity(result, color, archive_of(file))
+                    look["color"] = own_quantity(result, color, archive_path(file))
                 text = page_of(result, **look)
         write_page(text, page)
         console.finish([page], result)
@@ -103,27 +102,28 @@ def view(
             console.say(["open it in any browser"])
 
 
-@click.command(short_help="Flatten by hand and eye, live in the browser.")
+@click.command(short_help="Place cones and seams interactively in the browser.")
 @click.argument("file", type=click.Path(path_type=Path), metavar="[MESH|PROJECT]", required=False)
 @click.option(
     "--port",
     type=click.IntRange(0, 65535),
     default=0,
-    show_default="a free one",
-    help="Port of this machine at which the page is.",
+    show_default="a free port",
+    help="Port of the page on this machine.",
 )
-@click.option("--no-open", is_flag=True, help="Print the page's address, and open no browser.")
+@click.option("--no-open", is_flag=True, help="Print the address of the page without opening a browser.")
 @color_option
 @most_option
 @verbosity_options
 def studio(
     file: Path | None, port: int, no_open: bool, color: str | None, most_triangles: int, verbosity: str | None
 ) -> None:
-    """Move cones and draw seams on a mesh, and see at once what comes of it.
+    """Place cones and draw seams on a mesh in the browser, and see the layout immediately.
 
-    The page is at an address of this machine that nobody else can use; it is printed first. What is chosen is kept in
-    the current folder, in MESH's name with _studio, as .json, from which the studio goes on, and `coneflat flatten
-    --project` makes the same layout. A mesh can also be dropped on the page. Ctrl-C ends it.
+    The address of the page is printed first. It can be used on this machine only, and contains a secret token. A mesh
+    can also be dropped on the page. The choices are saved in the current folder in a project, MESH's name with
+    _studio.json, from which the studio can continue, and of which `coneflat flatten --project` computes the same
+    layout. Ctrl-C ends the studio.
 
     \b
     Examples:
@@ -134,9 +134,9 @@ def studio(
     from ..studio.serve import run_studio
 
     def say(line: str) -> None:
-        # Without a browser nobody would find the page.
+        # Without a browser, the address is needed.
         if verbosity != QUIET or no_open:
             click.echo(line)
 
-    tell = click.echo if verbosity == VERBOSE else None
-    run_studio(file, port, opens=not no_open, say=say, tell=tell, color=color, most_triangles=most_triangles)
+    log = click.echo if verbosity == VERBOSE else None
+    run_studio(file, port, opens=not no_open, say=say, log=log, color=color, most_triangles=most_triangles)

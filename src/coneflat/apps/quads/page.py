@@ -11,7 +11,7 @@ from ... import Flattening
 from ...base import BoolArray, IntArray, plural
 from ...io import Mapped
 from ...mesh import label_components
-from ..view import Told, flattening_of, page_of
+from ..view import PageText, flattening_of, page_of
 from .quad_mesh import QuadMesh
 from .quality import measure_quads
 from .transitions import TURNS
@@ -163,7 +163,7 @@ def page_of_quads(quads: QuadMesh, *, name: str = "Quads", show: str | None = No
     domains = find_domains(quads)
     result, charts = as_flattening(quads, domains), len(domains.sides)
     irregular = plural(len(quads.irregular), "irregular vertex", "irregular vertices")
-    told = Told(
+    text = PageText(
         title=f"{plural(len(quads.quads), 'quad')}  ·  {irregular}  ·  {plural(charts, 'rectangle')}",
         rows=[
             *measure_quads(quads).rows(),
@@ -175,7 +175,7 @@ def page_of_quads(quads: QuadMesh, *, name: str = "Quads", show: str | None = No
     )
     if show is None:
         show = "charts" if look.get("texture") is None else "picture"
-    return page_of(result, name=name, show=show, told=told, **look)
+    return page_of(result, name=name, show=show, text=text, **look)
 
 
 def as_flattening(quads: QuadMesh, domains: Domains) -> Flattening:

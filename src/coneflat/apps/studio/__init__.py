@@ -1,1 +1,1 @@
-"""Flattening by hand and eye: what the user has chosen, a session that flattens by it, a server, a page."""
+"""Interactive flattening in the browser: the choices of the user, a session that flattens, a server, a page."""

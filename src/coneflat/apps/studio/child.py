@@ -1,7 +1,7 @@
-"""A process that flattens: `python -m coneflat.apps.studio.child` reads jobs and writes layouts.
+"""The worker process of the studio, `python -m coneflat.apps.studio.child`: reads jobs and writes layouts.
 
-A flattening is given up as soon as a newer one is wanted. The mesh stays in memory between them, with all that depends
-on it alone.
+A flattening is cancelled as soon as a newer one is requested. The mesh, and everything that depends on it alone, is
+cached between flattenings.
 """
 
 from __future__ import annotations
@@ -22,33 +22,33 @@ from ...base import asking
 from ...errors import NonManifoldError, NonOrientableError
 from ...io import Joined, read_joined
 from ...options import MOST_TRIANGLES
-from ..view import Model, Quantity, Told, content_of, head_and_block, own_quantity, pack, shown_rows
+from ..view import Model, PageText, Quantity, content_of, head_and_block, own_quantity, pack, shown_rows
 from .choices import Choices
-from .known import with_prints
-from .messages import in_page, noted, strained
-from .outputs import curve_of, quads_of, saved
+from .known import with_hashes
+from .messages import angle_warning, page_message, with_warnings
+from .outputs import curve_data, quads_file, result_file
 from .worker import Head, read_frame, write_frame
 
-#: Polygons from which on the first layout is shown, too: of smaller meshes the last is there as soon.
+#: Number of polygons from which on a preview is shown; for smaller meshes the final layout is as fast.
 EARLY_POLYGONS = 20_000
-#: What stands for numbers until they are known, and what the first layout is.
-TO_COME = "…"
-FIRST = "First view: distortion is yet to be evened out, and overlaps to be parted  ·  …"
+#: The text that stands for unknown numbers, and the title of the preview.
+PLACEHOLDER = "…"
+FIRST_TITLE = "Preview: distortion is not yet reduced, and overlaps are not yet removed  ·  …"
 
 
 class Superseded(Exception):
-    """A newer flattening is wanted."""
+    """A newer flattening has been requested."""
 
 
 class Jobs:
-    """What is to be done, in order; of flattenings only the newest."""
+    """The queue of jobs; of several flattenings, only the newest is kept."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream
         self._waiting: deque[Head] = deque()
         self._changed = threading.Condition()
         self._newest = -1
-        self._over = False
+        self._is_closed = False
         threading.Thread(target=self._listen, daemon=True).start()
 
     def _listen(self) -> None:
@@ -61,29 +61,29 @@ class Jobs:
                 self._waiting.append(job)
                 self._changed.notify()
         with self._changed:
-            self._over = True
+            self._is_closed = True
             self._changed.notify()
 
     def next(self) -> Head | None:
-        """Return the next job; None when there will be no more."""
+        """Return the next job; None after the last one."""
         with self._changed:
-            self._changed.wait_for(lambda: self._waiting or self._over)
-            return None if self._over else self._waiting.popleft()
+            self._changed.wait_for(lambda: self._waiting or self._is_closed)
+            return None if self._is_closed else self._waiting.popleft()
 
     def is_stale(self, job: int) -> bool:
-        """Whether a flattening is no longer wanted."""
-        return self._over or job != self._newest
+        """Return whether a flattening is obsolete."""
+        return self._is_closed or job != self._newest
 
 
-class Bench:
-    """Flattens again and again; what depends on the mesh alone stays from one flattening to the next.
+class JobRunner:
+    """Runs jobs, and caches what depends on the mesh alone.
 
     Attributes:
-        result: of the last flattening; None where it has failed.
+        result: result of the last flattening; None if it has failed.
     """
 
     def __init__(self, early_from: int = EARLY_POLYGONS) -> None:
-        """early_from: polygons of meshes whose first layout is shown, too."""
+        """early_from: number of polygons from which on a preview is shown."""
         self.result: Flattening | None = None
         self._early_from = early_from
         self._source: Joined | None = None
@@ -93,40 +93,40 @@ class Bench:
         self._read: tuple[str, str] | None = None
 
     def flatten(
-        self, job: Head, told: Callable[[str, float], None], show: Callable[[Head, bytes], None]
+        self, job: Head, report: Callable[[str, float], None], show: Callable[[Head, bytes], None]
     ) -> tuple[Head, bytes]:
-        """Return a layout as the page takes it: numbers and texts, and arrays.
+        """Return a layout as data for the page: numbers and texts, and the bytes of arrays.
 
         Args:
-            job: the mesh, and what is chosen.
-            told: called with what is being done, and the fraction that is done.
-            show: called with the first layout, in the same form, before it is what it is to be.
+            job: the mesh and the choices.
+            report: called with the stage and the completed fraction.
+            show: called with a preview of the layout, in the same form.
         """
 
         self.result, self._most = None, job.get("most")
-        source, flattener = self._open(job["mesh"], job["sha256"], told)
+        source, flattener = self._open(job["mesh"], job["sha256"], report)
         name, furthest = Path(job["mesh"]).name, 0.0
 
-        def told_on(stage: str, fraction: float) -> None:
+        def report_max(stage: str, fraction: float) -> None:
             nonlocal furthest
             furthest = max(furthest, fraction)
-            told(stage, furthest)
+            report(stage, furthest)
 
         def show_first(first: Flattening) -> None:
-            told_on("first view", furthest)
+            report_max("preview", furthest)
             show(*self._picture(first, name, is_first=True))
 
         chosen = Choices.from_plain(job["choices"])
         words, is_large = source.renamed(chosen.keywords()), len(source.mesh.offsets) - 1 >= self._early_from
-        result = flattener.flatten(on_preview=show_first if is_large else None, progress=told_on, **words)
-        result = noted(replace(result, notes=source.notes_of(result.notes)), chosen)
-        told("picture", 1.0)
+        result = flattener.flatten(on_preview=show_first if is_large else None, progress=report_max, **words)
+        result = with_warnings(replace(result, notes=source.notes_of(result.notes)), chosen)
+        report("picture", 1.0)
         head, body = self._coloured(job, result, name)
         self.result = result
-        return {**head, "warnings": strained(chosen, result)}, body
+        return {**head, "warnings": angle_warning(chosen, result)}, body
 
     def _coloured(self, job: Head, result: Flattening, name: str) -> tuple[Head, bytes]:
-        """Return what the page shows of a result, with colours of the user's own; without, if there are none such."""
+        """Return the page data of a result, with the colours given by the user if these are available."""
 
         if not job.get("color"):
             return self._picture(result, name)
@@ -134,58 +134,58 @@ class Bench:
             own = own_quantity(result, job["color"])
         except ConeflatError as error:
             head, body = self._picture(result, name)
-            return {**head, "missing": in_page(str(error))}, body
+            return {**head, "missing": page_message(str(error))}, body
         return self._picture(result, name, own=own)
 
-    def make(self, job: Head, told: Callable[[str, float], None]) -> tuple[Head, bytes]:
-        """Return what is asked for beside layouts: a file of the result, quads, or a curve."""
+    def make(self, job: Head, report: Callable[[str, float], None]) -> tuple[Head, bytes]:
+        """Return the output of another job: a file of the result, quads, or a curve."""
 
         if job["do"] == "export":
-            return {}, saved(self.result, job["ending"])
-        source, _ = self._open(job["mesh"], job["sha256"], told)
+            return {}, result_file(self.result, job["ending"])
+        source, _ = self._open(job["mesh"], job["sha256"], report)
         chosen = Choices.from_plain(job["choices"])
         if job["do"] == "quads":
-            return {}, quads_of(source, chosen, job["count"], job["ending"], told)
-        return curve_of(source, chosen, told), b""
+            return {}, quads_file(source, chosen, job["count"], job["ending"], report)
+        return curve_data(source, chosen, report), b""
 
     def _picture(
         self, result: Flattening, name: str, is_first: bool = False, own: Quantity | None = None
     ) -> tuple[Head, bytes]:
-        """Return what the page shows of a result; of the first layout no numbers, which will be others.
+        """Return the page data of a result; a preview has no numbers, because they will change.
 
-        own: numbers that are shown as colours.
+        own: quantity that is shown as colours.
         """
 
-        told = None
+        text = None
         if is_first:
-            rows = [(measure, TO_COME, meaning) for measure, _, meaning in shown_rows(result)]
-            told = Told(FIRST, rows)
+            rows = [(measure, PLACEHOLDER, meaning) for measure, _, meaning in shown_rows(result)]
+            text = PageText(FIRST_TITLE, rows)
             result = replace(result, notes=())
         if self._model is None or not self._model.is_of(result):
             self._model = Model.of(result)
         content = content_of(result, self._most or MOST_TRIANGLES, self._model, own)
         show = "checker" if own is None else "own"
-        head, block = head_and_block(result, content, None, name, "y", show, told)
-        # All of a mesh of up to so many triangles, to paint and draw on, where the page shows fewer.
+        head, block = head_and_block(result, content, None, name, "y", show, text)
+        # A simplified mesh is sent in full, too, for painting and drawing, up to 4 million triangles.
         if content.left_out and len(result.faces) <= 4_000_000:
-            head, block = with_whole(head, block, self._model, result)
-        head["notes"] = [in_page(note) for note in head["notes"]]
+            head, block = with_all_triangles(head, block, self._model, result)
+        head["notes"] = [page_message(note) for note in head["notes"]]
         cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
-        told_of = {"head": with_prints(head, block), "found": cones.tolist(), "seconds": result.seconds}
-        return told_of, block
+        data = {"head": with_hashes(head, block), "found": cones.tolist(), "seconds": result.seconds}
+        return data, block
 
-    def _open(self, mesh: str, sha256: str, told: Callable[[str, float], None]) -> tuple[Joined, Flattener]:
+    def _open(self, mesh: str, sha256: str, report: Callable[[str, float], None]) -> tuple[Joined, Flattener]:
 
         if self._source is None or self._flattener is None or self._read != (mesh, sha256):
-            told("read", 0.0)
-            self._source = self._flattener = self._model = None  # There may not be memory for both.
+            report("read", 0.0)
+            self._source = self._flattener = self._model = None  # The memory may not suffice for both.
             source = read_joined(Path(mesh))
             self._source, self._flattener, self._read = source, Flattener(source.mesh), (mesh, sha256)
         return self._source, self._flattener
 
 
-def with_whole(head: Head, block: bytes, model: Model, result: Flattening) -> tuple[Head, bytes]:
-    """Return what the page shows of a result, and all vertices and triangles of its mesh beside."""
+def with_all_triangles(head: Head, block: bytes, model: Model, result: Flattening) -> tuple[Head, bytes]:
+    """Return the page data of a result with all vertices and triangles of its mesh added."""
 
     arrays = {
         "whole_places": model.places.astype(np.float32),
@@ -200,44 +200,44 @@ def with_whole(head: Head, block: bytes, model: Model, result: Flattening) -> tu
 
 
 def serve(jobs: Jobs, answers: IO[bytes]) -> None:
-    """Do jobs until there are no more."""
-    bench = Bench()
+    """Run jobs until the last one."""
+    bench = JobRunner()
     while (job := jobs.next()) is not None:
         number = job["job"]
 
-        def ask(wanted: int = job.get("after") or number) -> None:
+        def check_current(wanted: int = job.get("after") or number) -> None:
             if jobs.is_stale(wanted):
                 raise Superseded
 
-        def told(stage: str, fraction: float, number: int = number) -> None:
-            ask()
+        def report(stage: str, fraction: float, number: int = number) -> None:
+            check_current()
             write_frame(answers, {"job": number, "stage": stage, "fraction": fraction})
 
         def show(head: Head, body: bytes, number: int = number) -> None:
-            ask()
+            check_current()
             write_frame(answers, {"job": number, "early": head}, body)
 
         try:
-            with asking(ask):
+            with asking(check_current):
                 head, body = (
-                    bench.flatten(job, told, show) if job["do"] == "flatten" else bench.make(job, told)
+                    bench.flatten(job, report, show) if job["do"] == "flatten" else bench.make(job, report)
                 )
             write_frame(answers, {"job": number, "done": head}, body)
         except Superseded:
             write_frame(answers, {"job": number, "given_up": True})
         except ConeflatError as error:
-            # What a repair would mend, a button of the page does.
+            # The page offers a button for errors that a repair can fix.
             mends = isinstance(error, (NonManifoldError, NonOrientableError))
-            write_frame(answers, {"job": number, "error": in_page(str(error)), "repair": mends})
+            write_frame(answers, {"job": number, "error": page_message(str(error)), "repair": mends})
         except MemoryError:
             write_frame(answers, {"job": number, "error": "not enough memory for this mesh", "repair": False})
         except Exception as error:
-            said = f"internal error, please report it: {type(error).__name__}: {error}"
-            write_frame(answers, {"job": number, "error": said, "repair": False})
+            message = f"internal error, please report it: {type(error).__name__}: {error}"
+            write_frame(answers, {"job": number, "error": message, "repair": False})
 
 
 def main() -> None:
-    """Serve over standard input and output, which libraries that print of themselves do not get at."""
+    """Serve over standard input and output; what libraries print is redirected to standard error."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     serve(Jobs(sys.stdin.buffer), answers)

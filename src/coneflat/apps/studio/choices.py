@@ -1,6 +1,6 @@
-"""What the user of the studio has chosen, and what that means as options of `coneflat.flatten`.
+"""The choices of the user of the studio, and their conversion to options of `coneflat.flatten`.
 
-Also what gives the same result without the studio: a command line, and Python.
+They are also converted to a command line and to Python code that give the same result without the studio.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from ...errors import OptionError, StudioError
 from ...options import Flag, Options, as_number, as_whole, declarations, read_options
 from .paint import Paint, Region
 
-#: Options that are chosen as they are; cones and seams are chosen one by one.
+#: Options that the studio sets directly; cones and seams are edited individually.
 PLAIN_OPTIONS = (
     "distortion", "cone_count", "boundary", "stretch", "charts", "seams", "sharp_angle", "hide_seams",
     "resolution", "padding", "repair",
 )  # fmt: skip
-#: Those of them that say how many cones a search is to find.
+#: Options that determine the number of cones of a search; at most one of them is set.
 NUMBERS = ("distortion", "cone_count")
-#: What the boundary may become; a rectangle has four corners, which are picked.
+#: Shapes of the boundary; the four corners of a rectangle are picked by the user.
 BOUNDARIES = ("free", "lengths", "disk", "straight", "rectangle")
-#: What the file's unit of length may be; "" is not known. It changes nothing but the lengths that are shown.
+#: Units of length of a file; "" if unknown. They affect only the lengths that are shown.
 UNITS = ("", "mm", "cm", "m", "inch")
 
 Path = tuple[int, ...]
@@ -40,9 +40,9 @@ class Cone:
     """A cone that the user has placed.
 
     Attributes:
-        vertex: of the input.
-        angle: its cone angle, radians; None where the best one is to be computed.
-        locked: searches keep it where it is.
+        vertex: vertex of the input.
+        angle: cone angle in radians; None if it is computed.
+        locked: whether searches must keep it.
     """
 
     vertex: int
@@ -51,23 +51,23 @@ class Cone:
 
     @property
     def curvature(self) -> float | None:
-        """What its angle lacks of a full turn, radians."""
+        """Return its curvature, 2 pi minus the angle, in radians; None if it is computed."""
         return None if self.angle is None else 2 * math.pi - self.angle
 
 
 @dataclass(frozen=True)
 class Choices:
-    """What the user has chosen; nothing of it ever changes, a change makes another.
+    """The choices of the user; immutable, changes return new choices.
 
     Attributes:
-        options: those of `PLAIN_OPTIONS` that are not left at their defaults.
-        by_hand: `cones` are all there are; else a search places others around those that are locked.
-        cones: those placed or locked, by vertex.
-        cuts: paths along edges, as vertices, that are cut.
+        options: values of those `PLAIN_OPTIONS` that differ from their defaults.
+        by_hand: whether `cones` are all cones; otherwise a search adds others to the locked ones.
+        cones: placed or locked cones, sorted by vertex.
+        cuts: paths along edges that are cut, as vertices.
         kept: paths along edges that must not be cut.
-        paint: what is painted.
-        corners: vertices on the boundary, of a rectangle, ascending.
-        units: the file's unit of length, and that in which lengths are shown, of `UNITS`.
+        paint: painted regions.
+        corners: corners of a rectangle, vertices on the boundary, ascending.
+        units: unit of length of the file, and the one in which lengths are shown, of `UNITS`.
     """
 
     options: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
@@ -82,56 +82,56 @@ class Choices:
     # Options.
 
     def with_option(self, name: str, value: Any) -> Choices:
-        """Return choices with another value of an option; a number of cones, or a distortion, starts a search.
+        """Return choices with another value of an option; an option of `NUMBERS` also starts a search.
 
         Raises:
-            OptionError: it is none that the studio has, or the value makes no sense.
+            OptionError: the studio does not set this option, or the value is not valid.
         """
         if name not in PLAIN_OPTIONS:
-            raise OptionError(f"the studio sets no option {shown(name)}: it has {', '.join(PLAIN_OPTIONS)}")
+            raise OptionError(f"unknown option {shown(name)}: choose from {', '.join(PLAIN_OPTIONS)}")
         if name == "boundary" and value not in BOUNDARIES:
             raise OptionError(f"unknown boundary {shown(value)}: choose from {', '.join(BOUNDARIES)}")
         if name == "seams" and value not in (None, "input"):
-            raise OptionError(f"seams are drawn, or those of the file, 'input', not {shown(value)}")
-        kept, declared = dict(self.options), declarations(Options)[name]
+            raise OptionError(f"seams must be drawn or be 'input', those of the file, not {shown(value)}")
+        options, declared = dict(self.options), declarations(Options)[name]
         if value != "rectangle":
             value = declared.kind.parse(name, value)
         for other in NUMBERS if name in NUMBERS else (name,):
-            kept.pop(other, None)
+            options.pop(other, None)
         if value != declared.default or isinstance(declared.kind, Flag):
-            kept[name] = value
-        chosen = replace(self, options=MappingProxyType(kept))
-        return chosen.searching() if name in NUMBERS else chosen
+            options[name] = value
+        chosen = replace(self, options=MappingProxyType(options))
+        return chosen.with_search() if name in NUMBERS else chosen
 
-    def searching(self) -> Choices:
-        """Return choices with a search, which keeps the places of the cones that are locked."""
+    def with_search(self) -> Choices:
+        """Return choices with a search, which keeps the locked cones."""
         locked = tuple(replace(cone, angle=None) for cone in self.cones if cone.locked)
         return replace(self, by_hand=False, cones=locked)
 
     # Cones.
 
     def placed(self, found: Iterable[int]) -> Choices:
-        """Return choices by hand: the cones that a search has found, at these vertices, become the user's."""
+        """Return choices without a search: the cones that it has found, at these vertices, become placed cones."""
         if self.by_hand:
             return self
         known = {cone.vertex: cone for cone in self.cones}
         return self._with_cones(by_hand=True, cones=known | {v: Cone(v) for v in found if v not in known})
 
     def added(self, vertex: int, angle: float | None = None) -> Choices:
-        """Return choices with a cone more.
+        """Return choices with a further cone.
 
         Raises:
-            StudioError: there is one already, or no cone has such an angle.
+            StudioError: the vertex is a cone already, or the angle is not valid.
         """
         if vertex in self._by_vertex():
             raise StudioError(f"vertex {vertex} is a cone already")
         return self._with_cones(cones=self._by_vertex() | {vertex: Cone(vertex, _checked_angle(angle))})
 
     def moved(self, vertex: int, to: int) -> Choices:
-        """Return choices with a cone elsewhere.
+        """Return choices with a cone moved to another vertex.
 
         Raises:
-            StudioError: there is no cone, or there is one at the other place.
+            StudioError: the vertex is not a cone, or the other vertex is one.
         """
         if vertex == to:
             return self
@@ -146,22 +146,22 @@ class Choices:
         """Return choices without a cone.
 
         Raises:
-            StudioError: there is none.
+            StudioError: the vertex is not a cone.
         """
         self._cone(vertex)
         return self._with_cones(cones={v: cone for v, cone in self._by_vertex().items() if v != vertex})
 
-    def angled(self, vertex: int, angle: float | None) -> Choices:
-        """Return choices with another angle, radians, of a cone, or one that is to be computed.
+    def with_angle(self, vertex: int, angle: float | None) -> Choices:
+        """Return choices with another angle of a cone, in radians; None if it must be computed.
 
         Raises:
-            StudioError: there is no cone, or no cone has such an angle.
+            StudioError: the vertex is not a cone, or the angle is not valid.
         """
         cone = replace(self._cone(vertex), angle=_checked_angle(angle))
         return self._with_cones(cones=self._by_vertex() | {vertex: cone})
 
     def locked(self, vertex: int, locked: bool) -> Choices:
-        """Return choices in which searches keep a cone where it is, or need not; one that was found is kept by this."""
+        """Return choices with a cone locked or unlocked; locking also works for cones that a search has found."""
         cones = self._by_vertex()
         cone = replace(cones.get(vertex, Cone(vertex)), locked=locked)
         if vertex not in cones and (self.by_hand or not locked):
@@ -174,69 +174,70 @@ class Choices:
     # Seams.
 
     def cut(self, path: Path) -> Choices:
-        """Return choices with a path that is cut."""
+        """Return choices with a further path that is cut."""
         return replace(self, cuts=(*self.cuts, _checked(path)))
 
-    def keep_whole(self, path: Path) -> Choices:
-        """Return choices with a path that must not be cut."""
+    def with_kept(self, path: Path) -> Choices:
+        """Return choices with a further path that must not be cut."""
         return replace(self, kept=(*self.kept, _checked(path)))
 
     def erased(self, one: int, two: int) -> Choices:
-        """Return choices without the paths that run along the edge between two vertices.
+        """Return choices without the paths that contain the edge between two vertices.
 
         Raises:
-            StudioError: none does.
+            StudioError: there is no such path.
         """
         edge = frozenset((one, two))
         cuts = tuple(path for path in self.cuts if edge not in edges_of(path))
         kept = tuple(path for path in self.kept if edge not in edges_of(path))
         if len(cuts) + len(kept) == len(self.cuts) + len(self.kept):
-            raise StudioError(f"no path was drawn along the edge {one}-{two}")
+            raise StudioError(f"no path contains the edge {one}-{two}")
         return replace(self, cuts=cuts, kept=kept)
 
-    # What is painted, corners, units.
+    # Paint, corners, units.
 
     def painted(self, layer: object, where: Region, weight: object = None) -> Choices:
-        """Return choices after a stroke of a brush; see `Paint.stroked`."""
-        return replace(self, paint=self.paint.stroked(layer, where, weight))
+        """Return choices after a stroke of the brush; see `Paint.with_stroke`."""
+        return replace(self, paint=self.paint.with_stroke(layer, where, weight))
 
-    def cornered(self, vertex: int) -> Choices:
-        """Return choices with another corner of a rectangle, or without the one that is at a vertex.
+    def with_corner(self, vertex: int) -> Choices:
+        """Return choices with a corner of the rectangle added, or removed if the vertex is one.
 
         Raises:
-            StudioError: there are four already.
+            StudioError: there are four corners already.
         """
         corners = {*self.corners} ^ {vertex}
         if len(corners) > 4:
-            raise StudioError("a rectangle has 4 corners: pick one of them to take it away first")
+            raise StudioError("a rectangle has 4 corners: pick one of them to remove it first")
         return replace(self, corners=tuple(sorted(corners)))
 
-    def measured_in(self, of_file: object, as_shown: object) -> Choices:
-        """Return choices with other units.
+    def with_units(self, of_file: object, as_shown: object) -> Choices:
+        """Return choices with other units of length.
 
         Raises:
-            StudioError: they are none, or lengths of unknown unit are to be shown in one.
+            StudioError: a unit is unknown, or a unit to show is given without that of the file.
         """
         for unit in (of_file, as_shown):
             if unit not in UNITS:
                 raise StudioError(f"unknown unit {shown(unit)}: choose from {', '.join(UNITS[1:])}")
         if as_shown and not of_file:
-            raise StudioError(f"say what the file's unit is before lengths are shown in {as_shown}")
+            raise StudioError(f"set the unit of the file before lengths are shown in {as_shown}")
         return replace(self, units=(str(of_file), str(as_shown)))
 
     def flattens_like(self, other: Choices) -> bool:
-        """Whether these choices mean the same layout as others."""
+        """Return whether these choices give the same layout as others."""
         return replace(self, units=other.units) == other
 
-    # What they mean.
+    # Conversion.
 
     def keywords(self) -> dict[str, Any]:
-        """Return the keyword arguments of `coneflat.flatten` that they mean.
+        """Return the keyword arguments of `coneflat.flatten` for these choices.
 
-        They are not kept: of painted places they take many times what the choices do, of which undo keeps hundreds.
+        They are not cached, because for painted regions they need much more memory than the choices, of which the
+        history stores hundreds.
 
         Raises:
-            OptionError: they do not go together.
+            OptionError: they cannot be combined.
         """
         words = dict(self.options)
         if self.by_hand:
@@ -245,7 +246,7 @@ class Choices:
         elif self.cones:
             words["required_cones"] = [cone.vertex for cone in self.cones]
         if words.get("boundary") == "rectangle":
-            # While corners are still to be picked, the boundary is free.
+            # The boundary is free until all corners are picked.
             del words["boundary"]
             if len(self.corners) == 4:
                 words["boundary"] = dict.fromkeys(self.corners)
@@ -257,18 +258,18 @@ class Choices:
             words["no_seams"] = np.array([*paint.no_seam.vertices(), *chain(*self.kept)])
         elif self.kept:
             words["no_seams"] = _pairs(self.kept)
-        # Of what is painted, as far as it means something: cones placed by hand or locked lie where they are.
+        # Painted regions only restrict searches, not cones that are placed by hand or locked.
         if paint.no_cone and not self.by_hand:
             locked = {cone.vertex for cone in self.cones}
             words["forbidden_cones"] = [v for v in paint.no_cone.vertices() if v not in locked]
-        # Where all angles are given there is nothing to weigh.
+        # If all angles are given, weights have no effect.
         if paint.importance and (not self.by_hand or any(cone.angle is None for cone in self.cones)):
             words["weights"] = paint.weights()
         read_options(words)
         return words
 
     def as_plain(self) -> dict[str, Any]:
-        """Return them as JSON holds them."""
+        """Return the choices as values for JSON."""
         return {
             "options": dict(self.options),
             "by_hand": self.by_hand,
@@ -282,11 +283,11 @@ class Choices:
 
     @classmethod
     def from_plain(cls, plain: Mapping[str, Any]) -> Choices:
-        """Return choices that JSON holds.
+        """Return the choices in values from JSON.
 
         Raises:
-            OptionError, StudioError: they make no sense.
-            KeyError, TypeError, ValueError, AttributeError: they are not choices at all.
+            OptionError, StudioError: a choice is not valid.
+            KeyError, TypeError, ValueError, AttributeError: the values do not have the structure of choices.
         """
         chosen = cls()
         for name, value in plain["options"].items():
@@ -296,17 +297,17 @@ class Choices:
             vertex = as_whole("a cone's vertex", each["vertex"])
             angle = None if each["angle"] is None else as_number("a cone's angle", each["angle"])
             if vertex in cones:
-                raise StudioError(f"vertex {vertex} is a cone twice")
+                raise StudioError(f"vertex {vertex} is given as a cone twice")
             cones[vertex] = Cone(vertex, _checked_angle(angle), each["locked"] is True)
         chosen = chosen._with_cones(by_hand=plain["by_hand"] is True, cones=cones)
         for path in plain["cuts"]:
             chosen = chosen.cut(tuple(path))
         for path in plain["kept"]:
-            chosen = chosen.keep_whole(tuple(path))
+            chosen = chosen.with_kept(tuple(path))
         chosen = replace(chosen, paint=Paint.from_plain(plain.get("paint", {})))
         for vertex in dict.fromkeys(plain.get("corners", ())):
-            chosen = chosen.cornered(as_whole("a corner", vertex))
-        chosen = chosen.measured_in(*plain.get("units", ("", "")))
+            chosen = chosen.with_corner(as_whole("a corner", vertex))
+        chosen = chosen.with_units(*plain.get("units", ("", "")))
         chosen.keywords()
         return chosen
 
@@ -321,14 +322,14 @@ class Choices:
 
     def _with_cones(self, *, cones: Mapping[int, Cone], by_hand: bool | None = None) -> Choices:
         by_hand = self.by_hand if by_hand is None else by_hand
-        # In order of their vertices: the same cones are the same choices, however they came about.
+        # Cones are sorted by vertex, so that the same cones are equal choices.
         return replace(self, by_hand=by_hand, cones=tuple(cones[v] for v in sorted(cones)))
 
 
 def _checked_angle(angle: float | None) -> float | None:
     if angle is not None and not 0 < angle <= MAX_CONE_ANGLE * (1 + 1e-12):
         raise StudioError(
-            f"a cone has a positive angle of at most {math.degrees(MAX_CONE_ANGLE):g} degrees, not "
+            f"a cone angle must be positive and at most {math.degrees(MAX_CONE_ANGLE):g} degrees, not "
             f"{math.degrees(angle):,g}"
         )
     return angle
@@ -337,7 +338,7 @@ def _checked_angle(angle: float | None) -> float | None:
 def _checked(path: Iterable[Any]) -> Path:
     vertices = tuple(as_whole("a path's vertex", vertex) for vertex in path)
     if len(vertices) < 2 or any(a == b for a, b in pairwise(vertices)):
-        raise StudioError(f"a path leads from one vertex to others, not along {shown(list(vertices))}")
+        raise StudioError(f"a path must be vertices, consecutive ones different, not {shown(list(vertices))}")
     return vertices
 
 
@@ -347,21 +348,21 @@ def _pairs(paths: Iterable[tuple[int, ...]]) -> Any:
 
 
 def edges_of(path: tuple[int, ...]) -> set[frozenset[int]]:
-    """Return the edges that a path runs along."""
+    """Return the edges of a path."""
     return {frozenset(edge) for edge in pairwise(path)}
 
 
-#: Numbers that are written one by one.
+#: Number of values above which lists are written as ranges.
 LISTED_NUMBERS = 12
 
 
 def replay(mesh: str, project: str, choices: Choices) -> dict[str, str]:
-    """Return what makes the same layout without the studio: the command line, and Python."""
+    """Return the command line and the Python code that give the same layout without the studio."""
     return {"command": command_line(mesh, project, choices), "python": python_lines(mesh, choices)}
 
 
 def command_line(mesh: str, project: str, choices: Choices) -> str:
-    """Return a command that flattens a mesh by what was chosen; what was drawn or painted needs the project's file."""
+    """Return a command that flattens a mesh with these choices; drawn paths and paint need the project file."""
     if choices.cuts or choices.kept or choices.paint:
         return shlex.join(["coneflat", "flatten", "--project", project])
     parts = ["coneflat", "flatten", mesh]
@@ -379,10 +380,10 @@ def command_line(mesh: str, project: str, choices: Choices) -> str:
 
 
 def python_lines(mesh: str, choices: Choices) -> str:
-    """Return Python that flattens a mesh by what was chosen."""
+    """Return Python code that flattens a mesh with these choices."""
     given = [f"    {name}={_written(value)}," for name, value in choices.keywords().items()]
-    if sum(map(len, given)) > 20_000:  # letters in the panel
-        return "# What was drawn or painted is too much to be written here; the project's file has it."
+    if sum(map(len, given)) > 20_000:  # Characters in the panel.
+        return "# The drawn paths and the paint are too large to be shown here; they are in the project file."
     call = "\n".join([f"result = coneflat.flatten(\n    {mesh!r},", *given, ")"])
     return f"import coneflat\n\n{call}"
 
@@ -399,7 +400,7 @@ def _written(value: Any) -> str:
     if isinstance(value, list) and len(value) > LISTED_NUMBERS:
         return f"[{_ranges(value)}]"
     if isinstance(value, dict) and len(value) > LISTED_NUMBERS:
-        # Those that have one value are together.
+        # Vertices with the same value are grouped.
         groups: dict[Any, list[int]] = {}
         for vertex, each in value.items():
             groups.setdefault(each, []).append(vertex)
@@ -412,6 +413,6 @@ def _written(value: Any) -> str:
 
 
 def _ranges(vertices: list[int]) -> str:
-    """Return vertices, ascending, as they stand in brackets: those that follow each other as a range."""
+    """Return ascending vertices as the content of a Python list, with consecutive vertices as ranges."""
     runs = Region.of_runs((vertex, vertex) for vertex in vertices).runs
     return ", ".join(str(a) if a == b else f"*range({a}, {b + 1})" for a, b in runs)

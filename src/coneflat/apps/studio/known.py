@@ -1,4 +1,4 @@
-"""Pictures without the arrays that the page has from one before: most of a model stays as it is when a cone moves."""
+"""Page data without the arrays that the page has already; most of them do not change when a cone is moved."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from .worker import Head
 Picture = tuple[Head, bytes]
 
 
-def with_prints(head: Head, block: bytes) -> Head:
-    """Return the head of a picture with a print of each of its arrays, by which the same are known."""
+def with_hashes(head: Head, block: bytes) -> Head:
+    """Return the head of page data with a hash of each of its arrays, by which equal arrays are recognised."""
     view = memoryview(block)
-    # 16 bytes: two arrays never have the same print by chance.
+    # With 16 bytes, hashes of different arrays do not collide by chance.
     arrays = [
         {**each, "print": blake2b(view[slice(*_span(each))], digest_size=16).hexdigest()}
         for each in head["arrays"]
@@ -22,33 +22,33 @@ def with_prints(head: Head, block: bytes) -> Head:
     return {**head, "arrays": arrays}
 
 
-class Known:
-    """What was in the last pictures; each has a number, which no other one gets."""
+class SentPictures:
+    """The hashes of the arrays in the last page data that were sent, by their numbers."""
 
     def __init__(self) -> None:
         self._count = 0
-        self._prints: OrderedDict[int, dict[str, str]] = OrderedDict()
+        self._hashes: OrderedDict[int, dict[str, str]] = OrderedDict()
 
     def numbered(self, picture: Picture) -> Picture:
-        """Return a picture that has prints with a number, from 1 on."""
+        """Return page data with a new number, from 1 on, and store the hashes of its arrays."""
         head, block = picture
         self._count += 1
-        self._prints[self._count] = {each["name"]: each["print"] for each in head["arrays"]}
-        if len(self._prints) > 16:  # pictures: more than the page can be behind by
-            self._prints.popitem(last=False)
+        self._hashes[self._count] = {each["name"]: each["print"] for each in head["arrays"]}
+        if len(self._hashes) > 16:  # The page is never further behind than this.
+            self._hashes.popitem(last=False)
         return {**head, "number": self._count}, block
 
     def without(self, number: int, picture: Picture) -> Picture:
-        """Return a picture without the arrays that the one of a number has, too; these have no place in it."""
+        """Return page data without the arrays that those of a number contain, too; the offset of these is None."""
         head, block = picture
-        prints = self._prints.get(number, {})
+        hashes = self._hashes.get(number, {})
         arrays, parts, offset = [], [], 0
         for each in head["arrays"]:
-            if prints.get(each["name"]) == each["print"]:
+            if hashes.get(each["name"]) == each["print"]:
                 arrays.append({**each, "offset": None})
                 continue
             begin, end = _span(each)
-            end += -end % 4  # as arrays lie in the block
+            end += -end % 4  # Arrays are aligned to 4 bytes in the block.
             arrays.append({**each, "offset": offset})
             parts.append(memoryview(block)[begin:end])
             offset += end - begin
@@ -56,5 +56,5 @@ class Known:
 
 
 def _span(listed: dict[str, Any]) -> tuple[int, int]:
-    """Return where an array begins and ends in its block."""
+    """Return the begin and the end of an array in its block."""
     return listed["offset"], listed["offset"] + int(listed["type"][1:]) * listed["count"]

@@ -1,6 +1,6 @@
-"""What the page says: messages in its words, and warnings of cones that were set by hand.
+"""Messages of the page: errors in terms of its controls, and warnings on cones that were placed by hand.
 
-The warnings are noted on the result, too.
+The warnings are also added to the notes on the result.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ from .paint import Region
 if TYPE_CHECKING:
     from ... import Flattening
 
-#: By the name of an option: what is written on the control that sets it.
+#: Label of the control of each option in the page.
 CONTROLS = {
     "distortion": "Distortion",
     "cone_count": "Number",
     "required_cones": "Lock",
     "forbidden_cones": "No cones",
     "weights": "Important",
-    "seams": "Keep those of the file's UVs",
+    "seams": "Keep the UV seams of the file",
     "no_seams": "No seams",
     "sharp_angle": "Cut edges sharper than",
-    "hide_seams": "Hide them",
+    "hide_seams": "Hide seams",
     "boundary": "Boundary",
     "stretch": "From angles to areas",
     "charts": "Charts",
-    "resolution": "Texels a side",
+    "resolution": "Texels per side",
     "padding": "Texels between charts",
     "repair": "Repair the mesh",
 }
-#: A flag, or a name that is not a word; a name that is one means an option where a message begins with it.
+#: A flag, or the name of an option; names that are ordinary words count at the beginning of a message only.
 _NAMED = re.compile(
     r"--(?P<flag>[a-z]+(?:-[a-z]+)*)(?: (?:greedy|exact|linear)\b)?"
     rf"|\b(?P<name>{'|'.join(name for name in CONTROLS if '_' in name)})\b"
@@ -46,8 +46,8 @@ _NAMED = re.compile(
 )
 
 
-def in_page(message: str) -> str:
-    """Return a message with the page's controls for options and flags; of those without one, whose flag it is."""
+def page_message(message: str) -> str:
+    """Return a message with options and flags replaced by the labels of their controls, if they have one."""
     return _NAMED.sub(_control, message.replace(REPAIR_ADVICE, "repair the mesh"))
 
 
@@ -57,20 +57,20 @@ def _control(found: re.Match[str]) -> str:
     return f"“{CONTROLS[name]}”" if name in CONTROLS else f"{found[0]} of coneflat flatten"
 
 
-def misplaced(chosen: Choices) -> tuple[str, ...]:
-    """Return a sentence on cones that lie where none are to be, as painted, which binds searches alone."""
-    inside = within(chosen.paint.no_cone, [cone.vertex for cone in chosen.cones])
+def misplaced_warning(chosen: Choices) -> tuple[str, ...]:
+    """Return a sentence on cones in regions painted as "no cones", or nothing; these regions restrict searches only."""
+    inside = vertices_in(chosen.paint.no_cone, [cone.vertex for cone in chosen.cones])
     if not inside:
         return ()
     verb, what = ("lies", "vertex") if len(inside) == 1 else ("lie", "vertices")
     return (
-        f"{plural(len(inside), 'cone')} set by hand or locked {verb} where none are to be, as painted: "
-        f"{what} {list_some(inside)}. Searches keep off such places; what is set by hand stays.",
+        f"{plural(len(inside), 'cone')} set by hand or locked {verb} in regions painted as “No cones”: "
+        f"{what} {list_some(inside)}. Searches avoid these regions; cones set by hand remain.",
     )
 
 
-def within(region: Region, vertices: Iterable[int]) -> list[int]:
-    """Return those of some vertices that are in a region."""
+def vertices_in(region: Region, vertices: Iterable[int]) -> list[int]:
+    """Return those of the given vertices that are in a region."""
     runs = region.runs
     firsts = [first for first, _ in runs]
 
@@ -81,28 +81,28 @@ def within(region: Region, vertices: Iterable[int]) -> list[int]:
     return [vertex for vertex in vertices if is_inside(vertex)]
 
 
-def strained(chosen: Choices, result: Flattening) -> tuple[str, ...]:
-    """Return a sentence on cones of a result whose angle is out of bounds, as those that were typed leave no other."""
+def angle_warning(chosen: Choices, result: Flattening) -> tuple[str, ...]:
+    """Return a sentence on computed cone angles that are out of bounds because of typed ones, or nothing."""
     least, most = MIN_CONE_ANGLE, MAX_CONE_ANGLE
     typed = {cone.vertex for cone in chosen.cones if cone.angle is not None}
     if not (chosen.by_hand and typed):
         return ()
-    slack = 1e-9 * most  # rounding
+    slack = 1e-9 * most  # Tolerance for rounding.
     names = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
     angles = 2 * math.pi - result.curvatures
-    off = [
+    outside = [
         f"vertex {vertex} {math.degrees(angle):.4g}"
         for vertex, angle in sorted(zip(names.tolist(), angles.tolist(), strict=True))
         if vertex not in typed and not least - slack <= angle <= most + slack
     ]
-    if not off:
+    if not outside:
         return ()
     return (
-        f"The angles that are typed leave {plural(len(off), 'cone')} none from {math.degrees(least):g} to "
-        f"{math.degrees(most):g} degrees: {list_some(off)}. Type others, or add a cone whose angle is computed.",
+        f"With the typed angles, {plural(len(outside), 'cone')} cannot have an angle from {math.degrees(least):g} to "
+        f"{math.degrees(most):g} degrees: {list_some(outside)}. Change them, or add a cone whose angle is computed.",
     )
 
 
-def noted(result: Flattening, chosen: Choices) -> Flattening:
-    """Return a result of what was chosen with what is to be known of it among its notes."""
-    return replace(result, notes=(*result.notes, *misplaced(chosen), *strained(chosen, result)))
+def with_warnings(result: Flattening, chosen: Choices) -> Flattening:
+    """Return a result with the warnings on the choices added to its notes."""
+    return replace(result, notes=(*result.notes, *misplaced_warning(chosen), *angle_warning(chosen, result)))

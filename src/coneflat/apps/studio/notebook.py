@@ -1,4 +1,4 @@
-"""The studio from Python: its page in a frame, as notebooks show it, what is chosen there and what comes of it."""
+"""The studio in Python: its page in the frame of a notebook, its choices and its result."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from ...base import shown
 from ...errors import ArrayShapeError, OptionError, StudioError
 from ...io import as_input, atomic_write, lines_of
-from .serve import address_of, listening, studio_server
+from .serve import listening, page_address, studio_server
 from .session import PATIENCE, Session
 
 if TYPE_CHECKING:
@@ -25,16 +25,16 @@ if TYPE_CHECKING:
 
 
 class Studio:
-    """A studio that this process serves, until it is closed or the process ends.
+    """A studio that is served by this process until it is closed or the process ends.
 
-    The last line of a notebook's cell shows its page in a frame, which the browser loads from this machine; or, where
-    the kernel runs elsewhere, from the notebook's server by a proxy. A saved notebook holds no picture of it.
+    As the last line of a notebook cell, it is shown as a frame. The browser loads the page from this machine or, if the
+    kernel runs on another one, through a proxy of the notebook server. A saved notebook does not contain the page.
 
     Attributes:
-        address: of the page, for any browser on this machine, or as the notebook has it through a proxy; who knows it
-            may change what is chosen.
-        project: the file in which everything that is chosen is kept.
-        height: of the frame, pixels.
+        address: address of the page for browsers on this machine, or through the proxy. Everyone who knows it can
+            change the choices.
+        project: path of the project file, which contains all choices.
+        height: height of the frame in pixels.
     """
 
     def __init__(
@@ -51,17 +51,17 @@ class Studio:
             mesh: a file or a project; or vertices (n, 3) if `faces` is given, a pair (vertices, faces), or a mesh of
                 trimesh, meshio or pyvista.
             faces: (m, 3) vertex indices.
-            folder: where the project is kept, and meshes that come as arrays; by default the current one, and for
-                arrays a new one that goes with the studio.
-            color: numbers that are shown as colours, see `coneflat view --color`.
-            height: of the frame, pixels.
-            through: where a proxy has a port of this machine, as the browser sees it: "/proxy/{port}/" with
-                jupyter-server-proxy, "/user/NAME/proxy/{port}/" on a hub. Then the token alone keeps others out.
+            folder: folder of the project, and of meshes given as arrays; by default the current one, and for arrays
+                a temporary one that is removed by `close`.
+            color: name of values that are shown as colours, see `coneflat view --color`.
+            height: height of the frame in pixels.
+            through: address of ports of this machine through a proxy, as the browser uses it: "/proxy/{port}/" with
+                jupyter-server-proxy, "/user/NAME/proxy/{port}/" on a hub. Access is then protected by the token only.
 
         Raises:
-            ArrayShapeError: it is not a mesh.
+            ArrayShapeError: the arrays are not a mesh.
             MeshFileError, ProjectError: the file cannot be read.
-            OptionError: the extra `studio` is not installed, or `through` names no port.
+            OptionError: the extra `studio` is not installed, or `through` does not contain "{port}".
         """
         server_class = studio_server()
         self.height = height
@@ -76,7 +76,7 @@ class Studio:
             self._session.open(file)
             token, listener = secrets.token_urlsafe(24), listening(0)
             port = listener.getsockname()[1]
-            self.address = address_of(port, token) if through is None else _proxied(through, port, token)
+            self.address = page_address(port, token) if through is None else _proxied(through, port, token)
             self._server = server_class(self._session, token, port, framed=True, proxied=through is not None)
         except BaseException:
             self._session.close()
@@ -85,7 +85,7 @@ class Studio:
         self._thread.start()
 
     def _file_of(self, mesh: Any, faces: ArrayLike | None, folder: str | PathLike[str] | None) -> Path:
-        """Return the file of a mesh; arrays are written to one."""
+        """Return the path of a mesh file; arrays are written to a new file."""
         if faces is None and isinstance(mesh, (str, PathLike)):
             return Path(mesh)
         given = as_input(mesh, faces)
@@ -96,7 +96,7 @@ class Studio:
             raise ArrayShapeError(f"vertices must have the shape (n, 3), not {vertices.shape}")
         if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
             raise ArrayShapeError(
-                f"faces must be integers of the shape (m, 3), not of {triangles.shape} and type {triangles.dtype}"
+                f"faces must be integers of shape (m, 3), not of shape {triangles.shape} and type {triangles.dtype}"
             )
         if folder is None:
             self._own_folder = tempfile.TemporaryDirectory(prefix="coneflat-")
@@ -109,30 +109,30 @@ class Studio:
 
     @property
     def project(self) -> Path:
-        """The file in which everything that is chosen is kept."""
+        """Return the path of the project file, which contains all choices."""
         assert self._session.project_file is not None
         return self._session.project_file.resolve()
 
     @property
     def choices(self) -> dict[str, Any]:
-        """What is chosen, as the project's file has it; others may be set, which is a step that can be undone."""
+        """Return the choices as in the project file; they can be set, which is a step that can be undone."""
         return dict(self._session.state()["choices"])
 
     @choices.setter
     def choices(self, choices: Mapping[str, Any]) -> None:
-        """Choose something else.
+        """Set the choices.
 
         Raises:
-            StudioError, OptionError: it makes no sense.
+            StudioError, OptionError: a choice is not valid.
         """
         self._session.choose(choices)
 
     @property
     def result(self) -> Flattening:
-        """What comes of the choices, waited for.
+        """Return the flattening for the choices, after waiting for it.
 
         Raises:
-            StudioError: they cannot be, and why.
+            StudioError: the flattening has failed, or takes too long.
         """
         from ... import read_flattening
 
@@ -149,7 +149,7 @@ class Studio:
             return read_flattening(path)
 
     def close(self) -> None:
-        """End the page and what works behind it; the project stays, but for one in a folder of the studio's own."""
+        """End the server and the worker process; the project remains, except in a temporary folder."""
         self._server.should_exit = True
         self._thread.join(10)
         self._session.close()
@@ -163,7 +163,7 @@ class Studio:
         self.close()
 
     def _repr_html_(self) -> str:
-        """Return the page in a frame, which notebooks show."""
+        """Return the page in a frame, for notebooks."""
         return (
             f'<iframe src="{html.escape(self.address)}" title="coneflat studio" allow="clipboard-write" '
             f'style="width: 100%; height: {int(self.height)}px; border: 1px solid #8886; border-radius: 6px"></iframe>'
@@ -174,29 +174,29 @@ class Studio:
 
 
 def _proxied(through: str, port: int, token: str) -> str:
-    """Return the address of the page as a proxy has it.
+    """Return the address of the page through a proxy.
 
     Raises:
-        OptionError: that has no place for the port.
+        OptionError: the address does not contain "{port}".
     """
     if "{port}" not in through:
         raise OptionError(
-            f"through is an address with the port in it, such as /proxy/{{port}}/, not {shown(through)}"
+            f"through must be an address that contains {{port}}, such as /proxy/{{port}}/, not {shown(through)}"
         )
     return f"{through.replace('{port}', str(port)).rstrip('/')}/?token={token}"
 
 
 def studio(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Studio:
-    """Return the studio on a mesh, as a page that notebooks show; see `Studio` for the arguments and what it has.
+    """Return a studio for a mesh, whose page is shown in notebooks; see `Studio` for its arguments and attributes.
 
     Args:
-        mesh, faces: a file or a project, or a mesh as `coneflat.flatten` takes it.
-        options: the other arguments of `Studio`.
+        mesh, faces: a file or a project, or a mesh as in `coneflat.flatten`.
+        options: further arguments of `Studio`.
 
     Raises:
-        ArrayShapeError: it is not a mesh.
+        ArrayShapeError: the arrays are not a mesh.
         MeshFileError, ProjectError: the file cannot be read.
-        OptionError: the extra `studio` is not installed, or `through` names no port.
+        OptionError: the extra `studio` is not installed, or `through` does not contain "{port}".
 
     Examples:
         >>> page = coneflat.studio(coneflat.sample_path())  # doctest: +SKIP

@@ -1,4 +1,4 @@
-"""What the studio makes beside layouts: files, quads, and how distortion falls with more cones."""
+"""Outputs of the studio in addition to layouts: files, quads, and curves of distortion by number of cones."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ if TYPE_CHECKING:
     from ...io import Joined
     from .choices import Choices
 
-#: What a result can be saved as: .json is its report, .png a picture of the layout.
+#: File formats of results: .json is the report, .svg and .png are pictures of the layout.
 EXPORTS = (".obj", ".ply", ".glb", ".npz", ".svg", ".png", ".json")
-#: What quads can be saved as.
+#: File formats of quads.
 QUADS = (".obj", ".ply", ".glb")
-MOST_QUADS = 1_000_000
-#: Options that a search for any number of cones heeds, and those that quads heed.
-OF_CURVES = (
+MAX_QUADS = 1_000_000
+#: Options that apply to curves, and those that apply to quads.
+CURVE_OPTIONS = (
     "required_cones", "forbidden_cones", "weights", "seams", "no_seams", "sharp_angle", "repair",
 )  # fmt: skip
-OF_QUADS = ("forbidden_cones", "weights", "sharp_angle", "stretch", "repair")
+QUAD_OPTIONS = ("forbidden_cones", "weights", "sharp_angle", "stretch", "repair")
 
-Told = Callable[[str, float], None]
+Progress = Callable[[str, float], None]
 
 
-def saved(result: Flattening | None, ending: str) -> bytes:
-    """Return a result as a file; ending: one of `EXPORTS`.
+def result_file(result: Flattening | None, ending: str) -> bytes:
+    """Return the content of a file of a result; ending: one of `EXPORTS`.
 
     Raises:
         StudioError: there is no result.
@@ -58,53 +58,54 @@ def saved(result: Flattening | None, ending: str) -> bytes:
     return stream.getvalue()
 
 
-def quads_of(source: Joined, choices: Choices, count: int, ending: str, told: Told) -> bytes:
-    """Return quads of a mesh as a file.
+def quads_file(source: Joined, choices: Choices, count: int, ending: str, report: Progress) -> bytes:
+    """Return the content of a file of quads of a mesh.
 
-    They have cones of their own, of whole multiples of 90 degrees. Of what is chosen they heed where cones may not lie,
-    importance, sharp edges, areas, and a straight boundary.
+    Quads have their own cones, with curvatures that are multiples of 90 degrees. The choices that apply are forbidden
+    cones, importance, sharp edges, the trade-off between angles and areas, and a straight boundary.
 
     Args:
         source: the mesh.
-        choices: what is chosen.
-        count: about how many.
+        choices: the choices of the user.
+        count: approximate number of quads.
         ending: one of `QUADS`.
-        told: as of `coneflat.flatten`'s progress.
+        report: called like `progress` of `coneflat.flatten`.
     """
     from ... import quads
     from ..quads.files import write_quads_stream
 
-    words = choices.searching().keywords()
-    options = {name: words[name] for name in OF_QUADS if name in words}
+    words = choices.with_search().keywords()
+    options = {name: words[name] for name in QUAD_OPTIONS if name in words}
     if words.get("boundary") == "straight":
         options["boundary"] = "straight"
-    found = quads(source.mesh, quads=count, progress=told, **source.renamed(options))
+    found = quads(source.mesh, quads=count, progress=report, **source.renamed(options))
     stream = BytesIO()
     write_quads_stream(found, stream, ending)
     return stream.getvalue()
 
 
-def curve_of(source: Joined, choices: Choices, told: Told) -> dict[str, Any]:
-    """Return the least distortion found for each number of cones around those that are locked, as plain values.
+def curve_data(source: Joined, choices: Choices, report: Progress) -> dict[str, Any]:
+    """Return the least distortion found for each number of cones, locked ones included, as values for JSON.
 
-    That of the whole, with so many cones in each of its parts: components, and what is between marked seams.
+    It is the distortion of the whole mesh with this number of cones in each part: components, and regions between
+    marked seams.
     """
     from ...cone_curve import whole_curve
     from ...options import read_options
 
     words = curve_options(choices)
-    most = max(MOST_CONES, len(words.get("required_cones", ())) + 12)  # of which a dozen are free
+    n = max(MOST_CONES, len(words.get("required_cones", ())) + 12)  # A dozen of them are free.
     found = whole_curve(
-        source.mesh, None, read_options({**source.renamed(words), "cone_count": most, "progress": told}), most
+        source.mesh, None, read_options({**source.renamed(words), "cone_count": n, "progress": report}), n
     )
     curve = {"counts": found.counts.tolist(), "distortions": found.distortions.tolist()}
     return {**curve, "knee": found.knee, "parts": found.parts}
 
 
 def curve_options(choices: Choices) -> dict[str, Any]:
-    """Return what of the choices a curve depends on."""
-    words = choices.searching().keywords()
-    return {name: words[name] for name in OF_CURVES if name in words}
+    """Return the keyword arguments on which the curve depends."""
+    words = choices.with_search().keywords()
+    return {name: words[name] for name in CURVE_OPTIONS if name in words}
 
 
 def layout_svg(result: Flattening) -> str:

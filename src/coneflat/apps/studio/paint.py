@@ -1,4 +1,4 @@
-"""What the user has painted on the surface: where no cone lies, where no seam runs, what is important."""
+"""Painted regions of the surface: no cones, no seams, and importance."""
 
 from __future__ import annotations
 
@@ -12,78 +12,76 @@ from ...base import shown
 from ...errors import StudioError
 from ...options import as_number
 
-#: A region in words: numbers, and first and last of those that follow each other.
+#: A run of vertices in the text of a region: a vertex, or the first and the last one.
 _RUN = re.compile(r"([0-9]{1,15})(?:-([0-9]{1,15}))?")
-#: What is painted beside importance.
+#: Layers of paint in addition to importance.
 FLAGS = ("no_cone", "no_seam")
-MOST_IMPORTANT = 1e6
-#: Vertices that may be painted: more than any mesh has that a browser draws, and few enough to be counted out.
-MOST_PAINTED = 20_000_000
+MAX_IMPORTANCE = 1e6
+#: Largest number of painted vertices: above that of any mesh that a browser can draw, but small enough for lists.
+MAX_PAINTED = 20_000_000
 
 Runs = tuple[tuple[int, int], ...]
 
 
 @dataclass(frozen=True)
 class Region:
-    """A set of vertices; as text, a tenth of what numbers take: every step that can be undone has some.
+    """A set of vertices, stored as text, which needs a tenth of the memory of numbers in the undo history.
 
     Attributes:
-        text: numbers, and first and last of those that follow each other, ascending: "3-17 20".
+        text: ascending vertices and ranges of consecutive vertices, such as "3-17 20".
     """
 
     text: str = ""
 
     @classmethod
     def of_runs(cls, runs: Iterable[tuple[int, int]]) -> Region:
-        """Return what runs, first and last vertex of each, make together."""
+        """Return the union of runs, each given by its first and last vertex."""
         return cls(" ".join(str(a) if a == b else f"{a}-{b}" for a, b in _merged(runs)))
 
     @classmethod
     def of_text(cls, text: object) -> Region:
-        """Return what a text such as "3-17 20" names.
+        """Return the region given by a text such as "3-17 20".
 
         Raises:
-            StudioError: it is no such text, or names too many vertices.
+            StudioError: the text is not valid, or there are too many vertices.
         """
         if not isinstance(text, str):
-            raise StudioError(f"a region is written as 3-17 20, not {shown(text)}")
+            raise StudioError(f"a region must be a text such as 3-17 20, not {shown(text)}")
         runs = []
         for word in text.split():
             found = _RUN.fullmatch(word)
             first, last = (found[1], found[2] or found[1]) if found else ("1", "0")
             if int(first) > int(last):
-                raise StudioError(f"a region is written as 3-17 20; {shown(word)} is not part of one")
+                raise StudioError(f"a region must be a text such as 3-17 20; {shown(word)} is not valid")
             runs.append((int(first), int(last)))
         region = cls.of_runs(runs)
-        if region.count > MOST_PAINTED:
-            raise StudioError(
-                f"{region.count:,} painted vertices are more than the {MOST_PAINTED:,} that may be"
-            )
+        if region.count > MAX_PAINTED:
+            raise StudioError(f"{region.count:,} painted vertices are above the limit of {MAX_PAINTED:,}")
         return region
 
     @property
     def runs(self) -> Runs:
-        """First and last of the vertices that follow each other, ascending; they neither overlap nor touch."""
+        """Return the first and last vertex of each maximal run of consecutive vertices, ascending."""
         ends = (word.partition("-") for word in self.text.split())
         return tuple((int(first), int(last or first)) for first, _, last in ends)
 
     @property
     def count(self) -> int:
-        """How many vertices it has."""
+        """Return the number of vertices."""
         return sum(last - first + 1 for first, last in self.runs)
 
     def vertices(self) -> list[int]:
-        """Return its vertices, ascending."""
+        """Return the vertices, ascending."""
         return [vertex for first, last in self.runs for vertex in range(first, last + 1)]
 
     def joined(self, other: Region) -> Region:
-        """Return what is in this one or in the other."""
+        """Return the union of two regions."""
         return Region.of_runs((*self.runs, *other.runs))
 
     def without(self, other: Region) -> Region:
-        """Return what is in this one and not in the other."""
+        """Return the vertices of this region that are not in another."""
         left, at = [], 0
-        taken = (*other.runs, (2**53, 2**53))  # above all vertices
+        taken = (*other.runs, (2**53, 2**53))  # Above all vertices.
         for first, last in self.runs:
             begin = first
             while taken[at][1] < begin:
@@ -115,55 +113,57 @@ def _merged(runs: Iterable[tuple[int, int]]) -> Runs:
 
 @dataclass(frozen=True)
 class Paint:
-    """What is painted; nothing of it ever changes.
+    """The painted regions; immutable.
 
     Attributes:
-        no_cone: where searches put no cone.
-        no_seam: where no seam runs.
-        importance: weights, ascending, and where they are; elsewhere it is 1. These regions do not meet.
+        no_cone: vertices at which searches must not place cones.
+        no_seam: vertices between which there must be no seams.
+        importance: ascending weights and their regions, which are disjoint; elsewhere the weight is 1.
     """
 
     no_cone: Region = field(default_factory=Region)
     no_seam: Region = field(default_factory=Region)
     importance: tuple[tuple[float, Region], ...] = ()
 
-    def flagged(self, flag: str, where: Region) -> Paint:
-        """Return paint with more of a flag, one of `FLAGS`.
+    def with_flag(self, flag: str, where: Region) -> Paint:
+        """Return paint with vertices added to a layer, one of `FLAGS`.
 
         Raises:
-            StudioError: there is none of this name.
+            StudioError: there is no such layer.
         """
         if flag in FLAGS:
             return replace(self, **{flag: getattr(self, flag).joined(where)})
-        raise StudioError(f"nothing is painted as {shown(flag)}: choose from {', '.join(FLAGS)}, importance")
+        raise StudioError(f"unknown layer of paint {shown(flag)}: choose from {', '.join(FLAGS)}, importance")
 
-    def weighted(self, weight: float, where: Region) -> Paint:
-        """Return paint with another weight of some vertices.
+    def with_weight(self, weight: float, where: Region) -> Paint:
+        """Return paint with another weight for some vertices.
 
         Raises:
-            StudioError: it is none.
+            StudioError: the weight is not valid.
         """
-        if not 0 < weight <= MOST_IMPORTANT:
-            raise StudioError(f"an importance is above 0 and at most {MOST_IMPORTANT:,.0f}, not {weight:g}")
+        if not 0 < weight <= MAX_IMPORTANCE:
+            raise StudioError(
+                f"an importance must be above 0 and at most {MAX_IMPORTANCE:,.0f}, not {weight:g}"
+            )
         known = {each: region.without(where) for each, region in self.importance}
         if weight != 1:
             known[weight] = known.get(weight, Region()).joined(where)
         return replace(self, importance=tuple((each, known[each]) for each in sorted(known) if known[each]))
 
     def erased(self, where: Region) -> Paint:
-        """Return paint with nothing at some vertices."""
+        """Return paint with all layers erased at some vertices."""
         bare = replace(self, no_cone=self.no_cone.without(where), no_seam=self.no_seam.without(where))
-        return bare.weighted(1.0, where)
+        return bare.with_weight(1.0, where)
 
     def __bool__(self) -> bool:
         return bool(self.no_cone or self.no_seam or self.importance)
 
     def weights(self) -> dict[int, float]:
-        """Return vertex -> weight, of those that have one."""
+        """Return a map from vertex to weight, for the vertices with a weight other than 1."""
         return {vertex: weight for weight, region in self.importance for vertex in region.vertices()}
 
     def as_plain(self) -> dict[str, Any]:
-        """Return it as JSON holds it."""
+        """Return the paint as values for JSON."""
         plain: dict[str, Any] = {flag: getattr(self, flag).text for flag in FLAGS if getattr(self, flag)}
         if self.importance:
             plain["importance"] = {repr(weight): region.text for weight, region in self.importance}
@@ -171,39 +171,39 @@ class Paint:
 
     @classmethod
     def from_plain(cls, plain: Mapping[str, Any]) -> Paint:
-        """Return paint that JSON holds.
+        """Return the paint in values from JSON.
 
         Raises:
-            StudioError, OptionError: it makes no sense.
-            AttributeError: it is none at all.
+            StudioError, OptionError: a value is not valid.
+            AttributeError: the values do not have the structure of paint.
         """
         paint = cls()
         for name, given in plain.items():
             if name == "importance":
                 for weight, text in given.items():
-                    paint = paint.weighted(_weight(weight), Region.of_text(text))
+                    paint = paint.with_weight(_weight(weight), Region.of_text(text))
             else:
-                paint = paint.flagged(name, Region.of_text(given))
+                paint = paint.with_flag(name, Region.of_text(given))
         return paint
 
-    def stroked(self, layer: object, where: Region, weight: object) -> Paint:
-        """Return paint after a stroke of a brush, of a layer: one of `FLAGS`, "importance", or "erase".
+    def with_stroke(self, layer: object, where: Region, weight: object) -> Paint:
+        """Return paint after a stroke of the brush; layer: one of `FLAGS`, "importance", or "erase".
 
         Raises:
-            StudioError, OptionError: there is no such layer, or no such weight.
+            StudioError, OptionError: the layer is unknown, or the weight is not valid.
         """
         if layer == "erase":
             return self.erased(where)
         if layer == "importance":
-            return self.weighted(_weight(weight), where)
-        return self.flagged(str(layer), where)
+            return self.with_weight(_weight(weight), where)
+        return self.with_flag(str(layer), where)
 
 
 def _weight(given: object) -> float:
-    """Return an importance from what JSON holds, where keys are text."""
+    """Return a weight from a value of JSON, in which keys are text."""
     if isinstance(given, str):
         try:
             return float(given)
         except ValueError:
-            return math.nan  # which is refused
+            return math.nan  # NaN is rejected later.
     return as_number("an importance", given)

@@ -1,4 +1,4 @@
-"""A project: one small JSON file with a mesh, by path and hash, and what was chosen for it; and how both are opened."""
+"""Projects: a small JSON file with the path and hash of a mesh and the choices for it."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ ENDING = ".json"
 
 @dataclass(frozen=True)
 class Project:
-    """A mesh file and what was chosen for it.
+    """A mesh file and the choices for it.
 
     Attributes:
-        mesh: the file.
-        sha256: of its content, hexadecimal.
-        choices: what was chosen.
+        mesh: path of the mesh file.
+        sha256: SHA-256 of its content, hexadecimal.
+        choices: the choices of the user.
     """
 
     mesh: Path
@@ -34,7 +34,7 @@ class Project:
     choices: Choices
 
     def save(self, path: Path) -> None:
-        """Write it, in full or not at all; the mesh is named as it lies beside the project.
+        """Write the project, with the path of the mesh relative to it; no incomplete file is left.
 
         Raises:
             MeshFileError: the file cannot be written.
@@ -50,30 +50,30 @@ class Project:
             stream.write("\n")
 
     def check_mesh(self) -> None:
-        """Make sure that the mesh is the one that the choices were made for.
+        """Check that the mesh is the one for which the choices were made.
 
         Raises:
-            ProjectError: it has been changed since, or is not there.
+            ProjectError: the mesh has been changed since, or is missing.
         """
         try:
-            found = hash_of(self.mesh)
+            found = file_hash(self.mesh)
         except MeshFileError as error:
             raise ProjectError(f"the project's mesh is missing: {error}") from error
         if found != self.sha256:
             raise ProjectError(
                 f"{self.mesh} is not the mesh that the project was made with: its SHA-256 begins with {found[:12]}, "
-                f"not {self.sha256[:12]}, so numbers of vertices may mean others"
+                f"not {self.sha256[:12]}, so vertex numbers may have changed"
             )
 
 
 def read_project(path: Path) -> Project:
-    """Return the project that a file holds; its mesh is not looked at.
+    """Return the project in a file; its mesh is not read.
 
     Raises:
-        ProjectError: it cannot be read, or is none.
+        ProjectError: the file cannot be read, or is not a project.
     """
     try:
-        if path.stat().st_size > 64 * 1024 * 1024:  # a project of a million drawn edges is smaller
+        if path.stat().st_size > 64 * 1024 * 1024:  # A project with a million drawn edges is smaller.
             raise ProjectError(f"{path} is not a project: it has {path.stat().st_size:,} bytes")
         content = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -95,19 +95,17 @@ def _project(path: Path, content: Any) -> Project:
         file, sha256 = Path(str(mesh["path"])), str(mesh["sha256"])
         choices = Choices.from_plain(content["choices"])
     except ConeflatError as error:
-        raise ProjectError(f"{path} holds choices that make no sense: {error}") from error
+        raise ProjectError(f"{path} contains choices that are not valid: {error}") from error
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ProjectError(
-            f"{path} is not a project: something in it is missing or broken ({error})"
-        ) from error
+        raise ProjectError(f"{path} is not a project: an entry is missing or not valid ({error})") from error
     return Project(Path(os.path.normpath(path.parent / file)), sha256, choices)
 
 
-def hash_of(path: Path) -> str:
-    """Return the SHA-256 of a file's content.
+def file_hash(path: Path) -> str:
+    """Return the SHA-256 of the content of a file, hexadecimal.
 
     Raises:
-        MeshFileError: it cannot be read.
+        MeshFileError: the file cannot be read.
     """
     try:
         with path.open("rb") as stream:
@@ -120,32 +118,34 @@ def hash_of(path: Path) -> str:
 
 
 def _relative(path: Path, folder: Path) -> str:
-    """Return a path as seen from a folder, with slashes; the full path where there is no way."""
+    """Return a path relative to a folder, with slashes; the full path if it is on another drive."""
     try:
         return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
     except ValueError:  # Another drive.
         return str(path.resolve())
 
 
-def opened(path: Path, folder: Path, only_within: bool = False) -> tuple[Project, Path]:
-    """Return a mesh with what was chosen for it before, and the file that it is kept in; or a project and its file.
+def open_project(path: Path, folder: Path, only_within: bool = False) -> tuple[Project, Path]:
+    """Return the project of a mesh or of a project file, and the path of its file.
+
+    A mesh whose project is in the folder is opened with the choices in it.
 
     Args:
-        path: a mesh or a project.
-        folder: of the projects of meshes.
-        only_within: the mesh of a project must lie in the folder, too.
+        path: path of a mesh or a project.
+        folder: folder of the projects of meshes.
+        only_within: whether the mesh of a project must be in the folder, too.
 
     Raises:
         MeshFileError: the mesh cannot be read.
-        ProjectError: the project cannot, or its mesh is another.
+        ProjectError: the project cannot be read, or belongs to another mesh.
     """
     if path.suffix.lower() == ENDING:
         project = read_project(path)
         if only_within and not project.mesh.resolve().is_relative_to(folder):
-            raise ProjectError(f"the mesh of {path.name} lies outside the session's folder")
+            raise ProjectError(f"the mesh of {path.name} is outside the folder of the session")
         project.check_mesh()
         return project, path
-    sha256, file = hash_of(path), folder / f"{path.stem}_studio{ENDING}"
+    sha256, file = file_hash(path), folder / f"{path.stem}_studio{ENDING}"
     if not file.exists():
         return Project(path, sha256, Choices()), file
     before = read_project(file)
@@ -158,16 +158,18 @@ def opened(path: Path, folder: Path, only_within: bool = False) -> tuple[Project
 
 
 def file_within(name: str, folder: Path) -> Path:
-    """Return the file of a folder, without links in its own path, that has a name.
+    """Return the path of a file in a folder; `folder` must be a resolved path.
 
     Raises:
-        StudioError: it lies elsewhere, or has no proper name.
+        StudioError: the name is not valid, or the file is a link to another folder.
     """
     if not name:
-        raise StudioError("no file is named: give the name of a mesh or a project in the session's folder")
+        raise StudioError(
+            "no file is given: expected the name of a mesh or a project in the folder of the session"
+        )
     if name != Path(name).name or name.startswith(".") or "\\" in name or "\0" in name:
-        raise StudioError(f"{shown(name)} is not a name of a file in the session's folder")
+        raise StudioError(f"{shown(name)} is not the name of a file in the folder of the session")
     path = folder / name
     if not path.resolve().is_relative_to(folder):
-        raise StudioError(f"{shown(name)} leads out of the session's folder")
+        raise StudioError(f"{shown(name)} is outside the folder of the session")
     return path

@@ -1,4 +1,4 @@
-"""The studio at work: a session, its server, and the browser."""
+"""Start of the studio: a session, its server, and the browser."""
 
 from __future__ import annotations
 
@@ -23,24 +23,24 @@ def run_studio(
     port: int,
     opens: bool,
     say: Callable[[str], None],
-    tell: Callable[[str], None] | None,
+    log: Callable[[str], None] | None,
     color: str | None,
     most_triangles: int,
 ) -> None:
     """Serve a session until it is interrupted.
 
     Args:
-        file: a mesh or a project to begin with.
-        port: of this machine; 0 for a free one.
-        opens: show the page in the browser.
-        say: is told the page's address first.
-        tell: is told of every layout and every failure, if anybody wants to know.
-        color: what numbers of the user's own are shown as colours.
-        most_triangles: of larger meshes fewer are shown.
+        file: path of a mesh or a project to open.
+        port: port of this machine; 0 for a free one.
+        opens: whether to open the page in the browser.
+        say: called with the address of the page.
+        log: called with a line on every layout and every error; None for none.
+        color: name of values that are shown as colours.
+        most_triangles: largest number of triangles shown.
 
     Raises:
         OptionError: the extra `studio` is not installed.
-        StudioError: the port cannot be had.
+        StudioError: the port is not available.
         MeshFileError, ProjectError: the file cannot be read.
     """
     server_class = studio_server()
@@ -51,13 +51,13 @@ def run_studio(
     with listening(port) as listener:
         port = listener.getsockname()[1]
         token = secrets.token_urlsafe(24)
-        address = address_of(port, token)
+        address = page_address(port, token)
         try:
             if file is not None:
                 session.open(file)
             say(address)
-            if tell is not None:
-                session.listen(Teller(session, tell))
+            if log is not None:
+                session.listen(ChangePrinter(session, log))
             if opens:
                 open_address(address)
             server_class(session, token, port).run(sockets=[listener])
@@ -66,7 +66,7 @@ def run_studio(
 
 
 def studio_server() -> type[StudioServer]:
-    """Return the class of servers.
+    """Return the class of the server.
 
     Raises:
         OptionError: the extra `studio` is not installed.
@@ -80,32 +80,36 @@ def studio_server() -> type[StudioServer]:
     return StudioServer
 
 
-def address_of(port: int, token: str) -> str:
+def page_address(port: int, token: str) -> str:
     """Return the address of the page."""
     return f"http://{HOST}:{port}/?token={token}"
 
 
-class Teller:
-    """Hears of what happens in a session, and tells a line of each layout and each failure."""
+class ChangePrinter:
+    """Listener of a session that reports a line on each layout and each error."""
 
-    def __init__(self, session: Session, tell: Callable[[str], None]) -> None:
-        self._session, self._tell = session, tell
-        self._told: tuple[int, str] = (0, "")
+    def __init__(self, session: Session, log: Callable[[str], None]) -> None:
+        self._session, self._log = session, log
+        self._printed: tuple[int, str] = (0, "")
 
     def __call__(self) -> None:
-        """Tell what is new."""
+        """Report what has changed."""
         state, shown = self._session.state(), self._session.picture()
         trouble = "" if state["trouble"] is None else str(state["trouble"]["text"])
-        layout, before = self._told
-        self._told = (state["layout"], trouble)
+        layout, before = self._printed
+        self._printed = (state["layout"], trouble)
         if state["layout"] != layout and shown is not None and not state["early"]:
-            self._tell(f"layout {state['layout']} in {state['seconds']:.2f} s: {shown[0]['title']}")
+            self._log(f"layout {state['layout']} in {state['seconds']:.2f} s: {shown[0]['title']}")
         if trouble and trouble != before:
-            self._tell(trouble)
+            self._log(trouble)
 
 
 def listening(port: int) -> socket.socket:
-    """Return a socket of this machine alone."""
+    """Return a listening socket that only this machine can reach.
+
+    Raises:
+        StudioError: the port is not available.
+    """
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
@@ -113,5 +117,5 @@ def listening(port: int) -> socket.socket:
         listener.listen(64)
     except OSError as error:
         listener.close()
-        raise StudioError(f"port {port} cannot be had: {error.strerror or error}") from error
+        raise StudioError(f"port {port} is not available: {error.strerror or error}") from error
     return listener

@@ -1,4 +1,4 @@
-"""The studio's server: a session, for the page that has the token."""
+"""The server of the studio, which gives the page with the token access to a session."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ from starlette.types import ASGIApp
 from ... import ConeflatError
 from ...errors import StudioError
 from ...io import INPUT_FORMATS
-from .guard import MOST_ASKED, Guard
-from .messages import in_page
+from .guard import MAX_REQUEST_BYTES, Guard
+from .messages import page_message
 from .page import studio_page
 from .project import file_within
 from .session import Session
 
-MOST_UPLOADED = 512 * 1024 * 1024  # bytes of a mesh
+MAX_UPLOAD_BYTES = 512 * 1024 * 1024  # Bytes of an uploaded mesh.
 
 
 class StudioServer(uvicorn.Server):
-    """Serves a session until it is interrupted; then nobody waits for news any more."""
+    """Serves a session until it is interrupted, and then closes the session."""
 
     def __init__(
         self, session: Session, token: str, port: int, framed: bool = False, proxied: bool = False
@@ -42,7 +42,7 @@ class StudioServer(uvicorn.Server):
             uvicorn.Config(
                 studio_app(session, token, port, framed=framed, proxied=proxied),
                 log_level="error",
-                access_log=False,  # It would hold the token.
+                access_log=False,  # The log would contain the token.
                 server_header=False,
                 ws="none",
                 timeout_graceful_shutdown=1,
@@ -51,29 +51,29 @@ class StudioServer(uvicorn.Server):
         self._session = session
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """End."""
+        """Close the session, and shut down."""
         self._session.close()
         await super().shutdown(sockets)
 
 
 class TooLarge(Exception):
-    """More was sent than is taken."""
+    """A request is larger than the limit."""
 
 
-class Bell:
-    """Wakes coroutines when something has happened in a session, whose threads ring it."""
+class Notifier:
+    """Wakes coroutines after events of a session, from any thread."""
 
     def __init__(self) -> None:
         self._waiting: dict[asyncio.Event, asyncio.AbstractEventLoop] = {}
 
-    def ring(self) -> None:
-        """Wake all."""
+    def notify(self) -> None:
+        """Wake all waiting coroutines."""
         for event, loop in list(self._waiting.items()):
             with suppress(RuntimeError):  # The server has just ended.
                 loop.call_soon_threadsafe(event.set)
 
-    async def wait_beyond(self, session: Session, version: int, seconds: float) -> None:
-        """Wait until a session has come further than a version, or for some time."""
+    async def wait_for_change(self, session: Session, version: int, seconds: float) -> None:
+        """Wait until the version of a session is above the given one, or until the time is over."""
         event = asyncio.Event()
         self._waiting[event] = asyncio.get_running_loop()
         try:
@@ -87,17 +87,17 @@ class Bell:
 def studio_app(
     session: Session, token: str, port: int, framed: bool = False, proxied: bool = False
 ) -> ASGIApp:
-    """Return the server's application.
+    """Return the application of the server.
 
     Args:
-        session: what it shows and changes.
-        token: that every request must have.
-        port: at which it is served: the only one that requests may name.
-        framed: notebooks of this machine may show the page in a frame.
-        proxied: requests come through a proxy.
+        session: the session.
+        token: the token that every request must have.
+        port: port of the server; requests with another one are rejected.
+        framed: whether notebooks of this machine may show the page in a frame.
+        proxied: whether requests come through a proxy.
     """
-    bell = Bell()
-    session.listen(bell.ring)
+    notifier = Notifier()
+    session.listen(notifier.notify)
 
     async def page(request: Request) -> Response:
         return HTMLResponse(studio_page(INPUT_FORMATS))
@@ -105,7 +105,7 @@ def studio_app(
     async def state(request: Request) -> Response:
         after = _number(request, "after")
         if isinstance(after, int):
-            await bell.wait_beyond(session, after, 20.0)  # seconds
+            await notifier.wait_for_change(session, after, 20.0)  # Seconds.
         known = _number(request, "chosen")
         return JSONResponse(await run_sync(session.state, known if isinstance(known, int) else 0))
 
@@ -120,9 +120,9 @@ def studio_app(
         return Response(content, media_type="application/octet-stream")
 
     async def act(request: Request) -> Response:
-        action = json.loads(b"".join([part async for part in _parts(request, MOST_ASKED)]))
+        action = json.loads(b"".join([part async for part in _parts(request, MAX_REQUEST_BYTES)]))
         if not isinstance(action, dict):
-            raise StudioError("an action has names and values")
+            raise StudioError("an action must be a JSON object")
         await run_sync(session.act, action)
         return JSONResponse({"version": session.version})
 
@@ -142,7 +142,7 @@ def studio_app(
     async def upload(request: Request) -> Response:
         path = file_within(request.query_params.get("name", ""), session.folder)
         if path.suffix.lower() not in (*INPUT_FORMATS, ".json"):
-            raise StudioError(f"{path.name} is not a mesh that can be read: {', '.join(INPUT_FORMATS)}")
+            raise StudioError(f"{path.name} is not in a format that can be read: {', '.join(INPUT_FORMATS)}")
         stored = await _store(request, path)
         await run_sync(session.open_named, stored.name)
         return JSONResponse({"version": session.version})
@@ -168,7 +168,7 @@ def _media_type(ending: str) -> str:
 
 
 def _number(request: Request, name: str) -> int | str:
-    """Return the number that a request gives by a name, or the text that is none."""
+    """Return a query parameter of a request as a number, or as text if it is not one."""
     text = request.query_params.get(name, "")
     return int(text) if text.isdecimal() and text.isascii() and len(text) < 16 else text
 
@@ -176,40 +176,40 @@ def _number(request: Request, name: str) -> int | str:
 async def _refused(request: Request, error: Exception) -> Response:
     if isinstance(error, TooLarge):
         return PlainTextResponse(str(error), 413)
-    said = in_page(str(error)) if isinstance(error, ConeflatError) else "this cannot be read"
-    return PlainTextResponse(said, 400)
+    message = page_message(str(error)) if isinstance(error, ConeflatError) else "the request cannot be read"
+    return PlainTextResponse(message, 400)
 
 
 async def _parts(request: Request, most: int) -> AsyncIterator[bytes]:
-    """Yield what is sent, up to so many bytes.
+    """Yield the content of a request, at most `most` bytes.
 
     Raises:
-        TooLarge: it is more.
+        TooLarge: the content is larger.
     """
     size = 0
     async for part in request.stream():
         size += len(part)
         if size > most:
-            raise TooLarge(f"more than {most:,} bytes are not taken")
+            raise TooLarge(f"the request is larger than the limit of {most:,} bytes")
         yield part
 
 
 async def _store(request: Request, path: Path) -> Path:
-    """Return the file that what is sent is kept in: of this name, or, where another file has it, of one like it."""
+    """Store the content of a request in a file, with a number added to the name if needed, and return its path."""
     temporary = path.with_name(f".{secrets.token_hex(8)}.upload")
     try:
         with temporary.open("xb") as stream:
-            async for part in _parts(request, MOST_UPLOADED):
+            async for part in _parts(request, MAX_UPLOAD_BYTES):
                 stream.write(part)
         return await run_sync(_settle, temporary, path)
     except OSError as error:
-        raise StudioError(f"{path.name} cannot be kept: {error.strerror or error}") from error
+        raise StudioError(f"{path.name} cannot be stored: {error.strerror or error}") from error
     finally:
         temporary.unlink(missing_ok=True)
 
 
 def _settle(temporary: Path, path: Path) -> Path:
-    """Give a file a name; that of a file with the same content, or a new one."""
+    """Rename a temporary file to an unused name, or find a file with the same content; return the path."""
     content, count, target = temporary.read_bytes(), 1, path
     while target.exists() and not (target.is_file() and target.read_bytes() == content):
         count += 1

@@ -1,4 +1,4 @@
-"""A session: a mesh, what is chosen for it, and the layout that follows; there is no web in it."""
+"""Sessions: a mesh, the choices for it, and the resulting layout, independent of the web server."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from ...base import shown
 from ...errors import MeshFileError, StudioError
 from ...options import as_whole
 from .choices import Choices, replay
-from .known import Known
-from .messages import misplaced
-from .outputs import EXPORTS, MOST_QUADS, QUADS, curve_options
-from .project import Project, file_within, opened
+from .known import SentPictures
+from .messages import misplaced_warning
+from .outputs import EXPORTS, MAX_QUADS, QUADS, curve_options
+from .project import Project, file_within, open_project
 from .steps import STEPS, History
 from .worker import Head, Worker
 
-PATIENCE = 600.0  # seconds that saving waits for the flattening before it
+PATIENCE = 600.0  # Seconds that exports wait for the current flattening.
 
 
 class _Layout(NamedTuple):
-    """A layout: what is shown, the cones of it, the seconds that it took, and what is to be known of it."""
+    """A layout: the page data, the cones found, the seconds per stage, and warnings."""
 
     shown: tuple[Head, bytes] | None = None
     found: Sequence[int] = ()
@@ -34,20 +34,20 @@ class _Layout(NamedTuple):
 
 
 class Session:
-    """What the user works on. All of it may be called from any thread.
+    """The state of the studio. All methods are thread-safe.
 
     Attributes:
-        folder: where projects are, and whatever the page names.
-        version: counts what has happened; who has seen a version need not look again.
-        layout: the number of the layout that was shown last; no other one gets it, whatever mesh is opened.
-        is_early: whether that is the first one of a change, and another will follow.
+        folder: folder of the projects and of the files that the page can open.
+        version: number of events so far; the state of a version does not change.
+        layout: unique number of the layout that was shown last.
+        is_early: whether that is a preview, which the final layout will replace.
     """
 
     def __init__(self, folder: Path, color: str | None = None, most_triangles: int | None = None) -> None:
         """Args:
-        folder: of projects.
-        color: what numbers are shown as colours, as of `own_quantity`.
-        most_triangles: of larger meshes fewer are shown; None for as many as the viewer's page shows.
+        folder: folder of projects.
+        color: name of values that are shown as colours, as in `own_quantity`.
+        most_triangles: largest number of triangles shown; None for the default of the viewer.
         """
         self._look = {"color": color, "most": most_triangles}
         self.folder = folder.resolve()
@@ -58,42 +58,42 @@ class Session:
         self._mesh: Path | None = None
         self._sha256 = ""
         self._history = History(Choices())
-        self._opened = 0  # meshes and projects until now
-        # Counts changes of what is chosen, and so numbers it; 0 is nothing that anybody knows.
+        self._opened = 0  # Number of meshes and projects opened so far.
+        # Number of the current choices, which increases with every change; 0 is never used.
         self._chosen = 1
         self._job = 0
         self._busy: dict[str, Any] | None = None
         self._trouble: dict[str, Any] | None = None
-        self._now = _Layout()
-        self._of_choices: tuple[int, tuple[str, ...], dict[str, str]] = 0, (), {}
-        self._known = Known()
-        self._last: _Layout | None = None  # of an earlier change, while one on the way is shown
-        self._questions = 0
+        self._current = _Layout()
+        self._cached_texts: tuple[int, tuple[str, ...], dict[str, str]] = 0, (), {}
+        self._known = SentPictures()
+        self._last: _Layout | None = None  # The last final layout, while a preview is shown.
+        self._requests = 0
         self._answers: dict[int, tuple[Head, bytes]] = {}
         self._curves: dict[tuple[str, str], dict[str, Any]] = {}
         self._changed = threading.Condition(threading.RLock())
         self._listeners: list[Callable[[], None]] = []
-        self._worker = Worker(self._hear, self._mourn)
+        self._worker = Worker(self._on_message, self._on_exit)
 
     # Meshes and projects.
 
     def open(self, path: Path) -> None:
-        """Work on a mesh, with what was chosen for it before in this folder; or on a project.
+        """Open a mesh, with the choices of its project in this folder if there is one; or a project.
 
         Raises:
             MeshFileError: the mesh cannot be read.
-            ProjectError: the project cannot, or its mesh is another.
+            ProjectError: the project cannot be read, or belongs to another mesh.
         """
-        self._begin(*opened(path, self.folder))
+        self._begin(*open_project(path, self.folder))
 
     def open_named(self, name: str) -> None:
-        """Work on a mesh or a project in the session's folder.
+        """Open a mesh or a project in the folder of the session.
 
         Raises:
-            StudioError: it is not a file of the folder.
-            MeshFileError, ProjectError: as of `open`.
+            StudioError: there is no such file in the folder.
+            MeshFileError, ProjectError: as in `open`.
         """
-        self._begin(*opened(file_within(name, self.folder), self.folder, only_within=True))
+        self._begin(*open_project(file_within(name, self.folder), self.folder, only_within=True))
 
     def _begin(self, project: Project, file: Path) -> None:
         with self._changed:
@@ -101,24 +101,25 @@ class Session:
             self._history = History(project.choices)
             self._opened += 1
             self._chosen += 1
-            self._now = _Layout(seconds=self._now.seconds)
+            self._current = _Layout(seconds=self._current.seconds)
             self.is_early, self._last = False, None
             self._flatten()
 
-    # What the user does.
+    # Actions of the user.
 
     def act(self, action: Mapping[str, Any]) -> None:
-        """Do what the user asks for.
+        """Perform an action of the user.
 
         Args:
-            action: what to `do`: "set" an option (`name`, `value`), take the cones by "hand", "add", "move", "remove",
-                "angle" or "lock" a cone (`vertex`; `to`, `degrees`, `locked`), "cut" or "keep" a `path`, "erase" an
-                `edge`, "paint" a `layer` (`where`; `weight`), take or leave a "corner" (`vertex`), show lengths in
-                "units" (`of_file`, `shown`), "undo", "redo", or "again". Steps of one `stroke` are undone together.
+            action: its key `do` is "set" for an option (`name`, `value`); "hand" to place the cones by hand; "add",
+                "move", "remove", "angle" or "lock" for a cone (`vertex`; `to`, `degrees`, `locked`); "cut" or "keep"
+                for a `path`; "erase" for an `edge`; "paint" for a `layer` (`where`; `weight`); "corner" to add or
+                remove a corner (`vertex`); "units" for units of length (`of_file`, `shown`); "undo", "redo", or
+                "again" to flatten again. Actions of one `stroke` are undone together.
 
         Raises:
-            StudioError: it makes no sense, or cannot be done.
-            OptionError: options make no sense, or do not go together.
+            StudioError: the action is not valid, or is not possible now.
+            OptionError: an option is not valid, or cannot be combined with others.
         """
         with self._changed:
             self._require_mesh()
@@ -128,20 +129,20 @@ class Session:
             elif kind in ("undo", "redo"):
                 before = history.now
                 if history.undo() if kind == "undo" else history.redo():
-                    self._follow(before)
+                    self._apply_step(before)
             else:
                 try:
-                    chosen = STEPS[str(kind)](history.now, action, self._now.found)
+                    chosen = STEPS[str(kind)](history.now, action, self._current.found)
                 except (KeyError, TypeError) as error:
-                    raise StudioError(f"the studio does nothing by {shown(dict(action))}") from error
-                self._take(chosen, action.get("stroke"))
+                    raise StudioError(f"the action {shown(dict(action))} is not valid") from error
+                self._take_step(chosen, action.get("stroke"))
 
     def choose(self, plain: Mapping[str, Any]) -> None:
-        """Choose all anew, as `Choices.as_plain` has it.
+        """Replace all choices; plain: as returned by `Choices.as_plain`.
 
         Raises:
-            StudioError: it makes no sense, or there is no mesh.
-            OptionError: options make no sense, or do not go together.
+            StudioError: a choice is not valid, or there is no mesh.
+            OptionError: an option is not valid, or cannot be combined with others.
         """
         with self._changed:
             self._require_mesh()
@@ -150,40 +151,40 @@ class Session:
             except ConeflatError:
                 raise
             except (KeyError, TypeError, ValueError, AttributeError) as error:
-                raise StudioError(f"these are not choices: {shown(dict(plain))}") from error
-            self._take(chosen, None)
+                raise StudioError(f"expected choices, got {shown(dict(plain))}") from error
+            self._take_step(chosen, None)
 
     def _require_mesh(self) -> None:
         if self._mesh is None:
             raise StudioError("there is no mesh yet: drop one on the page, or run coneflat studio MESH")
 
-    def _take(self, chosen: Choices, stroke: object) -> None:
-        """Take a step, if it is one."""
+    def _take_step(self, chosen: Choices, stroke: object) -> None:
+        """Take a step if the choices differ."""
         chosen.keywords()
         before = self._history.now
         if self._history.change(chosen, stroke):
-            self._follow(before)
+            self._apply_step(before)
 
-    def _follow(self, before: Choices) -> None:
-        """Do what follows from a step: a layout, or no more than that what is chosen is kept and told."""
+    def _apply_step(self, before: Choices) -> None:
+        """Save the choices after a step, and flatten if the layout depends on what has changed."""
         self._chosen += 1
         if not self._history.now.flattens_like(before):
             return self._flatten()
         trouble = self._trouble
         self._save()
         self._trouble = self._trouble or trouble
-        return self._tell()
+        return self._notify()
 
     def _flatten(self) -> None:
         assert self._mesh is not None
         self._save()
         self._job += 1
         self._busy = {"stage": "", "fraction": 0.0}
-        self._tell()
+        self._notify()
         self._worker.send({"do": "flatten", "job": self._job, **self._look, **self._of_mesh()})
 
     def _save(self) -> None:
-        """Keep what is chosen, so that nothing is lost whatever happens next."""
+        """Write the project file."""
         assert self._mesh is not None
         assert self.project_file is not None
         self._trouble = None
@@ -192,21 +193,21 @@ class Session:
         except MeshFileError as error:
             self._trouble = {"text": f"the project is not saved: {error}", "repair": False}
 
-    # What comes of it.
+    # Results.
 
     @property
     def stages(self) -> dict[str, float]:
-        """The seconds that each stage of the layout that is shown took."""
-        return dict(self._now.seconds)
+        """Return the seconds that each stage of the current layout took."""
+        return dict(self._current.seconds)
 
     def state(self, known: int = 0) -> dict[str, Any]:
-        """Return all that there is to know, as plain values.
+        """Return the state of the session as values for JSON.
 
-        known: the number, `chosen`, of choices that need not be told again: paint may be large, and news come often.
+        known: number (`chosen`) of the choices that the caller has; they are left out then, because they may be large.
         """
         with self._changed:
             undo, redo = self._history.depth
-            warnings, texts = self._told_of_choices()
+            warnings, texts = self._choice_texts()
             return {
                 "version": self.version,
                 "opened": self._opened,
@@ -217,11 +218,11 @@ class Session:
                 "redo": redo,
                 "busy": self._busy,
                 "trouble": self._trouble,
-                "layout": 0 if self._now.shown is None else self.layout,
+                "layout": 0 if self._current.shown is None else self.layout,
                 "early": self.is_early,
-                "found": list(self._now.found),
-                "seconds": sum(self._now.seconds.values()),
-                "warnings": [*warnings, *self._now.warnings],
+                "found": list(self._current.found),
+                "seconds": sum(self._current.seconds.values()),
+                "warnings": [*warnings, *self._current.warnings],
                 **({} if known == self._chosen else {"choices": self._history.now.as_plain(), **texts}),
             }
 
@@ -229,78 +230,76 @@ class Session:
     def _project_name(self) -> str:
         return "" if self.project_file is None else self.project_file.name
 
-    def _told_of_choices(self) -> tuple[tuple[str, ...], dict[str, str]]:
-        """Return warnings of what is chosen, and what `replay` does; made once for each change."""
-        if self._of_choices[0] != self._chosen:
+    def _choice_texts(self) -> tuple[tuple[str, ...], dict[str, str]]:
+        """Return the warnings on the choices and the result of `replay`, cached until the next change."""
+        if self._cached_texts[0] != self._chosen:
             chosen, texts = self._history.now, {"command": "", "python": ""}
             if self._mesh is not None:
                 texts = replay(self._mesh.name, self._project_name, chosen)
-            self._of_choices = self._chosen, misplaced(chosen), texts
-        return self._of_choices[1:]
+            self._cached_texts = self._chosen, misplaced_warning(chosen), texts
+        return self._cached_texts[1:]
 
     def picture(self, known: int = 0) -> tuple[Head, bytes] | None:
-        """Return the layout that is shown: numbers and texts, and arrays; None where there is none yet.
+        """Return the page data of the current layout: numbers and texts, and arrays; None if there is none yet.
 
-        known: the number of a picture whose arrays need not be told again.
+        known: number of the page data that the caller has; arrays that have not changed are left out.
         """
         with self._changed:
-            return None if self._now.shown is None else self._known.without(known, self._now.shown)
+            return None if self._current.shown is None else self._known.without(known, self._current.shown)
 
     def export(self, ending: str) -> bytes:
-        """Return the result of what is chosen, as a file.
+        """Return the content of a file of the result.
 
         Raises:
-            StudioError: there is none, or no such format.
+            StudioError: there is no result, or the format is unknown.
         """
         if ending not in EXPORTS:
-            raise StudioError(
-                f"{shown(ending)} is not a format that results are saved as: {', '.join(EXPORTS)}"
-            )
-        return self._asked({"do": "export", "ending": ending})[1]
+            raise StudioError(f"unknown format {shown(ending)} of results: choose from {', '.join(EXPORTS)}")
+        return self._request({"do": "export", "ending": ending})[1]
 
     def quads(self, ending: str, count: object) -> bytes:
-        """Return quads of the mesh, about so many, as a file; a change ends the work on them.
+        """Return the content of a file of approximately `count` quads; a change of the choices cancels it.
 
         Raises:
-            StudioError: there is no mesh, no such format, or something was changed.
-            OptionError: the number makes no sense.
+            StudioError: there is no mesh, the format is unknown, or the choices were changed.
+            OptionError: the number is not an integer.
         """
         if ending not in QUADS:
-            raise StudioError(f"{shown(ending)} is not a format that quads are saved as: {', '.join(QUADS)}")
+            raise StudioError(f"unknown format {shown(ending)} of quads: choose from {', '.join(QUADS)}")
         number = as_whole("the number of quads", count)
-        if not 1 <= number <= MOST_QUADS:
-            raise StudioError(f"the number of quads must be from 1 to {MOST_QUADS:,}, not {number:,}")
-        return self._asked({"do": "quads", "ending": ending, "count": number})[1]
+        if not 1 <= number <= MAX_QUADS:
+            raise StudioError(f"the number of quads must be from 1 to {MAX_QUADS:,}, not {number:,}")
+        return self._request({"do": "quads", "ending": ending, "count": number})[1]
 
     def curve(self) -> dict[str, Any]:
-        """Return the distortion for each number of cones, as `curve_of` does; a change ends the work on it.
+        """Return the distortion for each number of cones, see `curve_data`; a change of the choices cancels it.
 
         Raises:
-            StudioError: there is no mesh, or something was changed.
+            StudioError: there is no mesh, or the choices were changed.
         """
         with self._changed:
             key = self._sha256, sha256(repr(curve_options(self._history.now)).encode()).hexdigest()
             if key not in self._curves:
-                self._curves[key] = self._asked({"do": "curve"})[0]
+                self._curves[key] = self._request({"do": "curve"})[0]
             return self._curves[key]
 
-    def _asked(self, job: Head) -> tuple[Head, bytes]:
-        """Return what the worker makes of a job beside the flattenings."""
+    def _request(self, job: Head) -> tuple[Head, bytes]:
+        """Return the output of a job of the worker other than a flattening."""
         with self._changed:
             self._require_mesh()
-            if not self._worker.is_alive:  # What it had is gone.
+            if not self._worker.is_alive:  # Its result is lost.
                 self._flatten()
-            self._questions -= 1  # No flattening has such a number.
-            number = self._questions
+            self._requests -= 1  # Negative, unlike the numbers of flattenings.
+            number = self._requests
             self._answers[number] = ({}, b"")
-            # What takes long is given up for a later flattening.
+            # Long jobs are cancelled by a later flattening.
             stops = {} if job["do"] == "export" else {"after": self._job}
             self._worker.send({**job, **stops, **self._of_mesh(), "job": number})
             self._changed.wait_for(lambda: self._answers[number][0], PATIENCE)
             head, body = self._answers[number]
             del self._answers[number]
         if "given_up" in head:
-            raise StudioError("something was changed meanwhile: ask again")
+            raise StudioError("the choices were changed meanwhile: try again")
         if "done" not in head:
             raise StudioError(head.get("error", "this took too long"))
         return head["done"], body
@@ -309,28 +308,28 @@ class Session:
         return {"mesh": str(self._mesh), "sha256": self._sha256, "choices": self._history.now.as_plain()}
 
     def listen(self, listener: Callable[[], None]) -> None:
-        """Call a function, from any thread, whenever something has happened."""
+        """Register a function that is called, from any thread, after every event."""
         self._listeners.append(listener)
 
     def wait_until_idle(self, seconds: float = PATIENCE) -> bool:
-        """Return whether what is chosen was flattened, or has failed, within some time."""
+        """Return whether the flattening of the choices ended, or failed, within the given time."""
         with self._changed:
             return self._changed.wait_for(lambda: self._busy is None, seconds)
 
     def close(self) -> None:
-        """End the process that flattens, and every wait for news."""
+        """End the worker process, and wake everyone who waits for events."""
         self._worker.end()
         with self._changed:
-            self._tell()
+            self._notify()
 
     @property
     def worker_process(self) -> int | None:
-        """The number of the process that flattens."""
+        """Return the id of the worker process."""
         return self._worker.process_id
 
-    # What the worker tells.
+    # Messages of the worker.
 
-    def _hear(self, head: Head, body: bytes) -> None:
+    def _on_message(self, head: Head, body: bytes) -> None:
         with self._changed:
             if head["job"] in self._answers and "stage" not in head:
                 self._answers[head["job"]] = (head, body)
@@ -341,11 +340,11 @@ class Session:
             if "stage" in head:
                 self._busy = {"stage": head["stage"], "fraction": head["fraction"]}
             elif "early" in head:
-                self._last = self._last or self._now
+                self._last = self._last or self._current
                 self._show(head["early"], body)
                 self.is_early = True
             elif "error" in head:
-                self._go_back()
+                self._restore_layout()
                 mends = head["repair"] and not self._history.now.options.get("repair")
                 self._trouble = {"text": head["error"], "repair": mends}
             elif "done" in head:
@@ -354,31 +353,31 @@ class Session:
                 if "missing" in head["done"] and self._trouble is None:
                     self._trouble = {"text": head["done"]["missing"], "repair": False}
                 self.is_early, self._last = False, None
-            self._tell()
+            self._notify()
 
-    def _show(self, told: Head, body: bytes) -> None:
+    def _show(self, data: Head, body: bytes) -> None:
         self.layout += 1
-        picture = self._known.numbered((told["head"], body))
-        self._now = _Layout(picture, told["found"], told["seconds"], told.get("warnings", ()))
+        picture = self._known.numbered((data["head"], body))
+        self._current = _Layout(picture, data["found"], data["seconds"], data.get("warnings", ()))
 
-    def _go_back(self) -> None:
-        """Work no more, and show the last layout that was finished instead of one on the way."""
+    def _restore_layout(self) -> None:
+        """End the current job, and show the last final layout instead of a preview."""
         self._busy = None
         if self.is_early and self._last is not None and self._last.shown is not None:
-            self._now = self._last
+            self._current = self._last
             self.layout += 1
             self.is_early, self._last = False, None
 
-    def _mourn(self, how: str) -> None:
+    def _on_exit(self, how: str) -> None:
         with self._changed:
-            said = f"the process that flattens {how}; nothing is lost: try again, or undo the last change"
+            message = f"the worker process {how}; no choices are lost: try again, or undo the last change"
             for job in self._answers:
-                self._answers[job] = ({"error": said}, b"")
-            self._go_back()
-            self._trouble = {"text": said, "repair": False}
-            self._tell()
+                self._answers[job] = ({"error": message}, b"")
+            self._restore_layout()
+            self._trouble = {"text": message, "repair": False}
+            self._notify()
 
-    def _tell(self) -> None:
+    def _notify(self) -> None:
         self.version += 1
         self._changed.notify_all()
         for listener in self._listeners:

@@ -1,4 +1,4 @@
-"""Steps of the user of the studio: what each does to the choices, and which can be undone."""
+"""Steps of the user of the studio: their effect on the choices, and the undo history."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .paint import Region
 
 
 def _step(change: Callable[..., Choices]) -> Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]:
-    """Return a step that makes the cones that were found the user's before it changes them."""
+    """Return a step that first turns the cones that a search has found into placed cones."""
     return lambda chosen, action, found: change(chosen.placed(found), action)
 
 
@@ -25,31 +25,31 @@ def _vertex(action: Mapping[str, Any], name: str = "vertex") -> int:
     return as_whole("a vertex", action[name])
 
 
-#: By what is to be done: the choices after it, from those before, the action, and the cones that were found.
+#: For each kind of step, a function (choices before, action, cones found by the search) -> choices after.
 STEPS: dict[str, Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]] = {
     "set": lambda chosen, action, found: chosen.with_option(action["name"], action["value"]),
     "hand": _step(lambda chosen, action: chosen),
     "add": _step(lambda chosen, action: chosen.added(_vertex(action), _angle(action))),
     "move": _step(lambda chosen, action: chosen.moved(_vertex(action), _vertex(action, "to"))),
     "remove": _step(lambda chosen, action: chosen.removed(_vertex(action))),
-    "angle": _step(lambda chosen, action: chosen.angled(_vertex(action), _angle(action))),
+    "angle": _step(lambda chosen, action: chosen.with_angle(_vertex(action), _angle(action))),
     "lock": lambda chosen, action, found: chosen.locked(_vertex(action), action["locked"] is True),
     "cut": lambda chosen, action, found: chosen.cut(tuple(action["path"])),
-    "keep": lambda chosen, action, found: chosen.keep_whole(tuple(action["path"])),
+    "keep": lambda chosen, action, found: chosen.with_kept(tuple(action["path"])),
     "erase": lambda chosen, action, found: chosen.erased(*(as_whole("a vertex", v) for v in action["edge"])),
     "paint": lambda chosen, action, found: chosen.painted(
         action["layer"], Region.of_text(action["where"]), action.get("weight")
     ),
-    "corner": lambda chosen, action, found: chosen.cornered(_vertex(action)),
-    "units": lambda chosen, action, found: chosen.measured_in(action["of_file"], action["shown"]),
+    "corner": lambda chosen, action, found: chosen.with_corner(_vertex(action)),
+    "units": lambda chosen, action, found: chosen.with_units(action["of_file"], action["shown"]),
 }
 
 
 class History:
-    """What was chosen before, what is chosen now, and what was undone.
+    """The undo history of the choices.
 
     Attributes:
-        now: what is chosen.
+        now: the current choices.
     """
 
     def __init__(self, now: Choices) -> None:
@@ -59,7 +59,7 @@ class History:
         self._stroke: object = None
 
     def change(self, to: Choices, stroke: object = None) -> bool:
-        """Take a step, and return whether it changes anything; steps of one stroke, as of a drag, are one."""
+        """Take a step, and return whether it changes anything; steps of one stroke (drag) are undone together."""
         if to == self.now:
             return False
         if stroke is None or stroke != self._stroke:
@@ -70,11 +70,11 @@ class History:
         return True
 
     def undo(self) -> bool:
-        """Go a step back, and return whether there was one."""
+        """Undo a step, and return whether there was one."""
         return self._go(self._past, self._undone)
 
     def redo(self) -> bool:
-        """Take the step that was undone last, and return whether there was one."""
+        """Redo the step that was undone last, and return whether there was one."""
         return self._go(self._undone, self._past)
 
     def _go(self, source: list[Choices], target: list[Choices]) -> bool:
@@ -87,5 +87,5 @@ class History:
 
     @property
     def depth(self) -> tuple[int, int]:
-        """How many steps there are to undo, and to redo."""
+        """Return the numbers of steps that can be undone and redone."""
         return len(self._past), len(self._undone)

@@ -1,6 +1,6 @@
-"""The process that flattens, seen from the session: it may die, and is started again.
+"""The worker process of a session, which is started again if it dies.
 
-Messages to it and from it are JSON, and bytes after it.
+Messages in both directions are JSON followed by bytes.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ COMMAND = [sys.executable, "-m", "coneflat.apps.studio.child"]
 
 
 class Worker:
-    """A process that is started when there is something to do."""
+    """A process that is started when the first job is sent."""
 
-    def __init__(self, hear: Callable[[Head, bytes], None], mourn: Callable[[str], None]) -> None:
+    def __init__(self, on_message: Callable[[Head, bytes], None], on_exit: Callable[[str], None]) -> None:
         """Args:
-        hear: called with every answer, from a thread.
-        mourn: called with how the process ended, where nobody has ended it.
+        on_message: called with every message of the process, from a thread.
+        on_exit: called with a text that says how the process ended, unless `end` has ended it.
         """
-        self._hear, self._mourn = hear, mourn
+        self._on_message, self._on_exit = on_message, on_exit
         self._process: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
 
     def send(self, job: Head) -> None:
-        """Give it something to do.
+        """Send a job to the process.
 
         Raises:
             StudioError: no process can be started.
@@ -45,11 +45,11 @@ class Worker:
         with self._lock:
             process = self._started()
             assert process.stdin is not None
-            with suppress(OSError):  # It has just died, which its listener hears.
+            with suppress(OSError):  # The process has just died, which `on_exit` reports.
                 write_frame(process.stdin, job)
 
     def end(self) -> None:
-        """End the process, whatever it does."""
+        """End the process in any state."""
         with self._lock:
             process, self._process = self._process, None
         if process is not None:
@@ -58,20 +58,20 @@ class Worker:
 
     @property
     def is_alive(self) -> bool:
-        """Whether there is a process."""
+        """Return whether the process is running."""
         process = self._process
         return process is not None and process.poll() is None
 
     @property
     def process_id(self) -> int | None:
-        """The number of the process that there is."""
+        """Return the id of the process; None if there is none."""
         process = self._process
         return None if process is None else process.pid
 
     def _started(self) -> subprocess.Popen[bytes]:
         if self._process is None or self._process.poll() is not None:
             try:
-                # What interrupts us must not interrupt it: we end it, and it ends where nobody is left to hear it.
+                # An interrupt of this process must not interrupt the worker. It ends when its input is closed.
                 self._process = subprocess.Popen(
                     COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
                 )
@@ -85,22 +85,22 @@ class Worker:
         with suppress(OSError, ValueError):
             while (frame := read_frame(process.stdout)) is not None:
                 if self._process is process:
-                    self._hear(*frame)
+                    self._on_message(*frame)
         code = process.wait()
-        if self._process is process:  # Nobody has ended it.
-            self._mourn(_end_of(code))
+        if self._process is process:  # It was not ended by `end`.
+            self._on_exit(_exit_text(code))
 
 
-def _end_of(code: int) -> str:
-    """Return how a process with an exit code ended."""
+def _exit_text(code: int) -> str:
+    """Return a text that says how a process with this exit code ended."""
     if code < 0:
         with suppress(ValueError):
-            return f"was ended by {signal.Signals(-code).name}, for want of memory perhaps"
+            return f"was ended by {signal.Signals(-code).name}, possibly because memory ran out"
     return f"ended with code {code}"
 
 
 def write_frame(stream: IO[bytes], head: Head, body: bytes = b"") -> None:
-    """Write a message."""
+    """Write a message to a stream."""
     text = json.dumps(head).encode("ascii")
     stream.write(_SIZES.pack(len(text), len(body)) + text)
     if body:
@@ -109,7 +109,7 @@ def write_frame(stream: IO[bytes], head: Head, body: bytes = b"") -> None:
 
 
 def read_frame(stream: IO[bytes]) -> tuple[Head, bytes] | None:
-    """Return the next message, or None where the other side has ended."""
+    """Return the next message; None if the other side has closed the stream."""
     sizes = stream.read(_SIZES.size)
     if len(sizes) < _SIZES.size:
         return None

@@ -1,4 +1,4 @@
-"""Figures and the interactive page of meshes and flattenings; figures need matplotlib (`coneflat[figures]`)."""
+"""Figures and interactive pages of meshes and flattenings; figures need matplotlib (`coneflat[figures]`)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .figures.model import DOTS_PER_INCH, draw_checker, draw_cones, draw_quantit
 from .figures.uv_layout import draw_layout, fill_layout, layout_aspect
 from .from_uv import flattening_of, own_flattening, shown_rows
 from .page.content import Model, content_of, outline_halfedges
-from .page.payload import Told, head_and_block, pack
+from .page.payload import PageText, head_and_block, pack
 from .page.webpage import check_page, notebook_html, open_address, open_page, page_around, page_of, write_page
 from .quantity import Quantity, conformal_distortion, own_quantity
 
@@ -20,10 +20,10 @@ __all__ = [
     "Eye",
     "Look",
     "Model",
+    "PageText",
     "Panel",
     "Quantity",
     "Row",
-    "Told",
     "check_figure",
     "check_page",
     "compose",

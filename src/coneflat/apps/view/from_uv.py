@@ -1,4 +1,4 @@
-"""UVs that a file has, as a flattening that pages and figures show."""
+"""Conversion of the UVs of a file to a flattening, for pages and figures."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from ...result import Flattening
 from ...stages import SolveStatistics
 from ..measure_uv import measure_mapped, uv_points
 
-#: The `method` in the settings of what was not made but found in the file.
-OWN = "the file's own UVs"
-#: UVs that pages, whose numbers have 32 bits, and pictures can show: squares of larger ones are none.
-LARGEST = 1e15
-#: Rows of a report that say nothing of a map that no search for cones has led to.
-_OF_A_SEARCH = ("cones", "curvature error", "of the metric")
+#: The `method` in the settings of a flattening that was read from the UVs of a file.
+FILE_UVS = "the file's own UVs"
+#: Largest UV that pages and pictures can show: pages have 32-bit numbers, in which squares of larger ones overflow.
+MAX_UV = 1e15
+#: Rows of a report that do not apply to a map without a cone search.
+_SEARCH_ROWS = ("cones", "curvature error", "of the metric")
 
 
 def own_flattening(source: Joined, *, strict: bool = False) -> Flattening | None:
-    """Return the UVs that a file has as a flattening; None if no triangle has any.
+    """Return the UVs of a mesh file as a flattening; None if no triangle has UVs.
 
-    Triangles without UVs are left out, with a note, and so is nothing else: what is not manifold is repaired.
+    Triangles without UVs are left out, with a note. A mesh that is not manifold is repaired.
 
     Raises:
-        MeshError: the triangles are not a mesh.
+        MeshError: the triangles are not a valid mesh.
         MeshFileError: UVs are too large to be shown.
     """
     try:
@@ -38,19 +38,19 @@ def own_flattening(source: Joined, *, strict: bool = False) -> Flattening | None
 
 
 def flattening_of(mapped: Mapped, *, strict: bool = False) -> Flattening:
-    """Return a map as a flattening without cones, whose curvature residuals are those of the plane it makes.
+    """Return a UV map as a flattening without cones; its curvature residuals are the angle errors in the plane.
 
     Raises:
         MissingUVError: no triangle has UVs.
-        MeshError: the triangles are not a mesh.
+        MeshError: the triangles are not a valid mesh.
         MeshFileError: UVs are too large to be shown.
     """
     measured = measure_mapped(mapped, strict=strict)
     largest = float(np.abs(measured.corner_uv).max())
-    if largest > LARGEST:
+    if largest > MAX_UV:
         raise MeshFileError(
             f"UVs of up to {largest:.3g} are too large to be shown: `coneflat measure` measures them, --again flattens "
-            "the mesh anew"
+            "the mesh again"
         )
     mesh = measured.mesh
     uv, uv_faces = uv_points(mesh, measured.corner_uv)
@@ -73,17 +73,17 @@ def flattening_of(mapped: Mapped, *, strict: bool = False) -> Flattening:
         distortion=measured.distortion,
         seconds={},
         notes=measured.notes,
-        settings={"method": OWN},
+        settings={"method": FILE_UVS},
         solve=SolveStatistics(),
         source=mapped.source,
     )
 
 
-def is_own(result: Flattening) -> bool:
-    """Return whether a flattening is what a file had."""
-    return getattr(result, "settings", {}).get("method") == OWN
+def is_from_file(result: Flattening) -> bool:
+    """Return whether a flattening was read from the UVs of a file."""
+    return getattr(result, "settings", {}).get("method") == FILE_UVS
 
 
 def shown_rows(result: Flattening) -> list[tuple[str, str, str]]:
-    """Return the rows of a result's report that say something of it."""
-    return [row for row in as_rows(result) if not (is_own(result) and row[0] in _OF_A_SEARCH)]
+    """Return the rows of the report that apply to a result."""
+    return [row for row in as_rows(result) if not (is_from_file(result) and row[0] in _SEARCH_ROWS)]

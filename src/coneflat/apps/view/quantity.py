@@ -1,4 +1,4 @@
-"""Quantities on a mesh that are shown by colours, the user's own among them, and their colour scales."""
+"""Quantities on a mesh that are shown as colours, also values given by the user, and their colour scales."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from ... import Flattening
 
 
-#: A colour scale of factors that is shorter would show noise as if it were distortion.
-LEAST_RANGE = 0.05
+#: Least range of a colour scale of factors; a shorter one would show noise as distortion.
+MIN_RANGE = 0.05
 
 
 @dataclass(frozen=True)
@@ -28,12 +28,12 @@ class ColorScale:
     """A map from numbers to colours.
 
     Attributes:
-        low, high: what the first and the last colour stand for; beyond them nothing changes. Of a signed logarithm,
-            the smallest and the largest amount.
+        low, high: numbers of the first and the last colour; numbers outside are clamped. For a signed logarithm, the
+            smallest and the largest absolute value.
         colors: name of a colour map of matplotlib; in a page, "sequential" or "diverging".
-        kind: "linear"; "log", where equal factors are equal steps; "signed log", which is so to both sides of a
-            middle where less than `low` is zero.
-        ticks: numbers to be marked, and what to write there.
+        kind: "linear", "log", or "signed log": logarithmic in the absolute value, with opposite signs to both sides of
+            the middle, where absolute values below `low` are mapped.
+        ticks: numbers to be marked, with their labels.
     """
 
     low: float
@@ -43,7 +43,7 @@ class ColorScale:
     ticks: tuple[tuple[float, str], ...]
 
     def position(self, values: FloatArray) -> FloatArray:
-        """Return where numbers are on the scale, 0 at its low end and 1 at its high one; NaN of NaN."""
+        """Return the positions of numbers on the scale, from 0 at the low end to 1 at the high end; NaN for NaN."""
         low, high = self.low, self.high
         if self.kind == "signed log":
             amount = np.clip(np.abs(values), low, high)
@@ -54,7 +54,7 @@ class ColorScale:
         return np.asarray((values - low) / (high - low))
 
     def rgb(self, values: FloatArray) -> FloatArray:
-        """Return the colours (..., 3) of numbers; grey of NaN: triangles without area, vertices of the boundary."""
+        """Return the (..., 3) colours of numbers; grey for NaN: triangles without area, boundary vertices."""
         from matplotlib import colormaps
 
         position = self.position(values)
@@ -65,15 +65,15 @@ class ColorScale:
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """Numbers on a mesh, and how to show them.
+    """Numbers on a mesh, with their colour scale and text format.
 
     Attributes:
-        label: what they are.
-        values: (k,) one for each triangle, or for each of some points; NaN where there is none.
-        weights: (k,) how much each counts in percentiles.
-        scale: the colours.
-        form: how to write one, as `format` takes it.
-        corners: (m, 3) of numbers at points, that of each triangle corner; of numbers of triangles None.
+        label: name of the quantity.
+        values: (k,) numbers, one for each triangle or point; NaN if undefined.
+        weights: (k,) weights in percentiles.
+        scale: the colour scale.
+        form: text format of a number, as of `format`.
+        corners: (m, 3) index of the number at each triangle corner; None if there is one number for each triangle.
     """
 
     label: str
@@ -84,26 +84,26 @@ class Quantity:
     corners: IntArray | None = None
 
     def colors(self) -> FloatArray:
-        """Return the colours (m, 3) of the triangles, or (m, 3, 3) of their corners."""
+        """Return the (m, 3) colours of the triangles, or the (m, 3, 3) colours of their corners."""
         colors = self.scale.rgb(self.values)
         return colors if self.corners is None else colors[self.corners]
 
     def counted(self) -> tuple[FloatArray, FloatArray]:
-        """Return the numbers that there are, and their weights."""
+        """Return the defined numbers with positive weight, and their weights."""
         known = np.isfinite(self.values) & (self.weights > 0.0)
         return self.values[known], self.weights[known]
 
     def percentile(self, percent: float) -> float:
-        """Return the number below which lie so many per cent of the weight."""
+        """Return the number below which the given percentage of the weight lies."""
         return quantile(*self.counted(), percent / 100)
 
     def text(self, percent: float) -> str:
-        """Return this number as it is to be written."""
+        """Return the text of this number."""
         value = self.percentile(percent)
         return "0" if value == 0.0 else format(value, self.form)
 
     def recolored(self, colors: str | None) -> Quantity:
-        """Return the same in another colour map of matplotlib; None for its own.
+        """Return the quantity with another colour map of matplotlib; None keeps its own.
 
         Raises:
             OptionError: there is no such colour map.
@@ -119,22 +119,22 @@ def conformal_distortion(result: Flattening) -> Quantity:
     qc, areas = result.distortion.qc, _areas(result)
     finite = np.isfinite(qc)
     excess = quantile(qc[finite], areas[finite], 0.95) - 1.0 if finite.any() else 0.0
-    step = LEAST_RANGE if excess < 0.5 else 0.5
-    # The percentile rounded up, less a little: one at a step, up to rounding, stays there.
-    top = 1.0 + max(float(np.ceil(excess / step - 1e-9)) * step, LEAST_RANGE)
+    step = MIN_RANGE if excess < 0.5 else 0.5
+    # The percentile is rounded up, with a tolerance for percentiles at a step.
+    top = 1.0 + max(float(np.ceil(excess / step - 1e-9)) * step, MIN_RANGE)
     ticks = [(float(x), f"{x:.4g}") for x in np.linspace(1.0, top, 3)]
     scale = ColorScale(1.0, top, "viridis_r", "linear", tuple(ticks))
     return Quantity("QC distortion", qc, areas, scale, ".3f")
 
 
 def stretch(result: Flattening) -> Quantity:
-    """Return by how much lengths of every triangle are scaled, over the mean."""
+    """Return the scale factor of lengths in every triangle, divided by the mean."""
     log_scale, areas = result.distortion.log_area_scale, _areas(result)
     known = np.isfinite(log_scale)
     mean = np.average(log_scale[known], weights=areas[known]) if known.any() else 0.0
     factor = np.exp(log_scale - mean)
     extreme = quantile(np.abs(log_scale[known] - mean), areas[known], 0.95) if known.any() else 0.0
-    reached = max(float(np.exp(extreme)), 1 + LEAST_RANGE) * (1 - 1e-9)
+    reached = max(float(np.exp(extreme)), 1 + MIN_RANGE) * (1 - 1e-9)
     rounded = (1.05, 1.1, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 100.0)
     top = next((each for each in rounded if each >= reached), reached)
     ticks = ((1 / top, f"{1 / top:.3g}"), (1.0, "1"), (top, f"{top:.3g}"))
@@ -142,11 +142,11 @@ def stretch(result: Flattening) -> Quantity:
 
 
 def curvature(result: Flattening, flat: bool) -> Quantity:
-    """Return how much the angles around each vertex miss a full turn, on the model or in the flat metric.
+    """Return the absolute angle defect of every vertex, on the model or in the flat metric.
 
-    Cones, which keep their curvature, do not count in percentiles.
+    In the flat metric, cones are excluded from percentiles.
     """
-    values = missing_angles(result, flat)
+    values = angle_defects(result, flat)
     counts = np.isfinite(values).astype(np.float64)
     if flat:
         counts[result.cones] = 0.0
@@ -156,13 +156,13 @@ def curvature(result: Flattening, flat: bool) -> Quantity:
     return Quantity(label, np.abs(values), counts, scale, ".1e", result.faces)
 
 
-def missing_angles(result: Flattening, flat: bool, mesh: TriangleMesh | None = None) -> FloatArray:
-    """Return (n,) by how much the angles around each vertex miss a full turn, radians; NaN on the boundary.
+def angle_defects(result: Flattening, flat: bool, mesh: TriangleMesh | None = None) -> FloatArray:
+    """Return the (n,) angle defects in radians: 2 pi minus the angle sum; NaN on the boundary.
 
     Args:
-        result: which tells.
-        flat: those of the metric, before it is laid out: in the plane no angle is ever missing but where it was cut.
-        mesh: that of the result, where its borders have been found already.
+        result: the flattening.
+        flat: whether to return those of the flat metric before layout; in the plane they are zero except at cuts.
+        mesh: the mesh of the result, if its boundary has been computed already.
     """
     mesh = TriangleMesh(result.vertices, result.faces) if mesh is None else mesh
     inside = np.zeros(len(mesh.vertices), dtype=bool)
@@ -190,26 +190,25 @@ def check_color_map(name: str) -> None:
 
 
 def own_quantity(result: Flattening, name: str, archive: Path | None = None) -> Quantity:
-    """Return numbers of the user's own, with a scale: from dark to light, or to both sides of 0 where there are both.
+    """Return values given by the user as a quantity; its scale is diverging if they have both signs.
 
     Args:
-        result: on which they are shown.
-        name: of a property of the vertices in the mesh's file (PLY); of an array in the result's archive; a file .npy;
-            or a file and an array in it, FILE.npz:NAME. There is one for each vertex, or for each triangle, of the
-            result or of the input.
+        result: the flattening on which they are shown.
+        name: name of a vertex property in the file of the mesh (PLY) or of an array in `archive`; path of a .npy file;
+            or FILE.npz:NAME. There is one value for each vertex, or for each triangle, of the result or of the input.
         archive: the .npz file that the result was read from, if any.
 
     Raises:
-        OptionError: there is no such property, or its numbers do not fit the mesh.
+        OptionError: there is no such property, or the number of values does not fit the mesh.
         MeshFileError: the file cannot be read.
     """
     if not isinstance(name, str):
-        raise OptionError(f"color must be the name of a property, or of a file, not {shown(name)}")
+        raise OptionError(f"color must be the name of a property or of a file, not {shown(name)}")
     label, values = _named(result, name, archive)
     if values.dtype.kind not in "fiub" or values.ndim != 1:
         raise OptionError(
-            f"{label}: colours are made of one number for each vertex or triangle, not of an array of shape "
-            f"{values.shape} and type {values.dtype}"
+            f"{label}: expected one number for each vertex or triangle, got an array of shape {values.shape} and type "
+            f"{values.dtype}"
         )
     values, corners = _fitted(result, label, values.astype(np.float64))
     values = np.where(np.isfinite(values), values, np.nan)
@@ -219,12 +218,12 @@ def own_quantity(result: Flattening, name: str, archive: Path | None = None) -> 
         weights = np.bincount(corners.ravel(), minlength=len(values)).astype(np.float64)
     known = np.isfinite(values) & (weights > 0)
     if not known.any():
-        raise OptionError(f"{label} has no finite number on this mesh to be shown")
+        raise OptionError(f"{label} has no finite number on this mesh")
     return Quantity(label, values, weights, _scale(values[known], weights[known]), ".4g", corners)
 
 
 def _named(result: Flattening, name: str, archive: Path | None) -> tuple[str, FloatArray]:
-    """Return what numbers are called, and the numbers."""
+    """Return the label of the numbers, and the numbers."""
     properties = {} if result.source is None else result.source.properties
     if name in properties:
         return name, np.asarray(properties[name])
@@ -234,7 +233,7 @@ def _named(result: Flattening, name: str, archive: Path | None) -> tuple[str, Fl
     if archive is not None:
         return name, _read(archive, name)
     has = "it has " + ", ".join(properties) if properties else "it has none"
-    raise OptionError(f"the mesh has no property {shown(name)} at its vertices to take colours from; {has}")
+    raise OptionError(f"the mesh has no vertex property {shown(name)}; {has}")
 
 
 def _read(path: Path, array: str) -> FloatArray:
@@ -252,7 +251,7 @@ def _read(path: Path, array: str) -> FloatArray:
 
 
 def _fitted(result: Flattening, label: str, values: FloatArray) -> tuple[FloatArray, IntArray | None]:
-    """Return numbers of the result's vertices and the corners' indices into them; or of its triangles and None."""
+    """Return the numbers of vertices and the (m, 3) indices of corners into them; or those of triangles and None."""
     count, origin = len(values), result.vertex_origin
     inputs = -1 if result.source is None else len(result.source.vertices)
     if origin is not None and count == inputs:
@@ -262,8 +261,8 @@ def _fitted(result: Flattening, label: str, values: FloatArray) -> tuple[FloatAr
     if count == len(result.faces):
         return values, None
     raise OptionError(
-        f"{label} has {count:,} numbers, which fits neither the {len(result.vertices):,} vertices nor the "
-        f"{len(result.faces):,} triangles of the mesh"
+        f"{label} has {count:,} numbers, but there are {len(result.vertices):,} vertices and "
+        f"{len(result.faces):,} triangles"
     )
 
 
@@ -276,6 +275,6 @@ def _scale(values: FloatArray, weights: FloatArray) -> ColorScale:
     elif low == high:
         reach = 0.5 * (abs(low) or 1.0)
         low, high = low - reach, high + reach
-    # By halves, so that the largest numbers do not overflow.
+    # Each is halved first, so that the sum of large numbers does not overflow.
     ticks = tuple((x, f"{x:.3g}") for x in (low, low / 2 + high / 2, high))
     return ColorScale(low, high, "PuOr_r" if is_signed else "viridis_r", "linear", ticks)

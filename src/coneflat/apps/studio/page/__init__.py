@@ -1,4 +1,4 @@
-"""The studio's page: the viewer's, made live by more scripts."""
+"""The page of the studio: the page of the viewer with further scripts and controls."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from ....options import Options, declarations
 from ...view import page_around
 from ..choices import PLAIN_OPTIONS
 
-#: What the page may do: draw, and talk to the server that it came from.
+#: Content security policy: only connections to the server of the page are allowed.
 POLICY = (
     "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'"
 )
-# In the order in which they must run: names are shared.
+# In the order in which they must run; they share one scope.
 _SCRIPTS = ("server", "surface", "graph", "paint", "tools", "overlay", "sizes", "curve", "panel", "studio")
 
 
 @cache
 def studio_page(formats: Sequence[str]) -> str:
-    """Return the page as text; formats: the endings of meshes that can be dropped on it."""
+    """Return the page as text; formats: extensions of meshes that can be dropped on it."""
     defaults = {name: declarations(Options)[name].default for name in PLAIN_OPTIONS}
     scripts = [f"const DEFAULTS = {json.dumps(defaults)};", *(_read(f"{name}.js") for name in _SCRIPTS)]
     return page_around(

@@ -1,4 +1,4 @@
-// Distortion over the number of cones: how far it falls with more of them, and where one is.
+// The curve of distortion by number of cones, with the current layout.
 
 const INSETS = {left: 34, right: 8, top: 8, bottom: 20}; // pixels
 
@@ -13,7 +13,7 @@ class ConeCurve {
     new ResizeObserver(() => this.draw()).observe(this.part("curve"));
   }
 
-  /** What a curve depends on: other changes leave it as it is. */
+  /** Return a key of the choices on which the curve depends. */
   key() {
     const {choices, news} = this.studio, {paint = {}, options, cuts, kept} = choices;
     const locked = choices.cones.filter((cone) => cone.locked).map((cone) => cone.vertex);
@@ -44,11 +44,11 @@ class ConeCurve {
     this.part("curve-of").hidden = !isKnown;
     if (!isKnown) return;
     const {parts} = this.found;
-    this.part("curve-of").textContent = `Distortion of the whole${parts > 1 ? `, for so many cones in each of its ${grouped(parts)} parts` : ""}. Click to choose a number.`;
+    this.part("curve-of").textContent = `Distortion of the mesh by number of cones${parts > 1 ? ` in each of its ${grouped(parts)} parts` : ""}. Click to choose a number.`;
     this.draw();
   }
 
-  /** Where a number of cones and a distortion lie, in pixels. */
+  /** Return the position of a number of cones and a distortion, in pixels. */
   places() {
     const {width, height} = this.part("curve").getBoundingClientRect(), {counts, distortions} = this.found;
     const last = counts[counts.length - 1], first = counts[0], most = Math.max(...distortions) * 1.04;
@@ -109,11 +109,11 @@ class ConeCurve {
     pen.stroke();
   }
 
-  /** The number of cones that there are and the distortion of so many; null where that is off the curve. */
+  /** Return the current number of cones and its distortion; null if it is not on the curve. */
   current() {
-    if (this.studio.choices.by_hand) return null; // Those that were moved have another distortion.
+    if (this.studio.choices.by_hand) return null; // Cones that were moved have another distortion.
     const {counts, distortions, parts} = this.found, asked = this.studio.choices.options.cone_count;
-    if (parts > 1 && asked === undefined) return null; // Each part has a number of its own.
+    if (parts > 1 && asked === undefined) return null; // The numbers of the parts differ.
     const count = parts > 1 ? asked : this.studio.coneRows().length, at = counts.findLastIndex((one) => one <= count);
     return at < 0 || count > counts[counts.length - 1] ? null : [count, distortions[at]];
   }
@@ -124,7 +124,7 @@ class ConeCurve {
   }
 }
 
-/** Round numbers from 0 to a largest one, three to five of them. */
+/** Return three to five round numbers from 0 to a maximum. */
 function ticksUpTo(most) {
   const rough = most / 4, power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 2.5, 5, 10].find((factor) => factor * power >= rough) * power;

@@ -1,6 +1,6 @@
 // Shortest paths along the edges of a surface.
 
-// As in `seams/costs.py`: radians of bending from which on an edge is sharp at all, and fully; and what it costs then.
+// As in `seams/costs.py`: dihedral angles in radians at which sharpness begins and is complete, and the factor of the cost of sharp edges.
 const [SMOOTH, SHARP, CHEAPEST] = [Math.PI / 9, Math.PI / 3, 0.1];
 
 class EdgeGraph {
@@ -11,7 +11,7 @@ class EdgeGraph {
     for (let c = 0; c < corners.length; c++) start[corners[c] + 1] += 2;
     for (let v = 0; v < count; v++) start[v + 1] += start[v];
     const next = start.slice(), ends = new Uint32Array(2 * corners.length), faces = new Uint32Array(2 * corners.length);
-    // Inner edges are there twice, from both of their triangles.
+    // Inner edges have two entries, one from each of their triangles.
     const note = (one, two, face) => {
       faces[next[one]] = face;
       ends[next[one]++] = two;
@@ -23,16 +23,16 @@ class EdgeGraph {
     }
     Object.assign(this, {start, ends, faces});
     this.from = -1;
-    this.shares = null; // how sharp the edge of each entry is, 0 to 1
+    this.shares = null; // Sharpness of the edge of each entry, 0 to 1.
   }
 
-  /** Whether paths follow sharp edges, which then cost less than their lengths. */
+  /** Set whether paths follow sharp edges, which then cost less than their lengths. */
   follow(sharp) {
     this.shares = sharp ? (this.found ??= sharpEdges(this)) : null;
     this.from = -1;
   }
 
-  /** What the edge of an entry of a vertex costs. */
+  /** Return the cost of the edge of an entry of a vertex. */
   cost(vertex, k) {
     const length = this.length(vertex, this.ends[k]);
     return this.shares?.[k] ? length * CHEAPEST ** this.shares[k] : length;
@@ -43,7 +43,7 @@ class EdgeGraph {
     return Math.hypot(p[3 * one] - p[3 * two], p[3 * one + 1] - p[3 * two + 1], p[3 * one + 2] - p[3 * two + 2]);
   }
 
-  /** The vertices of the shortest path from one to another, both included; empty where none leads there. */
+  /** Return the vertices of the shortest path between two vertices, both included; empty if there is none. */
   path(from, to) {
     if (from !== this.from) this.begin(from);
     this.reach(to);
@@ -64,7 +64,7 @@ class EdgeGraph {
     this.heap.push(0, from);
   }
 
-  /** Find how far vertices are from where paths begin, and by which way, until one is reached (Dijkstra). */
+  /** Compute distances and predecessors from the starts of paths until a vertex is reached (Dijkstra). */
   reach(to) {
     const {heap, far, isSettled, surface} = this;
     while (heap.size && !isSettled[to]) {
@@ -73,7 +73,7 @@ class EdgeGraph {
       isSettled[vertex] = 1;
       for (let k = this.start[vertex]; k < this.start[vertex + 1]; k++) {
         const other = this.ends[k], sum = at + this.cost(vertex, k);
-        // A vertex that was added, where triangles were cut, is none of the user's.
+        // A vertex that was added by splitting triangles is not in the mesh of the user.
         if (sum >= far[other] || surface.numberOf(other) < 0) continue;
         far[other] = sum;
         this.before[other] = vertex;
@@ -83,7 +83,7 @@ class EdgeGraph {
   }
 }
 
-/** How sharp the edge of each entry of a graph is, 0 to 1. */
+/** Return the sharpness of the edge of each entry of a graph, 0 to 1. */
 function sharpEdges({surface, start, ends, faces}) {
   const normals = surface.normals(), shares = new Float32Array(ends.length);
   const dot = (a, b) => normals[3 * a] * normals[3 * b] + normals[3 * a + 1] * normals[3 * b + 1] + normals[3 * a + 2] * normals[3 * b + 2];
@@ -91,7 +91,7 @@ function sharpEdges({surface, start, ends, faces}) {
     for (let k = start[vertex]; k < start[vertex + 1]; k++) {
       let other = start[vertex];
       while (other < k && ends[other] !== ends[k]) other++;
-      if (other === k) continue; // the first of its two sides, or the only one
+      if (other === k) continue; // The first of its two sides, or the only one.
       const [a, b] = [faces[other], faces[k]];
       const cosine = dot(a, b) / (Math.sqrt(dot(a, a) * dot(b, b)) || 1);
       const share = (Math.acos(Math.min(Math.max(cosine, -1), 1)) - SMOOTH) / (SHARP - SMOOTH);
@@ -101,7 +101,7 @@ function sharpEdges({surface, start, ends, faces}) {
   return shares;
 }
 
-/** A binary heap, the least key first. */
+/** A binary heap with the least key first. */
 class Heap {
   constructor() {
     this.keys = [];

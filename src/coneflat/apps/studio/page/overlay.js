@@ -1,4 +1,4 @@
-// What is chosen, drawn over both views: paths, cones that are locked, dragged or on their way.
+// The choices, drawn over both views: paths, and cones that are locked, dragged or not yet computed.
 
 const PATH_COLOURS = {cut: "#d6006c", keep: "#0a7d5c"};
 
@@ -27,7 +27,7 @@ class Overlay {
     if (tools.dragged) this.ring(pen, pane, tools.dragged.at, this.studio.viewer.accent, 10);
   }
 
-  /** Where a vertex is on the screen; in the layout perhaps at several places. */
+  /** Return the screen positions of a vertex; in the layout it may have several. */
   places(pane, vertex) {
     const {model} = this.studio.viewer;
     const found = pane.inPlane ? this.studio.pointsOf(vertex).map((point) => model.flatPlace(point)) : [model.place(vertex)];
@@ -68,7 +68,7 @@ class Overlay {
     }
   }
 
-  /** A path on the model; in the layout, where it may be torn, its points. */
+  /** Draw a path on the model; in the layout, where a seam may split it, draw its points. */
   path(pen, pane, vertices, colour, dash) {
     if (vertices.length < 2) return;
     const path = new Path2D();

@@ -1,17 +1,17 @@
-// What is painted on the surface, and the brush that paints.
+// The paint on the surface, and the brush.
 
 // [layer, name, letter, hint]
 const BRUSHES = [
-  ["no_cone", "No cones", "p", "Paint where searches are to put no cone."],
-  ["no_seam", "No seams", "b", "Paint where no seam is to run."],
-  ["importance", "Important", "i", "Paint what is to be distorted less than the rest."],
-  ["erase", "Erase", "e", "Wipe off what is painted."],
+  ["no_cone", "No cones", "p", "Paint where searches must not place cones."],
+  ["no_seam", "No seams", "b", "Paint where there must be no seams."],
+  ["importance", "Important", "i", "Paint regions that must have less distortion."],
+  ["erase", "Erase", "e", "Erase the paint."],
 ];
 const RADII = {least: 4, most: 150}; // pixels
-const SAMPLES_A_RADIUS = 2; // of a stroke
-const MOST_WEIGHT = 1000; // from which on an importance has its full colour
+const SAMPLES_A_RADIUS = 2; // Samples of a stroke per radius of the brush.
+const MOST_WEIGHT = 1000; // Importance at which the colour is saturated.
 
-/** Numbers in few words: "3-17 20". */
+/** Return numbers as a text of ranges: "3-17 20". */
 function regionText(numbers) {
   const sorted = Float64Array.from(numbers).sort(), words = [];
   for (let i = 0, j; i < sorted.length; i = j) {
@@ -21,7 +21,7 @@ function regionText(numbers) {
   return words.join(" ");
 }
 
-/** The numbers that such words mean. */
+/** Return the numbers in such a text. */
 function* regionNumbers(text) {
   for (const word of text.split(" ").filter(Boolean)) {
     const [first, last = first] = word.split("-").map(Number);
@@ -29,14 +29,14 @@ function* regionNumbers(text) {
   }
 }
 
-/** What is painted, as the graphics card takes it. */
+/** The paint, in the form for the graphics card. */
 class Paint {
   constructor(studio) {
     this.studio = studio;
-    this.shown = this.preview = null; // {layer, weight, numbers}: of the stroke that is not yet chosen
+    this.shown = this.preview = null; // {layer, weight, numbers} of the current stroke.
   }
 
-  /** Show what is chosen, where that has changed, and a stroke. */
+  /** Show the chosen paint if it has changed, and a stroke. */
   show() {
     const {viewer, choices} = this.studio;
     if (!viewer) return;
@@ -47,13 +47,13 @@ class Paint {
     viewer.redraw();
   }
 
-  /** What is chosen may have changed. */
+  /** Update after a possible change of the choices. */
   hear() {
     if (this.preview?.sent) this.preview = null;
     this.show();
   }
 
-  /** Show no more than what is chosen. */
+  /** Show the chosen paint only, without a stroke. */
   forget() {
     this.preview = null;
     this.show();
@@ -85,7 +85,7 @@ class Paint {
     return out;
   }
 
-  /** How many vertices are painted with a layer. */
+  /** Return the number of vertices painted with a layer. */
   count(layer) {
     const paint = this.studio.choices.paint ?? {};
     const texts = layer === "importance" ? Object.values(paint.importance ?? {}) : [paint[layer] ?? ""];
@@ -98,7 +98,7 @@ class Paint {
   }
 }
 
-/** The tone of an importance, a byte: more than half, so that its place is seen. */
+/** Return the tone of an importance, a byte; it is above half, so that the region is visible. */
 function toneOf(weight) {
   return weight === 1 ? 0 : Math.round(255 * (0.6 + 0.4 * Math.min(Math.max(Math.log(weight) / Math.log(MOST_WEIGHT), 0), 1)));
 }
@@ -108,7 +108,7 @@ class Brush {
     this.studio = studio;
     this.radius = 28; // pixels
     this.weight = 10;
-    this.at = null; // {pane, x, y}: where it is
+    this.at = null; // Position of the brush, {pane, x, y}.
   }
 
   grow(factor) {
@@ -116,7 +116,7 @@ class Brush {
     this.studio.viewer?.remark();
   }
 
-  /** The numbers of the vertices under the brush: those that hang together with what is in its middle, or those in the plane. */
+  /** Return the numbers of the vertices under the brush: on the model, those connected to its middle. */
   numbersAt(pane, x, y) {
     const {studio} = this, {tools} = studio;
     const nearest = tools.vertexAt(pane, x, y);
@@ -154,7 +154,7 @@ class Brush {
     return found;
   }
 
-  /** Paint once, with a click. */
+  /** Paint at a click. */
   dab(pane, x, y) {
     const stroke = new Stroke(this, pane, x, y);
     stroke.drop();
@@ -169,7 +169,7 @@ class Brush {
   }
 }
 
-/** A stroke of the brush: seen at once, and chosen when it ends. */
+/** A stroke of the brush: shown immediately, and chosen when it ends. */
 class Stroke {
   constructor(brush, pane, x, y) {
     Object.assign(this, {brush, pane, studio: brush.studio, layer: brush.studio.tools.mode});
@@ -201,7 +201,7 @@ class Stroke {
   }
 
   stop() {
-    if (!matchMedia("(hover: hover)").matches) this.brush.at = null; // A finger that is lifted is nowhere.
+    if (!matchMedia("(hover: hover)").matches) this.brush.at = null; // A lifted finger has no position.
     if (!this.studio.paint.preview?.sent) this.studio.paint.forget();
   }
 }

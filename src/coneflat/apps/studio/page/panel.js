@@ -1,7 +1,7 @@
-// The panel beside the panes: shows what is chosen, and changes it.
+// The panel next to the panes, which shows and changes the choices.
 
 const WIDEST = 720; // degrees, as in `choices.py`
-const LEAST_STEP = 5; // degrees that the keys change an angle by where it snaps to nothing
+const LEAST_STEP = 5; // Step in degrees by which keys change an angle without snapping.
 
 class Panel {
   constructor(studio) {
@@ -25,7 +25,7 @@ class Panel {
       button("Picture", "Save the layout as a picture, .png", () => this.studio.save("png"), {id: "save-png"}),
       button("Report", "Save the report, .json", () => this.studio.save("json"), {id: "save-json"}),
     );
-    for (const id of ["unit", "shown-in"]) this.part(id).replaceChildren(...UNITS.map(([key, name]) => new Option(key || id === "unit" ? name : "the same", key)));
+    for (const id of ["unit", "shown-in"]) this.part(id).replaceChildren(...UNITS.map(([key, name]) => new Option(key || id === "unit" ? name : "unit of the file", key)));
   }
 
   connect() {
@@ -57,7 +57,7 @@ class Panel {
     this.part("snap").addEventListener("change", (event) => (this.snap = Number(event.target.value)));
   }
 
-  /** Let a slider act while it moves, as often as there is time, and when it rests; one move is one step. */
+  /** Apply the value of a slider while it moves, as often as possible, and at the end; one motion is one step. */
   slider(id, action) {
     let stroke = null, sent = null;
     const send = (event, rests) => {
@@ -85,7 +85,7 @@ class Panel {
     if (kind === "hand") studio.act({do: "hand"});
   }
 
-  /** Return an angle in degrees that snaps. */
+  /** Return an angle in degrees after snapping. */
   snapped(degrees) {
     return this.snap ? Math.max(this.snap, Math.round(degrees / this.snap) * this.snap) : degrees;
   }
@@ -94,7 +94,7 @@ class Panel {
     return this.snap || LEAST_STEP;
   }
 
-  // What is shown.
+  // Display.
 
   show() {
     const {news, choices, tools} = this.studio, options = {...DEFAULTS, ...choices.options};
@@ -123,11 +123,11 @@ class Panel {
     this.value("charts", options.charts);
     for (const saving of this.part("exports").children) saving.disabled = !this.studio.viewer;
     this.part("save-quads").disabled = !this.studio.viewer || this.studio.making === "quads";
-    this.part("save-quads").textContent = this.studio.making === "quads" ? "Making quads…" : "Quads, OBJ";
+    this.part("save-quads").textContent = this.studio.making === "quads" ? "Computing quads…" : "Quads, OBJ";
     this.curve.show();
     this.part("command").textContent = news?.command ?? "";
     this.part("python").textContent = news?.python ?? "";
-    this.part("kept-in").textContent = news?.project ? `Kept in ${news.project}.` : "";
+    this.part("kept-in").textContent = news?.project ? `Saved in ${news.project}.` : "";
     this.showWork();
     this.showRefusal();
     this.showWarnings();
@@ -138,7 +138,7 @@ class Panel {
     showSizes(this.studio);
   }
 
-  /** Show a value, unless the user is just changing it. */
+  /** Show a value, unless the user is changing it. */
   value(id, value) {
     const field = this.part(id);
     if (document.activeElement !== field || field.tagName === "SELECT" || !this.studio.isBusy()) field.value = value;
@@ -160,7 +160,7 @@ class Panel {
     this.part("again").hidden = Boolean(trouble.repair) || Boolean(this.studio.refused);
   }
 
-  /** Show what is to be known of what is chosen. */
+  /** Show the warnings on the choices. */
   showWarnings() {
     const warnings = this.studio.news?.warnings ?? [], key = JSON.stringify(warnings);
     if (key === this.warningsShown) return;
@@ -169,7 +169,7 @@ class Panel {
     this.part("warnings").replaceChildren(...warnings.map((text) => Object.assign(document.createElement("li"), {textContent: text})));
   }
 
-  /** Show what the tool can be set to. */
+  /** Show the settings of the tool. */
   showTool() {
     const {tools, brush, paint} = this.studio;
     this.part("brush-size").closest("label").hidden = !tools.paints;
@@ -205,17 +205,17 @@ class Panel {
     if (typing !== undefined) this.angleField(typing)?.focus();
   }
 
-  /** What is wrong with the sum of angles that are all typed; nothing where one takes what is left, as the boundary does. */
+  /** Return a text if all angles are typed and their sum is wrong; "" if a computed cone or the boundary takes the rest. */
   sumText(rows) {
     const {viewer, choices, news} = this.studio;
-    const isWhole = viewer?.model.arrays.cones.length === news?.found.length; // A thinned model may show some of them alone.
+    const isWhole = viewer?.model.arrays.cones.length === news?.found.length; // A simplified model may show only some of them.
     if (!isWhole || this.studio.hasBoundary() || !choices.by_hand || !rows.length || rows.some((row) => !row.chosen)) return "";
-    // Whatever cones there are, on a closed surface they lack the same in all.
+    // On a closed surface the curvatures of all cones have a fixed sum.
     const lacking = viewer.model.head.cone_curvatures.reduce((sum, curvature) => sum + (curvature * 180) / Math.PI, 0);
     const off = rows.reduce((sum, row) => sum + row.degrees, 0) - (360 * rows.length - lacking);
     if (Math.abs(off) < 0.05) return "";
     const much = Number(Math.abs(off).toFixed(1)).toLocaleString("en-US");
-    return `All angles are typed, and in all they are ${much}° too ${off > 0 ? "wide" : "narrow"} for this surface. Clear one, and it gets what the others leave.`;
+    return `All angles are typed, and their sum is ${much}° too ${off > 0 ? "large" : "small"} for this surface. Clear one, so that it is computed.`;
   }
 
   coneRow({vertex, degrees, chosen, locked}, isPicked) {
@@ -225,15 +225,15 @@ class Panel {
     if (isPicked) row.setAttribute("aria-current", "true");
     const angle = Object.assign(document.createElement("input"), {
       type: "number", step: this.step(), min: 1, max: WIDEST, value: degrees === null ? "" : Number(degrees.toFixed(1)), className: chosen ? "" : "computed",
-      title: "Cone angle in degrees; empty: the best one",
+      title: "Cone angle in degrees; empty: computed",
     });
     angle.setAttribute("aria-label", `Angle of cone ${vertex}, degrees`);
     angle.addEventListener("change", () => studio.setAngle(vertex, angle.value === "" ? null : this.snapped(Number(angle.value))));
     row.append(
-      button(grouped(vertex), "Find it", () => studio.find(vertex), {className: "find"}),
+      button(grouped(vertex), "Show the cone", () => studio.find(vertex), {className: "find"}),
       angle,
-      button("Lock", "Searches keep it here (l)", () => studio.act({do: "lock", vertex, locked: !locked}), {className: "toggle", ariaPressed: String(locked)}),
-      button("×", "Take it away (Delete)", () => studio.act({do: "remove", vertex})),
+      button("Lock", "Searches keep this cone (l)", () => studio.act({do: "lock", vertex, locked: !locked}), {className: "toggle", ariaPressed: String(locked)}),
+      button("×", "Remove (Delete)", () => studio.act({do: "remove", vertex})),
     );
     return row;
   }
@@ -252,7 +252,7 @@ class Panel {
       line.className = "drawn";
       line.append(
         `${name} ${grouped(path[0])} to ${grouped(path[path.length - 1])}`,
-        button("×", "Erase it", () => this.studio.act({do: "erase", edge: path.slice(0, 2)})),
+        button("×", "Erase", () => this.studio.act({do: "erase", edge: path.slice(0, 2)})),
       );
       return line;
     };

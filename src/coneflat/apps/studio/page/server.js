@@ -1,4 +1,4 @@
-// What the page asks of the server, always with the token of its address, and where that is: perhaps behind a proxy.
+// Requests to the server, with the token in the address of the page; the server may be behind a proxy.
 
 class Server {
   constructor() {
@@ -6,14 +6,14 @@ class Server {
     this.queue = Promise.resolve();
   }
 
-  /** Return an answer; a refusal is an error with the server's words. */
+  /** Return the response; a rejected request raises an error with the message of the server. */
   async ask(path, options = {}) {
     const answer = await fetch(path, {...options, headers: {"x-coneflat-token": this.token}, cache: "no-store"});
     if (!answer.ok) throw new Refusal(await answer.text());
     return answer;
   }
 
-  /** Return what there is to know, once it is newer than what was known; choices that are the same are taken from that. */
+  /** Return the state as soon as it is newer than the known one; unchanged choices are taken from the known state. */
   async state(known) {
     const news = await (await this.ask(`state?after=${known?.version ?? ""}&chosen=${known?.chosen ?? ""}`)).json();
     if (news.choices) return news;
@@ -21,7 +21,7 @@ class Server {
     return {...news, choices, command, python};
   }
 
-  /** Return the layout that is shown now; arrays that a model from here has, too, are taken from that. */
+  /** Return the current layout; unchanged arrays are taken from the known model. */
   async layout(known) {
     const block = await (await this.ask(`layout?known=${known?.head.number ?? ""}`)).arrayBuffer();
     const size = new DataView(block).getUint32(0, true);
@@ -29,20 +29,20 @@ class Server {
     return modelOf(head, block, 4 + size, known);
   }
 
-  /** Do something, after what was asked for before. */
+  /** Perform an action, after the earlier ones. */
   act(action) {
     const sent = this.queue.then(() => this.ask("act", {method: "POST", body: JSON.stringify(action)}));
     this.queue = sent.catch(() => {});
     return sent;
   }
 
-  /** Return how distortion falls with more cones: {counts, distortions, knee}. */
+  /** Return the curve of distortion by number of cones: {counts, distortions, knee}. */
   async curve() {
     await this.queue;
     return (await this.ask("curve", {method: "POST"})).json();
   }
 
-  /** Hand what is at a path, the result or quads, to the browser as a file. */
+  /** Download the file at a path: the result or quads. */
   async save(path, name) {
     await this.queue;
     const content = await (await this.ask(path, {method: "POST"})).blob();
@@ -51,11 +51,11 @@ class Server {
     setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
   }
 
-  /** Send a mesh or a project, to work on it. */
+  /** Upload and open a mesh or a project. */
   open(file) {
     return this.ask(`mesh?name=${encodeURIComponent(file.name)}`, {method: "POST", body: file});
   }
 }
 
-/** The server does not do what it is asked for, and says why. */
+/** The error of a request that the server has rejected, with its message. */
 class Refusal extends Error {}

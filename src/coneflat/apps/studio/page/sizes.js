@@ -1,6 +1,6 @@
-// How large the model is, in the unit that the user says.
+// Sizes of the model, in the unit chosen by the user.
 
-// [key, name, how long it is in metres]
+// [key, name, length in metres]
 const UNITS = [
   ["", "no unit", 1],
   ["mm", "mm", 0.001],
@@ -9,7 +9,7 @@ const UNITS = [
   ["inch", "inches", 0.0254],
 ];
 
-/** Return a length, or an area (power 2), of the file as it is to be shown. */
+/** Return the text of a length, or an area (power 2), in the unit to be shown. */
 function sizeText(value, power, [ofFile, shown]) {
   const metres = (unit) => UNITS.find(([key]) => key === unit)[2];
   const scaled = value * (shown ? metres(ofFile) / metres(shown) : 1) ** power;

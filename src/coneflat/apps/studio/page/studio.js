@@ -1,9 +1,9 @@
-// The studio at work: hears from the server what is so, and shows it.
+// The studio: shows the state of the server, and sends actions to it.
 
-const FAINT = 0.45; // how strongly paint is shown while nobody paints
-const RETRY = 1500; // milliseconds before the server is asked again that did not answer
-const NOTHING = {options: {}, by_hand: false, cones: [], cuts: [], kept: []}; // and perhaps paint, corners, units
-const STEP = 1.25; // by which a key makes the brush larger
+const FAINT = 0.45; // Opacity of paint when no brush is used.
+const RETRY = 1500; // Milliseconds before a request is repeated if the server does not respond.
+const NOTHING = {options: {}, by_hand: false, cones: [], cuts: [], kept: []}; // Also paint, corners and units, if any.
+const STEP = 1.25; // Factor by which a key changes the size of the brush.
 
 class Studio {
   constructor() {
@@ -11,12 +11,12 @@ class Studio {
     this.viewer = this.news = this.refused = null;
     this.layout = 0;
     this.pending = 0;
-    this.took = this.sight = 0; // milliseconds from the last change to its picture, and to the first view of it
-    this.selected = null; // the vertex of the cone that is picked, whatever number it has
+    this.took = this.sight = 0; // Milliseconds from the last change to its layout, and to its preview.
+    this.selected = null; // The vertex of the picked cone, which does not depend on the index of the cone.
     this.tools = new Tools(this);
     this.paint = new Paint(this);
     this.brush = new Brush(this);
-    this.making = ""; // what is made beside layouts
+    this.making = ""; // The output that is being computed, other than layouts.
     this.follows = true; // Paths follow sharp edges.
     this.overlay = new Overlay(this);
     this.panel = new Panel(this);
@@ -25,16 +25,16 @@ class Studio {
     window.addEventListener("dragover", (event) => event.preventDefault());
   }
 
-  // What the server tells.
+  // Updates from the server.
 
-  /** Follow what happens, as long as the page is open. */
+  /** Follow the state of the server as long as the page is open. */
   async follow() {
     for (let heard; ; ) {
       try {
         const news = await this.server.state(this.news);
         trouble("");
         if (this.news && news.opened !== this.news.opened && this.layout) {
-          location.reload(); // What is here is about another mesh, down to the numbers of its vertices.
+          location.reload(); // The data of the page, also vertex numbers, belong to another mesh.
           return;
         }
         const isOld = !news.layout || news.layout === this.layout;
@@ -44,9 +44,9 @@ class Studio {
           trouble(error.message);
           return;
         }
-        if (!(error instanceof TypeError)) throw error; // fetch throws that where nobody answers.
+        if (!(error instanceof TypeError)) throw error; // fetch throws a TypeError if the server does not respond.
         const again = this.news?.project ? `; start it again with: coneflat studio ${this.news.project}` : "";
-        trouble(`the studio does not answer. Everything that was chosen is kept${again}`);
+        trouble(`the studio does not respond. All choices are saved${again}`);
         await new Promise((done) => setTimeout(done, RETRY));
         continue;
       }
@@ -54,7 +54,7 @@ class Studio {
     }
   }
 
-  /** Show what is new; model: the layout, if that is. */
+  /** Show a new state; model: the layout if it is new. */
   hear(news, model) {
     this.news = news;
     document.body.classList.toggle("empty", !this.news.mesh);
@@ -76,7 +76,7 @@ class Studio {
     if (!isSame) this.byNumber = this.boundary = null;
     if (!isSame && this.whole?.key !== Surface.keyOf(model)) this.whole = this.edges = null;
     this.points = this.nearest = null;
-    this.repicking = true; // A pick that ends because things have other numbers now is no letting go.
+    this.repicking = true; // The selection is not cleared if it ends because indices have changed.
     if (this.viewer) this.viewer.takeModel(model);
     else {
       this.viewer = window.coneflat = new Viewer(model, null);
@@ -92,7 +92,7 @@ class Studio {
     requestAnimationFrame(() => requestAnimationFrame(() => this.noteTime(asked, news.early)));
   }
 
-  /** Note that what was asked for at some time is drawn, or a first view of it. */
+  /** Record the time until the layout, or its preview, was drawn. */
   noteTime(asked, isEarly) {
     if (!asked || asked !== this.asked) return;
     this.sight ||= performance.now() - asked;
@@ -102,7 +102,7 @@ class Studio {
     this.panel.showWork();
   }
 
-  // What the user does.
+  // Actions of the user.
 
   async act(action) {
     this.asked = performance.now();
@@ -119,7 +119,7 @@ class Studio {
   }
 
   refuse(error) {
-    this.refused = {text: error instanceof Refusal ? error.message : "the studio does not answer"};
+    this.refused = {text: error instanceof Refusal ? error.message : "the studio does not respond"};
     this.paint.forget();
     this.panel.show();
   }
@@ -137,7 +137,7 @@ class Studio {
     await this.server.save(`export/${ending}`, `${this.stem}_${name}.${ending}`).catch((error) => this.refuse(error));
   }
 
-  /** Make quads of the mesh, about so many, and hand them to the browser. */
+  /** Compute quads of the mesh, approximately the chosen number, and download them. */
   async saveQuads(count) {
     this.refused = null;
     this.making = "quads";
@@ -158,7 +158,7 @@ class Studio {
 
   drop(event) {
     const [file] = event.dataTransfer?.files ?? [];
-    if (!file || file.type.startsWith("image/")) return; // The viewer lays pictures on the model.
+    if (!file || file.type.startsWith("image/")) return; // Images are handled by the viewer.
     event.preventDefault();
     event.stopImmediatePropagation();
     this.open(file);
@@ -233,7 +233,7 @@ class Studio {
     this.act({do: "move", vertex, to: this.numberOf(to)});
   }
 
-  // The cone that is picked.
+  // The picked cone.
 
   select(vertex) {
     this.selected = vertex;
@@ -254,14 +254,14 @@ class Studio {
     return this.selected === null || !this.viewer ? null : this.numberOf(this.selected);
   }
 
-  /** Pick a cone, and bring it into sight. */
+  /** Pick a cone, and make it visible. */
   find(number) {
     const [vertex] = this.verticesOf([number]);
     const index = this.viewer.model.arrays.cones.indexOf(vertex);
     if (index >= 0) this.viewer.find({kind: "cone", index});
   }
 
-  // What there is.
+  // Queries.
 
   get choices() {
     return this.news?.choices ?? NOTHING;
@@ -272,7 +272,7 @@ class Studio {
     return Boolean(model) && model.arrays.outline.length > 2 * model.seamCount;
   }
 
-  /** The cones that are chosen or found: {vertex, degrees, chosen, locked}, by the numbers of the user's vertices. */
+  /** Return the chosen or found cones, {vertex, degrees, chosen, locked}, with vertices of the user. */
   coneRows() {
     const model = this.viewer?.model, shown = new Map();
     if (model) model.arrays.cones.forEach((vertex, i) => shown.set(this.numberOf(vertex), 360 - (model.head.cone_curvatures[i] * 180) / Math.PI));
@@ -289,19 +289,19 @@ class Studio {
     return this.viewer.model.arrays.cones.includes(vertex);
   }
 
-  /** Whether there is a cone at a vertex, other than one. */
+  /** Return whether there is a cone at a vertex, other than the given one. */
   isCone(vertex, other = null) {
     if (vertex === other) return false;
     const number = this.numberOf(vertex);
     return this.coneRows().some((row) => row.vertex === number);
   }
 
-  /** The user's number of a vertex of the page. */
+  /** Return the number of a vertex of the page in the mesh of the user. */
   numberOf(vertex) {
     return this.viewer.model.vertexNumber(vertex);
   }
 
-  /** The page's vertices of the user's numbers; what is not shown is left out. */
+  /** Return the vertices of the page for numbers of the user; those not shown are left out. */
   verticesOf(numbers) {
     if (!this.byNumber) {
       this.byNumber = new Map();
@@ -311,7 +311,7 @@ class Studio {
     return numbers.map((number) => this.byNumber.get(number)).filter((vertex) => vertex !== undefined);
   }
 
-  /** The points of the layout that a vertex has. */
+  /** Return the points of a vertex in the layout. */
   pointsOf(vertex) {
     if (!this.points) {
       this.points = new Map();
@@ -323,7 +323,7 @@ class Studio {
     return this.points.get(vertex) ?? [];
   }
 
-  /** The mesh, of which the page may draw fewer triangles. */
+  /** Return the full mesh; the page may draw fewer triangles. */
   surface() {
     return (this.whole ??= new Surface(this.viewer.model));
   }
@@ -336,19 +336,19 @@ class Studio {
     return this.edges;
   }
 
-  /** The vertices of the mesh that some of the page are; without those that were added, where it is thinned. */
+  /** Return the vertices of the full mesh for vertices of the page; without added ones if the page is simplified. */
   inSurface(vertices) {
     const surface = this.surface();
     return surface.isThinned ? vertices.map((vertex) => surface.vertexOf(this.numberOf(vertex))).filter((vertex) => vertex >= 0) : vertices;
   }
 
-  /** The numbers of the vertices of the shortest path between two vertices of the page. */
+  /** Return the numbers of the vertices on the shortest path between two vertices of the page. */
   pathBetween(...ends) {
     const [from, to] = this.inSurface(ends);
     return to === undefined ? [] : this.graph().path(from, to).map((vertex) => this.surface().numberOf(vertex));
   }
 
-  /** The vertices of the mesh that some of the page are drawn for: they are nearest to these. */
+  /** Return the vertices of the full mesh that are nearest to vertices of the page. */
   standingFor(vertices) {
     const surface = this.surface(), chosen = new Set(this.inSurface([...vertices]));
     if (!surface.isThinned) return chosen;
@@ -370,7 +370,7 @@ class Studio {
     this.panel.show();
   }
 
-  /** The vertices on the boundary. */
+  /** Return the vertices on the boundary. */
   boundaryVertices() {
     if (!this.boundary) {
       const {model} = this.viewer, ends = new Set();
@@ -382,13 +382,13 @@ class Studio {
     return this.boundary;
   }
 
-  /** The corners of a rectangle, where they mean something. */
+  /** Return the corners of the rectangle, if the boundary is one. */
   cornersShown() {
     return this.tools.mode === "corner" || this.choices.options.boundary === "rectangle" ? this.choices.corners ?? [] : [];
   }
 }
 
-/** A layout that is refused is there no more: another mesh was opened meanwhile, of which there will be news. */
+/** A rejected layout no longer exists, because another mesh was opened meanwhile; an update follows. */
 function orNone(error) {
   if (error instanceof Refusal) return null;
   throw error;

@@ -1,28 +1,28 @@
-// The whole mesh, also where the page draws fewer triangles than it has: brushes and paths go along its own edges.
+// The full mesh, also if the page draws fewer triangles: brushes and paths use its edges.
 
 class Surface {
-  /** Vertices are those of the page where it draws all triangles; else they are others, with numbers of the user all the same. */
+  /** Vertices are those of the page if it draws all triangles; otherwise they differ, but also have numbers of the user. */
   constructor(model) {
     const {places, faces, point_vertex, vertex_numbers, whole_places, whole_faces, whole_numbers} = model.arrays;
     this.key = Surface.keyOf(model);
     this.isThinned = Boolean(whole_faces);
     this.places = whole_places ?? places;
-    this.corners = whole_faces ?? faces.map((point) => point_vertex[point]); // the vertex of each corner of each triangle
+    this.corners = whole_faces ?? faces.map((point) => point_vertex[point]); // The vertex of each corner of each triangle.
     this.numbers = this.isThinned ? whole_numbers : vertex_numbers;
     this.count = this.places.length / 3;
   }
 
-  /** What models with one surface share, whatever is drawn of it. */
+  /** Return the object that models of the same surface share. */
   static keyOf(model) {
     return model.arrays.whole_faces ?? model;
   }
 
-  /** The user's number of a vertex; -1 of those that were added. */
+  /** Return the number of a vertex in the mesh of the user; -1 for added vertices. */
   numberOf(vertex) {
     return this.numbers ? this.numbers[vertex] : vertex;
   }
 
-  /** The vertex that has a number of the user. */
+  /** Return the vertex of a number of the user. */
   vertexOf(number) {
     if (!this.numbers) return number;
     if (!this.byNumber) {
@@ -32,14 +32,14 @@ class Surface {
     return this.byNumber[number] ?? -1;
   }
 
-  /** Return normals of triangles, as long as twice their areas. */
+  /** Return normals of triangles with lengths of twice the areas. */
   normals() {
     const {places, corners} = this, at = new Float32Array(3 * corners.length);
     for (let c = 0; c < corners.length; c++) for (let k = 0; k < 3; k++) at[3 * c + k] = places[3 * corners[c] + k];
     return faceNormals(at);
   }
 
-  /** Return for each vertex the one of some that is fewest edges away; -1 where none can be reached. */
+  /** Return for each vertex the nearest of the given vertices by number of edges; -1 if none can be reached. */
   nearest(some, graph) {
     const nearest = new Int32Array(this.count).fill(-1), waiting = new Int32Array(this.count);
     let last = 0;

@@ -1,25 +1,25 @@
-// What clicks and drags on the panes do: look, place cones, draw seams.
+// Tools for clicks and drags on the panes: look, place cones, draw seams.
 
 // [key, name, letter, hint]
 const TOOLS = [
-  ["look", "Look", "v", "Drag turns the model. Drag a cone to move it."],
-  ["cone", "Cone", "a", "Click puts a cone there; drag one to move it."],
-  ["cut", "Cut", "x", "Click from point to point: the shortest path between them is cut. Esc, or Cut again, ends the line."],
-  ["keep", "Keep whole", "k", "Click from point to point: no seam runs along the path between them. Esc, or Keep whole again, ends the line."],
-  ["corner", "Corner", "o", "Click four points of the boundary: the corners of a rectangle. A click on one takes it away."],
+  ["look", "Look", "v", "Drag to rotate the model. Drag a cone to move it."],
+  ["cone", "Cone", "a", "Click to add a cone; drag a cone to move it."],
+  ["cut", "Cut", "x", "Click points: the shortest paths between them are cut. Esc, or Cut again, ends the path."],
+  ["keep", "Keep whole", "k", "Click points: the shortest paths between them are not cut. Esc, or Keep whole again, ends the path."],
+  ["corner", "Corner", "o", "Click four points of the boundary: the corners of a rectangle. Click a corner to remove it."],
 ];
-const NEAR = 12; // pixels within which a click means what is there
+const NEAR = 12; // Pick radius of a click in pixels.
 
-const BARE = {get: () => false}; // A state in which nothing but triangles is drawn, or picked.
+const BARE = {get: () => false}; // A state in which only triangles are drawn and picked.
 
 class Tools {
   /** studio: {viewer, pathBetween(vertex, other), act(action), isBusy(), select(vertex)}. */
   constructor(studio) {
     this.studio = studio;
     this.mode = "look";
-    this.from = null; // where the line that is being drawn begins
+    this.from = null; // Start of the path that is being drawn.
     this.preview = [];
-    this.dragged = null; // {from, at}: a cone, and where it is dragged to
+    this.dragged = null; // {from, at}: a cone, and the vertex that it is dragged to.
     this.strokes = 0;
   }
 
@@ -41,7 +41,7 @@ class Tools {
     return this.mode === "cut" || this.mode === "keep";
   }
 
-  /** The vertex nearest to a pixel, of the triangle there; null beside the surface. */
+  /** Return the vertex nearest to a pixel, of the triangle there; null outside the surface. */
   vertexAt(pane, x, y) {
     const {model, renderer} = this.studio.viewer;
     const thing = renderer.pick(pane, x, y, BARE);
@@ -57,7 +57,7 @@ class Tools {
     return thing?.kind === "triangle" ? [0, 1, 2].map((k) => model.vertexAt(3 * thing.index + k)) : [];
   }
 
-  /** The place of a pixel on the model, which is seen in parallel. */
+  /** Return the point of the model at a pixel, in parallel projection. */
   placeAt(pane, x, y) {
     const {model} = this.studio.viewer, places = this.cornersAt(pane, x, y).map((vertex) => model.place(vertex));
     const [a, b, c] = places.map((place) => pane.camera.project(place));
@@ -67,7 +67,7 @@ class Tools {
     return [0, 1, 2].map((k) => shares.reduce((sum, share, i) => sum + share * places[i][k], 0));
   }
 
-  /** The vertex of the boundary that a click means; null where there is none. */
+  /** Return the boundary vertex at a click; null if there is none. */
   boundaryVertexAt(pane, x, y) {
     const {studio} = this, {model} = studio.viewer, boundary = studio.boundaryVertices();
     const off = (vertex) => Math.min(...studio.overlay.places(pane, vertex).map(([px, py]) => Math.hypot(px - x, py - y)));
@@ -75,12 +75,12 @@ class Tools {
     if (picked !== undefined) return picked;
     const nearest = this.vertexAt(pane, x, y);
     if (nearest === null || pane.inPlane) return leastOf(boundary, off);
-    // Seen through the model there may be others at this pixel.
+    // Hidden vertices may be at the same pixel.
     const [px, py, pz] = model.place(nearest);
     return leastOf(boundary, (vertex) => Math.hypot(...model.place(vertex).map((value, k) => value - [px, py, pz][k])));
   }
 
-  // What the viewer tells.
+  // Handlers of the viewer.
 
   hover(pane, x, y) {
     if (this.paints) {
@@ -93,7 +93,7 @@ class Tools {
     this.studio.viewer.remark();
   }
 
-  /** The cone at a pixel, or, within so many, the nearest one in sight; null where there is none. */
+  /** Return the cone at a pixel, or the nearest visible one within a number of pixels; null if there is none. */
   coneAt(pane, x, y, reach) {
     const {viewer} = this.studio, {model} = viewer;
     const thing = viewer.renderer.pick(pane, x, y, viewer.state);
@@ -130,7 +130,7 @@ class Tools {
 
   corner(pane, x, y) {
     const vertex = this.boundaryVertexAt(pane, x, y);
-    if (vertex === null) this.studio.refuse(new Refusal("this model has no boundary to pick corners of"));
+    if (vertex === null) this.studio.refuse(new Refusal("this model has no boundary for corners"));
     else this.studio.act({do: "corner", vertex: this.studio.numberOf(vertex)});
   }
 
@@ -142,7 +142,7 @@ class Tools {
   }
 }
 
-/** The value for which a function is least; null of none. */
+/** Return the value that minimises a function; null if there are no values. */
 function leastOf(values, function_) {
   let best = null, least = Infinity;
   for (const value of values) {
@@ -152,7 +152,7 @@ function leastOf(values, function_) {
   return best;
 }
 
-/** A cone on its way along the surface. What follows from it is shown as often as it is there. */
+/** A cone that is dragged along the surface. Each layout is shown as soon as it is computed. */
 class Drag {
   constructor(tools, pane, vertex) {
     Object.assign(this, {tools, pane, studio: tools.studio});

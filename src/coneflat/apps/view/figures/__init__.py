@@ -1,1 +1,1 @@
-"""Figures of meshes and flattenings, by matplotlib."""
+"""Figures of meshes and flattenings, drawn with matplotlib."""

@@ -1,4 +1,4 @@
-"""An orthographic camera: from where a model is seen, and where its points are in the picture."""
+"""Orthographic cameras, which map points of a model to pixels."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from ....base import FloatArray, shown
 from ....errors import OptionError
 
 SIDES = ("front", "back", "left", "right", "top", "bottom")
-"""Words for directions; left and right are those of who stands in front of the model."""
+"""Names of directions; left and right are as seen by a viewer in front of the model."""
 
 Eye: TypeAlias = "str | ArrayLike"
-"""Where the eye is, as seen from the model: (3,) a direction, or a side, or two such as "front-right"."""
+"""Direction from the model to the eye: a (3,) vector, the name of a side, or two names such as "front-right"."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class Camera:
 
     Attributes:
         axes: (3, 3) rows are unit vectors to the right, up, and from the model to the eye.
-        centre: (3,) the point that lands in the middle of the picture, model units.
+        centre: (3,) the point in the middle of the picture, model units.
         scale: pixels per model unit.
         width, height: size of the picture in pixels.
     """
@@ -36,7 +36,7 @@ class Camera:
     height: int
 
     def project(self, points: ArrayLike) -> FloatArray:
-        """Return (..., 3): pixel x to the right, pixel y downwards, depth away from the eye, in pixels."""
+        """Return (..., 3) pixel coordinates of points: x to the right, y downwards, depth away from the eye."""
         right, up, near = np.moveaxis((np.asarray(points) - self.centre) @ self.axes.T, -1, 0)
         x, y = self.width / 2 + self.scale * right, self.height / 2 - self.scale * up
         return np.stack([x, y, -self.scale * near], axis=-1)
@@ -49,28 +49,28 @@ class Camera:
 def fit_camera(
     vertices: ArrayLike, size: tuple[int, int], eye: Eye = "front-right", up: str = "y", margin: float = 0.03
 ) -> Camera:
-    """Return the camera at which the vertices just fill the picture.
+    """Return the camera for which the vertices fill the picture.
 
     Args:
         vertices: (n, 3) positions.
         size: width and height in pixels.
         eye: direction from the model to the eye, see `eye_direction`.
         up: the model's upward axis, "x", "y" or "z".
-        margin: share of the picture left free at each side.
+        margin: fraction of the picture left free on each side.
 
     Raises:
-        OptionError: `up` names no axis, or `eye` no direction.
+        OptionError: `up` or `eye` is not valid.
     """
     vertices = np.asarray(vertices, dtype=np.float64)
     upward, near = _upward(up), eye_direction(eye, up)
     near = near / np.linalg.norm(near)
     right = np.cross(upward, near)
-    if np.linalg.norm(right) < 1e-9:  # unit vectors: straight from above, any side is upward
+    if np.linalg.norm(right) < 1e-9:  # From above or below, another axis points up.
         right = np.cross(np.roll(upward, 1), near)
     right /= np.linalg.norm(right)
     axes = np.stack([right, np.cross(near, right), near])
-    turned = vertices @ axes.T
-    low, high = turned.min(axis=0), turned.max(axis=0)
+    rotated = vertices @ axes.T
+    low, high = rotated.min(axis=0), rotated.max(axis=0)
     extent = np.maximum(high - low, np.finfo(np.float64).tiny)
     width, height = size
     scale = (1.0 - 2.0 * margin) * min(width / extent[0], height / extent[1])
@@ -78,10 +78,10 @@ def fit_camera(
 
 
 def view_aspect(vertices: ArrayLike, eye: Eye = "front-right", up: str = "y") -> float:
-    """Return the width of a view of the vertices over its height, at least 1/4 and at most 4.
+    """Return the ratio of width to height of a view of the vertices, clamped to 1/4 to 4.
 
     Raises:
-        OptionError: `up` names no axis, or `eye` no direction.
+        OptionError: `up` or `eye` is not valid.
     """
     camera = fit_camera(vertices, (1, 1), eye, up)
     width, height = np.ptp(camera.project(vertices), axis=0)[:2]
@@ -92,18 +92,18 @@ def eye_direction(eye: Eye, up: str = "y") -> FloatArray:
     """Return the (3,) direction from the model to the eye.
 
     Args:
-        eye: a direction in model axes; or a side, "front", "back", "left", "right", "top" or "bottom", seen straight
-            on; or two of them, such as "front-right", for a three-quarter view that shows more of the first.
+        eye: a vector in model axes; or a side, "front", "back", "left", "right", "top" or "bottom"; or two of them,
+            such as "front-right", for a three-quarter view that shows more of the first.
         up: the model's upward axis, "x", "y" or "z".
 
     Raises:
-        OptionError: `up` names no axis, or `eye` no direction.
+        OptionError: `up` or `eye` is not valid.
     """
     upward = _upward(up)
     if not isinstance(eye, str):
         direction = np.asarray(eye, dtype=np.float64)
         if direction.shape != (3,) or not np.isfinite(direction).all() or not direction.any():
-            raise OptionError(f"a direction to the eye has three numbers, not all 0, unlike {eye!r}")
+            raise OptionError(f"the direction to the eye must be three numbers, not all 0, not {eye!r}")
         return direction
     right = np.roll(upward, -1 if up == "y" else 1)
     front = np.cross(right, upward)
@@ -113,15 +113,15 @@ def eye_direction(eye: Eye, up: str = "y") -> FloatArray:
         raise OptionError(f"unknown eye {eye!r}: choose from {', '.join(SIDES)}, or two of them: front-right")
     if len(words) == 1:
         return sides[eye]
-    # A view that shows three sides of a box, from above.
+    # The view shows three sides of a box, one of them the top.
     one, two = (sides[word] for word in words)
     if one @ two:
-        raise OptionError(f"no eye is {words[0]} and {words[1]} of a model")
+        raise OptionError(f"the directions {words[0]} and {words[1]} cannot be combined")
     return np.asarray(0.75 * one + 0.55 * two + 0.38 * upward * (not (one + two) @ upward))
 
 
 def _upward(up: str) -> FloatArray:
-    if not isinstance(up, str) or up not in ("x", "y", "z"):  # arrays cannot be compared with words
+    if not isinstance(up, str) or up not in ("x", "y", "z"):  # Arrays cannot be compared with strings.
         raise OptionError(f'the upward axis must be "x", "y" or "z", not {shown(up)}')
     axis: FloatArray = np.eye(3)["xyz".index(up)]
     return axis

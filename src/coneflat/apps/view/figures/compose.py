@@ -1,6 +1,6 @@
-"""Figures: several panels in rows, each row with a card that explains its colours; made without a display, and written.
+"""Composition and writing of figures: panels in rows, each row with a card that explains its colours.
 
-Matplotlib is imported only when one is made.
+No display is needed. Matplotlib is imported only when a figure is created.
 """
 
 from __future__ import annotations
@@ -25,51 +25,51 @@ if TYPE_CHECKING:
 
 
 class Inches:
-    """Lengths in figures."""
+    """Lengths in figures, in inches."""
 
-    WIDTH = 7.0  # two columns of a journal
+    WIDTH = 7.0  # Two columns of a journal.
     MARGIN, GAP = 0.08, 0.12
     CARD, CARD_HEIGHT = 1.35, 1.4
     TITLE, LABEL, LEGEND = 0.3, 0.22, 0.28
     TICKS, LINE = 0.28, 0.135
-    SCALE_LEFT, SCALE_BELOW = 0.55, 0.42  # for the ticks and labels of a graph
+    SCALE_LEFT, SCALE_BELOW = 0.55, 0.42  # Space for the ticks and labels of a graph.
 
 
 class Points:
-    """Sizes of text."""
+    """Sizes of text, in points."""
 
     TITLE, LABEL, SMALL = 10.0, 8.5, 7.5
 
 
 TEXT_COLOR = "#333333"
 
-MOST_PIXELS = 30e6
-"""Four samples to the pixel and 16 bytes to the sample are held for pictures: 2 GB."""
+MAX_PIXELS = 30e6
+"""Largest number of pixels. Pictures need four samples per pixel and 16 bytes per sample: 2 GB."""
 
 
-# What tells the time or the library's version is left out: the same figure gives the same bytes for longer.
+# Dates and the version of matplotlib are left out, so that equal figures give equal files.
 _METADATA: dict[str, dict[str, Any]] = {
     ".png": {"Software": None},
     ".svg": {"Date": None, "Creator": None},
     ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
 }
 
-#: Endings of the files that `save_figure` writes.
+#: Extensions of the files that `save_figure` writes.
 FIGURE_FORMATS = tuple(_METADATA)
 
-# TrueType fonts, since many journals refuse those of Type 3, and names in SVG that are the same each time.
+# TrueType fonts, because many journals reject fonts of Type 3, and reproducible names in SVG.
 _SETTINGS = {"pdf.fonttype": 42, "svg.hashsalt": "coneflat"}
 
 
 @dataclass(frozen=True)
 class Panel:
-    """A picture.
+    """A picture in a figure.
 
     Attributes:
-        aspect: its width over its height.
-        draw: draws it.
-        label: to be written above it.
-        is_graph: whether it needs room for ticks and labels.
+        aspect: ratio of width to height.
+        draw: function that draws it in axes.
+        label: text above it.
+        is_graph: whether it needs space for ticks and labels.
     """
 
     aspect: float
@@ -78,13 +78,13 @@ class Panel:
     is_graph: bool = False
 
     def with_room(self, height: float) -> Panel:
-        """Return a panel that is wide enough for its label, if it is of a height in inches."""
+        """Return a panel that is wide enough for its label at a height in inches."""
         return replace(self, aspect=max(self.aspect, text_width(self.label) / height))
 
 
 @dataclass(frozen=True)
 class Row:
-    """Panels of one height, at most `tallest` inches, and the quantities that their colours show."""
+    """Panels of equal height, at most `tallest` inches, and the quantities that their colours show."""
 
     panels: Sequence[Panel]
     quantities: Sequence[Quantity] = ()
@@ -103,36 +103,36 @@ def compose(
     """Return a figure of rows of panels.
 
     Args:
-        rows: from the top.
-        title: to be written at the top.
-        marks: what a legend of matplotlib takes, to be named at the bottom.
-        size: width and height in inches; None for what the panels need.
-        dpi: dots per inch.
-        width: the largest width in inches if the size is left open.
+        rows: rows from top to bottom.
+        title: title at the top.
+        marks: matplotlib handles of the legend at the bottom.
+        size: width and height in inches; None to fit the panels.
+        dpi: resolution in dots per inch.
+        width: largest width in inches if `size` is None.
 
     Raises:
-        OptionError: the size leaves no room for the panels or has too many pixels, or matplotlib is not installed.
+        OptionError: the size is too small for the panels or has too many pixels, or matplotlib is not installed.
     """
     above = [Inches.LABEL * any(panel.label for panel in row.panels) for row in rows]
     fixed = sum(above) + Inches.GAP * (len(rows) - 1) + 2 * Inches.MARGIN
     fixed += Inches.TITLE * bool(title) + Inches.LEGEND * bool(marks)
     least = [max(Inches.CARD_HEIGHT * len(row.quantities), 0.3) for row in rows]
     if size is None:
-        natural = [min(_room(row, width) / _aspect(row), row.tallest) for row in rows]
-        spare = min(_room(row, width) - h * _aspect(row) for row, h in zip(rows, natural, strict=True))
+        natural = [min(_panel_space(row, width) / _aspect(row), row.tallest) for row in rows]
+        spare = min(_panel_space(row, width) - h * _aspect(row) for row, h in zip(rows, natural, strict=True))
         width = max(width - spare, _legend_width(marks))
         heights = np.maximum(natural, least).tolist()
         size = width, sum(heights) + fixed
     else:
         heights = [(size[1] - fixed) / len(rows)] * len(rows)
-        if heights[0] < max(least) or min(_room(row, size[0]) for row in rows) < 0.3:
-            raise OptionError(f"{size[0]:g} by {size[1]:g} inches leave no room for the pictures")
+        if heights[0] < max(least) or min(_panel_space(row, size[0]) for row in rows) < 0.3:
+            raise OptionError(f"{size[0]:g} by {size[1]:g} inches are too small for the pictures")
     check_pixels(size, dpi)
     figure = new_figure(*size, dpi=dpi)
     from matplotlib import rc_context
 
-    middle, room = size[1] - Inches.TITLE / 2 - Inches.MARGIN / 2, size[0] - 2 * Inches.MARGIN
-    _write(figure, Inches.MARGIN, middle, title, room, size=Points.TITLE, weight="bold", va="center")
+    middle, space = size[1] - Inches.TITLE / 2 - Inches.MARGIN / 2, size[0] - 2 * Inches.MARGIN
+    _write(figure, Inches.MARGIN, middle, title, space, size=Points.TITLE, weight="bold", va="center")
     top = size[1] - Inches.MARGIN - Inches.TITLE * bool(title)
     with rc_context({"font.size": Points.LABEL}):
         for row, height, label in zip(rows, heights, above, strict=True):
@@ -155,15 +155,15 @@ def check_pixels(size: tuple[float, float], dpi: float) -> None:
     """Raise OptionError if a figure of this size in inches cannot be drawn at this resolution."""
     check_dpi(dpi)
     pixels = size[0] * size[1] * dpi**2
-    if not 0 < min(size) <= pixels <= MOST_PIXELS:
+    if not 0 < min(size) <= pixels <= MAX_PIXELS:
         raise OptionError(
-            f"{size[0]:g} by {size[1]:g} inches at {dpi:g} dots per inch are {pixels / 1e6:.0f} million pixels, of at "
-            f"most {MOST_PIXELS / 1e6:g} million: choose another size or fewer dots"
+            f"{size[0]:g} by {size[1]:g} inches at {dpi:g} dots per inch are {pixels / 1e6:.0f} million pixels, above "
+            f"the limit of {MAX_PIXELS / 1e6:g} million: choose a smaller size or resolution"
         )
 
 
-def _room(row: Row, width: float) -> float:
-    """Return the width left for panels."""
+def _panel_space(row: Row, width: float) -> float:
+    """Return the width available for panels, in inches."""
     card = (Inches.CARD + Inches.GAP) * bool(row.quantities)
     return width - 2 * Inches.MARGIN - Inches.GAP * (len(row.panels) - 1) - card
 
@@ -174,26 +174,26 @@ def _aspect(row: Row) -> float:
 
 def _draw_row(figure: Figure, row: Row, floor: float, height: float) -> None:
     width = figure.get_figwidth()
-    unit = _room(row, width) / _aspect(row)
+    unit = _panel_space(row, width) / _aspect(row)
     left = Inches.MARGIN
     for panel in row.panels:
-        room = unit * panel.aspect
-        _write(figure, left, floor + height + 0.05, panel.label, room=room, size=Points.LABEL, va="bottom")
+        space = unit * panel.aspect
+        _write(figure, left, floor + height + 0.05, panel.label, space=space, size=Points.LABEL, va="bottom")
         x, y = (Inches.SCALE_LEFT, Inches.SCALE_BELOW) if panel.is_graph else (0.0, 0.0)
-        panel.draw(_add_axes(figure, left + x, floor + y, room - x, height - y))
-        left += room + Inches.GAP
+        panel.draw(_add_axes(figure, left + x, floor + y, space - x, height - y))
+        left += space + Inches.GAP
     share = height / max(len(row.quantities), 1)
     for k, quantity in enumerate(row.quantities):
         _draw_card(figure, quantity, left, floor + height - (k + 1) * share, share)
 
 
 def _draw_card(figure: Figure, quantity: Quantity, left: float, floor: float, height: float) -> None:
-    """Draw a quantity's colours, how often they are, and its percentiles."""
+    """Draw the colour bar, the histogram and the percentiles of a quantity."""
     lines = [("median", 50), ("95% below", 95), ("99% below", 99), ("largest", 100)]
     used = Inches.LABEL + Inches.TICKS + (len(lines) + 0.7) * Inches.LINE
     graph = min(max(height - used, 0.25), 0.7)
     top = floor + min(height, (height + used + graph) / 2)
-    _write(figure, left, top, quantity.label, room=Inches.CARD - 0.05, size=Points.LABEL, va="top")
+    _write(figure, left, top, quantity.label, space=Inches.CARD - 0.05, size=Points.LABEL, va="top")
     draw_histogram(
         _add_axes(figure, left + 0.05, top - Inches.LABEL - graph, Inches.CARD - 0.15, graph), quantity
     )
@@ -205,7 +205,7 @@ def _draw_card(figure: Figure, quantity: Quantity, left: float, floor: float, he
 
 
 def draw_histogram(axes: Axes, quantity: Quantity) -> None:
-    """Draw how often a quantity has which value over its colour bar; what is beyond its ends counts there."""
+    """Draw the histogram of a quantity above its colour bar; values outside the bar are counted at its ends."""
     from matplotlib import colormaps
 
     values, weights = quantity.counted()
@@ -226,35 +226,35 @@ def draw_histogram(axes: Axes, quantity: Quantity) -> None:
 
 
 def _add_axes(figure: Figure, left: float, floor: float, width: float, height: float) -> Axes:
-    """Return axes in a box given in inches."""
+    """Return new axes in a box given in inches."""
     wide, tall = figure.get_size_inches()
     return figure.add_axes((left / wide, floor / tall, width / wide, height / tall))
 
 
-def _write(figure: Figure, x: float, y: float, text: str, room: float | None = None, **look: Any) -> None:
-    """Write text at a place given in inches, smaller where the room, inches, too, is too narrow for it."""
+def _write(figure: Figure, x: float, y: float, text: str, space: float | None = None, **look: Any) -> None:
+    """Write text at a position in inches, in a smaller font if it is wider than `space` inches."""
     if not text:
         return
     wide, tall = figure.get_size_inches()
     look = {"ha": "left", "color": TEXT_COLOR, **look}
     written = figure.text(x / wide, y / tall, text, parse_math=False, **look)
-    if room is not None:
+    if space is not None:
         needed = written.get_window_extent().width / figure.dpi
-        written.set_fontsize(float(look["size"]) * min(1.0, room / needed))
+        written.set_fontsize(float(look["size"]) * min(1.0, space / needed))
 
 
 def text_width(text: str, size: float = Points.LABEL) -> float:
-    """Return about how wide a text is, inches; size: of the font, points."""
+    """Return the approximate width of a text in inches; size: font size in points."""
     return len(text) * 0.6 * size / 72.0
 
 
 def _legend_width(marks: Sequence[Any]) -> float:
-    """Return about how wide a legend of marks is, inches."""
+    """Return the approximate width of a legend of marks in inches."""
     return sum(0.45 + text_width(str(mark.get_label()), Points.SMALL) for mark in marks)
 
 
 def new_figure(width: float, height: float, dpi: float = 150) -> Figure:
-    """Return an empty figure of a size in inches, tied to no window and to no global state.
+    """Return an empty figure of a size in inches, independent of windows and of the state of pyplot.
 
     Raises:
         OptionError: matplotlib is not installed.
@@ -270,20 +270,20 @@ def new_figure(width: float, height: float, dpi: float = 150) -> Figure:
 
 
 def check_figure(path: str | PathLike[str]) -> Path:
-    """Return the path if `save_figure` can be expected to succeed with it; worth asking before long work.
+    """Return the path if `save_figure` can write to it; for use before long computations.
 
     Raises:
-        UnknownFormatError: the ending is not one of `FIGURE_FORMATS`.
+        UnknownFormatError: the extension is not one of `FIGURE_FORMATS`.
         MeshFileError: the folder is missing, the path is a folder, or writing is not permitted.
     """
     return checked_target(path, FIGURE_FORMATS, "figures are written as")
 
 
 def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
-    """Write a figure as PNG, SVG or PDF, by the path's ending; the file is there in full or not at all.
+    """Write a figure as PNG, SVG or PDF, by the extension of the path; no incomplete file is left.
 
     Raises:
-        UnknownFormatError: the ending is none of these.
+        UnknownFormatError: the extension is none of these.
         MeshFileError: the file cannot be written.
 
     Examples:

@@ -21,38 +21,38 @@ HIDDEN_SEAM_COLOR = "#a9aeb6"
 POSITIVE_COLOR = "#d62222"
 NEGATIVE_COLOR = "#000000"
 HIDDEN_COLORS = {POSITIVE_COLOR: "#e6b3b4", NEGATIVE_COLOR: "#a3a5a9"}
-"""What cones look like through the model."""
+"""Colours of cones that are hidden by the model."""
 
 DOT_REACH = 0.01
-"""About the radius of a dot, as a share of the picture's longer side."""
+"""Approximate radius of a dot, as a fraction of the longer side of the picture."""
 
 SEAM_WIDTH = 1.2
-"""Points."""
+"""Line width in points."""
 
 
 def mark_scale(axes: Axes) -> float:
-    """Return the factor of line widths and dot areas that fits the axes' size, 1 in 360 points."""
+    """Return the factor of line widths and dot areas for the size of the axes, 1 for 360 points."""
     box = axes.get_window_extent()
     side = float(np.sqrt(box.width * box.height)) * 72.0 / axes.figure.dpi
     return float(np.clip(side / 360.0, 0.15, 1.5))
 
 
 def cone_area(curvatures: FloatArray) -> FloatArray:
-    """Return the area of cones' dots in square points; small cones stay visible, large ones in bounds."""
+    """Return the areas of the dots of cones in square points, clamped to a minimum and a maximum."""
     return np.clip(60.0 * np.abs(curvatures) / (np.pi / 2), 15.0, 150.0)
 
 
 def draw_dots(
     axes: Axes, points: FloatArray, curvatures: FloatArray, *, hidden: bool = False, share: float = 1.0
 ) -> None:
-    """Draw cones as dots, red or black by the sign of their curvature and as large as its amount.
+    """Draw cones as dots, red for positive and black for negative curvature, with an area that grows with it.
 
     Args:
         axes: matplotlib axes to draw in.
-        points: (k, 2) where, in the axes' coordinates.
-        curvatures: (k,) radians.
-        hidden: whether they are seen through the model.
-        share: factor of the dots' area.
+        points: (k, 2) positions in the coordinates of the axes.
+        curvatures: (k,) curvatures in radians.
+        hidden: whether the cones are hidden by the model.
+        share: factor of the areas of dots.
     """
     if not len(points):
         return
@@ -74,7 +74,7 @@ def draw_dots(
 def draw_seams_on_model(
     axes: Axes, picture: MeshPicture, result: Flattening, *, through: bool = False
 ) -> None:
-    """Draw the visible parts of the seams on a picture of the model; `through` it the others, too, but faintly."""
+    """Draw the visible parts of the seams on a picture of the model; with `through`, also the hidden parts, faintly."""
     from matplotlib.collections import LineCollection
 
     pieces, visible = picture.split_segments(*np.moveaxis(result.vertices[result.seams], 1, 0))
@@ -91,10 +91,10 @@ def draw_seams_on_model(
 def draw_cones_on_model(
     axes: Axes, picture: MeshPicture, result: Flattening, *, through: bool = False
 ) -> None:
-    """Draw the visible cones on a picture of the model; `through` it the others, too, but faintly."""
+    """Draw the visible cones on a picture of the model; with `through`, also the hidden ones, faintly."""
     places, curvatures = result.vertices[result.cones], result.curvatures
     points = picture.camera.project(places)[:, :2]
-    # A dot that reaches beyond an outline is not hidden.
+    # A dot that extends beyond an outline counts as visible.
     visible = picture.visible_points(places, DOT_REACH * max(picture.camera.width, picture.camera.height))
     if through:
         draw_dots(axes, points[~visible], curvatures[~visible], hidden=True)
@@ -102,7 +102,7 @@ def draw_cones_on_model(
 
 
 def mark_handles(result: Flattening, *, cones: bool = True, seams: bool = True) -> list[Any]:
-    """Return what a legend of matplotlib takes to name the marks that a result has."""
+    """Return the matplotlib legend handles of the marks that a result has."""
     from matplotlib.lines import Line2D
 
     diameter = float(np.sqrt(cone_area(np.array([np.pi / 2]))[0]))
@@ -118,7 +118,7 @@ def mark_handles(result: Flattening, *, cones: bool = True, seams: bool = True) 
 
 
 def pixels_of(axes: Axes, dpi: float) -> tuple[int, int]:
-    """Return the width and height of the axes in pixels, at so many to the inch.
+    """Return the width and height of the axes in pixels, at a resolution in dots per inch.
 
     Raises:
         OptionError: `dpi` is not between 10 and 2400.
@@ -130,6 +130,6 @@ def pixels_of(axes: Axes, dpi: float) -> tuple[int, int]:
 
 
 def check_dpi(dpi: float) -> None:
-    """Raise OptionError if this is not a resolution."""
+    """Raise OptionError if the resolution is not between 10 and 2400 dots per inch."""
     if not 10 <= dpi <= 2400:
         raise OptionError(f"the resolution must be between 10 and 2400 dots per inch, not {dpi:g}")

@@ -1,4 +1,4 @@
-"""Figures of a flattening, by kind, and the one that shows it at a glance."""
+"""Figures of a flattening, by kind, and an overview figure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ....base import DISTORTION, IntArray, plural
 from ....base import shown as as_shown
 from ....errors import OptionError
 from ....io import CELLS, check_cells
-from ..from_uv import is_own
+from ..from_uv import is_from_file
 from ..quantity import Quantity, check_color_map, conformal_distortion, curvature, stretch
 from .camera import Eye, eye_direction, view_aspect
 from .compose import Panel, Row, check_pixels, compose
@@ -30,22 +30,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Look:
-    """How to draw a figure.
+    """Options of a figure.
 
     Attributes:
-        size: width and height in inches; None for what the pictures need.
-        dpi: dots per inch of the pictures.
+        size: width and height in inches; None to fit the pictures.
+        dpi: resolution of the pictures in dots per inch.
         eyes: directions from the model to the eye, one for each view, see `draw_checker`.
         up: the model's upward axis, "x", "y" or "z".
-        colors: a colour map of matplotlib for quality, color and curvature; None for their own.
-        cells: of the checkerboard, in a row that is as long as the root of the area.
+        colors: a colour map of matplotlib for quality, color and curvature; None for the defaults.
+        cells: number of checkerboard cells along the square root of the surface area.
         color_charts: give the charts of the layout different colours.
-        own: numbers to be shown as colours, of the kind "color".
-        distortion: of the curve: the area distortion that is wanted.
-        title: to be written above all.
+        own: quantity to be shown as colours, for the kind "color".
+        distortion: target area distortion of the curve.
+        title: title above the figure.
 
     Raises:
-        OptionError: one of them makes no sense.
+        OptionError: an option is not valid.
     """
 
     size: tuple[float, float] | None = None
@@ -63,7 +63,7 @@ class Look:
         if isinstance(self.eyes, str):
             object.__setattr__(self, "eyes", (self.eyes,))
         if not len(self.eyes):
-            raise OptionError("a figure of the model needs an eye to see it from")
+            raise OptionError("eyes must name at least one direction")
         for eye in self.eyes:
             eye_direction(eye, self.up)
         check_pixels((1.0, 1.0) if self.size is None else self.size, self.dpi)
@@ -79,7 +79,7 @@ class Look:
         faces: IntArray | None = None,
         **options: Any,
     ) -> list[Panel]:
-        """Return a panel for each eye, in which a function draws the model; faces: if they are not its triangles."""
+        """Return a panel for each eye, in which `draw` draws the model; faces: its faces if not `result.faces`."""
         draw = partial(draw, result, up=self.up, dpi=self.dpi, **options)
         vertices = result.vertices[np.unique(result.faces if faces is None else faces)]
         return [
@@ -92,28 +92,28 @@ _Rows: TypeAlias = "tuple[list[Row], list[Any]]"
 
 
 class Quads(Protocol):
-    """A mesh that knows its figure of the kind "quads", as `QuadMesh` does."""
+    """A mesh that provides its figure of the kind "quads", as `QuadMesh` does."""
 
     def figure_rows(self, look: Look) -> _Rows:
-        """Return the rows of the figure, and what its legend names."""
+        """Return the rows of the figure and the handles of its legend."""
 
 
 def make_figure(shown: Flattening | ConeCurve | Quads, kind: str, **look: Any) -> Figure:
     """Return a figure for print, which `save_figure` writes.
 
     Args:
-        shown: the flattening; of the kind "curve" a `ConeCurve`, of the kind "quads" a `QuadMesh`.
-        kind: "layout": the charts in the unit square with cones. "checker": the model with a checkerboard through
-            its UVs. "quality": distortion of angles and of scale on the model and in the layout. "color": `own` numbers
-            there. "cones": the model with cones and seams. "curvature": angles missing around vertices, before and
-            after. "curve": area distortion against the number of cones. "quads": the edges of quads, and their
-            irregular vertices.
-        look: `size` in inches, `dpi`, `eyes` to see the model from and its axis `up`, `colors`, `cells` of the
-            checkerboard, `color_charts`, `own` numbers, `distortion` wanted, `title`: the attributes of
-            `coneflat.apps.view.Look`.
+        shown: the flattening; for the kind "curve" a `ConeCurve`, for the kind "quads" a `QuadMesh`.
+        kind: "layout": the charts in the unit square with cones. "checker": the model with a checkerboard texture.
+            "quality": distortion of angles and of scale on the model and in the layout. "color": the quantity `own` on
+            the model and in the layout. "cones": the model with cones and seams. "curvature": angle defects before and
+            after flattening. "curve": area distortion against the number of cones. "quads": the edges of quads, and
+            their irregular vertices.
+        look: attributes of `coneflat.apps.view.Look`: `size` in inches, `dpi`, `eyes` (directions to the eye), upward
+            axis `up`, `colors`, `cells` of the checkerboard, `color_charts`, quantity `own`, target `distortion`,
+            `title`.
 
     Raises:
-        OptionError: an option makes no sense, or matplotlib is not installed.
+        OptionError: an option is not valid, or matplotlib is not installed.
 
     Examples:
         >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
@@ -125,13 +125,13 @@ def make_figure(shown: Flattening | ConeCurve | Quads, kind: str, **look: Any) -
     if not isinstance(kind, str) or kind not in KINDS:
         raise OptionError(f"unknown kind of figure {as_shown(kind)}: choose from {', '.join(KINDS)}")
     is_curve, is_quads = isinstance(shown, ConeCurve), hasattr(shown, "figure_rows")
-    for name, fits, maker in (("curve", is_curve, "cone_curve"), ("quads", is_quads, "quads")):
+    for name, fits, function in (("curve", is_curve, "cone_curve"), ("quads", is_quads, "quads")):
         if fits != (kind == name):
             raise OptionError(
-                f"figures of the kind {name!r}, and no others, show what `coneflat.{maker}` returns"
+                f"results of `coneflat.{function}` are shown by figures of the kind {name!r} and no others"
             )
     if kind not in ("curve", "quads") and not hasattr(shown, "uv_faces"):
-        raise OptionError(f"a figure shows what `coneflat.flatten` returns, not {as_shown(shown)}")
+        raise OptionError(f"expected a result of `coneflat.flatten`, got {as_shown(shown)}")
     chosen = Look(**look)
     rows, marks = _ROWS[kind](shown, chosen)
     return compose(rows, title=chosen.title, marks=marks, size=chosen.size, dpi=chosen.dpi)
@@ -156,12 +156,12 @@ def _quality(result: Flattening, look: Look) -> _Rows:
 
 def _color(result: Flattening, look: Look) -> _Rows:
     if look.own is None:
-        raise OptionError("a figure of the kind 'color' shows numbers: give `own`")
+        raise OptionError("a figure of the kind 'color' needs a quantity: give `own`")
     return [_coloured(result, look, look.own)], []
 
 
 def _coloured(result: Flattening, look: Look, quantity: Quantity) -> Row:
-    """Return views of the model, and the layout, coloured by a quantity."""
+    """Return a row with views of the model and the layout, coloured by a quantity."""
     shown = quantity.recolored(look.colors)
 
     in_layout = partial(fill_layout, result=result, quantity=shown, dpi=look.dpi)
@@ -200,15 +200,15 @@ KINDS = tuple(_ROWS)
 
 
 def demo_figure(result: Flattening, *, up: str = "y", dpi: float = 220.0) -> Figure:
-    """Return a figure of a flattening: the textured model, its layout, its distortion from two sides.
+    """Return an overview figure of a flattening: the textured model, its layout, its distortion from two sides.
 
     Args:
         result: the flattening.
         up: the model's upward axis, "x", "y" or "z".
-        dpi: dots per inch.
+        dpi: resolution in dots per inch.
 
     Raises:
-        OptionError: matplotlib is not installed, or `up` names no axis.
+        OptionError: matplotlib is not installed, or `up` is not valid.
     """
     front, back = "front-right", "back-left"
     vertices = result.vertices[np.unique(result.faces)]
@@ -226,11 +226,11 @@ def demo_figure(result: Flattening, *, up: str = "y", dpi: float = 220.0) -> Fig
 
 
 def title(result: Flattening) -> str:
-    """Return the line of key numbers."""
+    """Return the main measures in one line."""
     measures = result.distortion
     parts = [
         plural(len(result.faces), "triangle"),
-        *([] if is_own(result) else [plural(len(result.cones), "cone")]),
+        *([] if is_from_file(result) else [plural(len(result.cones), "cone")]),
         f"QC mean {measures.qc_mean:.4f}",
         f"{measures.flipped:,} flipped",
         f"seam length {measures.seam_length:.2f} √area",

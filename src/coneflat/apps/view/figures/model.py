@@ -1,4 +1,4 @@
-"""Drawing the model: its texture, its cones and seams, quantities on it, and what how many cones gain."""
+"""Drawing the model with a texture, cones, seams or colours, and the curve of distortion by number of cones."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .... import Flattening
 
 DOTS_PER_INCH = 300.0
-"""Resolution of pictures, for print."""
+"""Resolution of pictures for print."""
 
 
 def draw_checker(
@@ -33,20 +33,20 @@ def draw_checker(
     cones: bool = False,
     dpi: float = DOTS_PER_INCH,
 ) -> None:
-    """Draw the model with a checkerboard that its UVs put on it: squares, equally large, if nothing is distorted.
+    """Draw the model with a checkerboard texture; its cells are squares of equal size if there is no distortion.
 
     Args:
         result: the flattening.
-        axes: matplotlib axes to draw in; their own lines and ticks are turned off.
+        axes: matplotlib axes to draw in; their own lines and ticks are hidden.
         eye: direction from the model to the eye: (3,), or "front", "back", "left", "right", "top", "bottom", or two
-            of them such as "back-left" for three quarters.
+            of them such as "back-left" for a three-quarter view.
         up: the model's upward axis, "x", "y" or "z".
-        cells: cells in a row that is as long as the root of the area.
-        seams, cones: mark those that are visible.
-        dpi: resolution of the picture.
+        cells: number of cells along the square root of the surface area.
+        seams, cones: whether to draw the visible ones.
+        dpi: resolution in dots per inch.
 
     Raises:
-        OptionError: an option makes no sense.
+        OptionError: an option is not valid.
     """
     side = cell_side(result.uv, result.uv_faces, cells)
     paint = {"corner_uv": result.corner_uv, "cell": side}
@@ -60,9 +60,9 @@ def draw_checker(
 def draw_cones(
     result: Flattening, axes: Axes, *, eye: Eye = "front-right", up: str = "y", dpi: float = DOTS_PER_INCH
 ) -> None:
-    """Draw the model with its cones and seams, and faintly those behind it.
+    """Draw the model with its cones and seams; hidden ones are drawn in faint colours.
 
-    Cones are red where their curvature is positive and black where it is negative, with an area that grows with it.
+    Cones of positive curvature are red, those of negative curvature black. The area of a dot grows with the curvature.
     Arguments and errors are those of `draw_checker`.
     """
     picture = show_mesh(axes, result.vertices, result.faces, eye, up, dpi)
@@ -80,15 +80,15 @@ def draw_curvature(
     colors: str | None = None,
     dpi: float = DOTS_PER_INCH,
 ) -> None:
-    """Draw the curvature of every vertex, the angles missing around it, by colours.
+    """Draw the curvature of every vertex, its absolute angle defect, as colours.
 
     Args:
-        result, axes, eye, up, dpi: as of `draw_checker`.
-        flat: of the flat metric, where only cones should have curvature; else of the model.
-        colors: a colour map of matplotlib.
+        result, axes, eye, up, dpi: as in `draw_checker`.
+        flat: draw the curvature of the flat metric, where only cones should have any, instead of that of the model.
+        colors: name of a colour map of matplotlib; None for the default.
 
     Raises:
-        OptionError: an option makes no sense.
+        OptionError: an option is not valid.
     """
     quantity = curvature(result, flat).recolored(colors)
     picture = draw_quantity(result, axes, quantity, eye, up, dpi)
@@ -99,7 +99,7 @@ def draw_curvature(
 def draw_quantity(
     result: Flattening, axes: Axes, quantity: Quantity, eye: Eye, up: str, dpi: float
 ) -> MeshPicture:
-    """Draw the model coloured by a quantity, in half the light and shade: a shadow must not read as a number."""
+    """Draw the model coloured by a quantity; shading is reduced by half so that colours remain readable."""
     paint = {"colors": quantity.colors(), "contrast": 0.5}
     return show_mesh(axes, result.vertices, result.faces, eye, up, dpi, **paint)
 
@@ -107,7 +107,7 @@ def draw_quantity(
 def show_mesh(
     axes: Axes, vertices: FloatArray, faces: IntArray, eye: Eye, up: str, dpi: float, **paint: Any
 ) -> MeshPicture:
-    """Show a picture of a mesh so that the axes' coordinates are its pixels, row 0 at the top; see `render_mesh`."""
+    """Show a picture of a mesh in axes whose coordinates are its pixels, row 0 at the top; see `render_mesh`."""
     picture = render_mesh(vertices, faces, size=pixels_of(axes, dpi), eye=eye, up=up, **paint)
     extent = (0, picture.camera.width, picture.camera.height, 0)
     axes.imshow(picture.image, extent=extent, interpolation="antialiased")
@@ -115,25 +115,25 @@ def show_mesh(
     return picture
 
 
-CURVE_COLOR, WANTED_COLOR, KNEE_COLOR = "#35618f", "#b0413e", "#777777"
+CURVE_COLOR, TARGET_COLOR, KNEE_COLOR = "#35618f", "#b0413e", "#777777"
 
 
 def draw_cone_curve(curve: ConeCurve, axes: Axes, *, distortion: float = DISTORTION) -> None:
-    """Draw the area distortion against the number of cones, the distortion wanted, and the knee.
+    """Draw the area distortion against the number of cones, the target distortion, and the knee of the curve.
 
     Args:
-        curve: what `coneflat.cone_curve` returns.
+        curve: the result of `coneflat.cone_curve`.
         axes: matplotlib axes to draw in.
-        distortion: E that is wanted.
+        distortion: target area distortion E.
     """
     from matplotlib.ticker import MaxNLocator
 
     axes.plot(curve.counts, curve.distortions, color=CURVE_COLOR, marker="o", markersize=4, linewidth=1.5)
     axes.set_ylim(0.0, 1.1 * max(float(curve.distortions.max()), distortion))
-    axes.axhline(distortion, color=WANTED_COLOR, linewidth=1.0, linestyle="--")
+    axes.axhline(distortion, color=TARGET_COLOR, linewidth=1.0, linestyle="--")
     note: Any = partial(axes.annotate, textcoords="offset points")
     end, look = (curve.counts[-1], distortion), {"ha": "right", "va": "bottom"}
-    note(f"E = {distortion:g}", end, xytext=(0, 2), color=WANTED_COLOR, **look)
+    note(f"E = {distortion:g}", end, xytext=(0, 2), color=TARGET_COLOR, **look)
     axes.axvline(curve.knee, color=KNEE_COLOR, linewidth=0.8, linestyle=":")
     top, look = (curve.knee, axes.get_ylim()[1]), {"ha": "left", "va": "top"}
     note(f"knee: {curve.knee} cones", top, xytext=(3, 0), color=KNEE_COLOR, **look)

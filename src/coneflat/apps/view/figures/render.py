@@ -1,4 +1,4 @@
-"""Pictures of a triangle mesh by an orthographic camera: shaded, coloured or checkered, hidden parts hidden."""
+"""Rendering of a triangle mesh with an orthographic camera: shaded, coloured or checkered, without hidden parts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .camera import Camera, Eye, fit_camera
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
-    """What a picture of h by w pixels sees; row 0 is at the top.
+    """The visible faces in a picture of h by w pixels; row 0 is at the top.
 
     Attributes:
         face: (h, w) the nearest face at the pixel's centre, -1 for the background.
@@ -29,15 +29,15 @@ class Coverage:
 
     @property
     def covered(self) -> BoolArray:
-        """(h, w) whether the pixel shows a face."""
+        """Return (h, w) whether each pixel shows a face."""
         return self.face >= 0
 
 
 def rasterise(points: ArrayLike, faces: ArrayLike, width: int, height: int) -> Coverage:
     """Return the nearest face at every pixel centre.
 
-    The spans of pixels are half open, so two triangles that share an edge leave neither a gap nor an
-    overlap between them: the pixels of a tiled region are each counted once.
+    The intervals of pixels are half open, so two triangles that share an edge leave neither a gap nor an overlap:
+    each pixel of a tiled region is counted once.
 
     Args:
         points: (n, 3) pixel x to the right, pixel y downwards, and depth away from the eye. The
@@ -56,25 +56,25 @@ class Barycentrics:
     """Barycentric coordinates in projected triangles."""
 
     def __init__(self, points: FloatArray, faces: IntArray) -> None:
-        """Take points (n, 2 or 3) of the picture and faces (m, 3)."""
+        """Take (n, 2) or (n, 3) points of the picture and (m, 3) faces."""
         corners = points[faces, :2]
         p, q, r = np.moveaxis(corners, 1, 0)
         total = signed_double_areas(corners)
-        # Faces whose normals point away from the eye, as y runs downwards.
+        # These faces have normals that point away from the eye, because y runs downwards.
         self.is_clockwise = total > 0.0
-        total = np.where(total == 0.0, np.inf, total)[:, None]  # edge on, covered by rounding only
-        # Per face once, per pixel a few products: pixels outnumber faces.
+        total = np.where(total == 0.0, np.inf, total)[:, None]  # Edge-on faces cover pixels by rounding only.
+        # Gradients are computed once per face, because there are more pixels than faces.
         turn = np.array([1.0, -1.0])
         self._slopes = np.hstack([(r - p)[:, ::-1] * turn, (p - q)[:, ::-1] * turn]) / total
         self._first = p
 
     def footprint(self, corner_uv: FloatArray) -> FloatArray:
-        """Return the (m, 2) run of u and v across one pixel in each triangle; corner_uv: (m, 3, 2)."""
+        """Return the (m, 2) change of u and v across one pixel in each triangle; corner_uv: (m, 3, 2)."""
         sides, slopes = corner_uv[:, 1:] - corner_uv[:, :1], self._slopes.reshape(-1, 2, 2)
         return np.abs(np.einsum("mku,mkx->mxu", sides, slopes)).sum(axis=1)
 
     def of(self, face: IntArray, column: IntArray, row: IntArray) -> FloatArray:
-        """Return the (k, 3) coordinates of the centres of pixels (k,) in faces (k,)."""
+        """Return the (k, 3) barycentric coordinates of the centres of (k,) pixels in (k,) faces."""
         slopes, first = self._slopes[face], self._first[face]
         x, y = column + 0.5 - first[:, 0], row + 0.5 - first[:, 1]
         weights = np.empty((len(face), 3))
@@ -89,24 +89,24 @@ def lambert(normals: FloatArray, axes: FloatArray) -> FloatArray:
 
     Args:
         normals: (k, 3) normals towards the eye, of any length, model axes.
-        axes: (3, 3) the camera's axes.
+        axes: (3, 3) axes of the camera.
     """
     seen = unit_vectors(normals) @ axes.T
-    # Over the left shoulder, as in drawings.
+    # The key light is at the upper left, as in drawings.
     key = np.maximum(seen @ unit_vectors(np.array([[-0.45, 0.65, 0.62]]))[0], 0.0)
-    # At an outline the interpolated normal may point away from the eye though its face does not.
+    # At an outline the interpolated normal may point away from the eye although its face does not.
     return np.asarray(0.47 + 0.42 * key + 0.12 * np.maximum(seen[:, 2], 0.0) + 0.06 * seen[:, 1])
 
 
 def checkerboard(uv: FloatArray, footprint: FloatArray, cell: float) -> FloatArray:
-    """Return the (k, 1) share of light cells in each pixel, 0 to 1, of a board of square cells.
+    """Return the (k, 1) fraction of light cells in each pixel, 0 to 1, of a checkerboard.
 
-    The board is averaged over the pixel's footprint in closed form, so cells that shrink below a pixel
-    fade to grey instead of flickering.
+    The board is averaged over the footprint of the pixel in closed form, so cells smaller than a pixel become grey
+    and do not flicker.
 
     Args:
-        uv: (k, 2) point of each pixel's centre.
-        footprint: (k, 2) how far u and v run across the pixel.
+        uv: (k, 2) UV point at the centre of each pixel.
+        footprint: (k, 2) change of u and v across the pixel.
         cell: side of a cell in UV units.
     """
     low, high = (uv - footprint / 2) / cell, (uv + footprint / 2) / cell
@@ -116,11 +116,11 @@ def checkerboard(uv: FloatArray, footprint: FloatArray, cell: float) -> FloatArr
 
 
 def downsample(image: FloatArray, covered: BoolArray, factor: int) -> FloatArray:
-    """Return the (h, w, 4) RGBA picture from an image `factor` times as large, with soft outlines.
+    """Return the (h, w, 4) RGBA picture of an image `factor` times as large, with antialiased outlines.
 
     Args:
-        image: (factor h, factor w, 3) colours, black where it shows no model.
-        covered: (factor h, factor w) where it shows the model; elsewhere the picture is transparent.
+        image: (factor h, factor w, 3) colours, black outside the model.
+        covered: (factor h, factor w) whether a sample shows the model; elsewhere the picture is transparent.
         factor: samples per pixel along each axis.
     """
     share = np.zeros((covered.shape[0] // factor, covered.shape[1] // factor))
@@ -141,18 +141,19 @@ SUPERSAMPLING = 2
 """Samples per pixel along each axis; two give smooth outlines at print resolution."""
 
 DEPTH_TOLERANCE = 0.008
-"""Share of the picture's longer side by which a point on the surface may lie behind the surface seen
-at its pixel: seams run along edges, where a pixel's centre may be on a face that is a little nearer."""
+"""Depth by which a visible point may lie behind the surface at its pixel, as a fraction of the longer side.
+
+Seams run along edges, where the centre of a pixel may be on a face that is slightly nearer."""
 
 
 @dataclass(frozen=True, eq=False)
 class MeshPicture:
-    """A picture of a mesh, and what is needed to draw on it.
+    """A picture of a mesh, with the data needed to draw on it.
 
     Attributes:
         image: (h, w, 4) RGBA, transparent where there is no model; row 0 at the top.
-        camera: maps model points to this image's pixels.
-        coverage: what is seen at every sample.
+        camera: maps model points to the pixels of this image.
+        coverage: the visible face at every sample.
     """
 
     image: FloatArray
@@ -160,14 +161,14 @@ class MeshPicture:
     coverage: Coverage
 
     def visible_points(self, points: ArrayLike, reach: float = 0.0) -> BoolArray:
-        """Return for (k, 3) points on the surface whether nothing is in front of them.
+        """Return whether (k, 3) points on the surface are visible.
 
-        reach: a point is visible, too, if nothing is in front of it so many pixels beside it.
+        reach: a point is also visible if the surface does not hide it at one of four places `reach` pixels away.
         """
         projected = self.camera.enlarged(SUPERSAMPLING).project(points)
         height, width = self.coverage.face.shape
         tolerance = DEPTH_TOLERANCE * max(height, width)
-        # A frame of background: beside the picture nothing is in front of anything.
+        # A frame of background is added, because nothing is hidden outside the picture.
         depth = np.pad(self.coverage.depth, 1, constant_values=np.inf)
         visible = np.zeros(len(projected), dtype=bool)
         for side in ((0, 0), (1, 0), (0, 1), (-1, 0), (0, -1)) if reach else ((0, 0),):
@@ -180,13 +181,13 @@ class MeshPicture:
         return np.asarray(visible & inside.all(axis=1))
 
     def split_segments(self, start: ArrayLike, stop: ArrayLike) -> tuple[FloatArray, BoolArray]:
-        """Return surface segments cut where they vanish behind the model, and whether each piece is visible.
+        """Return segments on the surface, split where they become hidden, and whether each piece is visible.
 
         Args:
             start, stop: (k, 3) end points of the segments, model units.
 
         Returns:
-            (p, 2, 2) end points of the pieces in pixels of the image; (p,).
+            (p, 2, 2) end points of the pieces in pixels of the image, and (p,) whether each is visible.
         """
         start, stop = np.asarray(start, dtype=np.float64), np.asarray(stop, dtype=np.float64)
         if not len(start):
@@ -200,9 +201,9 @@ class MeshPicture:
             share = ((step + offset) / steps[owner])[:, None]
             return np.asarray((1.0 - share) * start[owner] + share * stop[owner])
 
-        # Lines along outlines may be seen from beside, about as far as they are wide, so that they do not flicker.
+        # Lines along outlines are tested within about their width, so that they are not interrupted.
         visible = self.visible_points(point(0.5), 1.5)
-        # Of steps in a row that are alike the first begins a piece and the last ends it.
+        # A piece consists of consecutive steps of one segment with the same visibility.
         change = np.flatnonzero((np.diff(owner) != 0) | np.diff(visible))
         first, last = np.append(0, change + 1), np.append(change, len(owner) - 1)
         pieces = np.stack([point(0.0)[first], point(1.0)[last]], axis=1)
@@ -231,13 +232,13 @@ def render_mesh(
         eye: direction from the model to the eye, see `eye_direction`.
         up: the model's upward axis, "x", "y" or "z".
         colors: (m, 3) RGB of each face, or (m, 3, 3) of each triangle corner, 0 to 1; default: one light grey.
-        corner_uv: (m, 3, 2) UV points; with `cell`, a checkerboard takes the place of the colours.
-        cell: side of the checkerboard's cells in UV units.
-        contrast: strength of light and shadow; at 0 every face has its plain colour.
-        margin: share of the picture left free at each side.
+        corner_uv: (m, 3, 2) UV points; with `cell`, a checkerboard replaces the colours.
+        cell: side of the cells of the checkerboard in UV units.
+        contrast: strength of light and shadow; 0 for no shading.
+        margin: fraction of the picture left free on each side.
 
     Raises:
-        OptionError: `up` names no axis, or `eye` no direction.
+        OptionError: `up` or `eye` is not valid.
     """
     vertices = np.asarray(vertices, dtype=np.float64)
     faces = np.asarray(faces, dtype=np.int64)
@@ -252,7 +253,7 @@ def render_mesh(
         paint = _plain(np.broadcast_to(np.array(LIGHT_CELL), faces.shape) if colors is None else colors)
     light = _light(vertices, faces, places.is_clockwise, coverage, camera)
     strips = []
-    # About 60,000 samples are shaded at once: what caches hold. It does not change the picture.
+    # About 60,000 samples are shaded at once, which fit into caches. The picture does not depend on it.
     rows = SUPERSAMPLING * max(60_000 // SUPERSAMPLING // fine.width, 1)
     for top in range(0, fine.height, rows):
         face = coverage.face[top : top + rows]
@@ -266,12 +267,12 @@ def render_mesh(
     return MeshPicture(np.concatenate(strips), camera, coverage)
 
 
-_AtSamples: TypeAlias = Callable[[IntArray, FloatArray], FloatArray]
-"""What gives a value to samples from their faces (k,) and barycentric coordinates (k, 3)."""
+_Shader: TypeAlias = Callable[[IntArray, FloatArray], FloatArray]
+"""Function that returns values of samples from their (k,) faces and (k, 3) barycentric coordinates."""
 
 
-def _plain(colors: ArrayLike) -> _AtSamples:
-    """Return what gives samples the colours of their faces, or the mix of those of the corners."""
+def _plain(colors: ArrayLike) -> _Shader:
+    """Return a function for the colours of samples: that of the face, or interpolated between its corners."""
     given = np.asarray(colors, dtype=np.float64)
 
     def paint(seen: IntArray, weights: FloatArray) -> FloatArray:
@@ -281,9 +282,9 @@ def _plain(colors: ArrayLike) -> _AtSamples:
     return paint
 
 
-def _board(places: Barycentrics, corner_uv: FloatArray, cell: float) -> _AtSamples:
-    """Return what gives samples the colours of a checkerboard."""
-    # A footprint must be positive, or its mean is 0 / 0; this one is far below what a pixel shows.
+def _board(places: Barycentrics, corner_uv: FloatArray, cell: float) -> _Shader:
+    """Return a function for the colours of samples on a checkerboard."""
+    # A footprint must be positive, or its mean is 0 / 0; this minimum is not visible.
     footprint = np.maximum(places.footprint(corner_uv), 1e-6 * cell)
     bright, dark = np.array(LIGHT_CELL), np.array(DARK_CELL)
 
@@ -297,10 +298,10 @@ def _board(places: Barycentrics, corner_uv: FloatArray, cell: float) -> _AtSampl
 
 def _light(
     vertices: FloatArray, faces: IntArray, away: BoolArray, coverage: Coverage, camera: Camera
-) -> _AtSamples:
-    """Return what gives samples their brightness; away: (m,) faces that run clockwise in the picture."""
+) -> _Shader:
+    """Return a function for the brightness of samples; away: (m,) whether faces are clockwise in the picture."""
     normals = np.where(away[:, None, None], -1.0, 1.0) * corner_normals(vertices, faces)
-    # Faces may run either way; the side that most of the picture shows counts as the outer one.
+    # Faces may have either orientation; the side that most of the picture shows is taken as the outside.
     visible = np.bincount(coverage.face[coverage.covered], minlength=len(faces))
     inner = ~away if visible[away].sum() > visible.sum() / 2 else away
 

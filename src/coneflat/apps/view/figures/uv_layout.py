@@ -1,4 +1,4 @@
-"""Drawing the layout."""
+"""Drawing of the UV layout."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
     from .... import Flattening
 
-MOST_EDGES_DRAWN = 40_000
-"""Triangles above which a layout is filled without its inner edges: they would turn it grey."""
+MAX_DRAWN_TRIANGLES = 40_000
+"""Number of triangles above which inner edges are not drawn, because they would fill the charts with grey."""
 
 CHART_COLOR = "#e3e9f1"
 CHART_COLORS = ("#cfe3f3", "#fbe3c4", "#cdeade", "#f6dbe9", "#fbf6c4", "#d8d4ea", "#f7d3c4", "#dddddd")
-"""Tints of the colours of Okabe and Ito, which are told apart without red or green."""
+"""Tints of the colours of Okabe and Ito, which colour-blind people can distinguish."""
 EDGE_COLOR = "#9fadc0"
 FRAME_COLOR = "#b8bcc2"
 
@@ -38,20 +38,19 @@ def draw_layout(
     cones: bool = True,
     crop: bool = False,
 ) -> None:
-    """Draw the charts in the unit square: filled polygons, their triangles' edges, and the cones.
+    """Draw the charts in the unit square: filled polygons, the edges of their triangles, and the cones.
 
-    Outlines and edges are lines and polygons, not pixels, in formats that have them; seams are black, and the model's
-    own boundary is grey. Above 40,000 triangles inner
-    edges are left out. Cones are red where their curvature is positive and black where it is negative, with a dot at
-    each of their points and an area that grows with the curvature.
+    Outlines and edges are vector graphics in formats that support them. Seams are black, the boundary of the model is
+    grey. Above 40,000 triangles inner edges are left out. Cones of positive curvature are red, those of negative
+    curvature black, with a dot at each of their points. The area of a dot grows with the curvature.
 
     Args:
         result: the flattening.
-        axes: matplotlib axes to draw in; their own lines and ticks are turned off.
+        axes: matplotlib axes to draw in; their own lines and ticks are hidden.
         color_charts: give the charts different colours.
-        edges: draw the triangles' edges.
+        edges: draw the edges of triangles.
         cones: mark the cones.
-        crop: show the charts alone, not all of the unit square, or of the tiles of several textures.
+        crop: show only the charts, not the unit square or the tiles of several textures.
     """
     from matplotlib.patches import PathPatch
 
@@ -62,7 +61,7 @@ def draw_layout(
         chart = PathPatch(path, facecolor=fill, edgecolor="none", zorder=0)
         chart.set_gid(f"chart-{k + 1}")
         axes.add_patch(chart)
-    if edges and len(result.faces) <= MOST_EDGES_DRAWN:
+    if edges and len(result.faces) <= MAX_DRAWN_TRIANGLES:
         mesh = TriangleMesh(result.uv, result.uv_faces)
         inner = result.uv[mesh.edges[~mesh.is_boundary_edge]]
         _draw_segments(axes, inner, "edges", color=EDGE_COLOR, width=0.2 * scale, zorder=1)
@@ -78,7 +77,7 @@ def draw_layout(
 
 
 def fill_layout(axes: Axes, result: Flattening, quantity: Quantity, dpi: float) -> None:
-    """Draw the layout coloured by a quantity, as a picture with outlines that are lines."""
+    """Draw the layout coloured by a quantity: a pixel image with vector outlines."""
     flat = np.column_stack([result.uv, np.zeros(len(result.uv))])
     size, colors = pixels_of(axes, dpi), quantity.colors()
     picture = render_mesh(flat, result.uv_faces, size=size, eye=(0.0, 0.0, 1.0), colors=colors, contrast=0.0)
@@ -94,7 +93,7 @@ def fill_layout(axes: Axes, result: Flattening, quantity: Quantity, dpi: float) 
 
 
 def draw_outlines(axes: Axes, result: Flattening, paths: list[Path], width: float) -> None:
-    """Draw the borders of the charts, lines of so many points; where the model itself ends they are lighter."""
+    """Draw the outlines of the charts, with lines of `width` points; the boundary of the model is lighter."""
     from matplotlib.patches import PathPatch
 
     for path in paths:
@@ -107,7 +106,7 @@ def draw_outlines(axes: Axes, result: Flattening, paths: list[Path], width: floa
 
 
 def frame_layout(axes: Axes, result: Flattening, crop: bool) -> None:
-    """Set the axes' limits: around the charts, or around the unit square, or its like for each texture."""
+    """Set the limits of the axes: around the charts if `crop`, else around the tiles of all textures."""
     low, high = layout_box(result, crop)
     margin = 0.02 * max(high - low)
     axes.set_xlim(low[0] - margin, high[0] + margin)
@@ -117,9 +116,9 @@ def frame_layout(axes: Axes, result: Flattening, crop: bool) -> None:
 
 
 def layout_tiles(result: Flattening) -> FloatArray:
-    """Return the (k, 2) lower left corners of the unit squares that hold charts: one, or those of several textures.
+    """Return the (k, 2) lower left corners of the unit squares (tiles) that contain charts.
 
-    A chart may reach out of its square, if others made it.
+    A chart of a file made by other programs may extend beyond its tile.
     """
     count, chart = label_faces(result.uv_faces, len(result.uv))
     size = np.maximum(np.bincount(chart, minlength=count), 1)
@@ -129,7 +128,7 @@ def layout_tiles(result: Flattening) -> FloatArray:
 
 
 def layout_box(result: Flattening, crop: bool) -> tuple[FloatArray, FloatArray]:
-    """Return the (2,) lower left and upper right corners of the box around the charts, or around whole tiles, too."""
+    """Return the (2,) lower left and upper right corners of the box around the charts and, unless `crop`, the tiles."""
     used = result.uv[np.unique(result.uv_faces)]
     if not crop:
         tiles = layout_tiles(result)
@@ -138,14 +137,14 @@ def layout_box(result: Flattening, crop: bool) -> tuple[FloatArray, FloatArray]:
 
 
 def layout_aspect(result: Flattening, crop: bool) -> float:
-    """Return the width of this box over its height, at least 1/4 and at most 4."""
+    """Return the ratio of width to height of this box, clamped to 1/4 to 4."""
     low, high = layout_box(result, crop)
     width, height = high - low
     return float(np.clip(width / max(height, np.finfo(np.float64).tiny), 0.25, 4.0))
 
 
 def chart_paths(uv: FloatArray, uv_faces: IntArray) -> list[Path]:
-    """Return a path of matplotlib for each chart: its closed outline, and those of its holes."""
+    """Return a matplotlib path for each chart: its closed outline and those of its holes."""
     from matplotlib.path import Path
 
     points = np.unique(uv_faces)
@@ -161,12 +160,12 @@ def chart_paths(uv: FloatArray, uv_faces: IntArray) -> list[Path]:
 
 
 def outline_loops(uv: FloatArray, uv_faces: IntArray) -> list[list[int]]:
-    """Return the points of every closed curve in which charts end, in order; a chart is to the left of its own."""
+    """Return the points of each closed boundary curve of the charts, in order; the chart is on the left."""
     mesh = TriangleMesh(uv, uv_faces)
     sides = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
     tails, heads = mesh.tails[sides], mesh.heads[sides]
     following = np.empty_like(sides)
-    # Where curves touch, as many sides arrive at a point as leave it, and any of these may come next.
+    # Where curves touch, several sides end and begin at a point; any pairing of these gives closed curves.
     following[np.argsort(heads, kind="stable")] = np.argsort(tails, kind="stable")
     seen = np.zeros(len(sides), dtype=bool)
     loops = []
@@ -182,7 +181,7 @@ def outline_loops(uv: FloatArray, uv_faces: IntArray) -> list[list[int]]:
 
 
 def layout_cones(result: Flattening) -> tuple[IntArray, IntArray]:
-    """Return the cones' vertices and layout points, one pair for every point that a cone has there."""
+    """Return the vertices of cones and their layout points, one pair for each point of a cone in the layout."""
     at_cone = np.isin(result.faces, result.cones)
     pairs = np.column_stack([result.faces[at_cone], result.uv_faces[at_cone]])
     vertex, point = np.unique(pairs, axis=0).reshape(-1, 2).T
@@ -204,7 +203,7 @@ def _draw_tiles(axes: Axes, tiles: FloatArray) -> None:
 def _draw_segments(
     axes: Axes, ends: FloatArray, name: str, *, color: str, width: float, zorder: float
 ) -> None:
-    """Draw line segments (k, 2, 2), thousands as one path: a path each would make files several times as large."""
+    """Draw (k, 2, 2) line segments, thousands in one path; a path for each would make files several times larger."""
     from matplotlib.collections import PathCollection
     from matplotlib.path import Path
 

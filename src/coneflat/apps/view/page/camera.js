@@ -1,10 +1,10 @@
-// Where one looks from: an orthographic view, as three rows to the right, up and towards the eye.
+// An orthographic camera; its rotation has rows to the right, up, and towards the eye.
 
-const MARGIN = 0.94; // of the pane that the model fills when it fits
+const MARGIN = 0.94; // Fraction of the pane that the model fills after fitting.
 const MOST_ZOOM = 5000;
 const LEAST_ZOOM = 0.05;
 
-/** Return turn * point. */
+/** Return the matrix product turn * point. */
 function turned(turn, p) {
   return [0, 3, 6].map((row) => turn[row] * p[0] + turn[row + 1] * p[1] + turn[row + 2] * p[2]);
 }
@@ -15,7 +15,7 @@ function product(one, two) {
   return out;
 }
 
-/** Return the rotation by an angle about a unit axis. */
+/** Return the rotation matrix for an angle about a unit axis. */
 function rotation(axis, angle) {
   const [x, y, z] = axis, c = Math.cos(angle), s = Math.sin(angle), t = 1 - c;
   return [
@@ -25,7 +25,7 @@ function rotation(axis, angle) {
   ];
 }
 
-/** Return the rows of a rotation made perpendicular and of length 1 again, after rounding. */
+/** Return the rows of a rotation matrix, orthonormalised to remove rounding errors. */
 function straightened(turn) {
   const unit = (v) => v.map((x) => x / Math.hypot(...v));
   const a = unit(turn.slice(0, 3));
@@ -34,9 +34,9 @@ function straightened(turn) {
   return [...a, ...b, a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 }
 
-const TILTS = [0, 0.4, 0.8, 1.15], AROUND = 8; // radians; directions of each tilt
+const TILTS = [0, 0.4, 0.8, 1.15], AROUND = 8; // Radians; number of directions for each tilt.
 
-/** Return directions around one, all of length 1, the least tilted first. */
+/** Return unit vectors around a direction, sorted by increasing angle from it. */
 function tilted(direction) {
   const least = direction.map(Math.abs).indexOf(Math.min(...direction.map(Math.abs)));
   const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -51,7 +51,7 @@ function tilted(direction) {
 }
 
 class Camera {
-  /** points: numbers, three each, that a fitting view shows; turns: whether one may look from elsewhere. */
+  /** points: coordinates, three per point, to be shown; turns: whether the camera can rotate. */
   constructor(points, turn, turns) {
     this.turns = turns;
     this.home = turn;
@@ -62,7 +62,7 @@ class Camera {
     this.fit();
   }
 
-  /** Note the extents of the points as seen from home. */
+  /** Measure the extents of the points in the home view. */
   measure(points) {
     const low = [Infinity, Infinity], high = [-Infinity, -Infinity];
     for (let i = 0; i < points.length; i += 3) {
@@ -77,7 +77,7 @@ class Camera {
     this.middle = [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2];
   }
 
-  /** Look at other points: all of them if all were seen, else from where one looked. */
+  /** Show other points: all of them if all were visible before, else with the same view. */
   showOthers(points) {
     const fitted = this.zoom === 1 && this.pan.every((x, k) => x === this.middle[k]);
     this.measure(points);
@@ -103,18 +103,18 @@ class Camera {
     this.note();
   }
 
-  /** Pixels per unit. */
+  /** Return the pixels per unit. */
   get scale() {
     return Math.min((MARGIN * this.width) / this.extent[0], (MARGIN * this.height) / this.extent[1]) * this.zoom;
   }
 
-  /** Return the pixel (from the pane's upper left corner) and the nearness of a point. */
+  /** Return the pixel (from the upper left corner of the pane) and the nearness of a point. */
   project(p) {
     const [x, y, z] = turned(this.turn, p);
     return [this.width / 2 + (x - this.pan[0]) * this.scale, this.height / 2 - (y - this.pan[1]) * this.scale, z];
   }
 
-  /** Turn about the screen's axes: right, down, and round, in radians. */
+  /** Rotate about the axes of the screen: to the right, down, and in the plane, in radians. */
   rotate(right, down, round = 0) {
     if (!this.turns) return;
     let turn = product(rotation([1, 0, 0], down), product(rotation([0, 1, 0], right), this.turn));
@@ -123,13 +123,13 @@ class Camera {
     this.note();
   }
 
-  /** Move what is seen by pixels to the right and down. */
+  /** Move the view by pixels to the right and down. */
   move(right, down) {
     this.pan = [this.pan[0] - right / this.scale, this.pan[1] + down / this.scale];
     this.note();
   }
 
-  /** Zoom, keeping what is at a pixel there. */
+  /** Zoom about a pixel, which remains fixed. */
   zoomAt(factor, x, y) {
     const zoom = Math.min(Math.max(this.zoom * factor, LEAST_ZOOM), MOST_ZOOM);
     const gain = 1 / this.scale - this.zoom / (this.scale * zoom);
@@ -139,7 +139,7 @@ class Camera {
   }
 }
 
-/** Move a camera, step by step, to another turn and pan. */
+/** Animate a camera to another rotation and pan. */
 function glide(camera, turn, pan) {
   const from = {turn: camera.turn, pan: camera.pan};
   const relative = product(turn, [0, 3, 6, 1, 4, 7, 2, 5, 8].map((i) => from.turn[i]));
@@ -152,7 +152,7 @@ function glide(camera, turn, pan) {
   const start = performance.now(), last = still ? 1 : 350;
   const version = {now: camera.version};
   const step = () => {
-    if (camera.version !== version.now) return; // The user has taken over.
+    if (camera.version !== version.now) return; // The user has moved the camera meanwhile.
     const part = Math.min((performance.now() - start) / last, 1), eased = part * part * (3 - 2 * part);
     camera.turn = part < 1 ? straightened(product(rotation(axis, angle * eased), from.turn)) : turn;
     camera.pan = [0, 1].map((k) => from.pan[k] + eased * (pan[k] - from.pan[k]));

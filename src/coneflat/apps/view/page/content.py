@@ -1,4 +1,4 @@
-"""What a page shows of a flattening, as arrays, with fewer triangles where there are too many."""
+"""The content of a page: a flattening as arrays, simplified if it has too many triangles."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from ....errors import ArrayShapeError, MeshError, OptionError
 from ....geometry import signed_double_areas
 from ....io import cell_side, split_at_seams
 from ....mesh import end_corners, label_faces, point_seams
-from ..quantity import ColorScale, Quantity, conformal_distortion, missing_angles, stretch
+from ..quantity import ColorScale, Quantity, angle_defects, conformal_distortion, stretch
 
 if TYPE_CHECKING:
     from .... import Flattening
 
 CELLS = 4095
-"""Cells along an axis at most, so that the five numbers of a cell fit into 60 bits."""
+"""Largest number of cells along an axis, so that the five indices of a cell fit into 60 bits."""
 
 
-def thin(
-    places: FloatArray, uv: FloatArray, faces: IntArray, kept: BoolArray, most: int
+def simplify(
+    places: FloatArray, uv: FloatArray, faces: IntArray, fixed: BoolArray, most: int
 ) -> tuple[IntArray, IntArray]:
-    """Return at most so many triangles in place of all: the faces that stay, and their (k, 3) new corners.
+    """Return a simplified mesh of at most `most` triangles: the (k,) faces that remain, and their (k, 3) new corners.
 
-    Points are merged that lie in one cell both in space and in the plane; each cell is represented by its point
-    nearest to their mean. Points that are kept, those on outlines, stay themselves. Such a map of a chart's
-    points, the identity on its outline, covers all of the chart, so no holes appear in the plane or in space.
+    Points in the same cell of a grid, in space and in the plane, are merged into the one nearest to their mean. The
+    points on outlines are not merged. Such a map of the points of a chart, the identity on its outline, covers the
+    whole chart, so no holes appear in the plane or in space.
 
     Args:
-        places: (u, 3) points in space, of a size about 1.
+        places: (u, 3) points in space, within about the unit ball.
         uv: (u, 2) the same points in the plane.
         faces: (m, 3) triangles.
-        kept: (u,) which points must stay.
-        most: triangles wanted at most.
+        fixed: (u,) whether a point must remain.
+        most: largest number of triangles.
 
     Raises:
-        MeshError: the triangles along outlines alone are more than that.
+        MeshError: there are more triangles than that along outlines alone.
     """
     areas = signed_double_areas(uv[faces])
     area = float(np.linalg.norm(np.cross(*sides(places[faces])), axis=1).sum())
@@ -47,40 +47,40 @@ def thin(
     coordinates = np.column_stack([places, uv / max(scale, 1e-300)])
     coordinates -= coordinates.min(axis=0)
     extent = float(coordinates.max())
-    # A cell holds about two triangles.
+    # A cell contains about two triangles.
     size = float(np.sqrt(area / most))
     for _ in range(60):
-        unmoved = kept
+        unmerged = fixed
         while True:
-            corners = _representatives(coordinates, unmoved, max(size, extent / CELLS))[faces]
-            stay = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
-            folded = np.flatnonzero(stay)
+            corners = _representatives(coordinates, unmerged, max(size, extent / CELLS))[faces]
+            remain = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+            folded = np.flatnonzero(remain)
             folded = folded[signed_double_areas(uv[corners[folded]]) * areas[folded] <= 0]
-            # Where merging folds the plane, what runs forward covers all that what runs backward does; but a fold
-            # at an outline may reach over it, so the points there stay, too.
-            crossing = folded[kept[faces[folded]].any(axis=1) & ~unmoved[faces[folded]].all(axis=1)]
+            # Where merging folds the plane, positively oriented triangles cover all that flipped ones cover. But a
+            # fold at an outline may extend beyond it, so the points there are not merged either.
+            crossing = folded[fixed[faces[folded]].any(axis=1) & ~unmerged[faces[folded]].all(axis=1)]
             if not len(crossing):
                 break
-            unmoved = unmoved.copy()
-            unmoved[faces[crossing]] = True
-        stay[folded] = False
-        count = int(stay.sum())
+            unmerged = unmerged.copy()
+            unmerged[faces[crossing]] = True
+        remain[folded] = False
+        count = int(remain.sum())
         if count <= most:
-            chosen = np.flatnonzero(stay)
+            chosen = np.flatnonzero(remain)
             return chosen, corners[chosen]
         if size > extent:
             break
         size *= float(np.clip(np.sqrt(count / most), 1.1, 2.0))
     raise MeshError(
-        f"{len(faces):,} triangles are too many for a page of {most:,}: {count:,} of them lie along seams or "
-        "boundaries, where none can be left out; allow more"
+        f"the mesh of {len(faces):,} triangles cannot be reduced to {most:,} for display: {count:,} of them lie along "
+        "seams or boundaries; allow more"
     )
 
 
-def _representatives(coordinates: FloatArray, kept: BoolArray, size: float) -> IntArray:
-    """Return (u,) the point that stands for each."""
+def _representatives(coordinates: FloatArray, fixed: BoolArray, size: float) -> IntArray:
+    """Return (u,) the point into which each point is merged."""
     new = np.arange(len(coordinates))
-    free = np.flatnonzero(~kept)
+    free = np.flatnonzero(~fixed)
     if not len(free):
         return new
     cells = np.floor(coordinates[free] / size).astype(np.int64)
@@ -90,17 +90,17 @@ def _representatives(coordinates: FloatArray, kept: BoolArray, size: float) -> I
     _, cell = np.unique(key, return_inverse=True)
     cell = cell.reshape(-1)
     members = np.bincount(cell)
-    off = np.zeros(len(free))
+    squared = np.zeros(len(free))
     for column in coordinates[free].T:
-        off += (column - (np.bincount(cell, weights=column) / members)[cell]) ** 2
-    order = np.lexsort([off, cell])
+        squared += (column - (np.bincount(cell, weights=column) / members)[cell]) ** 2
+    order = np.lexsort([squared, cell])
     first = np.concatenate([[0], np.cumsum(members)[:-1]])
     new[free] = free[order[first]][cell]
     return new
 
 
 def sides(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the two sides (m, d) of triangles (m, 3, d) from their first corner."""
+    """Return the two (m, d) sides of (m, 3, d) triangles from their first corner."""
     return corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
 
 
@@ -109,25 +109,25 @@ class Content:
     """A flattening as a page shows it: v vertices, u points of the layout, m triangles, c cones.
 
     Attributes:
-        model: the surface that these are of.
+        model: the surface.
         places: (v, 3) vertices, moved and scaled into the unit ball.
         point_vertex: (u,) the vertex of each point of the layout.
-        uv: (u, 2) the points.
-        uv_side: the root of the area of all triangles in the plane.
+        uv: (u, 2) points of the layout.
+        uv_side: square root of the area of all triangles in the plane.
         faces: (m, 3) triangles of points.
-        outline: half-edges 3 f + i on the outlines of charts, each opposite corner i of face f: the two sides of
-            each seam edge, one after the other, then those of the boundary.
-        seams: how many seam edges there are.
+        outline: half-edges 3 f + i on the outlines of charts, each opposite corner i of face f: the two half-edges of
+            each seam, one after the other, then those of the boundary.
+        seams: number of seam edges.
         chart: (m,) the chart of each triangle, the largest first.
         qc, area: (m,) QC distortion, and scale relative to its mean; NaN where undefined.
-        curvature, flat: (v,) of the model and of the flat metric, in units of pi; NaN on the boundary.
-        cones: (c,) vertices.
-        cone_curvatures: (c,) radians.
-        vertex_numbers: (v,) each vertex's number in the input, or -1.
-        face_numbers: (m,) each triangle's number in the result.
-        left_out: how many triangles are not shown.
-        scales: the scale of each colour map.
-        own: numbers of the user's own, at the vertices or the triangles that are shown.
+        curvature, flat: (v,) curvature of the model and of the flat metric, in units of pi; NaN on the boundary.
+        cones: (c,) vertices of the cones.
+        cone_curvatures: (c,) curvatures in radians.
+        vertex_numbers: (v,) index of each vertex in the input, or -1.
+        face_numbers: (m,) index of each triangle in the result.
+        left_out: number of triangles that are not shown.
+        scales: the colour scale of each quantity.
+        own: quantity given by the user, at the vertices or triangles that are shown.
     """
 
     model: Model
@@ -154,15 +154,15 @@ class Content:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """The surface of a result, whatever its layout: n vertices, v of which have triangles.
+    """The surface of a result, independent of its layout: n vertices, v of which have triangles.
 
     Attributes:
         mesh: the mesh.
         used: (v,) the vertices that have triangles.
-        places: (v, 3) these, moved and scaled into the unit ball.
-        centre, radius: where the ball lies in the model's units.
-        curvature: (v,) in units of pi; NaN on the boundary.
-        outward: 1 if triangles run anticlockwise seen from outside, else -1.
+        places: (v, 3) their positions, moved and scaled into the unit ball.
+        centre, radius: centre and radius of this ball in model units.
+        curvature: (v,) curvature in units of pi; NaN on the boundary.
+        outward: 1 if triangles are counterclockwise seen from outside, else -1.
     """
 
     mesh: TriangleMesh
@@ -181,17 +181,17 @@ class Model:
         is_used[mesh.faces] = True
         used = np.flatnonzero(is_used)
         places, centre, radius = _into_unit_ball(result.vertices[used])
-        curvature = missing_angles(result, False, mesh)[used] / np.pi
+        curvature = angle_defects(result, False, mesh)[used] / np.pi
         number = np.cumsum(is_used) - 1
         corners = places[number[mesh.faces]]
         centroids = corners.mean(axis=1)
-        # Normals point away from the middle, by and large.
+        # Most normals of an outward orientation point away from the middle.
         away = (centroids - centroids.mean(axis=0)) * np.cross(*sides(corners))
         outward = -1 if float(away.sum()) < 0 else 1
         return cls(mesh, used, places, centre, radius, curvature, outward)
 
     def is_of(self, result: Flattening) -> bool:
-        """Return whether it is the surface of a result."""
+        """Return whether this is the surface of a result."""
         mesh = self.mesh
         return np.array_equal(mesh.faces, result.faces) and np.array_equal(mesh.vertices, result.vertices)
 
@@ -199,25 +199,25 @@ class Model:
 def content_of(
     result: Flattening, most: int, model: Model | None = None, own: Quantity | None = None
 ) -> Content:
-    """Return what a page shows, with at most so many triangles.
+    """Return the content of a page of a result.
 
     Args:
-        result: what is shown.
-        most: triangles.
-        model: its surface, if something knows it already.
-        own: numbers of the user's own.
+        result: the flattening.
+        most: largest number of triangles.
+        model: its surface, if it has been computed already.
+        own: quantity given by the user.
 
     Raises:
         ArrayShapeError: the result has no UVs, or no triangles.
-        MeshError: it cannot be thinned to so few triangles.
+        MeshError: it cannot be reduced to `most` triangles.
         OptionError: `most` is not positive.
     """
     if most < 1:
-        raise OptionError(f"a page shows at least one triangle, not {most}")
+        raise OptionError(f"expected a limit of at least one triangle, got {most}")
     if not len(result.faces) or not len(result.uv) or np.shape(result.uv_faces) != np.shape(result.faces):
         raise ArrayShapeError(
-            f"there is nothing to show: {len(result.faces):,} triangles, {len(result.uv):,} UV points and "
-            f"{len(result.uv_faces):,} triangles of them"
+            f"the result cannot be shown: it has {len(result.faces):,} triangles, {len(result.uv):,} UV points and "
+            f"{len(result.uv_faces):,} UV triangles"
         )
     split, model = split_at_seams(result), Model.of(result) if model is None else model
     used, places = model.used, model.places
@@ -225,19 +225,19 @@ def content_of(
     outline, seams = outline_halfedges(model.mesh, split.faces)
     chart = _charts(split.faces, split.uv)
     qc, scale = conformal_distortion(result), stretch(result)
-    flat_curvature = missing_angles(result, True, model.mesh)[used] / np.pi
+    flat_curvature = angle_defects(result, True, model.mesh)[used] / np.pi
     cone = np.searchsorted(used, result.cones)
 
-    # Of all there is, every point is of a triangle, and every vertex has one.
+    # Without simplification, every point and every vertex has a triangle.
     shown, faces = np.arange(len(split.faces)), split.faces
     points, vertices, point_vertex = np.arange(len(split.uv)), np.arange(len(used)), vertex
     if len(shown) > most:
-        kept = np.zeros(len(split.uv), dtype=bool)
+        fixed = np.zeros(len(split.uv), dtype=bool)
         for end in end_corners(outline):
-            kept[split.faces.reshape(-1)[end]] = True
-        kept |= np.isin(vertex, cone)
-        shown, corners = thin(places[vertex], split.uv, split.faces, kept, most)
-        # Those at outlines all stay: their third corner is merged with none of the other two.
+            fixed[split.faces.reshape(-1)[end]] = True
+        fixed |= np.isin(vertex, cone)
+        shown, corners = simplify(places[vertex], split.uv, split.faces, fixed, most)
+        # All triangles at outlines remain, because their third corner is not merged with the other two.
         outline = 3 * np.searchsorted(shown, outline // 3) + outline % 3
         points, faces = np.unique(corners, return_inverse=True)
         vertices, point_vertex = np.unique(vertex[points], return_inverse=True)
@@ -272,13 +272,13 @@ def content_of(
 
 
 def _scales(qc: Quantity, area: Quantity, curvature: FloatArray) -> dict[str, ColorScale]:
-    """Return the scale of each colour map of a page; both curvatures have that of the model.
+    """Return the colour scale of each quantity of a page; both curvatures have that of the model.
 
-    That scale has four decades to either side of zero; almost all curvatures lie within its ends.
+    The scale of curvatures has four decades on each side of zero, and contains almost all curvatures.
 
     Args:
-        qc, area: distortion.
-        curvature: of the model, in units of pi.
+        qc, area: QC distortion and scale.
+        curvature: (v,) curvature of the model in units of pi.
     """
     amounts = np.abs(curvature[np.isfinite(curvature) & (curvature != 0)])
     largest = float(np.percentile(amounts, 99.9)) if len(amounts) else 1.0
@@ -297,9 +297,9 @@ def _scales(qc: Quantity, area: Quantity, curvature: FloatArray) -> dict[str, Co
 
 
 def outline_halfedges(mesh: TriangleMesh, uv_faces: IntArray) -> tuple[IntArray, int]:
-    """Return the half-edges on the outlines of charts, and how many seams are among them.
+    """Return the half-edges on the outlines of charts, and the number of seam edges.
 
-    Seams come first, the two half-edges of each together, then the half-edges of the boundary.
+    The two half-edges of each seam come first, one after the other, then the half-edges of the boundary.
     """
     seams = mesh.edge_halfedges[point_seams(mesh, uv_faces)]
     boundary = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
@@ -310,14 +310,14 @@ def _into_unit_ball(vertices: FloatArray) -> tuple[FloatArray, FloatArray, float
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     centre = low + (high - low) / 2
     centred = vertices - centre
-    # The largest coordinate first, or squares could overflow.
+    # Coordinates are divided by the largest one first, because squares could overflow.
     size = float(np.abs(centred).max()) or 1.0
     radius = size * float(np.sqrt(((centred / size) ** 2).sum(axis=1).max())) or 1.0
     return centred / radius, centre, radius
 
 
 def _charts(faces: IntArray, uv: FloatArray) -> IntArray:
-    """Return (m,) the chart of each triangle, numbered from the one with the largest area."""
+    """Return (m,) the chart of each triangle; charts are numbered by decreasing area."""
     count, chart = label_faces(faces, len(uv))
     areas = np.abs(signed_double_areas(uv[faces]))
     rank = np.full(count, -1, dtype=np.int64)

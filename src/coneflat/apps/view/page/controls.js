@@ -1,6 +1,6 @@
-// Buttons, keys, the scale and the report: each shows the state and changes it.
+// Buttons, keys, the scale and the report, which show and change the state.
 
-const LEAST_SQUARES = 3, MOST_SQUARES = 9; // logarithm to base 2 of the squares in a row as long as the root of the area
+const LEAST_SQUARES = 3, MOST_SQUARES = 9; // Logarithm to base 2 of the number of squares along the square root of the area.
 
 class Controls {
   /** viewer: {state, model, find(thing), takePicture(blob), panes, used}. */
@@ -35,8 +35,8 @@ class Controls {
     const notes = head.notes.map((note) => `Note: ${note}`);
     if (head.left_out) {
       notes.unshift(
-        `Drawn with ${grouped(shown)} of ${grouped(head.triangles)} triangles, so that the page stays light; ` +
-          "the measures are those of all.",
+        `Drawn with ${grouped(shown)} of ${grouped(head.triangles)} triangles, to reduce the size of the page; ` +
+          "the measures are those of all triangles.",
       );
     }
     return [table, ...notes.map((note) => Object.assign(document.createElement("p"), {className: "note", textContent: note}))];
@@ -80,7 +80,7 @@ class Controls {
   }
 
   showFacts(facts) {
-    const spans = (facts ?? ["Point at a triangle, a seam or a cone to find it on both sides; ? shows the keys."]).map(
+    const spans = (facts ?? ["Point at a triangle, a seam or a cone to show it in both views; ? shows the keys."]).map(
       (text) => Object.assign(document.createElement("span"), {textContent: text, className: facts ? "" : "faint"}),
     );
     this.part("facts").replaceChildren(...spans);
@@ -126,7 +126,7 @@ class Controls {
       w: () => this.viewer.find({kind: "triangle", index: this.viewer.model.worstTriangle()}),
       Escape: () => state.set({picked: null, hovered: null, report: false}),
     };
-    // On a button Enter and space press it.
+    // On a button, Enter and space press it.
     if (!event.target.closest?.("button")) keys.Enter = () => this.viewer.pickMiddle();
     let does = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (arrows[event.key]) {

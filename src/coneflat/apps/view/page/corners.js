@@ -1,4 +1,4 @@
-// Arrays with an entry for each corner of each triangle, as the graphics card takes them.
+// Arrays with an entry for each corner of each triangle, for the graphics card.
 
 function cornerPlaces(model) {
   const {places, point_vertex, faces} = model.arrays;
@@ -22,7 +22,7 @@ function cornerUVs(model) {
   return out;
 }
 
-/** Return (m, 3) face normals as long as twice the areas. */
+/** Return (m, 3) face normals with lengths of twice the areas. */
 function faceNormals(places) {
   const out = new Float32Array(places.length / 3);
   for (let p = 0, f = 0; p < places.length; p += 9, f += 3) {
@@ -35,7 +35,7 @@ function faceNormals(places) {
   return out;
 }
 
-/** Return the corners at each vertex: those of vertex v are list[start[v]] up to list[start[v + 1] - 1]. */
+/** Return the corners at each vertex: those of vertex v are list[start[v]] to list[start[v + 1] - 1]. */
 function cornersAtVertices(model) {
   const {point_vertex, faces, places} = model.arrays;
   const start = new Uint32Array(places.length / 3 + 1);
@@ -46,7 +46,7 @@ function cornersAtVertices(model) {
   return {start, list};
 }
 
-/** Return packed unit normals (10 bits a coordinate): the mean of the faces around that bend off by no crease. */
+/** Return packed unit normals (10 bits per coordinate): the mean of the faces at the corner that are not separated by a crease. */
 function cornerNormals(model, places) {
   const {point_vertex, faces} = model.arrays;
   const normals = faceNormals(places), crease = model.head.crease_cosine;
@@ -72,7 +72,7 @@ function cornerNormals(model, places) {
   return out;
 }
 
-/** Return the place on the table of colours of each corner, for what is shown. */
+/** Return the position of each corner in the colour table for a display mode. */
 function cornerValues(model, show) {
   const {faces, point_vertex, chart} = model.arrays;
   const out = new Float32Array(faces.length);
@@ -87,7 +87,7 @@ function cornerValues(model, show) {
   return out;
 }
 
-/** Give corners without a tone the mean of the others of their triangle, if there are any. */
+/** Set undefined tones of corners to the mean of the other corners of the triangle, if defined. */
 function fillUndefined(tones) {
   for (let c = 0; c < tones.length; c += 3) {
     if (Math.min(tones[c], tones[c + 1], tones[c + 2]) >= 0) continue;
@@ -97,9 +97,9 @@ function fillUndefined(tones) {
   }
 }
 
-const QUAD = 6; // vertices of the two triangles that a line or a dot is drawn as
+const QUAD = 6; // Vertices of the two triangles of a line or a dot.
 
-/** Return the rows of an array, so many numbers each, repeated for every vertex of a quad. */
+/** Return the rows of an array, of a given length, repeated for every vertex of a quad. */
 function forQuads(rows, size) {
   const out = new Float32Array(QUAD * rows.length);
   for (let i = 0; i < rows.length; i += size) {
@@ -108,7 +108,7 @@ function forQuads(rows, size) {
   return out;
 }
 
-/** Return where lines begin and end: seam edges, then boundary edges; in the layout a seam has two, side by side. */
+/** Return the ends of lines: seam edges, then boundary edges; in the layout a seam has two consecutive lines. */
 function outlineLines(model, inPlane) {
   const begins = [], ends = [];
   for (let i = 0; i < model.arrays.outline.length; i++) {
@@ -123,7 +123,7 @@ function outlineLines(model, inPlane) {
   return [begins, ends];
 }
 
-/** Return where dots are, and for each its radius in pixels, the sign of its curvature, and which cone it is. */
+/** Return the positions of dots, and for each its radius in pixels, the sign of the curvature, and the index of the cone. */
 function coneDots(model, inPlane) {
   const places = [], looks = [];
   for (let index = 0; index < model.coneCount; index++) {

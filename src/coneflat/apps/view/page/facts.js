@@ -1,8 +1,8 @@
-// What is known of a triangle, a seam edge or a cone, in words.
+// Texts on a triangle, a seam edge or a cone.
 
 const SIGNS = ["−", "", "+"];
 
-/** Return a number with its sign, in few digits: "+0.500", "−1.2e-4". */
+/** Return the text of a number with its sign: "+0.500", "−1.2e-4". */
 function signed(value, digits = 3) {
   if (!Number.isFinite(value)) return "undefined";
   const amount = Math.abs(value);
@@ -19,7 +19,7 @@ function measured(value, prefix = "", digits = 4) {
   return prefix + (value >= 1e4 ? value.toExponential(2) : value.toFixed(digits));
 }
 
-/** Return phrases about a thing, the first its name. */
+/** Return texts on a thing; the first is its name. */
 function factsOf(model, thing, show) {
   if (thing.kind === "triangle") return triangleFacts(model, thing.index, show);
   return thing.kind === "seam" ? seamFacts(model, thing.index) : coneFacts(model, thing.index);
@@ -48,8 +48,8 @@ function seamFacts(model, index) {
   const off = Math.abs(lengths[0] - lengths[1]) / Math.max((lengths[0] + lengths[1]) / 2, 1e-30);
   const charts = [0, 1].map((side) => model.arrays.chart[Math.floor(model.arrays.outline[2 * index + side] / 3)] + 1);
   const between = charts[0] === charts[1] ? `within chart ${charts[0]}` : `between charts ${charts[0]} and ${charts[1]}`;
-  // The page has single precision, seven digits.
-  const equal = off < 1e-4 ? "both sides equally long" : `sides ${(100 * off).toPrecision(2)}% apart in length`;
+  // The page has single precision, about seven digits.
+  const equal = off < 1e-4 ? "both sides of equal length" : `lengths of the sides differ by ${(100 * off).toPrecision(2)}%`;
   return [`Seam edge ${ends.join("–")}`, between, equal];
 }
 
@@ -64,7 +64,7 @@ function coneFacts(model, index) {
   ];
 }
 
-/** Return where a triangle lies on the scale of what is shown, 0 to 1, or null. */
+/** Return the position of a triangle on the current colour scale, from 0 to 1, or null. */
 function placeOfThing(model, thing, show) {
   const scale = model.head.scales[show];
   if (!scale || !thing || thing.kind !== "triangle") return null;

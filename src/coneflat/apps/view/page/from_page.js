@@ -1,6 +1,6 @@
-// The start of a page that carries its data.
+// Start of a page that contains its data.
 
-/** Start with the data that the page itself carries. */
+/** Start the viewer with the data in the page. */
 async function startFromPage() {
   try {
     if (typeof DecompressionStream === "undefined") throw new Error("this browser is too old for the page");

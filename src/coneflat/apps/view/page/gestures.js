@@ -1,14 +1,14 @@
-// Mouse, pen and touch on a pane become moves of its camera, hovering and picks.
+// Mouse, pen and touch on a pane: motions of its camera, hovering and picking.
 
 const TURN_SPEED = 0.008; // radians per pixel
-const WHEEL_SPEED = 0.0015; // of the logarithm of the zoom, per pixel of the wheel
-const STILL = 5; // pixels within which a press is a click
+const WHEEL_SPEED = 0.0015; // Change of the logarithm of the zoom per pixel of the wheel.
+const STILL = 5; // Largest motion of a click in pixels.
 const CLICK_TIME = 600; // milliseconds
-const FINGER = 16; // pixels that a finger may be off what it means
+const FINGER = 16; // Pick radius of a finger in pixels.
 
 class Gestures {
   /** pane: {element, camera}; hears: {hover(pane, x, y), leave(pane), pick(pane, x, y, reach), grab(pane, x, y, reach),
-   *  use(pane)}; reach: pixels that what is meant may be off. grab returns null, or who takes a drag, {move(x, y), drop(), stop()}, of which stop comes last in any case. */
+   *  use(pane)}; reach: pick radius in pixels. grab returns null, or a handler of the drag {move(x, y), drop(), stop()}; stop is called last in any case. */
   constructor(pane, hears) {
     this.pane = pane;
     this.hears = hears;
@@ -51,7 +51,7 @@ class Gestures {
       return;
     }
     if (this.press && Math.hypot(now.x - this.press.x, now.y - this.press.y) > STILL) this.press.still = false;
-    if (this.press?.still) return; // A trembling finger does not turn the model.
+    if (this.press?.still) return; // Small motions of a finger do not rotate the model.
     if (this.grabbed) this.grabbed.move(now.x, now.y);
     else if (this.fingers.size === 1) this.drag(now.x - before.x, now.y - before.y, event);
     else this.pinch(event.pointerId, before, now);
@@ -101,7 +101,7 @@ class Gestures {
     event.preventDefault();
     const {x, y} = this.at(event);
     const pixels = event.deltaY * (event.deltaMode === 1 ? 20 : event.deltaMode === 2 ? 400 : 1);
-    // A pinch on a touchpad comes as a wheel with ctrl, in small steps.
+    // A pinch on a touchpad is reported as a wheel with ctrl, in small steps.
     this.pane.camera.zoomAt(Math.exp(-WHEEL_SPEED * pixels * (event.ctrlKey ? 6 : 1)), x, y);
   }
 }

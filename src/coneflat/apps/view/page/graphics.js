@@ -1,6 +1,6 @@
-// The little of WebGL 2 that the page needs.
+// A thin layer over WebGL 2: programs, vertex arrays, render targets and textures.
 
-/** A program, with its uniforms by name. */
+/** A shader program, with its uniforms by name. */
 class Program {
   constructor(gl, vertex, fragment, picks) {
     const head = `#version 300 es\n${picks ? "#define PICK\n" : ""}precision highp float;\nprecision highp int;\n`;
@@ -16,7 +16,7 @@ class Program {
     gl.linkProgram(this.handle);
   }
 
-  /** Wait for the compiler, which works by itself meanwhile, and find the uniforms. */
+  /** Wait for the compiler, which runs asynchronously, and find the uniforms. */
   finish() {
     const gl = this.gl;
     if (!gl.getProgramParameter(this.handle, gl.LINK_STATUS) && !gl.isContextLost()) {
@@ -31,7 +31,7 @@ class Program {
     }
   }
 
-  /** Use it with these values; a name that the program does not have is passed over. */
+  /** Use the program with these uniforms; names that it does not have are ignored. */
   use(values) {
     const gl = this.gl;
     gl.useProgram(this.handle);
@@ -48,7 +48,7 @@ class Program {
   }
 }
 
-/** Vertices to draw, three for a triangle: a list of attributes, {array, size, type, normalised}. */
+/** Vertices to draw, three per triangle, given by attributes {array, size, type, normalised}. */
 class Shape {
   constructor(gl, attributes) {
     this.gl = gl;
@@ -71,7 +71,7 @@ class Shape {
     this.gl.deleteVertexArray(this.handle);
   }
 
-  /** Give it an attribute more, or another one in place of that which it has. */
+  /** Add or replace an attribute. */
   put(location, {array, size, type = this.gl.FLOAT, normalised = false}) {
     const gl = this.gl;
     if (this.buffers[location]) {
@@ -91,7 +91,7 @@ class Shape {
     this.gl.bufferData(this.gl.ARRAY_BUFFER, array, this.gl.STATIC_DRAW);
   }
 
-  /** Draw all vertices, or the first so many. */
+  /** Draw all vertices, or a number of them from the first on. */
   draw(count = this.count) {
     if (!count) return;
     this.gl.bindVertexArray(this.handle);
@@ -99,7 +99,7 @@ class Shape {
   }
 }
 
-/** Memory to draw into, with so many samples a pixel; 0 can be read. */
+/** A render target with a number of samples per pixel; with 0 its pixels can be read. */
 class Target {
   constructor(gl, width, height, samples) {
     Object.assign(this, {gl, width, height, samples});
@@ -118,7 +118,7 @@ class Target {
     return this.width === width && this.height === height && this.samples === samples;
   }
 
-  /** Aim at a box of it, left, bottom, width, height, and clear that. */
+  /** Draw into a box (left, bottom, width, height) from now on, and clear it. */
   begin(colour, box) {
     const gl = this.gl;
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
@@ -132,7 +132,7 @@ class Target {
     gl.depthFunc(gl.LEQUAL);
   }
 
-  /** Show one box in another of the canvas; of several samples a pixel it must be the same. */
+  /** Copy a box to a box of the canvas; with several samples per pixel the boxes must be equal. */
   show([left, bottom, width, height], [toLeft, toBottom, toWidth, toHeight]) {
     const gl = this.gl;
     gl.bindFramebuffer(gl.READ_FRAMEBUFFER, this.frame);
@@ -148,7 +148,7 @@ class Target {
   }
 }
 
-/** Return a texture of a table of colours, (k, 3) bytes. */
+/** Return a texture of a colour table, (k, 3) bytes. */
 function tableTexture(gl, colours, smooth) {
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, texture);
@@ -160,7 +160,7 @@ function tableTexture(gl, colours, smooth) {
   return texture;
 }
 
-/** Return a texture of a picture, row 0 at its top, with mipmaps. */
+/** Return a texture of an image, row 0 at the top, with mipmaps. */
 function pictureTexture(gl, source) {
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, texture);
@@ -173,7 +173,7 @@ function pictureTexture(gl, source) {
   return texture;
 }
 
-/** Return a CSS colour as three numbers, 0 to 1. */
+/** Return a CSS colour as three numbers from 0 to 1. */
 function rgb(text) {
   const value = parseInt(text.trim().slice(1), 16);
   return [value >> 16, (value >> 8) & 255, value & 255].map((x) => x / 255);

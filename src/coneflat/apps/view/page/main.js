@@ -1,31 +1,31 @@
-// The page at work: a model, two views of it, and what links them.
+// The viewer: a model, its two views, and their connection.
 
-const REST = 160; // milliseconds without a move after which nothing moves
-const SLOW = 45; // milliseconds for a frame from which on a machine is slow
+const REST = 160; // Milliseconds without motion after which the view counts as settled.
+const SLOW = 45; // Milliseconds per frame above which a machine counts as slow.
 
-/** A side of the page. */
+/** One of the two views. */
 class Pane {
   constructor(name, camera, inPlane, viewer) {
     Object.assign(this, {name, camera, inPlane, viewer});
     this.element = document.getElementById(name);
     camera.changed = () => {
-      this.spoil();
+      this.markStale();
       viewer.noteMove();
     };
   }
 
-  /** It must be drawn again. */
-  spoil() {
+  /** Mark the pane as outdated, so that it is drawn again. */
+  markStale() {
     this.stale = true;
     this.viewer.schedule();
   }
 
-  /** Note where it lies on the stage. */
+  /** Measure the position of the pane on the stage. */
   place(stage) {
     const box = this.element.getBoundingClientRect();
     [this.left, this.top, this.width, this.height] = [box.left - stage.left, box.top - stage.top, box.width, box.height];
     this.camera.resize(Math.max(this.width, 1), Math.max(this.height, 1));
-    this.spoil();
+    this.markStale();
   }
 
   sees([x, y]) {
@@ -34,7 +34,7 @@ class Pane {
 }
 
 class Viewer {
-  /** picture: to lay on the model, or null. */
+  /** picture: image for the model, or null. */
   constructor(model, picture) {
     this.model = model;
     this.state = new State({
@@ -46,7 +46,7 @@ class Viewer {
       new Pane("layout", new Camera(this.flatPlaces(), [1, 0, 0, 0, 1, 0, 0, 0, 1], false), true, this),
     ];
     this.used = this.panes[0];
-    this.tool = null; // What clicks and drags do instead: {hover(pane, x, y), pick(pane, x, y, reach), grab(pane, x, y, reach)}.
+    this.tool = null; // Alternative handler of clicks and drags: {hover(pane, x, y), pick(pane, x, y, reach), grab(pane, x, y, reach)}.
     this.moving = this.slowFrames = 0;
     this.renderer = new Renderer(document.getElementById("scene"), model);
     if (picture) this.renderer.setPicture(picture);
@@ -67,23 +67,23 @@ class Viewer {
     this.drawFirst();
   }
 
-  /** Draw for the first time, roughly; how long that takes tells whether there is a graphics card. */
+  /** Draw roughly for the first time; the time shows whether there is a graphics card. */
   drawFirst() {
     const start = performance.now();
     this.slowFrames = 2;
     this.drawStale();
     this.renderer.finish();
-    if (performance.now() - start > SLOW) return; // It will be drawn finely a little later.
+    if (performance.now() - start > SLOW) return; // It is drawn at full resolution a little later.
     this.slowFrames = 0;
     this.redraw();
     this.drawStale();
   }
 
-  /** Show another model; what is seen of it stays in sight, and what is picked, if there still is such a thing. */
+  /** Show another model, with the same view and, if possible, the same picked thing. */
   takeModel(model) {
     const [space, plane] = this.panes.map((pane) => pane.camera);
     const isSame = model.hasSurfaceOf(this.model);
-    // Of a large surface other triangles may be drawn now.
+    // The triangles drawn of a large surface may differ.
     const stays = isSame || (model.head.name === this.model.head.name && model.head.radius === this.model.head.radius);
     this.renderer.takeModel(model);
     this.model = this.marks.model = model;
@@ -108,24 +108,24 @@ class Viewer {
     return out;
   }
 
-  /** Some of the state has changed. */
+  /** Handle a change of the state. */
   note(names) {
     if (names.has("dark")) this.readColours();
     if (names.has("hovered") || names.has("picked")) this.remark();
     if (["show", "squares", "seams", "cones", "edges", "dark", "marked"].some((name) => names.has(name))) this.redraw();
   }
 
-  /** What is drawn over the views has changed. */
+  /** Draw the marks over the views again. */
   remark() {
     this.marksStale = true;
     this.schedule();
   }
 
   redraw() {
-    this.panes.forEach((pane) => pane.spoil());
+    this.panes.forEach((pane) => pane.markStale());
   }
 
-  /** Draw what is stale with the next frame. */
+  /** Draw outdated panes with the next frame. */
   schedule() {
     if (this.scheduled) return;
     this.scheduled = true;
@@ -137,13 +137,13 @@ class Viewer {
     });
   }
 
-  /** A camera moves; when it rests, everything is drawn finely. */
+  /** Handle a motion of a camera; when it ends, everything is drawn at full resolution. */
   noteMove() {
     if (!this.moving) this.lastFrame = Infinity;
     clearTimeout(this.moving);
     this.moving = setTimeout(() => {
       this.moving = 0;
-      this.panes.filter((pane) => pane.rough).forEach((pane) => pane.spoil());
+      this.panes.filter((pane) => pane.rough).forEach((pane) => pane.markStale());
       this.marksStale = true;
       this.schedule();
     }, REST);
@@ -179,7 +179,7 @@ class Viewer {
     }
   }
 
-  // What the gestures tell.
+  // Handlers of gestures.
 
   use(pane) {
     this.used = pane;
@@ -191,7 +191,7 @@ class Viewer {
     if (!sameThing(thing, this.state.get("hovered"))) this.state.set({hovered: thing});
   }
 
-  /** Return who hears of a drag that begins here instead of the camera, {move(x, y), drop()}, or null. */
+  /** Return a handler {move(x, y), drop()} of a drag that begins here, or null for the camera. */
   grab(pane, x, y, reach) {
     return this.tool?.grab(pane, x, y, reach) ?? null;
   }
@@ -209,7 +209,7 @@ class Viewer {
     this.pick(this.used, this.used.width / 2, this.used.height / 2);
   }
 
-  /** Pick a thing, and bring it into sight in every view but the one where the user just saw it. */
+  /** Pick a thing, and make it visible in all views except the one in which it was picked. */
   find(thing, except = null) {
     this.state.set({picked: thing});
     if (thing) this.panes.filter((pane) => pane !== except).forEach((pane) => this.bringIntoSight(pane, thing));
@@ -226,7 +226,7 @@ class Viewer {
     glide(pane.camera, turn, near ? pan : place.slice(0, 2));
   }
 
-  /** Return the least turned view in which a thing's triangle faces the user; tilted where that lies behind others. */
+  /** Return the rotation nearest to the current one in which the triangle of a thing faces the viewer; tilted if others hide it. */
   turnTowards(thing, turn) {
     const [p, q, r] = this.model.shapeOf({kind: "triangle", index: this.triangleAt(thing)}, false)[0];
     const [a, b] = [q, r].map((end) => end.map((x, k) => x - p[k]));
@@ -241,7 +241,7 @@ class Viewer {
     return straightened(product(rotation(axis, Math.atan2(side, z)), turn));
   }
 
-  /** A triangle that a thing lies on. */
+  /** Return a triangle at a thing. */
   triangleAt(thing) {
     if (thing.kind === "triangle") return thing.index;
     const {outline, faces, point_vertex, cones} = this.model.arrays;

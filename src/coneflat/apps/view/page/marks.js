@@ -1,8 +1,8 @@
-// What is pointed at and what is picked, drawn over both views; dashed where it is hidden.
+// The hovered and the picked thing, drawn over both views; dashed if hidden.
 
 const RING = 11; // pixels
-const SMALL = 14; // pixels: what is smaller gets a ring around it, to be found
-const IN_FRONT = 0.03; // model radii: what is nearer to the user by less hides nothing
+const SMALL = 14; // Pixels; smaller things are marked by a ring.
+const IN_FRONT = 0.03; // Model radii; a triangle hides a thing if it is nearer by at least this distance.
 const UNSEEN = "rgba(0, 0, 0, 0.01)";
 
 class Marks {
@@ -11,7 +11,7 @@ class Marks {
     this.model = model;
     this.renderer = renderer;
     this.seen = new Map();
-    this.overlay = null; // What else draws over a pane: a function of a pen and the pane.
+    this.overlay = null; // A function (pen, pane) that draws further things over a pane.
   }
 
   resize(width, height, pixel) {
@@ -19,12 +19,12 @@ class Marks {
     sizeCanvas(this.canvas, width * pixel, height * pixel);
   }
 
-  /** settled: nothing moves; else what is hidden is what was. */
+  /** settled: whether nothing moves; otherwise the visibility is not computed again. */
   draw(panes, state, ink, settled) {
     const pen = this.canvas.getContext("2d");
     pen.setTransform(this.pixel, 0, 0, this.pixel, 0, 0);
     pen.clearRect(0, 0, this.canvas.width, this.canvas.height);
-    pen.fillStyle = UNSEEN; // Where nothing is drawn after clearing, Chromium may go on showing what was there.
+    pen.fillStyle = UNSEEN; // Chromium may show the old content where nothing is drawn after clearing.
     pen.fillRect(0, 0, 1, 1);
     const [picked, hovered] = [state.get("picked"), state.get("hovered")];
     if (!picked && !hovered) this.seen.clear();
@@ -70,7 +70,7 @@ class Marks {
     }
   }
 
-  /** Whether nothing lies in front of a thing; in the plane nothing does. */
+  /** Return whether a thing is visible; in the layout everything is. */
   isSeen(pane, thing, state) {
     if (pane.inPlane) return true;
     const places = this.model.shapeOf(thing, false)[0].map((end) => pane.camera.project(end));

@@ -1,15 +1,15 @@
-// A flattened mesh: its arrays, and what can be asked of them. Points of the layout lie about the origin, too.
+// A flattened mesh: its arrays and queries on them. Points of the layout are centred at the origin.
 
 const ARRAY_TYPES = {f4: Float32Array, u4: Uint32Array, i4: Int32Array, u2: Uint16Array, u1: Uint8Array};
 
-/** Return the model that a page carries: `head` is an object, `text` the base64 of its compressed arrays. */
+/** Return the model in a page: `head` is an object, `text` the compressed arrays in base64. */
 async function unpackModel(head, text) {
   const packed = Uint8Array.fromBase64 ? Uint8Array.fromBase64(text) : bytesOfBase64(text);
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
   return modelOf(head, await new Response(stream).arrayBuffer(), 0);
 }
 
-/** Return the model whose arrays lie in a block of bytes from some place on, a multiple of four, or are another's. */
+/** Return the model whose arrays are in a block of bytes from an offset on, a multiple of four; missing arrays are shared with another model. */
 function modelOf(head, block, begin, other) {
   const arrays = {};
   for (const {name, type, offset, count} of head.arrays) {
@@ -38,7 +38,7 @@ class Model {
     this.conePoints = this.findConePoints();
   }
 
-  /** The vertex of a corner, 3 * triangle + 0, 1, 2. */
+  /** Return the vertex of a corner, 3 * triangle + 0, 1, 2. */
   vertexAt(corner) {
     return this.arrays.point_vertex[this.arrays.faces[corner]];
   }
@@ -48,20 +48,20 @@ class Model {
     return [places[3 * vertex], places[3 * vertex + 1], places[3 * vertex + 2]];
   }
 
-  /** Where a point of the layout is drawn: in a plane, about the origin. */
+  /** Return the position at which a point of the layout is drawn: in a plane, centred at the origin. */
   flatPlace(point) {
     const uv = this.arrays.uv;
     return [(uv[2 * point] - this.uvCentre[0]) * this.uvUnit, (uv[2 * point + 1] - this.uvCentre[1]) * this.uvUnit, 0];
   }
 
-  /** The corners that the i-th half-edge on the outlines of charts runs from and to. */
+  /** Return the two corners at the ends of the i-th half-edge on the outlines of charts. */
   outlineCorners(i) {
     const halfedge = this.arrays.outline[i];
     const base = halfedge - (halfedge % 3);
     return [base + ((halfedge + 1 - base) % 3), base + ((halfedge + 2 - base) % 3)];
   }
 
-  /** The points in space, or of the layout, that a thing consists of: a list of lists of ends. */
+  /** Return the polygons or segments of a thing, in space or in the layout, as lists of points. */
   shapeOf(thing, inPlane) {
     const at = (corner) => (inPlane ? this.flatPlace(this.arrays.faces[corner]) : this.place(this.vertexAt(corner)));
     if (thing.kind === "triangle") return [[0, 1, 2].map((k) => at(3 * thing.index + k))];
@@ -73,7 +73,7 @@ class Model {
     return this.conePoints[thing.index].map((point) => [this.flatPlace(point)]);
   }
 
-  /** The number of a vertex, or of a triangle, in the user's mesh. */
+  /** Return the index of a vertex, or of a triangle, in the mesh of the user. */
   vertexNumber(vertex) {
     return this.arrays.vertex_numbers ? this.arrays.vertex_numbers[vertex] : vertex;
   }
@@ -82,23 +82,23 @@ class Model {
     return this.arrays.face_numbers ? this.arrays.face_numbers[triangle] : triangle;
   }
 
-  /** Whether a colour map has a value for each triangle, not for each vertex. */
+  /** Return whether a colour map has a value for each triangle, not for each vertex. */
   isByFace(show) {
     return show === "qc" || show === "area" || (show === "own" && this.head.own === "faces");
   }
 
-  /** Where the values of a colour map lie on its scale: of each triangle, or of each vertex. */
+  /** Return the positions of the values of a colour map on its scale, for each triangle or each vertex. */
   tones(show) {
     return placesOnScale(this.head.scales[show], this.arrays[show]);
   }
 
-  /** Whether a triangle lies in front of a place, farther than so much, for who looks from a direction. */
+  /** Return whether a triangle hides a point seen from a direction, and is nearer than it by at least a distance. */
   isHidden(place, from, beyond) {
     const {places, faces, point_vertex} = this.arrays;
     for (let corner = 0; corner < faces.length; corner += 3) {
       const p = 3 * point_vertex[faces[corner]], q = 3 * point_vertex[faces[corner + 1]], r = 3 * point_vertex[faces[corner + 2]];
       const at = (v, k) => places[v + k] - place[k];
-      // The volumes of the direction with the sides have one sign where it goes through the triangle.
+      // The ray intersects the triangle if its signed volumes with the three sides have equal signs.
       const volume = (a, b) =>
         from[0] * (at(a, 1) * at(b, 2) - at(a, 2) * at(b, 1)) +
         from[1] * (at(a, 2) * at(b, 0) - at(a, 0) * at(b, 2)) +
@@ -111,7 +111,7 @@ class Model {
     return false;
   }
 
-  /** The triangle with the largest finite QC distortion. */
+  /** Return the triangle with the largest finite QC distortion. */
   worstTriangle() {
     const qc = this.arrays.qc;
     let worst = 0;
@@ -119,7 +119,7 @@ class Model {
     return worst;
   }
 
-  /** Whether another model has the same triangles in space, in the same order. */
+  /** Return whether another model has the same triangles in space, in the same order. */
   hasSurfaceOf(other) {
     const mine = this.arrays, its = other.arrays;
     if (mine.faces.length !== its.faces.length || mine.places.length !== its.places.length) return false;
@@ -144,7 +144,7 @@ class Model {
   }
 }
 
-/** Where values lie on a scale, 0 to 1, and -1 where they are undefined. */
+/** Return the positions of values on a scale, from 0 to 1; -1 for undefined values. */
 function placesOnScale(scale, values) {
   const {kind, low, high} = scale;
   const range = Math.log(high / low);

@@ -1,4 +1,4 @@
-"""A page's data: numbers and texts as JSON, arrays as one compressed block of bytes."""
+"""The data of a page: numbers and texts as JSON, arrays as one compressed block of bytes."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from .content import Content
 if TYPE_CHECKING:
     from .... import Flattening
 
-# The page does without matplotlib, which is an extra, and without the vivid ends of its tables, which light and shade
-# would spoil. Equal steps in value are about equal steps of CIE L*a*b* here; lightness runs one way (sequential), or
-# the same way from the middle to both ends (diverging), so that the tables hold without hue.
-#: From light to dark, and from blue over near white to red: hexadecimal colours at equal steps.
+# Colour tables that do not need matplotlib, which is an extra. They have no very dark or bright ends, which shading
+# would make unreadable. Equal steps in value are about equal steps in CIE L*a*b*. Lightness is monotonic (sequential),
+# or monotonic from the middle to both ends (diverging), so the tables can also be read without hue.
+#: Hexadecimal colours at equal steps: from light to dark, and from blue over near white to red.
 SEQUENTIAL = (
     "f6eec8 dee6b5 c5dea3 add595 95ca97 7cbf9a 5fb49c 48a89d 3f9a9c "
     "348d9b 26809b 1b7398 2b6491 345689 394882 3a3974 34285a 2c1841"
@@ -39,24 +39,24 @@ DIVERGING = (
 )
 TITLES = {
     "qc": "QC distortion",
-    "area": "Scale, against its mean",
+    "area": "Scale, relative to its mean",
     "curvature": "Curvature of the model, in π",
     "flat": "Curvature of the flat metric, in π",
 }
-#: The arrays that every page has.
+#: Arrays that every page has, and their types.
 _KINDS = dict.fromkeys(("places", "uv", "qc", "area", "curvature", "flat"), "f4") | dict.fromkeys(
     ("point_vertex", "faces", "outline", "cones"), "u4"
 )
 
 
 @dataclass(frozen=True)
-class Told:
-    """What a page says in words and numbers.
+class PageText:
+    """Texts and numbers of a page.
 
     Attributes:
-        title: a line of key numbers.
-        rows: of the report: measure, value, meaning.
-        squares: of the checkerboard at first, in a row as long as the root of the area.
+        title: the main measures in one line.
+        rows: rows (measure, value, meaning) of the report.
+        squares: number of checkerboard squares along the square root of the area, at the start.
     """
 
     title: str
@@ -65,9 +65,9 @@ class Told:
 
 
 def as_payload(head: dict[str, Any], block: bytes) -> tuple[str, str]:
-    """Return what `head_and_block` returns as it goes into a page.
+    """Return the results of `head_and_block` in the form that is written into a page.
 
-    JSON without anything that could end a script element or open a comment in it, and base64 text.
+    This is JSON in which characters that could end a script element or open a comment are escaped, and base64 text.
     """
     text = json.dumps(head, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     safe = text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
@@ -81,25 +81,25 @@ def head_and_block(
     name: str,
     up: str,
     show: str,
-    told: Told | None = None,
+    text: PageText | None = None,
 ) -> tuple[dict[str, Any], bytes]:
-    """Return the numbers and texts of a page, and its arrays as they lie in memory.
+    """Return the numbers and texts of a page, and its arrays as a block of bytes.
 
-    told: what is said, by default that of a flattening.
+    text: title and rows; by default those of a flattening.
 
     Raises:
-        OptionError: `up` names no axis.
+        OptionError: `up` is not valid.
     """
-    if told is None:
-        told = Told(title(replace(result, source=None)), shown_rows(result))
+    if text is None:
+        text = PageText(title(replace(result, source=None)), shown_rows(result))
     own, arrays = content.own, _arrays(content)
     if picture is not None:
         arrays["picture"] = np.frombuffer(picture.content, dtype=np.uint8)
     listed, block = pack(arrays)
     head = {
         "name": name,
-        "title": told.title,
-        "rows": list(told.rows),
+        "title": text.title,
+        "rows": list(text.rows),
         "notes": list(result.notes),
         "triangles": len(result.faces),
         "left_out": content.left_out,
@@ -112,7 +112,7 @@ def head_and_block(
         "uv_side": content.uv_side,
         "radius": content.model.radius,
         "sizes": _sizes(result, content),
-        "squares": told.squares,
+        "squares": text.squares,
         "crease_cosine": CREASE_COSINE,
         "scales": {
             key: _plain_scale(TITLES[key] if own is None or key != "own" else own.label, scale)
@@ -127,7 +127,7 @@ def head_and_block(
 
 
 def _plain_scale(title: str, scale: ColorScale) -> dict[str, Any]:
-    """Return what the page's scripts know of a scale: its ticks are places from 0 to 1."""
+    """Return a colour scale as data for the scripts of the page; its ticks are positions from 0 to 1."""
     places = scale.position(np.array([value for value, _ in scale.ticks])).tolist()
     ticks = [(place, label) for place, (_, label) in zip(places, scale.ticks, strict=True)]
     return {
@@ -141,7 +141,7 @@ def _plain_scale(title: str, scale: ColorScale) -> dict[str, Any]:
 
 
 def _color_table(colors: str) -> NDArray[np.uint8]:
-    """Return (256, 3) colours between some that are given."""
+    """Return (256, 3) colours interpolated between the given ones."""
     known = np.array([list(bytes.fromhex(color)) for color in colors.split()])
     place = np.linspace(0, len(known) - 1, 256)
     table = np.stack([np.interp(place, np.arange(len(known)), column) for column in known.T], axis=1)
@@ -149,12 +149,12 @@ def _color_table(colors: str) -> NDArray[np.uint8]:
 
 
 def _sizes(result: Flattening, content: Content) -> dict[str, float]:
-    """Return the area of a model and the lengths of its seams and its boundary, in radii of the ball it is shown in."""
+    """Return the area of a model and the lengths of its seams and its boundary, in units of the radius of its ball."""
     scaled = (result.vertices - content.model.centre) / content.model.radius
     area = double_areas(edge_lengths(scaled, result.faces)).sum() / 2
     ends = [content.point_vertex[content.faces.reshape(-1)[end]] for end in end_corners(content.outline)]
     lengths = np.linalg.norm(content.places[ends[1]] - content.places[ends[0]], axis=1)
-    seams = slice(0, 2 * content.seams, 2)  # each has two sides
+    seams = slice(0, 2 * content.seams, 2)  # Each seam has two half-edges.
     return {
         "area": float(area),
         "seams": float(lengths[seams].sum()),
@@ -163,7 +163,7 @@ def _sizes(result: Flattening, content: Content) -> dict[str, float]:
 
 
 def _arrays(content: Content) -> dict[str, NDArray[Any]]:
-    """Return the arrays by the names that the page's scripts know them by."""
+    """Return the arrays by the names that the scripts of the page use."""
     arrays: dict[str, NDArray[Any]] = {
         name: np.asarray(getattr(content, name)).astype(kind) for name, kind in _KINDS.items()
     }
@@ -180,11 +180,11 @@ def _arrays(content: Content) -> dict[str, NDArray[Any]]:
 
 
 def pack(arrays: Mapping[str, NDArray[Any]]) -> tuple[list[dict[str, Any]], bytes]:
-    """Return where each array lies in a block of bytes, little-endian, and the block."""
+    """Return the name, type, offset and count of each array in a block of little-endian bytes, and the block."""
     listed, parts, offset = [], [], 0
     for name, array in arrays.items():
         content = np.ascontiguousarray(array).astype(array.dtype.newbyteorder("<"), copy=False).tobytes()
-        content += bytes(-len(content) % 4)  # where the browser may put a typed array
+        content += bytes(-len(content) % 4)  # Typed arrays of the browser must be aligned.
         kind = f"{array.dtype.kind}{array.dtype.itemsize}"
         listed.append({"name": name, "type": kind, "offset": offset, "count": array.size})
         parts.append(content)

@@ -1,9 +1,9 @@
-// Pictures to lay on the model: the user's, or a board of numbered squares.
+// Images for the model: one given by the user, or a board of numbered squares.
 
-const LARGEST = 4096; // pixels along a side, which every graphics card takes
+const LARGEST = 4096; // Pixels along a side that every graphics card supports.
 const BOARD_SIZE = 1024, BOARD_SQUARES = 8;
 
-/** Return a canvas of squares A1 to H8, A1 at the lower left, where u and v are 0; each row has a hue of its own. */
+/** Return a canvas of squares A1 to H8, A1 at the lower left, where u and v are 0; each row has its own hue. */
 function numberedBoard() {
   const canvas = document.createElement("canvas");
   canvas.width = canvas.height = BOARD_SIZE;
@@ -24,7 +24,7 @@ function numberedBoard() {
   return canvas;
 }
 
-/** Return a picture that the graphics card takes, made smaller where it must be. */
+/** Return an image that the graphics card supports, reduced if necessary. */
 async function pictureOf(blob) {
   let picture;
   try {

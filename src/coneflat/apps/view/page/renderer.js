@@ -1,13 +1,13 @@
-// Draws a model and its layout into two parts of one canvas, and tells what is at a pixel.
+// Draws a model and its layout in two parts of one canvas, and finds the thing at a pixel.
 
-const DARK_CELL = [0.4, 0.53, 0.7]; // What dark squares let through: blue, so that red and black dots stand out.
+const DARK_CELL = [0.4, 0.53, 0.7]; // Factor of the colour in dark squares: blue, so that red and black dots are visible.
 const SEAM_CORE = 1, SEAM_RADIUS = 2.2; // pixels
-const PICK_RADII = [5, 1.5]; // What lies right under the pointer comes before what lies beside it.
-const SAMPLES = 4; // a pixel, for smooth outlines
-const ROUGH = 0.5; // of the pixels along a side, while a slow machine draws what moves
-const MAP_CONTRAST = 0.55; // On colour maps light is evened out, or a shadow would read as a value.
+const PICK_RADII = [5, 1.5]; // Things under the pointer have priority over things near it.
+const SAMPLES = 4; // Samples per pixel, for smooth outlines.
+const ROUGH = 0.5; // Fraction of the pixels along a side while the view moves on a slow machine.
+const MAP_CONTRAST = 0.55; // Shading is reduced on colour maps, so that a shadow is not read as a value.
 
-/** Set the size of a canvas, which costs much and clears it, where it has another. */
+/** Set the size of a canvas only if it changes, because this is slow and clears the canvas. */
 function sizeCanvas(canvas, width, height) {
   const size = [width, height].map((side) => Math.max(1, Math.round(side)));
   if (canvas.width !== size[0]) canvas.width = size[0];
@@ -19,12 +19,12 @@ class Renderer {
     this.canvas = canvas;
     this.model = model;
     this.gl = canvas.getContext("webgl2", {antialias: false, depth: false, preserveDrawingBuffer: true});
-    if (!this.gl) throw new Error("this browser shows no WebGL 2, which the drawing needs");
+    if (!this.gl) throw new Error("this browser does not support WebGL 2, which the page needs");
     this.look = {};
     this.prepare();
   }
 
-  /** Send everything to the graphics card: at the start, and when it has lost it. */
+  /** Upload all data to the graphics card: at the start, and after a loss of the context. */
   prepare() {
     const gl = this.gl, model = this.model;
     const pairs = {
@@ -66,7 +66,7 @@ class Renderer {
     this.setMarks(this.look.marks);
   }
 
-  /** Lay marks over the surface: at each corner four bytes, of which three say how much of what; null for none. */
+  /** Set the paint on the surface: four bytes for each corner, of which three are the strengths of the layers; null for none. */
   setMarks(marks) {
     this.look.marks = marks;
     if (marks) this.surface.put(4, {array: marks, size: 4, type: this.gl.UNSIGNED_BYTE, normalised: true});
@@ -77,7 +77,7 @@ class Renderer {
     this.dots = [false, true].map((inPlane) => this.quads(coneDots(this.model, inPlane)));
   }
 
-  /** Draw another model from now on; of one with the same surface only the layout is sent. */
+  /** Replace the model; if the surface is the same, only the layout is uploaded. */
   takeModel(model) {
     const isSame = model.hasSurfaceOf(this.model);
     this.model = model;
@@ -92,7 +92,7 @@ class Renderer {
     this.prepareLayout();
   }
 
-  /** Return lines or dots of two attributes of three numbers. */
+  /** Return lines or dots with two attributes of three numbers. */
   quads(attributes) {
     return new Shape(this.gl, attributes.map((rows) => ({array: forQuads(rows, 3), size: 3})));
   }
@@ -114,12 +114,12 @@ class Renderer {
     sizeCanvas(this.canvas, width * pixel, height * pixel);
   }
 
-  /** Fill what lies between the panes. */
+  /** Fill the area between the panes. */
   clear() {
     const gl = this.gl;
     if (gl.isContextLost()) return;
     const ground = [...this.look.colours.ground, 1];
-    // Some drivers show all of a target of several samples, whatever the box: what was between them must not come back.
+    // Some drivers copy the whole multisampled target, not only the box. The area between the panes must not show old content.
     this.fineTarget().begin(ground, [0, 0, this.canvas.width, this.canvas.height]);
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.clearColor(...ground);
@@ -131,8 +131,8 @@ class Renderer {
   }
 
   /**
-   * Draw a pane, {name, left, top, width, height, camera, inPlane}, as the state says; sizes in CSS pixels.
-   * rough: at a quarter of the work, for slow machines while something moves.
+   * Draw a pane, {name, left, top, width, height, camera, inPlane}, for a state; sizes in CSS pixels.
+   * rough: with a quarter of the pixels, for slow machines during motion.
    */
   draw(pane, state, rough) {
     const gl = this.gl;
@@ -182,10 +182,10 @@ class Renderer {
     });
     this.surface.draw();
     gl.enable(gl.BLEND);
-    gl.depthMask(false); // What is only laid over the surface hides nothing.
+    gl.depthMask(false); // Overlays do not hide anything.
     gl.blendFuncSeparate(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA, gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
     if (state.get("seams")) {
-      // All halos before all lines: a halo would break the line before it.
+      // All halos are drawn before all lines, because a halo would interrupt an earlier line.
       for (const [ink, strength, radius, lift] of [[colours.halo, 0.7, SEAM_RADIUS, 3], [colours.seam, 1, SEAM_CORE, 3.5]]) {
         const widths = {radius: (radius + 0.5) * pixel + 0.5, lift: lift * pixel};
         this.programs.line.use({...view, ...widths, ink, strength});
@@ -206,7 +206,7 @@ class Renderer {
     return {turn: camera.turn, pan: camera.pan, zoom, size: [width * pixel, height * pixel]};
   }
 
-  /** Return the memory of a name, made anew where it has another size. */
+  /** Return the render target of a name, created again if its size has changed. */
   targetOf(name, width, height, samples) {
     const old = this.targets.get(name);
     if (old?.fits(width, height, samples)) return old;
@@ -238,7 +238,7 @@ class Renderer {
     return {kind: "cone", index};
   }
 
-  /** Return the numbers of what a pane shows; drawn again only when the view has changed. */
+  /** Return the image of thing numbers of a pane; it is drawn again only if the view has changed. */
   pickTargetOf(pane, state) {
     const gl = this.gl, model = this.model;
     const size = [pane.width, pane.height].map((side) => Math.max(1, Math.round(side)));

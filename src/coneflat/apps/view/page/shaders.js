@@ -1,19 +1,19 @@
-// What runs on the graphics card. Each pair draws a picture or, with PICK defined, the numbers of things.
+// Shaders. Each pair draws an image or, with PICK defined, the numbers of things.
 
 const VIEW_UNIFORMS = `
 uniform mat3 turn;
 uniform vec2 pan;
 uniform vec2 zoom;  // clip units per unit
-uniform vec2 size;  // of the pane, pixels
+uniform vec2 size;  // Size of the pane in pixels.
 vec4 clip(vec3 p) {
   vec3 q = turn * p;
   return vec4((q.xy - pan) * zoom, -0.45 * q.z, 1.0);
 }
-vec2 quadCorner() {  // -1 or 1, of the two triangles that a line or dot is drawn as
+vec2 quadCorner() {  // -1 or 1 for the corners of the two triangles of a line or dot.
   int k = gl_VertexID % 6;
   return vec2(k == 1 || k == 2 || k == 4 ? 1.0 : -1.0, k == 2 || k == 4 || k == 5 ? 1.0 : -1.0);
 }
-float nearer(float pixels) {  // clip depth of a way towards the eye that is as long as so many pixels
+float nearer(float pixels) {  // Change of clip depth for a distance in pixels towards the eye.
   return 0.9 * pixels / (zoom.y * size.y);
 }
 `;
@@ -33,7 +33,7 @@ layout(location = 2) in vec4 normal;
 layout(location = 3) in float value;
 layout(location = 4) in vec4 marks;
 uniform bool inPlane;
-uniform vec3 plane;  // the middle of the layout, and its unit
+uniform vec3 plane;  // The centre of the layout, and its unit.
 ${VIEW_UNIFORMS}
 #ifdef PICK
 flat out uint id;
@@ -75,13 +75,13 @@ uniform bool board, pictured, tinted;
 uniform sampler2D table, picture;
 uniform vec3 paint, dark, undefinedPaint;
 uniform float cell, edges, outward, contrast, marked;
-uniform float hatch;  // pixels of the target per pixel
+uniform float hatch;  // Pixels of the render target per CSS pixel.
 
-const vec3 KEY_LIGHT = vec3(-0.4478, 0.6469, 0.6170);  // over the left shoulder, as in drawings
+const vec3 KEY_LIGHT = vec3(-0.4478, 0.6469, 0.6170);  // From the upper left, as in drawings.
 
 float wave(float x) { return 1.0 - abs(mod(x, 2.0) - 1.0); }
 
-// Share of light squares in the pixel: the board's mean over its footprint, so that far squares fade to grey.
+// Fraction of light squares in the pixel: the mean of the board over its footprint, so that small squares become grey.
 float lightShare() {
   vec2 width = max(fwidth(at), vec2(3e-4 * cell));
   vec2 low = (at - 0.5 * width) / cell, high = (at + 0.5 * width) / cell;
@@ -96,7 +96,7 @@ float edgeShare() {
   return edges * (1.0 - crowded) * (1.0 - min(off.x, min(off.y, off.z)));
 }
 
-// Marks differ in colour and, for those who see few colours, in pattern: lines that rise, lines that fall, even colour.
+// Layers of paint differ in colour and, for colour-blind users, in pattern: rising lines, falling lines, uniform.
 vec3 withMarks(vec3 base) {
   vec3 width = max(fwidth(mark), vec3(1e-4));
   vec3 on = smoothstep(0.5 - width, 0.5 + width, mark) * marked;
@@ -183,7 +183,7 @@ void main() {
 
 const DOT_VERTEX = `
 layout(location = 0) in vec3 place;
-layout(location = 1) in vec3 dot_;  // radius in pixels, sign, number
+layout(location = 1) in vec3 dot_;  // Radius in pixels, sign, number.
 uniform float pixel;  // device pixels per pixel
 ${VIEW_UNIFORMS}
 #ifdef PICK

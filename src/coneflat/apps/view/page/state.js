@@ -1,6 +1,6 @@
-// What the page shows, apart from how it is drawn and from where its data comes.
+// The state of the page, independent of drawing and of the source of the data.
 
-// What can be shown: [key, name, the scale of its colours if it has one].
+// Display modes: [key, name].
 const SHOWS = [
   ["checker", "Checkerboard"],
   ["picture", "Picture"],
@@ -13,13 +13,13 @@ const SHOWS = [
   ["own", "Own values"],
 ];
 
-/** What of these a model has: values of the user's own by their name. */
+/** Return the display modes of a model; values given by the user have their own name. */
 function showsOf(model) {
   const own = model.head.scales.own;
   return SHOWS.filter(([key]) => key !== "own" || own).map(([key, name]) => [key, key === "own" ? own.title : name]);
 }
 
-/** Named values; listeners hear which of them changed. */
+/** Named values; listeners are called with the names that have changed. */
 class State {
   constructor(values) {
     this.values = {...values};
@@ -47,7 +47,7 @@ class State {
   }
 }
 
-/** Whether two picked things, {kind, index} or null, are the same. */
+/** Return whether two things, {kind, index} or null, are the same. */
 function sameThing(one, other) {
   return one === other || (one && other && one.kind === other.kind && one.index === other.index);
 }

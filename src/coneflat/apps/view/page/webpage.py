@@ -1,4 +1,4 @@
-"""One self-contained HTML page of a flattening, which loads nothing from anywhere."""
+"""A self-contained HTML page of a flattening, which loads no other files."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from ....io import atomic_write, checked_target, read_picture
 from ....options import MOST_TRIANGLES, SHOWS
 from ..quantity import Quantity, own_quantity
 from .content import content_of
-from .payload import Told, as_payload, head_and_block
+from .payload import PageText, as_payload, head_and_block
 
 if TYPE_CHECKING:
     from .... import Flattening
 
-# In the order in which they must run: names are shared.
+# In the order in which they must run; they share one scope.
 _SCRIPTS = (
     "state", "model", "corners", "camera", "shaders", "graphics", "renderer", "marks", "gestures", "facts",
     "picture", "controls", "main",
 )  # fmt: skip
-#: What a page that carries its data may do: nothing but draw.
+#: Content security policy of a page that contains its data: nothing may be loaded.
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 
 
@@ -43,26 +43,27 @@ def page_of(
     up: str = "y",
     show: str | None = None,
     most_triangles: int = MOST_TRIANGLES,
-    told: Told | None = None,
+    text: PageText | None = None,
     color: Quantity | str | None = None,
 ) -> str:
-    """Return the page as text.
+    """Return the HTML page of a flattening as text.
 
     Args:
         result: the flattening.
-        name: the page's title; by default that of the file the mesh was read from.
-        texture: a PNG, JPEG, GIF or WebP file to lay on the model.
+        name: title of the page; by default the name of the file of the mesh.
+        texture: image file for the model: PNG, JPEG, GIF or WebP.
         up: the model's upward axis in the first view, "x", "y" or "z".
-        show: what the colours show first: "checker", "picture", "charts", "qc", "area", "curvature" (of the model),
-            "flat" (the curvature left) or "plain"; by default the picture, if there is one, or the checkerboard.
-        color: numbers of the user's own, or their name, see `own_quantity`; they are shown first then, or as "own".
-        most_triangles: a mesh with more is thinned for display.
-        told: what it says; by default the key numbers and the report.
+        show: display mode at the start: "checker", "picture", "charts", "qc", "area", "curvature" (of the model),
+            "flat" (curvature of the flat metric), "plain" or, with `color`, "own"; by default the values of `color`,
+            else the picture, else the checkerboard.
+        color: quantity given by the user, or its name, see `own_quantity`.
+        most_triangles: a mesh with more triangles is simplified for display.
+        text: title and rows of the page; by default the main measures and the report.
 
     Raises:
-        OptionError: `up` or `show` is none of these, or `most_triangles` is not an integer.
+        OptionError: `up` or `show` is not valid, or `most_triangles` is not an integer.
         ArrayShapeError: the result has no UVs.
-        MeshError: it cannot be thinned to so few triangles.
+        MeshError: the mesh cannot be reduced to `most_triangles`.
         MeshFileError: the texture cannot be read.
     """
     if show is None:
@@ -76,13 +77,13 @@ def page_of(
     content = content_of(result, most_triangles, own=own)
     if name is None:
         name = "Flattening" if result.source is None else result.source.path.name
-    head, arrays = as_payload(*head_and_block(result, content, picture, name, up, show, told))
+    head, arrays = as_payload(*head_and_block(result, content, picture, name, up, show, text))
     before, between, after = _template()
     return "".join((before, head, between, arrays, after))
 
 
 def check_page(path: str | PathLike[str]) -> Path:
-    """Return the path if a page can be expected to be written there.
+    """Return the path if a page can be written to it.
 
     Raises:
         UnknownFormatError: it does not end with .html or .htm.
@@ -92,10 +93,10 @@ def check_page(path: str | PathLike[str]) -> Path:
 
 
 def write_page(page: str, path: str | PathLike[str] | None) -> Path:
-    """Write a page, in full or not at all, and return where: by default a new temporary file.
+    """Write a page and return its path, by default a new temporary file; no incomplete file is left.
 
     Raises:
-        UnknownFormatError, MeshFileError: as of `check_page`.
+        UnknownFormatError, MeshFileError: as in `check_page`.
     """
     if path is None:
         handle, name = tempfile.mkstemp(prefix="coneflat-", suffix=".html")
@@ -108,16 +109,16 @@ def write_page(page: str, path: str | PathLike[str] | None) -> Path:
 
 
 def open_page(path: Path) -> bool:
-    """Open a page in the user's browser; return whether there is one that could."""
+    """Open a page in the browser of the user, and return whether a browser was found."""
     return open_address(path.resolve().as_uri())
 
 
 def open_address(address: str) -> bool:
-    """Open an address in the user's browser; return whether there is one that could."""
+    """Open an address in the browser of the user, and return whether a browser was found."""
     has_display = (
         not sys.platform.startswith("linux") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     )
-    if not has_display:  # A text browser would take the terminal, and show nothing.
+    if not has_display:  # A text browser would block the terminal, and cannot show the page.
         return False
     try:
         return webbrowser.open(address)
@@ -126,7 +127,7 @@ def open_address(address: str) -> bool:
 
 
 def notebook_html(result: Flattening) -> str:
-    """Return HTML with the page in a frame, for notebooks, which store every page that they show."""
+    """Return HTML with the page in a frame, for notebooks; it is small because notebooks store every page."""
     page = page_of(result, most_triangles=100_000)
     return (
         f'<iframe srcdoc="{html.escape(page)}" title="coneflat" loading="lazy" '
@@ -148,18 +149,18 @@ def _template() -> tuple[str, str, str]:
 def page_around(
     policy: str, data: str, *, script: str, style: str = "", panel: str = "", keys: str = ""
 ) -> str:
-    """Return the viewer's page, without a model, with more around it.
+    """Return the page of the viewer without a model, with further elements.
 
     Args:
-        policy: what it may load, as a Content-Security-Policy.
-        data: elements with the page's data.
-        script: what gets the model, and starts; it shares the names of the page's own scripts.
-        style: rules that come after the page's own.
-        panel: elements beside the panes.
-        keys: rows of the help.
+        policy: its Content-Security-Policy.
+        data: elements with the data of the page.
+        script: script that loads the model and starts the viewer; it shares a scope with the scripts of the page.
+        style: rules that follow those of the page.
+        panel: elements next to the panes.
+        keys: rows of the help on keys.
     """
     page = _read("page.html")
-    for mark, text in (
+    for mark, content in (
         ("{{policy}}", policy),
         ("{{style}}", _read("page.css") + style),
         ("{{panel}}", panel),
@@ -167,7 +168,7 @@ def page_around(
         ("{{data}}", data),
         ("{{script}}", "\n".join([*(_read(f"{name}.js") for name in _SCRIPTS), script])),
     ):
-        page = page.replace(mark, text)
+        page = page.replace(mark, content)
     return page
 
 
