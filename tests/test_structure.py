@@ -33,24 +33,24 @@ CEILINGS = {
     "apps": 0,
     "apps.ahead": 38,
     "apps.batch": 400,
-    "apps.cli": 1499,
+    "apps.cli": 1505,
     "apps.measure_uv": 161,
     "apps.peers": 1406,
     "apps.quads": 3199,
-    "apps.studio": 1701,
-    "apps.view": 1617,
-    "atlas": 1500,
+    "apps.studio": 1699,
+    "apps.view": 1618,
+    "atlas": 1498,
     "base": 356,
     "cone_curve": 108,
-    "cones": 2102,
+    "cones": 2110,
     "evaluate": 194,
-    "flatten": 208,
+    "flatten": 210,
     "flattener": 35,
     "geometry": 1598,
     "io": 2806,
     "layout": 2250,
     "linalg": 468,
-    "measure": 843,
+    "measure": 850,
     "mesh": 715,
     "metric": 998,
     "options": 549,
@@ -58,11 +58,11 @@ CEILINGS = {
     "sample": 5,
     "seams": 178,
     "source": 526,
-    "stages": 226,
+    "stages": 223,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_884, 233, 25_905
-CONSTANTS, KERNELS, NAMES, LEVELS = 299, 111, 30, 8
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_896, 233, 25_922
+CONSTANTS, KERNELS, NAMES, LEVELS = 300, 111, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
 
