@@ -140,7 +140,7 @@ class ConeBounds:
             vertex; a map from vertex to number, 1 for the others; the name of a vertex property in the file; or color,
             which gives 1 to grey vertices and 100 to vertices of a pure colour.
         min_cone_angle: Smallest cone angle (2 pi minus the curvature). Sharper cones distort the triangles around them.
-        max_cone_angle: Largest cone angle, above 2 pi; none or inf for no bound. The triangles around a wider cone
+        max_cone_angle: Largest cone angle, above 2 pi; none or inf: no bound. The triangles around a wider cone
             cannot hold its angle.
         positive_only: No cones of negative curvature (saddles).
     """
@@ -160,7 +160,8 @@ class ConeNumber:
     Attributes:
         distortion: Largest area distortion allowed: the standard deviation of the log scale, weighted by area. A
             smaller value needs more cones.
-        cone_count: Number of cones per component, placed for the least area distortion; replaces distortion.
+        cone_count: Number of cones per component, instead of a distortion. They are placed for the least area
+            distortion.
     """
 
     distortion: float = option(DISTORTION, POSITIVE, only="sparse")
@@ -228,12 +229,12 @@ class SeamOptions:
     """Seams.
 
     Attributes:
-        seams: Edges that must be cut, as pairs of vertices; or input, for the seams of the UVs in the file; or both, as
-            ("input", pairs). They act like a boundary. A single edge without a neighbouring seam is not cut.
+        seams: Edges that must be cut, as pairs of vertices; or input, for the seams of the UVs in the file. In Python,
+            ("input", pairs) gives both. They act like a boundary. A single edge without a neighbouring seam is not cut.
         no_seams: Edges that must not be cut, as pairs of vertices; or vertices, for all edges between two of them.
             This also excludes sharp edges and seams of the file. No search puts a cone where no seam can reach it.
             Cuts that are added later to remove overlaps avoid these edges if possible.
-        sharp_angle: Cut all edges with a larger dihedral angle, for example 40deg for CAD parts. Other seams prefer
+        sharp_angle: Cut edges with a larger dihedral angle, for example 40deg for CAD parts. Other seams prefer
             sharp edges: the cost of an edge is its length up to 20 degrees, and falls to a tenth of it at 60 degrees.
         hide_seams: Strength of the preference for seams in places that are hard to see, in deep folds and, if up is
             given, on the underside. At 1, hidden edges cost a tenth of their length.
@@ -255,7 +256,7 @@ class AtlasOptions:
     Attributes:
         charts: atlas: move seams and add cuts until no triangles overlap. one: a single chart per component, as in the
             paper, which may overlap itself; PAPER and --paper use it.
-        resolution: Texels along a side of the texture; padding is measured in these.
+        resolution: Texels along a side of the texture. Padding is measured in these.
         padding: Least distance between charts, and between charts and the border, in texels; at most a quarter of a
             side.
         tiles: Number of textures (UDIM tiles) over which charts are distributed, all at one scale.

@@ -34,9 +34,9 @@ class FileFlags:
     Attributes:
         output: File to write: .obj, .ply, .glb or .npz; - for standard output.  [default: MESH's name with _uv, as
             .obj; - if MESH is -]
-        format: File format for standard output, or if -o is not given.  [default: obj]
+        format: Format for standard output, or if -o is not given.  [default: obj]
         texture: Texture of a .glb: a checkerboard, or an image file.
-        project: A project of `coneflat studio` (.json), in place of MESH and its options.
+        project: Project of `coneflat studio` (.json) to flatten instead of MESH.
         report: JSON file for all measures.
     """
 

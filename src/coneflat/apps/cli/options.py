@@ -16,7 +16,7 @@ from ... import options as declared
 from ...errors import OptionError
 from ...options import ConeOptions, Declaration, Kind, MetricOptions, Number, Options, declarations, option
 from . import values
-from .shared import RARE, RARE_TITLE, Grouped, repair_keywords
+from .shared import BRIEF, RARE, RARE_TITLE, Grouped, repair_keywords
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 G = TypeVar("G")
@@ -31,7 +31,7 @@ paper_option = click.option(
     cls=Grouped,
     group="Metric",
     is_flag=True,
-    help="Use the method exactly as published (Ben-Chen et al. 2008), with one chart per component.",
+    help="The published method (Ben-Chen et al. 2008), one chart per component.",
 )
 
 
@@ -151,9 +151,9 @@ def _flag(declaration: Declaration) -> Callable[[Command], Command]:
             more = {"multiple": True, "metavar": "|".join((*kind.words, "FILE"))}
         case declared.Weights():
             more = {"metavar": "NAME|FILE"}
-    title = declaration.group
-    if name in RARE:
-        title, doc = RARE_TITLE, doc.split(". ")[0].rstrip(".") + "."
+    title = RARE_TITLE if name in RARE else declaration.group
+    if name in BRIEF:
+        doc = doc.split(". ")[0].rstrip(".") + "."
     shown = shown_default(declaration)
     doc += f"  [default: {shown}]" if shown else ""
     names = (spelled, *SPELLINGS.get(name, ()), name)

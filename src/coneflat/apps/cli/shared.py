@@ -15,12 +15,14 @@ if TYPE_CHECKING:
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-#: Rarely used options, which the help lists at the end, each with the first sentence of its description.
+#: Rarely used options, which the help lists at the end.
 RARE = (
-    "max_cones", "required_cones", "forbidden_cones", "weights", "min_cone_angle", "max_cone_angle", "no_seams",
-    "hide_seams", "seam_weights", "tiles", "threads",
+    "max_cones", "required_cones", "forbidden_cones", "weights", "min_cone_angle", "max_cone_angle", "quantise", "relax",
+    "no_seams", "hide_seams", "seam_weights", "tiles", "threads",
 )  # fmt: skip
-RARE_TITLE = "Less common options (details: docs/reference/command-line.md)"
+#: Options of which the help shows only the first sentence of the description.
+BRIEF = (*RARE, "distortion", "cone_count", "stretch", "seams", "sharp_angle", "resolution", "up")
+RARE_TITLE = "Less common options (all details: docs/reference/command-line.md)"
 #: Titles of groups of options in the help.
 GROUPS = ("Quads", "Cones", "Metric", "Seams", "Atlas", "Input", "Output", RARE_TITLE)
 #: Exit code if a condition of `--require` is not met.
@@ -48,7 +50,7 @@ class GroupedCommand(click.Command):
         for title, records in groups.items():
             if records:
                 with formatter.section(title):
-                    formatter.write_dl(records, col_max=26)
+                    formatter.write_dl(records, col_max=24)
 
 
 up_option = click.option(
@@ -64,15 +66,15 @@ _INPUT = (
         "--repair/--strict",
         "repair",
         cls=Grouped,
-        group="Input",
+        group=RARE_TITLE,
         default=True,
-        help="Repair a mesh that is not manifold, with a note: split edges and vertices, drop degenerate faces, cut "
-        "one-sided surfaces. Or reject it, and triangles without area, too.  [default: repair]",
+        help="Repair a mesh that is not manifold, with a note; or reject it, and triangles without area, too.  "
+        "[default: repair]",
     ),
     click.option(
         "--weld/--no-weld",
         cls=Grouped,
-        group="Input",
+        group=RARE_TITLE,
         default=None,
         help="Merge all vertices at the same position, or none.  [default: all in STL and glTF; in other formats "
         "those on boundaries that coincide]",
