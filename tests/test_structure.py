@@ -33,7 +33,7 @@ CEILINGS = {
     "apps": 0,
     "apps.ahead": 38,
     "apps.batch": 400,
-    "apps.cli": 1505,
+    "apps.cli": 1506,
     "apps.measure_uv": 161,
     "apps.peers": 1406,
     "apps.quads": 3199,
@@ -61,7 +61,7 @@ CEILINGS = {
     "stages": 223,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_896, 233, 25_922
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_896, 233, 25_923
 CONSTANTS, KERNELS, NAMES, LEVELS = 300, 111, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

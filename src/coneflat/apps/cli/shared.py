@@ -15,11 +15,9 @@ if TYPE_CHECKING:
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
+_BOUNDS = ("max_cones", "required_cones", "forbidden_cones", "weights", "min_cone_angle", "max_cone_angle")
 #: Rarely used options, which the help lists at the end.
-RARE = (
-    "max_cones", "required_cones", "forbidden_cones", "weights", "min_cone_angle", "max_cone_angle", "quantise", "relax",
-    "no_seams", "hide_seams", "seam_weights", "tiles", "threads",
-)  # fmt: skip
+RARE = (*_BOUNDS, "quantise", "relax", "no_seams", "hide_seams", "seam_weights", "tiles", "threads")
 #: Options of which the help shows only the first sentence of the description.
 BRIEF = (*RARE, "distortion", "cone_count", "stretch", "seams", "sharp_angle", "resolution", "up")
 RARE_TITLE = "Less common options (all details: docs/reference/command-line.md)"
