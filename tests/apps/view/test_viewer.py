@@ -171,7 +171,7 @@ class TestThinning:
 
     def test_too_few_to_be_had(self, fine):
         with pytest.raises(
-            MeshError, match=r"20,480 triangles are too many for a page of 50: \d+ of them lie along"
+            MeshError, match=r"20,480 triangles cannot be reduced to 50: \d+ of them lie along"
         ):
             content_of(fine, 50)
         with pytest.raises(OptionError, match="at least one triangle, not 0"):
