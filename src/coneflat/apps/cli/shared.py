@@ -16,8 +16,10 @@ if TYPE_CHECKING:
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 #: Rarely used options, which the help lists at the end, each with the first sentence of its description.
-RARE = ("max_cones", "required_cones", "forbidden_cones", "weights", "min_cone_angle", "max_cone_angle")
-RARE = (*RARE, "no_seams", "hide_seams", "seam_weights", "tiles", "threads")
+RARE = (
+    "max_cones", "required_cones", "forbidden_cones", "weights", "min_cone_angle", "max_cone_angle", "no_seams",
+    "hide_seams", "seam_weights", "tiles", "threads",
+)  # fmt: skip
 RARE_TITLE = "Less common options (details: docs/reference/command-line.md)"
 #: Titles of groups of options in the help.
 GROUPS = ("Quads", "Cones", "Metric", "Seams", "Atlas", "Input", "Output", RARE_TITLE)
