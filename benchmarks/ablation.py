@@ -1,8 +1,8 @@
 """Effect of each part of the cone search: `python benchmarks/ablation.py` prints a Markdown table.
 
-The models of `../shared/meshes` and 20 deformed ones, E = 0.1, 0.2 and 0.3; for each variant, the total number of cones and the CPU
-time of the search, without the factorization and the coarse model unless the variant concerns them. --largest
-excludes large models; --variants selects variants whose names contain one of the given words.
+The models of `../shared/meshes` and 20 deformed ones, E = 0.1, 0.2 and 0.3; for each variant, the total number of cones
+and the CPU time of the search, without the factorization and the coarse model unless the variant concerns them.
+--largest excludes large models; --variants selects variants whose names contain one of the given words.
 """
 
 from __future__ import annotations

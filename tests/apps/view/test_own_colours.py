@@ -107,5 +107,5 @@ class TestCommands:
         done = self.run("figure", ball, "--kind", "cones", "--color", "heat", "-o", tmp_path / "f.svg")
         assert "--color has no effect with --kind cones" in done.output
         done = self.run("figure", ball, "--color", "cold", "-o", tmp_path / "g.png")
-        assert "no property 'cold'" in str(done.exception)
+        assert "no vertex property 'cold'" in str(done.exception)
         assert not (tmp_path / "g.png").exists()

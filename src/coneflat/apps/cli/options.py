@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -153,7 +154,7 @@ def _flag(declaration: Declaration) -> Callable[[Command], Command]:
             more = {"metavar": "NAME|FILE"}
     title = declaration.group
     if name in RARE:
-        title, doc = RARE_TITLE, doc.split(". ")[0].rstrip(".") + "."
+        title, doc = RARE_TITLE, re.split("[.,:;] ", doc)[0].rstrip(".") + "."
     shown = shown_default(declaration)
     doc += f"  [default: {shown}]" if shown else ""
     names = (spelled, *SPELLINGS.get(name, ()), name)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-#: Rarely used options, which the help lists at the end, each with the first sentence of its description.
+#: Rarely used options, which the help lists at the end, with the beginning of their descriptions.
 RARE = (
     "max_cones", "required_cones", "forbidden_cones", "weights", "min_cone_angle", "max_cone_angle", "no_seams",
     "hide_seams", "seam_weights", "tiles", "threads",
