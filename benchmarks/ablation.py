@@ -1,8 +1,8 @@
-"""What each part of the cone search brings: `python benchmarks/ablation.py` prints a Markdown table.
+"""Effect of each part of the cone search: `python benchmarks/ablation.py` prints a Markdown table.
 
-The models of `../shared/meshes` and 20 deformed ones, E = 0.1, 0.2 and 0.3; per variant the cones in total and the CPU
-time of the search, the factorization and the coarse model aside where the variant does not concern them. --largest
-leaves models out, --variants takes those whose names contain one of the words given.
+The models of `../shared/meshes` and 20 deformed ones, E = 0.1, 0.2 and 0.3; for each variant, the total number of cones
+and the CPU time of the search, without the factorization and the coarse model unless the variant concerns them.
+--largest excludes large models; --variants selects variants whose names contain one of the given words.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ Patch = tuple[Any, str, Any]
 
 
 def variants() -> dict[str, list[Patch]]:
-    """Return what is changed in each variant."""
+    """Return the changes of each variant."""
     search, dense, exact = cone_search, dense_model, exact_model
     found: dict[str, list[Patch]] = {"as it is": []}
     for module, name, values in (

@@ -6,8 +6,8 @@ default cones and with more of them; boundary first flattening (BFF) as `conefla
 cones and one chart; xatlas and uvunwrap with their defaults, where they are installed. All results are measured by
 `coneflat.measure` on the UV points that the packages return; seam lengths are divided by the square root of the area.
 
-With `--matched`, ours have the area distortion of theirs, by `stretch` with the fewest cones that reach it, and by
-cones alone.
+With `--matched`, the results of coneflat have the area distortion of the others: by `stretch` with the fewest cones
+that reach it, and by cones alone.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from coneflat.errors import ConeflatError
 from coneflat.measure.distortion import Distortion
 from coneflat.mesh.connectivity import TriangleMesh
 
-# Area distortions allowed, one after the other, and halvings of the interval in which the stretch is sought.
+# Area distortions to try in this order, and the number of bisections of the interval of the stretch.
 ALLOWED = (0.2, 0.14, 0.1, 0.07, 0.05, 0.035, 0.025)
 ROUNDS = 4
 HEADINGS = "| package | flipped | with overlaps | QC distortion | area std | charts | seam length | covered | seconds |"
@@ -92,7 +92,7 @@ def row(name: str, mesh: TriangleMesh, method: str, found: Distortion, packed: f
 
 
 def flattened(mesh: TriangleMesh, more: float) -> Iterator[tuple[str, Flattening, float]]:
-    """Yield what each method makes of a mesh, and the seconds it takes."""
+    """Yield the result of each method on a mesh, and its seconds."""
     for method, options in (("coneflat", {}), (f"coneflat, distortion {more:g}", {"distortion": more})):
         start = time.perf_counter()
         ours = flatten(mesh.vertices, mesh.faces, charts="atlas", **options)
@@ -106,7 +106,7 @@ def flattened(mesh: TriangleMesh, more: float) -> Iterator[tuple[str, Flattening
 
 
 def matched(mesh: TriangleMesh) -> Iterator[tuple[str, Flattening, float]]:
-    """Yield what others make of a mesh, and ours at the same area distortion."""
+    """Yield the results of other packages on a mesh, and that of coneflat at the same area distortion."""
     default = flatten(mesh.vertices, mesh.faces, charts="atlas")
     for name in ("xatlas", "uvunwrap"):
         if name not in installed_peers():
@@ -125,7 +125,7 @@ def matched(mesh: TriangleMesh) -> Iterator[tuple[str, Flattening, float]]:
 
 
 def at_area_std(mesh: TriangleMesh, std: float) -> Flattening | None:
-    """Return a flattening whose areas vary by at most so much: the fewest cones, and the least stretch with them."""
+    """Return a flattening with bounded area distortion: the fewest cones, and the least stretch with them."""
     for allowed in ALLOWED:
         found = flatten(mesh.vertices, mesh.faces, distortion=allowed, stretch=1.0)
         if found.distortion.area_std > std:

@@ -1,4 +1,4 @@
-"""Meshes and clocks that the benchmarks share."""
+"""Meshes and time measurement shared by the benchmarks."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[1]
 MODELS = ROOT.parent / "shared" / "meshes"
 sys.path.insert(0, str(ROOT / "tests"))
 
-import chromium  # noqa: E402, F401 - for those that open a page
+import chromium  # noqa: E402, F401 - for benchmarks that open a page
 import shapes  # noqa: E402
 
 from coneflat import Flattening, check_mesh, flatten, read_mesh  # noqa: E402
@@ -22,7 +22,7 @@ from coneflat.mesh.connectivity import TriangleMesh  # noqa: E402
 
 
 def meshes(names: list[str], largest: int) -> Iterator[tuple[str, TriangleMesh]]:
-    """Yield a sphere and the models named, where they are, each split in four over and over up to a size."""
+    """Yield a sphere and the named models that exist, each subdivided (each triangle into four) up to a size."""
     sources = [("sphere", shapes.sphere(5))]
     for name in names:
         for path in sorted(MODELS.glob(f"{name}.*")):
@@ -35,7 +35,7 @@ def meshes(names: list[str], largest: int) -> Iterator[tuple[str, TriangleMesh]]
 
 
 def cases(names: list[str], largest: int) -> Iterator[tuple[str, int]]:
-    """Yield models and how often they are split."""
+    """Yield models and their numbers of subdivisions."""
     for name in ("sphere", *names):
         if name != "sphere" and not list(MODELS.glob(f"{name}.*")):
             continue
@@ -57,7 +57,7 @@ def model(name: str, rounds: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def with_cones_for(vertices: np.ndarray, faces: np.ndarray, std: float) -> Flattening:
-    """Return a flattening with so many cones that its areas vary by at most so much, if a tenth of it allowed does."""
+    """Return a flattening with enough cones to bound its area distortion, if a tenth of it as a limit suffices."""
     allowed = std
     while True:
         result = flatten(vertices, faces, distortion=allowed)
@@ -67,7 +67,7 @@ def with_cones_for(vertices: np.ndarray, faces: np.ndarray, std: float) -> Flatt
 
 
 def peak_memory() -> float:
-    """Return the largest memory of this process so far, MB; nan where it cannot be told."""
+    """Return the peak memory of this process so far in MB; nan if unknown."""
     if find_spec("resource") is None:
         return float("nan")
     import resource
@@ -77,7 +77,7 @@ def peak_memory() -> float:
 
 
 def best_time(run: Callable[[], object], runs: int) -> float:
-    """Return the least wall time of some runs, seconds."""
+    """Return the least wall time of several runs in seconds."""
     times = []
     for _ in range(runs):
         start = time.perf_counter()

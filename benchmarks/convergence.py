@@ -1,11 +1,11 @@
 """Three discrete conformal metrics of one smooth surface: `python benchmarks/convergence.py` prints a Markdown table.
 
 Circle patterns (CP), Ricci flow by circle packings (RF) and conformal factors (the exact method) discretise the
-same smooth problem, and know nothing of each other. On finer and finer meshes, with the same cones of the same
-curvature at the same vertices, their flat edge lengths, each at the same total area, must come to agree. Differences
-are those of the logs of lengths: the mean over the surface, and the largest farther than --away from all cones (next
-to a cone, where the smooth metric has its singularity, they stay). The surface is a bumpy sphere of radius about 1,
-whose new vertices lie on it, too. The order is the power of the edge length with which a difference falls.
+same smooth problem independently. On a sequence of finer meshes, with the same cones of the same curvature at the same
+vertices, their flat edge lengths, scaled to the same total area, must converge to each other. Differences are those of
+the log lengths: the mean over the surface, and the largest at a distance above --away from all cones (next to a cone,
+the singularity of the smooth metric, they do not converge). The surface is a bumpy sphere of radius about 1,
+whose new vertices lie on it, too. The order is the power of the edge length at which a difference decreases.
 
     python benchmarks/convergence.py --largest 400000 -o convergence.png
 """
@@ -40,11 +40,11 @@ CONES = np.array([0, 2, 3, 5, 7, 8, 10])
 CURVATURES = np.array([1.0, 0.75, 0.5, 0.75, 0.5, 1.0, -0.5]) * np.pi
 METHODS = ("CP", "RF", "exact")
 PAIRS = tuple(combinations(range(3), 2))
-COLORS = "#0072b2", "#d55e00", "#009e73"  # told apart without red or green
+COLORS = "#0072b2", "#d55e00", "#009e73"  # distinguishable by colour-blind people
 
 
 def flat_lengths(mesh: TriangleMesh) -> list[np.ndarray]:
-    """Return the log lengths (m, 3) of each method, at the area of the mesh."""
+    """Return the (m, 3) log lengths of each method, scaled to the area of the mesh."""
     lengths = edge_lengths(mesh.vertices, mesh.faces)
     solution = cones_with_curvature(
         cotangent_laplacian(mesh.faces, cotangents(lengths), len(mesh.vertices)),
@@ -85,7 +85,7 @@ def differences(rounds: int, bumps: float, away: float) -> tuple[int, float, np.
 
 
 def measured(largest: int, bumps: float, away: float) -> Iterator[tuple[int, float, np.ndarray]]:
-    """Yield what `differences` returns for finer and finer meshes."""
+    """Yield the result of `differences` for a sequence of finer meshes."""
     rounds = 2
     while 20 * 4**rounds <= largest:
         yield differences(rounds, bumps, away)
@@ -93,7 +93,7 @@ def measured(largest: int, bumps: float, away: float) -> Iterator[tuple[int, flo
 
 
 def plot(rows: list[tuple[int, float, np.ndarray]], path: Path) -> None:
-    """Draw the differences over the edge length."""
+    """Draw the differences against the edge length."""
     import matplotlib
 
     matplotlib.use("Agg")

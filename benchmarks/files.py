@@ -1,9 +1,9 @@
-"""What files cost: `python benchmarks/files.py` prints a Markdown table.
+"""Time and memory of reading and writing files: `python benchmarks/files.py` prints a Markdown table.
 
 Reading a mesh in each format, and writing its flattening, against the flattening itself in memory, in the same run.
-Each file is read or written by a process of its own, which loads everything with a small one before the clock starts;
-memory is the peak of that process, when writing with the result in it. The model is one of `../shared/meshes`, or
-a bumpy sphere where that is not there, split in four over and over up to --largest triangles. Wall time, the best of
+Each file is read or written by a separate process, which loads all code with a small file before the measurement;
+memory is the peak of that process, which includes the result when writing. The model is one of `../shared/meshes`, or
+a bumpy sphere if it is missing, subdivided (each triangle into four) up to --largest triangles. Wall time, the best of
 --runs.
 """
 
@@ -25,7 +25,7 @@ from common import best_time, cases, model, peak_memory, shapes
 from coneflat import flatten, read_mesh
 from coneflat.io import lines_of
 
-#: By name: the input to read and the ending of the output to write, where there are such.
+#: For each format: the input to read and the extension of the output to write, if supported.
 FORMATS = {
     "OBJ": ("mesh.obj", ".obj"),
     "PLY, binary": ("mesh.ply", ".ply"),
@@ -83,7 +83,7 @@ def child(*task: str) -> dict:
 
 
 def flattened(folder: str, name: str, rounds: str) -> dict:
-    """Write a model, and a small one, in all formats; flatten both, and keep the results."""
+    """Write a model and a small one in all formats, flatten both, and store the results."""
     found = {}
     for size, mesh in (("small", shapes.sphere(5)), ("large", model(name, int(rounds)))):
         place = Path(folder) / size
@@ -127,7 +127,7 @@ TASKS: dict[str, Callable[..., dict]] = {"flatten": flattened, "read": read, "wr
 
 
 def write_inputs(folder: Path, vertices: np.ndarray, faces: np.ndarray) -> None:
-    """Write a mesh in all formats that are read: doubles in text, but for STL, and single precision in binary."""
+    """Write a mesh in all input formats: double precision in text except STL, single precision in binary."""
     import trimesh
 
     points = b"".join(lines_of("", vertices, b"\n"))

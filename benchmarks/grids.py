@@ -1,10 +1,13 @@
-"""What becomes of random surfaces asked for integer grids and quads: `python benchmarks/grids.py --cases 200 --jobs 2`.
+"""Trial of integer grids and quads on random surfaces: `python benchmarks/grids.py --cases 200 --jobs 2`.
 
-Surfaces of all topologies, deformed, renumbered and scaled by a million either way, some of them as bad as those of the
-hostile trial; from three squares to thousands; with all stretches, boundaries and cone bounds.
-Each case must end in a grid whose equations hold exactly and a manifold mesh of quads on the surface, measured anew by
-`trials/grids.py`, or in an error of the package's own, in one line. All else, a case that takes too long among it, is a
-breach; the exit code is 1 if there is any. `--case 17` runs one alone in this process and tells all about it.
+Surfaces of all topologies, deformed, renumbered and scaled by factors of a million up or down, some of them as
+irregular as those of the hostile trial; from three squares to thousands; with all stretches, boundaries and cone
+bounds.
+
+Each case must end in a grid whose equations hold exactly and a manifold mesh of quads on the surface, checked
+independently by `trials/grids.py`, or in an error of the package, in one line. Everything else, also a case that
+takes too long, is a breach; the exit code is 1 if there is any. `--case 17` runs one case in this process and prints
+all details.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ from hostile import run_alone, summary, trial_parser
 from trials.outcome import Outcome
 from trials.workers import run_all
 
-# Seconds of a process's own work that a case may take.
+# CPU seconds that a case may take.
 WORK = 120.0
 
 

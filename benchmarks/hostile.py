@@ -1,9 +1,9 @@
-"""What becomes of hostile input: `python benchmarks/hostile.py --cases 10000 --jobs 2` tries 10,000 cases from seeds.
+"""Trial with hostile input: `python benchmarks/hostile.py --cases 10000 --jobs 2` runs 10,000 cases from seeds.
 
-A case is a kind and a seed: `--case mesh:17` runs one alone in this process and tells all about it.
+A case is a kind and a seed: `--case mesh:17` runs one case in this process and prints all details.
 
-- mesh: small meshes of all kinds, many of them bad, under options of all kinds;
-- file: mesh files of all formats, whole or damaged, read, flattened, written, and read back by other software;
+- mesh: small meshes of all kinds, many of them invalid, with random options;
+- file: mesh files of all formats, intact or damaged, read, flattened, written, and read back by other software;
 - argument: public functions with odd arguments;
 - command: odd command lines.
 
@@ -43,7 +43,7 @@ STATES = ("ok", "noted", "refused", "breach")
 
 
 def summary(outcomes: list[Outcome]) -> str:
-    """Return counts by kind, times and memory, and what was broken, most frequent first."""
+    """Return counts by kind, times and memory, and the breaches, most frequent first."""
     lines = [
         f"{'kind':10}{'cases':>8}"
         + "".join(f"{state:>9}" for state in STATES)
@@ -94,7 +94,7 @@ def _noted(outcomes: list[Outcome]) -> Groups:
 
 
 def _refusals(outcomes: list[Outcome]) -> Groups:
-    """Return refusals by their message with numbers left out."""
+    """Return the counts of errors by their message without numbers."""
     groups: Groups = defaultdict(list)
     for one in outcomes:
         if one.status == "refused":
@@ -103,7 +103,7 @@ def _refusals(outcomes: list[Outcome]) -> Groups:
 
 
 def run_alone(case: str) -> int:
-    """Run one case here, tell what came of it, and return the exit code."""
+    """Run one case in this process, print its outcome, and return the exit code."""
     kind, _, seed = case.partition(":")
     os.environ["MPLBACKEND"] = "Agg"
     with tempfile.TemporaryDirectory() as home:
@@ -123,7 +123,7 @@ def run_alone(case: str) -> int:
 
 
 def trial_parser(doc: str, cases: int, case: str) -> argparse.ArgumentParser:
-    """Return the options of a trial: doc says what it tries, case what one is called."""
+    """Return the options of a trial; doc: its description, case: the name of a case."""
     parser = argparse.ArgumentParser(description=doc.splitlines()[0])
     parser.add_argument("--cases", type=int, default=cases)
     parser.add_argument("--jobs", type=int, default=2)

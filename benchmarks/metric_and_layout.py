@@ -1,4 +1,4 @@
-"""What exactness costs: `python benchmarks/metric_and_layout.py` prints a Markdown table.
+"""Time of the exact metric and layout: `python benchmarks/metric_and_layout.py` prints a Markdown table.
 
 Metric and layout, given cones, by the exact metric and its unfolding against the paper's linear metric and its
 least squares layout, in the same process. Models of `../shared/meshes` where they are, split in four over and over
@@ -50,7 +50,7 @@ def main() -> None:
             lay_out(linear_flat_metric(mesh, lengths, solution), cut)  # noqa: B023
 
         if name == "sphere":
-            exact()  # compiles, or loads what was compiled
+            exact()  # This compiles or loads the kernels.
         one, two = best_time(exact, arguments.runs), best_time(linear, arguments.runs)
         statistics = found[-1].statistics
         flips = statistics.euclidean_flips + statistics.ptolemy_flips

@@ -1,4 +1,4 @@
-"""Charts packed into a texture, against others: `python benchmarks/packing.py` prints a Markdown table.
+"""Packing of charts compared with other packages: `python benchmarks/packing.py` prints a Markdown table.
 
 The charts are those of `flatten(charts="atlas")` of the models of `../shared/meshes`, cut along the borders between
 random faces' neighbourhoods into so many pieces, and scaled to the areas that they have in space. All packers leave two
@@ -66,7 +66,7 @@ def main() -> None:
 
 
 def all_packers(is_upright: bool) -> dict[str, Packer]:
-    """Return the packers; those alone that do not turn charts if these are to stay upright."""
+    """Return the packers; only those that do not rotate charts if these must remain upright."""
     if is_upright:
         packers = {"coneflat, not turned": ours("none")}
         others = {"xatlas, not turned": xatlas(rotate_charts=False, to_axis=False)}
@@ -89,7 +89,7 @@ def row(name: str, charts: str, values: list[float] | np.ndarray) -> str:
 
 
 def cut(result: coneflat.Flattening, number: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the charts of a result, cut into so many at least, of their areas in space; and the chart of each face."""
+    """Return at least a given number of charts, scaled to their areas in space, and the chart of each face."""
     points, corner_uv = result.uv_faces, result.corner_uv.copy()
     _, chart = label_components(len(result.uv), points[:, :2].ravel(), points[:, 1:].ravel())
     chart = chart[points[:, 0]]
@@ -104,7 +104,7 @@ def cut(result: coneflat.Flattening, number: int) -> tuple[np.ndarray, np.ndarra
 
 
 def neighbourhoods(corner_uv: np.ndarray, points: np.ndarray, chart: np.ndarray, number: int) -> np.ndarray:
-    """Return for each face the nearest, by paths from face to face within its chart, of random faces."""
+    """Return for each face the nearest of random faces, by paths across edges within its chart."""
     sides = np.sort(np.concatenate([points[:, [1, 2]], points[:, [2, 0]], points[:, [0, 1]]]), axis=1)
     _, edge = np.unique(sides, axis=0, return_inverse=True)
     order = np.argsort(edge.ravel(), kind="stable")
@@ -131,7 +131,7 @@ def ours(rotate: str) -> Packer:
 
 
 def xatlas(rotate_charts: bool, to_axis: bool) -> Packer:
-    """Every chart as a mesh with given UVs; twice, since the texture comes out larger than asked for.
+    """Every chart as a mesh with given UVs; twice, because the texture becomes larger than requested.
 
     Args:
         rotate_charts: whether u and v may be swapped.

@@ -1,4 +1,4 @@
-"""What whole processes cost: `python benchmarks/processes.py` prints Markdown tables.
+"""Time and memory of whole processes: `python benchmarks/processes.py` prints Markdown tables.
 
 First a single `coneflat flatten` of a model of 13,000 triangles from the command to its end, beside the work in it that
 is left once everything is loaded. Then `coneflat batch` of small meshes with one process and with two, beside the same
@@ -35,7 +35,7 @@ for job in jobs:
 print(json.dumps([time.perf_counter() - start, time.process_time() - used]))
 """
 
-# The workers' own processes are those that compute; they end with the workers, unwaited for.
+# The child processes of the workers compute; they end with the workers, which do not wait for them.
 DASK = """
 import json, sys, time
 from pathlib import Path
@@ -76,7 +76,7 @@ def main() -> None:
     parser.add_argument("--components", type=int, default=1000)
     parser.add_argument("--only", choices=("command", "batch", "components"), help="one of the tables")
     arguments = parser.parse_args()
-    # As installed: else what Python makes of our sources is made anew in each process, a quarter of a second.
+    # As in an installation: otherwise each process compiles the bytecode again, which takes a quarter of a second.
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     chosen = {arguments.only} if arguments.only else {"command", "batch", "components"}
     with tempfile.TemporaryDirectory() as folder:
@@ -90,18 +90,18 @@ def main() -> None:
 
 
 def print_command(folder: Path, runs: int) -> None:
-    """Print what a command costs from its start to its end."""
+    """Print the time and memory of a command."""
     print("| command | wall, s | processor, s | peak, MB |\n| --- | --- | --- | --- |")
     model = next(iter(MODELS.glob("fandisk.*")), None) or write(folder / "sphere.obj", shapes.sphere(5))
     for words in (["--help"], ["flatten", str(model), "-o", str(folder / "flat.obj")]):
-        costs([*COMMAND, *words])  # the first makes bytecode
+        costs([*COMMAND, *words])  # The first run compiles the bytecode.
         found = zip(*(costs([*COMMAND, *words]) for _ in range(runs)), strict=True)
         wall, used, memory = (statistics.median(each) for each in found)
         print(f"| {words[0]} | {wall:.2f} | {used:.2f} | {memory:.0f} |")
 
 
 def print_batches(meshes: list[Path], folder: Path) -> None:
-    """Print what batches of meshes cost."""
+    """Print the time and memory of batches of meshes."""
     jobs = [job(mesh, folder / "single.obj") for mesh in meshes]
     alone = subprocess.run(
         [sys.executable, "-c", SINGLE], input="\n".join(jobs), stdout=subprocess.PIPE, text=True
@@ -132,7 +132,7 @@ def print_batches(meshes: list[Path], folder: Path) -> None:
 
 
 def print_components(count: int, file: Path) -> None:
-    """Print what a component takes in meshes of many small ones."""
+    """Print the time per component in meshes of many small components."""
     print("\n| components | triangles of each | processor, ms each |\n| --- | --- | --- |")
     for kind in (*PIECES, "copies of a sphere"):
         pieces = [piece(kind, seed) for seed in range(count)]
@@ -151,7 +151,7 @@ PIECES = "sheets", "spheres", "tori", "tetrahedra"
 
 
 def piece(kind: str, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return a sheet with a hill, a bumpy sphere or torus of 80 triangles, or a tetrahedron; no two of them alike.
+    """Return a sheet with a hill, a bumpy sphere or torus of 80 triangles, or a tetrahedron, all different.
 
     But for copies, which are turned, and mirrored or not.
     """
@@ -173,8 +173,8 @@ def piece(kind: str, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def costs(command: list[str]) -> tuple[float, float, float]:
-    """Return the wall time of a command, the time of the processor, and the peak memory of its largest process."""
-    # A process between, as only those that have ended count, and all of them together.
+    """Return the wall time of a command, its CPU time, and the peak memory of its largest process."""
+    # An intermediate process is needed, because the system counts only processes that have ended, all together.
     script = (
         "import json, resource, subprocess, sys, time; start = time.perf_counter(); "
         "subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL); taken = time.perf_counter() - start; "
@@ -212,7 +212,7 @@ def write_script(path: Path, text: str) -> Path:
 
 
 def job(mesh: Path, output: Path) -> str:
-    """Return what a process of a batch is told of a mesh."""
+    """Return the job of a batch process for a mesh."""
     return json.dumps(
         {"mesh": os.fspath(mesh), "output": os.fspath(output), "options": {}, "weld": None, "required": []}
     )

@@ -1,4 +1,4 @@
-"""Quad meshes beside those of others: `python benchmarks/quads.py` prints a Markdown table.
+"""Quad meshes compared with those of other packages: `python benchmarks/quads.py` prints a Markdown table.
 
 Every model of `../shared/meshes` that is a manifold, by coneflat, and by what can be installed with pip: QuadriFlow
 (`pyquadriflow`) and Instant Meshes (`pynanoinstantmeshes`), with their defaults, at several counts of quads. With
@@ -33,7 +33,7 @@ from coneflat.mesh.connectivity import TriangleMesh
 
 TOOL = MODELS.parent / "tools" / "quads.py"
 STRETCHES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0)
-#: Edge lengths may vary so many times as much as those of Instant Meshes.
+#: Largest ratio of the variation of edge lengths to that of Instant Meshes.
 EVEN = 1.2
 
 Polygons = tuple[np.ndarray, list[list[int]]]
@@ -77,7 +77,7 @@ def models(names: list[str]) -> Iterator[tuple[str, TriangleMesh]]:
 
 
 def makers(names: list[str]) -> Iterator[tuple[str, Maker]]:
-    """Yield the methods named whose packages are installed."""
+    """Yield the named methods whose packages are installed."""
     for name in names:
         module, make = METHODS[name]
         if find_spec(module) is not None:
@@ -85,7 +85,7 @@ def makers(names: list[str]) -> Iterator[tuple[str, Maker]]:
 
 
 def as_even(mesh: TriangleMesh, count: int, cv: float, tool: Path) -> tuple[float, str]:
-    """Return the least of some stretches that makes edges even enough, and what it makes; or the last."""
+    """Return the least stretch for which edge lengths vary little enough, or the last one, and its result."""
     text = ""
     for stretch in STRETCHES:
         measures, text = trial(mesh, count, partial(by_coneflat, stretch=stretch), tool)
@@ -95,7 +95,7 @@ def as_even(mesh: TriangleMesh, count: int, cv: float, tool: Path) -> tuple[floa
 
 
 def trial(mesh: TriangleMesh, count: int, make: Maker, tool: Path) -> tuple[dict[str, Any], str]:
-    """Return what a method makes of a mesh, by measure, and as the end of a row; what fails says so."""
+    """Return the measures of a method on a mesh, and the end of its row; a failure is reported there."""
     with tempfile.TemporaryDirectory() as folder, ProcessPoolExecutor(1) as pool:
         path = Path(folder) / "quads.obj"
         try:
@@ -105,7 +105,7 @@ def trial(mesh: TriangleMesh, count: int, make: Maker, tool: Path) -> tuple[dict
             found = json.loads(subprocess.check_output([sys.executable, tool, path]))
         except BrokenProcessPool:
             return {}, "crashed | " + "| " * 7
-        except Exception as error:  # whatever others raise
+        except Exception as error:  # Other packages raise any type.
             return {}, f"{type(error).__name__}: {str(error)[:120]} | " + "| " * 7
     wanted = mesh.euler_characteristic
     euler = "right" if found["euler"] == wanted else f"{found['euler']}, not {wanted}"
@@ -118,18 +118,18 @@ def trial(mesh: TriangleMesh, count: int, make: Maker, tool: Path) -> tuple[dict
 
 
 def be_silent() -> None:
-    """Have what others print, from below Python, go nowhere."""
+    """Discard what other packages print from compiled code."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 
 def warm_up(make: Maker) -> None:
-    """Have what is needed loaded."""
+    """Load the packages of a method."""
     vertices, faces = shapes.sphere(3)
     make(vertices, faces, 200)
 
 
 def write(path: Path, mesh: TriangleMesh, count: int, make: Maker) -> float:
-    """Write what a method makes of a mesh as OBJ, and return how many seconds it took."""
+    """Write the result of a method on a mesh as OBJ, and return its seconds."""
     start = time.perf_counter()
     vertices, polygons = make(mesh.vertices, mesh.faces, count)
     seconds = time.perf_counter() - start
@@ -152,7 +152,7 @@ def by_quadriflow(vertices: np.ndarray, faces: np.ndarray, count: int) -> Polygo
 
 
 def by_instant_meshes(vertices: np.ndarray, faces: np.ndarray, count: int) -> Polygons:
-    """It counts vertices before it splits all faces into quads, in four as a rule."""
+    """Convert the number: the package counts vertices before it splits all faces into quads, usually four."""
     import pynanoinstantmeshes
 
     points, found = pynanoinstantmeshes.remesh(

@@ -1,4 +1,4 @@
-"""Layouts before and after they are relaxed: `python benchmarks/relaxation.py` prints Markdown tables.
+"""Layouts before and after relaxation: `python benchmarks/relaxation.py` prints Markdown tables.
 
 The models of `../shared/meshes`, as they are and decimated to so many triangles (by fast_simplification, where it is
 installed; a decimated mesh that is not manifold is left out), each flattened three times: `relax="off"`, the default
@@ -92,7 +92,7 @@ def flattened(vertices: np.ndarray, faces: np.ndarray, **options: Any) -> tuple[
 
 
 def meshes(names: list[str], sizes: list[int]) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
-    """Yield the models and what becomes of them when they are decimated."""
+    """Yield the models and their decimated versions."""
     for path in sorted(MODELS.glob("*.*")):
         if path.suffix == ".md" or path.stem == "nonmanifold" or (names and path.stem not in names):
             continue

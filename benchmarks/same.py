@@ -1,4 +1,4 @@
-"""What flattening gives on many meshes with many options, kept as hashes and numbers: two versions can be compared.
+"""Comparison of two versions of the package by hashes and measures of results for many meshes and options.
 
     python benchmarks/same.py keep before.json
     python benchmarks/same.py keep after.json
@@ -51,7 +51,7 @@ WAYS: dict[str, dict[str, object]] = {
 
 
 def deformed(name: str, how: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return a model, deformed in a way that depends on the two names alone."""
+    """Return a model with a deformation that depends only on the two names."""
     import coneflat
 
     mesh = coneflat.read_mesh(MODELS / name)
@@ -83,7 +83,7 @@ def deformed(name: str, how: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def cases() -> list[tuple[str, str, str]]:
-    """Return model, deformation and way of each case."""
+    """Return the model, deformation and options of each case."""
     meshes = [(path.name, "") for path in sorted(MODELS.glob("*.*")) if path.suffix != ".md"]
     meshes += [(base, how) for base in BASES for how in DEFORMATIONS]
     others = [way for way in WAYS if way not in ("one", "atlas")]
@@ -105,7 +105,7 @@ def digest(*arrays: object) -> str:
 
 
 def run(case: tuple[str, str, str]) -> tuple[str, dict[str, object]]:
-    """Return what becomes of a case."""
+    """Return the hashes and measures of a case."""
     import coneflat
 
     name, how, way = case
@@ -146,7 +146,7 @@ def run(case: tuple[str, str, str]) -> tuple[str, dict[str, object]]:
 
 
 def compare(before: dict[str, dict], after: dict[str, dict]) -> int:
-    """Print what differs, and return how many cases do."""
+    """Print the differences, and return the number of cases that differ."""
     differing = 0
     for key in before:
         one, two = dict(before[key]), dict(after.get(key, {}))

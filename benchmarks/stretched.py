@@ -1,4 +1,4 @@
-"""What stretching does: `python benchmarks/stretched.py` prints a Markdown table.
+"""Effect of anisotropic scaling of the model: `python benchmarks/stretched.py` prints a Markdown table.
 
 Models of `../shared/meshes`, where they are, stretched along each axis by each factor and flattened as by default:
 flipped triangles or without area in the plane, mean and worst QC, seconds relative to those of the model as it is,
@@ -31,7 +31,7 @@ def main() -> None:
     print(f"| {' | '.join(columns.split('|'))} |\n{'| --- ' * (columns.count('|') + 1)}|")
     for name in arguments.models.split(","):
         vertices, faces = model(name, 0)
-        flatten(vertices, faces)  # compiles, or loads what was compiled
+        flatten(vertices, faces)  # This compiles or loads the kernels.
         result, unit = timed(vertices, faces)
         print(line(name, 1.0, [(result, unit)], unit, len(faces)), flush=True)
         for factor in (float(word) for word in arguments.factors.split(",")):
@@ -50,7 +50,7 @@ def timed(vertices: Any, faces: Any) -> tuple[Flattening, float]:
 
 
 def line(name: str, factor: float, found: list[tuple[Flattening, float]], unit: float, count: int) -> str:
-    """Return the row of a model stretched by a factor: the worst of several results, with their seconds."""
+    """Return the row of a model stretched by a factor: the worst values of several results and their seconds."""
     results = [result for result, _ in found]
     measures = [result.distortion for result in results]
     cells = [

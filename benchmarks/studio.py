@@ -1,9 +1,9 @@
-"""How long the studio takes from a click to the picture: `python benchmarks/studio.py [MODEL:SPLITS[:MOVES]...]`.
+"""Time of the studio from a click to the layout: `python benchmarks/studio.py [MODEL:SPLITS[:MOVES]...]`.
 
 A split makes four triangles of each. The page is in a headless Chromium. After a search each cone is moved by hand to a
-neighbour and back. The seconds, medians, are from the request until the first view, where there is one, and until the
-layout is drawn; until the metric is there, and of the processor, in the process that flattens, whose memory is told,
-too: after the first layout, and after all moves.
+neighbour and back. The seconds, medians, are from the request until the preview, if there is one, and until the
+layout is drawn; until the metric is computed; and CPU seconds of the worker process. Its memory is measured after the
+first layout and after all moves.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from coneflat.apps.studio.session import Session
 
 SIZE = {"width": 1366, "height": 768}
 MOVES = 8
-FLATTENED = ("check", "cones", "metric")  # stages until the metric is there
+FLATTENED = ("check", "cones", "metric")  # Stages until the metric is computed.
 PATIENCE = 300_000  # milliseconds
 SETTLED = "!studio.isBusy() && studio.layout === studio.news.layout && studio.layout > {} && !studio.asked"
 MOVE = """
@@ -39,7 +39,7 @@ MOVE = """
 
 @dataclass
 class Seconds:
-    """Of moves, one after the other: until the first view, until all is drawn, until the metric, of the processor."""
+    """Seconds of moves: until the preview, until the layout is drawn, until the metric, and CPU seconds."""
 
     sight: list[float] = field(default_factory=list)
     took: list[float] = field(default_factory=list)
@@ -48,7 +48,7 @@ class Seconds:
 
 
 def moves(page: object, session: Session, count: int) -> Seconds:
-    """Return how long moves took."""
+    """Return the times of moves."""
     seconds = Seconds()
     for k in range(count):
         started = processor(session.worker_process)
@@ -63,7 +63,7 @@ def moves(page: object, session: Session, count: int) -> Seconds:
 
 
 def processor(process: int | None) -> float:
-    """Return the seconds of the processor that a process has had, where the system tells."""
+    """Return the CPU seconds of a process, if known."""
     path = Path(f"/proc/{process}/stat")
     if not path.exists():
         return float("nan")
@@ -72,7 +72,7 @@ def processor(process: int | None) -> float:
 
 
 def memory(process: int | None) -> float:
-    """Return the megabytes that a process has, where the system tells."""
+    """Return the memory of a process in MB, if known."""
     status = Path(f"/proc/{process}/status")
     lines = status.read_text().splitlines() if status.exists() else []
     return next((int(line.split()[1]) / 1024 for line in lines if line.startswith("VmRSS")), float("nan"))
@@ -118,7 +118,7 @@ def main(words: list[str]) -> None:
         "triangles",
         "moves",
         "metric, s",
-        "first view, s",
+        "preview, s",
         "picture, s",
         "longest, s",
         "processor, s",

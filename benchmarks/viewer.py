@@ -1,8 +1,8 @@
-"""What the viewer's page weighs and how fast it is: `python benchmarks/viewer.py [MODEL:SPLITS...]`.
+"""Size and speed of the page of the viewer: `python benchmarks/viewer.py [MODEL:SPLITS...]`.
 
 A split makes four triangles of each. The page is opened in a headless Chromium: the seconds are from the request of the
-file until the numbers are unpacked and both views drawn once, and between frames while the model turns. Without a
-graphics card the processor draws, which says least about the last.
+file until the arrays are unpacked and both views are drawn once, and between frames while the model rotates. Without a
+graphics card the CPU draws, so the time between frames is not representative.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from common import chromium, model
 import coneflat
 
 SIZE = {"width": 1366, "height": 768}
-# Turns the model by a little, frame after frame, and returns the milliseconds that each took.
+# Rotates the model by a small angle in each frame, and returns the milliseconds of each frame.
 TURN = """
 new Promise((done) => {
   const times = [];
@@ -41,7 +41,7 @@ def write_page(result: coneflat.Flattening, path: Path) -> float:
 
 
 def load(browser: object, path: Path) -> tuple[float, float]:
-    """Return the seconds until a page is drawn, and the milliseconds of a frame while it turns."""
+    """Return the seconds until a page is drawn, and the milliseconds per frame while the model rotates."""
     page = browser.new_page(viewport=SIZE)  # type: ignore[attr-defined]
     page.goto(path.as_uri())
     page.wait_for_selector("html[data-ready]", timeout=300_000)

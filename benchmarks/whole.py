@@ -1,4 +1,4 @@
-"""What a whole flattening costs: `python benchmarks/whole.py` prints Markdown tables.
+"""Time and memory of a whole flattening: `python benchmarks/whole.py` prints Markdown tables.
 
 Flattening to one chart in memory (check, cones, exact metric, cut, layout, measures), by stage, against one bare
 analysis and factorization of the same mesh's Laplacian by the same solver, and against what else can be installed with
@@ -26,7 +26,7 @@ from coneflat.geometry import cotangent_laplacian, cotangents, edge_lengths
 from coneflat.linalg import factorize
 
 STAGES = ("check", "cones", "metric", "cut", "layout", "measure")
-FITTED_FROM = 90_000  # triangles, from where on the growth is that of large meshes
+FITTED_FROM = 90_000  # Triangles from which on the growth of large meshes is fitted.
 
 
 def main() -> None:
@@ -57,10 +57,10 @@ def main() -> None:
 def measured(name: str, rounds: int, runs: int, largest_of_peers: int) -> dict:
     """Return the row of a mesh."""
     vertices, faces = model(name, rounds)
-    flatten(*shapes.sphere(2))  # compiles, or loads what was compiled
+    flatten(*shapes.sphere(2))  # This compiles or loads the kernels.
     lengths = edge_lengths(vertices, faces)
     laplacian = csc_matrix(cotangent_laplacian(faces, cotangents(lengths), len(vertices))[1:][:, 1:])
-    solver = type(factorize(laplacian)).__name__.removesuffix("Factor").lower()  # loads
+    solver = type(factorize(laplacian)).__name__.removesuffix("Factor").lower()  # This loads the solver.
     bare = best_time(lambda: factorize(laplacian), runs)
     found: list[Flattening] = []
     times = []
@@ -83,7 +83,7 @@ def measured(name: str, rounds: int, runs: int, largest_of_peers: int) -> dict:
 
 
 def peers(best: Flattening) -> dict[str, float]:
-    """Return the seconds that others take for the same mesh, of those that are installed."""
+    """Return the seconds of the installed other packages for the same mesh."""
     return {name: best_time(partial(PEERS[name].run, best), 1) for name in installed_peers()}
 
 
@@ -96,7 +96,7 @@ def line(row: dict) -> str:
 
 
 def growth(rows: list[dict]) -> str:
-    """Return the exponents of growth of models with two sizes or more that are large."""
+    """Return the exponents of growth of models with at least two large sizes."""
     found = []
     for name in dict.fromkeys(row["model"] for row in rows):
         large = [row for row in rows if row["model"] == name and row["triangles"] >= FITTED_FROM]

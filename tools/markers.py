@@ -1,4 +1,4 @@
-"""What stands between markers in the documentation: comments that neither a site nor a forge shows.
+"""Text between markers in the documentation; markers are comments that are not displayed.
 
 A block stands between `<!-- name -->` and `<!-- /name -->`; only the first word of a name is repeated at its end, as in
 `<!-- table gallery -->` and `<!-- /table -->`. A number in a sentence or a cell stands between `<!-- n what -->` and
@@ -23,7 +23,7 @@ def _block(name: str) -> re.Pattern[str]:
 
 
 def blocks(text: str, word: str) -> Iterator[tuple[str, str]]:
-    """Yield the names of a page's blocks that begin with a word, and what stands in them."""
+    """Yield the name and the content of each block of a page whose name begins with a word."""
     for match in re.finditer(rf"<!-- ({word}(?: [^>]+?)?) -->\n(.*?)<!-- /{word} -->", text, re.DOTALL):
         yield match[1], match[2].strip("\n")
 

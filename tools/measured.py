@@ -1,7 +1,7 @@
 """Measures of models, for the numbers and pictures of the documentation.
 
-A number in a sentence names itself: `<!-- n bunny charts=one qc_mean .3f -->` is a model, options of
-`coneflat.flatten` if there are any, or `by=` another method, a key of the report, and how it is written.
+The marker of a number contains its definition: `<!-- n bunny charts=one qc_mean .3f -->` is a model, options of
+`coneflat.flatten` if any, or `by=` another method, a key of the report, and a number format.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ Report = dict[str, Any]
 
 
 class Measured:
-    """Reports of models, each made once."""
+    """Reports of models, which are cached."""
 
     def __init__(self, models: Path) -> None:
-        """Look for models in a folder; the sample and a bumpy sphere are there in any case."""
+        """Find the models in a folder; the sample and a bumpy sphere always exist."""
         self._folder = models
         self._reports: dict[str, Report | None] = {}
         self._defaults: dict[str, coneflat.Flattening] = {}
@@ -35,7 +35,7 @@ class Measured:
         self._missing: set[str] = set()
 
     def path(self, model: str) -> Path | None:
-        """Return the file of a model, or None, which is said once."""
+        """Return the path of a model; None, with one message, if it is missing."""
         if model == "sample":
             return coneflat.sample_path()
         found = sorted(self._folder.glob(f"{model}.*"))
@@ -45,7 +45,7 @@ class Measured:
         return found[0] if found else None
 
     def has(self, *models: str) -> bool:
-        """Whether all of some models are there."""
+        """Return whether all given models exist."""
         return None not in [self.path(model) for model in models]
 
     def flattening(self, model: str) -> coneflat.Flattening:
@@ -56,7 +56,7 @@ class Measured:
         return self._defaults[model]
 
     def report(self, model: str, **options: Any) -> Report | None:
-        """Return the report of a flattening; None if the model is not there."""
+        """Return the report of a flattening; None if the model is missing."""
         key = f"{model} {sorted(options.items(), key=str)}"
         if key not in self._reports:
             if model == "sphere":
@@ -76,7 +76,7 @@ class Measured:
         return self._reports[key]
 
     def comparison(self, model: str, methods: tuple[str, ...], **options: Any) -> Comparison:
-        """Return what several methods make of a model with the same cones and cut."""
+        """Return the comparison of several methods on a model with the same cones and cut."""
         key = (model, methods, str(options))
         if key not in self._comparisons:
             print(f"  {model} by {len(methods)} methods", flush=True)

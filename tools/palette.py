@@ -1,4 +1,4 @@
-"""Small PNG files: a palette instead of full colours."""
+"""Small PNG files with a palette."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
-MOST = 250_000  # bytes of an image in the documentation
+MOST = 250_000  # Largest size of an image of the documentation in bytes.
 COLORS = (128, 192, 255)
 #: Of 255: fewer colours are taken if by the root mean square they are off by no more than this beyond the most colours.
 UNSEEN = 1.2
@@ -53,7 +53,7 @@ def _with_palette(full: Image.Image, colors: int, dither: bool) -> Image.Image:
     few = full.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG if dither else Image.Dither.NONE)
     chosen = palette.getpalette() or []
     numbers = np.asarray(few).copy()
-    numbers[(np.asarray(full) == 255).all(axis=2)] = colors  # paper stays white
+    numbers[(np.asarray(full) == 255).all(axis=2)] = colors  # The background remains white.
     few = Image.fromarray(numbers)
     few.putpalette([*chosen[: 3 * colors], 255, 255, 255])
     return few

@@ -48,7 +48,7 @@ from chromium import browser_path
 
 DPI = 170.0
 GALLERY_DPI = 110.0
-SIDE = 2.6  # inches of a panel of an atlas
+SIDE = 2.6  # Inches of a panel of an atlas.
 
 #: How to look at the models that all kinds of figures are shown of.
 LOOKS: dict[str, dict[str, Any]] = {
@@ -57,7 +57,7 @@ LOOKS: dict[str, dict[str, Any]] = {
     "horse": {"up": "z", "eyes": ["right-back", "left-front"]},
 }
 KINDS = ("layout", "checker", "quality", "cones", "curvature")
-#: The kinds that show one view, for two would be small.
+#: The kinds with one view, because two would be small.
 SINGLE = ("quality", "curvature")
 #: How to look at those of the gallery: what is up, and two eyes.
 SIGHTS = dict.fromkeys(GALLERY, ("y", "front-right", "back-left")) | {
@@ -66,7 +66,7 @@ SIGHTS = dict.fromkeys(GALLERY, ("y", "front-right", "back-left")) | {
     "fandisk": ("x", "right-front", "left-back"),
     "horse": ("z", "right-back", "left-front"),
 }
-#: Pictures that a browser takes, and of which models.
+#: Pictures taken in a browser, and their models.
 SCREENSHOTS = {
     "viewer": "bunny",
     "viewer-quads": "spot",
@@ -357,7 +357,7 @@ def dial_figure(measured: Measured) -> Any:
     return compose([Row(panels), Row(layouts)], dpi=DPI)
 
 
-#: Name of each picture, the models that it needs, and what draws it.
+#: Name of each picture, the models that it needs, and the function that draws it.
 PICTURES: dict[str, tuple[tuple[str, ...], Callable[[Measured], Any]]] = {
     "sample": ((), lambda measured: demo_figure(measured.flattening("sample"))),
     "atlas-shapes": ((), shapes_figure),

@@ -21,9 +21,9 @@ from catmull_clark import catmull_clark
 
 DPI = 110.0
 TALLEST = 3.0  # inches
-#: Models with a seamless checkerboard, and where they are seen from.
+#: Models with a seamless checkerboard, and their view directions.
 BOARDS = {"bunny": "front-right", "spot": "left-back", "hand": "front"}
-#: Those that are subdivided: how many quads, and where they are seen from.
+#: Models to subdivide: number of quads, and view directions.
 SUBDIVIDED = {"rocker-arm": (400, "right-top"), "spot": (400, "left-back")}
 
 
@@ -44,7 +44,7 @@ def draw_board(grid: coneflat.IntegerGrid, axes: Any, *, eye: str, dpi: float = 
 
 
 def boards_figure(measured: Measured) -> Any:
-    """Return a figure of models with a checkerboard in which no seam is seen."""
+    """Return a figure of models with a checkerboard without visible seams."""
     panels = []
     for model, eye in BOARDS.items():
         grid = coneflat.integer_grid(measured.path(model), quads=3000)
@@ -53,13 +53,13 @@ def boards_figure(measured: Measured) -> Any:
 
 
 def quads_figure(measured: Measured) -> Any:
-    """Return a figure of a model made into quads, from two sides."""
+    """Return a figure of a quad mesh, from two sides."""
     quads = coneflat.quads(measured.path("bunny"), quads=4000)
     return coneflat.make_figure(quads, "quads", eyes=["front-right", "back-left"], dpi=DPI)
 
 
 def subdivided_figure(measured: Measured) -> Any:
-    """Return a figure of coarse quads, and of what a step of Catmull-Clark makes of them."""
+    """Return a figure of coarse quads before and after a step of Catmull-Clark."""
     rows = []
     for model, (count, eye) in SUBDIVIDED.items():
         quads = coneflat.quads(measured.path(model), quads=count)

@@ -1,8 +1,8 @@
-"""Remake what the documentation shows of the program: `python tools/remake.py`.
+"""Regenerate the generated parts of the documentation: `python tools/remake.py`.
 
 Its parts are the tables of options, the drawing of the structure, the list of messages, the numbers and the pictures;
-`--only options,structure` takes some of them. `--check` changes nothing, and fails where something is out of date.
-Times are those of a machine, and are measured by `benchmarks/`.
+`--only options,structure` selects some of them. `--check` changes nothing, and fails if a part is out of date.
+Times depend on the machine, and are measured by `benchmarks/`.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def remake_numbers(arguments: argparse.Namespace) -> Iterator[tuple[Path, str]]:
     for page in PAGES:
         fill_page(
             page.read_text(encoding="utf-8"), measured
-        )  # takes its time, in which the page may be edited
+        )  # This takes long, and the page may be edited meanwhile.
         yield page, fill_page(page.read_text(encoding="utf-8"), measured)
 
 
@@ -80,7 +80,7 @@ PARTS: dict[str, Callable[[argparse.Namespace], Iterator[tuple[Path, str]]]] = {
 
 
 def main() -> int:
-    """Remake the parts that are asked for, and return the exit code."""
+    """Regenerate the selected parts, and return the exit code."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
     parser.add_argument("--only", help=f"parts, with commas between, of {', '.join(PARTS)}")
     parser.add_argument(

@@ -1,4 +1,4 @@
-"""The pictures of the viewer, taken in a Chromium."""
+"""Screenshots of the viewer in Chromium."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from coneflat.apps.quads.page import page_of_quads
 from coneflat.apps.view import write_page
 
 WIDE, NARROW = {"width": 1366, "height": 768}, {"width": 390, "height": 844}
-#: Name, size, theme, and what is done on the page first.
+#: Name, size, theme, and actions on the page before the screenshot.
 SHOTS = (
     (
         "viewer-light",
@@ -54,7 +54,7 @@ def _take(page_path: Path, shots: Sequence[tuple[str, Any, Any, str]]) -> None:
             page.goto(page_path.as_uri())
             page.wait_for_selector("html[data-ready]")
             page.evaluate(script)
-            page.wait_for_timeout(1500)  # Drawn finely once nothing moves.
+            page.wait_for_timeout(1500)  # The page is drawn at full resolution when nothing moves.
             with Image.open(BytesIO(page.screenshot())) as picture:
                 save_small(picture, name, dither=False)
             context.close()

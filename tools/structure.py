@@ -1,4 +1,4 @@
-"""The structure of the package: its packages, who imports whom, and how large they are.
+"""The structure of the package: its subpackages, their imports and their sizes.
 
 `python tools/structure.py` prints the sizes; `tools/remake.py` draws the packages for the documentation;
 `tests/test_structure.py` holds the rules.
@@ -18,7 +18,7 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[1] / "src" / "coneflat"
 
-#: The stages, which do not import one another: only `flatten.py` joins them.
+#: The stages, which do not import each other; only `flatten.py` combines them.
 STAGES = ("cones", "metric", "seams", "layout", "atlas", "measure")
 #: What a package or a file beside the packages holds, in about five words.
 HOLDS = {
@@ -53,7 +53,7 @@ HOLDS = {
 
 @dataclass(frozen=True)
 class Size:
-    """How large some code is.
+    """The size of some code.
 
     Attributes:
         files: how many.
@@ -127,7 +127,7 @@ def _is_number(node: ast.expr | None) -> bool:
 def package_of(name: str) -> str:
     """Return the package that a module belongs to: an application, a folder, or the module itself."""
     parts = name.split(".")
-    if name == "errors":  # which every package may raise
+    if name == "errors":  # Every package may raise these.
         return "base"
     return ".".join(parts[:2]) if parts[0] == "apps" else parts[0]
 

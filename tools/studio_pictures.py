@@ -1,4 +1,4 @@
-"""The pictures of the studio: its page at work, on a telephone, and a session that moves."""
+"""Pictures of the studio: its page, the page on a phone, and an animated session."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from coneflat.apps.studio.server import StudioServer
 from coneflat.apps.studio.session import Session
 
 SIZE = {"width": 1000, "height": 560}
-#: What is painted, and where: parts of the pane's width and height.
+#: Layers to paint, and positions as fractions of the width and height of the pane.
 PAINTED = (("importance", 0.3, 0.42), ("no_cone", 0.62, 0.62), ("no_seam", 0.47, 0.75))
 #: The highest of the cones in front is picked.
 PICK_SEEN = """
@@ -37,7 +37,7 @@ PICK_SEEN = """
 
 SESSION_SIZE = {"width": 820, "height": 430}
 SQUARES = 14  # of the checkerboard: fewer than usual, for a small file
-#: The mouse, which browsers draw outside of the page: an arrow above everything.
+#: An arrow for the mouse pointer, which is not part of screenshots.
 ARROW = """
 (() => {
   const arrow = document.createElementNS("http://www.w3.org/2000/svg", "svg");
@@ -51,7 +51,7 @@ ARROW = """
 #: Parts of the pane's width and height: where a cone is set, the way that it is dragged, and the ends of a cut.
 SET, WAY = (0.55, 0.64), ((0.51, 0.61), (0.47, 0.58), (0.43, 0.54), (0.39, 0.50))
 CUT = ((0.30, 0.66), (0.62, 0.72))
-QUICK, SLOW, LAST = 350, 900, 2200  # milliseconds of a frame
+QUICK, SLOW, LAST = 350, 900, 2200  # Milliseconds of a frame.
 QUALITIES = (80, 65, 50, 35)
 
 
@@ -62,20 +62,20 @@ class StudioPage(NamedTuple):
     session: Session
 
     def settle(self) -> None:
-        """Wait until what was done last is shown, and drawn finely."""
+        """Wait until the last action is shown at full resolution."""
         self.page.wait_for_timeout(150)
         self.session.wait_until_idle()
         self.page.wait_for_timeout(900)
 
     def picture(self) -> Image.Image:
-        """Return what is seen."""
+        """Return a screenshot."""
         with Image.open(BytesIO(self.page.screenshot())) as picture:
             return picture.convert("RGB")
 
 
 @contextmanager
 def studio_page(mesh: Path, **context: Any) -> Iterator[StudioPage]:
-    """Open a mesh in the studio; context: what the browser is told of the screen."""
+    """Open a mesh in the studio; context: options of the browser context."""
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver, listening(0) as listener:
         session, port = Session(Path(folder)), listener.getsockname()[1]
         server = StudioServer(session, "token", port)
@@ -188,7 +188,7 @@ def _tell(press: Callable[..., None], go: Callable[..., None], shoot: Callable[.
 
 
 def _save_moving(frames: list[tuple[Image.Image, int]], name: str) -> None:
-    """Write a picture that moves, in the best quality that is small enough."""
+    """Write an animated picture with the best quality that is small enough."""
     path = IMAGES / f"{name}.webp"
     pictures, times = [picture for picture, _ in frames], [milliseconds for _, milliseconds in frames]
     for quality in QUALITIES:

@@ -1,7 +1,7 @@
 """The tables of numbers in the documentation, and pages filled with them.
 
-Where a model is not there its numbers stay as they are. So do times, which are those of a machine, and what other
-packages do: they are measured by `benchmarks/`.
+Numbers of missing models remain unchanged, and so do times, which depend on the machine, and results of other packages:
+they are measured by `benchmarks/`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ TRADED = (
 )  # fmt: skip
 QUADS = ("bunny", "fandisk", "hand", "kitten", "rocker-arm", "spot")
 ALLOWED = (0.5, 0.35, 0.25, 0.2, 0.15, 0.1, 0.07)
-#: Area distortion that others have who make dozens of charts.
+#: Area distortion of other packages that create dozens of charts.
 MORE_CONES = 0.05
 
 Rows = dict[str, list[str]]
@@ -59,7 +59,7 @@ def _table(headings: str, rows: list[list[str]]) -> str:
 
 
 def _each(models: tuple[str, ...], body: str, made: Mapping[str, list[str] | None]) -> Iterator[list[str]]:
-    """Yield a row for each model: as it is made, or as it was."""
+    """Yield a row for each model: the new one, or the old one if the model is missing."""
     was = _rows_of(body)
     for model in models:
         row = made[model] or was.get(model)
@@ -67,12 +67,12 @@ def _each(models: tuple[str, ...], body: str, made: Mapping[str, list[str] | Non
             yield row
 
 
-#: Models that the paper's tables and we have alike, and what they are called there.
+#: Models that are also in the tables of the paper, and their names there.
 PAPERS = {"fandisk": "fandisk", "rocker-arm": "rockerarm"}
 
 
 def paper_table(measured: Measured, body: str) -> str:
-    """Return the published method on the models that the paper and we have alike."""
+    """Return the results of the published method on models that are also in the paper."""
     made = dict[str, list[str] | None]()
     for model, name in PAPERS.items():
         report, paper = measured.report(model, **PAPER), PUBLISHED[name]
@@ -98,7 +98,7 @@ READINGS = ("circle-patterns/fixed", "circle-patterns", "linear-abf/free", "line
 
 
 def readings_table(measured: Measured, body: str) -> str:
-    """Return the paper's mean QC distortions beside ours, of two readings of its methods."""
+    """Return the mean QC distortions of the paper next to ours, for two interpretations of its methods."""
     made = dict[str, list[str] | None]()
     for model, name in PAPERS.items():
         if not measured.has(model):
@@ -139,7 +139,7 @@ def gallery_table(measured: Measured, body: str) -> str:
     return _table(headings, list(_each(GALLERY, body, made)))
 
 
-#: What more cones change: keys of the report, and how they are called.
+#: Measures that depend on the number of cones: keys of the report, and their labels.
 TRADEOFF = {
     "cones": "cones",
     "qc_mean": "QC distortion",
@@ -150,7 +150,7 @@ TRADEOFF = {
 
 
 def tradeoff(measured: Measured) -> np.ndarray | None:
-    """Return (a, models, k) what each area distortion allowed makes of models in one chart, or None."""
+    """Return the (a, models, k) measures of models in one chart for each allowed area distortion, or None."""
     if not measured.has(*TRADED):
         return None
     rows = [
@@ -161,7 +161,7 @@ def tradeoff(measured: Measured) -> np.ndarray | None:
 
 
 def tradeoff_table(measured: Measured, body: str) -> str:
-    """Return what the number of cones does, medians over models."""
+    """Return the effect of the number of cones, as medians over models."""
     found = tradeoff(measured)
     if found is None:
         return body
@@ -182,7 +182,7 @@ def tradeoff_table(measured: Measured, body: str) -> str:
 
 
 def methods_table(measured: Measured, body: str) -> str:
-    """Return what all methods make of ten models with the same cones and cut."""
+    """Return the measures of all methods on ten models with the same cones and cut."""
     if not measured.has(*COMPARED):
         return body
     comparisons = []
@@ -232,7 +232,7 @@ def _brief(value: float) -> str:
 
 
 def atlases_table(measured: Measured, body: str) -> str:
-    """Return our atlases beside those of others, whose numbers stay."""
+    """Return our atlases next to those of others, whose numbers are not measured again."""
     was, made, ours = _rows_of(body), dict[str, list[str] | None](), []
     keys = {"charts": "d", "seam_length": ".2f", "qc_mean": ".3f", "packing_efficiency": ".2f"}
     for model in ATLASES:
@@ -264,7 +264,7 @@ def atlases_table(measured: Measured, body: str) -> str:
 
 @cache
 def convergence() -> str:
-    """Return the differences of three discretisations on finer and finer spheres, as a table."""
+    """Return a table of the differences of three discretisations on a sequence of finer spheres."""
     sys.path.insert(0, str(ROOT / "benchmarks"))
     from convergence import METHODS, PAIRS, measured
 
@@ -278,7 +278,7 @@ def convergence() -> str:
 
 
 def quads_table(measured: Measured, body: str) -> str:
-    """Return how good quads are, by the defaults."""
+    """Return the quality of quads with default options."""
     made = dict[str, list[str] | None]()
     for model in QUADS:
         path = measured.path(model)
@@ -303,7 +303,7 @@ def quads_table(measured: Measured, body: str) -> str:
     return _table(headings, list(_each(QUADS, body, made)))
 
 
-#: What makes each table, from what there is of models, and from what stands there.
+#: Function for each table, of the measured models and the old table.
 TABLES: dict[str, Callable[[Measured, str], str]] = {
     "paper": paper_table,
     "gallery": gallery_table,

@@ -1,1 +1,1 @@
-"""Hostile cases for `benchmarks/hostile.py`: made from seeds, run in workers, held against the package's promises."""
+"""Hostile cases for `benchmarks/hostile.py`: generated from seeds, run in workers, checked against the guarantees."""

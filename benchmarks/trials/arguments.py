@@ -51,7 +51,7 @@ DOORS = (
 
 
 class Calls:
-    """Good calls of the public functions, whose arguments are then exchanged."""
+    """Valid calls of the public functions, whose arguments are then replaced."""
 
     def __init__(self, folder: Path) -> None:
         import coneflat as cf
@@ -120,7 +120,7 @@ class Calls:
         return getattr(next(home for home in homes if hasattr(home, name)), name)
 
     def make(self, rng: Random) -> tuple[str, dict[str, Any], str]:
-        """Return a function's name, arguments, and how they are odd."""
+        """Return the name of a function, arguments, and a description of what is odd."""
         name = "flatten" if rng.random() < 0.45 else sorted(self.good)[int(rng.integers(len(self.good)))]
         if name in ("make_figure", "view", "cone_curve") and rng.random() < 0.6:
             name = "check_mesh"  # these take long

@@ -35,7 +35,7 @@ LARGEST_FILE = 5_000
 
 
 def run_case(kind: str, seed: int) -> Outcome:
-    """Return what came of a case; every file it writes is gone afterwards."""
+    """Return the outcome of a case; all files it writes are removed afterwards."""
     outcome = Outcome(kind, seed)
     rng = np.random.default_rng([zlib.crc32(kind.encode()), seed])
     home, folder = Path.cwd(), Path(tempfile.mkdtemp(prefix="case", dir="."))
@@ -54,7 +54,7 @@ def run_case(kind: str, seed: int) -> Outcome:
 
 
 def warm_up() -> None:
-    """Load and compile what cases need, so that no case's time has it."""
+    """Load and compile everything that cases need, so that it is not part of their time."""
     import shapes
 
     import coneflat
@@ -65,7 +65,7 @@ def warm_up() -> None:
 
 
 def _resident(name: str) -> float:
-    """Return the process's resident memory, or its peak since it was last asked for, MB; 0 where it cannot be told."""
+    """Return the resident memory of the process, or its peak since the last call, in MB; 0 if unknown."""
     try:
         found = re.search(rf"{name}:\s+(\d+) kB", Path("/proc/self/status").read_text())
         Path("/proc/self/clear_refs").write_text("5")
@@ -75,7 +75,7 @@ def _resident(name: str) -> float:
 
 
 def _mesh(rng: Random, outcome: Outcome) -> None:
-    """A mesh of any kind under options of any kind; one in three results is written, too."""
+    """Flatten a random mesh with random options; one in three results is also written."""
     import coneflat
 
     vertices, faces, made = make_mesh(rng)
@@ -109,7 +109,7 @@ def _flatten(
 
 
 def _file(rng: Random, outcome: Outcome) -> None:
-    """A file, whole or damaged, read and flattened from Python, or by the command line."""
+    """Read and flatten an intact or damaged file, in Python or by the command line."""
     import coneflat
 
     path, what = make_file(rng, Path())
@@ -167,7 +167,7 @@ def _file_by_command(rng: Random, outcome: Outcome, path: Path, weld: bool | Non
 
 
 def _argument(rng: Random, outcome: Outcome) -> None:
-    """A public function with odd arguments; of blocks to build with any error will do, but no crash or hang."""
+    """Call a public function with odd arguments; low-level ones may raise any error, but must not crash or hang."""
     global _calls
     if _calls is None:
         _calls = Calls(Path(tempfile.mkdtemp()))
@@ -190,7 +190,7 @@ _calls: Calls | None = None
 
 
 def _plain(options: dict[str, Any]) -> dict[str, Any]:
-    """Return the options that the checks take as they are; what is odder was used up or is not of one type."""
+    """Return the options that the checks can use directly; others were consumed or have several types."""
     values = {
         name: value.item() if isinstance(value, np.ndarray) and not value.ndim else value
         for name, value in options.items()
@@ -207,12 +207,12 @@ def _plain(options: dict[str, Any]) -> dict[str, Any]:
 
 
 def _command(rng: Random, outcome: Outcome) -> None:
-    """A command line with odd options."""
+    """Run a command line with odd options."""
     _run(outcome, make_command(rng, Path()))
 
 
 def _run(outcome: Outcome, line: list[str]) -> None:
-    """Run a command; it must end well, or with one line on stderr and a nonzero exit code."""
+    """Run a command, which must succeed, or print one line on stderr and return a nonzero exit code."""
     outcome.recipe += f"; coneflat {' '.join(map(repr, line))}"
     code, _, err = run_command(line)
     if "Traceback" in err or "internal error" in err:
@@ -256,7 +256,7 @@ SHARES = {"mesh": 12, "file": 4, "argument": 2, "command": 2}
 
 
 def cases(count: int, first: int, kinds: tuple[str, ...] = tuple(SHARES)) -> list[tuple[str, int]]:
-    """Return so many cases, of the kinds named in fixed shares, with seeds from the first on."""
+    """Return a number of cases of the named kinds in fixed proportions, with consecutive seeds."""
     cycle = [kind for kind in kinds for _ in range(SHARES[kind])]
     order = np.random.default_rng(0).permutation(len(cycle))
     return [(cycle[order[seed % len(cycle)]], seed) for seed in range(first, first + count)]

@@ -109,7 +109,7 @@ def make_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> dict[s
 def _given_curvatures(
     rng: Random, inside: np.ndarray, topology: Topology, faces: np.ndarray
 ) -> dict[int, float]:
-    """Return cones whose curvatures fit a surface in one piece, if there are inner vertices."""
+    """Return cones whose curvatures satisfy Gauss-Bonnet on a connected surface, if there are inner vertices."""
     count = min(len(inside), int(rng.integers(1, 8)))
     if not count or not len(faces):
         return {}
@@ -124,7 +124,7 @@ def _given_curvatures(
 
 
 def _walk(rng: Random, edges: np.ndarray) -> np.ndarray:
-    """Return edges along a random path, as a person would mark them."""
+    """Return the edges of a random path, like edges marked by a user."""
     at: dict[int, list[int]] = {}
     for number, (a, b) in enumerate(edges.tolist()):
         at.setdefault(a, []).append(number)
@@ -138,7 +138,7 @@ def _walk(rng: Random, edges: np.ndarray) -> np.ndarray:
 
 
 def _drop_clashes(rng: Random, options: dict[str, Any]) -> None:
-    """Leave out, nearly always, what is refused beside other options, so that most cases come to a result."""
+    """Remove, with high probability, options that exclude each other, so that most cases have a result."""
     if rng.random() < 0.04:
         return
     if options.get("method", "exact") != "exact":
@@ -154,7 +154,7 @@ def _drop_clashes(rng: Random, options: dict[str, Any]) -> None:
 
 
 def in_short(options: dict[str, Any]) -> str:
-    """Return options as one line, long ones cut."""
+    """Return options as one line, with long values truncated."""
     return ", ".join(f"{name}={_short(value)}" for name, value in options.items())
 
 

@@ -1,4 +1,4 @@
-"""Odd command lines, run within this process."""
+"""Odd command lines, run in this process."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ COMMANDS = {
 
 
 def make_command(rng: Random, folder: Path) -> list[str]:
-    """Return a command line in a folder that has some meshes in it."""
+    """Return a command line for a folder that contains some meshes."""
     from coneflat.apps.cli.main import cli
 
     names = [name for name in COMMANDS if name in cli.commands or name == "nonsense"]
@@ -76,7 +76,7 @@ def make_command(rng: Random, folder: Path) -> list[str]:
 
 
 def _value(rng: Random, option: click.Option) -> str:
-    """Return a value, that fits the option's type two times in three."""
+    """Return a value that has the type of the option in two of three cases."""
     kind: Any = option.type
     if rng.random() < 0.33:
         return TEXTS[int(rng.integers(len(TEXTS)))]
@@ -96,7 +96,7 @@ def _value(rng: Random, option: click.Option) -> str:
 
 
 def _write_inputs(rng: Random, folder: Path) -> None:
-    """Write some meshes, lists of numbers, and what is neither."""
+    """Write some meshes, lists of numbers, and other files."""
     from .files import write_obj, write_ply
 
     vertices, faces = shapes.hill(5, 4)
@@ -111,7 +111,7 @@ def _write_inputs(rng: Random, folder: Path) -> None:
 
 
 def run_command(line: list[str]) -> tuple[int, str, str]:
-    """Return the exit code, and what was printed to stdout and stderr; the process's own are left alone."""
+    """Return the exit code and the captured output on stdout and stderr."""
     from coneflat.apps.cli.main import main
 
     out, err = io.StringIO(), io.StringIO()

@@ -1,4 +1,4 @@
-"""Mesh files of all formats, whole and damaged."""
+"""Mesh files of all formats, intact and damaged."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def _gltf(rng: Random, vertices: np.ndarray, polygons: list[list[int]]) -> tuple
 
 
 def _damaged_scene(rng: Random, scene: dict) -> dict:
-    """A scene with one entry changed, removed, or asking for far too much; sometimes a sparse accessor."""
+    """A scene with one entry changed, removed or much too large; sometimes a sparse accessor."""
     if rng.random() < 0.2:
         accessor = scene["accessors"][int(rng.integers(2))]
         accessor["count"] = int(rng.choice([0, -1, 1 << 20, 1 << 30, 1 << 40]))
@@ -206,7 +206,7 @@ def write_gltf(rng: Random, vertices: np.ndarray, polygons: list[list[int]], dam
 
 
 def write_npz(rng: Random, vertices: np.ndarray, polygons: list[list[int]], damage: bool = False) -> bytes:
-    """A result of the package's own, at random with a member replaced, left out or swollen."""
+    """A result file of the package, at random with a member replaced, removed or enlarged."""
     import coneflat
 
     result = coneflat.flatten(vertices, _triangles(polygons), charts="atlas", max_cones=8, repair=True)
@@ -300,7 +300,7 @@ def damaged_bytes(rng: Random, content: bytes) -> bytes:
 
 
 def make_file(rng: Random, folder: Path) -> tuple[Path, str]:
-    """Write a file, two times in three a damaged one, and return its path and what it is."""
+    """Write a file, damaged in two of three cases, and return its path and a description."""
     ending = str(rng.choice(list(WRITERS), p=[0.27, 0.2, 0.12, 0.1, 0.15, 0.08, 0.08]))
     vertices, polygons = small_mesh(rng)
     damage = rng.random() < 0.6

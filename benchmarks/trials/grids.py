@@ -1,4 +1,4 @@
-"""Integer grids and quad meshes of random surfaces, and what they promise, measured anew in plain numpy."""
+"""Integer grids and quad meshes of random surfaces, and independent checks of their guarantees in numpy."""
 
 from __future__ import annotations
 
@@ -39,15 +39,15 @@ CHANGES = (
     (meshes.loose_vertices, 0.05),
     (meshes.shuffled, 0.3),
 )
-#: Part of cases whose meshes are as bad as those of the hostile trial.
+#: Fraction of cases with meshes as irregular as those of the hostile trial.
 HOSTILE = 0.2
-#: Part of the model's size by which a quad's vertex may be off where its barycentric coordinates say.
+#: Largest distance of a quad vertex from the point given by its barycentric coordinates, relative to the model size.
 ROUNDING = 1e-9
 TURNS = np.array([1, 1j, -1, -1j])
 
 
 def make_surface(rng: Random) -> tuple[np.ndarray, np.ndarray, str]:
-    """Return vertices, faces and how they were made; more of these can be flattened than of `meshes.make_mesh`."""
+    """Return vertices, faces and a description; more of these can be flattened than of `meshes.make_mesh`."""
     if rng.random() < HOSTILE:
         return meshes.make_mesh(rng)
     maker = MAKERS[int(rng.integers(len(MAKERS)))]
@@ -66,7 +66,7 @@ def make_surface(rng: Random) -> tuple[np.ndarray, np.ndarray, str]:
 
 
 def make_grid_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> dict[str, Any]:
-    """Return keywords of `coneflat.integer_grid`."""
+    """Return keyword arguments of `coneflat.integer_grid`."""
     options: dict[str, Any] = {}
     kind = rng.random()
     if kind < 0.8:
@@ -92,7 +92,7 @@ def make_grid_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> d
 
 
 def grid_case(rng: Random, outcome: Outcome) -> None:
-    """A surface under options of all kinds: its grid, and its quads, smoothed or not."""
+    """Compute the grid and the quads, smoothed or not, of a surface with random options."""
     import coneflat
 
     vertices, faces, made = make_surface(rng)
@@ -109,7 +109,7 @@ def grid_case(rng: Random, outcome: Outcome) -> None:
 
 
 def check_grid(outcome: Outcome, grid: Any, options: dict[str, Any]) -> None:
-    """All that an integer grid promises; equations hold exactly."""
+    """Check all guarantees of an integer grid; equations must hold exactly."""
     z = grid.corner_grid @ [1, 1j]
     if not np.isfinite(z).all():
         outcome.breach("grid: not finite")
@@ -148,7 +148,7 @@ def check_grid(outcome: Outcome, grid: Any, options: dict[str, Any]) -> None:
 
 
 def check_quads(outcome: Outcome, found: Any, grid: Any) -> None:
-    """A manifold mesh of quads on the surface, oriented and of its topology."""
+    """Check that quads are an oriented manifold mesh on the surface with its topology."""
     quads, points = found.quads, found.vertices
     if any("\n" in note or "nan" in note.split() for note in found.notes):
         outcome.breach("quads: a note of several lines, or of nan", found.notes)
@@ -195,7 +195,7 @@ def _says(found: Any, sentence: str) -> bool:
 
 
 def _check_fans(outcome: Outcome, quads: np.ndarray, count: int) -> None:
-    """Around each vertex the quads must be one fan: as many joints between them as they are, or one fewer."""
+    """Check that the quads around each vertex form one fan: k quads have k or k - 1 common edges."""
     before, after = np.roll(quads, 1, axis=1).ravel(), np.roll(quads, -1, axis=1).ravel()
     at = quads.ravel()
     spokes = np.unique(np.concatenate([at * count + before, at * count + after])) // count
@@ -205,7 +205,7 @@ def _check_fans(outcome: Outcome, quads: np.ndarray, count: int) -> None:
 
 
 def _inverted(points: np.ndarray, quads: np.ndarray) -> int:
-    """Return how many quads have a corner that turns the other way than their diagonals do."""
+    """Return the number of quads with a corner of an orientation opposite to that of their diagonals."""
     corners = points[quads] / max(np.abs(points).max(), np.finfo(float).tiny)
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     least = np.full(len(quads), np.inf)

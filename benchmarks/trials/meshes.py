@@ -13,7 +13,7 @@ Mesh = tuple[np.ndarray, np.ndarray]
 Random = np.random.Generator
 
 MODELS = Path(__file__).resolve().parents[3] / "shared" / "meshes"
-#: Bytes of a model's file at most: patches are cut from it, and a worker keeps it.
+#: Largest size of a model file in bytes; patches are cut from the model, which workers cache.
 LARGEST_MODEL = 3_000_000
 
 
@@ -36,7 +36,7 @@ def sheet(rng: Random) -> Mesh:
 
 
 def fan(rng: Random) -> Mesh:
-    """A vertex inside a ring on the unit circle, heights at random."""
+    """A vertex inside a ring on the unit circle, with random heights."""
     count = int(rng.choice([3, 4, 5, 8, 24, 24, 24, 60]))
     angle = 2 * np.pi * np.arange(count) / count
     rim = np.stack(
@@ -152,7 +152,7 @@ def random_sheet(rng: Random) -> Mesh:
 
 
 def soup(rng: Random) -> Mesh:
-    """Triangles between random points: hardly ever a manifold."""
+    """Triangles between random points, which are almost never a manifold."""
     count = int(rng.integers(3, 12))
     return rng.normal(size=(count, 3)), rng.integers(0, count, (int(rng.integers(1, 20)), 3))
 
@@ -179,7 +179,7 @@ def _model(path: Path) -> tuple[np.ndarray, np.ndarray, list[list[int]]]:
 
 
 def patch(rng: Random) -> Mesh:
-    """A connected piece of a scan, cut out, sometimes with vertices merged in cells; a ball where there are none."""
+    """A connected piece of a scan, sometimes with vertices merged in cells; a ball if there are no scans."""
     files = [path for path in sorted(MODELS.glob("*.o*")) if path.stat().st_size < LARGEST_MODEL]
     if not files:
         return ball(rng)
@@ -221,7 +221,7 @@ MAKERS: tuple[tuple[Callable[[Random], Mesh], float], ...] = (
 
 
 def make_mesh(rng: Random) -> tuple[np.ndarray, np.ndarray, str]:
-    """Return vertices, faces and how they were made."""
+    """Return vertices, faces and a description."""
     weights = np.array([weight for _, weight in MAKERS])
     maker = MAKERS[int(rng.choice(len(MAKERS), p=weights / weights.sum()))][0]
     vertices, faces = maker(rng)
@@ -283,7 +283,7 @@ def far_away(vertices: np.ndarray, faces: np.ndarray, rng: Random) -> Mesh:
 
 
 def two_parts(vertices: np.ndarray, faces: np.ndarray, rng: Random) -> Mesh:
-    """Another surface beside this one, or glued to it in a point."""
+    """Another surface next to this one, or glued to it at a point."""
     other = MAKERS[int(rng.integers(7))][0](rng)
     start = len(vertices)
     merged = shapes.join((vertices, faces), (other[0] + np.array([5.0, 0, 0]), np.asarray(other[1])))
@@ -328,7 +328,7 @@ def wing(vertices: np.ndarray, faces: np.ndarray, rng: Random) -> Mesh:
 
 
 def flips(vertices: np.ndarray, faces: np.ndarray, rng: Random) -> Mesh:
-    """Some edges replaced by the other diagonal, where that leaves a manifold."""
+    """Some edges replaced by the other diagonal, if the mesh remains a manifold."""
     faces = faces.copy()
     known = {tuple(sorted((int(a), int(b)))) for f in faces for a, b in zip(f, np.roll(f, -1), strict=True)}
     for _ in range(int(rng.integers(1, max(2, len(faces) // 5)))):

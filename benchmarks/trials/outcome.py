@@ -1,4 +1,4 @@
-"""What came of a case."""
+"""The outcome of a case."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[2] / "src" / "coneflat"
-#: Characters of a message at most that is still one line to read.
+#: Largest number of characters of a message that is readable as one line.
 LONGEST_MESSAGE = 900
 
 
 @dataclass
 class Outcome:
-    """What came of a case.
+    """The outcome of a case.
 
     Attributes:
         kind, seed: the case.
@@ -41,19 +41,19 @@ class Outcome:
     memory: float = 0.0
 
     def breach(self, cause: str, details: object = "") -> None:
-        """Add a broken promise; one of each cause will do."""
+        """Add a breach; further ones of the same cause are ignored."""
         self.status = "breach"
         if cause not in dict(self.breaches):
             self.breaches.append((cause, " ".join(str(details).split())[:600]))
 
     def excuse(self, promise: str) -> None:
-        """Add a promise not kept that a note names."""
+        """Add an unmet guarantee that is reported in a note."""
         self.noted.append(promise)
         if self.status == "ok":
             self.status = "noted"
 
     def refuse(self, message: str, expects_nan: bool = False) -> None:
-        """Take an error of the package's own, whose message must be one readable line."""
+        """Record an error of the package, whose message must be one readable line."""
         if self.status != "breach":
             self.status = "refused"
         self.message = message
@@ -66,7 +66,7 @@ class Outcome:
 
     @contextmanager
     def guarded(self, what: str = "", expects_nan: bool = False) -> Iterator[None]:
-        """Run what may be refused by an error of the package's own; any other is a breach, and so is a warning."""
+        """Run code that may raise an error of the package; any other error is a breach, and so is a warning."""
         from coneflat.errors import ConeflatError
 
         with warnings.catch_warnings(record=True) as caught:
@@ -87,7 +87,7 @@ class Outcome:
 
 
 def where(error: BaseException) -> str:
-    """Return the kind of an error and the innermost function of the package that it went through."""
+    """Return the type of an error and the innermost function of the package in its traceback."""
     frames = [
         frame
         for frame in traceback.extract_tb(error.__traceback__)

@@ -1,4 +1,4 @@
-"""Measures of triangles in the plane, slow and plain, to hold the package's own against."""
+"""Simple, slow measures of triangles in the plane, to check those of the package."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-#: Twice the area over the longest side squared below which a triangle has none; half of the sign's digits are left.
+#: Twice the area divided by the squared longest side below which a triangle has no area; half of the digits are exact.
 NO_AREA = 1e-12
-#: Depth, over the layout's extent, by which triangles must lie over each other to count here.
+#: Least depth of an overlap that is counted, relative to the extent of the layout.
 DEEP = 1e-9
-#: Length of a side, over that extent, from which on its normal is known a thousand times better than that.
+#: Least length of a side, relative to that extent, whose normal is a thousand times more accurate than that depth.
 SHORT = 1e-4
 
 
@@ -44,7 +44,7 @@ def charts_of(uv_faces: np.ndarray) -> np.ndarray:
 
 
 def flipped(corners: np.ndarray, chart: np.ndarray) -> np.ndarray:
-    """Return (m,) True for triangles that run against the area of their chart; those without area have no side."""
+    """Return (m,) whether triangles are flipped relative to the area of their chart; those without area are not."""
     areas = double_areas(corners)
     areas[np.abs(areas) <= NO_AREA * side_lengths(corners).max(axis=1) ** 2] = 0.0
     against: np.ndarray = np.sign(np.bincount(chart, areas))[chart] * areas < 0
@@ -52,7 +52,7 @@ def flipped(corners: np.ndarray, chart: np.ndarray) -> np.ndarray:
 
 
 def overlap_depths(corners: np.ndarray) -> np.ndarray:
-    """Return (m, m) by how much triangles lie over each other, negative where a line separates them.
+    """Return the (m, m) depths of overlaps of pairs of triangles; negative if a line separates them.
 
     By separating axes: the least depth over the six sides' normals. Triangles without area are nowhere.
     """
@@ -76,5 +76,5 @@ def overlap_depths(corners: np.ndarray) -> np.ndarray:
 
 
 def off_multiple(angle: np.ndarray, quantum: float) -> np.ndarray:
-    """Return how far angles are from the nearest multiples of a quantum."""
+    """Return the differences of angles from the nearest multiples of a quantum."""
     return np.abs(angle - quantum * np.round(angle / quantum))

@@ -1,4 +1,4 @@
-"""What a flattening promises, measured anew on the arrays that came out."""
+"""Independent checks of the guarantees of a flattening on the arrays of the result."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ ANGLE, SIDES = 1e-6, 1e-8
 LOOSE_SIDES = 1e-6
 #: A round boundary is found in rounds, each of which changes curvatures by less than the one before.
 ROUND = 0.02
-#: Largest mesh whose overlaps are found by all pairs, too.
+#: Largest mesh whose overlaps are also computed by all pairs.
 ALL_PAIRS = 700
 EPS = np.finfo(np.float64).eps
-#: The sentence that must be among the notes where a promise is not kept; no other one will do.
+#: The sentence that the notes must contain for each unmet guarantee.
 SENTENCES = {
     "flipped": r"There (is|are) [\d,]+ flipped triangles? .*in the plane",
     "collapsed": r"There (is|are) ([\d,]+ flipped triangles? and )?[\d,]+ degenerate triangles? in the plane",
@@ -38,7 +38,7 @@ SENTENCES = {
 
 
 class Trial:
-    """A result on trial: its arrays, and what was asked for."""
+    """A result to check: its arrays and the options."""
 
     def __init__(
         self, outcome: Outcome, result: Any, options: dict[str, Any], vertices: Any, faces: Any
@@ -53,11 +53,11 @@ class Trial:
         self.sides = plane.side_lengths(self.corners)
 
     def breach(self, cause: str, details: object) -> None:
-        """Add a breach that no note excuses."""
+        """Add a breach."""
         self.outcome.breach(cause, f"{details}; notes {list(self.result.notes)}")
 
     def broken(self, promise: str, cause: str, details: object) -> None:
-        """Take a promise that is not kept: a breach unless the note on it is there."""
+        """Record an unmet guarantee, which is a breach unless a note reports it."""
         if any(re.match(SENTENCES[promise], note) for note in self.result.notes):
             self.outcome.excuse(cause)
         else:
@@ -65,7 +65,7 @@ class Trial:
 
 
 def check(outcome: Outcome, result: Any, options: dict[str, Any], vertices: Any, faces: Any) -> None:
-    """Hold a result against all promises; what is broken goes to the outcome."""
+    """Check a result against all guarantees, and add breaches to the outcome."""
     if not _sound(outcome, result):
         return
     trial = Trial(outcome, result, options, vertices, faces)
@@ -83,7 +83,7 @@ def check(outcome: Outcome, result: Any, options: dict[str, Any], vertices: Any,
 
 
 def _sound(outcome: Outcome, result: Any) -> bool:
-    """Whether arrays have the shapes and ranges to go on with."""
+    """Return whether arrays have the shapes and ranges that further checks need."""
     for name, array in (("faces", result.faces), ("uv_faces", result.uv_faces)):
         bound = len(result.vertices) if name == "faces" else len(result.uv)
         if array.shape != (len(result.faces), 3) or array.min() < 0 or array.max() >= bound:
@@ -98,7 +98,7 @@ def _sound(outcome: Outcome, result: Any) -> bool:
 
 
 def _check_origin(trial: Trial) -> None:
-    """Vertices and faces are those of the input."""
+    """Check that vertices and faces are those of the input."""
     result, (vertices, faces) = trial.result, trial.given
     if not np.array_equal(result.vertices, vertices[result.vertex_origin], equal_nan=True):
         trial.outcome.breach("origin: vertices are not the input's", "")
@@ -112,7 +112,7 @@ def _check_origin(trial: Trial) -> None:
 
 
 def _check_place(trial: Trial) -> None:
-    """Points lie in the unit square, or in the tiles."""
+    """Check that points are in the unit square, or in the tiles."""
     uv, tiles = trial.result.uv, int(trial.options.get("tiles", 1))
     low, high = uv.min(axis=0), uv.max(axis=0)
     most = np.array([min(tiles, 10), (tiles + 9) // 10])
@@ -121,7 +121,7 @@ def _check_place(trial: Trial) -> None:
 
 
 def _check_orientation(trial: Trial) -> None:
-    """No triangle is flipped or collapsed, and the report counts those that are."""
+    """Check that no triangle is flipped or collapsed, and that the report counts them correctly."""
     chart = plane.charts_of(trial.result.uv_faces)
     against = int(plane.flipped(trial.corners, chart).sum())
     told = trial.result.distortion
@@ -134,7 +134,7 @@ def _check_orientation(trial: Trial) -> None:
 
 
 def _check_overlap(trial: Trial) -> None:
-    """Nothing overlaps in an atlas, and the report counts what does."""
+    """Check that nothing overlaps in an atlas, and that the report measures overlaps correctly."""
     from coneflat.geometry.overlap import find_overlaps
 
     found = find_overlaps(trial.corners)
@@ -161,7 +161,7 @@ def _check_overlap(trial: Trial) -> None:
 
 
 def _check_angles(trial: Trial) -> None:
-    """Angles around inner vertices sum to a full turn, at cones less their curvature."""
+    """Check that angle sums of inner vertices are 2 pi minus the curvature of cones."""
     if trial.method != "exact":
         return
     result, topology = trial.result, trial.topology
@@ -187,7 +187,7 @@ def _check_angles(trial: Trial) -> None:
 
 
 def _check_sides(trial: Trial) -> None:
-    """The two sides of every seam are equally long."""
+    """Check that the two sides of every seam have equal lengths."""
     if trial.method != "exact":
         return
     one, two = trial.sides.ravel()[trial.topology.sides].T
@@ -202,7 +202,7 @@ def _check_sides(trial: Trial) -> None:
 
 
 def _check_boundary(trial: Trial) -> None:
-    """A prescribed boundary is what it was to be."""
+    """Check that the boundary has the prescribed shape."""
     if trial.method != "exact" or trial.is_marked or not trial.topology.is_border.any():
         return
     if trial.boundary == "lengths":
@@ -231,13 +231,13 @@ def _check_boundary_lengths(trial: Trial) -> None:
 
 
 def _check_boundary_turns(trial: Trial) -> None:
-    """Curvature on the boundary: equal on round loops, none along straight sides."""
+    """Check the curvature of the boundary: uniform on round loops, zero along straight sides."""
     result, topology = trial.result, trial.topology
     curvature = np.pi - _angle_sums(trial)
     slack = ANGLE + _angle_rounding(trial)
     if trial.boundary == "straight":
         quantum = trial.options.get("quantise")
-        # Corners are found like cones, and may be many; between them sides are straight.
+        # Corners are found like cones, and there may be many; sides between them are straight.
         off = topology.is_border & (np.abs(curvature - np.nan_to_num(result.prescribed)) > slack)
         if off.any() and quantum is None:
             trial.broken("angles", "boundary not straight", f"{off.sum()} vertices")
@@ -281,7 +281,7 @@ def _check_boundary_turns(trial: Trial) -> None:
 
 
 def _check_rotations(trial: Trial) -> None:
-    """With a quantum the sides of seams are turned by multiples of it; the report says by how much they are off."""
+    """Check that rotations across seams are multiples of the quantum, and that the report has the deviation."""
     quantum = trial.options.get("quantise")
     if quantum is None:
         return
@@ -305,7 +305,7 @@ def _check_rotations(trial: Trial) -> None:
 
 
 def _must_turn_by_quanta(trial: Trial) -> bool:
-    """Whether cones alone say how seams are turned: no handles, no second boundary, nothing marked or given."""
+    """Return whether cones alone determine rotations across seams: no handles, one boundary at most, nothing marked."""
     if trial.is_marked or not isinstance(trial.options.get("cones", "auto"), str):
         return False
     topology, faces = trial.topology, trial.result.faces
@@ -318,7 +318,7 @@ def _must_turn_by_quanta(trial: Trial) -> bool:
 
 
 def _check_cones(trial: Trial) -> None:
-    """Cones are those that were asked for, and their curvatures sum to what the surface has."""
+    """Check that cones are the requested ones, and that their curvatures satisfy Gauss-Bonnet."""
     result, options, topology = trial.result, trial.options, trial.topology
     cones, curvatures = result.cones, result.curvatures
     names = result.vertex_origin[cones].tolist()
@@ -382,7 +382,7 @@ def _check_area(trial: Trial) -> None:
 
 
 def _check_report(trial: Trial) -> None:
-    """The report is JSON without NaN, and what is said of it is readable."""
+    """Check that the report is JSON without NaN, and that its texts are readable."""
     from coneflat.measure.report import as_rows
 
     json.dumps(trial.result.report(), allow_nan=False)
@@ -403,7 +403,7 @@ def _angle_sums(trial: Trial) -> np.ndarray:
 
 
 def _angle_rounding(trial: Trial) -> np.ndarray:
-    """Return (n,) by how much rounded points change the sum of angles at a vertex."""
+    """Return the (n,) changes of angle sums of vertices due to rounded points."""
     shorter = np.minimum(trial.sides, np.roll(trial.sides, 1, axis=1))
     return _spread(trial, trial.result.faces.ravel(), 4 * EPS / np.maximum(shorter.ravel(), EPS))
 

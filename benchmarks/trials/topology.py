@@ -1,4 +1,4 @@
-"""The topology of a triangle mesh in plain numpy, independent of the package that is on trial."""
+"""The topology of a triangle mesh in plain numpy, independent of the package to be checked."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 @dataclass(frozen=True, eq=False)
 class Topology:
-    """Edges of a mesh and what lies on its boundary.
+    """Edges and boundary of a mesh.
 
     Attributes:
         edges: (e, 2) vertices, the smaller first.

@@ -1,4 +1,4 @@
-"""Worker processes that take one case after the other, within limits of time and memory."""
+"""Worker processes that run cases one after the other, with limits of time and memory."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from pathlib import Path
 from .outcome import Outcome
 
 Case = tuple[str, int]
-#: Seconds of a process's own work, and of waiting, that a case may take. Other work on the machine slows down both
-#: less than a clock on the wall would tell.
+#: CPU seconds, and seconds of waiting, that a case may take. Both depend less on other work on the machine than wall
+#: time does.
 WORK, WALL = 20.0, 90.0
 #: MB that a case may add to the resident memory, and bytes of addresses that a worker may add to those at its start.
 MEMORY, ADDRESSES = 1500.0, 6 << 30
-#: Cases that a worker takes before it is replaced.
+#: Number of cases after which a worker is replaced.
 CASES = 500
 
 
 def run_all(
     cases: Iterable[Case], jobs: int, say: Callable[[Outcome, int], None], most_work: float = WORK
 ) -> None:
-    """Run cases on so many workers and tell the outcome of each as it comes, with how many were done.
+    """Run cases on a number of workers, and report the outcome of each and the number completed.
 
     most_work: seconds of a process's own work that a case may take.
     """
@@ -74,7 +74,7 @@ def _ran_out_of_time(outcome: Outcome) -> bool:
 
 
 class Worker:
-    """A process, the case that it is at, and its limits.
+    """A process, its current case, and its limits.
 
     Attributes:
         case: what it runs, None if nothing.
@@ -101,7 +101,7 @@ class Worker:
             self.pipe.send(case)
 
     def ended(self) -> Iterator[Outcome]:
-        """Yield the outcome of the case, if it has ended or must."""
+        """Yield the outcome of the case, if it has ended or must be ended."""
         try:
             if self.pipe.poll():
                 told = self.pipe.recv()
@@ -141,7 +141,7 @@ class Worker:
         return self.log.read_text(errors="replace")[-3000:]
 
     def _place(self) -> str:
-        """Return the innermost function of the package in the last trace that the process left."""
+        """Return the innermost function of the package in the last trace written by the process."""
         last = self.log.read_text(errors="replace").rpartition("most recent call first")[2]
         found = re.search(r'File ".*?/coneflat/([^"]*)", line \d+ in (\w+)', last)
         return "an unknown place" if found is None else f"{found[1]} {found[2]}"
@@ -156,7 +156,7 @@ class Worker:
 
 
 def recipe_of(kind: str, seed: int) -> str:
-    """Return what a case that came to no end was made of."""
+    """Return the description of a case that did not end."""
     if kind == "grid":
         return f"python benchmarks/grids.py --case {seed}"
     if kind != "mesh":
@@ -174,7 +174,7 @@ def recipe_of(kind: str, seed: int) -> str:
 
 
 def serve(pipe: Connection, home: Path, log: Path, path: list[str]) -> None:
-    """Take cases from a pipe until it is closed, and answer with outcomes."""
+    """Run cases from a pipe until it is closed, and send their outcomes."""
     sys.path[:] = path
     stream = log.open("w")
     atexit.register(stream.close)
@@ -210,7 +210,7 @@ def serve(pipe: Connection, home: Path, log: Path, path: list[str]) -> None:
 
 
 def _standard_output(path: Path) -> Callable[[], str]:
-    """Send standard output, that of compiled libraries, too, to a file; return what tells what has come since."""
+    """Redirect standard output, also that of compiled code, to a file; return a function that reads new output."""
     file = path.open("w+", errors="replace")
     os.dup2(file.fileno(), 1)
 
@@ -227,7 +227,7 @@ def _standard_output(path: Path) -> Callable[[], str]:
 
 
 def _limit_memory() -> None:
-    """Let the process have so many more addresses than now, where that can be said."""
+    """Limit the growth of the address space of the process, if the system supports it."""
     try:
         import resource
 
@@ -240,7 +240,7 @@ def _limit_memory() -> None:
 
 
 def _work_of(pid: int | None) -> float:
-    """Return the seconds that a process has computed; those that have passed where it cannot be told."""
+    """Return the CPU seconds of a process; wall time if unknown."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")

@@ -1,4 +1,4 @@
-"""Files that were written, read back by other people's code and held against the result."""
+"""Checks of written files, which are read by other libraries and compared with the result."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Read = tuple[np.ndarray, np.ndarray]  # (m, 3, 3) corners in space, (m, 3, 2) in
 
 
 def read_obj(path: Path) -> Read:
-    """Return the triangles of an OBJ, polygons as fans, as nearly all software takes them."""
+    """Return the triangles of an OBJ, with polygons as fans, like nearly all software."""
     points: list[list[float]] = []
     uv: list[list[float]] = []
     space, flat = [], []
@@ -48,7 +48,7 @@ def _number(word: str, count: int) -> int:
 
 
 def read_ply(path: Path) -> Read:
-    """Return the triangles of a PLY, by meshio."""
+    """Return the triangles of a PLY, read by meshio."""
     import meshio
 
     mesh = meshio.read(path)
@@ -83,7 +83,7 @@ def read_glb(path: Path) -> Read:
 
 
 def read_trimesh(path: Path) -> Read:
-    """Return the triangles as trimesh reads them, with its transforms, v upwards again."""
+    """Return the triangles read by trimesh, with transforms, v upwards."""
     import trimesh
 
     mesh = _load(path)
@@ -113,7 +113,7 @@ READERS: dict[str, Callable[[Path], Read]] = {
 
 
 def check_file(outcome: Outcome, result: Any, path: Path) -> None:
-    """Read a file that was written, and hold its geometry and its layout against the result, as written in it."""
+    """Read a written file, and compare its geometry and layout with the result."""
     ending = path.suffix.lower()
     readers: list[Callable[[Path], Read]] = [READERS[ending]]
     if ending in (".obj", ".glb"):
@@ -155,7 +155,7 @@ def _reads_otherwise(reader: Callable[[Path], Read], source: Any, ending: str) -
 
 
 def check_report(outcome: Outcome, report: dict[str, Any], path: Path) -> None:
-    """Read a file that the command wrote, and hold what its report says against it."""
+    """Read a file written by the command, and compare its report with it."""
     reader = READERS[path.suffix.lower()]
     name = f"report of {path.suffix}"
     try:
@@ -175,7 +175,7 @@ def check_report(outcome: Outcome, report: dict[str, Any], path: Path) -> None:
 
 
 def _count_flipped(flat: np.ndarray) -> int:
-    """Return how many triangles have a negative area beyond rounding."""
+    """Return the number of triangles with an area that is negative beyond rounding."""
     areas = plane.double_areas(flat.astype(np.float64))
     return int((areas < -1e-9 * plane.side_lengths(flat).max(axis=1) ** 2).sum())
 
@@ -183,7 +183,7 @@ def _count_flipped(flat: np.ndarray) -> int:
 def _compare(
     outcome: Outcome, name: str, result: Any, space: np.ndarray, flat: np.ndarray, stored: bool
 ) -> None:
-    """Hold triangles that were read against the result; `stored` for v as glTF has it, downwards."""
+    """Compare triangles that were read with the result; stored: v points downwards, as in glTF."""
     ending = name.split()[1]
     if len(space) != len(result.faces):
         outcome.breach(
@@ -223,7 +223,7 @@ def _compare(
 
 
 def _check_overlap(outcome: Outcome, name: str, flat: np.ndarray) -> None:
-    """Nothing overlaps in the numbers of the file, without any tolerance, where the report says so."""
+    """Check that nothing overlaps in the numbers of the file, without tolerance, if the report says so."""
     from coneflat.geometry.overlap import find_overlaps
 
     pairs = find_overlaps(flat.astype(np.float64)).pairs

@@ -145,7 +145,7 @@ def files(tmp_path, ball):
         (["--quantize", "pi/2", "--hide-seams", "2"], None),
         (["--weights", "nothing"], "it has red, green, blue, quality"),
         (["--forbidden-cones", "a,b"], "'a' is not a vertex"),
-        (["--min-cone-angle", "wide"], "is no angle"),
+        (["--min-cone-angle", "wide"], "is not a valid angle"),
         (["--cone-count", "5", "--distortion", "0.1"], "leave out --distortion"),
         (["--cones", "greedy", "--quantise", "pi/2"], "leave out --quantise"),
         (["--paper", "--distortion", "0.1"], "leave out --distortion"),

@@ -68,9 +68,9 @@ def test_paper_is_the_published_method(model, tmp_path):
         (["model.obj", "-o", "x.glb", "--texture", "none.png"], "none.png: there is no such file"),
         (["."], "coneflat batch"),
         (["model.obj", "-o", "x.glb", "--texture", "text.ply"], "text.ply is not a readable image"),
-        (["model.obj", "-o", "model.obj"], "is the input and the output"),
-        (["model.obj", "-o", "z.obj", "--report", "model.obj"], "is the input and the report"),
-        (["model.obj", "-o", "z.obj", "--report", "./z.obj"], "is the output and the report"),
+        (["model.obj", "-o", "model.obj"], "is both the input and the output"),
+        (["model.obj", "-o", "z.obj", "--report", "model.obj"], "is both the input and the report"),
+        (["model.obj", "-o", "z.obj", "--report", "./z.obj"], "is both the output and the report"),
         (["model.obj", "--distortion", "few"], "not a valid float"),
         (["model.obj", "--max-cones", "0"], "0 cones of at most 1.5 pi each cannot carry"),
         (["model.obj", "--cones", "magic"], "magic"),
@@ -80,7 +80,7 @@ def test_paper_is_the_published_method(model, tmp_path):
         (["model.obj", "--cones", "1", "--max-cones", "3"], "leave out --max-cones"),
         (["model.obj", "--paper", "--distortion", "1"], "leave out --distortion"),
         (["model.obj", "--magic"], "--magic"),
-        (["model.obj", "--hide-seams", "much"], "'much' is not a strength"),
+        (["model.obj", "--hide-seams", "much"], "'much' is not a number"),
         (["empty.obj"], "empty.obj"),
         (["text.ply"], "text.ply"),
         (["model.xyz"], ".xyz"),
@@ -113,7 +113,7 @@ def test_cones_from_a_file(model, tmp_path):
     for text, message in [
         ("3 pi/2\n50 2pi*0.5\n", "cones.txt, line 2: '50 2pi*0.5'"),
         ("3 pi/2\n50 pi\n", "sum to 4.712389 (1.5 pi)"),
-        ("# nothing\n", "cones.txt holds no cones"),
+        ("# nothing\n", "cones.txt contains no cones"),
     ]:
         done = flatten(text)
         assert done.returncode == 2
@@ -234,7 +234,7 @@ def test_marked_seams(tmp_path):
     assert run("flatten", "box.obj", "-q", "--seams", "pairs.txt", cwd=tmp_path).returncode == 0
     for text, message in (
         ("0 x\n", "line 1: '0 x' is not a pair"),
-        ("# none\n", "holds no pairs"),
+        ("# none\n", "contains no pairs"),
         ("0 25", "0-25"),
     ):
         (tmp_path / "pairs.txt").write_text(text)

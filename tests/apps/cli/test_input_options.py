@@ -172,10 +172,10 @@ class TestOwnUVs:
         if command == "figure":
             pytest.importorskip("matplotlib")
         done = run(command, square, "-o", f"a.{ending}")
-        assert "note: Shown are the UVs that own.obj has; --again" in done.stdout
+        assert "note: The UVs of own.obj are shown; --again" in done.stdout
         done = run(command, square, "-o", f"b.{ending}", "--again")
         assert done.exit_code == 0
-        assert "Shown are" not in done.stdout
+        assert "are shown; --again" not in done.stdout
 
     def test_they_are_those_of_the_file(self, square):
         from coneflat.apps.view.from_uv import own_flattening
@@ -195,7 +195,7 @@ class TestOwnUVs:
 def test_several_meshes_hint_at_batch():
     done = run("flatten", "a.obj", "b.obj", "c.obj")
     assert done.exit_code == 2
-    assert "flatten takes one mesh, and there are 3: `coneflat batch a.obj b.obj ..." in done.output
+    assert "expected one mesh, got 3: `coneflat batch a.obj b.obj ..." in done.output
 
 
 @pytest.mark.parametrize("command", ["view", "figure"])

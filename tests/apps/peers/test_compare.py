@@ -147,7 +147,7 @@ def test_commands(tmp_path, ball):
     [
         (["compare", "missing.obj", "-o", "out"], "there is no such file"),
         (["compare", "ball.obj", "--methods", "exact,"], "unknown method ''"),
-        (["compare", "ball.obj", "--eye", "front"], "pictures need a folder: give -o, or leave out --eye"),
+        (["compare", "ball.obj", "--eye", "front"], "--eye is for pictures: add -o, or leave out --eye"),
         (["compare", "ball.obj", "-o", "out", "--eye", "nowhere"], "unknown eye 'nowhere'"),
         (["compare", "ball.obj", "-o", "busy"], "it is a folder"),
         (["paper", "missing.obj", "-o", "out"], "'missing.obj' matches no mesh"),

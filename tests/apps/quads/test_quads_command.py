@@ -138,7 +138,7 @@ def test_cones_that_are_given(tmp_path):
     apart = np.linalg.norm(mesh.vertices[mesh.irregular][:, None] - vertices[near], axis=2)
     assert (apart.min(axis=0) < 1e-12).all()
     refused = run(path, "--cones", words, "--max-cones", 9)
-    assert "with cones given there is nothing to search: leave out --max-cones" in refused.output
+    assert "there is no search if the cones are given: leave out --max-cones" in refused.output
     for curvatures, what in ((None, "not given"), (1.0, "is 1")):
         cones = near if curvatures is None else dict.fromkeys(near, curvatures)
         with pytest.raises(

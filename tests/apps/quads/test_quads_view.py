@@ -130,7 +130,7 @@ class TestFigures:
         assert (tmp_path / "l.png").stat().st_size > 2000
         done = run("figure", "ball.obj", "--kind", "quads", "--quads", "200", "-o", "ball.png", "--dpi", "50")
         assert done.exit_code == 0, done.output
-        with pytest.raises(OptionError, match="holds quads: leave out --quads"):
+        with pytest.raises(OptionError, match="contains quads already: leave out --quads"):
             run("figure", "l.npz", "--kind", "quads", "--quads", "5")
         coneflat.flatten(*shapes.sphere(2)).save("flat.npz")
         with pytest.raises(MeshFileError, match="holds no mesh of quads"):

@@ -42,7 +42,7 @@ class TestFirstViews:
     @staticmethod
     def answer(session, kind, job, name):
         told = {"head": {"title": name, "arrays": []}, "found": [job], "seconds": {"metric": 1.0}}
-        session._hear({"job": job, kind: told}, name.encode())
+        session._on_message({"job": job, kind: told}, name.encode())
 
     def shown(self, session):
         return (

@@ -68,11 +68,11 @@ class TestRegion:
 
     @pytest.mark.parametrize("text", ["5-3", "a", "-1", "1--2", "1.5", "3,4", 7, None])
     def test_no_region(self, text):
-        with pytest.raises(StudioError, match="a region is written as 3-17 20"):
+        with pytest.raises(StudioError, match="a region must be a text such as 3-17 20"):
             Region.of_text(text)
 
     def test_too_large_a_region_is_not_counted_out(self):
-        with pytest.raises(StudioError, match="are more than the 20,000,000 that may be"):
+        with pytest.raises(StudioError, match="are above the limit of 20,000,000"):
             Region.of_text("0-999999999999")
 
 
@@ -95,9 +95,9 @@ class TestPaint:
     @pytest.mark.parametrize(
         ("layer", "weight", "message"),
         [
-            ("glue", None, "nothing is painted as 'glue'"),
-            ("importance", 0, "an importance is above 0"),
-            ("importance", "much", "an importance is above 0"),
+            ("glue", None, "unknown layer of paint 'glue'"),
+            ("importance", 0, "an importance must be above 0"),
+            ("importance", "much", "an importance must be above 0"),
             ("importance", 1e9, "at most 1,000,000"),
             ("importance", None, "an importance must be a number"),
         ],
@@ -191,5 +191,5 @@ class TestStories:
         assert "units" not in session.state()["choices"]
         with pytest.raises(StudioError, match="unknown unit 'furlong'"):
             session.act({"do": "units", "of_file": "furlong", "shown": ""})
-        with pytest.raises(StudioError, match="say what the file's unit is"):
+        with pytest.raises(StudioError, match="set the unit of the file"):
             session.act({"do": "units", "of_file": "", "shown": "cm"})

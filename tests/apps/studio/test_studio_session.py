@@ -131,7 +131,7 @@ class TestSession:
         os.kill(first, signal.SIGKILL)
         trouble = settled(session)["trouble"]
         assert "was ended by SIGKILL" in trouble["text"]
-        assert "nothing is lost" in trouble["text"]
+        assert "no choices are lost" in trouble["text"]
         session.act({"do": "again"})
         state = settled(session)
         assert state["trouble"] is None
@@ -159,14 +159,14 @@ class TestSession:
         other = tmp_path_factory.mktemp("other")
         shapes.write_obj(other / "secret.obj", *shapes.sphere(1))
         (tmp_path / "link.obj").symlink_to(other / "secret.obj")
-        with pytest.raises(StudioError, match="leads out of the session's folder"):
+        with pytest.raises(StudioError, match="is outside the folder of the session"):
             session.open_named("link.obj")
 
     def test_a_dropped_project_names_no_mesh_elsewhere(self, session, tmp_path_factory, tmp_path):
         other = tmp_path_factory.mktemp("other")
         shapes.write_obj(other / "secret.obj", *shapes.sphere(1))
         Project(other / "secret.obj", file_hash(other / "secret.obj"), Choices()).save(tmp_path / "p.json")
-        with pytest.raises(ProjectError, match="lies outside the session's folder"):
+        with pytest.raises(ProjectError, match="is outside the folder of the session"):
             session.open_named("p.json")
 
 

@@ -50,9 +50,9 @@ class TestPlaces:
         assert misplaced_warning(painted) == ()
         assert misplaced_warning(painted.added(10)) == ()
         (one,) = misplaced_warning(painted.added(9))
-        assert one.startswith("1 cone set by hand or locked lies where none are to be, as painted: vertex 9.")
+        assert one.startswith("1 cone set by hand or locked lies in regions painted as “No cones”: vertex 9.")
         (two,) = misplaced_warning(painted.added(20).added(10).added(3))
-        assert "2 cones set by hand or locked lie where none are to be, as painted: vertices 3, 20." in two
+        assert "2 cones set by hand or locked lie in regions painted as “No cones”: vertices 3, 20." in two
 
     def test_they_are_told_at_once_and_noted(self, session):
         found = settled(session)["found"]
@@ -75,9 +75,9 @@ class TestAngles:
         chosen = Choices().placed([4, 9]).with_angle(9, math.radians(720))
         assert chosen.cones[1].angle == MAX_CONE_ANGLE
         for angle in (0.0, math.radians(721), math.radians(3000), math.inf, math.nan):
-            with pytest.raises(StudioError, match="a positive angle of at most 720 degrees, not"):
+            with pytest.raises(StudioError, match="positive and at most 720 degrees, not"):
                 chosen.with_angle(4, angle)
-            with pytest.raises(StudioError, match="a positive angle of at most 720 degrees, not"):
+            with pytest.raises(StudioError, match="positive and at most 720 degrees, not"):
                 chosen.added(5, angle)
         plain = chosen.as_plain()
         plain["cones"][1]["angle"] = math.radians(3000)
@@ -100,7 +100,7 @@ class TestAngles:
         # 720 - 3 * 140 = 300.
         (warning,) = state["warnings"]
         assert warning.startswith(
-            f"The angles that are typed leave 1 cone none from 90 to 720 degrees: vertex {one} 60."
+            f"With the typed angles, 1 cone cannot have an angle from 90 to 720 degrees: vertex {one} 60."
         )
         assert state["trouble"] is None
 

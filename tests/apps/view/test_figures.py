@@ -71,12 +71,12 @@ class TestFigures:
             (np.eye(2), {}, "unknown kind of figure array"),
             ("curve", {}, "cone_curve"),
             ("cones", {"eyes": "above"}, "unknown eye 'above'"),
-            ("cones", {"eyes": []}, "needs an eye"),
+            ("cones", {"eyes": []}, "at least one direction"),
             ("cones", {"up": "w"}, "not 'w'"),
             ("cones", {"dpi": 0}, "between 10 and 2400"),
             ("cones", {"size": (50, 50)}, "225 million pixels"),
             ("cones", {"size": (-5, 5)}, "-5 by 5 inches"),
-            ("quality", {"size": (2, 1)}, "no room"),
+            ("quality", {"size": (2, 1)}, "too small for the pictures"),
             ("quality", {"colors": "rainbows"}, "no colour map 'rainbows'"),
             ("checker", {"cells": -1}, "must be positive, not -1"),
         ],
@@ -135,11 +135,14 @@ class TestCommand:
             (("ball.obj", "--kind", "magic"), "'magic' is not one of 'layout'"),
             (("ball.obj", "-o", "x.bmp"), "'.bmp', which is not a known format; figures are written as"),
             (("ball.obj", "-o", "none/x.png"), "there is no folder"),
-            (("ball.obj", "--eye", "front"), "--kind layout takes no --eye: only checker"),
-            (("ball.obj", "--kind", "curve", "--color-charts"), "takes no --color-charts"),
+            (("ball.obj", "--eye", "front"), "--eye has no effect with --kind layout, only with checker"),
+            (
+                ("ball.obj", "--kind", "curve", "--color-charts"),
+                "--color-charts has no effect with --kind curve",
+            ),
             (
                 ("ball.obj", "--kind", "curve", "--again"),
-                "only layout, checker, quality, color, cones, curvature do",
+                "only with layout, checker, quality, color, cones, curvature",
             ),
             (("ball.obj", "--kind", "cones", "--eye", "1,2"), "three numbers"),
             (("ball.obj", "--kind", "cones", "--eye", "1,x,2"), "'1,x,2' is not a direction"),
@@ -164,5 +167,5 @@ class TestCommand:
 
 @pytest.mark.parametrize("shown", [None, 3, np.eye(3), "layout"])
 def test_what_is_no_result_has_no_figure(shown):
-    with pytest.raises(OptionError, match="a figure shows what `coneflat.flatten` returns, not"):
+    with pytest.raises(OptionError, match="expected a result of `coneflat.flatten`, got"):
         coneflat.make_figure(shown, "layout")

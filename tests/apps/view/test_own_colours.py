@@ -61,10 +61,10 @@ class TestQuantity:
     @pytest.mark.parametrize(
         ("values", "message"),
         [
-            (np.arange(7), "has 7 numbers, which fits neither the 165 vertices nor the 320 triangles"),
-            (np.zeros((165, 3)), "not of an array of shape"),
+            (np.arange(7), "has 7 numbers, but there are 165 vertices and 320 triangles"),
+            (np.zeros((165, 3)), "got an array of shape"),
             (np.full(165, np.nan), "no finite number"),
-            (np.array(["a"] * 165), "not of an array of shape"),
+            (np.array(["a"] * 165), "got an array of shape"),
         ],
     )
     def test_what_fits_nothing(self, ball, tmp_path, values, message):
@@ -75,9 +75,7 @@ class TestQuantity:
     def test_what_is_not_there(self, ball, tmp_path):
         result = coneflat.flatten(ball)
         np.savez(tmp_path / "m.npz", one=np.zeros(3))
-        with pytest.raises(
-            OptionError, match="no property 'cold' at its vertices to take colours from; it has heat"
-        ):
+        with pytest.raises(OptionError, match="no vertex property 'cold'; it has heat"):
             own_quantity(result, "cold")
         with pytest.raises(OptionError, match="has no array 'two': it has one"):
             own_quantity(result, f"{tmp_path / 'm.npz'}:two")
@@ -107,7 +105,7 @@ class TestCommands:
         done = self.run("figure", ball, "--kind", "color", "-o", tmp_path / "f.svg")
         assert "--kind color needs --color" in done.output
         done = self.run("figure", ball, "--kind", "cones", "--color", "heat", "-o", tmp_path / "f.svg")
-        assert "--kind cones takes no --color" in done.output
+        assert "--color has no effect with --kind cones" in done.output
         done = self.run("figure", ball, "--color", "cold", "-o", tmp_path / "g.png")
-        assert "no property 'cold'" in str(done.exception)
+        assert "no vertex property 'cold'" in str(done.exception)
         assert not (tmp_path / "g.png").exists()

@@ -171,7 +171,7 @@ class TestThinning:
 
     def test_too_few_to_be_had(self, fine):
         with pytest.raises(
-            MeshError, match=r"20,480 triangles are too many for a page of 50: \d+ of them lie along"
+            MeshError, match=r"20,480 triangles cannot be reduced to 50 for display: \d+ of them lie along"
         ):
             content_of(fine, 50)
         with pytest.raises(OptionError, match="at least one triangle, not 0"):
@@ -214,7 +214,7 @@ class TestCommand:
             ((saved, "--texture", "none.png"), "none.png: there is no such file"),
             ((saved, "--show", "heat"), "'heat' is not one of"),
             ((saved, "-o", "page.pdf"), "ends with '.pdf'"),
-            ((saved, "--most-triangles", "9"), "too many for a page of 9"),
+            ((saved, "--most-triangles", "9"), "cannot be reduced to 9 for display"),
             (("none.npz",), "there is no such file"),
         ):
             done = command("view", *arguments, cwd=tmp_path)

@@ -116,7 +116,7 @@ def eye_direction(eye: Eye, up: str = "y") -> FloatArray:
     # The view shows three sides of a box, one of them the top.
     one, two = (sides[word] for word in words)
     if one @ two:
-        raise OptionError(f"the directions {words[0]} and {words[1]} cannot be combined")
+        raise OptionError(f"unknown eye {eye!r}: {words[0]} and {words[1]} cannot be combined")
     return np.asarray(0.75 * one + 0.55 * two + 0.38 * upward * (not (one + two) @ upward))
 
 
