@@ -25,7 +25,7 @@ def visible_share(vertices: FloatArray, faces: IntArray, up: FloatArray | None =
 
     Args:
         vertices, faces: (n, 3), (m, 3) one mesh, or several that occlude one another.
-        up: (3,) the up direction, for models that are mostly seen upright: directions are weighted from 1 for views
+        up: (3,) the up direction of the model: directions are weighted from 1 for views
             from above to 0 for views from below. None: all directions have the same weight.
 
     Raises:

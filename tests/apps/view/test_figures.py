@@ -78,7 +78,7 @@ class TestFigures:
             ("cones", {"size": (-5, 5)}, "-5 by 5 inches"),
             ("quality", {"size": (2, 1)}, "too small for the pictures"),
             ("quality", {"colors": "rainbows"}, "no colour map 'rainbows'"),
-            ("checker", {"cells": -1}, "must be positive, not -1"),
+            ("checker", {"cells": -1}, "must be positive, got -1"),
         ],
     )
     def test_what_makes_no_sense(self, result, kind, look, message):
