@@ -65,7 +65,7 @@ def test_command_refuses_before_the_work(tmp_path, ball):
     path = write_obj(tmp_path / "ball.obj", *ball)
     done = run(path, "--faces", 600, "--size", 0.1)
     assert done.exit_code == 2
-    assert "give one" in done.output
+    assert "leave out one" in done.output
     for words, message in (
         (("-o", tmp_path / "quads.stl"), "quads are written as .obj, .ply, .glb, .npz"),
         (("-o", path), "the input and the output"),

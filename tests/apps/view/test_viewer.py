@@ -174,7 +174,7 @@ class TestThinning:
             MeshError, match=r"20,480 triangles cannot be reduced to 50 for display: \d+ of them lie along"
         ):
             content_of(fine, 50)
-        with pytest.raises(OptionError, match="at least one triangle, not 0"):
+        with pytest.raises(OptionError, match="at least one triangle"):
             content_of(fine, 0)
 
 
