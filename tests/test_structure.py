@@ -38,7 +38,7 @@ CEILINGS = {
     "apps.peers": 1406,
     "apps.quads": 3199,
     "apps.studio": 1699,
-    "apps.view": 1618,
+    "apps.view": 1617,
     "atlas": 1498,
     "base": 356,
     "cone_curve": 108,
@@ -61,7 +61,7 @@ CEILINGS = {
     "stages": 223,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_896, 233, 25_923
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_896, 233, 25_922
 CONSTANTS, KERNELS, NAMES, LEVELS = 300, 111, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -141,7 +141,7 @@ class Session:
         """Replace all choices; plain: as returned by `Choices.as_plain`.
 
         Raises:
-            StudioError: a choice is not valid, or there is no mesh.
+            StudioError: a choice is not valid, or no mesh is open.
             OptionError: an option is not valid, or cannot be combined with others.
         """
         with self._changed:
@@ -156,7 +156,7 @@ class Session:
 
     def _require_mesh(self) -> None:
         if self._mesh is None:
-            raise StudioError("there is no mesh yet: drop one on the page, or run coneflat studio MESH")
+            raise StudioError("no mesh is open: drop one on the page, or run coneflat studio MESH")
 
     def _take_step(self, chosen: Choices, stroke: object) -> None:
         """Take a step if the choices differ."""
@@ -261,7 +261,7 @@ class Session:
         """Return the content of a file of approximately `count` quads; a change of the choices cancels it.
 
         Raises:
-            StudioError: there is no mesh, the format is unknown, or the choices were changed.
+            StudioError: no mesh is open, the format is unknown, or the choices were changed.
             OptionError: the number is not an integer.
         """
         if ending not in QUADS:
@@ -275,7 +275,7 @@ class Session:
         """Return the distortion for each number of cones, see `curve_data`; a change of the choices cancels it.
 
         Raises:
-            StudioError: there is no mesh, or the choices were changed.
+            StudioError: no mesh is open, or the choices were changed.
         """
         with self._changed:
             key = self._sha256, sha256(repr(curve_options(self._history.now)).encode()).hexdigest()
@@ -299,7 +299,7 @@ class Session:
             head, body = self._answers[number]
             del self._answers[number]
         if "given_up" in head:
-            raise StudioError("the choices were changed meanwhile: try again")
+            raise StudioError("the choices have changed: try again")
         if "done" not in head:
             raise StudioError(head.get("error", "this took too long"))
         return head["done"], body

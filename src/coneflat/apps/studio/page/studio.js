@@ -2,7 +2,7 @@
 
 const FAINT = 0.45; // Opacity of paint when no brush is used.
 const RETRY = 1500; // Milliseconds before a request is repeated if the server does not respond.
-const NOTHING = {options: {}, by_hand: false, cones: [], cuts: [], kept: []}; // Also paint, corners and units, if any.
+const NO_CHOICES = {options: {}, by_hand: false, cones: [], cuts: [], kept: []}; // Also paint, corners and units, if any.
 const STEP = 1.25; // Factor by which a key changes the size of the brush.
 
 class Studio {
@@ -264,7 +264,7 @@ class Studio {
   // Queries.
 
   get choices() {
-    return this.news?.choices ?? NOTHING;
+    return this.news?.choices ?? NO_CHOICES;
   }
 
   hasBoundary() {
@@ -388,7 +388,7 @@ class Studio {
   }
 }
 
-/** A rejected layout no longer exists, because another mesh was opened meanwhile; an update follows. */
+/** A rejected layout no longer exists, because another mesh has been opened; an update follows. */
 function orNone(error) {
   if (error instanceof Refusal) return null;
   throw error;

@@ -8,7 +8,7 @@ const TOOLS = [
   ["keep", "Keep whole", "k", "Click points: the shortest paths between them are not cut. Esc, or Keep whole again, ends the path."],
   ["corner", "Corner", "o", "Click four points of the boundary: the corners of a rectangle. Click a corner to remove it."],
 ];
-const NEAR = 12; // Pick radius of a click in pixels.
+const PICK_RADIUS = 12; // Pick radius of a click in pixels.
 
 const BARE = {get: () => false}; // A state in which only triangles are drawn and picked.
 
@@ -71,7 +71,7 @@ class Tools {
   boundaryVertexAt(pane, x, y) {
     const {studio} = this, {model} = studio.viewer, boundary = studio.boundaryVertices();
     const off = (vertex) => Math.min(...studio.overlay.places(pane, vertex).map(([px, py]) => Math.hypot(px - x, py - y)));
-    const picked = studio.verticesOf(studio.choices.corners ?? []).find((vertex) => off(vertex) <= NEAR);
+    const picked = studio.verticesOf(studio.choices.corners ?? []).find((vertex) => off(vertex) <= PICK_RADIUS);
     if (picked !== undefined) return picked;
     const nearest = this.vertexAt(pane, x, y);
     if (nearest === null || pane.inPlane) return leastOf(boundary, off);

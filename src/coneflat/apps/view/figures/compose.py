@@ -38,7 +38,7 @@ class Inches:
 class Points:
     """Sizes of text, in points."""
 
-    TITLE, LABEL, SMALL = 10.0, 8.5, 7.5
+    TITLE, LABEL, NOTES = 10.0, 8.5, 7.5
 
 
 TEXT_COLOR = "#333333"
@@ -140,7 +140,7 @@ def compose(
             _draw_row(figure, row, top, height)
             top -= Inches.GAP
     if marks:
-        look = {"frameon": False, "fontsize": Points.SMALL, "labelcolor": TEXT_COLOR, "borderpad": 0.4}
+        look = {"frameon": False, "fontsize": Points.NOTES, "labelcolor": TEXT_COLOR, "borderpad": 0.4}
         look |= {
             "loc": "lower left",
             "bbox_to_anchor": (0.0, 0.0),
@@ -199,7 +199,7 @@ def _draw_card(figure: Figure, quantity: Quantity, left: float, floor: float, he
     )
     for k, (name, percent) in enumerate(lines):
         y = top - Inches.LABEL - graph - Inches.TICKS - k * Inches.LINE
-        write = partial(_write, figure, y=y, size=Points.SMALL, va="top")
+        write = partial(_write, figure, y=y, size=Points.NOTES, va="top")
         write(left, text=name)
         write(left + Inches.CARD - 0.05, text=quantity.text(percent), ha="right")
 
@@ -220,7 +220,7 @@ def draw_histogram(axes: Axes, quantity: Quantity) -> None:
     axes.set_yticks([])
     at = quantity.scale.position(np.array([value for value, _ in quantity.scale.ticks]))
     axes.set_xticks(at.tolist(), [text for _, text in quantity.scale.ticks])
-    axes.tick_params(labelsize=Points.SMALL, width=0.5, length=2.0, pad=1.5, colors=TEXT_COLOR)
+    axes.tick_params(labelsize=Points.NOTES, width=0.5, length=2.0, pad=1.5, colors=TEXT_COLOR)
     for spine in axes.spines.values():
         spine.set_visible(False)
 
@@ -250,7 +250,7 @@ def text_width(text: str, size: float = Points.LABEL) -> float:
 
 def _legend_width(marks: Sequence[Any]) -> float:
     """Return the approximate width of a legend of marks in inches."""
-    return sum(0.45 + text_width(str(mark.get_label()), Points.SMALL) for mark in marks)
+    return sum(0.45 + text_width(str(mark.get_label()), Points.NOTES) for mark in marks)
 
 
 def new_figure(width: float, height: float, dpi: float = 150) -> Figure:

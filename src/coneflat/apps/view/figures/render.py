@@ -141,9 +141,8 @@ SUPERSAMPLING = 2
 """Samples per pixel along each axis; two give smooth outlines at print resolution."""
 
 DEPTH_TOLERANCE = 0.008
-"""Depth by which a visible point may lie behind the surface at its pixel, as a fraction of the longer side.
-
-Seams run along edges, where the centre of a pixel may be on a face that is slightly nearer."""
+"""Depth by which a visible point may lie behind the surface at its pixel, as a fraction of the longer side. Seams run
+along edges, where the centre of a pixel may be on a face that is slightly nearer."""
 
 
 @dataclass(frozen=True, eq=False)

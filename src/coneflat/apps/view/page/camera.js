@@ -152,7 +152,7 @@ function glide(camera, turn, pan) {
   const start = performance.now(), last = still ? 1 : 350;
   const version = {now: camera.version};
   const step = () => {
-    if (camera.version !== version.now) return; // The user has moved the camera meanwhile.
+    if (camera.version !== version.now) return; // The user has moved the camera during the animation.
     const part = Math.min((performance.now() - start) / last, 1), eased = part * part * (3 - 2 * part);
     camera.turn = part < 1 ? straightened(product(rotation(axis, angle * eased), from.turn)) : turn;
     camera.pan = [0, 1].map((k) => from.pan[k] + eased * (pan[k] - from.pan[k]));

@@ -1,7 +1,7 @@
 // The hovered and the picked thing, drawn over both views; dashed if hidden.
 
 const RING = 11; // pixels
-const SMALL = 14; // Pixels; smaller things are marked by a ring.
+const RING_SIZE = 14; // Pixels; smaller things are marked by a ring.
 const IN_FRONT = 0.03; // Model radii; a triangle hides a thing if it is nearer by at least this distance.
 const UNSEEN = "rgba(0, 0, 0, 0.01)";
 
@@ -51,14 +51,14 @@ class Marks {
       const path = new Path2D();
       places.forEach(([x, y], i) => (i ? path.lineTo(x, y) : path.moveTo(x, y)));
       if (thing.kind === "triangle") path.closePath();
-      if (span < SMALL) {
+      if (span < RING_SIZE) {
         const [x, y] = middleOf(places);
         path.moveTo(x + RING, y);
         path.arc(x, y, RING, 0, 2 * Math.PI);
       }
       pen.lineJoin = pen.lineCap = "round";
       pen.setLineDash(seen ? [] : [4, 5]);
-      if (thing.kind === "triangle" && seen && span >= SMALL) {
+      if (thing.kind === "triangle" && seen && span >= RING_SIZE) {
         pen.fillStyle = ink + (strong ? "55" : "33");
         pen.fill(path);
       }
