@@ -3,6 +3,7 @@ from __future__ import annotations
 import doctest
 import subprocess
 import sys
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -40,6 +41,7 @@ def test_kernels_compiled_ahead_are_all_that_flattening_needs(tmp_path):
     np.savez(tmp_path / "mesh.npz", vertices=vertices, faces=faces)
     script = """
 import sys
+from importlib import import_module
 import numpy
 from numba.core import event
 import coneflat
@@ -70,6 +72,7 @@ def test_flattening_a_file_loads_no_more_than_it_uses(tmp_path):
     """Outside a terminal there are no tables of rich, and nothing searches for near points."""
     script = """
 import sys
+from importlib import import_module
 from coneflat.apps.cli.main import cli
 cli.main(["flatten", sys.argv[1], "-o", sys.argv[2]], standalone_mode=False)
 print(*sys.modules)
@@ -93,6 +96,7 @@ def count(nodes, tails, heads):
 """)
     script = """
 import sys
+from importlib import import_module
 import numpy as np
 from counting import count, label_nodes
 pairs = np.array([0, 3]), np.array([1, 4])
@@ -132,3 +136,26 @@ def test_examples_of_public_names_run(name, tmp_path, monkeypatch):
         runner.run(test, out=printed.append)
     assert "".join(printed) == ""
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda result: coneflat.quads(coneflat.sample_path(), quads=set()),
+        lambda result: coneflat.quads(coneflat.sample_path(), quads=300, smooth=2.5),
+        lambda result: coneflat.integer_grid(result, stretch="x"),
+        lambda result: result.as_written(np.array([])),
+        lambda result: coneflat.measure_uv(1j, 2, 3),
+        lambda result: coneflat.measure_uv(result.vertices, result.faces, 1j),
+        lambda result: import_module("coneflat.geometry").find_overlaps(
+            result.uv, result.uv_faces, limit="x"
+        ),
+        lambda result: import_module("coneflat.layout.relax").StretchEnergy("x"),
+        lambda result: import_module("coneflat.layout.relax").StretchEnergy(0.0, [1]),
+    ],
+)
+def test_values_of_a_wrong_type_are_errors_of_the_package(call):
+    vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
+    result = coneflat.flatten(vertices, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
+    with pytest.raises(coneflat.ConeflatError, match="must be|has the shape|number"):
+        call(result)

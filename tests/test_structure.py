@@ -36,7 +36,7 @@ CEILINGS = {
     "apps.cli": 1506,
     "apps.measure_uv": 161,
     "apps.peers": 1406,
-    "apps.quads": 3199,
+    "apps.quads": 3201,
     "apps.studio": 1699,
     "apps.view": 1617,
     "atlas": 1498,
@@ -46,9 +46,9 @@ CEILINGS = {
     "evaluate": 194,
     "flatten": 210,
     "flattener": 35,
-    "geometry": 1598,
-    "io": 2806,
-    "layout": 2250,
+    "geometry": 1599,
+    "io": 2805,
+    "layout": 2251,
     "linalg": 468,
     "measure": 850,
     "mesh": 715,
@@ -61,7 +61,7 @@ CEILINGS = {
     "stages": 223,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_896, 233, 25_922
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_897, 233, 25_925
 CONSTANTS, KERNELS, NAMES, LEVELS = 300, 111, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -28,7 +28,7 @@ SENTENCES = {
     "collapsed": r"There (is|are) ([\d,]+ flipped triangles? and )?[\d,]+ degenerate triangles? in the plane",
     "overlap": r"[\d,]+ pairs? of triangles overlaps? in the atlas",
     "angles": r"Around [\d,]+ (vertex|vertices) the angle sum differs from its target",
-    "sides": r"The two sides of seams differ in length",
+    "sides": r"The two sides of seams differ in length|.* no seam or cone is exact",
     "lengths": r"Lengths along the boundary are not preserved",
     "round": r"The boundary is not quite round",
     "rotations": r"Seam rotations are .* rad off multiples of [\d.e+-]+ rad",

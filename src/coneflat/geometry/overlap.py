@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Integral
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -73,8 +74,8 @@ def find_overlaps(
         angles there, in the same time. Large numbers of other long triangles in many directions, whose boxes all
         overlap, take longer.
     """
-    if limit is not None and limit < 1:
-        raise OptionError(f"the limit must be 1 or more, not {limit}")
+    if limit is not None and not (isinstance(limit, Integral) and limit >= 1):
+        raise OptionError(f"the limit must be an integer, 1 or more, not {limit!r}")
     corners, exponent = _at_unit_size(_corners(points, triangles))
     oriented, signs = _counterclockwise(corners)
     return _overlaps(oriented, exponent, np.flatnonzero(signs), limit)

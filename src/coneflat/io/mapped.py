@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces
+from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats
 from ..errors import ArrayShapeError, MissingUVError
 from ..mesh.polygons import fan_corners
 from .join import Joined
@@ -123,14 +123,11 @@ def _of_result(result: Flattening) -> Mapped:
 
 def _of_arrays(vertices: ArrayLike, faces: ArrayLike, corner_uv: ArrayLike | None) -> Mapped:
     given = as_input(vertices, faces)
-    points = np.asarray(given.vertices, dtype=np.float64)
+    points = as_floats("vertices", given.vertices)
     triangles = as_faces(given.faces, len(points))
     if corner_uv is None:
         raise MissingUVError("vertices and faces alone have no UV coordinates: give corner_uv as well")
-    try:
-        uv = np.asarray(corner_uv, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ArrayShapeError(f"corner_uv must be an array of numbers: {error}") from error
+    uv = as_floats("corner_uv", corner_uv)
     if uv.shape != (*triangles.shape, 2):
         raise ArrayShapeError(f"corner_uv must have the shape {(*triangles.shape, 2)}, got {uv.shape}")
     without = np.isnan(uv).all(axis=2)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..atlas.touch import round_safely
 from ..base.arrays import FloatArray, IntArray
-from ..base.text import plural
+from ..base.text import plural, shown
 from ..errors import MeshFileError, OptionError, UnknownFormatError
 from ..measure.guarantees import DOUBLE, SINGLE, remeasured
 from ..mesh.polygons import polygon_of
@@ -151,6 +151,8 @@ def as_written(result: Flattening, ending: str) -> Flattening:
     Raises:
         MeshFileError: numbers are out of range for the format.
     """
+    if not isinstance(ending, str):
+        raise OptionError(f"ending must be text such as .glb, not {shown(ending)}")
     stored, lost = result, left_out(result, ending)
     if ending == ".glb":
         stored = _in_single_precision(result)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -81,7 +82,7 @@ def integer_grid(
     wanted, name = (size, "size") if size is not None else (QUADS if quads is None else quads, "quads")
     if quads is not None and size is not None:
         raise OptionError("quads and size must not be given together")
-    if not (np.isfinite(wanted) and wanted > 0):
+    if not (isinstance(wanted, Real) and 0 < wanted < np.inf):
         raise OptionError(f"{name} must be a positive number, not {wanted!r}")
     progress = options.pop("progress", None)
     stages = Stopwatch(progress)

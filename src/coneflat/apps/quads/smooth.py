@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from numbers import Integral
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -41,8 +42,8 @@ def smooth_quads(quads: QuadMesh, rounds: int = ROUNDS, features: ArrayLike = ()
         S. Bouaziz, M. Deuss, Y. Schwartzburg, T. Weise, M. Pauly, "Shape-Up: shaping discrete geometry with
         projections", 2012, Section 4.
     """
-    if rounds < 0:
-        raise OptionError(f"rounds of smoothing must be 0 or more, not {rounds}")
+    if not isinstance(rounds, Integral) or rounds < 0:
+        raise OptionError(f"rounds of smoothing must be an integer, 0 or more, not {rounds!r}")
     movable = ~(
         quads.is_boundary_vertex | _is_on_feature(quads, np.asarray(features, dtype=np.int64).reshape(-1, 2))
     )

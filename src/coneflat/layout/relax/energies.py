@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from numbers import Real
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -66,9 +67,9 @@ class StretchEnergy:
     sharpness: float = 1.0
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.stretch) and self.stretch >= 0):
+        if not (isinstance(self.stretch, Real) and np.isfinite(self.stretch) and self.stretch >= 0):
             raise OptionError(f"stretch must be a number from 0, got {self.stretch!r}")
-        if not (np.isfinite(self.sharpness) and self.sharpness >= 1):
+        if not (isinstance(self.sharpness, Real) and np.isfinite(self.sharpness) and self.sharpness >= 1):
             raise OptionError(f"sharpness must be a number from 1, got {self.sharpness!r}")
 
     @property
