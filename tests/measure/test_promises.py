@@ -166,3 +166,13 @@ def test_a_round_boundary_that_is_none_is_told():
     point = result.uv_faces[np.isin(result.faces, np.flatnonzero(rim))][0]
     uv[point] += 0.3 * (uv.mean(axis=0) - uv[point])
     assert any("not quite round: at vertex" in note for note in broken_promises(spoiled(result, uv)))
+
+
+def test_needles_are_named():
+    vertices, faces = shapes.sphere(2)
+    one, two, _ = faces[0]
+    vertices = vertices.copy()
+    vertices[one] = vertices[two] + 1e-8 * (vertices[one] - vertices[two])
+    result = flatten(vertices, faces, relax="off")
+    assert result.distortion.qc_max > 1000
+    assert any(note.startswith("2 triangles with a QC distortion above 1000: 0, 4") for note in result.notes)
