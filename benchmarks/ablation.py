@@ -20,8 +20,8 @@ from typing import Any
 from same import BASES, DEFORMATIONS, MODELS, deformed
 
 from coneflat.base.progress import Stopwatch
-from coneflat.base.threads import using_threads
-from coneflat.cones import only_choice, open_search
+from coneflat.base.threads import limit_threads
+from coneflat.cones import coneless_solution, open_search
 from coneflat.cones.sparse import aggregation, dense_model, exact_model, linear_model
 from coneflat.cones.sparse import search as cone_search
 from coneflat.io import as_input
@@ -120,13 +120,13 @@ def main() -> None:
     for case, given in cases():
         if any(word in case for word in skipped):
             continue
-        with using_threads():
+        with limit_threads():
             mesh, faces = given if len(given) == 2 else (given[0], None)
             part = max(Source(as_input(mesh, faces)).prepared(options).parts, key=lambda e: len(e.faces))
             if not arguments.smallest <= len(part.mesh.faces) <= arguments.largest:
                 continue
             surface = Surface.of(part.mesh, part.lengths)
-            if only_choice(surface, part.cones) is not None:
+            if coneless_solution(surface, part.cones) is not None:
                 continue
             operators: list[Any] = []
             coarse: list[Any] = []

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from common import chromium, model
 
-from coneflat.apps.studio.serve import listening
+from coneflat.apps.studio.serve import open_listener
 from coneflat.apps.studio.server import StudioServer
 from coneflat.apps.studio.session import Session
 
@@ -87,7 +87,7 @@ def measure(browser: object, name: str, splits: int, count: int, folder: Path) -
         stream.writelines(f"{x!r} {y!r} {z!r}\n" for x, y, z in vertices.tolist())
         stream.writelines(f"3 {a} {b} {c}\n" for a, b, c in faces.tolist())
     session = Session(folder)
-    with listening(0) as listener:
+    with open_listener(0) as listener:
         port = listener.getsockname()[1]
         server = StudioServer(session, "token", port)
         thread = threading.Thread(target=server.run, args=([listener],), daemon=True)

@@ -14,7 +14,7 @@ import coneflat
 pytest.importorskip("uvicorn", reason="the extra studio is not installed")
 pytest.importorskip("starlette", reason="the extra studio is not installed")
 
-from coneflat.apps.studio.serve import HOST, listening
+from coneflat.apps.studio.serve import HOST, open_listener
 from coneflat.apps.studio.server import StudioServer
 from coneflat.apps.studio.session import Session
 
@@ -26,7 +26,7 @@ class Studio:
 
     def __init__(self, folder, **options):
         self.session = Session(folder, **options)
-        listener = listening(0)
+        listener = open_listener(0)
         port = listener.getsockname()[1]
         self.address = f"http://{HOST}:{port}/?token={TOKEN}"
         self.server = StudioServer(self.session, TOKEN, port)

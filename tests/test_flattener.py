@@ -10,7 +10,7 @@ import shapes
 
 import coneflat
 from coneflat import errors
-from coneflat.base.progress import asking
+from coneflat.base.progress import cancel_with
 from coneflat.cones.sparse import green
 from coneflat.linalg import factorize
 from coneflat.mesh.connectivity import label_faces
@@ -130,7 +130,7 @@ def test_what_is_given_up_leaves_nothing_behind(how, step):
             if how == "told":
                 flattener.flatten(**options, progress=interrupt)
             else:
-                with asking(interrupt):
+                with cancel_with(interrupt):
                     flattener.flatten(**options)
         except Enough:
             interrupted += 1

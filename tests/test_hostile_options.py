@@ -11,7 +11,7 @@ import shapes
 
 import coneflat
 from coneflat import errors
-from coneflat.base.defaults import LEAST_QUANTUM
+from coneflat.base.defaults import MIN_QUANTUM
 from coneflat.io import as_input
 from coneflat.seams import find_seams
 
@@ -112,7 +112,7 @@ def test_costs_of_seams_that_overflow_when_summed():
             find_seams(mesh, cones, bad)
 
 
-@pytest.mark.parametrize("quantum", [1e-20, 1e-300, LEAST_QUANTUM / 2, math.inf, -1.0, 7.0])
+@pytest.mark.parametrize("quantum", [1e-20, 1e-300, MIN_QUANTUM / 2, math.inf, -1.0, 7.0])
 def test_a_quantum_outside_its_bounds_is_refused_with_them(quantum):
     with pytest.raises(errors.OptionError, match="quantise must be from 0.0001 radians"):
         coneflat.flatten(*shapes.sphere(1), quantise=quantum)

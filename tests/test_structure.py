@@ -36,9 +36,9 @@ CEILINGS = {
     "apps.cli": 1506,
     "apps.measure_uv": 161,
     "apps.peers": 1406,
-    "apps.quads": 3201,
-    "apps.studio": 1699,
-    "apps.view": 1617,
+    "apps.quads": 3203,
+    "apps.studio": 1704,
+    "apps.view": 1624,
     "atlas": 1498,
     "base": 356,
     "cone_curve": 108,
@@ -52,7 +52,7 @@ CEILINGS = {
     "linalg": 468,
     "measure": 850,
     "mesh": 715,
-    "metric": 998,
+    "metric": 1004,
     "options": 549,
     "result": 96,
     "sample": 5,
@@ -61,7 +61,7 @@ CEILINGS = {
     "stages": 223,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_897, 233, 25_925
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_903, 233, 25_945
 CONSTANTS, KERNELS, NAMES, LEVELS = 300, 111, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -16,7 +16,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 from screenshots import NARROW
 
-from coneflat.apps.studio.serve import listening
+from coneflat.apps.studio.serve import open_listener
 from coneflat.apps.studio.server import StudioServer
 from coneflat.apps.studio.session import Session
 
@@ -76,7 +76,7 @@ class StudioPage(NamedTuple):
 @contextmanager
 def studio_page(mesh: Path, **context: Any) -> Iterator[StudioPage]:
     """Open a mesh in the studio; context: options of the browser context."""
-    with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver, listening(0) as listener:
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver, open_listener(0) as listener:
         session, port = Session(Path(folder)), listener.getsockname()[1]
         server = StudioServer(session, "token", port)
         serving = threading.Thread(target=server.run, args=([listener],))

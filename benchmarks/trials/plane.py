@@ -75,6 +75,6 @@ def overlap_depths(corners: np.ndarray) -> np.ndarray:
     return depth
 
 
-def off_multiple(angle: np.ndarray, quantum: float) -> np.ndarray:
+def difference_from_multiple(angle: np.ndarray, quantum: float) -> np.ndarray:
     """Return the differences of angles from the nearest multiples of a quantum."""
     return np.abs(angle - quantum * np.round(angle / quantum))

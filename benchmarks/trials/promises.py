@@ -242,7 +242,7 @@ def _check_boundary_turns(trial: Trial) -> None:
         if off.any() and quantum is None:
             trial.broken("angles", "boundary not straight", f"{off.sum()} vertices")
         if quantum is not None:
-            off = plane.off_multiple(curvature, quantum) - slack
+            off = plane.difference_from_multiple(curvature, quantum) - slack
             if (off[topology.is_border] > 0).any():
                 trial.broken(
                     "angles", "corners are no multiples", f"by {off[topology.is_border].max():.3g} rad"
@@ -293,7 +293,7 @@ def _check_rotations(trial: Trial) -> None:
         turn = np.angle(-steps[there] / steps[here])
     slack = ANGLE + 16 * EPS / np.maximum(lengths, EPS)
     known = lengths > 1e-12
-    off = plane.off_multiple(turn[known], quantum)
+    off = plane.difference_from_multiple(turn[known], quantum)
     worst = float(off.max(initial=0.0))
     told = None if trial.result.rotations is None else trial.result.rotations.worst
     rounding = 2 * slack[known].max(initial=0.0)
@@ -353,8 +353,12 @@ def _check_cones(trial: Trial) -> None:
     if options.get("positive_only") and (curvatures < -ANGLE).any():
         trial.breach("cones: negative", curvatures.min())
     quantum = options.get("quantise")
-    if quantum is not None and len(cones) and plane.off_multiple(curvatures, quantum).max() > ANGLE:
-        trial.breach("cones: no multiples", plane.off_multiple(curvatures, quantum).max())
+    if (
+        quantum is not None
+        and len(cones)
+        and plane.difference_from_multiple(curvatures, quantum).max() > ANGLE
+    ):
+        trial.breach("cones: no multiples", plane.difference_from_multiple(curvatures, quantum).max())
 
 
 def _check_area(trial: Trial) -> None:

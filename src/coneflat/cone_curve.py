@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from .base.arrays import FloatArray, IntArray
 from .base.progress import Stopwatch
-from .base.threads import using_threads
-from .cones import only_choice, open_search
+from .base.threads import limit_threads
+from .cones import coneless_solution, open_search
 from .errors import OptionError
 from .geometry import double_areas
 from .geometry.operators import area_distortion, weighted_areas
@@ -131,7 +131,7 @@ def find_cones(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Fou
     parsed = read_options(options, FindOptions)
     chosen = Options(**vars(parsed))
     stages = Stopwatch(chosen.progress)
-    with using_threads():
+    with limit_threads():
         part = _largest(mesh, faces, chosen, stages)
         search = _open(part, stages)
         if isinstance(search, FoundCones):
@@ -174,7 +174,7 @@ def cone_curve(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Con
     parsed = read_options(options, CurveOptions)
     chosen = Options(**{name: value for name, value in vars(parsed).items() if name != "most"})
     stages = Stopwatch(chosen.progress)
-    with using_threads():
+    with limit_threads():
         return _curve(_largest(mesh, faces, chosen, stages), parsed.most, stages)[0]
 
 
@@ -193,14 +193,14 @@ def whole_curve(mesh: Any, faces: ArrayLike | None, options: Options, most: int)
         ConeflatError: as for `coneflat.flatten`.
     """
     stages = Stopwatch(options.progress)
-    with using_threads(options.threads):
+    with limit_threads(options.threads):
         with stages("check"):
             parts = Source(as_input(mesh, faces)).prepared(options).parts
         total, curves = sum(len(part.faces) for part in parts), []
         for part in parts:
             stages.share = len(part.faces) / total
             curves.append(_curve(part, most, stages))
-            stages.end_part()
+            stages.end_component()
     least = max(curve.counts[0] for curve, _ in curves)
     counts = np.unique(np.concatenate([[least], *(curve.counts for curve, _ in curves)]))
     counts = counts[counts >= least]
@@ -234,7 +234,7 @@ def _curve(part: Part, most: int, stages: Stopwatch) -> tuple[ConeCurve, float]:
 def _open(part: Part, stages: Stopwatch) -> ConeSearch | FoundCones:
     """Return a cone search on a component, or the only possible set of cones if there is nothing to search."""
     surface = Surface.of(part.mesh, part.lengths)
-    only = only_choice(surface, part.cones)
+    only = coneless_solution(surface, part.cones)
     if only is not None:
         share = weighted_areas(surface.areas, part.cones.weights)
         return _found_cones(only, area_distortion(only.log_scale, share), part)

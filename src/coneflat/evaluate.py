@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .atlas import arrange_charts, part_touching
+from .atlas import arrange_charts, separate_touching
 from .base.arrays import FloatArray, IntArray, rows_of
 from .base.progress import Stopwatch
 from .geometry.overlap import Overlaps
 from .measure.distortion import Distortion, curvature_errors, measure
-from .measure.guarantees import broken_promises
+from .measure.guarantees import unmet_guarantees
 from .measure.seam_data import Rotations, measure_rotations
 from .mesh.connectivity import TriangleMesh
 from .options import Options, settings
@@ -75,7 +75,7 @@ class _Triangles:
 
 
 @dataclass(frozen=True, eq=False)
-class _Layout:
+class _Packed:
     """The charts in the unit square.
 
     Attributes:
@@ -171,7 +171,7 @@ def evaluate(
         source=source,
         lengths=None if prepared.own_lengths is None else np.ldexp(prepared.own_lengths, -checked.exponent),
     )
-    return replace(result, notes=(*result.notes, *broken_promises(result)))
+    return replace(result, notes=(*result.notes, *unmet_guarantees(result)))
 
 
 def _number_vertices(prepared: Prepared) -> _Numbering:
@@ -199,7 +199,7 @@ def _pack(
     positions: FloatArray,
     mesh: TriangleMesh,
     options: Options,
-) -> _Layout:
+) -> _Packed:
     """Return the packed charts of all components."""
     points, own, chart, component = _all_charts(layouts)
     corners = triangles.sorted(own)
@@ -218,7 +218,7 @@ def _pack(
     uv = np.empty_like(points)
     # Assigning both coordinates as one complex number is several times as fast in NumPy.
     uv.view(np.complex128)[:, 0][corners] = packed.corner_uv.view(np.complex128)[..., 0]
-    return _Layout(uv, corners, own, packed.scale, packed.efficiency)
+    return _Packed(uv, corners, own, packed.scale, packed.efficiency)
 
 
 def _curvature(prepared: Prepared, layouts: Sequence[Layout], numbering: _Numbering) -> _Curvature:
@@ -233,12 +233,12 @@ def _curvature(prepared: Prepared, layouts: Sequence[Layout], numbering: _Number
 def _measure(
     prepared: Prepared,
     mesh: TriangleMesh,
-    layout: _Layout,
+    layout: _Packed,
     curvature: _Curvature,
     cones: IntArray,
     options: Options,
     overlaps: Overlaps | None,
-) -> tuple[_Layout, Distortion]:
+) -> tuple[_Packed, Distortion]:
     """Return the layout and its measures; in an atlas, triangles that overlap by rounding alone are separated."""
     residual = curvature.residual
     measured = partial(
@@ -251,7 +251,7 @@ def _measure(
     )
     distortion = measured(rows_of(layout.uv, layout.corners), overlaps=overlaps)
     if options.charts == "atlas" and distortion.overlapping_pairs:
-        separated, left = part_touching(layout.uv, layout.corners)
+        separated, left = separate_touching(layout.uv, layout.corners)
         if len(left.pairs) < distortion.overlapping_pairs:
             return replace(layout, uv=separated), measured(separated[layout.corners], overlaps=left)
     return layout, distortion

@@ -15,16 +15,16 @@ from .atlas import separate_overlaps
 from .base.arrays import FloatArray, IntArray
 from .base.progress import Stopwatch
 from .base.text import plural
-from .base.threads import concurrently, using_threads
+from .base.threads import concurrently, limit_threads
 from .cones import close_search, find_cones, uses_sparse_search
 from .errors import CurvatureError, MetricError, SeamError
 from .evaluate import evaluate
 from .geometry import double_areas
 from .geometry.operators import area_distortion, weighted_areas
-from .geometry.overlap import NOT_LOOKED_FOR
+from .geometry.overlap import UNKNOWN_OVERLAPS
 from .geometry.planar import signed_double_areas
 from .io.packages import as_input
-from .layout import free_seams, lay_out, relax_layouts
+from .layout import lay_out, relax_layouts, untangle_seams
 from .mesh.connectivity import TriangleMesh
 from .metric import find_metric, loop_rotations
 from .options import Options, read_options, takes
@@ -136,13 +136,13 @@ def flatten_source(
         prepared = source.prepared(o)
     relax = RelaxSpec(o.relax if o.method == "exact" else "off", o.stretch)
     method = Method(relax, o.charts == "atlas", o.quantise, watch, surface_of, find_metric)
-    with using_threads(o.threads):
+    with limit_threads(o.threads):
         copies = find_copies(prepared.parts)
         originals = {i: part for i, part in enumerate(prepared.parts) if copies[i] is None}
         layouts = lay_out_parts(originals, method)
         if on_preview is not None:
             preview = _with_copies(layouts, prepared.parts, copies)
-            on_preview(evaluate(prepared, preview, replace(o, charts="one"), Stopwatch(), NOT_LOOKED_FOR))
+            on_preview(evaluate(prepared, preview, replace(o, charts="one"), Stopwatch(), UNKNOWN_OVERLAPS))
         finished = finish_within_bound(originals, layouts, method)
         # Notes contain vertex indices, so copies of parts with notes are computed, too.
         noted = {i: prepared.parts[i] for i, copy in enumerate(copies) if copy and finished[copy.first].notes}
@@ -214,7 +214,7 @@ def finish_parts(
         watch.share = 0.0
         with watch("relax"):
             weights = [parts[i].cones.weights for i in group]
-            relaxed = relax_layouts([layouts[i] for i in group], weights, method.relax, watch.tell)
+            relaxed = relax_layouts([layouts[i] for i in group], weights, method.relax, watch.report)
         for i, layout in zip(group, relaxed, strict=True):
             with _at(parts[i], parts, watch, FINISHING):
                 finished[i] = finish_part(parts[i], layout, method)
@@ -226,7 +226,7 @@ def finish_part(part: Part, layout: Layout, method: Method) -> Layout:
     if part.is_exact:
         with method.watch("relax", 0.2):
             names, stretch = part.cones.names, method.relax.stretch
-            layout = free_seams(layout, part.cones.weights, names, stretch, method.quantum)
+            layout = untangle_seams(layout, part.cones.weights, names, stretch, method.quantum)
         layout = layout.with_notes(*_infeasible_notes(layout, part))
     if method.separates:
         with method.watch("atlas", 1.0):
@@ -337,4 +337,4 @@ def _at(part: Part, parts: Mapping[int, Part], watch: Stopwatch, portion: float)
         if len(parts) == 1:
             raise
         raise type(error)(f"{part.where}: {error}") from error
-    watch.end_part()
+    watch.end_component()

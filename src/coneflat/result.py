@@ -207,14 +207,14 @@ class Flattening:
             ArrayShapeError, MeshError: there are no UVs, or the mesh cannot be simplified to so few triangles.
             UnknownFormatError, MeshFileError: a file cannot be read or written.
         """
-        from .apps.view import check_page, open_page, page_of, write_page
+        from .apps.view import check_page, open_page, page_html, write_page
         from .options.declared import MOST_TRIANGLES
 
         if path is not None:
             check_page(path)
         most = MOST_TRIANGLES if most_triangles is None else most_triangles
         page = write_page(
-            page_of(self, texture=texture, up=up, show=show, most_triangles=most, color=color), path
+            page_html(self, texture=texture, up=up, show=show, most_triangles=most, color=color), path
         )
         if path is None:
             open_page(page)

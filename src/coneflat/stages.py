@@ -165,7 +165,7 @@ class RelaxSpec:
     stretch: float
 
     @property
-    def is_whole(self) -> bool:
+    def relaxes_all(self) -> bool:
         """Whether all triangles are relaxed."""
         return self.stretch > 0 or self.extent == "whole"
 
@@ -380,14 +380,14 @@ class FlatMetric:
         target: (n,) prescribed curvature, or the resulting curvature where the scale was prescribed; radians.
         log_scale: (n,) phi; flat lengths are about l * exp(phi).
         is_open: (n,) vertices whose curvature is not prescribed.
-        is_held: (n,) boundary vertices that a layout must not move from where the metric puts them.
+        is_fixed: (n,) boundary vertices that a layout must not move from where the metric puts them.
         statistics: statistics of the solvers.
         notes: unmet requests, one sentence each.
         scale: factor of the triangles' size, contained in phi.
         triangles: flat triangles with matching edge lengths, to be unfolded; or None.
         flat_lengths: (m, 3) lengths that are nearly flat, for a least squares layout; or None.
         embed: maps the cut mesh to the plane; or None.
-        holds_cones: the cones have their target curvature; if not, the sides of seams are a free boundary.
+        has_target_cones: the cones have their target curvature; if not, the sides of seams are a free boundary.
     """
 
     mesh: TriangleMesh
@@ -396,14 +396,14 @@ class FlatMetric:
     target: FloatArray
     log_scale: FloatArray
     is_open: BoolArray
-    is_held: BoolArray
+    is_fixed: BoolArray
     statistics: SolveStatistics = field(default_factory=SolveStatistics)
     notes: tuple[str, ...] = ()
     scale: float = 1.0
     triangles: FlatTriangles | None = None
     flat_lengths: FloatArray | None = None
     embed: Callable[[Cut], Embedding] | None = None
-    holds_cones: bool = True
+    has_target_cones: bool = True
 
     def scaled(self, factor: float) -> FlatMetric:
         """Return the metric with all lengths multiplied by a factor."""
@@ -425,7 +425,7 @@ class Layout:
         log_scale: (n,) phi; flat lengths are about l * exp(phi).
         target, curvature: (n,) target curvature and curvature of the metric, radians.
         is_open: (n,) vertices whose curvature is not prescribed.
-        is_held: (n,) boundary vertices that must not move.
+        is_fixed: (n,) boundary vertices that must not move.
         statistics: statistics of the solvers.
         notes: unmet requests, one sentence each.
         disk: the mesh cut to a disk, with one vertex per point and `corners` as faces; or None.
@@ -442,7 +442,7 @@ class Layout:
     target: FloatArray
     curvature: FloatArray
     is_open: BoolArray
-    is_held: BoolArray
+    is_fixed: BoolArray
     statistics: SolveStatistics
     notes: tuple[str, ...] = ()
     disk: TriangleMesh | None = None

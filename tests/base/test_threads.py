@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from coneflat.base.threads import MEMORY_BOUND_TRIANGLES, concurrently, using_threads
+from coneflat.base.threads import MEMORY_BOUND_TRIANGLES, concurrently, limit_threads
 
 
 @pytest.mark.parametrize("triangles", [1, MEMORY_BOUND_TRIANGLES + 1])
@@ -21,7 +21,7 @@ def test_results_and_errors_come_when_asked_for(triangles):
 @pytest.mark.parametrize(("triangles", "count"), [(1, 1), (MEMORY_BOUND_TRIANGLES + 1, 2)])
 def test_on_one_thread_and_on_huge_meshes_the_inside_begins_afterwards(triangles, count):
     begun = threading.Event()
-    with using_threads(count), concurrently(begun.is_set, triangles) as working:
+    with limit_threads(count), concurrently(begun.is_set, triangles) as working:
         begun.set()
         assert working.done()
     assert not working.result()

@@ -305,9 +305,9 @@ def test_more_cones_than_are_searched_for_is_an_error():
     with pytest.raises(CurvatureError, match="400 cones or more"):
         sparse(*SHAPES["sphere"], min_cone_angle=1.99 * np.pi)
     with pytest.raises(CurvatureError, match="no set of .* cones was found"):
-        sparse(*HANDLE, room=np.full(len(HANDLE[0]), 2 * np.pi))
+        sparse(*HANDLE, max_angles=np.full(len(HANDLE[0]), 2 * np.pi))
     with pytest.raises(CurvatureError, match="no set of 15 cones"):
-        sparse(*HANDLE, room=np.full(len(HANDLE[0]), 2.5 * np.pi), count=15)
+        sparse(*HANDLE, max_angles=np.full(len(HANDLE[0]), 2.5 * np.pi), count=15)
 
 
 def test_the_few_vertices_with_room_are_found():
@@ -315,6 +315,6 @@ def test_the_few_vertices_with_room_are_found():
     wide = np.random.default_rng(0).choice(len(HANDLE[0]), 6, replace=False)
     max_angles = np.full(len(HANDLE[0]), 2 * np.pi)
     max_angles[wide] = 4 * np.pi
-    found = sparse(*HANDLE, room=max_angles, count=8).solution
+    found = sparse(*HANDLE, max_angles=max_angles, count=8).solution
     assert np.isin(found.cones[found.curvatures < 0], wide).all()
     assert found.curvatures.min() >= -2 * np.pi - 1e-9

@@ -8,7 +8,7 @@ import shapes
 
 from coneflat import check_mesh, errors, flatten
 from coneflat.geometry import corner_angles, edge_lengths
-from coneflat.geometry.handles import handle_loops, loop_holonomy, off_multiple
+from coneflat.geometry.handles import difference_from_multiple, handle_loops, loop_holonomy
 from coneflat.measure.seam_data import measure_rotations
 
 QUARTER = np.pi / 2
@@ -59,7 +59,7 @@ def test_a_flat_torus_does_not_turn():
         np.concatenate([flat, flat[:, [0, 2, 1]]])[check_mesh(mesh.vertices, faces).face_origin]
     )
     turned = loop_holonomy(mesh).signs @ angles.ravel()
-    np.testing.assert_allclose(off_multiple(turned, 2 * np.pi), 0, atol=1e-9)
+    np.testing.assert_allclose(difference_from_multiple(turned, 2 * np.pi), 0, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["sphere", "hill"])
@@ -68,7 +68,7 @@ def test_without_handles_seams_turn_by_quarters(name):
     result = flatten(*shape, quantise=QUARTER, boundary="straight")
     assert result.rotations.worst < 1e-8
     assert result.rotations.handles == ()
-    np.testing.assert_allclose(off_multiple(result.curvatures, QUARTER), 0, atol=1e-12)
+    np.testing.assert_allclose(difference_from_multiple(result.curvatures, QUARTER), 0, atol=1e-12)
 
 
 @pytest.mark.parametrize("shape", [shapes.torus(), shapes.genus(2)])

@@ -121,7 +121,7 @@ class TestInput:
         vertices, faces = broken_mesh()
         checked = at_unit_size(check_mesh(vertices, faces, repair=True))
         assert len(checked.mesh.faces) < len(faces)
-        assert checked.is_turned.any()
+        assert checked.is_flipped.any()
         given = edge_lengths(vertices, faces)
         given[20] = np.nan  # of a face that is dropped
         found = lengths_of_input(checked, given, len(faces))

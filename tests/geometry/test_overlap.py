@@ -9,7 +9,7 @@ import shapes
 
 import coneflat
 from coneflat import errors
-from coneflat.atlas import part_touching
+from coneflat.atlas import separate_touching
 from coneflat.geometry import coverage
 from coneflat.geometry.orientation import fill_orientations
 from coneflat.geometry.overlap import bounding_boxes, find_overlaps
@@ -274,7 +274,7 @@ def test_what_touches_is_parted(angle, mirrored):
     turned = points @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]) / 31
     triangles = triangles[:, ::-1] if mirrored else triangles
     assert len(find_overlaps(turned, triangles).pairs) > 0  # by rounding
-    parted, overlaps = part_touching(turned, triangles)
+    parted, overlaps = separate_touching(turned, triangles)
     assert len(overlaps.pairs) == len(find_overlaps(parted, triangles).pairs) == 0
     assert np.abs(parted - turned).max() < 1e-13
 
@@ -282,7 +282,7 @@ def test_what_touches_is_parted(angle, mirrored):
 def test_what_overlaps_is_not_parted():
     points, triangles = separate_cells(2, 1)
     points[4:, 0] -= 1e-6
-    parted, overlaps = part_touching(points, triangles)
+    parted, overlaps = separate_touching(points, triangles)
     assert np.array_equal(parted, points)
     np.testing.assert_array_equal(overlaps.pairs, find_overlaps(points, triangles).pairs)
     assert len(overlaps.pairs) > 0

@@ -260,7 +260,7 @@ def measured(seen):
     points, number = np.unique(seen.points, axis=0, return_inverse=True)
     checked = check_mesh(points, number.reshape(-1)[seen.faces])
     assert len(checked.mesh.faces) == len(seen.faces)
-    assert not checked.is_turned.any()
+    assert not checked.is_flipped.any()
     return measure(checked.mesh, seen.corner_uv)
 
 

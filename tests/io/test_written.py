@@ -166,7 +166,7 @@ def test_notes_of_a_file_are_those_of_its_numbers():
     assert not result.as_written(".glb").notes
 
 
-def notes_of(path, ending):
+def all_notes(path, ending):
     out = path.with_name(f"out{ending}")
     return write_measured(flatten(path), out).notes
 
@@ -193,4 +193,4 @@ def test_notes_name_what_another_format_does_not_keep(tmp_path):
     for name, note in told.items():
         for ending in (".obj", ".ply", ".glb", ".npz"):
             keeps = ending == ".npz" or name.endswith(ending) or (ending == ".ply" and "coloured" in name)
-            assert any(f"{note} {ending}" in each for each in notes_of(tmp_path / name, ending)) != keeps
+            assert any(f"{note} {ending}" in each for each in all_notes(tmp_path / name, ending)) != keeps

@@ -8,7 +8,7 @@ import shapes
 
 import coneflat
 from coneflat import errors
-from coneflat.base.text import off_by
+from coneflat.base.text import error_text
 from coneflat.geometry import edge_lengths
 from coneflat.metric.exact import exact_metric
 
@@ -40,8 +40,8 @@ def test_a_first_guess_that_is_far_off_does_not_matter():
 
 
 def test_a_refusal_never_speaks_of_nan():
-    assert off_by(np.nan) == off_by(np.inf) == "off by more than double precision can hold"
-    assert off_by(0.25) == "off by 0.25 rad"
+    assert error_text(np.nan) == error_text(np.inf) == "off by more than double precision can hold"
+    assert error_text(0.25) == "off by 0.25 rad"
     messages = []
     for seed in range(3):
         vertices, faces = spiky_sphere(1, 40.0, seed)

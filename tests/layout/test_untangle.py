@@ -14,10 +14,10 @@ from coneflat import TriangleMesh
 from coneflat.geometry import edge_lengths
 from coneflat.geometry.planar import heights, signed_double_areas
 from coneflat.geometry.straight import FlatTriangles
-from coneflat.layout.free_seams import embedded_disk
 from coneflat.layout.patches import DEGENERATE_HEIGHT, Patches
 from coneflat.layout.relax.relax import rest_sides
 from coneflat.layout.untangle import untangle
+from coneflat.layout.untangle_seams import embedded_disk
 
 
 def fan(rim, noise, seed):
@@ -114,22 +114,22 @@ class TestWinding:
         _, faces = fan(6, 0, 0)
         turn = 2 * np.pi * np.arange(7) / 3
         points = np.append(np.column_stack([np.cos(turn[:6]), np.sin(turn[:6])]), [[0, 0]], axis=0)
-        from coneflat.geometry.planar import laid_out_curvature
+        from coneflat.geometry.planar import layout_curvature
 
         mesh = TriangleMesh(np.column_stack([points, np.zeros(7)]), faces)
-        curvature = laid_out_curvature(mesh, points[faces])
+        curvature = layout_curvature(mesh, points[faces])
         assert curvature[6] == pytest.approx(-2 * np.pi)
         np.testing.assert_allclose(curvature[:6], np.pi - 2 * np.pi / 6)
 
     def test_a_triangle_on_a_line_is_neither_upright_nor_inverted(self):
-        from coneflat.geometry.planar import laid_out_curvature
+        from coneflat.geometry.planar import layout_curvature
 
         points = np.array([[0, 0], [1, 0.0], [0.5, 0]])
         mesh = TriangleMesh(np.column_stack([points, np.zeros(3)]), np.array([[0, 1, 2]]))
         for height in (0.0, 1e-14, -1e-14):
             points[2, 1] = height
             np.testing.assert_allclose(
-                laid_out_curvature(mesh, points[mesh.faces]), [np.pi, np.pi, 0], atol=1e-12
+                layout_curvature(mesh, points[mesh.faces]), [np.pi, np.pi, 0], atol=1e-12
             )
 
 

@@ -8,7 +8,7 @@ import shapes
 from scipy.sparse import csc_matrix, diags
 
 from coneflat import errors, flatten
-from coneflat.base.threads import using_threads
+from coneflat.base.threads import limit_threads
 from coneflat.geometry import cotangent_laplacian, cotangents, edge_lengths
 from coneflat.linalg import SuperLUFactor, factorize, pardiso
 from coneflat.linalg.factors import MIN_PARDISO_UNKNOWNS, CholespyFactor, has_pardiso
@@ -59,7 +59,7 @@ def test_the_same_pattern_and_another(kind, matrix):
     right = np.random.default_rng(0).normal(size=matrix.shape[0])
     factor = factorize(matrix)
     for each in (same, other, matrix):
-        factor = factorize(each, used_up=factor)
+        factor = factorize(each, previous=factor)
         assert type(factor) is kind
         assert factor.solve(right) == pytest.approx(np.linalg.solve(each.toarray(), right), abs=1e-9)
 
@@ -70,7 +70,7 @@ def test_indefinite_matrices_are_solved_with_pivots(kind, matrix):
     right = np.random.default_rng(0).normal(size=matrix.shape[0])
     factor = factorize(matrix)
     for each in (changed, matrix, changed):
-        factor = factorize(csc_matrix(each), used_up=factor)
+        factor = factorize(csc_matrix(each), previous=factor)
         assert factor.solve(right) == pytest.approx(np.linalg.solve(each.toarray(), right), abs=1e-8)
 
 
@@ -103,8 +103,8 @@ def test_large_systems_are_solved_by_pardiso_where_it_is_installed(matrix, monke
     expected = np.linalg.solve(matrix.toarray(), right)
     for is_installed, large in ((True, PardisoFactor), (False, CholespyFactor)):
         monkeypatch.setattr("coneflat.linalg.factors.has_pardiso", lambda: is_installed)  # noqa: B023
-        for whole, kind in ((0, CholespyFactor), (MIN_PARDISO_UNKNOWNS, large)):
-            factor = factorize(matrix, whole=whole)
+        for total_size, kind in ((0, CholespyFactor), (MIN_PARDISO_UNKNOWNS, large)):
+            factor = factorize(matrix, total_size=total_size)
             assert type(factor) is kind
             assert factor.solve(right) == pytest.approx(expected, abs=1e-9)
 
@@ -161,9 +161,9 @@ def test_a_factor_stays_on_the_threads_that_it_was_made_on(matrix, monkeypatch):
     monkeypatch.setattr(
         pardiso, "_pardiso", lambda kind, count, *rest: used.append(count) or call(kind, count, *rest)
     )
-    with using_threads(3):
+    with limit_threads(3):
         factor = PardisoFactor(matrix)
-    with using_threads(1):
+    with limit_threads(1):
         factor = factor.refactorized(2 * matrix)
         factor.solve(np.ones(matrix.shape[0]))
     assert set(used) == {3}

@@ -14,7 +14,7 @@ from coneflat.atlas.pack import turns_of_quantum
 from coneflat.errors import ArrayShapeError, FaceIndexError
 from coneflat.geometry import edge_lengths
 from coneflat.measure.distortion import measure
-from coneflat.measure.guarantees import broken_promises
+from coneflat.measure.guarantees import unmet_guarantees
 from coneflat.mesh.connectivity import TriangleMesh
 
 
@@ -27,7 +27,7 @@ def seam_turns(result):
     return np.angle(-sides[two] / sides[one])
 
 
-def off_by(angles, quantum):
+def error_text(angles, quantum):
     return np.abs(angles - quantum * np.round(angles / quantum)).max()
 
 
@@ -45,8 +45,8 @@ def test_seams_of_an_atlas_turn_by_whole_quanta(limbs, parts, up):
     quantum = 2 * np.pi / parts
     result = flatten(*limbs, quantise=quantum, charts="atlas", distortion=0.1, up=up)
     assert result.distortion.charts > 1
-    assert off_by(seam_turns(result), quantum) < 1e-9
-    assert result.rotations.worst == pytest.approx(off_by(seam_turns(result), quantum), abs=1e-12)
+    assert error_text(seam_turns(result), quantum) < 1e-9
+    assert result.rotations.worst == pytest.approx(error_text(seam_turns(result), quantum), abs=1e-12)
 
 
 def test_charts_turn_by_parts_of_a_turn_that_are_multiples_of_the_quantum():
@@ -64,7 +64,7 @@ def test_charts_turn_by_parts_of_a_turn_that_are_multiples_of_the_quantum():
 def test_sound_results_break_no_promise():
     for mesh in (shapes.sphere(3), shapes.grid(6, 5)):
         result = flatten(*mesh, charts="atlas")
-        assert broken_promises(result) == ()
+        assert unmet_guarantees(result) == ()
         assert result.distortion.angle_sum_error < 1e-9
 
 
@@ -83,7 +83,7 @@ def test_a_point_out_of_place_is_named():
     point = result.uv_faces[result.faces == inner][0]
     uv = result.uv.copy()
     uv[point] += 3 * np.abs(uv[result.uv_faces[(result.faces == inner).any(axis=1)]] - uv[point]).max()
-    notes = " ".join(broken_promises(spoiled(result, uv)))
+    notes = " ".join(unmet_guarantees(spoiled(result, uv)))
     assert "flipped triangle" in notes
     assert "overlap in the atlas" in notes
     assert "angle sum differs" in notes
@@ -95,7 +95,7 @@ def test_a_triangle_without_area_is_named_and_where():
     uv[result.uv_faces[0]] = uv[result.uv_faces[0, 0]]
     bad = spoiled(result, uv)
     assert (bad.distortion.flipped, bad.distortion.degenerate) != (0, 0)
-    note = broken_promises(bad)[0]
+    note = unmet_guarantees(bad)[0]
     assert f"{bad.distortion.degenerate} degenerate triangles in the plane" in note
 
 
@@ -118,7 +118,7 @@ def test_sides_of_seams_that_differ_are_told():
     uv = result.uv.copy()
     on_seam = np.isin(result.faces, result.seams)
     uv[result.uv_faces[on_seam][0]] *= 1 + 1e-4
-    assert any("sides of seams differ" in note for note in broken_promises(spoiled(result, uv)))
+    assert any("sides of seams differ" in note for note in unmet_guarantees(spoiled(result, uv)))
 
 
 @pytest.mark.parametrize("method", ["linear", "bff", "abf++"])
@@ -143,7 +143,7 @@ def test_a_side_without_length_hides_no_seams_whose_sides_differ(unit):
     mesh = TriangleMesh(result.vertices, result.faces)
     torn = replace(result, uv=uv, distortion=measure(mesh, uv[corners], prescribed=result.prescribed))
     assert torn.distortion.seam_mismatch_max > 0.01
-    assert any("two sides of seams differ" in note for note in broken_promises(torn, unit))
+    assert any("two sides of seams differ" in note for note in unmet_guarantees(torn, unit))
 
 
 def test_arrays_that_do_not_fit_the_mesh_are_refused():
@@ -165,7 +165,7 @@ def test_a_round_boundary_that_is_none_is_told():
     uv = result.uv.copy()
     point = result.uv_faces[np.isin(result.faces, np.flatnonzero(rim))][0]
     uv[point] += 0.3 * (uv.mean(axis=0) - uv[point])
-    assert any("not quite round: at vertex" in note for note in broken_promises(spoiled(result, uv)))
+    assert any("not quite round: at vertex" in note for note in unmet_guarantees(spoiled(result, uv)))
 
 
 def test_needles_are_named():

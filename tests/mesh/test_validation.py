@@ -39,7 +39,7 @@ def test_mixed_orientation_is_made_consistent():
     faces = F.copy()
     faces[[3, 7, 11]] = faces[[3, 7, 11]][:, [0, 2, 1]]
     checked = check_mesh(V, faces)
-    np.testing.assert_array_equal(np.sort(np.flatnonzero(checked.is_turned)), [3, 7, 11])
+    np.testing.assert_array_equal(np.sort(np.flatnonzero(checked.is_flipped)), [3, 7, 11])
     assert checked.notes == ("Flipped 3 faces for a consistent orientation.",)
     assert set(map(tuple, np.sort(checked.mesh.faces, axis=1))) == set(map(tuple, np.sort(F, axis=1)))
     tails, heads = checked.mesh.tails, checked.mesh.heads

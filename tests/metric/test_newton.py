@@ -23,7 +23,7 @@ class LogCosh:
 
     def direction(self, here, exactly):
         self.asked.append(exactly)
-        return here.residual * np.cosh(here.place - self.centre) ** 2, True
+        return here.residual * np.cosh(here.variables - self.centre) ** 2, True
 
 
 class Flawed(LogCosh):
@@ -46,7 +46,7 @@ def test_a_quadratic_takes_one_step():
 
     problem = Quadratic()
     found, steps = minimise(problem, problem.evaluate(np.zeros(2)), LIMITS)
-    np.testing.assert_allclose(found.place, centre, atol=1e-14)
+    np.testing.assert_allclose(found.variables, centre, atol=1e-14)
     assert steps <= 2
 
 
@@ -54,7 +54,7 @@ def test_a_quadratic_takes_one_step():
 def test_the_minimum_is_found_where_full_steps_run_away(far):
     problem = LogCosh(np.array([1.0, 3.0, -2.0]))
     found, _ = minimise(problem, problem.evaluate(problem.centre + far), LIMITS)
-    np.testing.assert_allclose(found.place, problem.centre, atol=1e-9)
+    np.testing.assert_allclose(found.variables, problem.centre, atol=1e-9)
     assert found.largest <= 1e-9
 
 
@@ -106,4 +106,4 @@ def test_what_is_not_admissible_is_not_accepted():
 
     problem = Half(np.zeros(1))
     found, _ = minimise(problem, problem.evaluate(np.array([0.8])), LIMITS)
-    assert 0.1 < found.place[0] < 0.8
+    assert 0.1 < found.variables[0] < 0.8

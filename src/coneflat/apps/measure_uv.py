@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from .. import Distortion, TriangleMesh, check_mesh
 from ..base import FloatArray, IntArray, plural, unit_exponent
 from ..errors import MissingUVError
-from ..geometry import MAX_CELLS, find_overlaps, layers_of_raster, signed_double_areas
-from ..io import Mapped, as_mapped
+from ..geometry import MAX_CELLS, approximate_overlap_areas, find_overlaps, signed_double_areas
+from ..io import UVMesh, as_uv_mesh
 from ..measure import MAP_MEASURES, measure_map, path_text
 from ..mesh import CheckedMesh, corner_fans, end_corners, joined_edges, label_charts, left_out
 from ..source import at_unit_size
@@ -135,10 +135,10 @@ def measure_uv(
         >>> coneflat.measure_uv(vertices, faces, vertices[faces][:, :, :2])
         <UVMeasures: 2 triangles, 1 chart, QC 1.0000, 0 flipped, overlap 0>
     """
-    return measure_mapped(as_mapped(mesh, faces, corner_uv, weld), strict=strict)
+    return measure_mapped(as_uv_mesh(mesh, faces, corner_uv, weld), strict=strict)
 
 
-def measure_mapped(mapped: Mapped, *, strict: bool = False) -> UVMeasures:
+def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:
     """Return the measures of triangles with UVs.
 
     Raises:
@@ -179,7 +179,7 @@ def measure_mapped(mapped: Mapped, *, strict: bool = False) -> UVMeasures:
     )
 
 
-def surface_of(mapped: Mapped, *, strict: bool = False) -> tuple[CheckedMesh, FloatArray]:
+def surface_of(mapped: UVMesh, *, strict: bool = False) -> tuple[CheckedMesh, FloatArray]:
     """Return the triangles with UVs as a manifold mesh, repaired unless strict, and their (m, 3, 2) UVs.
 
     Raises:
@@ -193,7 +193,7 @@ def surface_of(mapped: Mapped, *, strict: bool = False) -> tuple[CheckedMesh, Fl
         )
     checked = check_mesh(mapped.vertices, mapped.faces[known], repair=not strict)
     corner_uv = mapped.corner_uv[known][checked.face_origin]
-    corner_uv[checked.is_turned] = corner_uv[checked.is_turned][:, [0, 2, 1]]
+    corner_uv[checked.is_flipped] = corner_uv[checked.is_flipped][:, [0, 2, 1]]
     return checked, corner_uv
 
 
@@ -256,7 +256,7 @@ def _cover(corner_uv: FloatArray) -> _Cover:
     if np.isfinite(found.fraction):
         area = found.area / found.fraction if found.fraction > 0 else total
         return _Cover(len(found.pairs), found.fraction, area, box_efficiency)
-    twice, area = layers_of_raster(corner_uv)
+    twice, area = approximate_overlap_areas(corner_uv)
     more = (
         ""
         if found.complete
@@ -266,7 +266,7 @@ def _cover(corner_uv: FloatArray) -> _Cover:
     return _Cover(len(found.pairs), twice / area if area > 0 else 0.0, area, box_efficiency, (note,))
 
 
-def _notes(mapped: Mapped, checked: CheckedMesh) -> tuple[str, ...]:
+def _notes(mapped: UVMesh, checked: CheckedMesh) -> tuple[str, ...]:
     """Return notes on what the measures leave out, and on repairs of the mesh."""
     corners = ((mapped.without, "no UV"), (mapped.not_finite, "a UV that is not finite"))
     why = " and ".join(f"{plural(count, 'corner')} with {what}" for count, what in corners if count)
@@ -278,6 +278,6 @@ def _notes(mapped: Mapped, checked: CheckedMesh) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def left_out_of(mapped: Mapped, checked: CheckedMesh) -> str:
+def left_out_of(mapped: UVMesh, checked: CheckedMesh) -> str:
     """Return the note on vertices without triangles, which does not concern the measures."""
     return left_out(len(mapped.vertices) - len(np.unique(checked.vertex_origin)))

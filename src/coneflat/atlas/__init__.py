@@ -3,13 +3,13 @@
 from .injective import separate_overlaps
 from .orient import orient_charts
 from .pack import Packed, arrange_charts, pack_charts
-from .touch import part_touching
+from .touch import separate_touching
 
 __all__ = [
     "Packed",
     "arrange_charts",
     "orient_charts",
     "pack_charts",
-    "part_touching",
+    "separate_touching",
     "separate_overlaps",
 ]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats
 from ..base.defaults import PADDING, RESOLUTION
-from ..base.text import shown
+from ..base.text import short_repr
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..geometry.planar import signed_double_areas
 from .charts import Charts, Outlines, read_charts
@@ -184,17 +184,17 @@ def _pack_single(outlines: Outlines, directions: FloatArray, rotate: str | int) 
 def _check(resolution: int, padding: float, margin: float, rotate: str | int, tiles: int) -> None:
     for name, count in (("resolution", resolution), ("tiles", tiles)):
         if not isinstance(count, (int, np.integer)) or isinstance(count, bool) or count < 1:
-            raise OptionError(f"{name} must be a positive integer, got {shown(count)}")
+            raise OptionError(f"{name} must be a positive integer, got {short_repr(count)}")
     for name, texels in (("padding", padding), ("margin", margin)):
         is_number = isinstance(texels, (int, float, np.number)) and not isinstance(texels, bool)
         if not is_number or not 0 <= texels < math.inf:
-            raise OptionError(f"{name} must be a number of texels, 0 or more, got {shown(texels)}")
+            raise OptionError(f"{name} must be a number of texels, 0 or more, got {short_repr(texels)}")
     if isinstance(rotate, int) and not isinstance(rotate, bool):
         if not 1 <= rotate <= MAX_TURNS:
             raise OptionError(f"rotate must be from 1 to {MAX_TURNS} turns, got {rotate}")
     elif not isinstance(rotate, str) or rotate not in ROTATIONS:
         raise OptionError(
-            f"unknown rotate {shown(rotate)}: choose from {', '.join(ROTATIONS)}, or a number of turns"
+            f"unknown rotate {short_repr(rotate)}: choose from {', '.join(ROTATIONS)}, or a number of turns"
         )
     if 2 * margin >= resolution:
         raise OptionError(f"margins of {margin:g} texels leave no space in a texture of {resolution} texels")

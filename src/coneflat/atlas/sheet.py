@@ -85,7 +85,7 @@ class Sheet:
         is_open = (left > 0) & (right > 0) & ((left != right) | (left == 1))
         costs = np.where(is_open, self._edge_costs, np.inf)
         paths = MultiGraph(
-            len(self.disk.vertices), self.disk.edges, costs, self.disk.edges_beside
+            len(self.disk.vertices), self.disk.edges, costs, self.disk.incident_edges
         ).shortest_paths(starts, ends)
         nearest = ends[np.argsort(paths.distance[ends], kind="stable")[:1]]
         return paths.edge[paths.nodes_to(nearest)]

@@ -27,7 +27,7 @@ SINGLE_SPACING = 2.0**-24
 MAX_ROUNDS = 10
 
 
-def part_touching(
+def separate_touching(
     points: FloatArray, corners: IntArray, stored: Callable[[FloatArray], FloatArray] | None = None
 ) -> tuple[FloatArray, Overlaps]:
     """Return points moved such that touching triangles do not overlap, and the remaining overlaps.
@@ -132,7 +132,7 @@ def round_safely(
         return points, find_overlaps(points, corners)
     is_positive = signed_double_areas(points[corners]) > 0
     rounded = _unflipped(rounded, corners, is_positive, stored)
-    separated, overlaps = part_touching(rounded, corners, stored)
+    separated, overlaps = separate_touching(rounded, corners, stored)
     if (is_positive & (signed_double_areas(separated[corners]) <= 0)).any():
         separated = _unflipped(separated, corners, is_positive, stored)
         overlaps = find_overlaps(separated, corners)

@@ -10,10 +10,10 @@ from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from .defaults import DISTORTION, MAX_CONE_ANGLE, MIN_CONE_ANGLE, MOST_CONES
-from .progress import Progress, Stopwatch, asking
-from .text import list_some, off_by, plural, printable, shown
-from .threads import THREADS, using_threads
+from .defaults import DISTORTION, MAX_CONE_ANGLE, MAX_CONES, MIN_CONE_ANGLE
+from .progress import Progress, Stopwatch, cancel_with
+from .text import error_text, list_some, plural, printable, short_repr
+from .threads import THREADS, limit_threads
 
 if TYPE_CHECKING:
     from .arrays import BoolArray, ComplexArray, FloatArray, IntArray, dots, unit_exponent
@@ -28,19 +28,19 @@ __all__ = [
     "IntArray",
     "MAX_CONE_ANGLE",
     "MIN_CONE_ANGLE",
-    "MOST_CONES",
+    "MAX_CONES",
     "Progress",
     "Stopwatch",
     "THREADS",
-    "asking",
+    "cancel_with",
     "compiled",
     "dots",
     "list_some",
-    "off_by",
+    "error_text",
     "plural",
     "printable",
-    "shown",
-    "using_threads",
+    "short_repr",
+    "limit_threads",
 ]
 
 

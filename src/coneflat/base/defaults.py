@@ -10,14 +10,14 @@ DISTORTION = 0.2
 MIN_CONE_ANGLE = math.pi / 2
 MAX_CONE_ANGLE = 4 * math.pi
 #: Maximum number of cones of a cone curve.
-MOST_CONES = 30
+MAX_CONES = 30
 #: Texels along a side of a texture, and texels between charts.
 RESOLUTION = 1024
 PADDING = 2.0
 # A preference of 1 makes seams at hidden places ten times cheaper. With a factor above 1e10, the lengths of seams
 # would be smaller than the rounding errors of their costs.
-MOST_PREFERENCE = 10.0
+MAX_PREFERENCE = 10.0
 # Error of a number that is typed with seven digits: radians, or relative.
 TYPED_TOLERANCE = 1e-6
 # Smallest quantum, radians. Multiples are known to 1e-6, so a smaller quantum would restrict nothing measurable.
-LEAST_QUANTUM = 1e-4
+MIN_QUANTUM = 1e-4

@@ -16,7 +16,7 @@ _ask: ContextVar[Callable[[], None] | None] = ContextVar("coneflat_ask", default
 
 
 @contextmanager
-def asking(ask: Callable[[], None]) -> Iterator[None]:
+def cancel_with(ask: Callable[[], None]) -> Iterator[None]:
     """Call `ask` every few milliseconds during long computations in the block, from any thread.
 
     `ask` cancels the computation by raising an exception.
@@ -29,7 +29,7 @@ def asking(ask: Callable[[], None]) -> Iterator[None]:
 
 
 def check_cancelled() -> None:
-    """Call the function that `asking` has set, if any; it raises an exception to cancel the computation."""
+    """Call the function that `cancel_with` has set, if any; it raises an exception to cancel the computation."""
     ask = _ask.get()
     if ask is not None:
         ask()
@@ -66,7 +66,7 @@ class Stopwatch:
         until: approximate fraction of the current component that is done when the stage ends.
         """
         self._name = name
-        self.tell()
+        self.report()
         start = time.perf_counter()
         try:
             yield
@@ -74,12 +74,12 @@ class Stopwatch:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
         self._within = until
 
-    def end_part(self) -> None:
+    def end_component(self) -> None:
         """Count the current component as done."""
         self.done += self.share
         self._within = 0.0
 
-    def tell(self, detail: str = "") -> None:
+    def report(self, detail: str = "") -> None:
         """Report the current stage and the fraction done to the callback, with an optional detail."""
         if self._progress is not None:
             text = f"{self._name}: {detail}" if detail else self._name

@@ -31,7 +31,7 @@ def printable(text: str) -> str:
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
-def shown(value: object) -> str:
+def short_repr(value: object) -> str:
     """Return a short one-line description of a value, for messages."""
     import numpy as np  # imported late: commands that only print their help do not need it
 
@@ -44,7 +44,7 @@ def shown(value: object) -> str:
     return text if len(text) <= MAX_SHOWN_CHARACTERS else f"{text[:MAX_SHOWN_CHARACTERS]}..."
 
 
-def off_by(residual: float, unit: str = " rad") -> str:
+def error_text(residual: float, unit: str = " rad") -> str:
     """Return the part of a message that states an error: "off by 0.1 rad"."""
     if not math.isfinite(residual):
         return "off by more than double precision can hold"

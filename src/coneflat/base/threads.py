@@ -43,7 +43,7 @@ def threads() -> int:
 
 
 @contextmanager
-def using_threads(count: int = THREADS) -> Iterator[None]:
+def limit_threads(count: int = THREADS) -> Iterator[None]:
     """Set the number of threads in the block: PARDISO uses all, the stages at most two, and OpenBLAS one.
 
     The dense matrices here are so small that threads of OpenBLAS gain nothing. Idle, they would occupy the cores by

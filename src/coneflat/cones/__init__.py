@@ -3,8 +3,8 @@
 from .find import (
     CONE_ANGLE_PER_TRIANGLE,
     close_search,
+    coneless_solution,
     find_cones,
-    only_choice,
     open_search,
     uses_sparse_search,
 )
@@ -25,7 +25,7 @@ __all__ = [
     "cones_with_curvature",
     "find_cones",
     "greedy_cones",
-    "only_choice",
+    "coneless_solution",
     "open_search",
     "quantise_cones",
     "uses_sparse_search",

@@ -67,7 +67,7 @@ def find_cones(
     is_greedy = spec.strategy == "greedy" or too_many_handles
     if is_greedy:
         solution = greedy_cones(
-            *given, max_cones=spec.max_count, tie_key=mesh_tie_key(mesh), progress=watch.tell
+            *given, max_cones=spec.max_count, tie_key=mesh_tie_key(mesh), progress=watch.report
         )
     elif len(spec.given):
         solution = _fit_given(surface, spec)
@@ -118,7 +118,7 @@ def polyhedron_corners(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
     return cones_with_curvature(*given, corners, curvature[corners])
 
 
-def only_choice(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
+def coneless_solution(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
     """Return the solution without cones if no vertex may be a cone and no cone is needed; else None."""
     mesh, absorbs = surface.mesh, spec.absorbs_curvature
     if (spec.is_allowed & ~absorbs).any() or not (absorbs.any() or mesh.euler_characteristic == 0):
@@ -155,10 +155,10 @@ def open_search(surface: Surface, spec: ConeSpec, watch: Stopwatch) -> ConeSearc
         weights=spec.weights,
         required=spec.required,
         allowed=spec.is_allowed,
-        room=max_angles.astype(np.float64),
+        max_angles=max_angles.astype(np.float64),
         linear=linear_model(surface, spec),
     )
-    search.tell = watch.tell
+    search.progress = watch.report
     if len(mesh.faces) <= MEMORY_BOUND_TRIANGLES:  # else it would use too much memory
         surface.memo["search"] = search
     return search
@@ -204,7 +204,7 @@ def _fit_given(surface: Surface, spec: ConeSpec) -> ConeSolution:
 def _search(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holonomy | None) -> ConeSolution:
     """Return the fewest cones for the allowed distortion, or the best cones of the requested number."""
     mesh = surface.mesh
-    only = only_choice(surface, spec)
+    only = coneless_solution(surface, spec)
     if only is not None:
         return replace(only, notes=_unmet(mesh.genus(), len(only.cones), 0.0, spec))
     search = open_search(surface, spec, watch)

@@ -1,6 +1,6 @@
 """Geometry: lengths, angles, areas, Laplacian, intrinsic triangulations, exact predicates, overlaps, visibility."""
 
-from .coverage import layers_of_raster
+from .coverage import approximate_overlap_areas
 from .delaunay import euclidean_diagonal, intrinsic_delaunay, make_delaunay, relink
 from .handles import handle_loops
 from .intrinsic import IntrinsicTriangulation, halfedge_twins, intrinsic_triangulation
@@ -54,7 +54,7 @@ __all__ = [
     "intrinsic_delaunay",
     "intrinsic_triangulation",
     "is_broken",
-    "layers_of_raster",
+    "approximate_overlap_areas",
     "make_delaunay",
     "map_factors",
     "mollify",

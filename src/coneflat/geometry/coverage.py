@@ -48,7 +48,7 @@ def overlap_areas(corners: FloatArray, pairs: IntArray) -> tuple[float, float]:
     return twice, total - more
 
 
-def layers_of_raster(corners: FloatArray) -> tuple[float, float]:
+def approximate_overlap_areas(corners: FloatArray) -> tuple[float, float]:
     """Return approximate areas inside at least two triangles and inside at least one, by counting pixels.
 
     corners: (m, 3, 2) corners of the triangles, of any orientation.

@@ -99,7 +99,7 @@ def corner_signs(loop: IntArray, twin: IntArray) -> tuple[IntArray, FloatArray]:
     return loop - leave + (3 - entry - leave), np.where(entry == (leave + 1) % 3, 1.0, -1.0)
 
 
-def off_multiple(angles: FloatArray, quantum: float) -> FloatArray:
+def difference_from_multiple(angles: FloatArray, quantum: float) -> FloatArray:
     """Return the signed difference of angles from the nearest multiple of a quantum, radians."""
     return angles - quantum * np.round(angles / quantum)
 

@@ -41,7 +41,7 @@ class Overlaps:
 
 
 #: Value for a layout whose overlaps were not searched for, as there may be many, which take long to find.
-NOT_LOOKED_FOR = Overlaps(np.empty((0, 2), dtype=np.int64), float("nan"), float("nan"), complete=False)
+UNKNOWN_OVERLAPS = Overlaps(np.empty((0, 2), dtype=np.int64), float("nan"), float("nan"), complete=False)
 
 
 def find_overlaps(

@@ -84,7 +84,7 @@ def map_factors(rest: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
     return found[0], found[1]
 
 
-def laid_out_curvature(mesh: TriangleMesh, corners: FloatArray, at: BoolArray | None = None) -> FloatArray:
+def layout_curvature(mesh: TriangleMesh, corners: FloatArray, at: BoolArray | None = None) -> FloatArray:
     """Return (n,) the curvature of a layout with corners (m, 3, 2): 2 pi, or pi on the boundary, minus the angles.
 
     The angles of flipped triangles are negative. If the triangles around a vertex wind around it twice, the curvature

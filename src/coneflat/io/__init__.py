@@ -13,7 +13,7 @@ from .files import (
 )
 from .gltf.write import FOR_INDICES, FOR_VERTICES, MATERIAL, Glb, bounds
 from .join import Joined
-from .mapped import Mapped, as_mapped, has_uv, of_file
+from .mapped import UVMesh, as_uv_mesh, has_uv, uv_mesh_of
 from .npz import CheckedArrays, number, read_archive, read_flattening
 from .obj import lines_of, parse_obj
 from .packages import as_input
@@ -24,7 +24,7 @@ from .texture import CELLS, DARK_CELL, LIGHT_CELL, Texture, cell_side, check_cel
 from .write import OUTPUT_FORMATS, as_written, check_output, write_flattening, write_measured, write_stream
 
 __all__ = [
-    "of_file",
+    "uv_mesh_of",
     "CELLS",
     "CheckedArrays",
     "DARK_CELL",
@@ -35,12 +35,12 @@ __all__ = [
     "Joined",
     "LIGHT_CELL",
     "MATERIAL",
-    "Mapped",
+    "UVMesh",
     "OUTPUT_FORMATS",
     "PIPE",
     "Texture",
     "as_input",
-    "as_mapped",
+    "as_uv_mesh",
     "as_path",
     "as_written",
     "atomic_write",

@@ -59,7 +59,7 @@ def find_pieces(uv: FloatArray, uv_faces: IntArray, offsets: IntArray, face_corn
     polygons = Polygons(offsets, face_corners)
     points, sizes, loops = polygons.points(uv_faces), polygons.sizes, polygons.loops()
     triples, at = polygons.corner_triples(points)
-    complete = polygons.are_whole(points)
+    complete = polygons.are_complete(points)
     height = heights(sides_between(uv[triples]))
     # A polygon that is flipped as a whole stays flipped in fans and in pieces, so it is not split.
     split = np.intersect1d(at[~(height > CONVEX_HEIGHT)], at[~(height < -CONVEX_HEIGHT)])

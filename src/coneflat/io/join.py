@@ -61,13 +61,13 @@ class Joined:
             )
         return tuple(notes)
 
-    def notes_of(self, notes: Sequence[str]) -> tuple[str, ...]:
+    def all_notes(self, notes: Sequence[str]) -> tuple[str, ...]:
         """Return these notes and those of a result; replaced vertices are not counted as left out."""
         kept = [note for note in notes if not (self.merged and is_left_out(note))]
         lone = len(self.used) - len(np.unique(self.mesh.corners)) - self.merged if self.merged else 0
         return (*self.notes(), *kept, *[left_out(lone)] * (lone > 0))
 
-    def renamed(self, options: Mapping[str, Any]) -> dict[str, Any]:
+    def map_options(self, options: Mapping[str, Any]) -> dict[str, Any]:
         """Return arguments of `coneflat.flatten` with vertices replaced by those that are used for them.
 
         Raises:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Mapped:
+class UVMesh:
     """Triangles with the UVs of their corners, some of which may be missing.
 
     Attributes:
@@ -52,9 +52,9 @@ class Mapped:
         return np.asarray(np.isfinite(self.corner_uv).all(axis=(1, 2)))
 
 
-def as_mapped(
+def as_uv_mesh(
     mesh: Any, faces: ArrayLike | None = None, corner_uv: ArrayLike | None = None, weld: bool | None = None
-) -> Mapped:
+) -> UVMesh:
     """Return the triangles and UVs of a mesh in any of the forms that `measure_uv` accepts.
 
     Args:
@@ -72,9 +72,9 @@ def as_mapped(
     if isinstance(mesh, (str, PathLike)):
         if Path(mesh).suffix.lower() == ".npz":
             return _of_result(read_flattening(mesh))
-        return of_file(read_joined(mesh, weld))
+        return uv_mesh_of(read_joined(mesh, weld))
     if isinstance(mesh, MeshFile):
-        return of_file(Joined(mesh, np.arange(len(mesh.vertices))))
+        return uv_mesh_of(Joined(mesh, np.arange(len(mesh.vertices))))
     if hasattr(mesh, "uv_faces") and hasattr(mesh, "uv"):
         return _of_result(mesh)
     raise ArrayShapeError(
@@ -82,7 +82,7 @@ def as_mapped(
     )
 
 
-def of_file(joined: Joined) -> Mapped:
+def uv_mesh_of(joined: Joined) -> UVMesh:
     """Return the triangles of a file, polygons as fans, with the UVs of their corners.
 
     Raises:
@@ -99,7 +99,7 @@ def of_file(joined: Joined) -> Mapped:
     texture = np.where(mesh.texture < 0, len(mesh.uv), mesh.texture)
     fans = fan_corners(mesh.offsets)
     missing = texture == len(mesh.uv)
-    return Mapped(
+    return UVMesh(
         vertices=mesh.vertices,
         faces=mesh.corners[fans],
         corner_uv=points[texture[fans]],
@@ -116,12 +116,12 @@ def has_uv(mesh: MeshFile) -> bool:
     return mesh.uv is not None and mesh.texture is not None and bool((mesh.texture >= 0).any())
 
 
-def _of_result(result: Flattening) -> Mapped:
+def _of_result(result: Flattening) -> UVMesh:
     faces = result.faces
-    return Mapped(result.vertices, faces, result.corner_uv, len(faces), 0, 0, source=result.source)
+    return UVMesh(result.vertices, faces, result.corner_uv, len(faces), 0, 0, source=result.source)
 
 
-def _of_arrays(vertices: ArrayLike, faces: ArrayLike, corner_uv: ArrayLike | None) -> Mapped:
+def _of_arrays(vertices: ArrayLike, faces: ArrayLike, corner_uv: ArrayLike | None) -> UVMesh:
     given = as_input(vertices, faces)
     points = as_floats("vertices", given.vertices)
     triangles = as_faces(given.faces, len(points))
@@ -132,4 +132,4 @@ def _of_arrays(vertices: ArrayLike, faces: ArrayLike, corner_uv: ArrayLike | Non
         raise ArrayShapeError(f"corner_uv must have the shape {(*triangles.shape, 2)}, got {uv.shape}")
     without = np.isnan(uv).all(axis=2)
     broken = ~np.isfinite(uv).all(axis=2) & ~without
-    return Mapped(points, triangles, uv, len(triangles), int(without.sum()), int(broken.sum()))
+    return UVMesh(points, triangles, uv, len(triangles), int(without.sum()), int(broken.sum()))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.text import shown
+from ..base.text import short_repr
 from ..errors import EmptyMeshError, MeshFileError, OptionError, UnknownFormatError
 from ..mesh.check import weld as weld_vertices
 from .files import PIPE, PathName, as_path, known_ending, read_bytes, read_input, readable
@@ -103,7 +103,7 @@ def read_mesh_from(
     """
     path = Path(name)
     if weld is not None and not isinstance(weld, (bool, np.bool_)):
-        raise OptionError(f"weld must be True, False or None, got {shown(weld)}")
+        raise OptionError(f"weld must be True, False or None, got {short_repr(weld)}")
     if not content or content.isspace():
         raise EmptyMeshError(f"{path} is empty")
     ending = format_of(content) if ending is None else ending.lower()

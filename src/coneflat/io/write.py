@@ -12,7 +12,7 @@ import numpy as np
 
 from ..atlas.touch import round_safely
 from ..base.arrays import FloatArray, IntArray
-from ..base.text import plural, shown
+from ..base.text import plural, short_repr
 from ..errors import MeshFileError, OptionError, UnknownFormatError
 from ..measure.guarantees import DOUBLE, SINGLE, remeasured
 from ..mesh.polygons import polygon_of
@@ -152,7 +152,7 @@ def as_written(result: Flattening, ending: str) -> Flattening:
         MeshFileError: numbers are out of range for the format.
     """
     if not isinstance(ending, str):
-        raise OptionError(f"ending must be text such as .glb, not {shown(ending)}")
+        raise OptionError(f"ending must be text such as .glb, not {short_repr(ending)}")
     stored, lost = result, left_out(result, ending)
     if ending == ".glb":
         stored = _in_single_precision(result)

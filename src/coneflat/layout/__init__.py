@@ -1,6 +1,5 @@
 """Layout of a flat metric on a disk as points in the plane."""
 
-from .free_seams import free_seams
 from .lay_out import lay_out
 from .least_squares import far_pins, fit_shapes, least_squares_layout, pinned_least_squares, shapes_of_angles
 from .relax import Lines, PointConstraints, Relaxed, StretchEnergy, relax
@@ -8,6 +7,7 @@ from .relax.relax import rest_sides
 from .relax.seam_chains import SeamChains, find_chains
 from .relax_layouts import relax_layouts
 from .unfold import closed_chain, unfold
+from .untangle_seams import untangle_seams
 
 __all__ = [
     "Lines",
@@ -19,7 +19,7 @@ __all__ = [
     "far_pins",
     "find_chains",
     "fit_shapes",
-    "free_seams",
+    "untangle_seams",
     "lay_out",
     "least_squares_layout",
     "pinned_least_squares",

@@ -10,7 +10,7 @@ from ..base.arrays import FloatArray, rows_of
 from ..base.text import plural
 from ..errors import MetricError
 from ..geometry import angle_defect, corner_angles, double_areas
-from ..geometry.planar import laid_out_curvature, signed_double_areas, vertex_log_scale
+from ..geometry.planar import layout_curvature, signed_double_areas, vertex_log_scale
 from ..geometry.straight import FlatTriangles
 from ..stages import Cut, Embedding, FlatMetric, Layout
 from .least_squares import least_squares_layout
@@ -42,7 +42,7 @@ def lay_out(metric: FlatMetric, cut: Cut) -> Layout:
 
 def _layout(metric: FlatMetric, cut: Cut, points: FloatArray, curvature: FloatArray) -> Layout:
     mesh, is_open = metric.mesh, metric.is_open
-    if not metric.holds_cones:
+    if not metric.has_target_cones:
         is_open = is_open.copy()
         is_open[mesh.edges[cut.seams]] = True
     return Layout(
@@ -57,7 +57,7 @@ def _layout(metric: FlatMetric, cut: Cut, points: FloatArray, curvature: FloatAr
         target=metric.target,
         curvature=curvature,
         is_open=is_open,
-        is_held=metric.is_held,
+        is_fixed=metric.is_fixed,
         statistics=metric.statistics,
         notes=metric.notes,
         disk=cut.mesh,
@@ -66,7 +66,7 @@ def _layout(metric: FlatMetric, cut: Cut, points: FloatArray, curvature: FloatAr
 
 def _unfolded(metric: FlatMetric, triangles: FlatTriangles, cut: Cut) -> Layout:
     mesh = metric.mesh
-    on_boundary, stays = mesh.is_boundary_vertex, metric.is_held.copy()
+    on_boundary, stays = mesh.is_boundary_vertex, metric.is_fixed.copy()
     stays[metric.cones] = True
     on_seam = np.zeros(len(mesh.vertices), dtype=bool)
     on_seam[mesh.edges[cut.seams]] = True
@@ -80,7 +80,7 @@ def _unfolded(metric: FlatMetric, triangles: FlatTriangles, cut: Cut) -> Layout:
         rest_sides(metric.lengths),
     )
     points = unfold(untangled.flat, cut.mesh.faces) * metric.scale
-    curvature = laid_out_curvature(mesh, rows_of(points, cut.mesh.faces))
+    curvature = layout_curvature(mesh, rows_of(points, cut.mesh.faces))
     statistics = replace(
         metric.statistics,
         untangled_triangles=int(triangles.is_inverted.sum()),
@@ -112,7 +112,7 @@ def _embedded(metric: FlatMetric, embedding: Embedding, cut: Cut) -> Layout:
         )
     before = double_areas(metric.lengths)
     factor = float(np.sqrt(before.sum() / doubles.sum()))
-    curvature = laid_out_curvature(mesh, corners)
+    curvature = layout_curvature(mesh, corners)
     return replace(
         _layout(metric, cut, points * factor, curvature),
         log_scale=vertex_log_scale(mesh, before, doubles * factor**2),

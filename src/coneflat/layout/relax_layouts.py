@@ -13,7 +13,7 @@ from ..base.compiled import compiled
 from ..errors import LengthError, MetricError, SeamError
 from ..geometry import double_areas
 from ..geometry.operators import LEAST_WEIGHT, area_distortion, at_unit_scale, vertex_areas, weighted_areas
-from ..geometry.planar import laid_out_curvature, signed_double_areas, vertex_log_scale
+from ..geometry.planar import layout_curvature, signed_double_areas, vertex_log_scale
 from ..geometry.straight import place_triangles
 from ..mesh.connectivity import TriangleMesh, label_components
 from ..stages import Layout, RelaxSpec
@@ -69,14 +69,14 @@ def relax_layouts(
             ]
         if isinstance(error, MetricError):
             raise
-        return [layouts[0].with_notes(f"Not relaxed: {error}.") if spec.is_whole else layouts[0]]
+        return [layouts[0].with_notes(f"Not relaxed: {error}.") if spec.relaxes_all else layouts[0]]
 
 
 def _relaxed(group: LayoutGroup, spec: RelaxSpec, report: Callable[[str], None]) -> list[Layout]:
     mesh, points = group.mesh, group.points
     before = group.ratios(points)
     is_free = group.is_free
-    if not spec.is_whole:
+    if not spec.relaxes_all:
         is_free = is_free & _around(mesh, before > RELAXED_QC) & ~mesh.is_boundary_vertex
 
     def relaxed_by(start: FloatArray, sharpness: float, is_free: BoolArray) -> FloatArray:
@@ -150,7 +150,7 @@ class LayoutGroup:
     @property
     def is_free(self) -> BoolArray:
         """Return (n,) True for vertices that may move."""
-        return ~np.concatenate([one.is_held for one in self.layouts])
+        return ~np.concatenate([one.is_fixed for one in self.layouts])
 
     def _sums(self, values: FloatArray, at: BoolArray | slice = slice(None)) -> FloatArray:
         """Return the sum of (m,) values per face for each layout, over the faces `at`."""
@@ -233,7 +233,7 @@ class LayoutGroup:
         changed = np.zeros(len(mesh.vertices), dtype=bool)
         changed[mesh.faces[has_any(was_free, mesh.faces)]] = True
         old = np.concatenate([one.curvature for one in self.layouts])
-        curvature = np.where(changed, laid_out_curvature(mesh, corners, changed), old)
+        curvature = np.where(changed, layout_curvature(mesh, corners, changed), old)
         # Areas are relative to those of each layout, as the threshold for zero area is.
         unit = self._sums(self.areas)[self._of_face]
         before, after = (np.abs(signed_double_areas(p[self.corners])) / 2 for p in (self.points, points))
@@ -244,7 +244,7 @@ class LayoutGroup:
         found = []
         for i, one in enumerate(self.layouts):
             own = slice(self._vertices[i], self._vertices[i + 1])
-            factor = 1.0 if one.is_held.any() else factors[i]
+            factor = 1.0 if one.is_fixed.any() else factors[i]
             log_scale[own] += np.log(factor)
             areas = vertex_areas(one.mesh.faces, one.lengths, len(one.mesh.vertices))
             reached = area_distortion(log_scale[own], weighted_areas(areas, self._given_weights[i]))

@@ -122,16 +122,16 @@ def has_pardiso() -> bool:
 
 
 def factorize(
-    matrix: csc_matrix, used_up: Factor | None = None, whole: int = 0, is_scattered: bool = False
+    matrix: csc_matrix, previous: Factor | None = None, total_size: int = 0, is_scattered: bool = False
 ) -> Factor:
     """Return the factorization of a sparse symmetric positive definite matrix.
 
     Args:
         matrix: (n, n), both triangles, with sorted indices.
-        used_up: the factor of another matrix of the same size that is not needed any more; its symbolic analysis is
+        previous: the factor of another matrix of the same size that is not needed any more; its symbolic analysis is
             reused if possible.
-        whole: number of unknowns of the larger system that the matrix belongs to, if any. The solver is chosen by the
-            larger of both sizes: it is loaded anyway, and reuses its analysis, which takes most of the time.
+        total_size: number of unknowns of the larger system that the matrix belongs to, if any. The solver is chosen by
+            the larger of both sizes: it is loaded anyway, and reuses its analysis, which takes most of the time.
         is_scattered: whether the matrix consists of many small, nearly disconnected blocks. SuperLU finds an
             elimination order for these in a fraction of the time of the other solvers.
 
@@ -141,10 +141,10 @@ def factorize(
     size = matrix.shape[0]
     if size == 0:
         return Factor(matrix)
-    is_by_pardiso = max(size, whole) >= MIN_PARDISO_UNKNOWNS and has_pardiso()
+    is_by_pardiso = max(size, total_size) >= MIN_PARDISO_UNKNOWNS and has_pardiso()
     try:
-        if used_up is not None:
-            return used_up.refactorized(matrix)
+        if previous is not None:
+            return previous.refactorized(matrix)
         if is_scattered and size < MAX_SUPERLU_UNKNOWNS:
             return SuperLUFactor(matrix)
         return _by_pardiso(matrix) if is_by_pardiso else CholespyFactor(matrix)

@@ -24,12 +24,12 @@ class Point:
     """A point of a function: the variables and the negative gradient.
 
     Attributes:
-        place: (n,) the variables.
+        variables: (n,) the variables.
         residual: (n,) minus the gradient.
         is_admissible: False if the point must not be accepted as a step, as the function is not valid there.
     """
 
-    place: FloatArray
+    variables: FloatArray
     residual: FloatArray
     is_admissible: bool = True
 
@@ -46,7 +46,7 @@ P = TypeVar("P", bound=Point)
 class Convex(Protocol[P]):
     """A convex function of (n,) variables."""
 
-    def evaluate(self, place: FloatArray) -> P:
+    def evaluate(self, variables: FloatArray) -> P:
         """Return the point with given variables (n,)."""
         ...
 
@@ -114,7 +114,7 @@ def minimise(function: Convex[P], start: P, limits: Limits) -> tuple[P, int]:
             step, is_exact = function.direction(here, exactly)
         except MetricError:  # singular in double precision: return the best point so far
             break
-        if not is_reached and np.abs(step).max() <= ROUNDING * np.abs(here.place).max():
+        if not is_reached and np.abs(step).max() <= ROUNDING * np.abs(here.variables).max():
             break
         halvings = limits.halvings_below if is_reached else limits.halvings
         found = _search_line(function, here, step, best.largest, halvings, limits.largest_step)
@@ -145,11 +145,11 @@ def _search_line(
         return None
     length = min(1.0, largest_step / reach)
     for _ in range(halvings + 1):
-        place = here.place + length * step
-        if np.array_equal(place, here.place):  # shorter than rounding
+        variables = here.variables + length * step
+        if np.array_equal(variables, here.variables):  # shorter than rounding
             return None
         check_cancelled()
-        found = function.evaluate(place)
+        found = function.evaluate(variables)
         is_short = float(found.residual @ step) >= 0
         if (is_short or found.largest <= least / 2) and found.is_admissible:
             return found

@@ -46,17 +46,17 @@ class MultiGraph:
         nodes: number of nodes.
         ends: (e, 2) the nodes that each edge connects.
         costs: (e,) edge costs, not negative.
-        beside: the incident edges of each node if they are known, as `edges_at_nodes` returns them.
+        incident_edges: the incident edges of each node if they are known, as `edges_at_nodes` returns them.
     """
 
     nodes: int
     ends: IntArray
     costs: FloatArray
-    beside: tuple[IntArray, IntArray] | None = None
+    incident_edges: tuple[IntArray, IntArray] | None = None
 
     @cached_property
     def _incident(self) -> tuple[IntArray, IntArray]:
-        return edges_at_nodes(self.ends, self.nodes) if self.beside is None else self.beside
+        return edges_at_nodes(self.ends, self.nodes) if self.incident_edges is None else self.incident_edges
 
     def shortest_paths(self, sources: IntArray, targets: IntArray | None = None) -> Paths:
         """Return the shortest paths from the sources; edges of infinite cost are not used.

@@ -12,7 +12,7 @@ from .requirements import REPORTED, Requirement, breaches, parse_requirements
 
 if TYPE_CHECKING:
     from .distortion import Distortion, angle_sum_errors, measure, measure_map, quantile, sum_angles
-    from .guarantees import broken_promises
+    from .guarantees import unmet_guarantees
     from .report import MAP_MEASURES, Row, as_rows, map_rows, number_text, packing_row, path_text
 
 __all__ = [
@@ -24,7 +24,7 @@ __all__ = [
     "Requirement",
     "Row",
     "breaches",
-    "broken_promises",
+    "unmet_guarantees",
     "map_rows",
     "measure",
     "measure_map",
@@ -42,7 +42,7 @@ _HOMES = {
     "Distortion": "distortion",
     "MAP_MEASURES": "report",
     "Row": "report",
-    "broken_promises": "guarantees",
+    "unmet_guarantees": "guarantees",
     "map_rows": "report",
     "measure": "distortion",
     "measure_map": "distortion",

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats, dots
 from ..base.compiled import compiled
-from ..base.text import list_some, shown
+from ..base.text import list_some, short_repr
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..geometry.intrinsic import check_lengths
 from ..geometry.overlap import Overlaps, overlaps_of_mesh
@@ -154,7 +154,7 @@ def _check_arrays(
     """Raise an error for invalid arrays, with which compiled loops would read out of bounds."""
     if not isinstance(mesh, TriangleMesh):
         raise ArrayShapeError(
-            f"mesh must be a TriangleMesh, for example check_mesh(vertices, faces).mesh, not {shown(mesh)}"
+            f"mesh must be a TriangleMesh, for example check_mesh(vertices, faces).mesh, not {short_repr(mesh)}"
         )
     as_faces(mesh.faces, len(mesh.vertices))
     if not np.isfinite(as_floats("corner_uv", corner_uv)).all():

@@ -39,7 +39,7 @@ NOT_ROUND, NOT_ROUND_SHARE = 1e-3, 0.02
 ROUGH_TOLERANCE = 0.01
 
 
-def broken_promises(result: Flattening, unit: float = DOUBLE) -> tuple[str, ...]:
+def unmet_guarantees(result: Flattening, unit: float = DOUBLE) -> tuple[str, ...]:
     """Return a note, one sentence, for each guarantee of the options that a result does not meet.
 
     Args:
@@ -74,7 +74,7 @@ def remeasured(
         notes: further notes to add.
         overlaps: the overlaps of its triangles; None to compute them.
     """
-    old_notes = broken_promises(result)
+    old_notes = unmet_guarantees(result)
     old = result.distortion
     # Scaling by a power of two avoids underflow and overflow of squared lengths.
     exponent = -unit_exponent(changed.vertices[changed.faces])
@@ -89,7 +89,7 @@ def remeasured(
     ).rescaled(exponent * float(np.log(2)))
     changed = replace(changed, distortion=distortion, rotations=_rotations(result, changed))
     kept = tuple(note for note in result.notes if note not in old_notes)
-    return replace(changed, notes=(*kept, *broken_promises(changed, unit), *notes))
+    return replace(changed, notes=(*kept, *unmet_guarantees(changed, unit), *notes))
 
 
 def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:

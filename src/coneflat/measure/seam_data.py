@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 from collections.abc import Iterable
 
 from ..base.arrays import BoolArray
-from ..geometry.handles import handle_loops, off_multiple
+from ..geometry.handles import difference_from_multiple, handle_loops
 from ..geometry.planar import sides_between
 
 
@@ -206,14 +206,14 @@ def measure_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float)
     turns = _rotations(mesh, corner_uv)
     across = np.zeros(mesh.faces.size)
     across[pairs[:, 0]], across[pairs[:, 1]] = turns, -turns
-    off = np.abs(off_multiple(turns, quantum))
-    handles = off_multiple(np.array([across[loop].sum() for loop in handle_loops(mesh)]), quantum)
+    off = np.abs(difference_from_multiple(turns, quantum))
+    handles = difference_from_multiple(np.array([across[loop].sum() for loop in handle_loops(mesh)]), quantum)
     return Rotations(quantum, float(off.max(initial=0.0)), tuple(handles.tolist()))
 
 
 def seam_rotations(mesh: TriangleMesh, corner_uv: FloatArray, quantum: float) -> FloatArray:
     """Return (k,) the deviation of the rotation across each inner edge from a multiple of a quantum, radians."""
-    return np.abs(off_multiple(_rotations(mesh, corner_uv), quantum))
+    return np.abs(difference_from_multiple(_rotations(mesh, corner_uv), quantum))
 
 
 def ratios_across(mesh: TriangleMesh, corner_uv: FloatArray) -> ComplexArray:

@@ -43,7 +43,7 @@ class CheckedMesh:
         mesh: manifold, consistently oriented, without isolated vertices.
         vertex_origin: (n,) the input vertex of each vertex of the mesh.
         face_origin: (m,) the input face of each face of the mesh.
-        is_turned: (m,) True for faces whose orientation was reversed (corners 1 and 2 exchanged).
+        is_flipped: (m,) True for faces whose orientation was reversed (corners 1 and 2 exchanged).
         notes: the changes that were made, one sentence each.
         exponent: the mesh has been scaled by two to the power of this number.
     """
@@ -51,7 +51,7 @@ class CheckedMesh:
     mesh: TriangleMesh
     vertex_origin: IntArray
     face_origin: IntArray
-    is_turned: BoolArray
+    is_flipped: BoolArray
     notes: tuple[str, ...]
     exponent: int = 0
 
@@ -80,7 +80,7 @@ def check_mesh(vertices: ArrayLike, faces: ArrayLike, *, repair: bool = False) -
     Examples:
         >>> vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
         >>> checked = coneflat.check_mesh(vertices, [[0, 1, 2], [0, 3, 2]])
-        >>> checked.is_turned  # the second face ran the other way
+        >>> checked.is_flipped  # the second face ran the other way
         array([False,  True])
         >>> checked.mesh.faces
         array([[0, 1, 2],
@@ -133,7 +133,7 @@ class _Check:
         self.faces = faces
         self.repair = repair
         self.face_origin = np.arange(len(faces))
-        self.is_turned = np.zeros(len(faces), dtype=bool)
+        self.is_flipped = np.zeros(len(faces), dtype=bool)
         self.pairs = np.empty((0, 2), dtype=np.int64)
         self.vertex_origin = np.arange(len(vertices))
         self.notes: list[str] = []
@@ -152,7 +152,7 @@ class _Check:
     def _keep(self, keep: BoolArray) -> None:
         self.faces = self.faces[keep]
         self.face_origin = self.face_origin[keep]
-        self.is_turned = self.is_turned[keep]
+        self.is_flipped = self.is_flipped[keep]
         if not len(self.faces):
             raise EmptyMeshError("the mesh has no faces left once degenerate ones are dropped")
 
@@ -258,7 +258,7 @@ class _Check:
 
     def _flip(self, flip: BoolArray) -> None:
         self.faces = np.where(flip[:, None], self.faces[:, [0, 2, 1]], self.faces)
-        self.is_turned ^= flip
+        self.is_flipped ^= flip
         corner = self.pairs % 3
         exchanged = np.where(corner == 0, 0, 3 - corner)
         self.pairs = np.where(flip[self.pairs // 3], self.pairs - corner + exchanged, self.pairs)
@@ -298,7 +298,7 @@ class _Check:
         mesh = TriangleMesh(self.vertices[self.vertex_origin], self.faces)
         if self.pairing is not None:
             mesh.__dict__["_pairing"] = self.pairing  # cached, so that the mesh does not compute it again
-        return CheckedMesh(mesh, self.vertex_origin, self.face_origin, self.is_turned, tuple(self.notes))
+        return CheckedMesh(mesh, self.vertex_origin, self.face_origin, self.is_flipped, tuple(self.notes))
 
 
 def weld(vertices: FloatArray) -> tuple[IntArray, IntArray]:

@@ -21,7 +21,7 @@ from ..base.sets import edges_at_nodes, label_nodes
 NEXT = np.array([1, 2, 0])
 PREVIOUS = np.array([2, 0, 1])
 # Cached properties of a mesh that depend on its faces only.
-CONNECTIVITY = ("_pairing", "tails", "heads", "is_boundary_edge", "is_boundary_vertex", "edges_beside")
+CONNECTIVITY = ("_pairing", "tails", "heads", "is_boundary_edge", "is_boundary_vertex", "incident_edges")
 
 
 def label_components(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntArray]:
@@ -156,7 +156,7 @@ class TriangleMesh:
         return mask
 
     @cached_property
-    def edges_beside(self) -> tuple[IntArray, IntArray]:
+    def incident_edges(self) -> tuple[IntArray, IntArray]:
         """Incident edges of the vertices: where those of each vertex start, (n + 1,), and the edges, (2e,)."""
         return edges_at_nodes(self.edges, len(self.vertices))
 

@@ -61,7 +61,7 @@ class Polygons:
         points[self.corners[points[self.corners] != uv_faces]] = -1
         return points
 
-    def are_whole(self, points: IntArray) -> BoolArray:
+    def are_complete(self, points: IntArray) -> BoolArray:
         """Return (p,) whether a polygon has all its triangles, and no seam separates them in the plane.
 
         points: (c,) as returned by `points`.
@@ -81,7 +81,7 @@ class Polygons:
         """
         sizes, loops = self.sizes, self.loops()
         polygon = np.repeat(np.arange(len(sizes)), sizes)
-        place = np.flatnonzero((self.are_whole(points) & (sizes > 3))[polygon])
+        place = np.flatnonzero((self.are_complete(points) & (sizes > 3))[polygon])
         polygon = polygon[place]
         start, size = self.offsets[polygon], sizes[polygon]
         before, after = start + (place - start - 1) % size, start + (place - start + 1) % size

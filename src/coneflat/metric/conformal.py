@@ -154,15 +154,15 @@ class ConformalProblem:
             MetricError: the Hessian is singular in double precision.
         """
         # The Hessian needs the triangulation of its own metric.
-        state = here if here is self.last else self.evaluate(here.place)
+        state = here if here is self.last else self.evaluate(here.variables)
         if exactly:
             self.preconditioner = None
         if self._pattern is None:
             self._pattern = HessianPattern(self.triangulation)
-        if self.preconditioner is not None and len(here.place) >= MAX_DIRECT_VERTICES:
+        if self.preconditioner is not None and len(here.variables) >= MAX_DIRECT_VERTICES:
             accuracy = min(max(state.largest, GOAL_RESIDUAL / state.largest / 4), MAX_RELATIVE_RESIDUAL)
             hessian = self._pattern.matrix(state.cots, self.fixed)
-            inverse = self._corrected(self.preconditioner, hessian, state.place)
+            inverse = self._corrected(self.preconditioner, hessian, state.variables)
             step = conjugate_gradients(hessian, state.residual, inverse, accuracy)
             if step is not None:
                 return np.where(self.fixed, 0.0, step), False
@@ -198,7 +198,7 @@ def find_scale(
     best, steps = minimise(
         problem, start, Limits(tolerance, max_steps, GOAL_RESIDUAL, halvings, largest_step=LARGEST_STEP)
     )
-    return best if best is problem.last else problem.evaluate(best.place), steps
+    return best if best is problem.last else problem.evaluate(best.variables), steps
 
 
 @compiled

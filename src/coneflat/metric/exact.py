@@ -167,7 +167,7 @@ def exact_metric(
     if doubled:
         state.curvature[:n] /= copies
     if pinned.any():
-        state.place = _keep_area(mesh, lengths, problem, state.place, original)
+        state.variables = _keep_area(mesh, lengths, problem, state.variables, original)
     return _finish(problem, state, n, euclidean, steps, tolerance, doubled)
 
 
@@ -231,11 +231,11 @@ def _finish(
 ) -> ExactMetric:
     """Return the result: the lengths of the metric are written to the triangulation, statistics are collected."""
     triangulation = problem.triangulation
-    triangulation.length = problem.flat_lengths(state.place)
+    triangulation.length = problem.flat_lengths(state.variables)
     residual = np.abs(state.residual[:n])
     records = problem.records
     return ExactMetric(
-        log_scale=state.place[:n],
+        log_scale=state.variables[:n],
         curvature=state.curvature[:n],
         triangulation=triangulation,
         flips=np.concatenate(records) if records else np.empty(0, dtype=np.int64),

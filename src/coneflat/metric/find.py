@@ -16,7 +16,13 @@ from scipy.sparse import csc_matrix
 from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..errors import ConvergenceError
 from ..geometry import corner_angles, double_areas
-from ..geometry.handles import Holonomy, curvature_by_log_lengths, edge_means, loop_holonomy, off_multiple
+from ..geometry.handles import (
+    Holonomy,
+    curvature_by_log_lengths,
+    difference_from_multiple,
+    edge_means,
+    loop_holonomy,
+)
 from ..geometry.straight import FlatTriangles
 from ..geometry.triangles import slacks
 from ..linalg import factorize
@@ -58,7 +64,7 @@ def find_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> F
         return linear_flat_metric(mesh, lengths, solution)
     choices = _exact_choices(surface, solution, spec)
     if quantum is not None:
-        if not choices.is_held(mesh).any():
+        if not choices.is_fixed(mesh).any():
             holonomy = loop_holonomy(mesh, holes=True)
             try:
                 if len(holonomy.loops) > 2 * mesh.genus():
@@ -127,7 +133,7 @@ def corrected_flat_metric(
     mesh = holonomy.mesh
     given = lengths
     metric, triangles = _solve_metric(mesh, lengths, solution, choices)
-    off = off_multiple(holonomy.of_flat(triangles), quantum)
+    off = difference_from_multiple(holonomy.of_flat(triangles), quantum)
     first = float(np.abs(off).max())
     fixed = choices.is_open(mesh)
     changes = None
@@ -154,7 +160,7 @@ def corrected_flat_metric(
         lengths = sheared
         solution = replace(solution, log_scale=metric.log_scale - np.log(metric.scale))
         metric, triangles = _solve_metric(mesh, lengths, solution, choices)
-        before, off = off, off_multiple(holonomy.of_flat(triangles), quantum)
+        before, off = off, difference_from_multiple(holonomy.of_flat(triangles), quantum)
         if fraction < 1:
             changes = None
             continue

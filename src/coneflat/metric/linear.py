@@ -46,7 +46,7 @@ def linear_flat_metric(
         target=solution.target,
         log_scale=solution.log_scale + np.log(shrink),
         is_open=mesh.is_boundary_vertex,
-        is_held=np.zeros(len(mesh.vertices), dtype=bool),
+        is_fixed=np.zeros(len(mesh.vertices), dtype=bool),
         statistics=SolveStatistics(broken=int(is_broken(scaled).sum())),
         flat_lengths=scaled,
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
-from ..base.text import off_by, plural
+from ..base.text import error_text, plural
 from ..errors import ConvergenceError
 from ..geometry import double_areas
 from ..geometry.intrinsic import IntrinsicTriangulation
@@ -58,7 +58,7 @@ class ExactChoices:
             return mesh.is_boundary_vertex.copy()
         return np.zeros(len(mesh.vertices), dtype=bool) if self.rigid is None else self.rigid.copy()
 
-    def is_held(self, mesh: TriangleMesh) -> BoolArray:
+    def is_fixed(self, mesh: TriangleMesh) -> BoolArray:
         """Return (n,) the boundary vertices that untangling must not move."""
         if self.boundary is not None:
             return mesh.is_boundary_vertex.copy()
@@ -94,8 +94,8 @@ def exact_flat_metric(
         worst = solved.worst_vertex if choices.names is None else choices.names[solved.worst_vertex]
         raise ConvergenceError(
             f"the exact metric did not converge: after {solved.steps} steps the curvature at vertex {worst} is "
-            f"{off_by(solved.residual)}; --method linear needs no convergence, and other cones, --repair or remeshing "
-            "may help"
+            f"{error_text(solved.residual)}; --method linear needs no convergence, and other cones, --repair or "
+            "remeshing may help"
         )
     triangles = solved.straight()
     return FlatMetric(
@@ -105,7 +105,7 @@ def exact_flat_metric(
         target=np.where(fixed, solved.curvature, target),
         log_scale=solved.log_scale,
         is_open=is_open,
-        is_held=choices.is_held(mesh),
+        is_fixed=choices.is_fixed(mesh),
         statistics=statistics_of(solved),
         notes=_length_notes(mesh, lengths, solved, triangles, choices),
         triangles=triangles,

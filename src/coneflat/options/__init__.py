@@ -32,8 +32,8 @@ from .kinds import (
     VerticesOrEdges,
     Weights,
     WordOrVertices,
+    as_integer,
     as_number,
-    as_whole,
     strength,
 )
 from .reading import read_options, settings, takes
@@ -67,7 +67,7 @@ __all__ = [
     "Weights",
     "WordOrVertices",
     "as_number",
-    "as_whole",
+    "as_integer",
     "declarations",
     "option",
     "read_options",

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from ..base.defaults import LEAST_QUANTUM, TYPED_TOLERANCE
+from ..base.defaults import MIN_QUANTUM, TYPED_TOLERANCE
 from ..errors import OptionError
 from .declared import WIDEST_CONE, AtlasOptions, ConeOptions, MetricOptions, RunOptions, SeamOptions
 
@@ -56,9 +56,9 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
                 yield "boundary 'straight' needs the cone search, which finds its corners: use cones 'sparse'"
         if quantum is None and self.correct_handles:
             yield "correct_handles needs quantised cones: set quantise, for example to pi/2"
-        if quantum is not None and not LEAST_QUANTUM <= quantum <= 2 * math.pi * (1 + TYPED_TOLERANCE):
+        if quantum is not None and not MIN_QUANTUM <= quantum <= 2 * math.pi * (1 + TYPED_TOLERANCE):
             yield (
-                f"quantise must be from {LEAST_QUANTUM:g} radians (a smaller quantum has no effect) to 2 pi, not "
+                f"quantise must be from {MIN_QUANTUM:g} radians (a smaller quantum has no effect) to 2 pi, not "
                 f"{quantum:g}"
             )
 

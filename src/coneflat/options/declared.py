@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 from ..base.defaults import (
     DISTORTION,
     MAX_CONE_ANGLE,
+    MAX_CONES,
+    MAX_PREFERENCE,
     MIN_CONE_ANGLE,
-    MOST_CONES,
-    MOST_PREFERENCE,
     PADDING,
     RESOLUTION,
 )
@@ -245,7 +245,7 @@ class SeamOptions:
     seams: ArrayLike | str | tuple[str, ArrayLike] | None = option(None, Edges(("input",)), one_mesh=True)
     no_seams: ArrayLike | None = option(None, VerticesOrEdges(), one_mesh=True)
     sharp_angle: float | None = option(None, ANGLE_OR_NONE)
-    hide_seams: float = option(0.0, strength(MOST_PREFERENCE))
+    hide_seams: float = option(0.0, strength(MAX_PREFERENCE))
     seam_weights: ArrayLike | str | None = option(None, Weights())
 
 
@@ -318,4 +318,4 @@ class CurveOptions(ConeBounds, InputOptions):
         most: Largest number of cones.
     """
 
-    most: int = option(MOST_CONES, integer())
+    most: int = option(MAX_CONES, integer())

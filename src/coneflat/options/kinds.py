@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from numbers import Integral
 from typing import TYPE_CHECKING, Any
 
-from ..base.text import shown
+from ..base.text import short_repr
 from ..errors import OptionError
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Choice(Kind):
 
     def parse(self, name: str, value: Any) -> str:
         if not isinstance(value, str) or value not in self.words:
-            raise OptionError(f"unknown {name} {shown(value)}: choose from {', '.join(self.words)}")
+            raise OptionError(f"unknown {name} {short_repr(value)}: choose from {', '.join(self.words)}")
         return value
 
 
@@ -56,7 +56,7 @@ class Flag(Kind):
         import numpy as np
 
         if not isinstance(value, (bool, np.bool_)):
-            raise OptionError(f"{name} must be True or False, not {shown(value)}")
+            raise OptionError(f"{name} must be True or False, not {short_repr(value)}")
         return bool(value)
 
 
@@ -66,7 +66,7 @@ class Number(Kind):
 
     Attributes:
         least, most: inclusive bounds.
-        is_whole: the number must be an integer.
+        is_integer: the number must be an integer.
         is_positive: the number must be finite and above 0.
         is_angle, is_strength: the number is an angle, or a strength.
         optional: None is allowed.
@@ -74,7 +74,7 @@ class Number(Kind):
 
     least: float = -math.inf
     most: float = math.inf
-    is_whole: bool = False
+    is_integer: bool = False
     is_positive: bool = False
     is_angle: bool = False
     is_strength: bool = False
@@ -85,7 +85,7 @@ class Number(Kind):
             return None
         if self.is_strength and type(value).__name__ in ("bool", "bool_"):
             value = float(value)
-        number = as_whole(name, value) if self.is_whole else as_number(name, value)
+        number = as_integer(name, value) if self.is_integer else as_number(name, value)
         if not self.least <= number <= self.most or (self.is_positive and not 0 < number < math.inf):
             raise OptionError(f"{name} must be {self.text}, not {number:,.6g}")
         return number
@@ -93,7 +93,7 @@ class Number(Kind):
     @property
     def text(self) -> str:
         """A description of the valid numbers, for messages."""
-        noun = "an integer" if self.is_whole else "a number"
+        noun = "an integer" if self.is_integer else "a number"
         if self.is_positive:
             return f"{noun} above 0"
         if self.least == -math.inf:
@@ -103,7 +103,7 @@ class Number(Kind):
 
 ANGLE, ANGLE_OR_NONE = Number(is_angle=True), Number(is_angle=True, optional=True)
 POSITIVE = Number(is_positive=True)
-COUNT = Number(0, is_whole=True, optional=True)
+COUNT = Number(0, is_integer=True, optional=True)
 
 
 def strength(most: float) -> Number:
@@ -113,7 +113,7 @@ def strength(most: float) -> Number:
 
 def integer(most: float = math.inf) -> Number:
     """Return the kind of an integer from 1 to `most`."""
-    return Number(1, most, is_whole=True)
+    return Number(1, most, is_integer=True)
 
 
 @dataclass(frozen=True)
@@ -204,7 +204,7 @@ class Direction(Kind):
         is_one = direction.shape == (3,) and direction.dtype.kind in "fiu"
         if not (is_one and np.isfinite(direction).all() and direction.any()):
             raise OptionError(
-                f"{name} must be a direction, three numbers that are not all 0, not {shown(value)}"
+                f"{name} must be a direction, three numbers that are not all 0, not {short_repr(value)}"
             )
         direction = direction.astype(np.float64)
         largest = np.abs(direction).max()
@@ -219,20 +219,20 @@ def as_number(name: str, value: object) -> float:
 
     is_scalar = np.ndim(value) == 0 if isinstance(value, np.ndarray) else not isinstance(value, (str, bytes))
     if not is_scalar or isinstance(value, (bool, np.bool_, complex, np.complexfloating)):
-        raise OptionError(f"{name} must be a number, not {shown(value)}")
+        raise OptionError(f"{name} must be a number, not {short_repr(value)}")
     try:
         return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError) as error:
-        raise OptionError(f"{name} must be a number, not {shown(value)}") from error
+        raise OptionError(f"{name} must be a number, not {short_repr(value)}") from error
 
 
-def as_whole(name: str, value: object) -> int:
+def as_integer(name: str, value: object) -> int:
     """Return a value as an integer, or raise OptionError."""
     import numpy as np
 
     number = math.nan if isinstance(value, (bool, np.bool_)) else as_number(name, value)
     if not number.is_integer() or abs(number) >= 2**62:
-        raise OptionError(f"{name} must be an integer, not {shown(value)}")
+        raise OptionError(f"{name} must be an integer, not {short_repr(value)}")
     return int(number)
 
 
@@ -280,20 +280,20 @@ def given_vertices(noun: str, vertices: object, may_differ: bool = False) -> dic
 
     if isinstance(vertices, Mapping):
         given: dict[int, float | None] = {
-            as_whole(f"a {noun}'s vertex", v): None if k is None else as_number(f"a {noun}'s curvature", k)
+            as_integer(f"a {noun}'s vertex", v): None if k is None else as_number(f"a {noun}'s curvature", k)
             for v, k in vertices.items()
         }
     elif isinstance(vertices, Iterable) and not isinstance(vertices, (str, bytes)):
         if isinstance(vertices, np.ndarray) and np.ndim(vertices) != 1:
-            raise OptionError(f"{noun}s must be a list of vertices, not {shown(vertices)}")
-        listed = [as_whole(f"a {noun}'s vertex", v) for v in vertices]
+            raise OptionError(f"{noun}s must be a list of vertices, not {short_repr(vertices)}")
+        listed = [as_integer(f"a {noun}'s vertex", v) for v in vertices]
         given = dict.fromkeys(listed)
         if len(given) < len(listed):
             twice = next(v for i, v in enumerate(listed) if v in listed[:i])
             raise OptionError(f"vertex {twice} is given as a {noun} twice")
     else:
         is_count = noun == "cone" and isinstance(vertices, Integral) and int(vertices) > 0
-        advice = f": for a number of cones use cone_count={shown(vertices)}" if is_count else ""
+        advice = f": for a number of cones use cone_count={short_repr(vertices)}" if is_count else ""
         raise OptionError(
             f"{noun}s must be vertices, or a map from vertex to curvature, not {type(vertices).__name__}{advice}"
         )

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.arrays import FloatArray
-from ..base.defaults import MOST_PREFERENCE
+from ..base.defaults import MAX_PREFERENCE
 from ..errors import OptionError
 from ..geometry.operators import at_safe_scale
 from ..geometry.triangles import dihedral_angles
@@ -50,8 +50,8 @@ def edge_costs(
     Raises:
         OptionError: `hiding` is out of range, or weights are negative, not finite, all 0 or of the wrong shape.
     """
-    if not 0 <= hiding <= MOST_PREFERENCE:
-        raise OptionError(f"hiding must be a number from 0 to {MOST_PREFERENCE:g}, got {hiding:g}")
+    if not 0 <= hiding <= MAX_PREFERENCE:
+        raise OptionError(f"hiding must be a number from 0 to {MAX_PREFERENCE:g}, got {hiding:g}")
     costs = np.array(lengths, dtype=np.float64)
     angles = dihedral_angles(mesh) if creases or hiding else np.zeros(len(costs))
     if creases:

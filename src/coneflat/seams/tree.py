@@ -112,7 +112,7 @@ def _tree(mesh: TriangleMesh, costs: FloatArray, is_cut: BoolArray, is_end: Bool
     ends simultaneously, then a minimum spanning tree over the cheapest bridges between their regions. Edges that are
     already cut (e,) cost nothing.
     """
-    paths = MultiGraph(len(mesh.vertices), mesh.edges, costs, mesh.edges_beside).shortest_paths(
+    paths = MultiGraph(len(mesh.vertices), mesh.edges, costs, mesh.incident_edges).shortest_paths(
         np.flatnonzero(is_end)
     )
     regions = paths.source[mesh.edges]
@@ -134,7 +134,7 @@ def _loops(mesh: TriangleMesh, costs: FloatArray, is_cut: BoolArray, is_end: Boo
     inner = len(mesh.vertices) - int(is_end.sum())
     if len(pairs) == inner + len(mesh.faces) - pieces:
         return np.zeros(len(costs), dtype=bool)
-    paths = MultiGraph(len(mesh.vertices), mesh.edges, costs, mesh.edges_beside).shortest_paths(
+    paths = MultiGraph(len(mesh.vertices), mesh.edges, costs, mesh.incident_edges).shortest_paths(
         np.flatnonzero(is_end)
     )
     is_left = ~is_cut

@@ -14,7 +14,7 @@ from ..geometry.operators import at_unit_scale
 from ..mesh.check import CheckedMesh
 from ..mesh.polygons import COLOURS
 from ..options import Options
-from ..options.kinds import as_number, as_whole
+from ..options.kinds import as_integer, as_number
 from ..stages import VertexCurvatures
 from .input_mesh import InputMesh
 
@@ -146,7 +146,7 @@ def _weights_of_some(noun: str, weights: Mapping[Any, Any], count: int) -> Float
     """Return (n,) the weights of the vertices in a map, and 1 for the others."""
     values = np.ones(count)
     for vertex, weight in weights.items():
-        at = as_whole(f"a vertex of {noun}", vertex)
+        at = as_integer(f"a vertex of {noun}", vertex)
         if not 0 <= at < count:
             raise OptionError(f"{noun}: {at} is not a vertex: indices are from 0 to {count - 1}")
         values[at] = as_number(f"{noun}: that of vertex {at}", weight)

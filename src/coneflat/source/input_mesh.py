@@ -96,7 +96,7 @@ def at_unit_size(checked: CheckedMesh) -> CheckedMesh:
 def reorder_corners(checked: CheckedMesh, per_corner: Values) -> Values:
     """Return values (m, 3) at triangle corners of the input, rearranged for the faces of the checked mesh."""
     values = per_corner[checked.face_origin]
-    return np.where(checked.is_turned[:, None], values[:, [0, 2, 1]], values)
+    return np.where(checked.is_flipped[:, None], values[:, [0, 2, 1]], values)
 
 
 def lengths_of_input(checked: CheckedMesh, lengths: ArrayLike, face_count: int) -> FloatArray:

@@ -75,8 +75,8 @@ class TestChoices:
                 StudioError,
                 "positive and at most 720 degrees, not -57.2",
             ),
-            (lambda c: c.cut((4,)), StudioError, "a path must be vertices"),
-            (lambda c: c.cut((4, 4)), StudioError, "a path must be vertices"),
+            (lambda c: c.cut((4,)), StudioError, "a path must be two or more vertices"),
+            (lambda c: c.cut((4, 4)), StudioError, "a path must be two or more vertices"),
             (lambda c: c.with_option("progress", print), OptionError, "unknown option 'progress'"),
             (lambda c: c.with_option("stretch", 2), OptionError, "stretch must be a number from 0 to 1"),
             (lambda c: c.with_option("boundary", [3]), OptionError, "unknown boundary"),
@@ -149,7 +149,10 @@ class TestProject:
                 lambda p: {**p, "choices": {**p["choices"], "options": {"colour": "red"}}},
                 "unknown option 'colour'",
             ),
-            (lambda p: {**p, "choices": {**p["choices"], "cuts": [[1]]}}, "a path must be vertices"),
+            (
+                lambda p: {**p, "choices": {**p["choices"], "cuts": [[1]]}},
+                "a path must be two or more vertices",
+            ),
             (lambda p: {**p, "choices": {**p["choices"], "cones": [{"vertex": "x"}]}}, "a number"),
         ],
     )

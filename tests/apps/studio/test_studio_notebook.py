@@ -50,7 +50,7 @@ def test_choices_are_set_and_read(page):
     for bad, message in (
         ({"options": {"stretch": 7}}, "from 0 to 1"),
         ({"cuts": 5}, "expected choices, got"),
-        ({"paint": {"glue": "1"}}, "unknown layer of paint 'glue'"),
+        ({"paint": {"glue": "1"}}, "unknown layer 'glue'"),
     ):
         with pytest.raises((StudioError, OptionError), match=message):
             page.choices = bad

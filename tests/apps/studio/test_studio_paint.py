@@ -95,7 +95,7 @@ class TestPaint:
     @pytest.mark.parametrize(
         ("layer", "weight", "message"),
         [
-            ("glue", None, "unknown layer of paint 'glue'"),
+            ("glue", None, "unknown layer 'glue'"),
             ("importance", 0, "an importance must be above 0"),
             ("importance", "much", "an importance must be above 0"),
             ("importance", 1e9, "at most 1,000,000"),

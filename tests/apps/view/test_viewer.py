@@ -16,7 +16,7 @@ from shapes import sphere
 import coneflat
 from coneflat.apps.view.figures.render import rasterise
 from coneflat.apps.view.page.content import content_of, outline_halfedges
-from coneflat.apps.view.page.webpage import page_of
+from coneflat.apps.view.page.webpage import page_html
 from coneflat.errors import MeshError, MeshFileError, OptionError, UnknownFormatError
 from coneflat.io.texture import read_picture
 from coneflat.measure.report import as_rows
@@ -47,7 +47,7 @@ def unpack(page):
 
 class TestPage:
     def test_it_carries_the_result(self, result):
-        head, arrays = unpack(page_of(result))
+        head, arrays = unpack(page_html(result))
         faces = arrays["faces"].reshape(-1, 3)
         np.testing.assert_allclose(arrays["uv"].reshape(-1, 2)[faces], result.corner_uv, atol=1e-7)
         places = arrays["places"].reshape(-1, 3)
@@ -64,7 +64,7 @@ class TestPage:
         assert head["rows"] == [list(row) for row in as_rows(result)]
 
     def test_it_names_no_other_place(self, result):
-        page = page_of(result)
+        page = page_html(result)
         assert not re.findall(r"https?:|//[a-z]+\.|\bfetch\(|XMLHttpRequest|WebSocket|@import|url\(", page)
         assert re.findall(r'(?:src|href)="?([^"> ]+)', page) == ["data:,"]
         assert "default-src 'none'" in page
@@ -72,14 +72,14 @@ class TestPage:
 
     def test_a_hostile_name_stays_text(self, result):
         name = "</script><script>alert(1)</script><!--\udc80"
-        page = page_of(result, name=name)
+        page = page_html(result, name=name)
         assert "<script>alert" not in page
         assert unpack(page)[0]["name"] == name
         page.encode()
 
     def test_a_picture_goes_into_the_page(self, result, tmp_path):
         (tmp_path / "one.png").write_bytes(PIXEL)
-        head, arrays = unpack(page_of(result, texture=tmp_path / "one.png"))
+        head, arrays = unpack(page_html(result, texture=tmp_path / "one.png"))
         assert head["picture"] == "image/png"
         assert head["show"] == "picture"
         assert arrays["picture"].tobytes() == PIXEL

@@ -29,7 +29,7 @@ def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
             "status": "failed" if unmet else "done",
             "error": f"not met: {'; '.join(unmet)}" if unmet else "",
         } | {name: report[name] for name in COLUMNS}
-        row["notes"] = " ".join(source.notes_of(report["notes"]))
+        row["notes"] = " ".join(source.all_notes(report["notes"]))
     except ConeflatError as error:
         row |= {"status": "failed", "error": str(error)}
     except MemoryError:

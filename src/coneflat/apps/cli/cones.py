@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...base import DISTORTION, MOST_CONES, plural
+from ...base import DISTORTION, MAX_CONES, plural
 from ...options import FindOptions
 from .options import flag, is_given, keywords, option_flags, path_flag, pop_flags
 from .shared import GroupedCommand, input_options, verbosity_options
@@ -33,7 +33,7 @@ class ConeFlags:
 
     output: Path | None = path_flag()
     curve: bool = flag(False, is_flag=True)
-    most: int = flag(MOST_CONES, type=int)
+    most: int = flag(MAX_CONES, type=int)
     picture: Path | None = path_flag()
 
 
@@ -72,7 +72,7 @@ def cones(
     with Console(verbosity) as console:
         with console.stage("read", 0.0):
             joined = read_joined(mesh, weld)
-            source, options = joined.mesh, joined.renamed(options)
+            source, options = joined.mesh, joined.map_options(options)
         with console.stage("cones", READ):
             found_cones = find_cones(
                 source, progress=console.part(READ, 0.5 if flags.curve else FLATTENED), **options

@@ -172,7 +172,7 @@ def _quads(
         joined = read_joined(file, weld)
     found = quads(joined.mesh, quads=count, progress=console.part(READ, FLATTENED), **repair_keywords(repair))
     console.seconds.update(found.seconds)
-    return found, joined.notes_of(found.notes)
+    return found, joined.all_notes(found.notes)
 
 
 def _check_combinations(context: click.Context, kind: str) -> None:

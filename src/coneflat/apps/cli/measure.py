@@ -39,7 +39,7 @@ def measure(
       coneflat measure asset.glb --json
       coneflat measure asset.glb --require flipped=0,overlap=0 --require "qc_mean<=1.1"
     """
-    from ...io import as_mapped, check_target
+    from ...io import as_uv_mesh, check_target
     from ...measure import parse_requirements
     from ..measure_uv import MEASURED, measure_mapped
     from .run import Console, require_distinct, write_report
@@ -50,7 +50,7 @@ def measure(
     require_distinct({"input": file, "report": report})
     with Console(verbosity) as console:
         with console.stage("read", 0.0):
-            mapped = as_mapped(file, weld=weld)
+            mapped = as_uv_mesh(file, weld=weld)
         with console.stage("measure", 0.3):
             measured = measure_mapped(mapped, strict=not repair)
         found = measured.report()

@@ -140,7 +140,7 @@ def _flag(declaration: Declaration) -> Callable[[Command], Command]:
         case Number(is_strength=True):
             more = {"type": _strength, "is_flag": False, "flag_value": 1.0, "metavar": "STRENGTH"}
         case Number():
-            more = {"type": int if kind.is_whole else float}
+            more = {"type": int if kind.is_integer else float}
         case declared.Direction():
             more = {"type": _direction, "metavar": "DIRECTION"}
         case declared.Vertices() | declared.VerticesOrEdges():

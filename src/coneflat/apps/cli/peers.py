@@ -103,7 +103,7 @@ def compare(
                 methods=methods,
                 peers=() if flags.no_peers else None,
                 progress=console.part(READ, FLATTENED),
-                **source.renamed(options),
+                **source.map_options(options),
             )
         console.say(f"note: {note}" for note in source.notes())
         if not found.drawn:

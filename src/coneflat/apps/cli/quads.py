@@ -140,9 +140,9 @@ def _read_grid(mesh: Path, console: Console, options: dict[str, Any], weld: bool
         if mesh.suffix.lower() == ".npz":
             return read_grid(mesh)
         joined = read_joined(mesh, weld)
-    found = integer_grid(joined.mesh, progress=console.part(READ, FLATTENED), **joined.renamed(options))
+    found = integer_grid(joined.mesh, progress=console.part(READ, FLATTENED), **joined.map_options(options))
     console.seconds.update(found.seconds)
-    return replace(found, notes=joined.notes_of(found.notes))
+    return replace(found, notes=joined.all_notes(found.notes))
 
 
 def _grid_rows(grid: IntegerGrid) -> Iterator[tuple[str, str, str]]:

@@ -242,9 +242,9 @@ def flatten_file(
 
 def flatten_joined(source: Joined, console: Console, options: Mapping[str, Any]) -> Flattening:
     """Flatten a mesh that has been read, show the progress, and return the result."""
-    result = flatten(source.mesh, progress=console.part(READ, FLATTENED), **source.renamed(options))
+    result = flatten(source.mesh, progress=console.part(READ, FLATTENED), **source.map_options(options))
     console.seconds.update(result.seconds)
-    return replace(result, notes=source.notes_of(result.notes))
+    return replace(result, notes=source.all_notes(result.notes))
 
 
 def save(

@@ -72,7 +72,7 @@ def view(
     from ...io import read_picture
     from ..quads.files import holds_quads, read_quads
     from ..quads.page import page_of_quads
-    from ..view import check_page, open_page, own_quantity, page_of, write_page
+    from ..view import check_page, open_page, own_quantity, page_html, write_page
     from .run import FLATTENED, Console, archive_path, open_result
 
     # Errors that writing would raise are reported before the work starts.
@@ -95,7 +95,7 @@ def view(
             with console.stage("page", FLATTENED):
                 if color is not None:
                     look["color"] = own_quantity(result, color, archive_path(file))
-                text = page_of(result, **look)
+                text = page_html(result, **look)
         write_page(text, page)
         console.finish([page], result)
         if flags.output is None and not open_page(page):

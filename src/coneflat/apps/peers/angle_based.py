@@ -83,7 +83,7 @@ def angle_based(
         statistics = SolveStatistics(newton_steps=steps, residual=residual, broken=broken)
         return Embedding(fit_shapes(cut.mesh, shapes, lengths), statistics, tuple(notes))
 
-    return embedding_metric(mesh, lengths, solution, embed, holds_cones=not is_free)
+    return embedding_metric(mesh, lengths, solution, embed, has_target_cones=not is_free)
 
 
 def nearest_angles(conditions: AngleConditions, wanted: FloatArray) -> tuple[FloatArray, int, bool]:

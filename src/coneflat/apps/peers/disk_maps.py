@@ -41,7 +41,7 @@ def map_cut_mesh(
         )
         return Embedding(place(cut.mesh, lengths), notes=notes if len(cut.seams) else ())
 
-    return embedding_metric(mesh, lengths, solution, embed, holds_cones=False)
+    return embedding_metric(mesh, lengths, solution, embed, has_target_cones=False)
 
 
 def least_squares_conformal(

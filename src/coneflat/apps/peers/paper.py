@@ -279,7 +279,7 @@ def _row(panels: Sequence[Panel], quantities: Sequence[Quantity] = ()) -> Row:
     from ..view import Row
 
     inches = 2.2  # of height
-    return Row([panel.with_room(inches) for panel in panels], quantities[:1], tallest=inches)
+    return Row([panel.fit_label(inches) for panel in panels], quantities[:1], tallest=inches)
 
 
 def _cells(rows: Sequence[Sequence[object]], forms: Sequence[str]) -> list[list[str]]:

@@ -80,7 +80,7 @@ def coherent_angles(
     least = np.clip(LEAST_PART * angles, LEAST_ANGLE, 0.02)
     problem = _Dual(angles, least, triangulation.twin, equations, right, bool(is_summed.all()))
     found, steps = minimise(problem, problem.evaluate(np.zeros(len(right))), ANGLE_LIMITS)
-    return CoherentAngles(problem.project(found.place)[0], found.largest, steps)
+    return CoherentAngles(problem.project(found.variables)[0], found.largest, steps)
 
 
 @dataclass(eq=False)
@@ -115,7 +115,7 @@ class _Dual:
     def direction(self, here: Point, exactly: bool) -> tuple[FloatArray, bool]:
         """Return the Newton step, with damping proportional to the residual; True, as there is no more exact step."""
         residual = here.residual
-        _, own, across = self.project(here.place)
+        _, own, across = self.project(here.variables)
         slots = np.flatnonzero(across)
         every = np.arange(len(own))
         derivative = csr_matrix(

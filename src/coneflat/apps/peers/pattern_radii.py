@@ -51,7 +51,7 @@ def circle_pattern(twin: IntArray, coherent: CoherentAngles) -> CirclePattern:
     # If circles intersect at a small angle, the last bit of a log radius changes angles by a thousand times the
     # tolerance. As small changes of a base value, log radii are accurate enough.
     found, more = minimise(problem, problem.evaluate(np.zeros_like(problem.base)), RADIUS_LIMITS)
-    log_radius = problem.base + found.place
+    log_radius = problem.base + found.variables
     spread = float(np.ptp(log_radius))
     if not spread < 600:  # Squares of lengths must be finite; their logs are at most half as large.
         raise ConvergenceError(
@@ -59,7 +59,7 @@ def circle_pattern(twin: IntArray, coherent: CoherentAngles) -> CirclePattern:
             "other cones or --repair may help"
         )
     log_radius -= (log_radius.max() + log_radius.min()) / 2
-    half = problem.half_angles(found.place)
+    half = problem.half_angles(found.variables)
     lengths = 2 * np.exp(np.repeat(log_radius, 3)) * np.sin(half)
     upper = np.flatnonzero(twin > np.arange(len(half)))
     lengths[twin[upper]] = lengths[upper]
@@ -122,7 +122,7 @@ class RadiiProblem:
 
     def direction(self, here: Point, exactly: bool) -> tuple[FloatArray, bool]:
         """Return the Newton step; True, as it is exact."""
-        half_theta, gaps = self.sides[3], self._gaps(here.place)
+        half_theta, gaps = self.sides[3], self._gaps(here.variables)
         with np.errstate(over="ignore"):
             slope = np.sin(2 * half_theta) / (4 * (np.sinh(gaps / 2) ** 2 + np.sin(half_theta) ** 2))
         return self.solve(slope, here.residual), True

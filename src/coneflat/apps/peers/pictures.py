@@ -145,7 +145,7 @@ def figure_of(rows: Sequence[view.Row], *, marks_of: Flattening | None = None) -
 
 def in_rows(panels: Sequence[view.Panel], quantities: Sequence[view.Quantity] = ()) -> list[view.Row]:
     """Return panels in rows of `IN_A_ROW`."""
-    wide = [panel.with_room(TALLEST) for panel in panels]
+    wide = [panel.fit_label(TALLEST) for panel in panels]
     return [
         view.Row(wide[k : k + IN_A_ROW], quantities, tallest=TALLEST) for k in range(0, len(wide), IN_A_ROW)
     ]

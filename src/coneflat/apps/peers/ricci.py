@@ -65,14 +65,14 @@ def ricci_flow(
     if not start.is_admissible:
         start = packing.evaluate(np.zeros(len(border)))
     found, steps = minimise(packing, start, LIMITS)
-    state = packing.evaluate(found.place)
+    state = packing.evaluate(found.variables)
     notes: tuple[str, ...] = ()
     if state.broken or not state.largest <= LIMITS.tolerance:
         broken = plural(state.broken, "triangle")
         what = f"the Ricci flow did not converge: {broken} broke the triangle inequality, the curvature is"
         notes = failure_notes(what, steps, state.largest, " rad", best_effort)
-    flat, flips = packing.lengths(found.place), np.concatenate(packing.flips)
-    metric = flat_metric(mesh, lengths, solution, packing.triangulation, flat, found.place, flips, steps)
+    flat, flips = packing.lengths(found.variables), np.concatenate(packing.flips)
+    metric = flat_metric(mesh, lengths, solution, packing.triangulation, flat, found.variables, flips, steps)
     return replace(metric, notes=notes)
 
 
@@ -153,7 +153,7 @@ class Packing:
 
     def direction(self, here: State, exactly: bool) -> tuple[FloatArray, bool]:
         """Return the Newton step; True, as it is exact."""
-        state = here if here is self.last else self.evaluate(here.place)
+        state = here if here is self.last else self.evaluate(here.variables)
         count, tail = len(self.radii), self.triangulation.tail
         head = tail.reshape(-1, 3)[:, NEXT].ravel()
         half = state.weights / 2

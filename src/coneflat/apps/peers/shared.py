@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import FloatArray, IntArray, off_by, plural
+from ...base import FloatArray, IntArray, error_text, plural
 from ...errors import ConvergenceError
 from ...geometry import IntrinsicTriangulation, angle_defect, corner_angles, double_areas, straight_triangles
 from ...stages import ConeSolution, Cut, Embedding, FlatMetric, SolveStatistics
@@ -25,7 +25,7 @@ def failure_notes(what: str, steps: int, residual: float, unit: str, accepted: b
     Raises:
         ConvergenceError: the result is not accepted, or the residual is not finite.
     """
-    failure = f"{what} {off_by(residual, unit)} after {plural(steps, 'step')}"
+    failure = f"{what} {error_text(residual, unit)} after {plural(steps, 'step')}"
     if not accepted or not np.isfinite(residual):
         raise ConvergenceError(f"{failure}; method 'exact', other cones, a repair or remeshing may help")
     return (f"{failure[0].upper()}{failure[1:]}.",)
@@ -65,7 +65,7 @@ def flat_metric(
         target=np.where(border, curvature, solution.target),
         log_scale=log_scale,
         is_open=border,
-        is_held=np.zeros(len(border), dtype=bool),
+        is_fixed=np.zeros(len(border), dtype=bool),
         statistics=statistics,
         triangles=straight_triangles(triangulation, flips, len(mesh.faces)),
     ).scaled(float(np.sqrt(double_areas(lengths).sum() / double_areas(flat.reshape(-1, 3)).sum())))
@@ -76,7 +76,7 @@ def embedding_metric(
     lengths: FloatArray,
     solution: ConeSolution,
     embed: Callable[[Cut], Embedding],
-    holds_cones: bool = True,
+    has_target_cones: bool = True,
 ) -> FlatMetric:
     """Return the metric object of a method that maps the cut mesh directly; its boundary is free.
 
@@ -85,7 +85,7 @@ def embedding_metric(
         lengths: (m, 3) side lengths.
         solution: the cones and their curvatures.
         embed: maps the cut mesh.
-        holds_cones: whether the method prescribes the cones' curvatures.
+        has_target_cones: whether the method prescribes the cones' curvatures.
     """
     return FlatMetric(
         mesh=mesh,
@@ -94,7 +94,7 @@ def embedding_metric(
         target=solution.target,
         log_scale=solution.log_scale,
         is_open=mesh.is_boundary_vertex,
-        is_held=np.zeros(len(mesh.vertices), dtype=bool),
+        is_fixed=np.zeros(len(mesh.vertices), dtype=bool),
         embed=embed,
-        holds_cones=holds_cones,
+        has_target_cones=has_target_cones,
     )

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import Flattening, check_mesh, flatten
-from ...base import THREADS, Progress, Stopwatch, plural, using_threads
+from ...base import THREADS, Progress, Stopwatch, limit_threads, plural
 from ...errors import CurvatureError, GridError, MetricError, OptionError
 from ...io import as_input
 from ...layout import StretchEnergy
-from ...measure import broken_promises
+from ...measure import unmet_guarantees
 from ...options import WordOrVertices
 from .integer_map import IntegerGrid
 from .layout import GRID_TOLERANCE, aligned
@@ -172,7 +172,7 @@ class _Search:
                 self.mesh, self.faces, progress=self.progress, **{**_defaults(options), **options}
             )
         # Unmet guarantees of the map do not apply to the grid.
-        notes = tuple(note for note in result.notes if note not in broken_promises(result))
+        notes = tuple(note for note in result.notes if note not in unmet_guarantees(result))
         found = self.of_result(result, options, all_sides)
         return replace(found, notes=(*notes, *found.notes))
 
@@ -182,7 +182,7 @@ class _Search:
         """Return the grid of a flattening; `options` are None if the user gave the flattening."""
         is_straight = result.settings.get("boundary") == "straight"
         self.stages.done = 1.0
-        with self.stages("grid"), using_threads(result.settings.get("threads", THREADS)):
+        with self.stages("grid"), limit_threads(result.settings.get("threads", THREADS)):
             try:
                 layout = aligned(result, self.quads, self.size)
                 starts = layout.ends[0][layout.border]
@@ -213,7 +213,7 @@ class _Search:
         for layout, features, notes in sharp_layouts(
             self.mesh, self.faces, self.quads, self.size, options, OPTIONS, self.progress
         ):
-            with using_threads(options.get("threads", THREADS)):
+            with limit_threads(options.get("threads", THREADS)):
                 grid, why = grid_near(layout, self.energy)
             if grid is not None:
                 return replace(grid, features=features, notes=(*grid.notes, *notes)), ""

@@ -9,9 +9,9 @@ import numpy as np
 
 from ... import Flattening
 from ...base import BoolArray, IntArray, plural
-from ...io import Mapped
+from ...io import UVMesh
 from ...mesh import label_components
-from ..view import PageText, flattening_of, page_of
+from ..view import PageText, page_html, uv_flattening
 from .quad_mesh import QuadMesh
 from .quality import measure_quads
 from .transitions import TURNS
@@ -155,7 +155,7 @@ def arranged(domains: Domains) -> tuple[IntArray, int]:
 
 
 def page_of_quads(quads: QuadMesh, *, name: str = "Quads", show: str | None = None, **look: Any) -> str:
-    """Return the HTML page of a quad mesh; arguments and errors are those of `page_of`.
+    """Return the HTML page of a quad mesh; arguments and errors are those of `page_html`.
 
     Triangles are halves of quads. Charts, which are shown first, are the rectangles of `find_domains`, and seams are
     their borders. Irregular vertices are cones: red if fewer than four quads meet there, black if more.
@@ -175,14 +175,14 @@ def page_of_quads(quads: QuadMesh, *, name: str = "Quads", show: str | None = No
     )
     if show is None:
         show = "charts" if look.get("texture") is None else "picture"
-    return page_of(result, name=name, show=show, text=text, **look)
+    return page_html(result, name=name, show=show, text=text, **look)
 
 
 def as_flattening(quads: QuadMesh, domains: Domains) -> Flattening:
     """Return the triangles of quads with UVs in which all quads are squares of one size, in disjoint rectangles."""
     places, side = arranged(domains)
     corner_uv = places.reshape(-1, 2)[quads.triangle_corners] / side
-    result = flattening_of(Mapped(quads.vertices, quads.triangles, corner_uv, len(quads.quads), 0, 0))
+    result = uv_flattening(UVMesh(quads.vertices, quads.triangles, corner_uv, len(quads.quads), 0, 0))
     irregular = quads.irregular
     return replace(
         result, cones=irregular, curvatures=(4 - quads.valences[irregular]) * np.pi / 2, notes=quads.notes

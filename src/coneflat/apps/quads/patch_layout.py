@@ -136,7 +136,7 @@ def _cones(
     surface = Surface.of(mesh, lengths)
     inside = ~mesh.is_boundary_vertex
     total = 4 * mesh.euler_characteristic - round(float(corners.sum()) / (np.pi / 2))
-    room = CONE_ANGLE_PER_TRIANGLE * np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
+    max_angles = CONE_ANGLE_PER_TRIANGLE * np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
     try:
         search = ConeSearch(
             surface.laplacian,
@@ -148,7 +148,7 @@ def _cones(
             min_cone_angle=options.min_cone_angle,
             max_cone_angle=options.max_cone_angle,
             allowed=inside,
-            room=room.astype(np.float64),
+            max_angles=max_angles.astype(np.float64),
         )
         found = quantise_cones(search, np.pi / 2, distortion=distortion).solution
     except CurvatureError as error:

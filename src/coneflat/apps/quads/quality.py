@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import FloatArray, dots, shown
+from ...base import FloatArray, dots, short_repr
 from ...errors import ArrayShapeError
 from ...geometry import edge_lengths
 from .nearest import surface_distances
@@ -105,7 +105,9 @@ def measure_quads(quads: QuadMesh) -> QuadMeasures:
         (0.0, 1.0)
     """
     if not isinstance(quads, QuadMesh):
-        raise ArrayShapeError(f"quads must be a QuadMesh, as `coneflat.quads` returns, not {shown(quads)}")
+        raise ArrayShapeError(
+            f"quads must be a QuadMesh, as `coneflat.quads` returns, not {short_repr(quads)}"
+        )
     points = quads.vertices
     off = np.abs(corner_angles_of(quads) - 90.0)
     length = np.linalg.norm(points[quads.edges[:, 0]] - points[quads.edges[:, 1]], axis=1)

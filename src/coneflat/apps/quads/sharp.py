@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import TriangleMesh
-from ...base import FloatArray, IntArray, Progress, list_some, plural, using_threads
+from ...base import FloatArray, IntArray, Progress, limit_threads, list_some, plural
 from ...errors import ConvergenceError, GridError, OptionError
 from ...geometry import double_areas, edge_lengths, mollify
 from ...io import as_input
@@ -71,7 +71,7 @@ def sharp_layouts(
     angle = options.sharp_angle
     sharp = np.empty(0, dtype=np.int64) if angle is None else features.sharp_edges(checked, angle)
     search = _Search(checked, sharp, square, area, options, progress)
-    with using_threads(options.threads):
+    with limit_threads(options.threads):
         for layout in search.layouts():
             mesh = TriangleMesh(np.ldexp(layout.mesh.vertices, -exponent), layout.mesh.faces)
             lengths, side = np.ldexp(layout.lengths, -exponent), float(np.ldexp(square, -exponent))

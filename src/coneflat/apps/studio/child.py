@@ -18,7 +18,7 @@ from typing import IO
 import numpy as np
 
 from ... import ConeflatError, Flattener, Flattening
-from ...base import asking
+from ...base import cancel_with
 from ...errors import NonManifoldError, NonOrientableError
 from ...io import Joined, read_joined
 from ...options import MOST_TRIANGLES
@@ -117,9 +117,10 @@ class JobRunner:
             show(*self._picture(first, name, is_first=True))
 
         chosen = Choices.from_plain(job["choices"])
-        words, is_large = source.renamed(chosen.keywords()), len(source.mesh.offsets) - 1 >= self._early_from
+        words = source.map_options(chosen.keywords())
+        is_large = len(source.mesh.offsets) - 1 >= self._early_from
         result = flattener.flatten(on_preview=show_first if is_large else None, progress=report_max, **words)
-        result = with_warnings(replace(result, notes=source.notes_of(result.notes)), chosen)
+        result = with_warnings(replace(result, notes=source.all_notes(result.notes)), chosen)
         report("picture", 1.0)
         head, body = self._coloured(job, result, name)
         self.result = result
@@ -218,7 +219,7 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
             write_frame(answers, {"job": number, "early": head}, body)
 
         try:
-            with asking(check_current):
+            with cancel_with(check_current):
                 head, body = (
                     bench.flatten(job, report, show) if job["do"] == "flatten" else bench.make(job, report)
                 )

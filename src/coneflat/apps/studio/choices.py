@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from ...base import MAX_CONE_ANGLE, shown
+from ...base import MAX_CONE_ANGLE, short_repr
 from ...errors import OptionError, StudioError
-from ...options import Flag, Options, as_number, as_whole, declarations, read_options
+from ...options import Flag, Options, as_integer, as_number, declarations, read_options
 from .paint import Paint, Region
 
 #: Options that the studio sets directly; cones and seams are edited individually.
@@ -88,11 +88,11 @@ class Choices:
             OptionError: the studio does not set this option, or the value is not valid.
         """
         if name not in PLAIN_OPTIONS:
-            raise OptionError(f"unknown option {shown(name)}: choose from {', '.join(PLAIN_OPTIONS)}")
+            raise OptionError(f"unknown option {short_repr(name)}: choose from {', '.join(PLAIN_OPTIONS)}")
         if name == "boundary" and value not in BOUNDARIES:
-            raise OptionError(f"unknown boundary {shown(value)}: choose from {', '.join(BOUNDARIES)}")
+            raise OptionError(f"unknown boundary {short_repr(value)}: choose from {', '.join(BOUNDARIES)}")
         if name == "seams" and value not in (None, "input"):
-            raise OptionError(f"seams must be drawn or be 'input', those of the file, not {shown(value)}")
+            raise OptionError(f"seams must be drawn or 'input', those of the file, not {short_repr(value)}")
         options, declared = dict(self.options), declarations(Options)[name]
         if value != "rectangle":
             value = declared.kind.parse(name, value)
@@ -211,18 +211,18 @@ class Choices:
             raise StudioError("a rectangle has 4 corners: pick one of them to remove it first")
         return replace(self, corners=tuple(sorted(corners)))
 
-    def with_units(self, of_file: object, as_shown: object) -> Choices:
+    def with_units(self, of_file: object, shown: object) -> Choices:
         """Return choices with other units of length.
 
         Raises:
             StudioError: a unit is unknown, or a unit to show is given without that of the file.
         """
-        for unit in (of_file, as_shown):
+        for unit in (of_file, shown):
             if unit not in UNITS:
-                raise StudioError(f"unknown unit {shown(unit)}: choose from {', '.join(UNITS[1:])}")
-        if as_shown and not of_file:
-            raise StudioError(f"set the unit of the file before lengths are shown in {as_shown}")
-        return replace(self, units=(str(of_file), str(as_shown)))
+                raise StudioError(f"unknown unit {short_repr(unit)}: choose from {', '.join(UNITS[1:])}")
+        if shown and not of_file:
+            raise StudioError(f"set the unit of the file before lengths are shown in {shown}")
+        return replace(self, units=(str(of_file), str(shown)))
 
     def flattens_like(self, other: Choices) -> bool:
         """Return whether these choices give the same layout as others."""
@@ -294,7 +294,7 @@ class Choices:
             chosen = chosen.with_option(name, value)
         cones = {}
         for each in plain["cones"]:
-            vertex = as_whole("a cone's vertex", each["vertex"])
+            vertex = as_integer("a cone's vertex", each["vertex"])
             angle = None if each["angle"] is None else as_number("a cone's angle", each["angle"])
             if vertex in cones:
                 raise StudioError(f"vertex {vertex} is given as a cone twice")
@@ -306,7 +306,7 @@ class Choices:
             chosen = chosen.with_kept(tuple(path))
         chosen = replace(chosen, paint=Paint.from_plain(plain.get("paint", {})))
         for vertex in dict.fromkeys(plain.get("corners", ())):
-            chosen = chosen.with_corner(as_whole("a corner", vertex))
+            chosen = chosen.with_corner(as_integer("a corner", vertex))
         chosen = chosen.with_units(*plain.get("units", ("", "")))
         chosen.keywords()
         return chosen
@@ -336,9 +336,11 @@ def _checked_angle(angle: float | None) -> float | None:
 
 
 def _checked(path: Iterable[Any]) -> Path:
-    vertices = tuple(as_whole("a path's vertex", vertex) for vertex in path)
+    vertices = tuple(as_integer("a path's vertex", vertex) for vertex in path)
     if len(vertices) < 2 or any(a == b for a, b in pairwise(vertices)):
-        raise StudioError(f"a path must be vertices, consecutive ones different, not {shown(list(vertices))}")
+        raise StudioError(
+            f"a path must be two or more vertices, no two equal in a row: {short_repr(list(vertices))}"
+        )
     return vertices
 
 

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...base import shown
+from ...base import short_repr
 from ...errors import ArrayShapeError, OptionError, StudioError
 from ...io import as_input, atomic_write, lines_of
-from .serve import listening, page_address, studio_server
+from .serve import open_listener, page_address, studio_server
 from .session import PATIENCE, Session
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ class Studio:
         self._session = Session(home, color)
         try:
             self._session.open(file)
-            token, listener = secrets.token_urlsafe(24), listening(0)
+            token, listener = secrets.token_urlsafe(24), open_listener(0)
             port = listener.getsockname()[1]
             self.address = page_address(port, token) if through is None else _proxied(through, port, token)
             self._server = server_class(self._session, token, port, framed=True, proxied=through is not None)
@@ -181,7 +181,7 @@ def _proxied(through: str, port: int, token: str) -> str:
     """
     if "{port}" not in through:
         raise OptionError(
-            f"through must be an address that contains {{port}}, such as /proxy/{{port}}/, not {shown(through)}"
+            f"through must be an address that contains {{port}}, such as /proxy/{{port}}/, not {short_repr(through)}"
         )
     return f"{through.replace('{port}', str(port)).rstrip('/')}/?token={token}"
 

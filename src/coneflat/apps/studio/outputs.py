@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import MOST_CONES
+from ...base import MAX_CONES
 from ...errors import StudioError
 from ...mesh import end_corners
 from ..view import outline_halfedges
@@ -78,7 +78,7 @@ def quads_file(source: Joined, choices: Choices, count: int, ending: str, report
     options = {name: words[name] for name in QUAD_OPTIONS if name in words}
     if words.get("boundary") == "straight":
         options["boundary"] = "straight"
-    found = quads(source.mesh, quads=count, progress=report, **source.renamed(options))
+    found = quads(source.mesh, quads=count, progress=report, **source.map_options(options))
     stream = BytesIO()
     write_quads_stream(found, stream, ending)
     return stream.getvalue()
@@ -94,9 +94,9 @@ def curve_data(source: Joined, choices: Choices, report: Progress) -> dict[str, 
     from ...options import read_options
 
     words = curve_options(choices)
-    n = max(MOST_CONES, len(words.get("required_cones", ())) + 12)  # A dozen of them are free.
+    n = max(MAX_CONES, len(words.get("required_cones", ())) + 12)  # A dozen of them are free.
     found = whole_curve(
-        source.mesh, None, read_options({**source.renamed(words), "cone_count": n, "progress": report}), n
+        source.mesh, None, read_options({**source.map_options(words), "cone_count": n, "progress": report}), n
     )
     curve = {"counts": found.counts.tolist(), "distortions": found.distortions.tolist()}
     return {**curve, "knee": found.knee, "parts": found.parts}

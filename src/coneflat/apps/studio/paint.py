@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ...base import shown
+from ...base import short_repr
 from ...errors import StudioError
 from ...options import as_number
 
@@ -46,13 +46,13 @@ class Region:
             StudioError: the text is not valid, or there are too many vertices.
         """
         if not isinstance(text, str):
-            raise StudioError(f"a region must be a text such as 3-17 20, not {shown(text)}")
+            raise StudioError(f"a region must be a text such as 3-17 20, not {short_repr(text)}")
         runs = []
         for word in text.split():
             found = _RUN.fullmatch(word)
             first, last = (found[1], found[2] or found[1]) if found else ("1", "0")
             if int(first) > int(last):
-                raise StudioError(f"a region must be a text such as 3-17 20; {shown(word)} is not valid")
+                raise StudioError(f"a region must be a text such as 3-17 20; {short_repr(word)} is not valid")
             runs.append((int(first), int(last)))
         region = cls.of_runs(runs)
         if region.count > MAX_PAINTED:
@@ -133,7 +133,7 @@ class Paint:
         """
         if flag in FLAGS:
             return replace(self, **{flag: getattr(self, flag).joined(where)})
-        raise StudioError(f"unknown layer of paint {shown(flag)}: choose from {', '.join(FLAGS)}, importance")
+        raise StudioError(f"unknown layer {short_repr(flag)}: choose from {', '.join(FLAGS)}, importance")
 
     def with_weight(self, weight: float, where: Region) -> Paint:
         """Return paint with another weight for some vertices.

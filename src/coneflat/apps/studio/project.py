@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ... import ConeflatError
-from ...base import shown
+from ...base import short_repr
 from ...errors import MeshFileError, ProjectError, StudioError
 from ...io import atomic_write
 from .choices import Choices
@@ -168,8 +168,8 @@ def file_within(name: str, folder: Path) -> Path:
             "no file is given: expected the name of a mesh or a project in the folder of the session"
         )
     if name != Path(name).name or name.startswith(".") or "\\" in name or "\0" in name:
-        raise StudioError(f"{shown(name)} is not the name of a file in the folder of the session")
+        raise StudioError(f"{short_repr(name)} is not the name of a file in the folder of the session")
     path = folder / name
     if not path.resolve().is_relative_to(folder):
-        raise StudioError(f"{shown(name)} is outside the folder of the session")
+        raise StudioError(f"{short_repr(name)} is outside the folder of the session")
     return path

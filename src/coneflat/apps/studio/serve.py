@@ -48,7 +48,7 @@ def run_studio(
 
     folder = Path() if file is None or file.suffix.lower() != ".json" else file.parent
     session = Session(folder, color, most_triangles)
-    with listening(port) as listener:
+    with open_listener(port) as listener:
         port = listener.getsockname()[1]
         token = secrets.token_urlsafe(24)
         address = page_address(port, token)
@@ -104,7 +104,7 @@ class ChangePrinter:
             self._log(trouble)
 
 
-def listening(port: int) -> socket.socket:
+def open_listener(port: int) -> socket.socket:
     """Return a listening socket that only this machine can reach.
 
     Raises:

@@ -10,9 +10,9 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from ... import ConeflatError
-from ...base import shown
+from ...base import short_repr
 from ...errors import MeshFileError, StudioError
-from ...options import as_whole
+from ...options import as_integer
 from .choices import Choices, replay
 from .known import SentPictures
 from .messages import misplaced_warning
@@ -134,7 +134,7 @@ class Session:
                 try:
                     chosen = STEPS[str(kind)](history.now, action, self._current.found)
                 except (KeyError, TypeError) as error:
-                    raise StudioError(f"the action {shown(dict(action))} is not valid") from error
+                    raise StudioError(f"the action {short_repr(dict(action))} is not valid") from error
                 self._take_step(chosen, action.get("stroke"))
 
     def choose(self, plain: Mapping[str, Any]) -> None:
@@ -151,7 +151,7 @@ class Session:
             except ConeflatError:
                 raise
             except (KeyError, TypeError, ValueError, AttributeError) as error:
-                raise StudioError(f"expected choices, got {shown(dict(plain))}") from error
+                raise StudioError(f"expected choices, got {short_repr(dict(plain))}") from error
             self._take_step(chosen, None)
 
     def _require_mesh(self) -> None:
@@ -254,7 +254,7 @@ class Session:
             StudioError: there is no result, or the format is unknown.
         """
         if ending not in EXPORTS:
-            raise StudioError(f"unknown format {shown(ending)} of results: choose from {', '.join(EXPORTS)}")
+            raise StudioError(f"unknown format {short_repr(ending)}: choose from {', '.join(EXPORTS)}")
         return self._request({"do": "export", "ending": ending})[1]
 
     def quads(self, ending: str, count: object) -> bytes:
@@ -265,8 +265,8 @@ class Session:
             OptionError: the number is not an integer.
         """
         if ending not in QUADS:
-            raise StudioError(f"unknown format {shown(ending)} of quads: choose from {', '.join(QUADS)}")
-        number = as_whole("the number of quads", count)
+            raise StudioError(f"unknown format {short_repr(ending)} of quads: choose from {', '.join(QUADS)}")
+        number = as_integer("the number of quads", count)
         if not 1 <= number <= MAX_QUADS:
             raise StudioError(f"the number of quads must be from 1 to {MAX_QUADS:,}, not {number:,}")
         return self._request({"do": "quads", "ending": ending, "count": number})[1]

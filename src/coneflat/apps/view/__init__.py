@@ -8,10 +8,18 @@ from .figures.cone_marks import DOT_REACH, mark_handles, mark_scale
 from .figures.kinds import Look, demo_figure, make_figure
 from .figures.model import DOTS_PER_INCH, draw_checker, draw_cones, draw_quantity, show_mesh
 from .figures.uv_layout import draw_layout, fill_layout, layout_aspect
-from .from_uv import flattening_of, own_flattening, shown_rows
+from .from_uv import own_flattening, shown_rows, uv_flattening
 from .page.content import Model, content_of, outline_halfedges
 from .page.payload import PageText, head_and_block, pack
-from .page.webpage import check_page, notebook_html, open_address, open_page, page_around, page_of, write_page
+from .page.webpage import (
+    check_page,
+    notebook_html,
+    open_address,
+    open_page,
+    page_around,
+    page_html,
+    write_page,
+)
 from .quantity import Quantity, conformal_distortion, own_quantity
 
 __all__ = [
@@ -36,7 +44,7 @@ __all__ = [
     "draw_quantity",
     "eye_direction",
     "fill_layout",
-    "flattening_of",
+    "uv_flattening",
     "head_and_block",
     "layout_aspect",
     "make_figure",
@@ -51,7 +59,7 @@ __all__ = [
     "own_quantity",
     "pack",
     "page_around",
-    "page_of",
+    "page_html",
     "save_figure",
     "show_mesh",
     "shown_rows",

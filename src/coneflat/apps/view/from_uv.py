@@ -7,7 +7,7 @@ import numpy as np
 from ...base import unit_exponent
 from ...errors import MeshFileError, MissingUVError
 from ...geometry import double_areas, edge_lengths
-from ...io import Joined, Mapped, cell_side, of_file
+from ...io import Joined, UVMesh, cell_side, uv_mesh_of
 from ...measure import angle_sum_errors, as_rows
 from ...mesh import uv_seams
 from ...result import Flattening
@@ -32,12 +32,12 @@ def own_flattening(source: Joined, *, strict: bool = False) -> Flattening | None
         MeshFileError: UVs are too large to be shown.
     """
     try:
-        return flattening_of(of_file(source), strict=strict)
+        return uv_flattening(uv_mesh_of(source), strict=strict)
     except MissingUVError:
         return None
 
 
-def flattening_of(mapped: Mapped, *, strict: bool = False) -> Flattening:
+def uv_flattening(mapped: UVMesh, *, strict: bool = False) -> Flattening:
     """Return a UV map as a flattening without cones; its curvature residuals are the angle errors in the plane.
 
     Raises:

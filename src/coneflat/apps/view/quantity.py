@@ -10,7 +10,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import FloatArray, IntArray, shown
+from ...base import FloatArray, IntArray, short_repr
 from ...errors import MeshFileError, OptionError
 from ...geometry import angle_defect, corner_angles, double_areas, edge_lengths
 from ...measure import quantile
@@ -203,7 +203,7 @@ def own_quantity(result: Flattening, name: str, archive: Path | None = None) -> 
         MeshFileError: the file cannot be read.
     """
     if not isinstance(name, str):
-        raise OptionError(f"color must be the name of a property or of a file, not {shown(name)}")
+        raise OptionError(f"color must be the name of a property or of a file, not {short_repr(name)}")
     label, values = _named(result, name, archive)
     if values.dtype.kind not in "fiub" or values.ndim != 1:
         raise OptionError(
@@ -233,7 +233,7 @@ def _named(result: Flattening, name: str, archive: Path | None) -> tuple[str, Fl
     if archive is not None:
         return name, _read(archive, name)
     has = "it has " + ", ".join(properties) if properties else "it has none"
-    raise OptionError(f"the mesh has no vertex property {shown(name)}; {has}")
+    raise OptionError(f"the mesh has no vertex property {short_repr(name)}; {has}")
 
 
 def _read(path: Path, array: str) -> FloatArray:
@@ -247,7 +247,7 @@ def _read(path: Path, array: str) -> FloatArray:
             has = ", ".join(found.files) or "none"
     except (OSError, ValueError, TypeError, EOFError, BadZipFile) as error:
         raise MeshFileError(f"cannot read numbers from {path}: {' '.join(str(error).split())}") from error
-    raise OptionError(f"{path} has no array {shown(array)}: it has {has}")
+    raise OptionError(f"{path} has no array {short_repr(array)}: it has {has}")
 
 
 def _fitted(result: Flattening, label: str, values: FloatArray) -> tuple[FloatArray, IntArray | None]:

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...base.arrays import FloatArray, IntArray
-from ...base.defaults import DISTORTION, LEAST_QUANTUM, TYPED_TOLERANCE
+from ...base.defaults import DISTORTION, MIN_QUANTUM, TYPED_TOLERANCE
 from ...errors import CurvatureError, OptionError
-from ...geometry.handles import off_multiple
+from ...geometry.handles import difference_from_multiple
 from ...stages import ConeSolution
 from ..solution import FULL_TURN
 from ..sparse.dense_model import MIN_RELATIVE_GAIN
@@ -59,7 +59,7 @@ def align_handles(
     """
     operator = search.operator
     by_curvature = operator.solve(np.ascontiguousarray(by_scale[:, operator.vertices].T))
-    best, best_off = quantised, off_multiple(holonomy(quantised.solution), quantised.quantum)
+    best, best_off = quantised, difference_from_multiple(holonomy(quantised.solution), quantised.quantum)
     trial, off = best, best_off
     for _ in range(MAX_COMPARISONS):
         if np.abs(best_off).max() <= MIN_GAIN:
@@ -67,7 +67,7 @@ def align_handles(
         moved = moved_cones(search, trial, by_curvature, off, bound)
         if np.array_equal(moved.solution.cones, trial.solution.cones):
             break
-        trial, off = moved, off_multiple(holonomy(moved.solution), quantised.quantum)
+        trial, off = moved, difference_from_multiple(holonomy(moved.solution), quantised.quantum)
         if (off**2).sum() < (best_off**2).sum():
             best, best_off = trial, off
     return best
@@ -212,8 +212,8 @@ def make_lattice(search: ConeSearch, quantum: float) -> Lattice:
         OptionError: the quantum is out of range.
         CurvatureError: no multiples within the bounds have the required sum.
     """
-    if not LEAST_QUANTUM <= quantum <= FULL_TURN * (1 + TYPED_TOLERANCE):
-        raise OptionError(f"quantum must be from {LEAST_QUANTUM:g} radians to 2 pi, not {quantum:g}")
+    if not MIN_QUANTUM <= quantum <= FULL_TURN * (1 + TYPED_TOLERANCE):
+        raise OptionError(f"quantum must be from {MIN_QUANTUM:g} radians to 2 pi, not {quantum:g}")
     parts = round(FULL_TURN / quantum)
     if abs(parts * quantum - FULL_TURN) <= TYPED_TOLERANCE * FULL_TURN:
         quantum = FULL_TURN / parts

@@ -77,12 +77,12 @@ class ConeSearch:
         weights: (n,) importance of each vertex; None: 1.
         required: vertices that are always cones.
         allowed: (n,) mask of the other vertices that may be cones; None: all.
-        room: (n,) largest cone angle at each vertex, radians, in addition to `max_cone_angle`; None: no further
+        max_angles: (n,) largest cone angle at each vertex, radians, in addition to `max_cone_angle`; None: no further
             bound.
         linear: the linear model of these arrays, with these weights, if it is known.
 
     Attributes:
-        tell: function that is called with a text on the progress.
+        progress: function that is called with a text on the progress.
 
     Raises:
         OptionError: an option is not valid.
@@ -104,7 +104,7 @@ class ConeSearch:
         weights: FloatArray | None = None,
         required: Iterable[int] = (),
         allowed: BoolArray | None = None,
-        room: FloatArray | None = None,
+        max_angles: FloatArray | None = None,
         linear: LinearModel | None = None,
     ) -> None:
         chi = None if is_boundary.any() else euler_characteristic
@@ -113,15 +113,15 @@ class ConeSearch:
         usable = ~is_boundary if allowed is None else ~is_boundary & allowed
         limits.check_available(usable, cones)
         self.curvature, self.is_boundary = curvature, is_boundary
-        self.tell: Callable[[str], None] = lambda _: None
+        self.progress: Callable[[str], None] = lambda _: None
         if linear is None:
             share = weighted_areas(areas, weights)
             linear = LinearModel.of(laplacian, curvature, share, is_boundary, tie_key)
         self._linear, self.operator, self._coarse_model = linear, linear.operator, linear.coarse
         vertices = self.operator.vertices
         self._least = np.full(len(vertices), limits.least)
-        if room is not None:
-            self._least = np.maximum(self._least, np.minimum(FULL_TURN - room[vertices], 0.0))
+        if max_angles is not None:
+            self._least = np.maximum(self._least, np.minimum(FULL_TURN - max_angles[vertices], 0.0))
         self._required = self.unknowns_of(cones)
         self.exact = ExactModel(linear, self._required, limits, self._least)
         # The exact model will need the score; it is computed while the coarse model is set up.
@@ -302,7 +302,7 @@ class ConeSearch:
 
         It starts from the set of the coarse model, or from the next larger set without one cone if that is better.
         """
-        self.tell(plural(count, "cone"))
+        self.progress(plural(count, "cone"))
         exact, starts = self.exact, []
         if count in self.coarse.best:
             starts.append(exact.insert(self.places[self.coarse.best[count].members]))

@@ -98,7 +98,7 @@ def descend(
             part, parts, unknown_part = elements.part, elements.parts, elements.unknown_part
             maps, active, factor = elements.maps(places), np.ones(parts, dtype=bool), None
         gradient, pull, matrix = elements.newton_system(energy, maps, remaining)
-        factor = factorize(matrix, used_up=factor, whole=len(points))
+        factor = factorize(matrix, previous=factor, total_size=len(points))
         step = np.append(factor.solve(-gradient - pull), remaining)
         if not np.isfinite(step).all():
             raise MetricError(f"relaxation found no finite step of its {elements.count:,} unknowns")

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ....base import FloatArray, shown
+from ....base import FloatArray, short_repr
 from ....errors import OptionError
 
 SIDES = ("front", "back", "left", "right", "top", "bottom")
@@ -122,6 +122,6 @@ def eye_direction(eye: Eye, up: str = "y") -> FloatArray:
 
 def _upward(up: str) -> FloatArray:
     if not isinstance(up, str) or up not in ("x", "y", "z"):  # Arrays cannot be compared with strings.
-        raise OptionError(f'the upward axis must be "x", "y" or "z", not {shown(up)}')
+        raise OptionError(f'the upward axis must be "x", "y" or "z", not {short_repr(up)}')
     axis: FloatArray = np.eye(3)["xyz".index(up)]
     return axis

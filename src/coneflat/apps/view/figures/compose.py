@@ -77,7 +77,7 @@ class Panel:
     label: str = ""
     is_graph: bool = False
 
-    def with_room(self, height: float) -> Panel:
+    def fit_label(self, height: float) -> Panel:
         """Return a panel that is wide enough for its label at a height in inches."""
         return replace(self, aspect=max(self.aspect, text_width(self.label) / height))
 

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 import numpy as np
 
 from .... import ConeCurve
-from ....base import DISTORTION, IntArray, plural
-from ....base import shown as as_shown
+from ....base import DISTORTION, IntArray, plural, short_repr
 from ....errors import OptionError
 from ....io import CELLS, check_cells
 from ..from_uv import is_from_file
@@ -123,7 +122,7 @@ def make_figure(shown: Flattening | ConeCurve | Quads, kind: str, **look: Any) -
         1
     """
     if not isinstance(kind, str) or kind not in KINDS:
-        raise OptionError(f"unknown kind of figure {as_shown(kind)}: choose from {', '.join(KINDS)}")
+        raise OptionError(f"unknown kind of figure {short_repr(kind)}: choose from {', '.join(KINDS)}")
     is_curve, is_quads = isinstance(shown, ConeCurve), hasattr(shown, "figure_rows")
     for name, fits, function in (("curve", is_curve, "cone_curve"), ("quads", is_quads, "quads")):
         if fits != (kind == name):
@@ -131,7 +130,7 @@ def make_figure(shown: Flattening | ConeCurve | Quads, kind: str, **look: Any) -
                 f"results of `coneflat.{function}` are shown by figures of the kind {name!r} and no others"
             )
     if kind not in ("curve", "quads") and not hasattr(shown, "uv_faces"):
-        raise OptionError(f"expected a result of `coneflat.flatten`, got {as_shown(shown)}")
+        raise OptionError(f"expected a result of `coneflat.flatten`, got {short_repr(shown)}")
     chosen = Look(**look)
     rows, marks = _ROWS[kind](shown, chosen)
     return compose(rows, title=chosen.title, marks=marks, size=chosen.size, dpi=chosen.dpi)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ....base import shown
+from ....base import short_repr
 from ....errors import OptionError
 from ....io import atomic_write, checked_target, read_picture
 from ....options import MOST_TRIANGLES, SHOWS
@@ -35,7 +35,7 @@ _SCRIPTS = (
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 
 
-def page_of(
+def page_html(
     result: Flattening,
     *,
     name: str | None = None,
@@ -69,10 +69,10 @@ def page_of(
     if show is None:
         show = "own" if color is not None else "checker" if texture is None else "picture"
     if not isinstance(show, str) or (show not in SHOWS and (show != "own" or color is None)):
-        raise OptionError(f"unknown show {shown(show)}: choose from {', '.join(SHOWS)}")
+        raise OptionError(f"unknown show {short_repr(show)}: choose from {', '.join(SHOWS)}")
     picture = None if texture is None else read_picture(texture)
     if isinstance(most_triangles, bool) or not isinstance(most_triangles, (int, np.integer)):
-        raise OptionError(f"most_triangles must be an integer, not {shown(most_triangles)}")
+        raise OptionError(f"most_triangles must be an integer, not {short_repr(most_triangles)}")
     own = color if color is None or isinstance(color, Quantity) else own_quantity(result, color)
     content = content_of(result, most_triangles, own=own)
     if name is None:
@@ -128,7 +128,7 @@ def open_address(address: str) -> bool:
 
 def notebook_html(result: Flattening) -> str:
     """Return HTML with the page in a frame, for notebooks; it is small because notebooks store every page."""
-    page = page_of(result, most_triangles=100_000)
+    page = page_html(result, most_triangles=100_000)
     return (
         f'<iframe srcdoc="{html.escape(page)}" title="coneflat" loading="lazy" '
         f'style="width: 100%; height: 560px; border: 1px solid #8886; border-radius: 6px"></iframe>'

@@ -23,7 +23,7 @@ from .unfold import unfold
 from .untangle import MAX_RINGS, any_degenerate, untangle
 
 
-def free_seams(
+def untangle_seams(
     layout: Layout, weights: FloatArray | None, names: IntArray, stretch: float, quantum: float | None
 ) -> Layout:
     """Return a layout whose inverted triangles are positively oriented, while seams near them may become unequal.
@@ -55,7 +55,7 @@ def free_seams(
     disk = TriangleMesh(np.zeros((len(layout.points), 3)), layout.corners)
     vertex = np.empty(len(layout.points), dtype=np.int64)
     vertex[layout.corners] = layout.mesh.faces
-    fixed = layout.is_held[vertex]
+    fixed = layout.is_fixed[vertex]
     # The angle at a vertex of a prescribed boundary is preserved if the adjacent seam edges do not move.
     border = disk.edges[disk.is_boundary_edge]
     is_near = fixed.copy()
