@@ -16,7 +16,7 @@ from .base.arrays import FloatArray, IntArray
 from .base.progress import Stopwatch
 from .base.text import plural
 from .base.threads import concurrently, limit_threads
-from .cones import close_search, find_cones, uses_sparse_search
+from .cones import MAX_SEARCHED, close_search, find_cones, uses_sparse_search
 from .errors import CurvatureError, MetricError, SeamError
 from .evaluate import evaluate
 from .geometry import double_areas
@@ -45,7 +45,7 @@ FindMetric: TypeAlias = Callable[[Surface, ConeSolution, MetricSpec], FlatMetric
 MAX_SEARCHES = 4
 # A result may exceed the allowed area distortion by this factor. Beyond that, the part is relaxed with this stretch,
 # then flattened with tighter bounds of the search: at most so often, and by at most this factor each time.
-TOLERATED_EXCESS, MAX_CORRECTIONS, MAX_TIGHTENING, CORRECTING_STRETCH = 1.02, 3, 2.0, 0.1
+TOLERATED_EXCESS, MAX_CORRECTIONS, MAX_TIGHTENING, CORRECTING_STRETCH = 1.02, 2, 2.0, 0.1
 # Curvature error of an infeasible cone, radians: ideally a full turn; rounding and untangled neighbours reduce it.
 INFEASIBLE_ERROR = 1.0
 # A log scale that varies by less is constant: the surface is a polyhedron with vertices as cones, cut along its edges.
@@ -243,22 +243,38 @@ def finish_within_bound(
     be larger. First all triangles of such a part are relaxed with some weight on areas, then more cones are searched.
     """
     finished = finish_parts(parts, layouts, method)
-    stretch = 0.0 if method.relax.is_off else max(method.relax.stretch, CORRECTING_STRETCH)
-    method = replace(method, relax=replace(method.relax, stretch=stretch))
     left = {i: part for i, part in parts.items() if _excess(part, finished[i]) > 1}
+    if 0 < len(left) and not method.relax.is_off and method.relax.stretch < CORRECTING_STRETCH:
+        method = replace(method, relax=replace(method.relax, stretch=CORRECTING_STRETCH))
+        _keep_better(finished, finish_parts(left, layouts, method), parts)
     for _ in range(MAX_CORRECTIONS):
-        for i, layout in finish_parts(left, layouts, method).items():
-            finished[i] = min(finished[i], layout, key=partial(_rank, parts[i]))
         excess = {i: min(_excess(parts[i], finished[i]), MAX_TIGHTENING) for i in left}
-        left = {i: left[i].with_distortion(1 / excess[i]) for i in left if excess[i] > 1}
-        layouts = lay_out_parts(left, method)
-    for i in left:
+        # About that many times as many cones are needed; a search without enough of them takes longest.
+        left = {
+            i: left[i].with_distortion(1 / excess[i])
+            for i in left
+            if excess[i] > 1 and excess[i] * len(finished[i].cones) <= MAX_SEARCHED
+        }
+        better = _keep_better(finished, finish_parts(left, lay_out_parts(left, method), method), parts)
+        left = {i: left[i] for i in better}
+    for i in parts:
+        if _excess(parts[i], finished[i]) <= 1:
+            continue
         bound = parts[i].cones.distortion
         finished[i] = finished[i].with_notes(
             f"The triangles of a component have an area distortion of {bound * _excess(parts[i], finished[i]):.3g}, "
             f"above the {bound:g} allowed. Allow more cones, or refine the mesh."
         )
     return finished
+
+
+def _keep_better(
+    finished: dict[int, Layout], others: Mapping[int, Layout], parts: Mapping[int, Part]
+) -> list[int]:
+    """Replace finished layouts of parts by better ones, and return the indices of these parts."""
+    better = [i for i in others if _rank(parts[i], others[i]) < _rank(parts[i], finished[i])]
+    finished.update((i, others[i]) for i in better)
+    return better
 
 
 def _rank(part: Part, layout: Layout) -> tuple[int, float]:

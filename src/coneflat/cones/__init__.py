@@ -13,12 +13,14 @@ from .greedy import greedy_cones
 from .integer.search import quantise_cones
 from .solution import GroundedLaplacian
 from .sparse import SparseCones
+from .sparse.limits import MAX_SEARCHED
 from .sparse.search import ConeSearch
 
 __all__ = [
     "ConeSearch",
     "GroundedLaplacian",
     "CONE_ANGLE_PER_TRIANGLE",
+    "MAX_SEARCHED",
     "SparseCones",
     "close_search",
     "cones_at",

@@ -11,8 +11,9 @@ from ..sparse.dense_model import MIN_RELATIVE_GAIN, BestSets, DenseModel, nonneg
 from ..sparse.fit_curvatures import fit_curvatures
 from .moves import Quanta, best_merge, best_pair, best_split, descend, energy_of
 
-# Largest number of exchanges that are tried in a call; with more than a hundred cones, later ones gain little.
-MAX_EXCHANGES = 100
+# Largest number of exchanges that are tried in a call, times the number of cones. With 100 instead of 10 exchanges of
+# 100 cones, the search takes twice as long and finds no fewer cones.
+MAX_EXCHANGES = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +123,7 @@ class Lattice:
         """Return cones improved by removing one cone and adding another, until there is no gain or the limit."""
         fixed = len(self.model.fixed)
         place, unchanged = fixed, 0
-        for _ in range(MAX_EXCHANGES):
+        for _ in range(MAX_EXCHANGES // max(len(cones), 1)):
             if unchanged >= len(cones) - fixed:
                 break
             rest = self.merged(cones, place)

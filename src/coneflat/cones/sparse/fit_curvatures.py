@@ -45,10 +45,10 @@ def fit_curvatures(
     feasible = not has_sum or bool(least.sum() - slack <= total <= most.sum() + slack)
     if not feasible:
         least, most = np.full(len(slope), -np.inf), np.full(len(slope), np.inf)
-    found = change_at_once(gram, slope, least, most, total)
-    if found is None:
-        found = _Program(gram, slope, least, most, total).change_one_by_one()
-    return *found, feasible
+    curvatures, multiplier, is_optimal = change_at_once(gram, slope, least, most, total)
+    if not is_optimal:
+        curvatures, multiplier = _Program(gram, slope, least, most, total).change_one_by_one(curvatures)
+    return curvatures, multiplier, feasible
 
 
 def inverse_with_sum(gram: FloatArray, has_sum: bool) -> FloatArray:
@@ -78,10 +78,11 @@ class _Program:
     most: FloatArray
     total: float
 
-    def change_one_by_one(self) -> tuple[FloatArray, float]:
+    def change_one_by_one(self, start: FloatArray) -> tuple[FloatArray, float]:
         """Return the optimum (s,) and the multiplier by a primal active set method, which always terminates."""
         size, has_sum, multiplier = len(self.slope), not math.isnan(self.total), 0.0
-        state, curvatures = np.zeros(size, dtype=np.int64), self._start()
+        curvatures = self._allowed(start)
+        state = (curvatures >= self.most).astype(np.int64) - (curvatures <= self.least)
         for _ in range(20 * size + 20):
             free, best, multiplier = best_free(self.gram, self.slope, self.total, state, curvatures)
             # Move towards the best values as far as the bounds allow.
@@ -120,10 +121,10 @@ class _Program:
             state[high if pull_high >= pull_low else low] = 0
         return curvatures, multiplier
 
-    def _start(self) -> FloatArray:
-        """Return (s,) curvatures within the bounds with the given sum, as uniform as possible."""
+    def _allowed(self, start: FloatArray) -> FloatArray:
+        """Return (s,) curvatures within the bounds with the given sum, after a uniform change of the given ones."""
         size, has_sum = len(self.slope), not math.isnan(self.total)
-        curvatures = np.clip(np.full(size, self.total / size if has_sum else 0.0), self.least, self.most)
+        curvatures = np.clip(start, self.least, self.most)
         for _ in range(size if has_sum else 0):
             missing = self.total - float(curvatures.sum())
             movable = np.count_nonzero(curvatures < self.most if missing > 0 else curvatures > self.least)
@@ -181,8 +182,8 @@ def best_free(
 @compiled
 def change_at_once(
     gram: FloatArray, slope: FloatArray, least: FloatArray, most: FloatArray, total: float
-) -> tuple[FloatArray, float] | None:
-    """Return the optimum (s,) and the multiplier, by updating all active bounds at once; None if it does not converge.
+) -> tuple[FloatArray, float, bool]:
+    """Return the optimum (s,) and the multiplier, by updating all active bounds at once, and whether this converged.
 
     This is the primal-dual active set method (M. Hintermueller, K. Ito, K. Kunisch, "The primal-dual active set
     strategy as a semismooth Newton method", 2003). If it converges, it takes a few steps.
@@ -192,7 +193,7 @@ def change_at_once(
     for _ in range(MAX_STEPS_AT_ONCE):
         free, best, multiplier = best_free(gram, slope, total, state, curvatures)
         if not len(free):
-            return None
+            break
         curvatures[free] = best
         nothing, is_same = 0.0, True
         for i in range(size):
@@ -209,7 +210,7 @@ def change_at_once(
             is_same = is_same and new == state[i]
             state[i] = new
         if is_same:
-            return curvatures, multiplier
+            return curvatures, multiplier, True
         for i in range(size):
             curvatures[i] = min(max(curvatures[i], least[i]), most[i])
-    return None
+    return curvatures, 0.0, False
