@@ -107,10 +107,15 @@ def test_a_mesh_is_dropped_on_an_empty_page(browser, tmp_path):
         visit = StudioVisit(browser, served)
         assert "empty" in visit.page.get_attribute("body", "class")
         visit.page.set_input_files("#open", tmp_path / "from" / "bad.obj")
-        visit.wait("studio.news.trouble?.repair && !studio.isBusy()")
-        visit.page.click("#repair")
         visit.wait("studio.layout === 1 && !studio.isBusy()")
         visit.settle()
+        assert "The mesh was repaired: 1 edge" in visit.page.inner_text("#warnings")
+        # Undone, the layout is dimmed and named as out of date, until the mesh is repaired.
+        visit.page.click("#undo")
+        visit.wait("document.body.classList.contains('stale')")
+        visit.page.click("#repair")
+        visit.settle()
+        assert "stale" not in visit.page.get_attribute("body", "class")
         assert visit.drawn_share("model") > 0.1
         visit.close()
     finally:

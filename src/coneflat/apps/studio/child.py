@@ -19,10 +19,12 @@ import numpy as np
 
 from ... import ConeflatError, Flattener, Flattening
 from ...base import cancel_with
-from ...errors import NonManifoldError, NonOrientableError
+from ...errors import DegenerateFaceError, NonManifoldError, NonOrientableError
 from ...io import Joined, read_joined
+from ...mesh import CheckedMesh
 from ...options import MOST_TRIANGLES
 from ..view import Model, PageText, Quantity, content_of, head_and_block, own_quantity, pack, shown_rows
+from .bare import bad_places, repaired, without_layout
 from .choices import Choices
 from .known import with_hashes
 from .messages import angle_warning, page_message, with_warnings
@@ -33,6 +35,7 @@ from .worker import Head, read_frame, write_frame
 EARLY_POLYGONS = 20_000
 #: The text that stands for unknown numbers, and the title of the preview.
 PLACEHOLDER = "…"
+BARE_TITLE = "No layout"
 FIRST_TITLE = "Preview: distortion is not yet reduced, and overlaps are not yet removed  ·  …"
 
 
@@ -91,6 +94,7 @@ class JobRunner:
         self._model: Model | None = None
         self._most: int | None = None
         self._read: tuple[str, str] | None = None
+        self._checked: tuple[CheckedMesh, str] | None = None
 
     def flatten(
         self, job: Head, report: Callable[[str, float], None], show: Callable[[Head, bytes], None]
@@ -114,7 +118,7 @@ class JobRunner:
 
         def show_first(first: Flattening) -> None:
             report_max("preview", furthest)
-            show(*self._picture(first, name, is_first=True))
+            show(*self._picture(first, name, FIRST_TITLE))
 
         chosen = Choices.from_plain(job["choices"])
         words = source.map_options(chosen.keywords())
@@ -124,7 +128,32 @@ class JobRunner:
         report("picture", 1.0)
         head, body = self._coloured(job, result, name)
         self.result = result
-        return {**head, "warnings": angle_warning(chosen, result)}, body
+        return {**head, "warnings": (*self._mark_repairs(head, chosen), *angle_warning(chosen, result))}, body
+
+    def _mark_repairs(self, data: Head, chosen: Choices) -> tuple[str, ...]:
+        """Add the repaired places to page data, and return a sentence on them, or nothing."""
+        if not chosen.options.get("repair"):
+            return ()
+        checked, wrong = self._repaired()
+        data["head"]["bad"] = bad_places(checked)
+        return (f"The mesh was repaired: {wrong}. “Undo” reverts this.",) if wrong else ()
+
+    def bare(self, job: Head) -> tuple[Head, bytes]:
+        """Return the page data of the mesh of a failed job without a layout; nothing if no triangle can be drawn."""
+        if self._source is None:
+            return {}, b""
+        try:
+            checked, _ = self._repaired()
+            data, block = self._picture(without_layout(checked), Path(job["mesh"]).name, BARE_TITLE)
+        except ConeflatError:
+            return {}, b""
+        data["head"] |= {"bad": bad_places(checked), "show": "plain"}
+        return data, block
+
+    def _repaired(self) -> tuple[CheckedMesh, str]:
+        assert self._source is not None
+        self._checked = repaired(self._source) if self._checked is None else self._checked
+        return self._checked
 
     def _coloured(self, job: Head, result: Flattening, name: str) -> tuple[Head, bytes]:
         """Return the page data of a result, with the colours given by the user if these are available."""
@@ -150,17 +179,21 @@ class JobRunner:
         return curve_data(source, chosen, report), b""
 
     def _picture(
-        self, result: Flattening, name: str, is_first: bool = False, own: Quantity | None = None
+        self, result: Flattening, name: str, title: str = "", own: Quantity | None = None
     ) -> tuple[Head, bytes]:
-        """Return the page data of a result; a preview has no numbers, because they will change.
+        """Return the page data of a result.
 
-        own: quantity that is shown as colours.
+        Args:
+            result: the result.
+            name: name of the mesh.
+            title: title of a preview or a mesh without a layout, which has no numbers; "" for a final layout.
+            own: quantity that is shown as colours.
         """
 
         text = None
-        if is_first:
-            rows = [(measure, PLACEHOLDER, meaning) for measure, _, meaning in shown_rows(result)]
-            text = PageText(FIRST_TITLE, rows)
+        if title:
+            rows = [] if title == BARE_TITLE else shown_rows(result)
+            text = PageText(title, [(measure, PLACEHOLDER, meaning) for measure, _, meaning in rows])
             result = replace(result, notes=())
         if self._model is None or not self._model.is_of(result):
             self._model = Model.of(result)
@@ -179,7 +212,9 @@ class JobRunner:
 
         if self._source is None or self._flattener is None or self._read != (mesh, sha256):
             report("read", 0.0)
-            self._source = self._flattener = self._model = None  # The memory may not suffice for both.
+            self._source = self._flattener = self._model = self._bad = (
+                None  # The memory may not suffice for both.
+            )
             source = read_joined(Path(mesh))
             self._source, self._flattener, self._read = source, Flattener(source.mesh), (mesh, sha256)
         return self._source, self._flattener
@@ -228,13 +263,15 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
             write_frame(answers, {"job": number, "given_up": True})
         except ConeflatError as error:
             # The page offers a button for errors that a repair can fix.
-            mends = isinstance(error, (NonManifoldError, NonOrientableError))
-            write_frame(answers, {"job": number, "error": page_message(str(error)), "repair": mends})
+            mends = isinstance(error, (DegenerateFaceError, NonManifoldError, NonOrientableError))
+            head, body = bench.bare(job) if job.get("bare") else ({}, b"")
+            told = {"job": number, "error": page_message(str(error)), "repair": mends, "bare": head}
+            write_frame(answers, told, body)
         except MemoryError:
-            write_frame(answers, {"job": number, "error": "not enough memory for this mesh", "repair": False})
+            write_frame(answers, {"job": number, "error": "not enough memory for this mesh", "again": True})
         except Exception as error:
             message = f"internal error, please report it: {type(error).__name__}: {error}"
-            write_frame(answers, {"job": number, "error": message, "repair": False})
+            write_frame(answers, {"job": number, "error": message, "again": True})
 
 
 def main() -> None:

@@ -24,13 +24,15 @@ from .worker import Head, Worker
 PATIENCE = 600.0  # Seconds that exports wait for the current flattening.
 
 
-class _Layout(NamedTuple):
-    """A layout: the page data, the cones found, the seconds per stage, and warnings."""
+class _Shown(NamedTuple):
+    """What is shown: page data, cones, seconds per stage, warnings, the job, and whether there is no layout."""
 
     shown: tuple[Head, bytes] | None = None
     found: Sequence[int] = ()
     seconds: Mapping[str, float] = MappingProxyType({})
     warnings: Sequence[str] = ()
+    job: int = 0
+    is_bare: bool = False
 
 
 class Session:
@@ -59,15 +61,16 @@ class Session:
         self._sha256 = ""
         self._history = History(Choices())
         self._opened = 0  # Number of meshes and projects opened so far.
+        self._repaired = 0  # The last of them that was repaired automatically.
         # Number of the current choices, which increases with every change; 0 is never used.
         self._chosen = 1
         self._job = 0
         self._busy: dict[str, Any] | None = None
         self._trouble: dict[str, Any] | None = None
-        self._current = _Layout()
+        self._current = _Shown()
         self._cached_texts: tuple[int, tuple[str, ...], dict[str, str]] = 0, (), {}
         self._known = SentPictures()
-        self._last: _Layout | None = None  # The last final layout, while a preview is shown.
+        self._last: _Shown | None = None  # The last final layout, while a preview is shown.
         self._requests = 0
         self._answers: dict[int, tuple[Head, bytes]] = {}
         self._curves: dict[tuple[str, str], dict[str, Any]] = {}
@@ -101,7 +104,7 @@ class Session:
             self._history = History(project.choices)
             self._opened += 1
             self._chosen += 1
-            self._current = _Layout(seconds=self._current.seconds)
+            self._current = _Shown(seconds=self._current.seconds)
             self.is_early, self._last = False, None
             self._flatten()
 
@@ -181,7 +184,8 @@ class Session:
         self._job += 1
         self._busy = {"stage": "", "fraction": 0.0}
         self._notify()
-        self._worker.send({"do": "flatten", "job": self._job, **self._look, **self._of_mesh()})
+        bare = {"bare": self._current.shown is None or self._current.is_bare}
+        self._worker.send({"do": "flatten", "job": self._job, **bare, **self._look, **self._of_mesh()})
 
     def _save(self) -> None:
         """Write the project file."""
@@ -191,7 +195,11 @@ class Session:
         try:
             Project(self._mesh, self._sha256, self._history.now).save(self.project_file)
         except MeshFileError as error:
-            self._trouble = {"text": f"the project is not saved: {error}", "repair": False}
+            self._tell(f"the project is not saved: {error}", again=True)
+
+    def _tell(self, text: str, repair: bool = False, again: bool = False) -> None:
+        """Set the error that the page shows, and whether a repair or another attempt may help."""
+        self._trouble = {"text": text, "repair": repair, "again": again}
 
     # Results.
 
@@ -220,11 +228,19 @@ class Session:
                 "trouble": self._trouble,
                 "layout": 0 if self._current.shown is None else self.layout,
                 "early": self.is_early,
+                "bare": self._current.is_bare,
+                "stale": self._is_stale,
                 "found": list(self._current.found),
                 "seconds": sum(self._current.seconds.values()),
-                "warnings": [*warnings, *self._current.warnings],
+                "warnings": [*warnings, *(() if self._is_stale else self._current.warnings)],
                 **({} if known == self._chosen else {"choices": self._history.now.as_plain(), **texts}),
             }
+
+    @property
+    def _is_stale(self) -> bool:
+        """Return whether the layout shown is that of earlier choices, and no other is being computed."""
+        shown = self._current
+        return shown.shown is not None and not shown.is_bare and self._busy is None and shown.job != self._job
 
     @property
     def _project_name(self) -> str:
@@ -333,32 +349,39 @@ class Session:
         with self._changed:
             if head["job"] in self._answers and "stage" not in head:
                 self._answers[head["job"]] = (head, body)
-                self._changed.notify_all()
-                return
+                return self._changed.notify_all()
             if head["job"] != self._job:
-                return
+                return None
             if "stage" in head:
                 self._busy = {"stage": head["stage"], "fraction": head["fraction"]}
             elif "early" in head:
                 self._last = self._last or self._current
-                self._show(head["early"], body)
+                self._show(head["early"], body, head["job"])
                 self.is_early = True
             elif "error" in head:
                 self._restore_layout()
-                mends = head["repair"] and not self._history.now.options.get("repair")
-                self._trouble = {"text": head["error"], "repair": mends}
+                options = self._history.now.options
+                mends = head.get("repair", False) and not options.get("repair")
+                if mends and "repair" not in options and self._repaired != self._opened:
+                    self._repaired = self._opened  # Only once: the user can undo it.
+                    return self._take_step(self._history.now.with_option("repair", True), None)
+                if head.get("bare"):
+                    self._show(head["bare"], body, head["job"], is_bare=True)
+                self._tell(head["error"], mends, head.get("again", False))
             elif "done" in head:
                 self._busy = None
-                self._show(head["done"], body)
+                self._show(head["done"], body, head["job"])
                 if "missing" in head["done"] and self._trouble is None:
-                    self._trouble = {"text": head["done"]["missing"], "repair": False}
+                    self._tell(head["done"]["missing"])
                 self.is_early, self._last = False, None
-            self._notify()
+            return self._notify()
 
-    def _show(self, data: Head, body: bytes) -> None:
+    def _show(self, data: Head, body: bytes, job: int, is_bare: bool = False) -> None:
         self.layout += 1
         picture = self._known.numbered((data["head"], body))
-        self._current = _Layout(picture, data["found"], data["seconds"], data.get("warnings", ()))
+        self._current = _Shown(
+            picture, data["found"], data["seconds"], data.get("warnings", ()), job, is_bare
+        )
 
     def _restore_layout(self) -> None:
         """End the current job, and show the last final layout instead of a preview."""
@@ -374,7 +397,7 @@ class Session:
             for job in self._answers:
                 self._answers[job] = ({"error": message}, b"")
             self._restore_layout()
-            self._trouble = {"text": message, "repair": False}
+            self._tell(message, again=True)
             self._notify()
 
     def _notify(self) -> None:

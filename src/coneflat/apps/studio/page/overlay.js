@@ -17,6 +17,7 @@ class Overlay {
       if (tools.from !== null) this.ring(pen, pane, tools.from, PATH_COLOURS[tools.mode], 6);
     }
     this.studio.brush.draw(pen, pane);
+    for (const place of this.studio.viewer.model.head.bad ?? []) this.bad(pen, pane, this.studio.verticesOf(place));
     for (const vertex of this.studio.verticesOf(this.studio.cornersShown())) this.diamond(pen, pane, vertex);
     for (const cone of choices.cones) {
       const [vertex] = this.studio.verticesOf([cone.vertex]);
@@ -41,6 +42,13 @@ class Overlay {
       pen.stroke(path);
     }
     pen.setLineDash([]);
+  }
+
+  /** Mark an edge or a vertex of the model that needed a repair. */
+  bad(pen, pane, vertices) {
+    if (pane.inPlane || !vertices.length) return;
+    if (vertices.length > 1) this.path(pen, pane, vertices, this.studio.viewer.accent, []);
+    else this.ring(pen, pane, vertices[0], this.studio.viewer.accent, 6);
   }
 
   ring(pen, pane, vertex, colour, radius) {

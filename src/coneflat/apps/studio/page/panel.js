@@ -33,6 +33,8 @@ class Panel {
     const set = (name, value) => act({do: "set", name, value});
     for (const name of ["undo", "redo", "again"]) this.part(name).addEventListener("click", () => act({do: name}));
     this.part("repair").addEventListener("click", () => set("repair", true));
+    this.part("undo-last").addEventListener("click", () => act({do: "undo"}));
+    this.part("search").addEventListener("click", () => this.placeBy("distortion"));
     this.part("open").addEventListener("change", (event) => {
       if (event.target.files.length) studio.open(event.target.files[0]);
       event.target.value = "";
@@ -121,8 +123,8 @@ class Panel {
     this.value("padding", options.padding);
     this.value("stretch", options.stretch);
     this.value("charts", options.charts);
-    for (const saving of this.part("exports").children) saving.disabled = !this.studio.viewer;
-    this.part("save-quads").disabled = !this.studio.viewer || this.studio.making === "quads";
+    for (const saving of this.part("exports").children) saving.disabled = !this.studio.hasLayout();
+    this.part("save-quads").disabled = !this.studio.hasLayout() || this.studio.making === "quads";
     this.part("save-quads").textContent = this.studio.making === "quads" ? "Computing quads…" : "Quads, OBJ";
     this.curve.show();
     this.part("command").textContent = news?.command ?? "";
@@ -152,12 +154,16 @@ class Panel {
   }
 
   showRefusal() {
-    const trouble = this.studio.refused ?? this.studio.news?.trouble;
-    this.part("refusal").hidden = !trouble;
-    if (!trouble) return;
-    this.part("refusal-text").textContent = trouble.text[0].toUpperCase() + trouble.text.slice(1) + ".";
-    this.part("repair").hidden = !trouble.repair;
-    this.part("again").hidden = Boolean(trouble.repair) || Boolean(this.studio.refused);
+    const {news, refused, choices} = this.studio, trouble = news?.trouble, isFailed = Boolean(news?.stale || news?.bare);
+    this.part("refusal").hidden = !refused && !trouble;
+    for (const [id, told] of [["refusal-text", refused], ["trouble-text", trouble]]) {
+      this.part(id).hidden = !told;
+      this.part(id).textContent = told ? told.text[0].toUpperCase() + told.text.slice(1) + "." : "";
+    }
+    this.part("repair").hidden = !trouble?.repair;
+    this.part("undo-last").hidden = !trouble || !isFailed || !news.undo;
+    this.part("search").hidden = !trouble || !isFailed || !choices.by_hand;
+    this.part("again").hidden = !trouble?.again;
   }
 
   /** Show the warnings on the choices. */

@@ -58,7 +58,8 @@ class Studio {
   hear(news, model) {
     this.news = news;
     document.body.classList.toggle("empty", !this.news.mesh);
-    document.body.classList.toggle("bare", !this.news.layout);
+    document.body.classList.toggle("bare", !this.news.layout || this.news.bare);
+    document.body.classList.toggle("stale", this.news.stale);
     if (!this.viewer) document.getElementById("name").textContent = this.news.mesh ?? "";
     if (model) this.take(model);
     if (model) this.layout = news.layout;
@@ -77,8 +78,11 @@ class Studio {
     if (!isSame && this.whole?.key !== Surface.keyOf(model)) this.whole = this.edges = null;
     this.points = this.nearest = null;
     this.repicking = true; // The selection is not cleared if it ends because indices have changed.
-    if (this.viewer) this.viewer.takeModel(model);
-    else {
+    if (this.viewer) {
+      const wasBare = this.viewer.model.head.show === "plain", isBare = model.head.show === "plain";
+      this.viewer.takeModel(model);
+      if (wasBare !== isBare) this.viewer.state.set({show: model.head.show});
+    } else {
       this.viewer = window.coneflat = new Viewer(model, null);
       this.viewer.tool = this.tools;
       this.viewer.state.set({marked: FAINT});
@@ -265,6 +269,10 @@ class Studio {
 
   get choices() {
     return this.news?.choices ?? NO_CHOICES;
+  }
+
+  hasLayout() {
+    return Boolean(this.viewer) && !this.news.bare;
   }
 
   hasBoundary() {
