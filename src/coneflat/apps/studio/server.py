@@ -143,8 +143,13 @@ def studio_app(
         path = file_within(request.query_params.get("name", ""), session.folder)
         if path.suffix.lower() not in (*INPUT_FORMATS, ".json"):
             raise StudioError(f"{path.name} is not in a format that can be read: {', '.join(INPUT_FORMATS)}")
-        stored = await _store(request, path)
-        await run_sync(session.open_named, stored.name)
+        stored, is_new = await _store(request, path)
+        try:
+            await run_sync(session.open_named, stored.name)
+        except ConeflatError:
+            if is_new:
+                stored.unlink(missing_ok=True)
+            raise
         return JSONResponse({"version": session.version})
 
     app = Starlette(
@@ -194,8 +199,11 @@ async def _parts(request: Request, most: int) -> AsyncIterator[bytes]:
         yield part
 
 
-async def _store(request: Request, path: Path) -> Path:
-    """Store the content of a request in a file, with a number added to the name if needed, and return its path."""
+async def _store(request: Request, path: Path) -> tuple[Path, bool]:
+    """Store the content of a request in a file, with a number added to the name if needed.
+
+    Return its path, and whether the file is new.
+    """
     temporary = path.with_name(f".{secrets.token_hex(8)}.upload")
     try:
         with temporary.open("xb") as stream:
@@ -208,12 +216,13 @@ async def _store(request: Request, path: Path) -> Path:
         temporary.unlink(missing_ok=True)
 
 
-def _settle(temporary: Path, path: Path) -> Path:
-    """Rename a temporary file to an unused name, or find a file with the same content; return the path."""
+def _settle(temporary: Path, path: Path) -> tuple[Path, bool]:
+    """Rename a temporary file to an unused name, or find a file with the same content; return as `_store`."""
     content, count, target = temporary.read_bytes(), 1, path
     while target.exists() and not (target.is_file() and target.read_bytes() == content):
         count += 1
         target = path.with_name(f"{path.stem}-{count}{path.suffix}")
-    if not target.exists():
+    is_new = not target.exists()
+    if is_new:
         temporary.rename(target)
-    return target
+    return target, is_new

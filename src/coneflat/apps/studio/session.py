@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from ... import ConeflatError
 from ...base import short_repr
 from ...errors import MeshFileError, StudioError
+from ...io import read_joined
 from ...options import as_integer
 from .choices import Choices, replay
 from .known import SentPictures
@@ -96,7 +97,9 @@ class Session:
             StudioError: there is no such file in the folder.
             MeshFileError, ProjectError: as in `open`.
         """
-        self._begin(*open_project(file_within(name, self.folder), self.folder, only_within=True))
+        project, file = open_project(file_within(name, self.folder), self.folder, only_within=True)
+        read_joined(project.mesh)  # What is shown is replaced only by a mesh that can be read.
+        self._begin(project, file)
 
     def _begin(self, project: Project, file: Path) -> None:
         with self._changed:
