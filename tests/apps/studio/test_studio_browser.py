@@ -109,7 +109,7 @@ def test_a_mesh_is_dropped_on_an_empty_page(browser, tmp_path):
         visit.page.set_input_files("#open", tmp_path / "from" / "bad.obj")
         visit.wait("studio.layout === 1 && !studio.isBusy()")
         visit.settle()
-        assert "The mesh was repaired: 1 edge" in visit.page.inner_text("#warnings")
+        assert "The mesh was repaired: 3 vertices" in visit.page.inner_text("#warnings")
         # Undone, the layout is dimmed and named as out of date, until the mesh is repaired.
         visit.page.click("#undo")
         visit.wait("document.body.classList.contains('stale')")

@@ -134,7 +134,8 @@ class TestPage:
         answer = page.post("/act", json={"do": "remove", "vertex": 10**9})
         assert answer.status_code == 400
         assert "vertex 1000000000 is not a cone" in answer.text
-        for garbled in (b"{", b"[]", b"\xff", b'{"do": NaN}'):
+        deep = b'{"do": "cut", "path": ' + b"[" * 900 + b"]" * 900 + b"}"
+        for garbled in (b"{", b"[]", b"\xff", b'{"do": NaN}', b"[" * 100_000, b'{"a":' * 100_000, deep):
             assert page.post("/act", content=garbled).status_code == 400
         assert page.post("/export/exe").status_code == 400
         assert page.get("/nowhere").status_code == 404
@@ -163,6 +164,23 @@ class TestUploads:
         before = set(tmp_path.parent.rglob("*"))
         assert page.post(f"/mesh?name={name}", content=ball.read_bytes()).status_code == 400
         assert set(tmp_path.parent.rglob("*")) == before
+
+    @pytest.mark.parametrize(
+        ("name", "stored"),
+        [
+            ("CON.obj", "_CON.obj"),
+            ("com1.v2.obj", "_com1.v2.obj"),
+            ("a\u202ejbo.obj", "ajbo.obj"),
+            ("a\u200b\tb.obj", "ab.obj"),
+            ("a:b?.obj", "a_b_.obj"),
+            ("bücher 3d.obj", "bücher 3d.obj"),
+        ],
+    )
+    def test_odd_names_are_made_safe(self, page, ball, tmp_path, name, stored):
+        assert page.post("/mesh", params={"name": name}, content=ball.read_bytes()).status_code == 200
+        assert page.get("/state").json()["mesh"] == stored
+        assert (tmp_path / stored).exists()
+        assert page.post("/mesh", params={"name": "\u202e.obj"}, content=ball.read_bytes()).status_code == 400
 
     def test_no_file_is_overwritten(self, page, ball, tmp_path):
         (tmp_path / "ball.obj").write_text("# mine\n")

@@ -212,7 +212,7 @@ class JobRunner:
 
         if self._source is None or self._flattener is None or self._read != (mesh, sha256):
             report("read", 0.0)
-            self._source = self._flattener = self._model = self._bad = (
+            self._source = self._flattener = self._model = self._checked = (
                 None  # The memory may not suffice for both.
             )
             source = read_joined(Path(mesh))

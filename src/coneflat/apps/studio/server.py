@@ -26,10 +26,12 @@ from ...io import INPUT_FORMATS
 from .guard import MAX_REQUEST_BYTES, Guard
 from .messages import page_message
 from .page import studio_page
-from .project import file_within
+from .project import file_within, safe_name
 from .session import Session
 
 MAX_UPLOAD_BYTES = 512 * 1024 * 1024  # Bytes of an uploaded mesh.
+#: Errors of requests that are answered with their message, not with a traceback.
+REFUSED = (ConeflatError, ValueError, RecursionError, ClientDisconnect)
 
 
 class StudioServer(uvicorn.Server):
@@ -56,7 +58,7 @@ class StudioServer(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-class TooLarge(Exception):
+class TooLarge(ValueError):
     """A request is larger than the limit."""
 
 
@@ -140,7 +142,8 @@ def studio_app(
         return JSONResponse(await run_sync(session.curve))
 
     async def upload(request: Request) -> Response:
-        path = file_within(request.query_params.get("name", ""), session.folder)
+        given = file_within(request.query_params.get("name", ""), session.folder)
+        path = file_within(safe_name(given.name), session.folder)
         if path.suffix.lower() not in (*INPUT_FORMATS, ".json"):
             raise StudioError(f"{path.name} is not in a format that can be read: {', '.join(INPUT_FORMATS)}")
         stored, is_new = await _store(request, path)
@@ -163,7 +166,9 @@ def studio_app(
             Route("/curve", curve, methods=["POST"]),
             Route("/mesh", upload, methods=["POST"]),
         ],
-        exception_handlers=dict.fromkeys((ConeflatError, ValueError, TooLarge, ClientDisconnect), _refused),
+        exception_handlers=dict.fromkeys(
+            (ConeflatError, ValueError, RecursionError, TooLarge, ClientDisconnect), _refused
+        ),
     )
     return Guard(app, token, port, framed, proxied)
 
