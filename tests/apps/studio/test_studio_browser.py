@@ -218,6 +218,51 @@ def test_the_curve_offers_numbers_of_cones(visit):
     assert page.locator("#curve-ask").is_enabled()
 
 
+SHOWN_PLACES = """
+(() => { const {model} = coneflat, {camera} = coneflat.panes[1], out = [];
+const {faces} = model.arrays;
+for (let c = 0; c < faces.length; c += 30) out.push(camera.project(model.flatPlace(faces[c])));
+return [out, [camera.width, camera.height], Array.from(model.arrays.chart)]; })()
+"""
+
+
+def test_a_small_change_keeps_the_layout_in_place(visit, studio):
+    visit.settle()
+    mesh = coneflat.read_mesh(coneflat.sample_path())
+    faces = np.asarray(mesh.corners).reshape(-1, 3)
+    turned = 0
+    studio.session.act({"do": "hand"})
+    visit.settle()
+    for cone in visit.cones()[:5]:
+        (before, size, charts), neighbours = visit.run(SHOWN_PLACES), faces[(faces == cone).any(axis=1)]
+        to = int(np.setdiff1d(neighbours, visit.cones()).min())
+        studio.session.act({"do": "move", "vertex": cone, "to": to})
+        visit.settle()
+        after, _, now = visit.run(SHOWN_PLACES)
+        turned += visit.run("studio.turns") > 0
+        if len(set(now)) == len(set(charts)):  # No chart was split.
+            off = np.linalg.norm(np.subtract(after, before)[:, :2], axis=1).mean()
+            assert off < 0.2 * min(size), cone
+            assert (np.array(now) == charts).mean() > 0.9
+    assert turned  # Without the turn of the view, the places would be far apart.
+
+
+def test_a_path_joins_an_earlier_cut_instead_of_running_next_to_it(visit):
+    visit.settle()
+    ends = visit.visible_vertices(40)
+    one, two = ends[0], ends[-1]
+    path = visit.run(f"studio.pathBetween(...studio.verticesOf([{one}, {two}]))")
+    visit.run(f"studio.act({{do: 'cut', path: {path}}})")
+    visit.settle()
+    beside = visit.run(
+        "(() => { const graph = studio.graph(), near = (number) => {"
+        f"const [v] = studio.verticesOf([number]), on = new Set(studio.verticesOf({path}));"
+        "return [...graph.ends.slice(graph.start[v], graph.start[v + 1])].find((w) => !on.has(w)); };"
+        f"return studio.pathBetween(near({path[1]}), near({path[-2]})); }})()"
+    )
+    assert len(set(beside) & set(path)) > len(path) - 4
+
+
 def test_sizes_are_shown_in_a_unit(hill, tmp_path):
     page = hill.page
     page.click("#sizes summary")

@@ -10,6 +10,7 @@ class Studio {
     this.server = new Server();
     this.viewer = this.news = this.refused = null;
     this.layout = 0;
+    this.turns = 0; // Quarter turns of the view of the layout.
     this.pending = 0;
     this.took = this.sight = 0; // Milliseconds from the last change to its layout, and to its preview.
     this.selected = null; // The vertex of the picked cone, which does not depend on the index of the cone.
@@ -79,6 +80,7 @@ class Studio {
     this.points = this.nearest = null;
     this.repicking = true; // The selection is not cleared if it ends because indices have changed.
     if (this.viewer) {
+      if (isSame) this.align(model);
       const wasBare = this.viewer.model.head.show === "plain", isBare = model.head.show === "plain";
       this.viewer.takeModel(model);
       if (wasBare !== isBare) this.viewer.state.set({show: model.head.show});
@@ -94,6 +96,16 @@ class Studio {
     this.pickSelected();
     const {asked, news} = this;
     requestAnimationFrame(() => requestAnimationFrame(() => this.noteTime(asked, news.early)));
+  }
+
+  /** Turn the view of the layout, and number the charts, like those of the layout shown before. */
+  align(model) {
+    const before = this.viewer.model, {camera} = this.viewer.panes[1];
+    if (before.head.show === "plain" || model.head.show === "plain") return;
+    this.turns = nearestTurns(before, this.turns, model);
+    camera.turn = camera.home = quarterTurns(this.turns);
+    keepChartNumbers(before, model);
+    document.querySelector("#layout h2").textContent = this.turns ? `Layout, turned by ${90 * this.turns}°` : "Layout";
   }
 
   /** Record the time until the layout, or its preview, was drawn. */
@@ -341,6 +353,7 @@ class Studio {
       this.edges = new EdgeGraph(this.surface());
       this.edges.follow(this.follows);
     }
+    this.edges.prefer(this.choices.cuts);
     return this.edges;
   }
 
