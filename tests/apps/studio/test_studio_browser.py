@@ -164,6 +164,11 @@ def test_a_brush_paints_on_both_sides(visit, studio, tmp_path):
     page.locator("#layout").focus()
     page.keyboard.press("b")
     page.keyboard.press(".")
+    visit.run(
+        "(() => { const {camera} = coneflat.panes[1];"
+        "const [p] = coneflat.model.shapeOf({kind: 'triangle', index: coneflat.model.worstTriangle()}, true);"
+        "camera.pan = [0, 1].map((k) => (p[0][k] + p[1][k] + p[2][k]) / 3); camera.note(); })()"
+    )
     within = visit.run(
         "(() => { const pane = coneflat.panes[1], {model} = coneflat, near = [];"
         "model.arrays.point_vertex.forEach((v, p) => { const [x, y] = pane.camera.project(model.flatPlace(p));"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,6 +14,7 @@ from ...io import Joined, as_input
 from ...mesh import REPAIR_ADVICE, CheckedMesh
 
 
+@lru_cache(maxsize=1)
 def repaired(source: Joined) -> tuple[CheckedMesh, str]:
     """Return the repaired mesh of a source, and what was wrong with it, or "".
 

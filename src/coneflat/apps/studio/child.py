@@ -21,7 +21,6 @@ from ... import ConeflatError, Flattener, Flattening
 from ...base import cancel_with
 from ...errors import DegenerateFaceError, NonManifoldError, NonOrientableError
 from ...io import Joined, read_joined
-from ...mesh import CheckedMesh
 from ...options import MOST_TRIANGLES
 from ..view import Model, PageText, Quantity, content_of, head_and_block, own_quantity, pack, shown_rows
 from .bare import bad_places, repaired, without_layout
@@ -94,7 +93,6 @@ class JobRunner:
         self._model: Model | None = None
         self._most: int | None = None
         self._read: tuple[str, str] | None = None
-        self._checked: tuple[CheckedMesh, str] | None = None
 
     def flatten(
         self, job: Head, report: Callable[[str, float], None], show: Callable[[Head, bytes], None]
@@ -132,9 +130,9 @@ class JobRunner:
 
     def _mark_repairs(self, data: Head, chosen: Choices) -> tuple[str, ...]:
         """Add the repaired places to page data, and return a sentence on them, or nothing."""
-        if not chosen.options.get("repair"):
+        if not chosen.options.get("repair") or self._source is None:
             return ()
-        checked, wrong = self._repaired()
+        checked, wrong = repaired(self._source)
         data["head"]["bad"] = bad_places(checked)
         return (f"The mesh was repaired: {wrong}. “Undo” reverts this.",) if wrong else ()
 
@@ -143,17 +141,12 @@ class JobRunner:
         if self._source is None:
             return {}, b""
         try:
-            checked, _ = self._repaired()
+            checked, _ = repaired(self._source)
             data, block = self._picture(without_layout(checked), Path(job["mesh"]).name, BARE_TITLE)
         except ConeflatError:
             return {}, b""
         data["head"] |= {"bad": bad_places(checked), "show": "plain"}
         return data, block
-
-    def _repaired(self) -> tuple[CheckedMesh, str]:
-        assert self._source is not None
-        self._checked = repaired(self._source) if self._checked is None else self._checked
-        return self._checked
 
     def _coloured(self, job: Head, result: Flattening, name: str) -> tuple[Head, bytes]:
         """Return the page data of a result, with the colours given by the user if these are available."""
@@ -212,9 +205,8 @@ class JobRunner:
 
         if self._source is None or self._flattener is None or self._read != (mesh, sha256):
             report("read", 0.0)
-            self._source = self._flattener = self._model = self._checked = (
-                None  # The memory may not suffice for both.
-            )
+            self._source = self._flattener = self._model = None  # The memory may not suffice for both.
+            repaired.cache_clear()
             source = read_joined(Path(mesh))
             self._source, self._flattener, self._read = source, Flattener(source.mesh), (mesh, sha256)
         return self._source, self._flattener
@@ -267,10 +259,10 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
             head, body = bench.bare(job) if job.get("bare") else ({}, b"")
             told = {"job": number, "error": page_message(str(error)), "repair": mends, "bare": head}
             write_frame(answers, told, body)
-        except MemoryError:
-            write_frame(answers, {"job": number, "error": "not enough memory for this mesh", "again": True})
         except Exception as error:
             message = f"internal error, please report it: {type(error).__name__}: {error}"
+            if isinstance(error, MemoryError):
+                message = "not enough memory for this mesh"
             write_frame(answers, {"job": number, "error": message, "again": True})
 
 

@@ -371,11 +371,6 @@ def edges_of(path: tuple[int, ...]) -> set[frozenset[int]]:
 LISTED_NUMBERS = 12
 
 
-def replay(mesh: str, project: str, choices: Choices) -> dict[str, str]:
-    """Return the command line and the Python code that give the same layout without the studio."""
-    return {"command": command_line(mesh, project, choices), "python": python_lines(mesh, choices)}
-
-
 def command_line(mesh: str, project: str, choices: Choices) -> str:
     """Return a command that flattens a mesh with these choices; drawn paths and paint need the project file."""
     if choices.cuts or choices.kept or choices.paint:

@@ -20,7 +20,7 @@ from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import Route
 from starlette.types import ASGIApp
 
-from ... import ConeflatError
+from ... import ConeflatError, sample_path
 from ...errors import StudioError
 from ...io import INPUT_FORMATS
 from .guard import MAX_REQUEST_BYTES, Guard
@@ -30,6 +30,7 @@ from .project import file_within, safe_name
 from .session import Session
 
 MAX_UPLOAD_BYTES = 512 * 1024 * 1024  # Bytes of an uploaded mesh.
+BYTES = "application/octet-stream"
 #: Errors of requests that are answered with their message, not with a traceback.
 REFUSED = (ConeflatError, ValueError, RecursionError, ClientDisconnect)
 
@@ -119,7 +120,7 @@ def studio_app(
         head = json.dumps(shown[0]).encode("ascii")
         head += b" " * (-len(head) % 4)
         content = struct.pack("<I", len(head)) + head + shown[1]
-        return Response(content, media_type="application/octet-stream")
+        return Response(content, media_type=BYTES)
 
     async def act(request: Request) -> Response:
         action = json.loads(b"".join([part async for part in _parts(request, MAX_REQUEST_BYTES)]))
@@ -128,15 +129,13 @@ def studio_app(
         await run_sync(session.act, action)
         return JSONResponse({"version": session.version})
 
-    async def export(request: Request) -> Response:
+    async def output(request: Request) -> Response:
         ending = f".{request.path_params['ending']}"
-        content = await run_sync(session.export, ending)
-        return Response(content, media_type=_media_type(ending))
-
-    async def quads(request: Request) -> Response:
-        ending = f".{request.path_params['ending']}"
-        content = await run_sync(session.quads, ending, _number(request, "count"))
-        return Response(content, media_type=_media_type(ending))
+        if request.url.path.startswith("/quads"):
+            content = await run_sync(session.quads, ending, _number(request, "count"))
+        else:
+            content = await run_sync(session.export, ending)
+        return Response(content, media_type=mimetypes.MimeTypes(()).guess_type(f"it{ending}")[0] or BYTES)
 
     async def curve(request: Request) -> Response:
         return JSONResponse(await run_sync(session.curve))
@@ -146,13 +145,18 @@ def studio_app(
         path = file_within(safe_name(given.name), session.folder)
         if path.suffix.lower() not in (*INPUT_FORMATS, ".json"):
             raise StudioError(f"{path.name} is not in a format that can be read: {', '.join(INPUT_FORMATS)}")
-        stored, is_new = await _store(request, path)
+        before = set(session.folder.iterdir())
+        stored = await _store(request, path)
         try:
             await run_sync(session.open_named, stored.name)
         except ConeflatError:
-            if is_new:
-                stored.unlink(missing_ok=True)
+            for new in {stored} - before:
+                new.unlink(missing_ok=True)
             raise
+        return JSONResponse({"version": session.version})
+
+    async def sample(request: Request) -> Response:
+        await run_sync(session.open, sample_path())
         return JSONResponse({"version": session.version})
 
     app = Starlette(
@@ -161,20 +165,16 @@ def studio_app(
             Route("/state", state),
             Route("/layout", layout),
             Route("/act", act, methods=["POST"]),
-            Route("/export/{ending}", export, methods=["POST"]),
-            Route("/quads/{ending}", quads, methods=["POST"]),
+            *(Route(f"/{kind}/{{ending}}", output, methods=["POST"]) for kind in ("export", "quads")),
             Route("/curve", curve, methods=["POST"]),
             Route("/mesh", upload, methods=["POST"]),
+            Route("/sample", sample, methods=["POST"]),
         ],
         exception_handlers=dict.fromkeys(
             (ConeflatError, ValueError, RecursionError, TooLarge, ClientDisconnect), _refused
         ),
     )
     return Guard(app, token, port, framed, proxied)
-
-
-def _media_type(ending: str) -> str:
-    return mimetypes.MimeTypes(()).guess_type(f"it{ending}")[0] or "application/octet-stream"
 
 
 def _number(request: Request, name: str) -> int | str:
@@ -204,11 +204,8 @@ async def _parts(request: Request, most: int) -> AsyncIterator[bytes]:
         yield part
 
 
-async def _store(request: Request, path: Path) -> tuple[Path, bool]:
-    """Store the content of a request in a file, with a number added to the name if needed.
-
-    Return its path, and whether the file is new.
-    """
+async def _store(request: Request, path: Path) -> Path:
+    """Store the content of a request in a file, with a number added to the name if needed, and return its path."""
     temporary = path.with_name(f".{secrets.token_hex(8)}.upload")
     try:
         with temporary.open("xb") as stream:
@@ -221,13 +218,12 @@ async def _store(request: Request, path: Path) -> tuple[Path, bool]:
         temporary.unlink(missing_ok=True)
 
 
-def _settle(temporary: Path, path: Path) -> tuple[Path, bool]:
-    """Rename a temporary file to an unused name, or find a file with the same content; return as `_store`."""
+def _settle(temporary: Path, path: Path) -> Path:
+    """Rename a temporary file to an unused name, or find a file with the same content; return the path."""
     content, count, target = temporary.read_bytes(), 1, path
     while target.exists() and not (target.is_file() and target.read_bytes() == content):
         count += 1
         target = path.with_name(f"{path.stem}-{count}{path.suffix}")
-    is_new = not target.exists()
-    if is_new:
+    if not target.exists():
         temporary.rename(target)
-    return target, is_new
+    return target

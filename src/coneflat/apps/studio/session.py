@@ -14,7 +14,7 @@ from ...base import short_repr
 from ...errors import MeshFileError, StudioError
 from ...io import read_joined
 from ...options import as_integer
-from .choices import Choices, replay
+from .choices import Choices, command_line, python_lines
 from .known import SentPictures
 from .messages import misplaced_warning
 from .outputs import EXPORTS, MAX_QUADS, QUADS, curve_options
@@ -54,25 +54,23 @@ class Session:
         """
         self._look = {"color": color, "most": most_triangles}
         self.folder = folder.resolve()
-        self.version = 0
-        self.layout = 0
+        self.version = self.layout = 0
         self.is_early = False
         self.project_file: Path | None = None
         self._mesh: Path | None = None
         self._sha256 = ""
         self._history = History(Choices())
-        self._opened = 0  # Number of meshes and projects opened so far.
-        self._repaired = 0  # The last of them that was repaired automatically.
+        # Number of meshes and projects opened so far, and that of the last one that was repaired automatically.
+        self._opened = self._repaired = 0
         # Number of the current choices, which increases with every change; 0 is never used.
         self._chosen = 1
-        self._job = 0
+        self._job = self._requests = 0
         self._busy: dict[str, Any] | None = None
         self._trouble: dict[str, Any] | None = None
         self._current = _Shown()
         self._cached_texts: tuple[int, tuple[str, ...], dict[str, str]] = 0, (), {}
         self._known = SentPictures()
         self._last: _Shown | None = None  # The last final layout, while a preview is shown.
-        self._requests = 0
         self._answers: dict[int, tuple[Head, bytes]] = {}
         self._curves: dict[tuple[str, str], dict[str, Any]] = {}
         self._changed = threading.Condition(threading.RLock())
@@ -250,11 +248,12 @@ class Session:
         return "" if self.project_file is None else self.project_file.name
 
     def _choice_texts(self) -> tuple[tuple[str, ...], dict[str, str]]:
-        """Return the warnings on the choices and the result of `replay`, cached until the next change."""
+        """Return the warnings on the choices and the command line and the Python code, cached until the next change."""
         if self._cached_texts[0] != self._chosen:
             chosen, texts = self._history.now, {"command": "", "python": ""}
             if self._mesh is not None:
-                texts = replay(self._mesh.name, self._project_name, chosen)
+                texts["command"] = command_line(self._mesh.name, self._project_name, chosen)
+                texts["python"] = python_lines(self._mesh.name, chosen)
             self._cached_texts = self._chosen, misplaced_warning(chosen), texts
         return self._cached_texts[1:]
 

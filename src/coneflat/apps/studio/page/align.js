@@ -8,7 +8,7 @@ function quarterTurns(count) {
   return [c, -s, 0, s, c, 0, 0, 0, 1];
 }
 
-/** Return the number of quarter turns with which a layout is nearest to an earlier one of the same triangles, turned by its own. */
+/** Return the number of quarter turns with which a layout clearly is nearest to an earlier one of the same triangles, turned by its own. */
 function nearestTurns(before, turns, after) {
   const {faces} = after.arrays, step = 3 * Math.max(1, Math.floor(faces.length / 3 / SAMPLED)), sums = [0, 0, 0, 0];
   for (let corner = 0; corner < faces.length; corner += step) {
@@ -18,7 +18,8 @@ function nearestTurns(before, turns, after) {
       sums[k] += Math.hypot(x - place[0], y - place[1]);
     }
   }
-  return sums.indexOf(Math.min(...sums));
+  const least = Math.min(...sums);
+  return least < sums[0] / 2 ? sums.indexOf(least) : 0;
 }
 
 /** Renumber the charts of a layout so that each has the number, and so the colour, of the earlier chart with which it shares most triangles. */

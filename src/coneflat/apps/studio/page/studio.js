@@ -18,11 +18,13 @@ class Studio {
     this.paint = new Paint(this);
     this.brush = new Brush(this);
     this.making = ""; // The output that is being computed, other than layouts.
+    this.keyed = false; // The keyboard was used last, not the mouse.
     this.follows = true; // Paths follow sharp edges.
     this.overlay = new Overlay(this);
     this.panel = new Panel(this);
     document.addEventListener("keydown", (event) => this.key(event), {capture: true});
     window.addEventListener("drop", (event) => this.drop(event), {capture: true});
+    for (const name of ["keydown", "pointermove"]) window.addEventListener(name, (event) => this.noteKeys(event.type === "keydown"), {capture: true});
     window.addEventListener("dragover", (event) => event.preventDefault());
   }
 
@@ -60,6 +62,7 @@ class Studio {
     this.news = news;
     document.body.classList.toggle("empty", !this.news.mesh);
     document.body.classList.toggle("bare", !this.news.layout || this.news.bare);
+    document.body.classList.toggle("alone", this.news.bare);
     document.body.classList.toggle("stale", this.news.stale);
     if (!this.viewer) document.getElementById("name").textContent = this.news.mesh ?? "";
     if (model) this.take(model);
@@ -78,6 +81,8 @@ class Studio {
     if (!isSame) this.byNumber = this.boundary = null;
     if (!isSame && this.whole?.key !== Surface.keyOf(model)) this.whole = this.edges = null;
     this.points = this.nearest = null;
+    // All layouts are drawn in the frame of the unit square, so that they do not move in the view.
+    if (model.head.show !== "plain") [model.uvCentre, model.uvUnit] = [[0.5, 0.5], 2];
     this.repicking = true; // The selection is not cleared if it ends because indices have changed.
     if (this.viewer) {
       if (isSame) this.align(model);
@@ -87,6 +92,8 @@ class Studio {
     } else {
       this.viewer = window.coneflat = new Viewer(model, null);
       this.viewer.tool = this.tools;
+      this.viewer.showsSquare = this.viewer.renderer.look.behind = true;
+      this.viewer.panes[1].camera.showOthers(this.viewer.flatPlaces());
       this.viewer.state.set({marked: FAINT});
       this.viewer.marks.overlay = (pen, pane) => this.overlay.draw(pen, pane);
       this.viewer.state.listen((names) => names.has("picked") && this.notePick());
@@ -94,8 +101,27 @@ class Studio {
     if (!isSame) this.selected = selected === null ? null : (this.verticesOf([selected])[0] ?? null);
     this.repicking = false;
     this.pickSelected();
+    this.showMeasures(model.head);
     const {asked, news} = this;
     requestAnimationFrame(() => requestAnimationFrame(() => this.noteTime(asked, news.early)));
+  }
+
+  /** Add the charts, the packing and the overlap to the title; a preview does not have them. */
+  showMeasures({rows}) {
+    const values = new Map(rows.map(([name, value]) => [name, value])), charts = values.get("charts");
+    if (!(Number(charts?.replaceAll(",", "")) > 0)) return;
+    const more = [`${charts} ${charts === "1" ? "chart" : "charts"}`, `packing ${values.get("packing")}`, `overlap ${values.get("overlap")}`];
+    const place = document.getElementById("title");
+    place.textContent = place.title = [place.textContent, ...more].join("  ·  ");
+  }
+
+  /** Choose the axis of the model that points up in its view. */
+  setUp(axis) {
+    const {camera} = this.viewer.panes[0], {turn} = this.viewer.model.head;
+    const cycle = {x: [0, 0, 1, 1, 0, 0, 0, 1, 0], y: [1, 0, 0, 0, 1, 0, 0, 0, 1], z: [0, 1, 0, 0, 0, 1, 1, 0, 0]}[axis];
+    camera.home = product(turn.flat(), cycle);
+    camera.measure(this.viewer.model.arrays.places);
+    camera.fit();
   }
 
   /** Turn the view of the layout, and number the charts, like those of the layout shown before. */
@@ -172,6 +198,11 @@ class Studio {
     await this.server.open(file).catch((error) => this.refuse(error));
   }
 
+  async openSample() {
+    this.refused = null;
+    await this.server.ask("sample", {method: "POST"}).catch((error) => this.refuse(error));
+  }
+
   drop(event) {
     const [file] = event.dataTransfer?.files ?? [];
     if (!file || file.type.startsWith("image/")) return; // Images are handled by the viewer.
@@ -217,6 +248,12 @@ class Studio {
     if (name === "Escape") this.tools.endLine();
     const does = tool ? () => this.setTool(tool[0]) : keys[name];
     if (does) this.obey(event, does);
+  }
+
+  noteKeys(keyed) {
+    if (keyed === this.keyed && !keyed) return;
+    this.keyed = keyed;
+    this.viewer?.remark();
   }
 
   obey(event, does) {
