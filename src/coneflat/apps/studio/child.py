@@ -11,6 +11,7 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import IO
@@ -126,39 +127,34 @@ class JobRunner:
         report("picture", 1.0)
         head, body = self._coloured(job, result, name)
         self.result = result
-        return {**head, "warnings": (*self._mark_repairs(head, chosen), *angle_warning(chosen, result))}, body
-
-    def _mark_repairs(self, data: Head, chosen: Choices) -> tuple[str, ...]:
-        """Add the repaired places to page data, and return a sentence on them, or nothing."""
-        if not chosen.options.get("repair") or self._source is None:
-            return ()
-        checked, wrong = repaired(self._source)
-        data["head"]["bad"] = bad_places(checked)
-        return (f"The mesh was repaired: {wrong}. “Undo” reverts this.",) if wrong else ()
+        warnings = angle_warning(chosen, result)
+        if chosen.options.get("repair"):
+            checked, wrong = repaired(source)
+            head["head"]["bad"] = bad_places(checked)
+            warnings += (f"The mesh was repaired: {wrong}. “Undo” reverts this.",) if wrong else ()
+        return {**head, "warnings": warnings}, body
 
     def bare(self, job: Head) -> tuple[Head, bytes]:
         """Return the page data of the mesh of a failed job without a layout; nothing if no triangle can be drawn."""
-        if self._source is None:
-            return {}, b""
-        try:
-            checked, _ = repaired(self._source)
-            data, block = self._picture(without_layout(checked), Path(job["mesh"]).name, BARE_TITLE)
-        except ConeflatError:
-            return {}, b""
-        data["head"] |= {"bad": bad_places(checked), "show": "plain"}
-        return data, block
+        with suppress(ConeflatError):
+            if self._source is not None:
+                checked, _ = repaired(self._source)
+                data, block = self._picture(without_layout(checked), Path(job["mesh"]).name, BARE_TITLE)
+                data["head"] |= {"bad": bad_places(checked), "show": "plain"}
+                return data, block
+        return {}, b""
 
     def _coloured(self, job: Head, result: Flattening, name: str) -> tuple[Head, bytes]:
         """Return the page data of a result, with the colours given by the user if these are available."""
 
-        if not job.get("color"):
-            return self._picture(result, name)
-        try:
-            own = own_quantity(result, job["color"])
-        except ConeflatError as error:
-            head, body = self._picture(result, name)
-            return {**head, "missing": page_message(str(error))}, body
-        return self._picture(result, name, own=own)
+        own, missing = None, {}
+        if job.get("color"):
+            try:
+                own = own_quantity(result, job["color"])
+            except ConeflatError as error:
+                missing = {"missing": page_message(str(error))}
+        head, body = self._picture(result, name, own=own)
+        return {**head, **missing}, body
 
     def make(self, job: Head, report: Callable[[str, float], None]) -> tuple[Head, bytes]:
         """Return the output of another job: a file of the result, quads, or a curve."""

@@ -162,8 +162,7 @@ def open_project(path: Path, folder: Path, only_within: bool = False) -> tuple[P
 def safe_name(name: str) -> str:
     """Return a file name that every system accepts, without invisible characters and those that reorder text."""
     kept = "".join("_" if each in '<>:"|?*' else each for each in name if category(each)[0] != "C")
-    stem = kept.partition(".")[0].strip()
-    return f"_{kept}" if re.fullmatch(r"(?i)con|prn|aux|nul|(com|lpt)[0-9¹²³]", stem) else kept
+    return f"_{kept}" if re.match(r"(?i)(con|prn|aux|nul|(com|lpt)[0-9¹²³])\s*(\.|$)", kept) else kept
 
 
 def file_within(name: str, folder: Path) -> Path:

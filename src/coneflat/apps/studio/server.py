@@ -38,12 +38,10 @@ REFUSED = (ConeflatError, ValueError, RecursionError, ClientDisconnect)
 class StudioServer(uvicorn.Server):
     """Serves a session until it is interrupted, and then closes the session."""
 
-    def __init__(
-        self, session: Session, token: str, port: int, framed: bool = False, proxied: bool = False
-    ) -> None:
+    def __init__(self, session: Session, token: str, port: int, **access: bool) -> None:
         super().__init__(
             uvicorn.Config(
-                studio_app(session, token, port, framed=framed, proxied=proxied),
+                studio_app(session, token, port, **access),
                 log_level="error",
                 access_log=False,  # The log would contain the token.
                 server_header=False,
@@ -87,17 +85,14 @@ class Notifier:
             del self._waiting[event]
 
 
-def studio_app(
-    session: Session, token: str, port: int, framed: bool = False, proxied: bool = False
-) -> ASGIApp:
+def studio_app(session: Session, token: str, port: int, **access: bool) -> ASGIApp:
     """Return the application of the server.
 
     Args:
         session: the session.
         token: the token that every request must have.
         port: port of the server; requests with another one are rejected.
-        framed: whether notebooks of this machine may show the page in a frame.
-        proxied: whether requests come through a proxy.
+        access: `framed` and `proxied`, as in `Guard`.
     """
     notifier = Notifier()
     session.listen(notifier.notify)
@@ -174,7 +169,7 @@ def studio_app(
             (ConeflatError, ValueError, RecursionError, TooLarge, ClientDisconnect), _refused
         ),
     )
-    return Guard(app, token, port, framed, proxied)
+    return Guard(app, token, port, **access)
 
 
 def _number(request: Request, name: str) -> int | str:

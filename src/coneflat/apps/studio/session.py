@@ -216,43 +216,36 @@ class Session:
         """
         with self._changed:
             undo, redo = self._history.depth
-            warnings, texts = self._choice_texts()
+            shown, project = self._current, "" if self.project_file is None else self.project_file.name
+            # The layout is that of earlier choices, and no other is being computed.
+            is_stale = bool(shown.shown) and not (shown.is_bare or self._busy or shown.job == self._job)
+            warnings, texts = self._choice_texts(project)
             return {
                 "version": self.version,
                 "opened": self._opened,
                 "mesh": None if self._mesh is None else self._mesh.name,
-                "project": self._project_name,
+                "project": project,
                 "chosen": self._chosen,
                 "undo": undo,
                 "redo": redo,
                 "busy": self._busy,
                 "trouble": self._trouble,
-                "layout": 0 if self._current.shown is None else self.layout,
+                "layout": 0 if shown.shown is None else self.layout,
                 "early": self.is_early,
-                "bare": self._current.is_bare,
-                "stale": self._is_stale,
-                "found": list(self._current.found),
-                "seconds": sum(self._current.seconds.values()),
-                "warnings": [*warnings, *(() if self._is_stale else self._current.warnings)],
+                "bare": shown.is_bare,
+                "stale": is_stale,
+                "found": list(shown.found),
+                "seconds": sum(shown.seconds.values()),
+                "warnings": [*warnings, *(() if is_stale else shown.warnings)],
                 **({} if known == self._chosen else {"choices": self._history.now.as_plain(), **texts}),
             }
 
-    @property
-    def _is_stale(self) -> bool:
-        """Return whether the layout shown is that of earlier choices, and no other is being computed."""
-        shown = self._current
-        return shown.shown is not None and not shown.is_bare and self._busy is None and shown.job != self._job
-
-    @property
-    def _project_name(self) -> str:
-        return "" if self.project_file is None else self.project_file.name
-
-    def _choice_texts(self) -> tuple[tuple[str, ...], dict[str, str]]:
+    def _choice_texts(self, project: str) -> tuple[tuple[str, ...], dict[str, str]]:
         """Return the warnings on the choices and the command line and the Python code, cached until the next change."""
         if self._cached_texts[0] != self._chosen:
             chosen, texts = self._history.now, {"command": "", "python": ""}
             if self._mesh is not None:
-                texts["command"] = command_line(self._mesh.name, self._project_name, chosen)
+                texts["command"] = command_line(self._mesh.name, project, chosen)
                 texts["python"] = python_lines(self._mesh.name, chosen)
             self._cached_texts = self._chosen, misplaced_warning(chosen), texts
         return self._cached_texts[1:]
