@@ -24,11 +24,10 @@ from ...errors import DegenerateFaceError, NonManifoldError, NonOrientableError
 from ...io import Joined, read_joined
 from ...options import MOST_TRIANGLES
 from ..view import Model, PageText, Quantity, content_of, head_and_block, own_quantity, pack, shown_rows
-from .bare import bad_places, repaired, without_layout
 from .choices import Choices
 from .known import with_hashes
 from .messages import angle_warning, page_message, with_warnings
-from .outputs import curve_data, quads_file, result_file
+from .outputs import bad_places, curve_data, quads_file, repaired, result_file, without_layout
 from .worker import Head, read_frame, write_frame
 
 #: Number of polygons from which on a preview is shown; for smaller meshes the final layout is as fast.

@@ -11,6 +11,7 @@ class Studio {
     this.viewer = this.news = this.refused = null;
     this.layout = 0;
     this.turns = 0; // Quarter turns of the view of the layout.
+    this.final = null; // The last layout that was not a preview, {model, turns}.
     this.pending = 0;
     this.took = this.sight = 0; // Milliseconds from the last change to its layout, and to its preview.
     this.selected = null; // The vertex of the picked cone, which does not depend on the index of the cone.
@@ -102,6 +103,8 @@ class Studio {
     this.repicking = false;
     this.pickSelected();
     this.showMeasures(model.head);
+    if (!isSame) this.final = null;
+    if (!this.news.early && model.head.show !== "plain") this.final = {model, turns: this.turns};
     const {asked, news} = this;
     requestAnimationFrame(() => requestAnimationFrame(() => this.noteTime(asked, news.early)));
   }
@@ -124,13 +127,13 @@ class Studio {
     camera.fit();
   }
 
-  /** Turn the view of the layout, and number the charts, like those of the layout shown before. */
+  /** Turn the view of the layout, and number the charts, like those of the last layout that was not a preview. */
   align(model) {
-    const before = this.viewer.model, {camera} = this.viewer.panes[1];
-    if (before.head.show === "plain" || model.head.show === "plain") return;
-    this.turns = nearestTurns(before, this.turns, model);
+    const {camera} = this.viewer.panes[1], before = this.final;
+    if (!before || model.head.show === "plain") return;
+    this.turns = nearestTurns(before.model, before.turns, model);
     camera.turn = camera.home = quarterTurns(this.turns);
-    keepChartNumbers(before, model);
+    keepChartNumbers(before.model, model);
     document.querySelector("#layout h2").textContent = this.turns ? `Layout, turned by ${90 * this.turns}°` : "Layout";
   }
 
