@@ -107,10 +107,15 @@ def test_a_mesh_is_dropped_on_an_empty_page(browser, tmp_path):
         visit = StudioVisit(browser, served)
         assert "empty" in visit.page.get_attribute("body", "class")
         visit.page.set_input_files("#open", tmp_path / "from" / "bad.obj")
-        visit.wait("studio.news.trouble?.repair && !studio.isBusy()")
-        visit.page.click("#repair")
         visit.wait("studio.layout === 1 && !studio.isBusy()")
         visit.settle()
+        assert "The mesh was repaired: 3 vertices" in visit.page.inner_text("#warnings")
+        # Undone, the layout is dimmed and named as out of date, until the mesh is repaired.
+        visit.page.click("#undo")
+        visit.wait("document.body.classList.contains('stale')")
+        visit.page.click("#repair")
+        visit.settle()
+        assert "stale" not in visit.page.get_attribute("body", "class")
         assert visit.drawn_share("model") > 0.1
         visit.close()
     finally:
@@ -159,6 +164,11 @@ def test_a_brush_paints_on_both_sides(visit, studio, tmp_path):
     page.locator("#layout").focus()
     page.keyboard.press("b")
     page.keyboard.press(".")
+    visit.run(
+        "(() => { const {camera} = coneflat.panes[1];"
+        "const [p] = coneflat.model.shapeOf({kind: 'triangle', index: coneflat.model.worstTriangle()}, true);"
+        "camera.pan = [0, 1].map((k) => (p[0][k] + p[1][k] + p[2][k]) / 3); camera.note(); })()"
+    )
     within = visit.run(
         "(() => { const pane = coneflat.panes[1], {model} = coneflat, near = [];"
         "model.arrays.point_vertex.forEach((v, p) => { const [x, y] = pane.camera.project(model.flatPlace(p));"
@@ -211,6 +221,51 @@ def test_the_curve_offers_numbers_of_cones(visit):
     visit.settle()
     assert page.locator("#curve").is_hidden()
     assert page.locator("#curve-ask").is_enabled()
+
+
+SHOWN_PLACES = """
+(() => { const {model} = coneflat, {camera} = coneflat.panes[1], out = [];
+const {faces} = model.arrays;
+for (let c = 0; c < faces.length; c += 30) out.push(camera.project(model.flatPlace(faces[c])));
+return [out, [camera.width, camera.height], Array.from(model.arrays.chart)]; })()
+"""
+
+
+def test_a_small_change_keeps_the_layout_in_place(visit, studio):
+    visit.settle()
+    mesh = coneflat.read_mesh(coneflat.sample_path())
+    faces = np.asarray(mesh.corners).reshape(-1, 3)
+    turned = 0
+    studio.session.act({"do": "hand"})
+    visit.settle()
+    for cone in visit.cones()[:5]:
+        (before, size, charts), neighbours = visit.run(SHOWN_PLACES), faces[(faces == cone).any(axis=1)]
+        to = int(np.setdiff1d(neighbours, visit.cones()).min())
+        studio.session.act({"do": "move", "vertex": cone, "to": to})
+        visit.settle()
+        after, _, now = visit.run(SHOWN_PLACES)
+        turned += visit.run("studio.turns") > 0
+        if len(set(now)) == len(set(charts)):  # No chart was split.
+            off = np.linalg.norm(np.subtract(after, before)[:, :2], axis=1).mean()
+            assert off < 0.2 * min(size), cone
+            assert (np.array(now) == charts).mean() > 0.9
+    assert turned  # Without the turn of the view, the places would be far apart.
+
+
+def test_a_path_joins_an_earlier_cut_instead_of_running_next_to_it(visit):
+    visit.settle()
+    ends = visit.visible_vertices(40)
+    one, two = ends[0], ends[-1]
+    path = visit.run(f"studio.pathBetween(...studio.verticesOf([{one}, {two}]))")
+    visit.run(f"studio.act({{do: 'cut', path: {path}}})")
+    visit.settle()
+    beside = visit.run(
+        "(() => { const graph = studio.graph(), near = (number) => {"
+        f"const [v] = studio.verticesOf([number]), on = new Set(studio.verticesOf({path}));"
+        "return [...graph.ends.slice(graph.start[v], graph.start[v + 1])].find((w) => !on.has(w)); };"
+        f"return studio.pathBetween(near({path[1]}), near({path[-2]})); }})()"
+    )
+    assert len(set(beside) & set(path)) > len(path) - 4
 
 
 def test_sizes_are_shown_in_a_unit(hill, tmp_path):

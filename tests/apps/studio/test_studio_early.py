@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import threading
+import time
+from contextlib import ExitStack
+
 import numpy as np
 import pytest
 import shapes
 
 import coneflat
-from coneflat.apps.studio.child import PLACEHOLDER, JobRunner
+from coneflat.apps.studio.child import PLACEHOLDER, JobRunner, Jobs, serve
 from coneflat.apps.studio.choices import Choices
 from coneflat.apps.studio.known import SentPictures, with_hashes
 from coneflat.apps.studio.session import Session
+from coneflat.apps.studio.worker import read_frame, write_frame
 from coneflat.apps.view.page.payload import pack
+from coneflat.base.progress import check_cancelled
 
 
 class Mute:
@@ -139,3 +147,39 @@ class TestKnownArrays:
         assert len(less[1]) < len(whole[1])
         assert self.arrays_of(less, self.arrays_of(first)) == self.arrays_of(whole)
         assert self.arrays_of(whole) == {"places": [1.0, 2.0], "tints": [1, 2, 4], "uv": [0.5]}
+
+
+def test_a_change_cancels_the_separation_of_overlaps(tmp_path, monkeypatch):
+    """The preview comes before the separation, which may take long, and the next change does not wait for it."""
+    path = shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(5))
+    module, begun = sys.modules["coneflat.flatten"], threading.Event()
+    separate = module.separate_overlaps
+
+    def endless(*given):
+        if begun.is_set():
+            return separate(*given)
+        begun.set()
+        while True:
+            check_cancelled()
+            time.sleep(0.01)
+
+    monkeypatch.setattr(module, "separate_overlaps", endless)
+    (jobs_out, jobs_in), (answers_out, answers_in) = os.pipe(), os.pipe()
+    with ExitStack() as stack:
+        asking, answers, hearing = (
+            stack.enter_context(os.fdopen(end, mode))
+            for end, mode in ((jobs_in, "wb"), (answers_in, "wb"), (answers_out, "rb"))
+        )
+        thread = threading.Thread(target=serve, args=(Jobs(os.fdopen(jobs_out, "rb")), answers), daemon=True)
+        thread.start()
+        job = {"do": "flatten", "mesh": str(path), "sha256": "", "choices": Choices().as_plain()}
+        write_frame(asking, {**job, "job": 1})
+        heard = []
+        while not (heard and "early" in heard[-1]):
+            heard.append(read_frame(hearing)[0])
+        assert begun.wait(60)
+        write_frame(asking, {**job, "job": 2})
+        while not (heard[-1]["job"] == 2 and "done" in heard[-1]):
+            heard.append(read_frame(hearing)[0])
+    assert {"job": 1, "given_up": True} in heard
+    assert not any(each["job"] == 1 and "done" in each for each in heard)

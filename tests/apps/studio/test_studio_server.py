@@ -134,7 +134,8 @@ class TestPage:
         answer = page.post("/act", json={"do": "remove", "vertex": 10**9})
         assert answer.status_code == 400
         assert "vertex 1000000000 is not a cone" in answer.text
-        for garbled in (b"{", b"[]", b"\xff", b'{"do": NaN}'):
+        deep = b'{"do": "cut", "path": ' + b"[" * 900 + b"]" * 900 + b"}"
+        for garbled in (b"{", b"[]", b"\xff", b'{"do": NaN}', b"[" * 100_000, b'{"a":' * 100_000, deep):
             assert page.post("/act", content=garbled).status_code == 400
         assert page.post("/export/exe").status_code == 400
         assert page.get("/nowhere").status_code == 404
@@ -164,6 +165,23 @@ class TestUploads:
         assert page.post(f"/mesh?name={name}", content=ball.read_bytes()).status_code == 400
         assert set(tmp_path.parent.rglob("*")) == before
 
+    @pytest.mark.parametrize(
+        ("name", "stored"),
+        [
+            ("CON.obj", "_CON.obj"),
+            ("com1.v2.obj", "_com1.v2.obj"),
+            ("a\u202ejbo.obj", "ajbo.obj"),
+            ("a\u200b\tb.obj", "ab.obj"),
+            ("a:b?.obj", "a_b_.obj"),
+            ("bücher 3d.obj", "bücher 3d.obj"),
+        ],
+    )
+    def test_odd_names_are_made_safe(self, page, ball, tmp_path, name, stored):
+        assert page.post("/mesh", params={"name": name}, content=ball.read_bytes()).status_code == 200
+        assert page.get("/state").json()["mesh"] == stored
+        assert (tmp_path / stored).exists()
+        assert page.post("/mesh", params={"name": "\u202e.obj"}, content=ball.read_bytes()).status_code == 400
+
     def test_no_file_is_overwritten(self, page, ball, tmp_path):
         (tmp_path / "ball.obj").write_text("# mine\n")
         assert page.post("/mesh?name=ball.obj", content=ball.read_bytes()).status_code == 200
@@ -183,3 +201,44 @@ def test_the_page_costs_edges_as_seams_do():
     assert numbers is not None
     smooth, sharp, cheapest = map(float, numbers.groups())
     np.testing.assert_allclose([np.pi / smooth, np.pi / sharp, cheapest], [SMOOTH, SHARP, CHEAPEST])
+
+
+class TestFailedOpening:
+    """What is shown stays, and no file is left, if a dropped file cannot be opened."""
+
+    @pytest.mark.parametrize(
+        ("name", "content"),
+        [
+            ("garbage.obj", b"\x00\x01 nonsense"),
+            ("empty.obj", b""),
+            ("faceless.obj", b"v 0 0 0\n"),
+            ("cut.glb", b"glTF\x02\x00\x00\x00"),
+            ("other.json", b"{}"),
+        ],
+    )
+    def test_what_is_shown_stays_and_no_file_is_left(self, page, session, ball, tmp_path, name, content):
+        assert page.post("/mesh?name=ball.obj", content=ball.read_bytes()).status_code == 200
+        assert session.wait_until_idle(120)
+        before, files_before = page.get("/state").json(), sorted(tmp_path.iterdir())
+        assert page.post(f"/mesh?name={name}", content=content).status_code == 400
+        assert page.get("/state").json() == before
+        assert sorted(tmp_path.iterdir()) == files_before
+
+    def test_a_file_that_was_there_is_not_removed(self, page, tmp_path):
+        (tmp_path / "mine.obj").write_bytes(b"v 0 0 0\n")
+        assert page.post("/mesh?name=mine.obj", content=b"v 0 0 0\n").status_code == 400
+        assert (tmp_path / "mine.obj").exists()
+
+
+def test_a_refused_export_replaces_no_reason(page, session, ball):
+    page.post("/mesh?name=ball.obj", content=ball.read_bytes())
+    assert session.wait_until_idle(120)
+    for vertex in page.get("/state").json()["found"]:
+        page.post("/act", json={"do": "remove", "vertex": vertex})
+    assert session.wait_until_idle(120)
+    reason = page.get("/state").json()["trouble"]["text"]
+    assert "needs cones to carry it" in reason
+    answer = page.post("/export/obj")
+    assert answer.status_code == 400
+    assert "there is nothing to save" in answer.text
+    assert page.get("/state").json()["trouble"]["text"] == reason

@@ -119,6 +119,8 @@ class TestSession:
             {"do": "add", "vertex": 1.5}, {"do": "cut", "path": 3}, {"do": "cut", "path": ["a", "b"]},
             {"do": "erase", "edge": [1]}, {"do": "set", "name": "progress", "value": 1},
             {"do": "set", "name": "distortion", "value": "much"}, {"do": "angle", "vertex": 3, "degrees": "nan"},
+            {"do": "add", "vertex": -1}, {"do": "corner", "vertex": -1}, {"do": "cut", "path": [0, -1]},
+            {"do": "lock", "vertex": -1, "locked": True},
         ):  # fmt: skip
             with pytest.raises((StudioError, OptionError)):
                 session.act(action)

@@ -11,6 +11,7 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import IO
@@ -19,20 +20,21 @@ import numpy as np
 
 from ... import ConeflatError, Flattener, Flattening
 from ...base import cancel_with
-from ...errors import NonManifoldError, NonOrientableError
+from ...errors import DegenerateFaceError, NonManifoldError, NonOrientableError
 from ...io import Joined, read_joined
 from ...options import MOST_TRIANGLES
 from ..view import Model, PageText, Quantity, content_of, head_and_block, own_quantity, pack, shown_rows
 from .choices import Choices
 from .known import with_hashes
 from .messages import angle_warning, page_message, with_warnings
-from .outputs import curve_data, quads_file, result_file
+from .outputs import bad_places, curve_data, quads_file, repaired, result_file, without_layout
 from .worker import Head, read_frame, write_frame
 
 #: Number of polygons from which on a preview is shown; for smaller meshes the final layout is as fast.
 EARLY_POLYGONS = 20_000
 #: The text that stands for unknown numbers, and the title of the preview.
 PLACEHOLDER = "…"
+BARE_TITLE = "No layout"
 FIRST_TITLE = "Preview: distortion is not yet reduced, and overlaps are not yet removed  ·  …"
 
 
@@ -114,7 +116,7 @@ class JobRunner:
 
         def show_first(first: Flattening) -> None:
             report_max("preview", furthest)
-            show(*self._picture(first, name, is_first=True))
+            show(*self._picture(first, name, FIRST_TITLE))
 
         chosen = Choices.from_plain(job["choices"])
         words = source.map_options(chosen.keywords())
@@ -124,19 +126,34 @@ class JobRunner:
         report("picture", 1.0)
         head, body = self._coloured(job, result, name)
         self.result = result
-        return {**head, "warnings": angle_warning(chosen, result)}, body
+        warnings = angle_warning(chosen, result)
+        if chosen.options.get("repair"):
+            checked, wrong = repaired(source)
+            head["head"]["bad"] = bad_places(checked)
+            warnings += (f"The mesh was repaired: {wrong}. “Undo” reverts this.",) if wrong else ()
+        return {**head, "warnings": warnings}, body
+
+    def bare(self, job: Head) -> tuple[Head, bytes]:
+        """Return the page data of the mesh of a failed job without a layout; nothing if no triangle can be drawn."""
+        with suppress(ConeflatError):
+            if self._source is not None:
+                checked, _ = repaired(self._source)
+                data, block = self._picture(without_layout(checked), Path(job["mesh"]).name, BARE_TITLE)
+                data["head"] |= {"bad": bad_places(checked), "show": "plain"}
+                return data, block
+        return {}, b""
 
     def _coloured(self, job: Head, result: Flattening, name: str) -> tuple[Head, bytes]:
         """Return the page data of a result, with the colours given by the user if these are available."""
 
-        if not job.get("color"):
-            return self._picture(result, name)
-        try:
-            own = own_quantity(result, job["color"])
-        except ConeflatError as error:
-            head, body = self._picture(result, name)
-            return {**head, "missing": page_message(str(error))}, body
-        return self._picture(result, name, own=own)
+        own, missing = None, {}
+        if job.get("color"):
+            try:
+                own = own_quantity(result, job["color"])
+            except ConeflatError as error:
+                missing = {"missing": page_message(str(error))}
+        head, body = self._picture(result, name, own=own)
+        return {**head, **missing}, body
 
     def make(self, job: Head, report: Callable[[str, float], None]) -> tuple[Head, bytes]:
         """Return the output of another job: a file of the result, quads, or a curve."""
@@ -150,17 +167,21 @@ class JobRunner:
         return curve_data(source, chosen, report), b""
 
     def _picture(
-        self, result: Flattening, name: str, is_first: bool = False, own: Quantity | None = None
+        self, result: Flattening, name: str, title: str = "", own: Quantity | None = None
     ) -> tuple[Head, bytes]:
-        """Return the page data of a result; a preview has no numbers, because they will change.
+        """Return the page data of a result.
 
-        own: quantity that is shown as colours.
+        Args:
+            result: the result.
+            name: name of the mesh.
+            title: title of a preview or a mesh without a layout, which has no numbers; "" for a final layout.
+            own: quantity that is shown as colours.
         """
 
         text = None
-        if is_first:
-            rows = [(measure, PLACEHOLDER, meaning) for measure, _, meaning in shown_rows(result)]
-            text = PageText(FIRST_TITLE, rows)
+        if title:
+            rows = [] if title == BARE_TITLE else shown_rows(result)
+            text = PageText(title, [(measure, PLACEHOLDER, meaning) for measure, _, meaning in rows])
             result = replace(result, notes=())
         if self._model is None or not self._model.is_of(result):
             self._model = Model.of(result)
@@ -180,6 +201,7 @@ class JobRunner:
         if self._source is None or self._flattener is None or self._read != (mesh, sha256):
             report("read", 0.0)
             self._source = self._flattener = self._model = None  # The memory may not suffice for both.
+            repaired.cache_clear()
             source = read_joined(Path(mesh))
             self._source, self._flattener, self._read = source, Flattener(source.mesh), (mesh, sha256)
         return self._source, self._flattener
@@ -228,13 +250,15 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
             write_frame(answers, {"job": number, "given_up": True})
         except ConeflatError as error:
             # The page offers a button for errors that a repair can fix.
-            mends = isinstance(error, (NonManifoldError, NonOrientableError))
-            write_frame(answers, {"job": number, "error": page_message(str(error)), "repair": mends})
-        except MemoryError:
-            write_frame(answers, {"job": number, "error": "not enough memory for this mesh", "repair": False})
+            mends = isinstance(error, (DegenerateFaceError, NonManifoldError, NonOrientableError))
+            head, body = bench.bare(job) if job.get("bare") else ({}, b"")
+            told = {"job": number, "error": page_message(str(error)), "repair": mends, "bare": head}
+            write_frame(answers, told, body)
         except Exception as error:
             message = f"internal error, please report it: {type(error).__name__}: {error}"
-            write_frame(answers, {"job": number, "error": message, "repair": False})
+            if isinstance(error, MemoryError):
+                message = "not enough memory for this mesh"
+            write_frame(answers, {"job": number, "error": message, "again": True})
 
 
 def main() -> None:

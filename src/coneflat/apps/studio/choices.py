@@ -294,7 +294,7 @@ class Choices:
             chosen = chosen.with_option(name, value)
         cones = {}
         for each in plain["cones"]:
-            vertex = as_integer("a cone's vertex", each["vertex"])
+            vertex = as_vertex("a cone's vertex", each["vertex"])
             angle = None if each["angle"] is None else as_number("a cone's angle", each["angle"])
             if vertex in cones:
                 raise StudioError(f"vertex {vertex} is given as a cone twice")
@@ -306,7 +306,7 @@ class Choices:
             chosen = chosen.with_kept(tuple(path))
         chosen = replace(chosen, paint=Paint.from_plain(plain.get("paint", {})))
         for vertex in dict.fromkeys(plain.get("corners", ())):
-            chosen = chosen.with_corner(as_integer("a corner", vertex))
+            chosen = chosen.with_corner(as_vertex("a corner", vertex))
         chosen = chosen.with_units(*plain.get("units", ("", "")))
         chosen.keywords()
         return chosen
@@ -326,6 +326,19 @@ class Choices:
         return replace(self, by_hand=by_hand, cones=tuple(cones[v] for v in sorted(cones)))
 
 
+def as_vertex(name: str, value: object) -> int:
+    """Return a vertex index from a value of JSON.
+
+    Raises:
+        OptionError: it is not an integer.
+        StudioError: it is negative.
+    """
+    vertex = as_integer(name, value)
+    if vertex < 0:
+        raise StudioError(f"{name} must be an index from 0, not {vertex}")
+    return vertex
+
+
 def _checked_angle(angle: float | None) -> float | None:
     if angle is not None and not 0 < angle <= MAX_CONE_ANGLE * (1 + 1e-12):
         raise StudioError(
@@ -336,7 +349,7 @@ def _checked_angle(angle: float | None) -> float | None:
 
 
 def _checked(path: Iterable[Any]) -> Path:
-    vertices = tuple(as_integer("a path's vertex", vertex) for vertex in path)
+    vertices = tuple(as_vertex("a path's vertex", vertex) for vertex in path)
     if len(vertices) < 2 or any(a == b for a, b in pairwise(vertices)):
         raise StudioError(
             f"a path must be two or more vertices, no two equal in a row: {short_repr(list(vertices))}"
@@ -356,11 +369,6 @@ def edges_of(path: tuple[int, ...]) -> set[frozenset[int]]:
 
 #: Number of values above which lists are written as ranges.
 LISTED_NUMBERS = 12
-
-
-def replay(mesh: str, project: str, choices: Choices) -> dict[str, str]:
-    """Return the command line and the Python code that give the same layout without the studio."""
-    return {"command": command_line(mesh, project, choices), "python": python_lines(mesh, choices)}
 
 
 def command_line(mesh: str, project: str, choices: Choices) -> str:

@@ -6,6 +6,8 @@ import hmac
 from typing import TYPE_CHECKING
 from urllib.parse import parse_qs
 
+from starlette.responses import PlainTextResponse
+
 if TYPE_CHECKING:
     from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -23,12 +25,8 @@ _HEADERS = (
 )
 #: Headers that forbid frames, and headers that allow frames of notebooks (Jupyter, VS Code) and of a proxy.
 _UNFRAMED = ((b"x-frame-options", b"DENY"), (b"content-security-policy", b"frame-ancestors 'none'"))
-_FRAMED = (
-    (
-        b"content-security-policy",
-        b"frame-ancestors http://localhost:* http://127.0.0.1:* 'self' vscode-webview: vscode-file:",
-    ),
-)
+_ANCESTORS = b"frame-ancestors http://localhost:* http://127.0.0.1:* 'self' vscode-webview: vscode-file:"
+_FRAMED = ((b"content-security-policy", _ANCESTORS),)
 
 
 class Guard:
@@ -51,21 +49,17 @@ class Guard:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request to the application, or reject it."""
-        if scope["type"] == "lifespan":
-            await self._app(scope, receive, send)
+        if scope["type"] == "websocket":  # They are not supported.
             return
-        reason = "websockets are not supported" if scope["type"] != "http" else self.refusal(scope)
-        if reason:
-            if scope["type"] == "http":
-                await _refuse(send, reason)
-            return
+        reason = "" if scope["type"] == "lifespan" else self.refusal(scope)
+        answer = PlainTextResponse(reason, 403) if reason else self._app
 
         async def send_guarded(message: Message) -> None:
             if message["type"] == "http.response.start":
                 message["headers"] = [*message.get("headers", ()), *self._headers]
             await send(message)
 
-        await self._app(scope, receive, send_guarded)
+        await answer(scope, receive, send_guarded)
 
     def refusal(self, scope: Scope) -> str:
         """Return the reason for rejecting a request; "" if it is accepted."""
@@ -86,15 +80,3 @@ class Guard:
         if len(given) != 1 or not hmac.compare_digest(given[0].encode(), self._token.encode()):
             return "the token is missing or wrong: open the address that the studio has printed"
         return ""
-
-
-async def _refuse(send: Send, reason: str) -> None:
-    text = reason.encode()
-    headers = [
-        (b"content-type", b"text/plain"),
-        (b"content-length", str(len(text)).encode()),
-        *_HEADERS,
-        *_UNFRAMED,
-    ]
-    await send({"type": "http.response.start", "status": 403, "headers": headers})
-    await send({"type": "http.response.body", "body": text})

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import math
 import re
-from bisect import bisect_right
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from ...base import MAX_CONE_ANGLE, MIN_CONE_ANGLE, list_some, plural
 from ...mesh import REPAIR_ADVICE
@@ -71,14 +72,9 @@ def misplaced_warning(chosen: Choices) -> tuple[str, ...]:
 
 def vertices_in(region: Region, vertices: Iterable[int]) -> list[int]:
     """Return those of the given vertices that are in a region."""
-    runs = region.runs
-    firsts = [first for first, _ in runs]
-
-    def is_inside(vertex: int) -> bool:
-        at = bisect_right(firsts, vertex) - 1
-        return at >= 0 and vertex <= runs[at][1]
-
-    return [vertex for vertex in vertices if is_inside(vertex)]
+    named, runs = list(vertices), np.array(region.runs or [(0, -1)])
+    at = np.searchsorted(runs[:, 0], named, side="right") - 1
+    return [vertex for vertex, k in zip(named, at, strict=True) if k >= 0 and vertex <= runs[k, 1]]
 
 
 def angle_warning(chosen: Choices, result: Flattening) -> tuple[str, ...]:

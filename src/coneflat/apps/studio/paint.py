@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -175,13 +174,13 @@ class Paint:
 
         Raises:
             StudioError, OptionError: a value is not valid.
-            AttributeError: the values do not have the structure of paint.
+            AttributeError, ValueError: the values do not have the structure of paint.
         """
         paint = cls()
         for name, given in plain.items():
             if name == "importance":
                 for weight, text in given.items():
-                    paint = paint.with_weight(_weight(weight), Region.of_text(text))
+                    paint = paint.with_weight(float(weight), Region.of_text(text))
             else:
                 paint = paint.with_flag(name, Region.of_text(given))
         return paint
@@ -195,15 +194,5 @@ class Paint:
         if layer == "erase":
             return self.erased(where)
         if layer == "importance":
-            return self.with_weight(_weight(weight), where)
+            return self.with_weight(as_number("an importance", weight), where)
         return self.with_flag(str(layer), where)
-
-
-def _weight(given: object) -> float:
-    """Return a weight from a value of JSON, in which keys are text."""
-    if isinstance(given, str):
-        try:
-            return float(given)
-        except ValueError:
-            return math.nan  # NaN is rejected later.
-    return as_number("an importance", given)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from unicodedata import category
 
 from ... import ConeflatError
 from ...base import short_repr
@@ -155,6 +157,12 @@ def open_project(path: Path, folder: Path, only_within: bool = False) -> tuple[P
             f"{path} with {sha256[:12]}; move it away, or work in another folder"
         )
     return Project(path, sha256, before.choices), file
+
+
+def safe_name(name: str) -> str:
+    """Return a file name that every system accepts, without invisible characters and those that reorder text."""
+    kept = "".join("_" if each in '<>:"|?*' else each for each in name if category(each)[0] != "C")
+    return f"_{kept}" if re.match(r"(?i)(con|prn|aux|nul|(com|lpt)[0-9¹²³])\s*(\.|$)", kept) else kept
 
 
 def file_within(name: str, folder: Path) -> Path:

@@ -98,7 +98,7 @@ class ChangePrinter:
         trouble = "" if state["trouble"] is None else str(state["trouble"]["text"])
         layout, before = self._printed
         self._printed = (state["layout"], trouble)
-        if state["layout"] != layout and shown is not None and not state["early"]:
+        if state["layout"] != layout and shown is not None and not (state["early"] or state["bare"]):
             self._log(f"layout {state['layout']} in {state['seconds']:.2f} s: {shown[0]['title']}")
         if trouble and trouble != before:
             self._log(trouble)

@@ -20,27 +20,28 @@ from starlette.responses import HTMLResponse, JSONResponse, PlainTextResponse, R
 from starlette.routing import Route
 from starlette.types import ASGIApp
 
-from ... import ConeflatError
+from ... import ConeflatError, sample_path
 from ...errors import StudioError
 from ...io import INPUT_FORMATS
 from .guard import MAX_REQUEST_BYTES, Guard
 from .messages import page_message
 from .page import studio_page
-from .project import file_within
+from .project import file_within, safe_name
 from .session import Session
 
 MAX_UPLOAD_BYTES = 512 * 1024 * 1024  # Bytes of an uploaded mesh.
+BYTES = "application/octet-stream"
+#: Errors of requests that are answered with their message, not with a traceback.
+REFUSED = (ConeflatError, ValueError, RecursionError, ClientDisconnect)
 
 
 class StudioServer(uvicorn.Server):
     """Serves a session until it is interrupted, and then closes the session."""
 
-    def __init__(
-        self, session: Session, token: str, port: int, framed: bool = False, proxied: bool = False
-    ) -> None:
+    def __init__(self, session: Session, token: str, port: int, **access: bool) -> None:
         super().__init__(
             uvicorn.Config(
-                studio_app(session, token, port, framed=framed, proxied=proxied),
+                studio_app(session, token, port, **access),
                 log_level="error",
                 access_log=False,  # The log would contain the token.
                 server_header=False,
@@ -56,7 +57,7 @@ class StudioServer(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-class TooLarge(Exception):
+class TooLarge(ValueError):
     """A request is larger than the limit."""
 
 
@@ -84,17 +85,14 @@ class Notifier:
             del self._waiting[event]
 
 
-def studio_app(
-    session: Session, token: str, port: int, framed: bool = False, proxied: bool = False
-) -> ASGIApp:
+def studio_app(session: Session, token: str, port: int, **access: bool) -> ASGIApp:
     """Return the application of the server.
 
     Args:
         session: the session.
         token: the token that every request must have.
         port: port of the server; requests with another one are rejected.
-        framed: whether notebooks of this machine may show the page in a frame.
-        proxied: whether requests come through a proxy.
+        access: `framed` and `proxied`, as in `Guard`.
     """
     notifier = Notifier()
     session.listen(notifier.notify)
@@ -117,7 +115,7 @@ def studio_app(
         head = json.dumps(shown[0]).encode("ascii")
         head += b" " * (-len(head) % 4)
         content = struct.pack("<I", len(head)) + head + shown[1]
-        return Response(content, media_type="application/octet-stream")
+        return Response(content, media_type=BYTES)
 
     async def act(request: Request) -> Response:
         action = json.loads(b"".join([part async for part in _parts(request, MAX_REQUEST_BYTES)]))
@@ -126,25 +124,34 @@ def studio_app(
         await run_sync(session.act, action)
         return JSONResponse({"version": session.version})
 
-    async def export(request: Request) -> Response:
+    async def output(request: Request) -> Response:
         ending = f".{request.path_params['ending']}"
-        content = await run_sync(session.export, ending)
-        return Response(content, media_type=_media_type(ending))
-
-    async def quads(request: Request) -> Response:
-        ending = f".{request.path_params['ending']}"
-        content = await run_sync(session.quads, ending, _number(request, "count"))
-        return Response(content, media_type=_media_type(ending))
+        if request.url.path.startswith("/quads"):
+            content = await run_sync(session.quads, ending, _number(request, "count"))
+        else:
+            content = await run_sync(session.export, ending)
+        return Response(content, media_type=mimetypes.MimeTypes(()).guess_type(f"it{ending}")[0] or BYTES)
 
     async def curve(request: Request) -> Response:
         return JSONResponse(await run_sync(session.curve))
 
     async def upload(request: Request) -> Response:
-        path = file_within(request.query_params.get("name", ""), session.folder)
+        given = file_within(request.query_params.get("name", ""), session.folder)
+        path = file_within(safe_name(given.name), session.folder)
         if path.suffix.lower() not in (*INPUT_FORMATS, ".json"):
             raise StudioError(f"{path.name} is not in a format that can be read: {', '.join(INPUT_FORMATS)}")
+        before = set(session.folder.iterdir())
         stored = await _store(request, path)
-        await run_sync(session.open_named, stored.name)
+        try:
+            await run_sync(session.open_named, stored.name)
+        except ConeflatError:
+            for new in {stored} - before:
+                new.unlink(missing_ok=True)
+            raise
+        return JSONResponse({"version": session.version})
+
+    async def sample(request: Request) -> Response:
+        await run_sync(session.open, sample_path())
         return JSONResponse({"version": session.version})
 
     app = Starlette(
@@ -153,18 +160,16 @@ def studio_app(
             Route("/state", state),
             Route("/layout", layout),
             Route("/act", act, methods=["POST"]),
-            Route("/export/{ending}", export, methods=["POST"]),
-            Route("/quads/{ending}", quads, methods=["POST"]),
+            *(Route(f"/{kind}/{{ending}}", output, methods=["POST"]) for kind in ("export", "quads")),
             Route("/curve", curve, methods=["POST"]),
             Route("/mesh", upload, methods=["POST"]),
+            Route("/sample", sample, methods=["POST"]),
         ],
-        exception_handlers=dict.fromkeys((ConeflatError, ValueError, TooLarge, ClientDisconnect), _refused),
+        exception_handlers=dict.fromkeys(
+            (ConeflatError, ValueError, RecursionError, TooLarge, ClientDisconnect), _refused
+        ),
     )
-    return Guard(app, token, port, framed, proxied)
-
-
-def _media_type(ending: str) -> str:
-    return mimetypes.MimeTypes(()).guess_type(f"it{ending}")[0] or "application/octet-stream"
+    return Guard(app, token, port, **access)
 
 
 def _number(request: Request, name: str) -> int | str:

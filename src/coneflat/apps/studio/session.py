@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 from ... import ConeflatError
 from ...base import short_repr
 from ...errors import MeshFileError, StudioError
+from ...io import read_joined
 from ...options import as_integer
-from .choices import Choices, replay
+from .choices import Choices, command_line, python_lines
 from .known import SentPictures
 from .messages import misplaced_warning
 from .outputs import EXPORTS, MAX_QUADS, QUADS, curve_options
@@ -24,13 +25,15 @@ from .worker import Head, Worker
 PATIENCE = 600.0  # Seconds that exports wait for the current flattening.
 
 
-class _Layout(NamedTuple):
-    """A layout: the page data, the cones found, the seconds per stage, and warnings."""
+class _Shown(NamedTuple):
+    """What is shown: page data, cones, seconds per stage, warnings, the job, and whether there is no layout."""
 
     shown: tuple[Head, bytes] | None = None
     found: Sequence[int] = ()
     seconds: Mapping[str, float] = MappingProxyType({})
     warnings: Sequence[str] = ()
+    job: int = 0
+    is_bare: bool = False
 
 
 class Session:
@@ -51,24 +54,23 @@ class Session:
         """
         self._look = {"color": color, "most": most_triangles}
         self.folder = folder.resolve()
-        self.version = 0
-        self.layout = 0
+        self.version = self.layout = 0
         self.is_early = False
         self.project_file: Path | None = None
         self._mesh: Path | None = None
         self._sha256 = ""
         self._history = History(Choices())
-        self._opened = 0  # Number of meshes and projects opened so far.
+        # Number of meshes and projects opened so far, and that of the last one that was repaired automatically.
+        self._opened = self._repaired = 0
         # Number of the current choices, which increases with every change; 0 is never used.
         self._chosen = 1
-        self._job = 0
+        self._job = self._requests = 0
         self._busy: dict[str, Any] | None = None
         self._trouble: dict[str, Any] | None = None
-        self._current = _Layout()
+        self._current = _Shown()
         self._cached_texts: tuple[int, tuple[str, ...], dict[str, str]] = 0, (), {}
         self._known = SentPictures()
-        self._last: _Layout | None = None  # The last final layout, while a preview is shown.
-        self._requests = 0
+        self._last: _Shown | None = None  # The last final layout, while a preview is shown.
         self._answers: dict[int, tuple[Head, bytes]] = {}
         self._curves: dict[tuple[str, str], dict[str, Any]] = {}
         self._changed = threading.Condition(threading.RLock())
@@ -93,7 +95,9 @@ class Session:
             StudioError: there is no such file in the folder.
             MeshFileError, ProjectError: as in `open`.
         """
-        self._begin(*open_project(file_within(name, self.folder), self.folder, only_within=True))
+        project, file = open_project(file_within(name, self.folder), self.folder, only_within=True)
+        read_joined(project.mesh)  # What is shown is replaced only by a mesh that can be read.
+        self._begin(project, file)
 
     def _begin(self, project: Project, file: Path) -> None:
         with self._changed:
@@ -101,7 +105,7 @@ class Session:
             self._history = History(project.choices)
             self._opened += 1
             self._chosen += 1
-            self._current = _Layout(seconds=self._current.seconds)
+            self._current = _Shown(seconds=self._current.seconds)
             self.is_early, self._last = False, None
             self._flatten()
 
@@ -181,7 +185,8 @@ class Session:
         self._job += 1
         self._busy = {"stage": "", "fraction": 0.0}
         self._notify()
-        self._worker.send({"do": "flatten", "job": self._job, **self._look, **self._of_mesh()})
+        bare = {"bare": self._current.shown is None or self._current.is_bare}
+        self._worker.send({"do": "flatten", "job": self._job, **bare, **self._look, **self._of_mesh()})
 
     def _save(self) -> None:
         """Write the project file."""
@@ -191,7 +196,11 @@ class Session:
         try:
             Project(self._mesh, self._sha256, self._history.now).save(self.project_file)
         except MeshFileError as error:
-            self._trouble = {"text": f"the project is not saved: {error}", "repair": False}
+            self._tell(f"the project is not saved: {error}", again=True)
+
+    def _tell(self, text: str, repair: bool = False, again: bool = False) -> None:
+        """Set the error that the page shows, and whether a repair or another attempt may help."""
+        self._trouble = {"text": text, "repair": repair, "again": again}
 
     # Results.
 
@@ -207,35 +216,37 @@ class Session:
         """
         with self._changed:
             undo, redo = self._history.depth
-            warnings, texts = self._choice_texts()
+            shown, project = self._current, "" if self.project_file is None else self.project_file.name
+            # The layout is that of earlier choices, and no other is being computed.
+            is_stale = bool(shown.shown) and not (shown.is_bare or self._busy or shown.job == self._job)
+            warnings, texts = self._choice_texts(project)
             return {
                 "version": self.version,
                 "opened": self._opened,
                 "mesh": None if self._mesh is None else self._mesh.name,
-                "project": self._project_name,
+                "project": project,
                 "chosen": self._chosen,
                 "undo": undo,
                 "redo": redo,
                 "busy": self._busy,
                 "trouble": self._trouble,
-                "layout": 0 if self._current.shown is None else self.layout,
+                "layout": 0 if shown.shown is None else self.layout,
                 "early": self.is_early,
-                "found": list(self._current.found),
-                "seconds": sum(self._current.seconds.values()),
-                "warnings": [*warnings, *self._current.warnings],
+                "bare": shown.is_bare,
+                "stale": is_stale,
+                "found": list(shown.found),
+                "seconds": sum(shown.seconds.values()),
+                "warnings": [*warnings, *(() if is_stale else shown.warnings)],
                 **({} if known == self._chosen else {"choices": self._history.now.as_plain(), **texts}),
             }
 
-    @property
-    def _project_name(self) -> str:
-        return "" if self.project_file is None else self.project_file.name
-
-    def _choice_texts(self) -> tuple[tuple[str, ...], dict[str, str]]:
-        """Return the warnings on the choices and the result of `replay`, cached until the next change."""
+    def _choice_texts(self, project: str) -> tuple[tuple[str, ...], dict[str, str]]:
+        """Return the warnings on the choices and the command line and the Python code, cached until the next change."""
         if self._cached_texts[0] != self._chosen:
             chosen, texts = self._history.now, {"command": "", "python": ""}
             if self._mesh is not None:
-                texts = replay(self._mesh.name, self._project_name, chosen)
+                texts["command"] = command_line(self._mesh.name, project, chosen)
+                texts["python"] = python_lines(self._mesh.name, chosen)
             self._cached_texts = self._chosen, misplaced_warning(chosen), texts
         return self._cached_texts[1:]
 
@@ -333,32 +344,39 @@ class Session:
         with self._changed:
             if head["job"] in self._answers and "stage" not in head:
                 self._answers[head["job"]] = (head, body)
-                self._changed.notify_all()
-                return
+                return self._changed.notify_all()
             if head["job"] != self._job:
-                return
+                return None
             if "stage" in head:
                 self._busy = {"stage": head["stage"], "fraction": head["fraction"]}
             elif "early" in head:
                 self._last = self._last or self._current
-                self._show(head["early"], body)
+                self._show(head["early"], body, head["job"])
                 self.is_early = True
             elif "error" in head:
                 self._restore_layout()
-                mends = head["repair"] and not self._history.now.options.get("repair")
-                self._trouble = {"text": head["error"], "repair": mends}
+                options = self._history.now.options
+                mends = head.get("repair", False) and not options.get("repair")
+                if mends and "repair" not in options and self._repaired != self._opened:
+                    self._repaired = self._opened  # Only once: the user can undo it.
+                    return self._take_step(self._history.now.with_option("repair", True), None)
+                if head.get("bare"):
+                    self._show(head["bare"], body, head["job"], is_bare=True)
+                self._tell(head["error"], mends, head.get("again", False))
             elif "done" in head:
                 self._busy = None
-                self._show(head["done"], body)
+                self._show(head["done"], body, head["job"])
                 if "missing" in head["done"] and self._trouble is None:
-                    self._trouble = {"text": head["done"]["missing"], "repair": False}
+                    self._tell(head["done"]["missing"])
                 self.is_early, self._last = False, None
-            self._notify()
+            return self._notify()
 
-    def _show(self, data: Head, body: bytes) -> None:
+    def _show(self, data: Head, body: bytes, job: int, is_bare: bool = False) -> None:
         self.layout += 1
         picture = self._known.numbered((data["head"], body))
-        self._current = _Layout(picture, data["found"], data["seconds"], data.get("warnings", ()))
+        self._current = _Shown(
+            picture, data["found"], data["seconds"], data.get("warnings", ()), job, is_bare
+        )
 
     def _restore_layout(self) -> None:
         """End the current job, and show the last final layout instead of a preview."""
@@ -374,7 +392,7 @@ class Session:
             for job in self._answers:
                 self._answers[job] = ({"error": message}, b"")
             self._restore_layout()
-            self._trouble = {"text": message, "repair": False}
+            self._tell(message, again=True)
             self._notify()
 
     def _notify(self) -> None:

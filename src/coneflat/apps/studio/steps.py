@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from ...options import as_integer, as_number
-from .choices import Choices
+from ...options import as_number
+from .choices import Choices, as_vertex
 from .paint import Region
 
 
@@ -22,7 +22,7 @@ def _angle(action: Mapping[str, Any]) -> float | None:
 
 
 def _vertex(action: Mapping[str, Any], name: str = "vertex") -> int:
-    return as_integer("a vertex", action[name])
+    return as_vertex("a vertex", action[name])
 
 
 #: For each kind of step, a function (choices before, action, cones found by the search) -> choices after.
@@ -36,9 +36,7 @@ STEPS: dict[str, Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]]
     "lock": lambda chosen, action, found: chosen.locked(_vertex(action), action["locked"] is True),
     "cut": lambda chosen, action, found: chosen.cut(tuple(action["path"])),
     "keep": lambda chosen, action, found: chosen.with_kept(tuple(action["path"])),
-    "erase": lambda chosen, action, found: chosen.erased(
-        *(as_integer("a vertex", v) for v in action["edge"])
-    ),
+    "erase": lambda chosen, action, found: chosen.erased(*(as_vertex("a vertex", v) for v in action["edge"])),
     "paint": lambda chosen, action, found: chosen.painted(
         action["layer"], Region.of_text(action["where"]), action.get("weight")
     ),

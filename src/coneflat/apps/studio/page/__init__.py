@@ -17,7 +17,9 @@ POLICY = (
     "base-uri 'none'; form-action 'none'"
 )
 # In the order in which they must run; they share one scope.
-_SCRIPTS = ("server", "surface", "graph", "paint", "tools", "overlay", "sizes", "curve", "panel", "studio")
+_SCRIPTS = (
+    "server", "surface", "graph", "paint", "tools", "overlay", "align", "sizes", "curve", "panel", "studio",
+)  # fmt: skip
 
 
 @cache

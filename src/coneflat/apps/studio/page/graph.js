@@ -23,6 +23,7 @@ class EdgeGraph {
     }
     Object.assign(this, {start, ends, faces});
     this.from = -1;
+    this.cut = new Set(); // The edges of drawn cuts, as keys.
     this.shares = null; // Sharpness of the edge of each entry, 0 to 1.
   }
 
@@ -32,9 +33,26 @@ class EdgeGraph {
     this.from = -1;
   }
 
+  /** Set the drawn cuts. Their edges cost little, so that new paths join them: strips between two cuts would be slivers. */
+  prefer(cuts) {
+    if (cuts === this.cuts) return;
+    this.cuts = cuts;
+    this.from = -1;
+    this.cut.clear();
+    for (const path of cuts) {
+      const vertices = path.map((number) => this.surface.vertexOf(number));
+      for (let i = 1; i < vertices.length; i++) this.cut.add(this.edgeKey(vertices[i - 1], vertices[i]));
+    }
+  }
+
+  edgeKey(one, two) {
+    return Math.min(one, two) * this.surface.count + Math.max(one, two);
+  }
+
   /** Return the cost of the edge of an entry of a vertex. */
   cost(vertex, k) {
     const length = this.length(vertex, this.ends[k]);
+    if (this.cut.size && this.cut.has(this.edgeKey(vertex, this.ends[k]))) return length * CHEAPEST;
     return this.shares?.[k] ? length * CHEAPEST ** this.shares[k] : length;
   }
 

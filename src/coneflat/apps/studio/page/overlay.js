@@ -10,13 +10,15 @@ class Overlay {
   draw(pen, pane) {
     const {tools, choices} = this.studio;
     pen.lineJoin = pen.lineCap = "round";
+    if (pane.inPlane && this.studio.hasLayout()) this.square(pen, pane);
+    for (const path of choices.cuts) this.path(pen, pane, this.studio.verticesOf(path), PATH_COLOURS.cut, [1, 6]);
+    for (const path of choices.kept) this.path(pen, pane, this.studio.verticesOf(path), PATH_COLOURS.keep, [1, 6]);
     if (tools.draws) {
-      for (const path of choices.cuts) this.path(pen, pane, this.studio.verticesOf(path), PATH_COLOURS.cut, [1, 6]);
-      for (const path of choices.kept) this.path(pen, pane, this.studio.verticesOf(path), PATH_COLOURS.keep, [1, 6]);
       this.path(pen, pane, tools.preview, PATH_COLOURS[tools.mode], []);
       if (tools.from !== null) this.ring(pen, pane, tools.from, PATH_COLOURS[tools.mode], 6);
     }
     this.studio.brush.draw(pen, pane);
+    for (const place of this.studio.viewer.model.head.bad ?? []) this.bad(pen, pane, this.studio.verticesOf(place));
     for (const vertex of this.studio.verticesOf(this.studio.cornersShown())) this.diamond(pen, pane, vertex);
     for (const cone of choices.cones) {
       const [vertex] = this.studio.verticesOf([cone.vertex]);
@@ -25,6 +27,35 @@ class Overlay {
       if (!this.studio.isShown(vertex)) this.ring(pen, pane, vertex, this.studio.viewer.accent, 8);
     }
     if (tools.dragged) this.ring(pen, pane, tools.dragged.at, this.studio.viewer.accent, 10);
+    if (this.aims(pane)) this.crosshair(pen, pane);
+  }
+
+  /** Return whether keys apply to the middle of a pane: while they are used instead of the mouse. */
+  aims(pane) {
+    const {keyed, viewer, tools} = this.studio;
+    return keyed && pane === viewer.used && (tools.mode !== "look" || document.activeElement === pane.element);
+  }
+
+  crosshair(pen, pane) {
+    const [x, y] = [pane.width / 2, pane.height / 2];
+    const path = new Path2D(`M${x - 14} ${y}H${x - 4}M${x + 4} ${y}H${x + 14}M${x} ${y - 14}V${y - 4}M${x} ${y + 4}V${y + 14}`);
+    this.stroke(pen, path, this.studio.viewer.accent, 2);
+  }
+
+  /** Draw the unit square of the texture. */
+  square(pen, pane) {
+    const path = new Path2D();
+    [[0, 0], [1, 0], [1, 1], [0, 1]].forEach(([u, v], i) => {
+      const [x, y] = pane.camera.project(this.studio.viewer.model.planePlace(u, v));
+      if (i) path.lineTo(x, y);
+      else path.moveTo(x, y);
+    });
+    path.closePath();
+    pen.strokeStyle = "#808890";
+    pen.lineWidth = 1;
+    pen.setLineDash([5, 4]);
+    pen.stroke(path);
+    pen.setLineDash([]);
   }
 
   /** Return the screen positions of a vertex; in the layout it may have several. */
@@ -41,6 +72,13 @@ class Overlay {
       pen.stroke(path);
     }
     pen.setLineDash([]);
+  }
+
+  /** Mark an edge or a vertex of the model that needed a repair. */
+  bad(pen, pane, vertices) {
+    if (pane.inPlane || !vertices.length) return;
+    if (vertices.length > 1) this.path(pen, pane, vertices, this.studio.viewer.accent, []);
+    else this.ring(pen, pane, vertices[0], this.studio.viewer.accent, 6);
   }
 
   ring(pen, pane, vertex, colour, radius) {

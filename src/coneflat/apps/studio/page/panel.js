@@ -33,10 +33,14 @@ class Panel {
     const set = (name, value) => act({do: "set", name, value});
     for (const name of ["undo", "redo", "again"]) this.part(name).addEventListener("click", () => act({do: name}));
     this.part("repair").addEventListener("click", () => set("repair", true));
-    this.part("open").addEventListener("change", (event) => {
-      if (event.target.files.length) studio.open(event.target.files[0]);
-      event.target.value = "";
-    });
+    this.part("undo-last").addEventListener("click", () => act({do: "undo"}));
+    this.part("search").addEventListener("click", () => this.placeBy("distortion"));
+    for (const id of ["open", "open-first"]) {
+      this.part(id).addEventListener("change", (event) => {
+        if (event.target.files.length) studio.open(event.target.files[0]);
+        event.target.value = "";
+      });
+    }
     this.part("cones-by").addEventListener("change", (event) => this.placeBy(event.target.value));
     this.part("cone-count").addEventListener("change", (event) => set("cone_count", Math.round(Number(event.target.value))));
     this.slider("distortion", (value) => ({do: "set", name: "distortion", value: Number((10 ** value).toPrecision(3))}));
@@ -54,6 +58,10 @@ class Panel {
     this.part("sharp").addEventListener("change", (event) => {
       set("sharp_angle", event.target.value ? (Number(event.target.value) * Math.PI) / 180 : null);
     });
+    this.part("up").addEventListener("change", (event) => studio.viewer && studio.setUp(event.target.value));
+    this.part("sample").addEventListener("click", () => studio.openSample());
+    for (const id of ["tools", "brushes", "exports"]) rove(this.part(id), "button", true);
+    this.part("cone-list").addEventListener("keydown", (event) => this.changeRow(event));
     this.part("snap").addEventListener("change", (event) => (this.snap = Number(event.target.value)));
   }
 
@@ -121,8 +129,8 @@ class Panel {
     this.value("padding", options.padding);
     this.value("stretch", options.stretch);
     this.value("charts", options.charts);
-    for (const saving of this.part("exports").children) saving.disabled = !this.studio.viewer;
-    this.part("save-quads").disabled = !this.studio.viewer || this.studio.making === "quads";
+    for (const saving of this.part("exports").children) saving.disabled = !this.studio.hasLayout();
+    this.part("save-quads").disabled = !this.studio.hasLayout() || this.studio.making === "quads";
     this.part("save-quads").textContent = this.studio.making === "quads" ? "Computing quads…" : "Quads, OBJ";
     this.curve.show();
     this.part("command").textContent = news?.command ?? "";
@@ -148,16 +156,20 @@ class Panel {
     const {news, took} = this.studio, busy = news?.busy;
     this.part("work").classList.toggle("idle", !busy);
     this.part("busy").value = busy?.fraction ?? 0;
-    this.part("stage-name").textContent = busy ? busy.stage || "…" : took ? `shown ${(took / 1000).toFixed(2)} s after the change` : "";
+    this.part("stage-name").textContent = busy ? stageText(busy.stage) : took ? `shown ${(took / 1000).toFixed(2)} s after the change` : "";
   }
 
   showRefusal() {
-    const trouble = this.studio.refused ?? this.studio.news?.trouble;
-    this.part("refusal").hidden = !trouble;
-    if (!trouble) return;
-    this.part("refusal-text").textContent = trouble.text[0].toUpperCase() + trouble.text.slice(1) + ".";
-    this.part("repair").hidden = !trouble.repair;
-    this.part("again").hidden = Boolean(trouble.repair) || Boolean(this.studio.refused);
+    const {news, refused, choices} = this.studio, trouble = news?.trouble, isFailed = Boolean(news?.stale || news?.bare);
+    this.part("refusal").hidden = !refused && !trouble;
+    for (const [id, told] of [["refusal-text", refused], ["trouble-text", trouble]]) {
+      this.part(id).hidden = !told;
+      this.part(id).textContent = told ? told.text[0].toUpperCase() + told.text.slice(1) + "." : "";
+    }
+    this.part("repair").hidden = !trouble?.repair;
+    this.part("undo-last").hidden = !trouble || !isFailed || !news.undo;
+    this.part("search").hidden = !trouble || !isFailed || !choices.by_hand;
+    this.part("again").hidden = !trouble?.again;
   }
 
   /** Show the warnings on the choices. */
@@ -200,9 +212,23 @@ class Panel {
     this.part("cone-names").hidden = !rows.length;
     this.part("angle-sum").textContent = this.sumText(rows);
     this.part("angle-sum").hidden = !this.part("angle-sum").textContent;
-    const typing = document.activeElement?.closest?.("#cone-list .cone")?.dataset.vertex;
-    this.part("cone-list").replaceChildren(...rows.map((row) => this.coneRow(row, row.vertex === picked)));
-    if (typing !== undefined) this.angleField(typing)?.focus();
+    const list = this.part("cone-list"), focused = document.activeElement, held = focused?.closest?.("#cone-list .cone");
+    const [line, column] = held ? [[...list.children].indexOf(held), [...held.children].indexOf(focused)] : [-1, -1];
+    list.replaceChildren(...rows.map((row) => this.coneRow(row, row.vertex === picked)));
+    if (!held) return;
+    // The focus stays on the same control; of a removed cone, on that of the next one.
+    const row = this.coneElement(held.dataset.vertex) ?? list.children[Math.min(line, rows.length - 1)];
+    row?.children[column]?.focus();
+  }
+
+  /** Move the focus to the next or the previous row. */
+  changeRow(event) {
+    const step = {ArrowUp: "previousElementSibling", ArrowDown: "nextElementSibling"}[event.key];
+    if (!step || event.target.tagName === "INPUT") return;
+    const row = event.target.closest(".cone");
+    event.preventDefault();
+    event.stopPropagation();
+    row[step]?.children[[...row.children].indexOf(event.target)].focus();
   }
 
   /** Return a text if all angles are typed and their sum is wrong; "" if a computed cone or the boundary takes the rest. */
@@ -232,14 +258,19 @@ class Panel {
     row.append(
       button(grouped(vertex), "Show the cone", () => studio.find(vertex), {className: "find"}),
       angle,
-      button("Lock", "Searches keep this cone (l)", () => studio.act({do: "lock", vertex, locked: !locked}), {className: "toggle", ariaPressed: String(locked)}),
-      button("×", "Remove (Delete)", () => studio.act({do: "remove", vertex})),
+      button("Lock", "Searches keep this cone (l)", () => studio.act({do: "lock", vertex, locked: !locked}), {className: "toggle", ariaPressed: String(locked), ariaLabel: `Lock cone ${vertex}`}),
+      button("×", "Remove (Delete)", () => studio.act({do: "remove", vertex}), {ariaLabel: `Remove cone ${vertex}`}),
     );
+    rove(row, "button, input");
     return row;
   }
 
+  coneElement(vertex) {
+    return document.querySelector(`#cone-list .cone[data-vertex="${vertex}"]`);
+  }
+
   angleField(vertex) {
-    return document.querySelector(`#cone-list .cone[data-vertex="${vertex}"] input`);
+    return this.coneElement(vertex)?.querySelector("input");
   }
 
   showPaths() {
@@ -248,11 +279,11 @@ class Panel {
     if (key === this.pathsShown) return;
     this.pathsShown = key;
     const row = (path, name) => {
-      const line = document.createElement("div");
+      const line = document.createElement("div"), text = `${name} ${grouped(path[0])} to ${grouped(path[path.length - 1])}`;
       line.className = "drawn";
       line.append(
-        `${name} ${grouped(path[0])} to ${grouped(path[path.length - 1])}`,
-        button("×", "Erase", () => this.studio.act({do: "erase", edge: path.slice(0, 2)})),
+        text,
+        button("×", "Erase", () => this.studio.act({do: "erase", edge: path.slice(0, 2)}), {ariaLabel: `Erase ${text}`}),
       );
       return line;
     };
@@ -262,7 +293,28 @@ class Panel {
 
 function button(text, title, does, more = {}) {
   const made = Object.assign(document.createElement("button"), {type: "button", textContent: text, title, ...more});
-  if (text.length < 2) made.setAttribute("aria-label", title);
+  if (text.length < 2 && !more.ariaLabel) made.setAttribute("aria-label", title);
   made.addEventListener("click", does);
   return made;
+}
+
+/** Make controls one tab stop, among which the arrow keys to the sides move; vertical: the other arrow keys, too. */
+function rove(bar, selector, vertical = false) {
+  const all = () => [...bar.querySelectorAll(selector)];
+  const stopAt = (chosen) => all().forEach((one) => (one.tabIndex = one === chosen ? 0 : -1));
+  stopAt(all()[0]);
+  bar.addEventListener("focusin", (event) => stopAt(event.target.closest(selector)));
+  bar.addEventListener("keydown", (event) => {
+    const step = {ArrowLeft: -1, ArrowRight: 1, ...(vertical ? {ArrowUp: -1, ArrowDown: 1} : {})}[event.key];
+    if (!step) return;
+    event.preventDefault();
+    event.stopPropagation();
+    const usable = all().filter((one) => !one.hidden && !one.disabled);
+    usable[(usable.indexOf(event.target) + step + usable.length) % usable.length]?.focus();
+  });
+}
+
+/** Return the text of a stage of the computation. */
+function stageText(stage) {
+  return stage.startsWith("atlas") ? "separating overlaps; a change cancels this" : stage || "…";
 }

@@ -10,6 +10,8 @@ class Studio {
     this.server = new Server();
     this.viewer = this.news = this.refused = null;
     this.layout = 0;
+    this.turns = 0; // Quarter turns of the view of the layout.
+    this.final = null; // The last layout that was not a preview, {model, turns}.
     this.pending = 0;
     this.took = this.sight = 0; // Milliseconds from the last change to its layout, and to its preview.
     this.selected = null; // The vertex of the picked cone, which does not depend on the index of the cone.
@@ -17,11 +19,13 @@ class Studio {
     this.paint = new Paint(this);
     this.brush = new Brush(this);
     this.making = ""; // The output that is being computed, other than layouts.
+    this.keyed = false; // The keyboard was used last, not the mouse.
     this.follows = true; // Paths follow sharp edges.
     this.overlay = new Overlay(this);
     this.panel = new Panel(this);
     document.addEventListener("keydown", (event) => this.key(event), {capture: true});
     window.addEventListener("drop", (event) => this.drop(event), {capture: true});
+    for (const name of ["keydown", "pointermove"]) window.addEventListener(name, (event) => this.noteKeys(event.type === "keydown"), {capture: true});
     window.addEventListener("dragover", (event) => event.preventDefault());
   }
 
@@ -58,7 +62,9 @@ class Studio {
   hear(news, model) {
     this.news = news;
     document.body.classList.toggle("empty", !this.news.mesh);
-    document.body.classList.toggle("bare", !this.news.layout);
+    document.body.classList.toggle("bare", !this.news.layout || this.news.bare);
+    document.body.classList.toggle("alone", this.news.bare);
+    document.body.classList.toggle("stale", this.news.stale);
     if (!this.viewer) document.getElementById("name").textContent = this.news.mesh ?? "";
     if (model) this.take(model);
     if (model) this.layout = news.layout;
@@ -76,11 +82,19 @@ class Studio {
     if (!isSame) this.byNumber = this.boundary = null;
     if (!isSame && this.whole?.key !== Surface.keyOf(model)) this.whole = this.edges = null;
     this.points = this.nearest = null;
+    // All layouts are drawn in the frame of the unit square, so that they do not move in the view.
+    if (model.head.show !== "plain") [model.uvCentre, model.uvUnit] = [[0.5, 0.5], 2];
     this.repicking = true; // The selection is not cleared if it ends because indices have changed.
-    if (this.viewer) this.viewer.takeModel(model);
-    else {
+    if (this.viewer) {
+      if (isSame) this.align(model);
+      const wasBare = this.viewer.model.head.show === "plain", isBare = model.head.show === "plain";
+      this.viewer.takeModel(model);
+      if (wasBare !== isBare) this.viewer.state.set({show: model.head.show});
+    } else {
       this.viewer = window.coneflat = new Viewer(model, null);
       this.viewer.tool = this.tools;
+      this.viewer.showsSquare = this.viewer.renderer.look.behind = true;
+      this.viewer.panes[1].camera.showOthers(this.viewer.flatPlaces());
       this.viewer.state.set({marked: FAINT});
       this.viewer.marks.overlay = (pen, pane) => this.overlay.draw(pen, pane);
       this.viewer.state.listen((names) => names.has("picked") && this.notePick());
@@ -88,8 +102,39 @@ class Studio {
     if (!isSame) this.selected = selected === null ? null : (this.verticesOf([selected])[0] ?? null);
     this.repicking = false;
     this.pickSelected();
+    this.showMeasures(model.head);
+    if (!isSame) this.final = null;
+    if (!this.news.early && model.head.show !== "plain") this.final = {model, turns: this.turns};
     const {asked, news} = this;
     requestAnimationFrame(() => requestAnimationFrame(() => this.noteTime(asked, news.early)));
+  }
+
+  /** Add the charts, the packing and the overlap to the title; a preview does not have them. */
+  showMeasures({rows}) {
+    const values = new Map(rows.map(([name, value]) => [name, value])), charts = values.get("charts");
+    if (!(Number(charts?.replaceAll(",", "")) > 0)) return;
+    const more = [`${charts} ${charts === "1" ? "chart" : "charts"}`, `packing ${values.get("packing")}`, `overlap ${values.get("overlap")}`];
+    const place = document.getElementById("title");
+    place.textContent = place.title = [place.textContent, ...more].join("  ·  ");
+  }
+
+  /** Choose the axis of the model that points up in its view. */
+  setUp(axis) {
+    const {camera} = this.viewer.panes[0], {turn} = this.viewer.model.head;
+    const cycle = {x: [0, 0, 1, 1, 0, 0, 0, 1, 0], y: [1, 0, 0, 0, 1, 0, 0, 0, 1], z: [0, 1, 0, 0, 0, 1, 1, 0, 0]}[axis];
+    camera.home = product(turn.flat(), cycle);
+    camera.measure(this.viewer.model.arrays.places);
+    camera.fit();
+  }
+
+  /** Turn the view of the layout, and number the charts, like those of the last layout that was not a preview. */
+  align(model) {
+    const {camera} = this.viewer.panes[1], before = this.final;
+    if (!before || model.head.show === "plain") return;
+    this.turns = nearestTurns(before.model, before.turns, model);
+    camera.turn = camera.home = quarterTurns(this.turns);
+    keepChartNumbers(before.model, model);
+    document.querySelector("#layout h2").textContent = this.turns ? `Layout, turned by ${90 * this.turns}°` : "Layout";
   }
 
   /** Record the time until the layout, or its preview, was drawn. */
@@ -156,6 +201,11 @@ class Studio {
     await this.server.open(file).catch((error) => this.refuse(error));
   }
 
+  async openSample() {
+    this.refused = null;
+    await this.server.ask("sample", {method: "POST"}).catch((error) => this.refuse(error));
+  }
+
   drop(event) {
     const [file] = event.dataTransfer?.files ?? [];
     if (!file || file.type.startsWith("image/")) return; // Images are handled by the viewer.
@@ -201,6 +251,12 @@ class Studio {
     if (name === "Escape") this.tools.endLine();
     const does = tool ? () => this.setTool(tool[0]) : keys[name];
     if (does) this.obey(event, does);
+  }
+
+  noteKeys(keyed) {
+    if (keyed === this.keyed && !keyed) return;
+    this.keyed = keyed;
+    this.viewer?.remark();
   }
 
   obey(event, does) {
@@ -265,6 +321,10 @@ class Studio {
 
   get choices() {
     return this.news?.choices ?? NO_CHOICES;
+  }
+
+  hasLayout() {
+    return Boolean(this.viewer) && !this.news.bare;
   }
 
   hasBoundary() {
@@ -333,6 +393,7 @@ class Studio {
       this.edges = new EdgeGraph(this.surface());
       this.edges.follow(this.follows);
     }
+    this.edges.prefer(this.choices.cuts);
     return this.edges;
   }
 

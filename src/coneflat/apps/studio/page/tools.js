@@ -9,6 +9,7 @@ const TOOLS = [
   ["corner", "Corner", "o", "Click four points of the boundary: the corners of a rectangle. Click a corner to remove it."],
 ];
 const PICK_RADIUS = 12; // Pick radius of a click in pixels.
+const CONE_RADIUS = 5; // That of a cone, which a seam in front may cover.
 
 const BARE = {get: () => false}; // A state in which only triangles are drawn and picked.
 
@@ -98,9 +99,9 @@ class Tools {
     const {viewer} = this.studio, {model} = viewer;
     const thing = viewer.renderer.pick(pane, x, y, viewer.state);
     if (thing?.kind === "cone") return thing;
-    if (!reach || !viewer.state.get("cones")) return null;
+    if (!viewer.state.get("cones")) return null;
     const off = (index) => Math.min(...this.studio.overlay.places(pane, model.arrays.cones[index]).map(([px, py]) => Math.hypot(px - x, py - y)));
-    const isNear = (index) => off(index) <= reach && viewer.marks.isSeen(pane, {kind: "cone", index}, viewer.state);
+    const isNear = (index) => off(index) <= Math.max(reach ?? 0, CONE_RADIUS) && viewer.marks.isSeen(pane, {kind: "cone", index}, viewer.state);
     const index = leastOf(Array.from({length: model.coneCount}, (_, one) => one).filter(isNear), off);
     return index === null ? null : {kind: "cone", index};
   }

@@ -46,6 +46,7 @@ class Viewer {
       new Pane("layout", new Camera(this.flatPlaces(), [1, 0, 0, 0, 1, 0, 0, 0, 1], false), true, this),
     ];
     this.used = this.panes[0];
+    this.showsSquare = false; // The view of the layout also contains the unit square.
     this.tool = null; // Alternative handler of clicks and drags: {hover(pane, x, y), pick(pane, x, y, reach), grab(pane, x, y, reach)}.
     this.moving = this.slowFrames = 0;
     this.renderer = new Renderer(document.getElementById("scene"), model);
@@ -102,8 +103,9 @@ class Viewer {
   }
 
   flatPlaces() {
-    const points = this.model.arrays.uv.length / 2;
-    const out = new Float32Array(3 * points);
+    const points = this.model.arrays.uv.length / 2, square = this.showsSquare ? [[0, 0], [1, 1]] : [];
+    const out = new Float32Array(3 * (points + square.length));
+    square.forEach(([u, v], i) => out.set(this.model.planePlace(u, v), 3 * (points + i)));
     for (let i = 0; i < points; i++) out.set(this.model.flatPlace(i), 3 * i);
     return out;
   }

@@ -50,8 +50,11 @@ class Model {
 
   /** Return the position at which a point of the layout is drawn: in a plane, centred at the origin. */
   flatPlace(point) {
-    const uv = this.arrays.uv;
-    return [(uv[2 * point] - this.uvCentre[0]) * this.uvUnit, (uv[2 * point + 1] - this.uvCentre[1]) * this.uvUnit, 0];
+    return this.planePlace(this.arrays.uv[2 * point], this.arrays.uv[2 * point + 1]);
+  }
+
+  planePlace(u, v) {
+    return [(u - this.uvCentre[0]) * this.uvUnit, (v - this.uvCentre[1]) * this.uvUnit, 0];
   }
 
   /** Return the two corners at the ends of the i-th half-edge on the outlines of charts. */

@@ -5,6 +5,7 @@ const SEAM_CORE = 1, SEAM_RADIUS = 2.2; // pixels
 const PICK_RADII = [5, 1.5]; // Things under the pointer have priority over things near it.
 const SAMPLES = 4; // Samples per pixel, for smooth outlines.
 const ROUGH = 0.5; // Fraction of the pixels along a side while the view moves on a slow machine.
+const BEHIND = 0.35; // Opacity of the picture behind the layout.
 const MAP_CONTRAST = 0.55; // Shading is reduced on colour maps, so that a shadow is not read as a value.
 
 /** Set the size of a canvas only if it changes, because this is slow and clears the canvas. */
@@ -40,6 +41,10 @@ class Renderer {
     }
     this.prepareSurface();
     this.prepareLayout();
+    this.square = new Shape(gl, [
+      {array: new Float32Array(18), size: 3},
+      {array: new Float32Array([0, 0, 1, 0, 1, 1, 0, 0, 1, 1, 0, 1]), size: 2},
+    ]);
     const {sequential, diverging, tints} = model.arrays;
     this.tables = {
       sequential: tableTexture(gl, sequential, true),
@@ -180,6 +185,7 @@ class Renderer {
       marked: this.look.marks ? (state.get("marked") ?? 1) : 0,
       hatch: pixel,
     });
+    if (pane.inPlane && this.look.behind && show === "picture" && this.picture) this.drawBehind();
     this.surface.draw();
     gl.enable(gl.BLEND);
     gl.depthMask(false); // Overlays do not hide anything.
@@ -197,6 +203,16 @@ class Renderer {
       this.dots[side].draw();
     }
     gl.depthMask(true);
+    gl.disable(gl.BLEND);
+  }
+
+  /** Draw the picture, faded, in the unit square behind the layout. */
+  drawBehind() {
+    const gl = this.gl;
+    gl.enable(gl.BLEND);
+    gl.blendColor(0, 0, 0, BEHIND);
+    gl.blendFunc(gl.CONSTANT_ALPHA, gl.ONE_MINUS_CONSTANT_ALPHA);
+    this.square.draw();
     gl.disable(gl.BLEND);
   }
 

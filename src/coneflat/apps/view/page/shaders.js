@@ -218,7 +218,8 @@ flat in float radius, positive;
 out vec4 colour;
 uniform float pixel;
 void main() {
-  float away = length(off);
+  // Discs for positive curvature, squares for negative curvature.
+  float away = positive > 0.0 ? length(off) : 1.12 * max(abs(off.x), abs(off.y));
   float inside = 1.0 - smoothstep(radius - pixel - 0.5, radius - pixel + 0.5, away);
   float rim = 1.0 - smoothstep(radius, radius + pixel, away);
   if (rim < 0.02) discard;
