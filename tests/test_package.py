@@ -87,7 +87,7 @@ print(*sys.modules)
 def test_a_kernel_that_was_loaded_is_compiled_into_others(tmp_path):
     """To load one leaves out what only compiling needs; what is compiled with it has all of it."""
     (tmp_path / "counting.py").write_text("""
-from coneflat.base.compiled import compiled
+from coneflat.base.jit import compiled
 from coneflat.mesh.connectivity import label_nodes
 
 @compiled

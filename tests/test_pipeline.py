@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -348,3 +349,15 @@ def test_components_have_the_same_texel_density():
     faces = np.concatenate([faces, [[len(vertices) - 3, len(vertices) - 2, len(vertices) - 1]]])
     scale = coneflat.flatten(vertices, faces).distortion.log_area_scale
     assert abs(scale[:-1].mean() - scale[-1]) < 0.1
+
+
+def test_no_more_cones_are_searched_for_than_a_search_can_find(monkeypatch):
+    """A distortion that needs more cones than the search allows is named at once: each search would take longest."""
+    pipeline = import_module("coneflat.flatten")
+    searches, once = [], pipeline.lay_out_part
+    monkeypatch.setattr(pipeline, "lay_out_part", lambda *given: searches.append(0) or once(*given))
+    monkeypatch.setattr(pipeline, "MAX_SEARCHED", 5)
+    monkeypatch.setattr(pipeline, "_excess", lambda *_: 2.0)
+    result = coneflat.flatten(coneflat.sample_path())
+    assert len(searches) == 1
+    assert any("above the 0.2 allowed" in note for note in result.notes)

@@ -37,14 +37,14 @@ CEILINGS = {
     "apps.measure_uv": 161,
     "apps.peers": 1406,
     "apps.quads": 3203,
-    "apps.studio": 1704,
+    "apps.studio": 1751,
     "apps.view": 1624,
     "atlas": 1498,
-    "base": 356,
+    "base": 349,
     "cone_curve": 108,
-    "cones": 2110,
+    "cones": 2113,
     "evaluate": 194,
-    "flatten": 210,
+    "flatten": 222,
     "flattener": 35,
     "geometry": 1599,
     "io": 2805,
@@ -61,7 +61,7 @@ CEILINGS = {
     "stages": 223,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_903, 233, 25_945
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_911, 233, 26_000
 CONSTANTS, KERNELS, NAMES, LEVELS = 300, 111, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

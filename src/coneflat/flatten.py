@@ -244,7 +244,7 @@ def finish_within_bound(
     """
     finished = finish_parts(parts, layouts, method)
     left = {i: part for i, part in parts.items() if _excess(part, finished[i]) > 1}
-    if 0 < len(left) and not method.relax.is_off and method.relax.stretch < CORRECTING_STRETCH:
+    if len(left) > 0 and not method.relax.is_off and method.relax.stretch < CORRECTING_STRETCH:
         method = replace(method, relax=replace(method.relax, stretch=CORRECTING_STRETCH))
         _keep_better(finished, finish_parts(left, layouts, method), parts)
     for _ in range(MAX_CORRECTIONS):

@@ -222,6 +222,21 @@ def test_fit_agrees_with_the_optimality_conditions(at_once, monkeypatch):
         assert (gradient[k > least + 1e-9] < 1e-7).all()
 
 
+def test_changing_bounds_one_by_one_starts_from_the_bounds_found_at_once(monkeypatch):
+    """From the optimum, no bound changes: with tight bounds, starting anew takes a hundred factorizations."""
+    rng = np.random.default_rng(3)
+    root = rng.normal(size=(80, 82))
+    bounds = np.full(80, -0.1), np.full(80, 0.1)
+    program = fit_curvatures._Program(root @ root.T, 3 * rng.normal(size=80), *bounds, 0.5)
+    best, _ = program.change_one_by_one(np.zeros(80))
+    calls, once = [], fit_curvatures.best_free
+    monkeypatch.setattr(fit_curvatures, "best_free", lambda *given: calls.append(0) or once(*given))
+    again, _ = program.change_one_by_one(best)
+    np.testing.assert_allclose(again, best, atol=1e-9)
+    assert np.count_nonzero(np.abs(best) == 0.1) > 20
+    assert len(calls) < 5
+
+
 @pytest.mark.parametrize(
     ("name", "count"),
     [

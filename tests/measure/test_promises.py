@@ -43,7 +43,7 @@ def limbs():
 @pytest.mark.parametrize(("parts", "up"), [(4, None), (6, (0.0, 0.3, 1.0))])
 def test_seams_of_an_atlas_turn_by_whole_quanta(limbs, parts, up):
     quantum = 2 * np.pi / parts
-    result = flatten(*limbs, quantise=quantum, charts="atlas", distortion=0.1, up=up)
+    result = flatten(*limbs, quantise=quantum, charts="atlas", distortion=0.07, up=up)
     assert result.distortion.charts > 1
     assert error_text(seam_turns(result), quantum) < 1e-9
     assert result.rotations.worst == pytest.approx(error_text(seam_turns(result), quantum), abs=1e-12)

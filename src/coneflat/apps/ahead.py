@@ -1,6 +1,6 @@
 """Ahead-of-time compilation of the kernels: `python -m coneflat.apps.ahead`.
 
-Kernels are compiled at the first call and cached next to their sources (see `coneflat.base.compiled`), which takes half
+Kernels are compiled at the first call and cached next to their sources (see `coneflat.base.jit`), which takes half
 a minute in the first flattening of an installation. The build runs this module in advance (hatch_build.py).
 """
 

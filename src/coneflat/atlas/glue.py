@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..base.progress import check_cancelled
 from ..geometry.overlap import find_overlaps
 from ..geometry.planar import bounds, fill_bounds, signed_double_areas

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import FloatArray, IntArray
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..errors import OptionError
 from .charts import Charts, Outlines, read_charts
 from .straight import HALF_PI, RELATIVE_TOLERANCE, straight_directions

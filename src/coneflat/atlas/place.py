@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..base.progress import check_cancelled
 from ..errors import OptionError
 from .charts import Outlines

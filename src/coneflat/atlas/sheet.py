@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..base.sets import find_root, unite
 from ..linalg.shortest_paths import MultiGraph, Paths
 from ..mesh.connectivity import TriangleMesh

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from ..base.compiled import compiled
+from ..base.jit import compiled
 
 HALF_PI = np.pi / 2
 # A run is straight if its distance from the line between its ends is below this fraction of its length. This includes

@@ -5,9 +5,7 @@ Modules that need NumPy or numba are imported on first use, so that the commands
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from .defaults import DISTORTION, MAX_CONE_ANGLE, MAX_CONES, MIN_CONE_ANGLE
@@ -17,7 +15,7 @@ from .threads import THREADS, limit_threads
 
 if TYPE_CHECKING:
     from .arrays import BoolArray, ComplexArray, FloatArray, IntArray, dots, unit_exponent
-    from .compiled import compiled
+    from .jit import compiled
 
 __all__ = [
     "unit_exponent",
@@ -44,18 +42,7 @@ __all__ = [
 ]
 
 
-class _Package(ModuleType):
-    """The package module; `coneflat.base.compiled` stays the decorator when the module of that name is imported."""
-
-    def __setattr__(self, name: str, value: object) -> None:
-        if not (name == "compiled" and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package
-
-
 def __getattr__(name: str) -> Any:
     if name in __all__:
-        return getattr(import_module("." + ("compiled" if name == "compiled" else "arrays"), __name__), name)
+        return getattr(import_module("." + ("jit" if name == "compiled" else "arrays"), __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

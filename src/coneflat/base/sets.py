@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import BoolArray, IntArray
-from .compiled import compiled
+from .jit import compiled
 
 
 def edges_at_nodes(ends: IntArray, nodes: int) -> tuple[IntArray, IntArray]:

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from ..base.arrays import FloatArray, IntArray
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..linalg.shortest_paths import drop_first, push
 from ..mesh.connectivity import TriangleMesh
 from .intrinsic import IntrinsicTriangulation, intrinsic_triangulation

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import FloatArray, IntArray
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..mesh.connectivity import NEXT, PREVIOUS
 
 # Number of corners at one point from which the angles are used; for fewer triangles, testing all pairs is fast enough.

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, Int32Array, IntArray
-from ..base.compiled import compiled
+from ..base.jit import compiled
 
 # Number of cells along a side of the grid, divided by the square root of the number of triangles, and its maximum.
 CELLS_PER_ROOT, MAX_CELLS = 1.5, 2048

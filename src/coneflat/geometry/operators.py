@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import csc_matrix
 
 from ..base.arrays import BoolArray, FloatArray, Int32Array, IntArray, as_faces, as_floats, unit_exponent
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..errors import ArrayShapeError, OptionError
 from .triangles import double_areas
 

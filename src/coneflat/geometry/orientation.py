@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import FloatArray, IntArray
-from ..base.compiled import compiled
+from ..base.jit import compiled
 
 # Rounding of the determinant, relative to the sum of the magnitudes of its two products (Shewchuk, Section 4.3).
 FILTER = (3 + 16 * 2.0**-53) * 2.0**-53

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import FloatArray, IntArray, as_faces, as_floats, require_finite, rows_of, unit_exponent
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..errors import ArrayShapeError, OptionError
 from .coverage import overlap_areas
 from .fans import are_disjoint, find_fans

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh
 
 # Height divided by longest side below which a triangle counts as degenerate, neither positively oriented nor flipped:

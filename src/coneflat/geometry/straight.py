@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..mesh.connectivity import TriangleMesh
 from .intrinsic import IntrinsicTriangulation, check_lengths, intrinsic_triangulation
 

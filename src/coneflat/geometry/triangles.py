@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats, dots
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..base.text import list_some, plural
 from ..errors import ArrayShapeError, DegenerateFaceError, FaceIndexError
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh, corner_fans

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, dots
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..errors import OptionError
 from ..mesh.ties import shape_axes
 from .triangles import vertex_normals

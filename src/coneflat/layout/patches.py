@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import bsr_matrix
 
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..errors import MetricError
 from ..geometry.planar import map_factors
 from ..geometry.straight import FlatTriangles

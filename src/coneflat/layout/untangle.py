@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..geometry.planar import heights, signed_angles
 from ..geometry.straight import FlatTriangles
 from .patches import DEGENERATE_HEIGHT, Patches

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..base.sets import edges_at_nodes, grow_forest
 
 

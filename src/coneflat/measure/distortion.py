@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats, dots
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..base.text import list_some, short_repr
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..geometry.intrinsic import check_lengths

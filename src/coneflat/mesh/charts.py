@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..base.sets import number_sets, unite
 from .connectivity import TriangleMesh, end_corners
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..base.sets import edges_at_nodes, label_nodes
 
 NEXT = np.array([1, 2, 0])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import BoolArray, IntArray, rows_of
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..base.text import plural
 from ..errors import MetricError
 from .connectivity import TriangleMesh, label_components

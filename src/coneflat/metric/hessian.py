@@ -11,7 +11,7 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import LinearOperator, cg
 
 from ..base.arrays import BoolArray, FloatArray, Int32Array, IntArray
-from ..base.compiled import compiled
+from ..base.jit import compiled
 from ..errors import MetricError
 from ..geometry.intrinsic import IntrinsicTriangulation
 from ..linalg import Factor, factorize

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.arrays import BoolArray, FloatArray, IntArray
-from ...base.compiled import compiled
+from ...base.jit import compiled
 from ..solution import TIE_TOLERANCE
 from ..sparse.dense_model import argmin_tied
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import csr_matrix, diags
 
 from ...base.arrays import FloatArray, IntArray
-from ...base.compiled import compiled
+from ...base.jit import compiled
 from ..solution import TIE_TOLERANCE
 
 # Largest coarsening factor of a level: an aggregate is a vertex with its neighbours.

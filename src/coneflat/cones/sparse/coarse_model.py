@@ -9,7 +9,7 @@ from scipy.linalg import lapack
 from scipy.sparse import csr_matrix
 
 from ...base.arrays import FloatArray, IntArray
-from ...base.compiled import compiled
+from ...base.jit import compiled
 from ...errors import MetricError
 from ..solution import TIE_TOLERANCE
 from .aggregation import coarse_basis, representatives

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.arrays import BoolArray, FloatArray, IntArray
-from ...base.compiled import compiled
+from ...base.jit import compiled
 from .dense_model import BestSets, DenseModel, argmin_tied
 from .limits import Limits
 from .linear_model import LinearModel

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.arrays import FloatArray, IntArray
-from ...base.compiled import compiled
+from ...base.jit import compiled
 from ..solution import TIE_TOLERANCE
 
 # Value added to the diagonal, relative to its largest entry, as cones at neighbouring vertices are nearly dependent.

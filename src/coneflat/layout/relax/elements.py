@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import csc_matrix
 
 from ...base.arrays import BoolArray, ComplexArray, FloatArray, Int32Array, IntArray, has_any
-from ...base.compiled import compiled
+from ...base.jit import compiled
 from ...geometry.planar import map_factors
 from ...mesh.connectivity import label_components
 from .energies import Energy
