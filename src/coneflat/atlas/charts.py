@@ -44,8 +44,7 @@ class Charts:
 
     def sums(self, values: FloatArray) -> FloatArray:
         """Return (k,) the sum over each chart of (m,) values per triangle."""
-        sums: FloatArray = np.bincount(self.chart, weights=values, minlength=self.count).astype(np.float64)
-        return sums
+        return np.bincount(self.chart, weights=values, minlength=self.count).astype(np.float64)
 
     @cached_property
     def has_area(self) -> NDArray[np.bool_]:

@@ -158,8 +158,7 @@ def _members(label: IntArray, numbers: IntArray) -> list[IntArray]:
 
 def _pairs(places: NDArray[np.complex128]) -> FloatArray:
     """Return complex numbers as pairs of real and imaginary part, along an additional last axis."""
-    parts: FloatArray = np.ascontiguousarray(places).view(np.float64).reshape(*places.shape, 2)
-    return parts
+    return np.ascontiguousarray(places).view(np.float64).reshape(*places.shape, 2)
 
 
 @compiled

@@ -157,8 +157,7 @@ def mean_rise(charts: Charts, corners: ArrayLike | None, up: ArrayLike) -> Compl
     height = positions @ (direction / np.abs(direction).max())
     opposite = charts.corners[:, [2, 0, 1]] - charts.corners[:, [1, 2, 0]]
     rise = 0.5j * (height * opposite).sum(axis=1)
-    total: ComplexArray = charts.sums(rise.real) + 1j * charts.sums(rise.imag)
-    return total
+    return charts.sums(rise.real) + 1j * charts.sums(rise.imag)
 
 
 @compiled

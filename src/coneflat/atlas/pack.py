@@ -283,8 +283,7 @@ def _best_turn(rise: NDArray[np.complex128], allowed: BoolArray) -> FloatArray:
     """Return (k,) the allowed multiple of a t-th of a turn that rotates each direction closest to v, in radians."""
     turns = 2 * np.pi / allowed.shape[1] * np.arange(allowed.shape[1])
     height = np.where(allowed, (rise[:, None] * np.exp(1j * turns)).imag, -np.inf)
-    angles: FloatArray = turns[height.argmax(axis=1)]
-    return angles
+    return turns[height.argmax(axis=1)]
 
 
 def _unmirrored(flat: FloatArray, chart: IntArray) -> FloatArray:

@@ -73,8 +73,7 @@ class Sheet:
         self._start += [0] * (len(ids) - 1)
         for piece, low, side in zip(ids.tolist(), first.tolist(), start.tolist(), strict=True):
             self._first[piece], self._start[piece] = low, side
-        found: list[int] = ids[np.argsort(first)].tolist()
-        return found
+        return ids[np.argsort(first)].tolist()
 
     def _path(self, own: int, one: BoolArray, other: BoolArray, starts: IntArray, ends: IntArray) -> IntArray:
         """Return the edges of the cheapest path in a piece from starts to ends that avoids two sets of triangles."""
@@ -191,8 +190,7 @@ def _between(border: IntArray, mark: IntArray) -> tuple[IntArray, IntArray]:
 def across(halfedge_edges: IntArray, edge_halfedges: IntArray, h: int) -> int:
     """Return the twin of a half-edge, -1 on the boundary."""
     e = halfedge_edges[h]
-    other: int = edge_halfedges[e, 1] if edge_halfedges[e, 0] == h else edge_halfedges[e, 0]
-    return other
+    return edge_halfedges[e, 1] if edge_halfedges[e, 0] == h else edge_halfedges[e, 0]
 
 
 @compiled

@@ -20,14 +20,12 @@ Numbers = TypeVar("Numbers", FloatArray, IntArray)
 
 def dots(one: FloatArray, other: FloatArray) -> FloatArray:
     """Return the inner products of vectors along the last axis; several times faster than a sum of products."""
-    products: FloatArray = np.einsum("...i,...i->...", one, other)
-    return products
+    return np.einsum("...i,...i->...", one, other)
 
 
 def rows_of(values: Numbers, places: IntArray) -> Numbers:
     """Return (*places, k) the rows of `values` (n, k) at the indices `places`, ten times as fast as indexing."""
-    rows: Numbers = values.take(places, axis=0)
-    return rows
+    return values.take(places, axis=0)
 
 
 def has_any(mask: BoolArray, sets: IntArray) -> BoolArray:

@@ -85,5 +85,4 @@ class KernelCache(FunctionCache):  # type: ignore[misc]
 
 @cache
 def _no_bitcode() -> bytes:
-    bitcode: bytes = binding.parse_assembly("").as_bitcode()
-    return bitcode
+    return binding.parse_assembly("").as_bitcode()

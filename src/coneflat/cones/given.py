@@ -167,5 +167,4 @@ def fitted_cones(
 
 def _covariances(one: FloatArray, other: FloatArray, areas: FloatArray) -> FloatArray:
     """Return (k, l) the area-weighted covariances of functions (k, f) and (l, f)."""
-    products: FloatArray = (one * areas) @ other.T - np.outer(one @ areas, other @ areas)
-    return products
+    return (one * areas) @ other.T - np.outer(one @ areas, other @ areas)

@@ -51,8 +51,7 @@ def target_from_log_scale(
         log_scale: (n,) phi.
         is_singular: (n,) mask of the cones, and of the boundary.
     """
-    target: FloatArray = np.where(is_singular, curvature + laplacian @ log_scale, 0.0)
-    return target
+    return np.where(is_singular, curvature + laplacian @ log_scale, 0.0)
 
 
 def check_feasible(cones: IntArray, curvatures: FloatArray, names: IntArray | None, advice: str) -> None:

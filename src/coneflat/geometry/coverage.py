@@ -68,8 +68,7 @@ def approximate_overlap_areas(corners: FloatArray) -> tuple[float, float]:
 
 
 def _cross(one: FloatArray, two: FloatArray) -> FloatArray:
-    product: FloatArray = one[..., 0] * two[..., 1] - one[..., 1] * two[..., 0]
-    return product
+    return one[..., 0] * two[..., 1] - one[..., 1] * two[..., 0]
 
 
 def _outline(corners: FloatArray) -> IntArray:

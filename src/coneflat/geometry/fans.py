@@ -38,8 +38,7 @@ class Fans:
         rank = np.empty(len(order))
         rank[order] = np.arange(len(order))
         is_outside = self.numbers < 0
-        along: IntArray = np.lexsort((np.where(is_outside, rank, self.angles[:, 0]), self.numbers))
-        return along
+        return np.lexsort((np.where(is_outside, rank, self.angles[:, 0]), self.numbers))
 
     def tree(self, order: IntArray, leaves: int) -> tuple[IntArray, FloatArray]:
         """Return the fan and the range of angles of each node of a binary tree over the triangles in an order.

@@ -241,8 +241,7 @@ def z_order(boxes: FloatArray) -> IntArray:
     centres -= centres.min(axis=0)
     extent = centres.max()
     cells = (centres * ((2**32 - 1) / extent if extent > 0 else 0.0)).astype(np.uint64)
-    order: IntArray = np.argsort(_spread(cells[:, 0]) | _spread(cells[:, 1]) << np.uint64(1), kind="stable")
-    return order
+    return np.argsort(_spread(cells[:, 0]) | _spread(cells[:, 1]) << np.uint64(1), kind="stable")
 
 
 def _spread(cells: NDArray[np.uint64]) -> NDArray[np.uint64]:

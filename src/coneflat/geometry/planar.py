@@ -17,8 +17,7 @@ MIN_AREA = 1e-12
 
 def as_complex(places: FloatArray) -> ComplexArray:
     """Return (k,) complex points x + i y from (k, 2) coordinates."""
-    points: ComplexArray = places[:, 0] + 1j * places[:, 1]
-    return points
+    return places[:, 0] + 1j * places[:, 1]
 
 
 def as_pairs(points: ComplexArray) -> FloatArray:
@@ -56,8 +55,7 @@ def heights(sides: ComplexArray) -> FloatArray:
     doubled = (np.conj(sides[:, 0]) * sides[:, 1]).imag
     squares = sides.real**2 + sides.imag**2
     longest = np.maximum(np.maximum(squares[:, 0], squares[:, 1]), squares[:, 2])
-    ratio: FloatArray = doubled / np.maximum(longest, np.finfo(np.float64).tiny)
-    return ratio
+    return doubled / np.maximum(longest, np.finfo(np.float64).tiny)
 
 
 def sides_between(corners: FloatArray) -> ComplexArray:
@@ -101,8 +99,7 @@ def layout_curvature(mesh: TriangleMesh, corners: FloatArray, at: BoolArray | No
     angles = signed_angles(sides)
     angles = np.where((np.abs(heights(sides)) < FLAT_HEIGHT)[:, None], np.abs(angles), angles)
     sums = np.bincount(mesh.faces[chosen].ravel(), angles.ravel(), len(mesh.vertices))
-    curvature: FloatArray = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - sums
-    return curvature
+    return np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - sums
 
 
 def vertex_log_scale(mesh: TriangleMesh, before: FloatArray, after: FloatArray) -> FloatArray:
@@ -114,8 +111,7 @@ def vertex_log_scale(mesh: TriangleMesh, before: FloatArray, after: FloatArray) 
     for areas in (before, after):
         around = np.bincount(mesh.faces.ravel(), np.repeat(areas, 3), minlength=len(mesh.vertices))
         ratio.append(np.maximum(around, MIN_AREA * around.mean()))
-    log_scale: FloatArray = np.log(ratio[1] / ratio[0]) / 2
-    return log_scale
+    return np.log(ratio[1] / ratio[0]) / 2
 
 
 @compiled

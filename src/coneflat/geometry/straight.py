@@ -34,8 +34,7 @@ class FlatTriangles:
     def is_inverted(self) -> BoolArray:
         """(m,) True for triangles that are flipped or have no area."""
         sides = self.sides.reshape(-1, 3)
-        inverted: BoolArray = (np.conj(sides[:, 0]) * sides[:, 1]).imag <= 0
-        return inverted
+        return (np.conj(sides[:, 0]) * sides[:, 1]).imag <= 0
 
 
 def flat_triangles(mesh: TriangleMesh, lengths: ArrayLike) -> FlatTriangles:

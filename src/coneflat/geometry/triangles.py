@@ -51,8 +51,7 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
         raise FaceIndexError(
             f"faces name vertices from {triangles.min()} to {triangles.max()}, but there are {len(points)}, from 0 on"
         )
-    lengths: FloatArray = measure_sides(points, triangles)
-    return lengths
+    return measure_sides(points, triangles)
 
 
 def as_triples(name: str, values: ArrayLike) -> FloatArray:
@@ -108,8 +107,7 @@ def cotangents(lengths: FloatArray) -> FloatArray:
 
 def _perimeter(lengths: FloatArray) -> FloatArray:
     # Computed column by column, as NumPy is slow at sums along an axis of length three.
-    perimeter: FloatArray = lengths[:, 0] + lengths[:, 1] + lengths[:, 2]
-    return perimeter
+    return lengths[:, 0] + lengths[:, 1] + lengths[:, 2]
 
 
 def mollify(

@@ -131,8 +131,7 @@ class Patches:
     def moved(self, shifts: ComplexArray) -> ComplexArray:
         """Return (f, 3) the sides of the triangles after their vertices are shifted."""
         moved = np.where(self.corners >= 0, self.shift * shifts[self.corners], 0)
-        sides: ComplexArray = self.sides + moved[:, [2, 0, 1]] - moved[:, [1, 2, 0]]
-        return sides
+        return self.sides + moved[:, [2, 0, 1]] - moved[:, [1, 2, 0]]
 
     def worst(self, shifts: ComplexArray) -> FloatArray:
         """Return (count,) the smallest determinant of each patch."""

@@ -88,8 +88,7 @@ def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
 
 
 def _next(halfedges: IntArray) -> IntArray:
-    turned: IntArray = halfedges - halfedges % 3 + (halfedges + 1) % 3
-    return turned
+    return halfedges - halfedges % 3 + (halfedges + 1) % 3
 
 
 def _border(flat: FlatTriangles, cut: BoolArray, start: int) -> tuple[IntArray, ComplexArray]:

@@ -83,8 +83,7 @@ class SuperLUFactor(Factor):
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return the solution x of A x = right, for one right-hand side (n,) or several (n, k)."""
-        solution: FloatArray = self._factor.solve(np.asarray(right, dtype=np.float64))
-        return solution
+        return self._factor.solve(np.asarray(right, dtype=np.float64))
 
 
 class CholespyFactor(Factor):
@@ -176,5 +175,4 @@ class HermitianFactor:
     def solve(self, right: NDArray[Any]) -> NDArray[np.complex128]:
         """Return the complex solution x of A x = right, both (n,)."""
         parts = self._factor.solve(np.concatenate([right.real, right.imag]))
-        solution: NDArray[np.complex128] = parts[: len(right)] + 1j * parts[len(right) :]
-        return solution
+        return parts[: len(right)] + 1j * parts[len(right) :]

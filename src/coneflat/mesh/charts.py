@@ -62,8 +62,7 @@ def uv_seams(mesh: TriangleMesh, corner_uv: FloatArray) -> IntArray:
 def joined_edges(mesh: TriangleMesh, corner_uv: FloatArray) -> BoolArray:
     """Return (e,) True for inner edges whose two sides coincide in the plane; `corner_uv` is (m, 3, 2)."""
     uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
-    joined: BoolArray = find_joined(mesh.edge_halfedges, uv, JOIN_TOLERANCE)
-    return joined
+    return find_joined(mesh.edge_halfedges, uv, JOIN_TOLERANCE)
 
 
 def label_charts(mesh: TriangleMesh, joined: BoolArray) -> tuple[int, IntArray]:

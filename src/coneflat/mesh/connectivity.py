@@ -53,8 +53,7 @@ def sort_by_counting(keys: IntArray, bound: int) -> IntArray:
     # SciPy converts rows to columns by a counting sort.
     count = len(keys)
     rows = csr_matrix((np.empty(count, dtype=np.int8), keys, np.arange(count + 1)), shape=(count, bound))
-    order: IntArray = rows.tocsc().indices
-    return order
+    return rows.tocsc().indices
 
 
 def sort_pairs(one: IntArray, two: IntArray, bound: int) -> tuple[IntArray, BoolArray]:

@@ -48,8 +48,7 @@ class Polygons:
         sizes = self.sizes
         start, size = np.repeat(self.offsets[:-1], sizes), np.repeat(sizes, sizes)
         step = np.arange(len(start)) - start
-        loops: IntArray = start + np.where(np.repeat(self.is_reversed, sizes), (size - step) % size, step)
-        return loops
+        return start + np.where(np.repeat(self.is_reversed, sizes), (size - step) % size, step)
 
     def points(self, uv_faces: IntArray) -> IntArray:
         """Return (c,) the point at each polygon corner; -1 if its triangles have several points there, or none.
@@ -106,8 +105,7 @@ def polygon_of(face_corners: IntArray, offsets: IntArray) -> IntArray:
         face_corners: (m, 3) polygon corner at each triangle corner.
         offsets: (p + 1,) where the corners of each polygon start.
     """
-    polygon: IntArray = np.searchsorted(offsets, face_corners[:, 0], side="right") - 1
-    return polygon
+    return np.searchsorted(offsets, face_corners[:, 0], side="right") - 1
 
 
 def first_bad_corner(corners: IntArray, vertex_count: int) -> int | None:

@@ -81,8 +81,7 @@ def mesh_tie_key(mesh: TriangleMesh) -> FloatArray:
     known = mesh.__dict__
     if "_tie_key" not in known:
         known["_tie_key"] = tie_key(mesh.vertices)
-    key: FloatArray = known["_tie_key"]
-    return key
+    return known["_tie_key"]
 
 
 def argmax_tied(values: FloatArray, key: FloatArray) -> int:

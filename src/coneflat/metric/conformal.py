@@ -51,8 +51,7 @@ class State(Point):
 
 def centred(log_scale: FloatArray) -> FloatArray:
     """Return a log scale shifted so that the middle of its range is 0, which avoids overflow and keeps all angles."""
-    middle: FloatArray = log_scale - (log_scale.max() + log_scale.min()) / 2
-    return middle
+    return log_scale - (log_scale.max() + log_scale.min()) / 2
 
 
 @dataclass(eq=False)

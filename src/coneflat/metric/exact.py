@@ -216,8 +216,7 @@ def _keep_area(
     # If the area has vanished, the metric is rejected later, and any shift will do.
     is_left = np.isfinite(after) & (after > 0)
     shift = np.log(copies * before / np.where(is_left, after, copies * before)) / 2
-    shifted: FloatArray = log_scale + np.where(free, shift, 0.0)[component]
-    return shifted
+    return log_scale + np.where(free, shift, 0.0)[component]
 
 
 def _finish(

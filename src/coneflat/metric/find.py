@@ -203,8 +203,7 @@ def least_changes(holonomy: Holonomy, sides: FloatArray, norm: csc_matrix, fixed
     answer = factorize(csc_matrix(curvature @ means)).solve(np.ascontiguousarray(by_scale))
     slopes = np.asarray(by_lengths.todense()).T - curvature.T @ answer
     smoothed = factorize(norm).solve(slopes)
-    result: FloatArray = smoothed @ np.linalg.inv(slopes.T @ smoothed)
-    return result
+    return smoothed @ np.linalg.inv(slopes.T @ smoothed)
 
 
 def shear_norm(mesh: TriangleMesh, lengths: FloatArray, cones: IntArray) -> csc_matrix:

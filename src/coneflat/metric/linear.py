@@ -77,5 +77,4 @@ def _sinhc(x: FloatArray) -> FloatArray:
     """Return sinh(x) / x."""
     small = np.abs(x) < SERIES
     safe = np.where(small, 1.0, x)
-    result: FloatArray = np.where(small, 1 + x**2 / 6 * (1 + x**2 / 20), np.sinh(safe) / safe)
-    return result
+    return np.where(small, 1 + x**2 / 6 * (1 + x**2 / 20), np.sinh(safe) / safe)

@@ -98,8 +98,7 @@ def _hidden(mesh: TriangleMesh, share: FloatArray, angles: FloatArray) -> FloatA
         share = (share + around / degree) / 2
     # Fraction of the directions from which a flat surface is visible that the two faces of a valley leave open.
     open_share = 1 + np.minimum(angles * _orientation_sign(mesh), 0.0) / np.pi
-    hidden: FloatArray = 1 - share[mesh.edges].mean(axis=1) * open_share
-    return hidden
+    return 1 - share[mesh.edges].mean(axis=1) * open_share
 
 
 def _orientation_sign(mesh: TriangleMesh) -> float:

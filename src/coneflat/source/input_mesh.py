@@ -48,8 +48,7 @@ class InputMesh:
         if self.source is None or self.face_corners is None:
             return np.ones(np.shape(self.faces), dtype=bool)
         # Column k of is_polygon_side is the side from corner k to k + 1, which is opposite corner k + 2.
-        sides: BoolArray = is_polygon_side(self.face_corners, self.source.offsets)[:, [1, 2, 0]]
-        return sides
+        return is_polygon_side(self.face_corners, self.source.offsets)[:, [1, 2, 0]]
 
     def corner_texture(self) -> IntArray | None:
         """Return (m, 3) indices that are equal where triangle corners have the same input UV; None without UVs."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import shapes
 from grid_maps import (
     CUBE,
     L_SHAPE,
@@ -21,8 +22,10 @@ from grid_maps import (
 )
 from shapes import grid as rectangle
 
+import coneflat
 from coneflat.apps.quads.extract import extract_quads
 from coneflat.apps.quads.nearest import surface_distances
+from coneflat.apps.quads.quad_mesh import degenerate_quads
 from coneflat.apps.quads.quality import measure_quads
 from coneflat.errors import GridError
 
@@ -166,3 +169,37 @@ def test_distances_are_the_least_of_all_triangles():
     assert (found <= dense + 1e-12).all()
     # Samples are 0.005 sides apart, and a distance is off by no more than half of that.
     assert (found >= dense - 0.03).all()
+
+
+def test_components_with_few_vertices_get_quads():
+    """A tetrahedron has four vertices for the eight cones of a cube: its triangles are split."""
+    vertices, faces = shapes.join(shapes.sphere(3), shapes.tetrahedron())
+    mesh = coneflat.quads(vertices, faces, quads=300)
+    assert mesh.euler_characteristic == mesh.surface_euler == 4
+    assert any("Split the triangles of 1 component with too few vertices" in note for note in mesh.notes)
+
+
+def test_quads_that_meet_themselves_are_made_smaller():
+    """Around each hole of a surface with three handles there are too few squares."""
+    grid = coneflat.integer_grid(*shapes.genus(3), quads=10)
+    with pytest.raises(GridError, match="with a vertex or an edge twice .*: use more quads"):
+        extract_quads(grid)
+    assert all("Left out" in note for note in extract_quads(grid, leave_out=True).notes)
+    mesh = coneflat.quads(*shapes.genus(3), quads=10)
+    assert mesh.euler_characteristic == mesh.surface_euler == -4
+    assert any("More quads than wanted" in note for note in mesh.notes)
+    assert not degenerate_quads(mesh.quads, edges_of(mesh.quads)).any()
+
+
+def test_quads_with_a_vertex_or_an_edge_twice():
+    quads = np.array([[0, 1, 2, 3], [1, 0, 4, 5], [6, 7, 6, 8], [9, 10, 11, 12], [10, 9, 13, 14]])
+    edges = edges_of(quads)
+    assert degenerate_quads(quads, edges).tolist() == [False, False, True, False, False]
+    edges[4, 0] = edges.max() + 1  # another edge from 9 to 10
+    assert degenerate_quads(quads, edges).tolist() == [False, False, True, True, True]
+
+
+def edges_of(quads):
+    """Edges by their vertices."""
+    pairs = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1), axis=-1)
+    return np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)[1].reshape(quads.shape)

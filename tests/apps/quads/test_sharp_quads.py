@@ -144,3 +144,12 @@ def test_elimination_spans_all_solutions(seed, solutions):
     else:  # turned: as long as what least squares leave
         nearest = rows @ np.linalg.lstsq(rows, right)[0]
         assert np.linalg.norm(missed) == pytest.approx(np.linalg.norm(right - nearest))
+
+
+@pytest.mark.parametrize("count", [10, 300])
+def test_two_triangles_back_to_back(count):
+    """Splitting an edge of both would join the new vertex to the third one by two edges."""
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0.3, 0.8, 0]])
+    mesh = quads(vertices, np.array([[0, 1, 2], [0, 2, 1]]), quads=count, sharp_angle=0.8)
+    assert mesh.euler_characteristic == 2
+    assert abs(len(mesh.quads) - count) < 0.1 * count + 5

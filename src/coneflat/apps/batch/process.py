@@ -113,8 +113,7 @@ class Child:
         seconds = time.perf_counter() - start
         if line.endswith("\n"):
             with suppress(ValueError):
-                row: dict[str, Any] = json.loads(line)
-                return row
+                return json.loads(line)
         self.end()
         remove_unfinished(job.output)
         if limit is not None and seconds >= limit:
@@ -164,8 +163,7 @@ def flatten_here(job: Job, limit: float | None) -> dict[str, Any]:
     """Flatten in a child process, one for each thread of a worker, which is ended at the time limit."""
     if not hasattr(_local, "child"):
         _local.child = Child()
-    row: dict[str, Any] = _local.child.flatten(job, limit)
-    return row
+    return _local.child.flatten(job, limit)
 
 
 def rows_of_cluster(

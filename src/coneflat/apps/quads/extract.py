@@ -14,13 +14,13 @@ from ...mesh import label_components
 from .exact_grid import ExactGrid, exact_grid
 from .grid_points import LOST, GridPoints, Ports, find_points, find_ports, join_ports
 from .integer_map import IntegerGrid
-from .quad_mesh import QuadMesh, require_manifold
+from .quad_mesh import CoarseGridError, QuadMesh, degenerate_quads
 
 # Largest number of squares; at about a kilobyte of peak memory for each, many machines have enough.
 MAX_SQUARES = 20_000_000
 
 
-def extract_quads(grid: IntegerGrid) -> QuadMesh:
+def extract_quads(grid: IntegerGrid, leave_out: bool = False) -> QuadMesh:
     """Return the quad mesh whose edges are the grid lines of an integer-grid map.
 
     The vertices are the grid points on the surface. From each, grid lines leave in as many directions as its angle has
@@ -30,9 +30,13 @@ def extract_quads(grid: IntegerGrid) -> QuadMesh:
     Squares that the boundary cuts are left out and counted. The result is manifold: quads that touch in a single point
     get separate vertices there.
 
+    Args:
+        grid: the map.
+        leave_out: leave out quads with the same vertex or edge twice, instead of raising an error.
+
     Raises:
-        GridError: the map is not an integer-grid map, is so coarse that a quad has the same vertex twice, or has too
-            many squares.
+        GridError: the map is not an integer-grid map, is so coarse that a quad has the same vertex or edge twice, or
+            has too many squares.
 
     References:
         H.-C. Ebke, D. Bommes, M. Campen, L. Kobbelt, "QEx: robust quad mesh extraction", 2013.
@@ -60,8 +64,14 @@ def extract_quads(grid: IntegerGrid) -> QuadMesh:
         raise GridError(
             f"no complete square of the grid lies on the surface, of {area:.1f} squares: use more quads"
         )
-    origin, quads, edge_count = _split_fans(darts, mates, ports.points)
-    require_manifold(quads, len(origin), edge_count)
+    origin, quads, edges = _split_fans(darts, mates, ports.points)
+    notes: tuple[str, ...] = ()
+    while (bad := degenerate_quads(quads, edges)).any():
+        text = f"{plural(int(bad.sum()), 'quad')} of {len(quads):,} with a vertex or an edge twice"
+        if not leave_out or bad.all():
+            raise CoarseGridError(f"{text} ({list_some(np.flatnonzero(bad))}): use more quads")
+        darts, notes = darts[~bad], (*notes, f"Left out {text}: the surface is too thin there.")
+        origin, quads, edges = _split_fans(darts, mates, ports.points)
     barycentric = _barycentric(exact, found, origin)
     corners = exact.mesh.vertices[exact.mesh.faces[found.faces[origin]]]
     return QuadMesh(
@@ -72,6 +82,7 @@ def extract_quads(grid: IntegerGrid) -> QuadMesh:
         left_out,
         area - len(darts),
         exact.mesh,
+        notes,
     )
 
 
@@ -120,8 +131,8 @@ def _close(following: IntArray, ports: Ports) -> tuple[IntArray, int]:
     return darts, len(np.unique(labels[is_corner]))
 
 
-def _split_fans(darts: IntArray, mates: IntArray, points: IntArray) -> tuple[IntArray, IntArray, int]:
-    """Return (q,) the grid point of each vertex, (p, 4) the vertices of quads, and the number of their edges.
+def _split_fans(darts: IntArray, mates: IntArray, points: IntArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Return (q,) the grid point of each vertex, (p, 4) the vertices of quads, and (p, 4) the edges of their sides.
 
     There is one vertex for each fan of quads around a point. Vertices are in the order of points.
     """
@@ -140,7 +151,8 @@ def _split_fans(darts: IntArray, mates: IntArray, points: IntArray) -> tuple[Int
     rank = np.argsort(point_of, kind="stable")
     number = np.empty(count, dtype=np.int64)
     number[rank] = np.arange(count)
-    return point_of[rank], number[fan].reshape(-1, 4), darts.size - len(shared) // 2
+    edge = np.where(other >= 0, np.minimum(corner, other), corner)
+    return point_of[rank], number[fan].reshape(-1, 4), edge.reshape(-1, 4)
 
 
 def _barycentric(exact: ExactGrid, found: GridPoints, points: IntArray) -> FloatArray:

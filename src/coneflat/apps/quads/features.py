@@ -9,7 +9,7 @@ import numpy as np
 from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray
 from ...geometry import corner_angles, dihedral_angles, face_normals
-from ...mesh import CutMesh, label_components, open_along, tie_key
+from ...mesh import CutMesh, label_components, label_faces, open_along, tie_key
 
 
 def sharp_edges(mesh: TriangleMesh, angle: float) -> IntArray:
@@ -159,7 +159,7 @@ def split_for_features(
     References:
         M.-C. Rivara, "Algorithms for refining triangular grids suitable for adaptive and multigrid techniques", 1984.
     """
-    mesh = TriangleMesh(vertices, faces)
+    mesh = TriangleMesh(*_without_pillows(vertices, faces))
     edges, origin = edge_indices(mesh, features), np.arange(len(features))
     for _ in range(30):  # each round halves edges
         marked = _too_long(mesh, edges, longest)
@@ -179,14 +179,43 @@ def split_faces(
     return _split(mesh, edges, origin, _chords(mesh, edges))
 
 
+def split_small_components(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
+    """Return a mesh with at least 60 triangles in each component, by splitting edges, and how many were smaller.
+
+    On a sphere, a grid has at least eight cones.
+    """
+    mesh, none = TriangleMesh(*_without_pillows(mesh.vertices, mesh.faces)), np.empty(0, dtype=np.int64)
+    small = 0
+    while True:
+        count, label = label_faces(mesh.faces, len(mesh.vertices))
+        is_small = np.bincount(label, minlength=count) < 60
+        small = small or int(is_small.sum())
+        if not is_small.any():
+            return mesh, small
+        mesh, _, _ = _split(mesh, none, none, is_small[label[mesh.edge_faces[:, 0]]])
+
+
 def edge_indices(mesh: TriangleMesh, pairs: IntArray) -> IntArray:
     """Return (k,) the indices of the edges between pairs of vertices (k, 2)."""
     n = len(mesh.vertices)
     keys = mesh.edges[:, 0] * n + mesh.edges[:, 1]
     low, high = pairs.min(axis=1, initial=n), pairs.max(axis=1, initial=0)
     order = np.argsort(keys)
-    found: IntArray = order[np.searchsorted(keys[order], low * n + high)]
-    return found
+    return order[np.searchsorted(keys[order], low * n + high)]
+
+
+def _without_pillows(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+    """Return a mesh in which faces with the same three vertices are split at their centroids.
+
+    Splitting an edge of two such faces would join the new vertex and the third one by two edges.
+    """
+    _, which, count = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True)
+    paired = count[which.ravel()] > 1
+    corners = faces[paired]
+    middle = len(vertices) + np.arange(len(corners))
+    fans = [np.column_stack([corners[:, [i, (i + 1) % 3]], middle]) for i in range(3)]
+    points = np.concatenate([vertices, vertices[corners].mean(axis=1)])
+    return points, np.concatenate([faces[~paired], *fans])
 
 
 def _too_long(mesh: TriangleMesh, edges: IntArray, longest: float) -> BoolArray:
@@ -196,8 +225,7 @@ def _too_long(mesh: TriangleMesh, edges: IntArray, longest: float) -> BoolArray:
     allowed = np.minimum(longest, np.sqrt(np.bincount(patch, areas, count)) / 4)[patch]
     lengths = lengths_along(mesh, np.arange(len(mesh.edges)))
     one, two = mesh.edge_faces.T
-    too_long: BoolArray = lengths > np.minimum(allowed[one], np.where(two < 0, np.inf, allowed[two]))
-    return too_long
+    return lengths > np.minimum(allowed[one], np.where(two < 0, np.inf, allowed[two]))
 
 
 def _chords(mesh: TriangleMesh, edges: IntArray) -> BoolArray:
@@ -233,8 +261,7 @@ def _longest_sides(mesh: TriangleMesh, among: BoolArray) -> IntArray:
     rank[np.lexsort((key, rounded))] = np.arange(len(lengths))
     rank[~among] = -1
     sides = mesh.halfedge_edges.reshape(-1, 3)
-    longest: IntArray = sides[np.arange(len(sides)), np.argmax(rank[sides], axis=1)]
-    return longest
+    return sides[np.arange(len(sides)), np.argmax(rank[sides], axis=1)]
 
 
 def _split(

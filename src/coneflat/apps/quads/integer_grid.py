@@ -11,12 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import Flattening, check_mesh, flatten
-from ...base import THREADS, Progress, Stopwatch, limit_threads, plural
-from ...errors import CurvatureError, GridError, MetricError, OptionError
+from ...base import THREADS, FloatArray, IntArray, Progress, Stopwatch, limit_threads, plural
+from ...errors import ConeflatError, CurvatureError, GridError, MetricError, OptionError
 from ...io import as_input
 from ...layout import StretchEnergy
 from ...measure import unmet_guarantees
+from ...mesh import CheckedMesh
 from ...options import WordOrVertices
+from .features import split_small_components
 from .integer_map import IntegerGrid
 from .layout import GRID_TOLERANCE, aligned
 from .options import QUADS, QuadOptions
@@ -138,7 +140,7 @@ class _Search:
         if boundary != "auto":
             return self._of_flattening(boundary)
         may_be_straight = isinstance(self.options.get("cones", "auto"), str)
-        if not (may_be_straight and self._has_boundary()):
+        if not (may_be_straight and self._checked().mesh.is_boundary_edge.any()):
             return self._of_flattening("free")
         try:
             return self._of_flattening("straight", all_sides=True)
@@ -155,9 +157,21 @@ class _Search:
             return found
         return with_note(self._of_flattening(boundary), f"No sharp edge is on a grid line: {why}.")
 
-    def _has_boundary(self) -> bool:
+    def _checked(self) -> CheckedMesh:
         given, repair = as_input(self.mesh, self.faces), bool(self.options.get("repair", False))
-        return bool(check_mesh(given.vertices, given.faces, repair=repair).mesh.is_boundary_edge.any())
+        return check_mesh(given.vertices, given.faces, repair=repair)
+
+    def _refined(self) -> tuple[tuple[FloatArray, IntArray], tuple[str, ...]]:
+        """Return the mesh with the triangles of small components split, and notes; no notes if none is small."""
+        checked = self._checked()
+        mesh, count = split_small_components(checked.mesh)
+        note = (
+            f"Split the triangles of {plural(count, 'component')} with too few vertices for cones of a grid."
+        )
+        return (np.ldexp(mesh.vertices, -checked.exponent), mesh.faces), (
+            *checked.notes,
+            note,
+        ) if count else ()
 
     def _of_flattening(self, boundary: Any, all_sides: bool = False) -> IntegerGrid:
         """Return the grid of a flattening with a boundary; `all_sides` requires all straight sides on grid lines.
@@ -167,12 +181,21 @@ class _Search:
         """
         options = {**self.options, "boundary": boundary}
         self.stages.done = 0.0
+        given = {**_defaults(options), **options, "progress": self.progress}
+        refined: tuple[str, ...] = ()
         with self.stages("flatten"):
-            result = flatten(
-                self.mesh, self.faces, progress=self.progress, **{**_defaults(options), **options}
-            )
+            try:
+                result = flatten(self.mesh, self.faces, **given)
+            except CurvatureError as error:
+                finer, refined = self._refined()
+                if not refined:
+                    raise
+                try:
+                    result = flatten(finer, **given)
+                except ConeflatError:
+                    raise error from None
         # Unmet guarantees of the map do not apply to the grid.
-        notes = tuple(note for note in result.notes if note not in unmet_guarantees(result))
+        notes = (*refined, *(note for note in result.notes if note not in unmet_guarantees(result)))
         found = self.of_result(result, options, all_sides)
         return replace(found, notes=(*notes, *found.notes))
 

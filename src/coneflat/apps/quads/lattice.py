@@ -119,8 +119,7 @@ class Lattice:
         squares: FloatArray = np.full(count, np.inf)
         number = enumerate_points(root, target, found, squares, visits)
         order = np.argsort(squares[:number], kind="stable")
-        nearest: IntArray = self.one + found[order] @ basis.T
-        return nearest
+        return self.one + found[order] @ basis.T
 
     def _reduction(self) -> tuple[FloatArray, IntArray]:
         """Return the Cholesky factor of the reduced basis' Gram matrix, and (k, k) the change of basis."""

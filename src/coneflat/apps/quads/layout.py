@@ -218,10 +218,7 @@ def _directions(
 ) -> FloatArray:
     """Return (c,) the mean direction of weighted vectors up to quarter turns; `label` is the component of each."""
     fourth, count = weights * (vectors / np.abs(vectors)) ** 4, int(component.max(initial=-1)) + 1
-    angles: FloatArray = (
-        np.angle(np.bincount(label, fourth.real, count) + 1j * np.bincount(label, fourth.imag, count)) / 4
-    )
-    return angles
+    return np.angle(np.bincount(label, fourth.real, count) + 1j * np.bincount(label, fourth.imag, count)) / 4
 
 
 def find_sides(layout: Layout, is_straight: BoolArray) -> Sides:

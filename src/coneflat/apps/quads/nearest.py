@@ -163,8 +163,7 @@ class Stars:
 
     def at(self, on_faces: IntArray, barycentric: FloatArray) -> FloatArray:
         """Return (q, 3) the positions of points given by triangles (q,) and barycentric coordinates (q, 3)."""
-        places: FloatArray = np.einsum("qi,qix->qx", barycentric, self.vertices[self.faces[on_faces]])
-        return places
+        return np.einsum("qi,qix->qx", barycentric, self.vertices[self.faces[on_faces]])
 
     def axes(self, face: int) -> FloatArray:
         """Return (2, 3) orthonormal axes of a triangle's plane, the first along its longest side."""

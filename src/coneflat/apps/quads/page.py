@@ -132,8 +132,7 @@ def _unfold(twin: IntArray, is_cut: BoolArray, count: int) -> tuple[Domains, Boo
 
 
 def _turned(turn: IntArray, vectors: IntArray) -> IntArray:
-    found: IntArray = np.einsum("qxy,qy->qx", TURNS[turn], vectors)
-    return found
+    return np.einsum("qxy,qy->qx", TURNS[turn], vectors)
 
 
 def arranged(domains: Domains) -> tuple[IntArray, int]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import BoolArray, FloatArray, IntArray, dots, list_some, plural
+from ...base import BoolArray, FloatArray, IntArray, dots
 from ...errors import GridError
 from ...mesh import sort_pairs
 
@@ -145,26 +145,23 @@ class QuadMesh:
         return read_quads(path)
 
 
-def require_manifold(quads: IntArray, vertex_count: int, edge_count: int) -> None:
-    """Raise GridError unless all quads have four different vertices, and no two edges have the same two vertices.
+class CoarseGridError(GridError):
+    """A grid is so coarse that its quads are not a mesh."""
+
+
+def degenerate_quads(quads: IntArray, edges: IntArray) -> BoolArray:
+    """Return (p,) whether a quad has a vertex twice, or a side with the same vertices as another edge.
 
     Args:
         quads: (p, 4) vertex indices.
-        vertex_count, edge_count: number of vertices and edges on the surface.
+        edges: (p, 4) the edge of the side from each vertex to the next one.
     """
-    again = np.flatnonzero((np.diff(np.sort(quads, axis=1), axis=1) == 0).any(axis=1))
-    if len(again):
-        raise GridError(
-            f"{plural(len(again), 'quad')} of {len(quads):,} with a vertex twice ({list_some(again)}): the grid is too "
-            "coarse; use more quads"
-        )
-    _, first = sort_pairs(quads.ravel(), np.roll(quads, -1, axis=1).ravel(), vertex_count)
-    missing = edge_count - int(first.sum())
-    if missing:
-        raise GridError(
-            f"{plural(missing, 'edge')} of {edge_count:,} with the same vertices as another edge: the grid is too "
-            "coarse; use more quads"
-        )
+    ahead = np.roll(quads, -1, axis=1)
+    key = np.minimum(quads, ahead) * (int(quads.max(initial=0)) + 1) + np.maximum(quads, ahead)
+    _, first = np.unique(edges, return_index=True)
+    keys, count = np.unique(key.ravel()[first], return_counts=True)
+    is_twice = (np.diff(np.sort(quads, axis=1), axis=1) == 0).any(axis=1)
+    return is_twice | np.isin(key, keys[count > 1]).any(axis=1)
 
 
 def least_jacobians(points: FloatArray, quads: IntArray) -> FloatArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -14,7 +15,7 @@ from .extract import extract_quads
 from .integer_grid import integer_grid
 from .integer_map import IntegerGrid
 from .options import ROUNDS
-from .quad_mesh import QuadMesh, least_jacobians
+from .quad_mesh import CoarseGridError, QuadMesh, least_jacobians
 from .smooth import smooth_quads, untangled
 
 
@@ -45,7 +46,7 @@ def quads(
         The quad mesh, with the position of its vertices on the surface.
 
     Raises:
-        GridError: no grid of this size without flipped triangles was found, or it is too coarse for quads.
+        GridError: no grid of this size, or somewhat finer, without flipped triangles was found.
         OptionError: an option is unknown or invalid.
         MeshError, CurvatureError, SeamError, MetricError: as for `coneflat.flatten`.
 
@@ -55,25 +56,34 @@ def quads(
         >>> mesh.quads.shape, mesh.vertices.shape
         ((9, 4), (16, 3))
     """
-    progress = options.get("progress")
-    if isinstance(mesh, IntegerGrid):
-        given = (faces, quads, size, sharp_angle)
-        if any(one is not None for one in given) or options.keys() - {"progress"}:
-            raise OptionError("a grid already has faces, size and options: no others can be given")
-        grid = mesh
-    else:
-        grid = integer_grid(
-            mesh, faces, quads=quads, size=size, stretch=stretch, sharp_angle=sharp_angle, **options
-        )
-    stages = Stopwatch(progress)
-    stages.done = 1.0
-    with stages("extract"):
-        found = extract_quads(grid)
+    is_given = isinstance(mesh, IntegerGrid)
+    stages, stated = Stopwatch(options.get("progress")), (faces, quads, size, sharp_angle)
+    if is_given and (any(one is not None for one in stated) or options.keys() - {"progress"}):
+        raise OptionError("a grid already has faces, size and options: no others can be given")
+    search = partial(integer_grid, mesh, faces, stretch=stretch, sharp_angle=sharp_angle, **options)
+    grid, coarse = mesh if is_given else search(quads=quads, size=size), list[str]()
+    # Where the surface is as thin as a square, quads have a vertex twice. Then 1.6 times as many quads are tried, at
+    # most twice. If that does not help, these quads are left out.
+    for retries in (0,) if is_given else (2, 1, 0):
+        stages.done = 1.0
+        try:
+            with stages("extract"):
+                found = extract_quads(grid, leave_out=not (is_given or retries))
+            break
+        except CoarseGridError:
+            if not retries:
+                raise
+            coarse.append("More quads than wanted: with fewer, some have a vertex or an edge twice.")
+            grid = search(size=grid.size / 1.6**0.5)
     with stages("smooth"):
         found = smooth_quads(found, smooth, grid.features)
         if smooth:
             found = untangled(found)
-    return replace(found, notes=(*grid.notes, *_notes(found)), seconds={**grid.seconds, **stages.seconds})
+    return replace(
+        found,
+        notes=(*grid.notes, *coarse[:1], *found.notes, *_notes(found)),
+        seconds={**grid.seconds, **stages.seconds},
+    )
 
 
 def _notes(found: QuadMesh) -> Iterator[str]:

@@ -23,29 +23,28 @@ NOTED_SHARE = 0.1
 def grid_of(layout: Layout, energy: StretchEnergy) -> IntegerGrid:
     """Return the grid of a smooth layout.
 
-    If rounding changes the number of squares much, the size is corrected.
+    If rounding changes the number of squares much, the size is corrected. If there is no grid of this size, a finer one
+    is returned.
 
     Raises:
-        GridError: no grid was found; the message names a number of quads with a grid, if there is one.
+        GridError: no grid was found.
     """
     is_split = between_nodes(layout)
     split = int(is_split.sum())
     if split:
         layout = split_edges(layout, is_split)
-    found, why = grid_near(layout, energy)
-    wanted = layout.area
+    wanted, found, why, most = layout.area, None, "", 4
+    for finer in (2.0**k for k in range(most + 1)):
+        found, why = grid_near(layout.scaled(finer), energy)
+        if found is not None:
+            break
     if found is None:
-        most = 4
-        advice = f"none was found with up to {2**most} times as many"
-        for k in range(1, most + 1):
-            finer = layout.scaled(2**k)
-            if grid_near(finer, energy)[0] is not None:
-                advice = f"{finer.area:,.0f} quads are possible"
-                break
-        raise GridError(f"no grid of about {wanted:,.0f} quads was found: {why}; {advice}")
+        raise GridError(
+            f"no grid of about {wanted:,.0f} quads, or of up to {2**most} times as many, was found: {why}"
+        )
     factor, last = 1.0, _squares(found)
     for _ in range(4):
-        if abs(_squares(found) - wanted) <= NOTED_SHARE * wanted:
+        if finer > 1 or abs(_squares(found) - wanted) <= NOTED_SHARE * wanted:
             break
         # Later corrections are halved, because the number of squares changes by entire rows.
         factor *= (wanted / last) if factor == 1.0 else math.sqrt(wanted / last)

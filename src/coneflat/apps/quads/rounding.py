@@ -42,8 +42,7 @@ class Stiffness:
         """Return the displacements (2u, k) of least energy for changes (v, k) of the variables."""
         given = self._shifts @ values
         right = -(self._turned.T @ (self._energy @ given))
-        shifts: FloatArray = given + self._turned @ self._factor.solve(np.ascontiguousarray(right))
-        return shifts
+        return given + self._turned @ self._factor.solve(np.ascontiguousarray(right))
 
     def gram(self, basis: IntArray) -> FloatArray:
         """Return (d, d) the Gram matrix of the columns of a basis (v, d) in the energy."""
@@ -121,8 +120,7 @@ class ConePairs:
         sizes = np.linalg.norm(after, axis=1) * np.linalg.norm(self.before, axis=1)
         is_bad = along <= np.cos(angle) * sizes + np.finfo(float).eps
         order = np.argsort((self.before**2).sum(axis=1), kind="stable")
-        bad: IntArray = order[is_bad[order]]
-        return bad
+        return order[is_bad[order]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,8 +146,7 @@ class Rounding:
     @property
     def smooth(self) -> FloatArray:
         """(v,) the variables of the smooth layout, projected to the solutions of the equations."""
-        values: FloatArray = self.basis @ self.start
-        return values
+        return self.basis @ self.start
 
     def candidates(self) -> list[IntArray]:
         """Return integer values (v,) of the variables near the smooth ones that merge no two cones.
@@ -201,8 +198,7 @@ class Rounding:
         moved = self.layout.points[:, None] + shifts[0::2] + 1j * shifts[1::2]
         a, b, c = (moved[self.layout.corners[:, i]] for i in range(3))
         doubled = (np.conj(b - a) * (c - a)).imag
-        areas: FloatArray = -np.minimum(doubled, 0.0).sum(axis=0)
-        return areas
+        return -np.minimum(doubled, 0.0).sum(axis=0)
 
     def _separate(self, pair: int, lattice: Lattice) -> Lattice | None:
         """Return the part of a lattice where two cones keep their distance along an axis, at least a unit.
@@ -293,8 +289,7 @@ def _vector(sides: list[tuple[int, int]], transitions: Transitions, points: Comp
     """
 
     def shift(point: int) -> IntArray:
-        rows: IntArray = transitions.shifts[2 * point : 2 * point + 2].toarray()
-        return rows
+        return transitions.shifts[2 * point : 2 * point + 2].toarray()
 
     turn, total = 0, -shift(sides[0][0])
     place = points[sides[0][1]] - points[sides[0][0]]

@@ -177,8 +177,7 @@ class _Search:
         """Return the areas of patches, in squares."""
         count, patch = features.patches_of(self.mesh, self.edges)
         areas = double_areas(self._side_lengths()) / 2
-        found: FloatArray = np.bincount(patch, areas, count) / self.square**2
-        return found
+        return np.bincount(patch, areas, count) / self.square**2
 
     def _drop_some(self, attempt: int) -> None:
         """Leave out dangling edges, or else the borders of the smallest patches, more of them in later attempts."""

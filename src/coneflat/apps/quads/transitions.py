@@ -55,8 +55,7 @@ class Transitions:
         """Return (u,) the points for given values of the variables; copies follow from their base points."""
         shift = self.shifts @ values
         loose = np.where(self.fixed[:, 0], 0, points.real) + 1j * np.where(self.fixed[:, 1], 0, points.imag)
-        moved: ComplexArray = UNITS[self.turn] * loose[self.base] + (shift[0::2] + 1j * shift[1::2])
-        return moved
+        return UNITS[self.turn] * loose[self.base] + (shift[0::2] + 1j * shift[1::2])
 
 
 def find_transitions(layout: Layout) -> Transitions:

@@ -126,8 +126,7 @@ def row_argmins(values: FloatArray) -> IntArray:
     """Return (r,) for each row of values (r, c) the first column whose value equals the minimum up to rounding."""
     least = values.min(axis=1)
     finite = np.where(np.isfinite(least), least, 0.0)
-    columns: IntArray = (values <= (least + TIE_TOLERANCE * np.abs(finite))[:, None]).argmax(axis=1)
-    return columns
+    return (values <= (least + TIE_TOLERANCE * np.abs(finite))[:, None]).argmax(axis=1)
 
 
 @dataclass(eq=False)
@@ -215,8 +214,7 @@ class DenseModel:
         """Return (s,) whether the curvature of a member is strictly between its bounds."""
         k = fitted.curvatures
         span = TIE_TOLERANCE * (1.0 + np.abs(k))
-        inside: BoolArray = (self.least[members] + span < k) & (k < self.limits.most - span)
-        return inside
+        return (self.least[members] + span < k) & (k < self.limits.most - span)
 
     def _gradient(self, members: IntArray, fitted: Fit) -> FloatArray:
         """Return (m,) half the derivative of the Lagrangian of E^2 and the sum by the curvature of each candidate."""

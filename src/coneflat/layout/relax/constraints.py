@@ -147,8 +147,7 @@ def _checked_lines(
 
 
 def _across(directions: FloatArray, places: FloatArray) -> FloatArray:
-    across: FloatArray = directions[:, 0] * places[:, 1] - directions[:, 1] * places[:, 0]
-    return across
+    return directions[:, 0] * places[:, 1] - directions[:, 1] * places[:, 0]
 
 
 def _indices(value: ArrayLike, count: int, name: str) -> IntArray:
@@ -159,8 +158,7 @@ def _indices(value: ArrayLike, count: int, name: str) -> IntArray:
         raise OptionError(f"{name} must be a list of indices, got {given.dtype} of shape {given.shape}")
     if given.min() < 0 or given.max() >= count:
         raise OptionError(f"{name} must be below {count}, got indices from {given.min()} to {given.max()}")
-    indices: IntArray = given.astype(np.int64)
-    return indices
+    return given.astype(np.int64)
 
 
 def _floats(value: ArrayLike, name: str) -> FloatArray:

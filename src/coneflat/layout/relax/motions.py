@@ -52,8 +52,7 @@ class Motions:
         motions = self.builder.at(points).motions()
         step = np.zeros(motions.count + 1)
         step[-1] = CLOSING_UNIT
-        moved: ComplexArray = points + motions.shifts(step)
-        return moved
+        return points + motions.shifts(step)
 
     def shifts(self, step: FloatArray) -> ComplexArray:
         """Return (u,) the complex shifts of the points for a step (k + 1,) of the unknowns and the offset."""
@@ -314,10 +313,7 @@ class _Builder:
         lines, first = np.unique(c.line, return_index=True)
         loose = np.isnan(at[lines])
         at[lines[loose]] = across[first[loose]]
-        here: FloatArray = (
-            at[line] - (np.conj(1j * as_complex(c.directions)[line]) * self.points[points]).real
-        )
-        return here
+        return at[line] - (np.conj(1j * as_complex(c.directions)[line]) * self.points[points]).real
 
     def _solutions(self) -> csr_matrix:
         """Return (v, k + 1) a basis of the variables' values, and a particular solution in the last column."""

@@ -136,8 +136,7 @@ def _strands(vertices: IntArray, sides: IntArray, is_node: BoolArray) -> tuple[I
 
 def _nearest_quarter(turns: ComplexArray) -> ComplexArray:
     """Return for each number the nearest of 1, i, -1 and -i."""
-    nearest: ComplexArray = QUARTER_TURNS[np.rint(np.angle(turns) / (np.pi / 2)).astype(np.int64) % 4]
-    return nearest
+    return QUARTER_TURNS[np.rint(np.angle(turns) / (np.pi / 2)).astype(np.int64) % 4]
 
 
 def _rotating(vertices: IntArray, sides: IntArray, turns: ComplexArray, is_node: BoolArray) -> IntArray:
@@ -150,8 +149,7 @@ def _rotating(vertices: IntArray, sides: IntArray, turns: ComplexArray, is_node:
     edge, point = edge[order], point[order]
     # The first sides of both edges are on the same side of the seam if they share a point.
     other = np.where(point[:, 0] == point[:, 1], turns[edge[:, 1]], np.conj(turns[edge[:, 1]]))
-    turning: IntArray = ends[order[np.abs(other - turns[edge[:, 0]]) > ROTATION_TOLERANCE, 0]]
-    return turning
+    return ends[order[np.abs(other - turns[edge[:, 0]]) > ROTATION_TOLERANCE, 0]]
 
 
 def _check_rigid(edges: IntArray, vertices: IntArray, one: ComplexArray, two: ComplexArray) -> None:

@@ -123,5 +123,4 @@ def eye_direction(eye: Eye, up: str = "y") -> FloatArray:
 def _upward(up: str) -> FloatArray:
     if not isinstance(up, str) or up not in ("x", "y", "z"):  # Arrays cannot be compared with strings.
         raise OptionError(f'the upward axis must be "x", "y" or "z", not {short_repr(up)}')
-    axis: FloatArray = np.eye(3)["xyz".index(up)]
-    return axis
+    return np.eye(3)["xyz".index(up)]
