@@ -36,7 +36,7 @@ CEILINGS = {
     "apps.cli": 1506,
     "apps.measure_uv": 161,
     "apps.peers": 1406,
-    "apps.quads": 3234,
+    "apps.quads": 3251,
     "apps.studio": 1751,
     "apps.view": 1623,
     "atlas": 1492,
@@ -61,7 +61,7 @@ CEILINGS = {
     "stages": 223,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_865, 233, 25_982
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_865, 233, 25_999
 CONSTANTS, KERNELS, NAMES, LEVELS = 300, 111, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

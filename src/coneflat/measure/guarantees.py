@@ -32,9 +32,9 @@ WINDING_TOLERANCE = 1.0
 EXTREME_QC, EXTREME_TAIL = 1.25, 2.0
 # QC distortion of a triangle that is named, whatever the others have.
 NEEDLE_QC = 1e3
-# Tolerance of the turning angle of a round boundary at a vertex: radians, as it is solved iteratively to a thousandth,
-# plus a fraction of the turning angle of a circle, which is not visible.
-NOT_ROUND, NOT_ROUND_SHARE = 1e-3, 0.02
+# Tolerance of the turning angle of a round boundary at a vertex: radians, as it is solved iteratively, plus a fraction
+# of the turning angle of a circle, which is not visible.
+NOT_ROUND, NOT_ROUND_SHARE = 1e-5, 0.02
 # Tolerated relative difference of the sides of marked seams for methods without a flat metric.
 ROUGH_TOLERANCE = 0.01
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 import numpy as np
 import pytest
 import shapes
@@ -161,6 +163,24 @@ def test_a_grid_that_is_too_coarse_is_made_finer(shared):
     grid = integer_grid(result, quads=5)
     check_laws(grid)
     assert any("squares, not 5." in note for note in grid.notes)
+
+
+def test_more_cones_are_tried_where_a_grid_is_not_found(monkeypatch):
+    module, tried = import_module("coneflat.apps.quads.integer_grid"), []
+
+    def failing(*mesh, **given):
+        tried.append(given["distortion"])
+        if len(tried) < 2:
+            raise errors.ConvergenceError("rotations did not reach multiples")
+        return flatten(*mesh, **given)
+
+    monkeypatch.setattr(module, "flatten", failing)
+    grid = integer_grid(*shapes.sphere(3), quads=300, distortion=0.1)
+    assert tried == pytest.approx([0.1, 0.07])
+    assert "With a distortion above 0.07, no grid was found." in grid.notes
+    tried.clear()
+    with pytest.raises(errors.ConvergenceError):
+        integer_grid(*shapes.sphere(3), quads=300, distortion=0.1, cone_count=8)
 
 
 def test_numbering_changes_nothing():

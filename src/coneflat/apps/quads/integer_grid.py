@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import Flattening, check_mesh, flatten
-from ...base import THREADS, FloatArray, IntArray, Progress, Stopwatch, limit_threads, plural
-from ...errors import ConeflatError, CurvatureError, GridError, MetricError, OptionError
+from ...base import DISTORTION, THREADS, FloatArray, IntArray, Progress, Stopwatch, limit_threads, plural
+from ...errors import ConeflatError, ConvergenceError, CurvatureError, GridError, MetricError, OptionError
 from ...io import as_input
 from ...layout import StretchEnergy
 from ...measure import unmet_guarantees
@@ -93,10 +93,8 @@ def integer_grid(
         if faces is not None or options or sharp_angle is not None:
             raise OptionError("a flattening already has faces and options: no others can be given")
         found = search.of_result(mesh)
-    elif sharp_angle is not None:
-        found = search.with_lines(sharp_angle, options.pop("boundary", "auto"))
     else:
-        found = search.with_boundary(options.pop("boundary", "auto"))
+        found = search.with_more_cones(sharp_angle, options.pop("boundary", "auto"))
     return replace(found, seconds=stages.seconds)
 
 
@@ -135,6 +133,23 @@ class _Search:
     progress: Progress | None
     stages: Stopwatch
 
+    def with_more_cones(self, sharp_angle: float | str | None, boundary: Any) -> IntegerGrid:
+        """Return a grid for the options `sharp_angle` and `boundary`, with less distortion if there is none as given.
+
+        Where few cones leave rotations around handles far from quarter turns, more cones help.
+        """
+        given = self.options
+        is_searched = isinstance(given.get("cones", "auto"), str) and not given.get("cone_count")
+        try:
+            return self.with_lines(sharp_angle, boundary)
+        except (ConvergenceError, GridError):
+            if not is_searched:
+                raise
+        less = 0.7 * given.get("distortion", DISTORTION)
+        search = replace(self, options={**given, "distortion": less})
+        note = f"With a distortion above {less:.3g}, no grid was found."
+        return with_note(search.with_lines(sharp_angle, boundary), note)
+
     def with_boundary(self, boundary: Any) -> IntegerGrid:
         """Return a grid for the option `boundary` of `integer_grid`."""
         if boundary != "auto":
@@ -148,8 +163,10 @@ class _Search:
             why = f"The boundary cuts squares, because no grid with the boundary on grid lines was found: {error}."
         return with_note(self._of_flattening("free"), why)
 
-    def with_lines(self, sharp_angle: float | str, boundary: Any) -> IntegerGrid:
+    def with_lines(self, sharp_angle: float | str | None, boundary: Any) -> IntegerGrid:
         """Return a grid with the boundary and as many sharp edges as possible on grid lines."""
+        if sharp_angle is None:
+            return self.with_boundary(boundary)
         boundary = "free" if boundary == "auto" else boundary
         with self.stages("grid"):
             found, why = self._along_axes({**self.options, "sharp_angle": sharp_angle, "boundary": boundary})

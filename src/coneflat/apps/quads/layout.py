@@ -54,7 +54,7 @@ class Sides:
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class GridLayout:
     """A layout in units of a grid.
 
     Attributes:
@@ -104,7 +104,7 @@ class Layout:
         """Return (m,) twice the signed areas of triangles in the plane, negative for flipped ones."""
         return signed_double_areas(as_pairs(self.points)[self.corners])
 
-    def scaled(self, factor: float) -> Layout:
+    def scaled(self, factor: float) -> GridLayout:
         """Return the layout with the number of squares multiplied by a factor."""
         times = float(np.sqrt(factor))
         return replace(self, points=times * self.points, size=self.size / times)
@@ -114,7 +114,7 @@ class Layout:
         return find_chains(self.mesh, self.corners, self.points, self.nodes, quarter_turns=quarter_turns)
 
 
-def aligned(result: Flattening, quads: float | None, size: float | None) -> Layout:
+def aligned(result: Flattening, quads: float | None, size: float | None) -> GridLayout:
     """Return the layout of a flattening, rotated so that the grid is aligned with creases and boundaries.
 
     Charts are joined at some seams, and a cone of each component is at the origin.
@@ -142,16 +142,16 @@ def aligned(result: Flattening, quads: float | None, size: float | None) -> Layo
         size = float(np.sqrt(area / quads))
     scale = np.sqrt(area / size**2 / (flat.sum() / 2))
     points = scale * as_complex(result.uv)
-    cones = np.asarray(result.cones, dtype=np.int64)
-    cones = cones[~mesh.is_boundary_vertex[cones]]
-    layout, component = joined_charts(Layout(mesh, lengths, result.uv_faces, points, cones, Sides(), size))
+    cones = np.setdiff1d(result.cones, np.flatnonzero(mesh.is_boundary_vertex))
+    apart = GridLayout(mesh, lengths, result.uv_faces, points, cones, Sides(), size)
+    layout, component = joined_charts(apart)
     is_straight, angles = _side_angles(layout, component)
     angles = np.where(is_straight, angles, _crease_angles(layout, component))
     layout = replace(layout, points=layout.points * np.exp(-1j * angles)[component])
     return at_origin(replace(layout, sides=find_sides(layout, is_straight[component])), component)
 
 
-def joined_charts(layout: Layout) -> tuple[Layout, IntArray]:
+def joined_charts(layout: GridLayout) -> tuple[GridLayout, IntArray]:
     """Return a layout with the charts of each component joined, and (u,) the component of each point.
 
     The motion across each of the chains that `joining_chains` returns becomes the identity.
@@ -179,7 +179,7 @@ def joined_charts(layout: Layout) -> tuple[Layout, IntArray]:
     return replace(layout, points=points), component
 
 
-def at_origin(layout: Layout, component: IntArray) -> Layout:
+def at_origin(layout: GridLayout, component: IntArray) -> GridLayout:
     """Return a layout with the first cone or corner of each component, or the first point on a side, at the origin."""
     at = np.concatenate([first_points(layout.vertex)[layout.nodes], layout.sides.points])[::-1]
     origins = np.zeros(int(component.max(initial=-1)) + 1, dtype=np.complex128)
@@ -187,7 +187,7 @@ def at_origin(layout: Layout, component: IntArray) -> Layout:
     return replace(layout, points=layout.points - origins[component])
 
 
-def _crease_angles(layout: Layout, component: IntArray) -> FloatArray:
+def _crease_angles(layout: GridLayout, component: IntArray) -> FloatArray:
     """Return (c,) the main direction of the creases of each component, an angle up to quarter turns.
 
     The weight of an edge is its length times its dihedral angle (Cohen-Steiner and Morvan 2003); boundary edges count
@@ -200,7 +200,7 @@ def _crease_angles(layout: Layout, component: IntArray) -> FloatArray:
     return _directions(layout.lengths.ravel()[one] * bend, side, component, component[starts[one]])
 
 
-def _side_angles(layout: Layout, component: IntArray) -> tuple[BoolArray, FloatArray]:
+def _side_angles(layout: GridLayout, component: IntArray) -> tuple[BoolArray, FloatArray]:
     """Return (c,) whether the boundary of each component consists of sides at right angles, and (c,) their direction.
 
     component: (u,) the component of each point.
@@ -221,7 +221,7 @@ def _directions(
     return np.angle(np.bincount(label, fourth.real, count) + 1j * np.bincount(label, fourth.imag, count)) / 4
 
 
-def find_sides(layout: Layout, is_straight: BoolArray) -> Sides:
+def find_sides(layout: GridLayout, is_straight: BoolArray) -> Sides:
     """Return the straight sides of a layout, along the axes; `is_straight` (u,) marks points of such components."""
     mesh, points, border = layout.mesh, layout.points, layout.border
     starts, ends = (each[border] for each in layout.ends)
@@ -251,7 +251,7 @@ def quarters_around(mesh: TriangleMesh, sides: ComplexArray) -> IntArray:
     return np.rint(sums / (np.pi / 2)).astype(np.int64)
 
 
-def charts_of(layout: Layout, chains: SeamChains) -> tuple[IntArray, IntArray]:
+def charts_of(layout: GridLayout, chains: SeamChains) -> tuple[IntArray, IntArray]:
     """Return (u,) the chart of each point, and (u,) its component."""
     count = len(layout.points)
     charts, chart = label_faces(layout.corners, count)
@@ -295,7 +295,7 @@ PIECES: tuple[tuple[tuple[int, int, int], ...], ...] = (
 )
 
 
-def between_nodes(layout: Layout) -> BoolArray:
+def between_nodes(layout: GridLayout) -> BoolArray:
     """Return (e,) whether each edge joins two vertices that must lie on grid points.
 
     A triangle of three such vertices degenerates if they are rounded to collinear points.
@@ -305,7 +305,7 @@ def between_nodes(layout: Layout) -> BoolArray:
     return np.asarray(is_node[layout.mesh.edges].all(axis=1))
 
 
-def split_edges(layout: Layout, is_split: BoolArray) -> Layout:
+def split_edges(layout: GridLayout, is_split: BoolArray) -> GridLayout:
     """Return a layout of the same surface with the edges `is_split` (e,) split at their midpoints."""
     mesh, corners, points = layout.mesh, layout.corners, layout.points
     edge_of = mesh.halfedge_edges.reshape(-1, 3)

@@ -19,7 +19,7 @@ from ...options import Options
 from ...seams import find_seams
 from ...stages import ConeSolution, Cut, Surface
 from .features import Opened
-from .layout import Layout, Sides, at_origin, find_sides, joined_charts
+from .layout import GridLayout, Sides, at_origin, find_sides, joined_charts
 
 
 class PatchError(GridError):
@@ -36,7 +36,7 @@ class CoarseError(PatchError):
 
 def sharp_layout(
     opened: Opened, lengths: FloatArray, size: float, options: Options, tell: Callable[[int, int], None]
-) -> Layout:
+) -> GridLayout:
     """Return a seamless layout of a mesh with sharp edges along the axes, in units of a grid.
 
     Args:
@@ -62,7 +62,7 @@ def sharp_layout(
 
 def _flat_patches(
     opened: Opened, lengths: FloatArray, size: float, options: Options, tell: Callable[[int, int], None]
-) -> Layout:
+) -> GridLayout:
     """Return the layout of all patches of an opened mesh, each with its own area; they do not match yet.
 
     Raises:
@@ -96,7 +96,7 @@ def _flat_patches(
         )
     every = np.concatenate([*cones, opened.irregular])
     sides = Sides(np.setdiff1d(opened.nodes, opened.irregular))
-    return Layout(opened.mesh, lengths, corners, np.concatenate(points), every, sides, size)
+    return GridLayout(opened.mesh, lengths, corners, np.concatenate(points), every, sides, size)
 
 
 def _flat_patch(
@@ -167,7 +167,7 @@ def _along_axes(mesh: TriangleMesh, corners: IntArray, points: ComplexArray) -> 
     return points * np.exp(-1j * angle)
 
 
-def _fitting(opened: Opened, layout: Layout) -> ComplexArray:
+def _fitting(opened: Opened, layout: GridLayout) -> ComplexArray:
     """Return the relaxed points of patches: sides are along the axes, and both sides of seams match by quarter turns.
 
     Raises:
@@ -192,7 +192,7 @@ def _fitting(opened: Opened, layout: Layout) -> ComplexArray:
     return as_complex(found.points)
 
 
-def _all_sides(opened: Opened, layout: Layout, chains: SeamChains) -> Sides:
+def _all_sides(opened: Opened, layout: GridLayout, chains: SeamChains) -> Sides:
     """Return the sides along the axes: sides of the boundary, and the left sides of feature chains."""
     points = layout.points
     border = find_sides(layout, np.ones(len(points), dtype=bool))

@@ -12,7 +12,7 @@ from ...errors import ConvergenceError, GridError, OptionError
 from ...geometry import as_complex, as_pairs, double_areas, map_factors, sides_between, signed_double_areas
 from ...layout import Lines, PointConstraints, Relaxed, StretchEnergy, relax, rest_sides
 from .integer_map import IntegerGrid, find_motions
-from .layout import Layout, between_nodes, quarters_around, split_edges
+from .layout import GridLayout, between_nodes, quarters_around, split_edges
 from .rounding import Rounding, find_rounding
 from .transitions import Transitions, find_transitions
 
@@ -20,7 +20,7 @@ from .transitions import Transitions, find_transitions
 NOTED_SHARE = 0.1
 
 
-def grid_of(layout: Layout, energy: StretchEnergy) -> IntegerGrid:
+def grid_of(layout: GridLayout, energy: StretchEnergy) -> IntegerGrid:
     """Return the grid of a smooth layout.
 
     If rounding changes the number of squares much, the size is corrected. If there is no grid of this size, a finer one
@@ -74,7 +74,7 @@ def _squares(grid: IntegerGrid) -> float:
     return float(signed_double_areas(grid.corner_grid).sum()) / 2
 
 
-def grid_near(layout: Layout, energy: StretchEnergy) -> tuple[IntegerGrid | None, str]:
+def grid_near(layout: GridLayout, energy: StretchEnergy) -> tuple[IntegerGrid | None, str]:
     """Return a grid for one of the nearest lattice points, or None and the reason why the last one failed."""
     transitions = find_transitions(layout)
     try:
@@ -99,7 +99,7 @@ def grid_near(layout: Layout, energy: StretchEnergy) -> tuple[IntegerGrid | None
 
 
 def _displaced(
-    layout: Layout, smooth: ComplexArray, rounding: Rounding, transitions: Transitions, values: IntArray
+    layout: GridLayout, smooth: ComplexArray, rounding: Rounding, transitions: Transitions, values: IntArray
 ) -> ComplexArray:
     """Return the layout with seams and cones at their rounded values, moved by the displacement of least energy.
 
@@ -112,7 +112,11 @@ def _displaced(
 
 
 def _relaxed(
-    layout: Layout, smooth: ComplexArray, transitions: Transitions, values: IntArray, energy: StretchEnergy
+    layout: GridLayout,
+    smooth: ComplexArray,
+    transitions: Transitions,
+    values: IntArray,
+    energy: StretchEnergy,
 ) -> Relaxed:
     """Return the relaxed layout with integer translations of seams and cones on grid points.
 
@@ -165,7 +169,7 @@ def _snapped(found: Relaxed, transitions: Transitions, values: IntArray) -> Comp
 
 
 def _make_grid(
-    layout: Layout, smooth: ComplexArray, points: ComplexArray, found: Relaxed, tries: int
+    layout: GridLayout, smooth: ComplexArray, points: ComplexArray, found: Relaxed, tries: int
 ) -> IntegerGrid:
     mesh, corner_grid = layout.mesh, as_pairs(points)[layout.corners]
     turns, shifts, _ = find_motions(mesh, corner_grid)
@@ -199,7 +203,7 @@ def _make_grid(
     )
 
 
-def _moves(layout: Layout, smooth: ComplexArray, points: ComplexArray) -> tuple[float, float]:
+def _moves(layout: GridLayout, smooth: ComplexArray, points: ComplexArray) -> tuple[float, float]:
     """Return the root mean square and the largest displacement of cones in grid units, relative to their mean."""
     at = np.isin(layout.mesh.faces, layout.nodes)
     if not at.any():
@@ -209,7 +213,7 @@ def _moves(layout: Layout, smooth: ComplexArray, points: ComplexArray) -> tuple[
     return float(np.sqrt((size**2).mean())), float(size.max())
 
 
-def _distortion(layout: Layout, points: ComplexArray) -> tuple[float, float]:
+def _distortion(layout: GridLayout, points: ComplexArray) -> tuple[float, float]:
     """Return the mean quasi-conformal distortion weighted by area, and the least area of a triangle over its ideal."""
     areas = double_areas(layout.lengths) / 2
     real = areas > 0

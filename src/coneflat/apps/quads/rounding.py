@@ -15,7 +15,7 @@ from ...errors import GridError
 from ...geometry import cotangents
 from ...linalg import factorize
 from .lattice import Lattice, integer_solutions
-from .layout import Layout
+from .layout import GridLayout
 from .transitions import TURNS, UNITS, Transitions
 
 
@@ -28,7 +28,7 @@ class Stiffness:
     which some belong to loops around the entire model and some to loops around a finger.
     """
 
-    def __init__(self, layout: Layout, transitions: Transitions) -> None:
+    def __init__(self, layout: GridLayout, transitions: Transitions) -> None:
         self._shifts = transitions.shifts
         self._energy = kron(_laplacian(layout), np.eye(2)).tocsr()
         self._turned = _turned_copies(transitions)
@@ -57,7 +57,7 @@ class Stiffness:
         return (gram + gram.T) / 2 + 1e-10 * max(float(np.trace(gram)), 1.0) * np.eye(count)
 
 
-def _laplacian(layout: Layout) -> csr_matrix:
+def _laplacian(layout: GridLayout) -> csr_matrix:
     """Return (u, u) the cotangent Laplacian of the layout."""
     points, (starts, ends) = layout.points, layout.ends
     weights = cotangents(np.abs(points[ends] - points[starts]).reshape(-1, 3)).ravel() / 2
@@ -141,7 +141,7 @@ class Rounding:
     metric: FloatArray
     pairs: ConePairs
     stiffness: Stiffness
-    layout: Layout
+    layout: GridLayout
 
     @property
     def smooth(self) -> FloatArray:
@@ -220,7 +220,7 @@ class Rounding:
         return None
 
 
-def find_rounding(layout: Layout, transitions: Transitions) -> Rounding:
+def find_rounding(layout: GridLayout, transitions: Transitions) -> Rounding:
     """Return the lattice to which the translations and cones of a layout must be rounded."""
     zeros = np.zeros(len(transitions.equations), dtype=np.int64)
     solutions = integer_solutions(transitions.equations, zeros)
@@ -233,7 +233,9 @@ def find_rounding(layout: Layout, transitions: Transitions) -> Rounding:
     return Rounding(basis, start, stiffness.gram(basis), pairs, stiffness, layout)
 
 
-def _near_pairs(layout: Layout, transitions: Transitions, basis: IntArray, start: FloatArray) -> ConePairs:
+def _near_pairs(
+    layout: GridLayout, transitions: Transitions, basis: IntArray, start: FloatArray
+) -> ConePairs:
     """Return the vectors between near cones along the shortest edge paths."""
     mesh, points, cones, (starts, ends) = layout.mesh, layout.points, layout.nodes, layout.ends
     tails, heads = mesh.tails, mesh.heads
@@ -263,8 +265,7 @@ def _near_pairs(layout: Layout, transitions: Transitions, basis: IntArray, start
         rows.append(joining(path).rows)
         ends_of.append((i, j))
     cone_rows = np.array(rows, dtype=np.int64).reshape(len(rows), 2, len(basis))
-    paths = _paths_to_sides(layout)
-    side_rows, length = _distances_to_sides([joining(path) for path in paths], transitions)
+    side_rows, length = _distances_to_sides([joining(each) for each in _paths_to_sides(layout)], transitions)
     side_rows = side_rows @ basis
     # Keep pairs that face each other and are not collinear: the distance is at least 45% of the length of the vector.
     facing = np.abs(side_rows[:, 0] @ start) > np.maximum(0.45 * length, 1e-6)
@@ -305,7 +306,7 @@ def _vector(sides: list[tuple[int, int]], transitions: Transitions, points: Comp
     return PathVector(last, length, sides[0][0], sides[-1][1], turn)
 
 
-def _paths_to_sides(layout: Layout) -> list[list[int]]:
+def _paths_to_sides(layout: GridLayout) -> list[list[int]]:
     """Return short vertex paths between two sides, or a side and a cone, that pass no other side or cone.
 
     Only the shortest path between the same two is returned. Paths between cones are found elsewhere.

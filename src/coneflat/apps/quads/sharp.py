@@ -20,7 +20,7 @@ from ...io import as_input
 from ...options import Options, read_options
 from ...source import Source
 from . import features
-from .layout import Layout
+from .layout import GridLayout
 from .patch_layout import CoarseError, PatchError, sharp_layout
 
 # Options of the cones inside patches and of the input that the user can set; all others have fixed values.
@@ -39,7 +39,7 @@ def sharp_layouts(
     given: Mapping[str, Any],
     defaults: Mapping[str, Any],
     progress: Progress | None,
-) -> Iterator[tuple[Layout, IntArray, tuple[str, ...]]]:
+) -> Iterator[tuple[GridLayout, IntArray, tuple[str, ...]]]:
     """Yield layouts of a surface, each with fewer sharp edges along the axes than the previous one.
 
     With each layout come (k, 2) these sharp edges, as vertices of its mesh, and notes on edges that were left out.
@@ -132,7 +132,7 @@ class _Search:
             f"lines{why}.",
         )
 
-    def layouts(self) -> Iterator[Layout]:
+    def layouts(self) -> Iterator[GridLayout]:
         """Yield layouts; until the next one, the features of a layout are `edges` of `mesh`."""
         with_edges = True
         for attempt in range(MAX_TRIES):
@@ -153,7 +153,7 @@ class _Search:
                 self.why = "there was no grid with them"
                 self._drop_some(attempt)
 
-    def _layout(self, attempt: int) -> Layout:
+    def _layout(self, attempt: int) -> GridLayout:
         def tell(patch: int, count: int) -> None:
             if self.progress is not None:
                 done = (attempt + patch / count) / MAX_TRIES

@@ -16,7 +16,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 from ...base import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import GridError
 from ...layout import SeamChains
-from .layout import GRID_TOLERANCE, Layout, charts_of, first_points, joining_chains
+from .layout import GRID_TOLERANCE, GridLayout, charts_of, first_points, joining_chains
 
 UNITS = np.array([1, 1j, -1, -1j])
 # The same rotations, counterclockwise quarter turns, as integer matrices.
@@ -58,7 +58,7 @@ class Transitions:
         return UNITS[self.turn] * loose[self.base] + (shift[0::2] + 1j * shift[1::2])
 
 
-def find_transitions(layout: Layout) -> Transitions:
+def find_transitions(layout: GridLayout) -> Transitions:
     """Return the transitions of a layout.
 
     Raises:
@@ -78,7 +78,7 @@ def find_transitions(layout: Layout) -> Transitions:
 
 
 class _Builder:
-    def __init__(self, layout: Layout, chains: SeamChains, quarters: IntArray) -> None:
+    def __init__(self, layout: GridLayout, chains: SeamChains, quarters: IntArray) -> None:
         count = len(layout.points)
         self.layout, self.points, self.sides = layout, layout.points, layout.sides
         self.chains, self.quarters, self.chain_count = chains, quarters, len(quarters)
