@@ -47,6 +47,7 @@ HOLDS = {
     "sample": "the model that ships",
     "ahead": "kernels compiled at the build",
     "apps": "commands, page, studio, quads, peers",
+    "xatlas": "the interface of xatlas",
     "__main__": "python -m coneflat",
 }
 

@@ -14,9 +14,12 @@ import numpy as np
 from markers import ROOT, blocks, fill, fill_numbers
 from measured import Measured, number_text
 
+sys.path.insert(0, str(ROOT / "benchmarks"))
+
+from paper import MODELS as PUBLISHED
+
 import coneflat
 from coneflat.apps.peers import METHODS, Comparison
-from coneflat.apps.peers.paper import MODELS as PUBLISHED
 from coneflat.options import PAPER
 
 GALLERY = (

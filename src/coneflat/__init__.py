@@ -53,8 +53,8 @@ _HOMES = {
     "TriangleMesh": "mesh.connectivity",
     "measure": "measure.distortion",
     "measure_uv": "apps.measure_uv",
-    "UVMeasures": "apps.measure_uv",
     "quads": "apps.quads.quads",
+    "unwrap": "apps.unwrap.unwrap",
     "QuadMesh": "apps.quads.quad_mesh",
     "measure_quads": "apps.quads.quality",
     "integer_grid": "apps.quads.integer_grid",
@@ -68,18 +68,9 @@ _HOMES = {
 #: Modules by name: first those in `__all__`, then the packages whose functions can be called directly.
 _MODULES = {"errors": "errors", "peers": "apps.peers"}
 _PACKAGES = (
-    "atlas",
-    "cones",
-    "geometry",
-    "io",
-    "layout",
-    "linalg",
-    "mesh",
-    "metric",
-    "options",
-    "seams",
-    "stages",
-)
+    "atlas", "cones", "geometry", "io", "layout", "linalg",
+    "mesh", "metric", "options", "seams", "stages",
+)  # fmt: skip
 
 __all__ = [
     "ConeCurve",
@@ -93,7 +84,6 @@ __all__ = [
     "QuadMesh",
     "SeamData",
     "TriangleMesh",
-    "UVMeasures",
     "__version__",
     "check_mesh",
     "cone_curve",
@@ -112,18 +102,20 @@ __all__ = [
     "sample_path",
     "save_figure",
     "studio",
+    "unwrap",
 ]
 
 if TYPE_CHECKING:
     from . import atlas, cones, errors, geometry, io, layout, linalg, mesh, metric, options, seams, stages  # noqa: F401
     from .apps import peers
-    from .apps.measure_uv import UVMeasures, measure_uv
+    from .apps.measure_uv import measure_uv
     from .apps.quads.integer_grid import integer_grid
     from .apps.quads.integer_map import IntegerGrid
     from .apps.quads.quad_mesh import QuadMesh
     from .apps.quads.quads import quads
     from .apps.quads.quality import measure_quads
     from .apps.studio.notebook import studio
+    from .apps.unwrap.unwrap import unwrap
     from .apps.view import make_figure, save_figure
     from .cone_curve import ConeCurve, cone_curve, find_cones
     from .errors import ConeflatError

@@ -53,8 +53,8 @@ CONSTANT_SCALE = 1e-9
 # Parts with at most SMALL_TRIANGLES triangles are relaxed together, as one mesh of about GROUP_TRIANGLES: 13% of the
 # time of 60 spheres of 320 triangles.
 SMALL_TRIANGLES, GROUP_TRIANGLES = 500, 40_000
-# Fractions of the work: computing the layouts, then relaxing and separating them.
-LAYING_OUT, FINISHING = 0.8, 0.2
+# Fraction of the work that computes the layouts; the rest relaxes and separates them.
+LAYING_OUT = 0.8
 
 
 @takes(Options)
@@ -141,13 +141,13 @@ def flatten_source(
         originals = {i: part for i, part in enumerate(prepared.parts) if copies[i] is None}
         layouts = lay_out_parts(originals, method)
         if on_preview is not None:
-            preview = _with_copies(layouts, prepared.parts, copies)
+            preview = with_copies(layouts, prepared.parts, copies)
             on_preview(evaluate(prepared, preview, replace(o, charts="one"), Stopwatch(), UNKNOWN_OVERLAPS))
         finished = finish_within_bound(originals, layouts, method)
         # Notes contain vertex indices, so copies of parts with notes are computed, too.
         noted = {i: prepared.parts[i] for i, copy in enumerate(copies) if copy and finished[copy.first].notes}
         finished |= finish_within_bound(noted, lay_out_parts(noted, method), method)
-    return evaluate(prepared, _with_copies(finished, prepared.parts, copies), o, watch)
+    return evaluate(prepared, with_copies(finished, prepared.parts, copies), o, watch)
 
 
 def lay_out_parts(parts: Mapping[int, Part], method: Method) -> dict[int, Layout]:
@@ -216,7 +216,7 @@ def finish_parts(
             weights = [parts[i].cones.weights for i in group]
             relaxed = relax_layouts([layouts[i] for i in group], weights, method.relax, watch.report)
         for i, layout in zip(group, relaxed, strict=True):
-            with _at(parts[i], parts, watch, FINISHING):
+            with _at(parts[i], parts, watch, 1 - LAYING_OUT):
                 finished[i] = finish_part(parts[i], layout, method)
     return finished
 
@@ -315,7 +315,7 @@ def _infeasible_notes(layout: Layout, part: Part) -> Iterator[str]:
         )
 
 
-def _with_copies(
+def with_copies(
     known: Mapping[int, Layout], parts: Sequence[Part], copies: Sequence[Copy | None]
 ) -> list[Layout]:
     """Return the layouts of all parts; a missing layout is copied from the part of which it is a copy."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -12,7 +13,7 @@ from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..errors import CurvatureError, OptionError
 from ..mesh.ties import argmax_tied
 from ..stages import ConeSolution
-from .solution import FULL_TURN, GroundedLaplacian, target_from_log_scale
+from .solution import GroundedLaplacian, target_from_log_scale
 
 # Range of the log scale at which the search of the paper ends.
 EPSILON = 1.0
@@ -127,7 +128,7 @@ class _Search:
         return pair[: max(remaining, 0)]
 
     def _is_feasible(self) -> bool:
-        return bool((self._target()[self.cones] < FULL_TURN).all())
+        return bool((self._target()[self.cones] < math.tau).all())
 
     def _target(self) -> FloatArray:
         return target_from_log_scale(self.laplacian, self.curvature, self.phi, self.is_singular)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from scipy.sparse import csc_matrix
 
@@ -11,7 +13,6 @@ from ..errors import CurvatureError
 from ..linalg import Factor, factorize
 from ..mesh.connectivity import TriangleMesh
 
-FULL_TURN = 2 * np.pi
 # Values with at most this relative difference, or difference in radians, are equal. Symmetric surfaces have many values
 # that differ by rounding only; the first in the order of vertices is then chosen.
 TIE_TOLERANCE = 1e-9
@@ -62,7 +63,7 @@ def check_feasible(cones: IntArray, curvatures: FloatArray, names: IntArray | No
         names: (n,) vertex numbers of the input, for the message; None if they are those of the mesh.
         advice: the end of the message: what the user can do.
     """
-    bad = np.flatnonzero(curvatures >= FULL_TURN * (1 - 1e-12))
+    bad = np.flatnonzero(curvatures >= math.tau * (1 - 1e-12))
     if len(bad):
         worst = bad[np.argmax(curvatures[bad])]
         name = cones[worst] if names is None else names[cones[worst]]

@@ -8,7 +8,16 @@ from .layers import MAX_CELLS
 from .operators import angle_defect, cotangent_laplacian, vertex_areas
 from .orientation import fill_orientations, orientation
 from .overlap import Overlaps, find_overlaps
-from .planar import as_complex, as_pairs, map_factors, sides_between, signed_angles, signed_double_areas
+from .planar import (
+    as_complex,
+    as_pairs,
+    layout_curvature,
+    map_factors,
+    sides_between,
+    signed_angles,
+    signed_double_areas,
+    vertex_log_scale,
+)
 from .straight import FlatTriangles, flat_triangles, straight_triangles
 from .triangles import (
     CREASE_COSINE,
@@ -55,6 +64,7 @@ __all__ = [
     "intrinsic_triangulation",
     "is_broken",
     "approximate_overlap_areas",
+    "layout_curvature",
     "make_delaunay",
     "map_factors",
     "mollify",
@@ -67,6 +77,7 @@ __all__ = [
     "straight_triangles",
     "unit_vectors",
     "vertex_areas",
+    "vertex_log_scale",
     "vertex_normals",
     "visible_share",
 ]

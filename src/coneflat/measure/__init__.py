@@ -36,25 +36,13 @@ __all__ = [
     "sum_angles",
 ]
 
-_HOMES = {
-    "as_rows": "report",
-    "angle_sum_errors": "distortion",
-    "Distortion": "distortion",
-    "MAP_MEASURES": "report",
-    "Row": "report",
-    "unmet_guarantees": "guarantees",
-    "map_rows": "report",
-    "measure": "distortion",
-    "measure_map": "distortion",
-    "number_text": "report",
-    "packing_row": "report",
-    "path_text": "report",
-    "quantile": "distortion",
-    "sum_angles": "distortion",
-}
+_DISTORTION = ("angle_sum_errors", "Distortion", "measure", "measure_map", "quantile", "sum_angles")
 
 
 def __getattr__(name: str) -> Any:
-    if name in _HOMES:
-        return getattr(import_module("." + _HOMES[name], __name__), name)
+    if name in __all__:
+        home = (
+            "distortion" if name in _DISTORTION else "guarantees" if name == "unmet_guarantees" else "report"
+        )
+        return getattr(import_module("." + home, __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -33,6 +33,8 @@ class Distortion:
         log_area_scale: (m,) log of sqrt(UV area / area on the model); NaN for the same triangles.
         qc_mean, qc_p95, qc_max: of `qc`.
         area_std: standard deviation of `log_area_scale`.
+        energy: symmetric Dirichlet energy, the sum of the squares of both singular values and of their inverses,
+            averaged by area, at the scale where it is least; 4 for an isometry. Orientation does not count.
         flipped: number of triangles whose orientation is opposite to that of their chart.
         degenerate: number of triangles without area in the plane that have area on the model.
         degenerate_input: number of triangles without area on the model.
@@ -68,6 +70,7 @@ class Distortion:
     qc_p95: float
     qc_max: float
     area_std: float
+    energy: float
     flipped: int
     degenerate: int
     degenerate_input: int
@@ -229,6 +232,7 @@ def measure_map(
         qc_p95=quantile(qc[chosen], weights, 0.95),
         qc_max=float(qc[chosen].max()) if len(weights) else float("nan"),
         area_std=float(np.sqrt(_mean((scales - mean_scale) ** 2, weights))),
+        energy=_symmetric_dirichlet(qc[chosen], scales, weights),
         flipped=int(against.sum()),
         degenerate=int((has_area & ~has_uv_area).sum()),
         degenerate_input=int((~has_area).sum()),
@@ -244,6 +248,13 @@ def measure_map(
         curvature_error=curvature_error[0],
         curvature_error_max=curvature_error[1],
     )
+
+
+def _symmetric_dirichlet(qc: FloatArray, log_scale: FloatArray, weights: FloatArray) -> float:
+    """Return the mean symmetric Dirichlet energy at the best scale, from QC distortions and log scales."""
+    ratio = qc + 1 / qc
+    squares, inverses = (_mean(ratio * np.exp(sign * 2 * log_scale), weights) for sign in (1, -1))
+    return 2 * float(np.sqrt(squares * inverses))
 
 
 def _side_lengths(ends: FloatArray) -> FloatArray:

@@ -25,6 +25,7 @@ MAP_MEASURES = (
     "qc_p95",
     "qc_max",
     "area_std",
+    "energy",
     "flipped",
     "degenerate",
     "degenerate_input",
@@ -143,6 +144,7 @@ def as_rows(result: Flattening) -> list[Row]:
         ),
         of_map["QC distortion"],
         of_map["area distortion"],
+        of_map["energy"],
         (
             "of the metric",
             number_text(solve.area_distortion, ".4f"),
@@ -175,6 +177,11 @@ def map_rows(d: Distortion) -> dict[str, Row]:
             "area distortion",
             number_text(d.area_std, ".4f"),
             "standard deviation of the log scale, weighted by area",
+        ),
+        (
+            "energy",
+            number_text(d.energy, ".4f"),
+            "symmetric Dirichlet energy, averaged by area; 4 is an isometry",
         ),
         ("flipped", f"{d.flipped:,}", "triangles with orientation opposite to their chart"),
         (

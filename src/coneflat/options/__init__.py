@@ -7,6 +7,7 @@ from .declared import (
     MOST_TRIANGLES,
     PAPER,
     SHOWS,
+    AtlasOptions,
     ConeBounds,
     ConeNumber,
     ConeOptions,
@@ -15,6 +16,7 @@ from .declared import (
     FindOptions,
     MetricOptions,
     RunOptions,
+    SeamOptions,
     declarations,
     option,
 )
@@ -41,6 +43,7 @@ from .reading import read_options, settings, takes
 __all__ = [
     "ANGLE",
     "ANGLE_OR_NONE",
+    "AtlasOptions",
     "CONES",
     "COUNT",
     "Choice",
@@ -62,6 +65,7 @@ __all__ = [
     "PAPER",
     "RunOptions",
     "SHOWS",
+    "SeamOptions",
     "Vertices",
     "VerticesOrEdges",
     "Weights",

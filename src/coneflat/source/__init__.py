@@ -1,6 +1,7 @@
 """Preparation of the input: connected parts, each with the specification of its cones, metric and seams."""
 
+from .copies import Copy, copied, find_copies
 from .input_mesh import at_unit_size
 from .parts import Part, Source
 
-__all__ = ["Part", "Source", "at_unit_size"]
+__all__ = ["Copy", "Part", "Source", "at_unit_size", "copied", "find_copies"]

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.arrays import FloatArray
 from ..stages import Layout
-from . import Part
+from .parts import Part
 
 # Largest distance of the vertices of a copy from the transformed vertices of the first, relative to the largest
 # coordinates: rounding errors. And largest relative difference of side lengths: a tenth of the accuracy of metrics.

@@ -1,4 +1,4 @@
-"""`coneflat flatten`."""
+"""`coneflat flatten` and `coneflat unwrap`."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...options import FORMATS, Options, declarations
+from ..unwrap.options import UnwrapOptions
 from .options import (
     check_combinations,
     flag,
@@ -36,15 +37,24 @@ class FileFlags:
             .obj; - if MESH is -]
         format: Format for standard output, or if -o is not given.  [default: obj]
         texture: Texture of a .glb: a checkerboard, or an image file.
-        project: Project of `coneflat studio` (.json) to flatten instead of MESH.
         report: JSON file for all measures.
     """
 
     output: Path | None = path_flag()
     format: str | None = flag(type=click.Choice(FORMATS))
     texture: str | None = flag(metavar="checker|IMAGE")
-    project: Path | None = path_flag()
     report: Path | None = path_flag()
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlattenFlags(FileFlags):
+    """Output.
+
+    Attributes:
+        project: Project of `coneflat studio` (.json) to flatten instead of MESH.
+    """
+
+    project: Path | None = path_flag()
 
 
 @click.command(
@@ -53,7 +63,7 @@ class FileFlags:
     context_settings={"allow_extra_args": True},
 )
 @click.argument("mesh", type=click.Path(path_type=Path), required=False)
-@option_flags(FileFlags)
+@option_flags(FlattenFlags)
 @paper_option
 @option_flags(Options)
 @input_options
@@ -89,19 +99,68 @@ def flatten(
             f"{mesh} {context.args[0]} ... --out FOLDER` flattens many",
             context,
         )
-    from ...io import PIPE, check_output, check_target
-    from ...measure import REPORTED, parse_requirements
-    from .run import Console, flatten_file, redirect_prints, require_distinct, save
+    from ... import flatten as find
 
-    requirements = parse_requirements(required, REPORTED)
     check_combinations(context)
-    flags, add_notes = pop_flags(given, FileFlags), None
+    flags, add_notes = pop_flags(given, FlattenFlags), None
     if flags.project is not None:
         mesh, options, add_notes = project_arguments(context, flags.project)
     elif mesh is None:
         raise click.MissingParameter(ctx=context, param_hint="'MESH'", param_type="argument")
     else:
         options = keywords(given)
+    _flatten_and_save(context, mesh, flags, options, required, weld, verbosity, find, add_notes)
+
+
+@click.command(cls=GroupedCommand, short_help="Unwrap a mesh for textures, with short seams.")
+@click.argument("mesh", type=click.Path(path_type=Path))
+@option_flags(FileFlags)
+@option_flags(UnwrapOptions)
+@input_options
+@require_option
+@verbosity_options
+@click.pass_context
+def unwrap(
+    context: click.Context,
+    /,
+    mesh: Path,
+    required: tuple[str, ...],
+    weld: bool | None,
+    verbosity: str | None,
+    **given: Any,
+) -> None:
+    """Write MESH with UV coordinates for a texture: nearly isometric, with the shortest seams.
+
+    MESH is a file (.obj, .ply, .stl, .off, .gltf, .glb), or - for standard input.
+
+    \b
+    Examples:
+      coneflat unwrap horse.ply -o horse.glb
+      coneflat unwrap hand.obj -o hand.obj --max-energy 4.05 --resolution 2048
+    """
+    from ... import unwrap as find
+
+    flags, options = pop_flags(given, FileFlags), keywords(given, UnwrapOptions)
+    _flatten_and_save(context, mesh, flags, options, required, weld, verbosity, find)
+
+
+def _flatten_and_save(
+    context: click.Context,
+    mesh: Path,
+    flags: FileFlags,
+    options: dict[str, Any],
+    required: tuple[str, ...],
+    weld: bool | None,
+    verbosity: str | None,
+    by: Callable[..., Flattening],
+    add_notes: Callable[[Flattening], Flattening] | None = None,
+) -> None:
+    """Flatten a file by a function, and write the result and its report."""
+    from ...io import PIPE, check_output, check_target
+    from ...measure import REPORTED, parse_requirements
+    from .run import Console, flatten_file, redirect_prints, require_distinct, save
+
+    requirements = parse_requirements(required, REPORTED)
     ending = f".{flags.format or 'obj'}"
     named = PIPE if mesh == PIPE else Path(f"{mesh.stem}_uv{ending}")
     output = named if flags.output is None else flags.output
@@ -113,7 +172,7 @@ def flatten(
         check_target(flags.report)
     require_distinct({"input": mesh, "output": output, "report": flags.report})
     with redirect_prints(output) as stdout, Console(verbosity) as console:
-        result = flatten_file(mesh, console, options, weld)
+        result = flatten_file(mesh, console, options, weld, by)
         result = result if add_notes is None else add_notes(result)
         result = save(result, console, output, flags.report, flags.texture, stdout, ending)
         written = [path for path in (output, flags.report) if path is not None and path != PIPE]

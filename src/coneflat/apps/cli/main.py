@@ -15,9 +15,9 @@ from ... import ConeflatError, __version__
 from .batch import batch
 from .cones import cones
 from .figure import demo, figure
-from .flatten import flatten
+from .flatten import flatten, unwrap
 from .measure import measure
-from .peers import compare, paper
+from .peers import compare
 from .quads import quads
 from .view import studio, view
 
@@ -33,7 +33,7 @@ def cli() -> None:
     """Flatten triangle meshes into the plane: conformal UV maps with automatic cones and seams."""
 
 
-for command in (flatten, batch, quads, measure, cones, figure, view, studio, compare, paper, demo):
+for command in (flatten, unwrap, batch, quads, measure, cones, figure, view, studio, compare, demo):
     cli.add_command(command)
 
 

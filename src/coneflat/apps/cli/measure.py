@@ -11,8 +11,8 @@ import click
 from .shared import QUIET, check_required, input_options, require_option, verbosity_options
 
 if TYPE_CHECKING:
-    from ... import UVMeasures
     from ...measure import Row
+    from ..measure_uv import UVMeasures
 
 
 @click.command(short_help="Measure the UVs of a file, made by any tool.")

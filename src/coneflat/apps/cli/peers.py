@@ -1,4 +1,4 @@
-"""`coneflat compare` and `coneflat paper`."""
+"""`coneflat compare`."""
 
 from __future__ import annotations
 
@@ -18,43 +18,23 @@ COMPARED = ("compare.md", "compare.csv", "layouts.png", "quality.png")
 
 
 @dataclass(frozen=True, kw_only=True)
-class SightFlags:
-    """Output.
-
-    Attributes:
-        eye: Direction from which pictures show the model: front, back, left, right, top, bottom, two of these, or
-            X,Y,Z.
-    """
-
-    eye: Any = flag("front-right", type=parse_eye, metavar="EYE")
-
-
-@dataclass(frozen=True, kw_only=True)
-class CompareFlags(SightFlags):
+class CompareFlags:
     """Output.
 
     Attributes:
         output: Folder for the table (Markdown and CSV) and the pictures.  [default: none; the table is printed]
         methods: Methods to compare, separated by commas.  [default: all whose name contains no /]
+        eye: Direction from which pictures show the model: front, back, left, right, top, bottom, two of these, or
+            X,Y,Z.
         no_peers: Leave out other packages (libigl, xatlas, uvunwrap).
         paper: Use the cones of the published method (greedy, epsilon 1).
     """
 
     output: Path | None = path_flag()
     methods: str | None = flag(metavar="NAMES")
+    eye: Any = flag("front-right", type=parse_eye, metavar="EYE")
     no_peers: bool = flag(False, is_flag=True)
     paper: bool = flag(False, is_flag=True)
-
-
-@dataclass(frozen=True, kw_only=True)
-class PaperFlags(SightFlags):
-    """Output.
-
-    Attributes:
-        output: Folder for the tables (Markdown and CSV) and the figures.
-    """
-
-    output: Path = path_flag(default=Path("paper"))
 
 
 @click.command(cls=GroupedCommand, short_help="Compare all methods on a mesh, with the same cones and cut.")
@@ -116,40 +96,4 @@ def compare(
                 pictures = draw_layouts(found), draw_qualities(found, sight)
                 written = write_folder(flags.output, dict(zip(COMPARED, (*texts, *pictures), strict=True)))
         console.say(comparison_lines(found))
-        console.finish(written)
-
-
-@click.command(short_help="Reproduce the paper's tables and figures.")
-@click.argument("meshes", nargs=-1, required=True, type=click.Path(path_type=Path))
-@option_flags(PaperFlags)
-@up_option
-@verbosity_options
-def paper(meshes: tuple[Path, ...], up: str, verbosity: str | None, **given: Any) -> None:
-    """Run the experiments of the paper (Section 5) on MESHES, and print its numbers next to those of coneflat.
-
-    MESHES are files or folders. Models are recognised by their names: fandisk, rocker-arm, foot, gargoyle, elephant,
-    horse, hand, torso, isi-horse.
-
-    \b
-    Examples:
-      coneflat paper fandisk.obj rocker-arm.obj -o paper
-      coneflat paper models
-    """
-    from ...io import find_meshes
-    from ..peers import reproduce
-    from ..peers.paper import FILES
-    from ..peers.pictures import Sight, open_folder, write_folder
-    from .run import FLATTENED, Console
-
-    flags = pop_flags(given, PaperFlags)
-    sight = Sight(flags.eye, up)
-    for mesh in meshes:
-        find_meshes(str(mesh))
-    open_folder(flags.output, FILES)
-    with Console(verbosity) as console:
-        with console.stage("compare", 0.0):
-            found = reproduce(meshes, progress=console.part(0.0, FLATTENED))
-        with console.stage("draw", FLATTENED):
-            written = write_folder(flags.output, {**found.texts(), **found.figures(sight)})
-        console.say([found.tables().rstrip()])
         console.finish(written)

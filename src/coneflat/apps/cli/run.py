@@ -9,7 +9,7 @@ import sys
 import textwrap
 import threading
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import asdict, replace
 from io import BytesIO
@@ -35,7 +35,16 @@ AGAIN = "--again flattens the mesh again"
 
 INTERVAL = 1.0  # Seconds between lines of progress, and before the first one.
 #: The rows that are always printed, in this order; the others are printed if verbose.
-FIRST_ROWS = ("charts", "overlap", "flipped", "texel density", "seam length", "QC distortion", "cones")
+FIRST_ROWS = (
+    "charts",
+    "overlap",
+    "flipped",
+    "texel density",
+    "seam length",
+    "QC distortion",
+    "energy",
+    "cones",
+)
 
 
 class Console:
@@ -232,17 +241,23 @@ def archive_path(file: Path) -> Path | None:
 
 
 def flatten_file(
-    mesh: Path, console: Console, options: Mapping[str, Any], weld: bool | None = None
+    mesh: Path,
+    console: Console,
+    options: Mapping[str, Any],
+    weld: bool | None = None,
+    by: Callable[..., Flattening] = flatten,
 ) -> Flattening:
-    """Read and flatten a mesh file, show the progress, and return the result."""
+    """Read and flatten a mesh file by a function, show the progress, and return the result."""
     with console.stage("read", 0.0):
         source = read_joined(mesh, weld)
-    return flatten_joined(source, console, options)
+    return flatten_joined(source, console, options, by)
 
 
-def flatten_joined(source: Joined, console: Console, options: Mapping[str, Any]) -> Flattening:
+def flatten_joined(
+    source: Joined, console: Console, options: Mapping[str, Any], by: Callable[..., Flattening] = flatten
+) -> Flattening:
     """Flatten a mesh that has been read, show the progress, and return the result."""
-    result = flatten(source.mesh, progress=console.part(READ, FLATTENED), **source.map_options(options))
+    result = by(source.mesh, progress=console.part(READ, FLATTENED), **source.map_options(options))
     console.seconds.update(result.seconds)
     return replace(result, notes=source.all_notes(result.notes))
 

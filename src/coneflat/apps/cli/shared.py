@@ -22,7 +22,7 @@ RARE = (*_BOUNDS, "quantise", "relax", "no_seams", "hide_seams", "seam_weights",
 BRIEF = (*RARE, "distortion", "cone_count", "stretch", "seams", "sharp_angle", "resolution", "up")
 RARE_TITLE = "Less common options (all details: docs/reference/command-line.md)"
 #: Titles of groups of options in the help.
-GROUPS = ("Quads", "Cones", "Metric", "Seams", "Atlas", "Input", "Output", RARE_TITLE)
+GROUPS = ("Texture", "Quads", "Cones", "Metric", "Seams", "Atlas", "Input", "Output", RARE_TITLE)
 #: Exit code if a condition of `--require` is not met.
 NOT_MET = 3
 

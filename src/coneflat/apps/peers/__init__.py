@@ -1,4 +1,4 @@
-"""Other flattening methods with the same cones and cut, their comparison, and the paper's experiments.
+"""Other flattening methods with the same cones and cut, and their comparison.
 
 Examples:
     >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
@@ -10,7 +10,6 @@ Examples:
 """
 
 from .methods import METHODS, flatten_by
-from .paper import Reproduction, reproduce
 from .run import Comparison, Entry, compare_methods
 
-__all__ = ["METHODS", "Comparison", "Entry", "Reproduction", "compare_methods", "flatten_by", "reproduce"]
+__all__ = ["METHODS", "Comparison", "Entry", "compare_methods", "flatten_by"]

@@ -11,17 +11,14 @@ from dataclasses import replace
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import BoolArray, FloatArray, IntArray
+from ...base import BoolArray, FloatArray
 from ...geometry import (
     IntrinsicTriangulation,
     corner_angles,
-    euclidean_diagonal,
     intrinsic_triangulation,
     make_delaunay,
-    relink,
     vertex_areas,
 )
-from ...mesh import NEXT, PREVIOUS
 from ...metric import checked_target
 from ...stages import ConeSolution, FlatMetric
 from .pattern_angles import CoherentAngles, coherent_angles
@@ -60,7 +57,8 @@ def circle_patterns(
     border = mesh.is_boundary_vertex
     target, _ = checked_target(mesh, np.where(border, 0.0, solution.target), border)
     triangulation = intrinsic_triangulation(mesh, lengths)
-    coherent, flips = _find_angles(triangulation, target, border, delaunay)
+    flips = make_delaunay(triangulation) if delaunay else np.empty(0, dtype=np.int64)
+    coherent = _nearest_angles(triangulation, target, border)
     notes: tuple[str, ...] = ()
     if not coherent.converged:
         what = "no circle pattern on these triangles has the curvatures: their angles are"
@@ -80,99 +78,8 @@ def circle_patterns(
     return replace(metric, notes=notes)
 
 
-def _find_angles(
-    triangulation: IntrinsicTriangulation, target: FloatArray, border: BoolArray, delaunay: bool
-) -> tuple[CoherentAngles, IntArray]:
-    """Return the angles of a pattern, and the half-edges that were flipped in place to make it feasible."""
-    if not delaunay:
-        return _nearest_angles(triangulation, target, border), np.empty(0, dtype=np.int64)
-    flips = make_delaunay(triangulation)
-    coherent = _nearest_angles(triangulation, target, border)
-    if not coherent.converged:
-        # In a flat region, two edges between the same vertices cannot both be straight. And a cone angle is bounded by
-        # the angles of its corners, whose mean must be below 0.98 pi.
-        wanted = np.where(border, 0, np.floor((2 * np.pi - target) / (0.98 * np.pi)).astype(np.int64) + 1)
-        flips = np.concatenate([flips, make_proper(triangulation, wanted)])
-        coherent = _nearest_angles(triangulation, target, border)
-    return coherent, flips
-
-
 def _nearest_angles(
     triangulation: IntrinsicTriangulation, target: FloatArray, border: BoolArray
 ) -> CoherentAngles:
     angles = corner_angles(triangulation.length.reshape(-1, 3)).ravel()
     return coherent_angles(triangulation, angles, 2 * np.pi - target, ~border)
-
-
-def make_proper(triangulation: IntrinsicTriangulation, wanted: IntArray) -> IntArray:
-    """Flip multiple edges and loops, and edges opposite vertices of small degree, in place.
-
-    Intrinsic Delaunay triangulations have some such edges near vertices of large curvature. The edge with the largest
-    margin of convexity is flipped first; there are few, so the search is repeated after each flip.
-
-    Args:
-        triangulation: updated in place, where quads are convex.
-        wanted: (n,) least number of triangles at each vertex.
-
-    Returns:
-        The flipped half-edges, in order.
-    """
-    flipped: list[int] = []
-    while True:
-        slots, margin = _candidates(triangulation, wanted)
-        if not len(slots):
-            return np.array(flipped, dtype=np.int64)
-        h = int(slots[np.argmax(margin)])
-        twin, tail, length = triangulation.twin, triangulation.tail, triangulation.length
-        one, two = _around(h), _around(int(twin[h]))
-        sides = (h, one[1], one[0], two[0], two[1])
-        diagonal = euclidean_diagonal(*(float(length[side]) for side in sides))
-        relink(twin, tail, length, h, diagonal)
-        flipped.append(h)
-
-
-def _around(slots: int | IntArray) -> tuple[IntArray, IntArray]:
-    """Return the next and the previous half-edge in the triangle of each half-edge."""
-    base = slots - slots % 3
-    return base + NEXT[slots % 3], base + PREVIOUS[slots % 3]
-
-
-def _candidates(triangulation: IntrinsicTriangulation, wanted: IntArray) -> tuple[IntArray, FloatArray]:
-    """Return the half-edges that should and can be flipped, and their margins of convexity, radians."""
-    twin, tail, count = triangulation.twin, triangulation.tail, triangulation.vertex_count
-    every = np.arange(len(twin))
-    after, before = _around(every)
-    keys = _pair(tail, tail[after], count)
-    known, number, times = np.unique(keys[twin < every], return_inverse=True, return_counts=True)
-    is_double = np.zeros(len(twin), dtype=bool)
-    is_double[twin < every] = times[number.ravel()] > 1
-    is_double |= tail == tail[after]
-    degree = np.bincount(tail, minlength=count)
-    should: BoolArray = is_double | (degree < wanted)[tail[before]]
-    slots = every[should & (twin >= 0)]
-    slots = slots[twin[slots] // 3 != slots // 3]
-
-    other = twin[slots]
-    new = tail[before[slots]], tail[before[other]]
-    spare = degree > wanted
-    fine = spare[tail[slots]] & spare[tail[other]] & (new[0] != new[1])
-    fine &= ~np.isin(_pair(*new, count), known)
-    slots = slots[fine]
-    margin = _margin(triangulation, slots)
-    wide = margin > 1e-3  # radians between the corners of the quad and a straight angle
-    return slots[wide], margin[wide]
-
-
-def _pair(one: IntArray, two: IntArray, count: int) -> IntArray:
-    return np.minimum(one, two) * count + np.maximum(one, two)
-
-
-def _margin(triangulation: IntrinsicTriangulation, slots: IntArray) -> FloatArray:
-    """Return pi minus the larger angle of the quad at the two ends of each edge, radians."""
-    lengths, other = triangulation.length.reshape(-1, 3), triangulation.twin[slots]
-    one, two = corner_angles(lengths[slots // 3]), corner_angles(lengths[other // 3])
-    rows = np.arange(len(slots))
-    # The half-edge in slot i has corner i + 1 at its tail and corner i + 2 at its head.
-    at_tail = one[rows, NEXT[slots % 3]] + two[rows, PREVIOUS[other % 3]]
-    at_head = one[rows, PREVIOUS[slots % 3]] + two[rows, NEXT[other % 3]]
-    return np.pi - np.maximum(at_tail, at_head)

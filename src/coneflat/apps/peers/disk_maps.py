@@ -1,45 +1,34 @@
-"""Maps of a disk that prescribe no cones: least squares and spectral conformal maps."""
+"""Maps of a disk that prescribe no cones: least squares conformal maps."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TypeAlias
-
 import numpy as np
-from scipy.sparse import csr_matrix, diags
-from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
+from scipy.sparse import csr_matrix
 
 from ... import TriangleMesh
-from ...base import ComplexArray, FloatArray, IntArray, plural
-from ...errors import ConvergenceError, MetricError
+from ...base import FloatArray, IntArray, plural
+from ...errors import MetricError
 from ...geometry import corner_angles, double_areas
 from ...layout import far_pins, pinned_least_squares
-from ...linalg import HermitianFactor
 from ...stages import ConeSolution, Cut, Embedding, FlatMetric
 from .shared import embedding_metric
 
-Place: TypeAlias = Callable[[TriangleMesh, FloatArray], FloatArray]
 
-
-def map_cut_mesh(
-    mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, name: str, place: Place
-) -> FlatMetric:
-    """Return the map of a mesh, cut open through its cones, by a method that prescribes no cones.
+def least_squares_map(mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution) -> FlatMetric:
+    """Return the LSCM of a mesh, cut open through its cones, which it does not prescribe.
 
     Args:
         mesh: a connected mesh.
         lengths: (m, 3) side lengths, model units.
         solution: the cones, which only determine the cut.
-        name: name of the method.
-        place: returns (c, 2) points of a disk, at any scale, given its (m, 3) side lengths.
     """
 
     def embed(cut: Cut) -> Embedding:
-        notes = (
-            f"The mesh was cut open first, and {name} mapped the disk: it prescribes no cones, and the sides of seams "
-            "do not match.",
+        note = (
+            "The mesh was cut open first, and LSCM mapped the disk: it prescribes no cones, and the sides of seams do "
+            "not match."
         )
-        return Embedding(place(cut.mesh, lengths), notes=notes if len(cut.seams) else ())
+        return Embedding(least_squares_conformal(cut.mesh, lengths), notes=(note,) if len(cut.seams) else ())
 
     return embedding_metric(mesh, lengths, solution, embed, has_target_cones=False)
 
@@ -64,63 +53,6 @@ def least_squares_conformal(
     z = pinned_least_squares(conformal_equations(disk, lengths), pins)
     if not np.isfinite(z).all():
         raise MetricError(f"the least squares conformal map of {len(disk.faces):,} triangles is not finite")
-    return np.stack([z.real, z.imag], axis=1)
-
-
-# Shift of the eigenvalues, times the number of boundary vertices, so that none is zero: well below the eigenvalue of a
-# map with angle errors of a thousandth, and large enough for factorizations.
-SHIFT = 1e-7
-# Largest number of restarts of the Arnoldi iteration, which normally needs a few.
-RESTARTS = 300
-
-
-def spectral_conformal(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
-    """Return (n, 2) the spectral conformal map of a disk: the least conformal energy for a boundary of unit variance.
-
-    This is the Fiedler vector of L_C u = lambda B u, where B is one at boundary vertices and zero inside (Mullen et al.
-    2008, Section 3): the eigenvector of the smallest lambda among those with centred boundary, computed as that of the
-    largest 1 / lambda. No vertex is pinned. Triangles may be flipped.
-
-    Args:
-        disk: a topological disk.
-        lengths: (m, 3) side lengths; every triangle has area.
-
-    Raises:
-        ConvergenceError: the eigenvector was not found.
-        MetricError: the map is not finite.
-    """
-    walk = disk.boundary_walk()
-    border, sides = disk.tails[walk], lengths.ravel()[walk]
-    shift = np.zeros(len(disk.vertices))
-    shift[border] = SHIFT / len(border)
-    equations = conformal_equations(disk, lengths)
-    factor = HermitianFactor(csr_matrix(equations.conj().T @ equations + diags(shift)))
-
-    def centred(source: ComplexArray) -> ComplexArray:
-        """Return (n,) a source on the boundary minus its mean, and zero inside."""
-        right = np.zeros(len(shift), dtype=np.complex128)
-        right[border] = source - source.mean()
-        return right
-
-    def apply(source: ComplexArray) -> ComplexArray:
-        z = factor.solve(centred(source))[border]
-        return z - z.mean()
-
-    # Rotated maps have the same energy; the start vector determines which of them is found.
-    start = np.exp(2j * np.pi * (np.cumsum(sides) - sides) / sides.sum())
-    operator = LinearOperator((len(border),) * 2, matvec=apply, dtype=np.complex128)
-    try:
-        _, vectors = eigsh(operator, k=1, which="LM", v0=start, tol=1e-13, maxiter=RESTARTS)
-    except ArpackError as error:
-        raise ConvergenceError(
-            f"the spectral map of {len(disk.faces):,} triangles was not found in {RESTARTS} restarts of the Arnoldi "
-            "iteration: another cut or method 'lscm' may help"
-        ) from error
-    right = centred(vectors[:, 0])
-    z = factor.solve(right)
-    z += factor.solve(right - shift * z - equations.conj().T @ (equations @ z))
-    if not np.isfinite(z).all():
-        raise MetricError(f"the spectral conformal map of {len(disk.faces):,} triangles is not finite")
     return np.stack([z.real, z.imag], axis=1)
 
 

@@ -19,23 +19,20 @@ from ...stages import ConeSolution, FlatMetric, MetricSpec, Surface
 from .angle_based import angle_based, linear_angles, nearest_angles
 from .bff import boundary_first
 from .circle_patterns import circle_patterns
-from .disk_maps import least_squares_conformal, map_cut_mesh, spectral_conformal
-from .ricci import ricci_flow
+from .disk_maps import least_squares_map
 
 #: The compared methods; each takes a connected mesh, its (m, 3) side lengths, and cones with their curvatures.
 PEERS: Mapping[str, Callable[..., FlatMetric]] = {
     "circle-patterns": circle_patterns,
     "circle-patterns/fixed": partial(circle_patterns, delaunay=False),
-    "ricci": ricci_flow,
     "linear-abf": partial(angle_based, solve=linear_angles),
     "linear-abf/free": partial(angle_based, solve=linear_angles, is_free=True),
     "abf++": partial(angle_based, solve=nearest_angles),
-    "lscm": partial(map_cut_mesh, name="LSCM", place=least_squares_conformal),
-    "spectral": partial(map_cut_mesh, name="the spectral method", place=spectral_conformal),
+    "lscm": least_squares_map,
     "bff": boundary_first,
 }
 #: Methods that may fail to converge, and accept `best_effort`.
-ITERATIVE = ("circle-patterns", "circle-patterns/fixed", "ricci", "abf++")
+ITERATIVE = ("circle-patterns", "circle-patterns/fixed", "abf++")
 #: All methods of `flatten_by`. Those with a / are variants as used in 2008: circle patterns without flips, and angle
 #: based flattening that prescribes nothing at cones.
 METHODS = ("exact", "linear", *PEERS)

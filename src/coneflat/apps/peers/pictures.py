@@ -129,13 +129,6 @@ def same_scale(entries: Sequence[Entry]) -> list[view.Quantity]:
     return [replace(one, scale=scale, label=name) for one, name in zip(quantities, names, strict=True)]
 
 
-def layout_panel(result: Flattening, label: str) -> view.Panel:
-    """Return a panel of the charts."""
-    return view.Panel(
-        view.layout_aspect(result, crop=True), partial(view.draw_layout, result, crop=True), label
-    )
-
-
 def figure_of(rows: Sequence[view.Row], *, marks_of: Flattening | None = None) -> Figure:
     """Return a figure of rows of panels with the width of a page."""
     return view.compose(

@@ -17,7 +17,6 @@ from ...base.defaults import DISTORTION, MIN_QUANTUM, TYPED_TOLERANCE
 from ...errors import CurvatureError, OptionError
 from ...geometry.handles import difference_from_multiple
 from ...stages import ConeSolution
-from ..solution import FULL_TURN
 from ..sparse.dense_model import MIN_RELATIVE_GAIN
 from ..sparse.exact_model import MAX_ROUNDS, MIN_PROMISED_GAIN
 from ..sparse.search import COARSE_MODEL_ERROR, ConeSearch
@@ -212,11 +211,11 @@ def make_lattice(search: ConeSearch, quantum: float) -> Lattice:
         OptionError: the quantum is out of range.
         CurvatureError: no multiples within the bounds have the required sum.
     """
-    if not MIN_QUANTUM <= quantum <= FULL_TURN * (1 + TYPED_TOLERANCE):
+    if not MIN_QUANTUM <= quantum <= math.tau * (1 + TYPED_TOLERANCE):
         raise OptionError(f"quantum must be from {MIN_QUANTUM:g} radians to 2 pi, not {quantum:g}")
-    parts = round(FULL_TURN / quantum)
-    if abs(parts * quantum - FULL_TURN) <= TYPED_TOLERANCE * FULL_TURN:
-        quantum = FULL_TURN / parts
+    parts = round(math.tau / quantum)
+    if abs(parts * quantum - math.tau) <= TYPED_TOLERANCE * math.tau:
+        quantum = math.tau / parts
     limits = search.limits
     total = None
     if limits.has_sum:

@@ -10,7 +10,7 @@ import numpy as np
 from ...base.arrays import BoolArray, IntArray
 from ...base.text import plural
 from ...errors import CurvatureError, OptionError
-from ..solution import FULL_TURN, TIE_TOLERANCE
+from ..solution import TIE_TOLERANCE
 
 # Largest number of cones searched for, in addition to the required ones: seams through more cones are useless.
 MAX_SEARCHED = 200
@@ -54,15 +54,15 @@ class Limits:
             raise OptionError(
                 f"the largest cone angle ({max_cone_angle:g} radians) must exceed the smallest ({min_cone_angle:g})"
             )
-        least = -math.inf if max_cone_angle is None else FULL_TURN - max_cone_angle
+        least = -math.inf if max_cone_angle is None else math.tau - max_cone_angle
         if positive_only:
             least = max(least, 0.0)
-        most = FULL_TURN - min_cone_angle
+        most = math.tau - min_cone_angle
         if positive_only and most <= 0:
             raise OptionError("cones of positive curvature have angles below 2 pi: allow smaller angles")
         if euler_characteristic is None:
             return cls(least, most, math.nan)
-        total = FULL_TURN * euler_characteristic
+        total = math.tau * euler_characteristic
         if (total > 0 and most <= 0) or (total < 0 and least >= 0):
             kind = "positive" if total < 0 else "negative"
             raise CurvatureError(

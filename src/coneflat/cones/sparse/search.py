@@ -29,7 +29,7 @@ from ...geometry.operators import vertex_areas, weighted_areas
 from ...mesh.connectivity import TriangleMesh
 from ...mesh.ties import tie_key as key_of_shape
 from ...stages import ConeSolution
-from ..solution import FULL_TURN, TIE_TOLERANCE
+from ..solution import TIE_TOLERANCE
 from .coarse_model import candidates
 from .dense_model import ConeSet, DenseModel
 from .exact_model import ExactModel
@@ -121,7 +121,7 @@ class ConeSearch:
         vertices = self.operator.vertices
         self._least = np.full(len(vertices), limits.least)
         if max_angles is not None:
-            self._least = np.maximum(self._least, np.minimum(FULL_TURN - max_angles[vertices], 0.0))
+            self._least = np.maximum(self._least, np.minimum(math.tau - max_angles[vertices], 0.0))
         self._required = self.unknowns_of(cones)
         self.exact = ExactModel(linear, self._required, limits, self._least)
         # The exact model will need the score; it is computed while the coarse model is set up.

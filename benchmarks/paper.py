@@ -1,26 +1,42 @@
-"""Section 5 of the paper on given meshes: its tables and figures, with the paper's numbers for comparison."""
+"""Section 5 of the paper on given meshes: its tables and figures, with the paper's numbers for comparison.
+
+    python benchmarks/paper.py fandisk.obj rocker-arm.obj -o paper
+
+Models are recognised by their file names: fandisk, rocker-arm, foot, gargoyle, elephant, horse, hand, torso, isi-horse.
+"""
 
 from __future__ import annotations
 
+import argparse
 import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ... import PAPER, ConeflatError, read_mesh
-from ...base import Progress, plural
-from ...errors import MeshError
-from ...io import find_meshes
-from .run import Comparison, as_cell, as_csv, compare_methods, known_methods, markdown, notes
+from coneflat import PAPER, ConeflatError, read_mesh
+from coneflat.apps.peers import pictures
+from coneflat.apps.peers.run import (
+    Comparison,
+    as_cell,
+    as_csv,
+    compare_methods,
+    known_methods,
+    markdown,
+    notes,
+)
+from coneflat.apps.view import Panel, Row, draw_checker, draw_cones, draw_layout, layout_aspect
+from coneflat.base import Progress, plural
+from coneflat.errors import MeshError
+from coneflat.io import find_meshes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ... import Flattening
-    from ..view import Panel, Quantity, Row
-    from .pictures import Sight
+    from coneflat import Flattening
+    from coneflat.apps.view import Quantity
 
 
 @dataclass(frozen=True)
@@ -189,11 +205,8 @@ class Reproduction:
         one, two = as_csv(TABLE_1, self.table_1()), as_csv(TABLE_2, self.table_2())
         return dict(zip(TEXTS, (self.markdown(), one, two), strict=True))
 
-    def figures(self, sight: Sight) -> dict[str, Figure]:
+    def figures(self, sight: pictures.Sight) -> dict[str, Figure]:
         """Return the paper's figures by file name."""
-        from ..view import draw_checker, draw_cones
-        from . import pictures
-
         cones, quality, layouts, textures = [], [], [], []
         for model in self.models:
             label = f"{model.name}: {plural(len(model.linear.cones), 'cone')}"
@@ -203,7 +216,7 @@ class Reproduction:
             quality.append(_row(pictures.quality_panels(shown, scale, sight), scale))
             pairs = zip(shown, pictures.aligned_layouts(shown), strict=True)
             layouts.append(
-                _row([pictures.layout_panel(result, f"{model.name}, {one.method}") for one, result in pairs])
+                _row([layout_panel(result, f"{model.name}, {one.method}") for one, result in pairs])
             )
             linear = [entry for entry in shown if entry.method == "linear"]
             own = pictures.same_scale(linear)
@@ -274,10 +287,13 @@ def _sort_key(path: Path) -> tuple[int, str, str]:
     return (len(MODELS) if name is None else list(MODELS).index(name), path.stem, str(path))
 
 
+def layout_panel(result: Flattening, label: str) -> Panel:
+    """Return a panel of the charts."""
+    return Panel(layout_aspect(result, crop=True), partial(draw_layout, result, crop=True), label)
+
+
 def _row(panels: Sequence[Panel], quantities: Sequence[Quantity] = ()) -> Row:
     """Return a row of panels, wide enough for their labels."""
-    from ..view import Row
-
     inches = 2.2  # of height
     return Row([panel.fit_label(inches) for panel in panels], quantities[:1], tallest=inches)
 
@@ -291,3 +307,20 @@ def _cells(rows: Sequence[Sequence[object]], forms: Sequence[str]) -> list[list[
         ]
         for row in rows
     ]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("meshes", nargs="+", type=Path, help="files or folders")
+    parser.add_argument(
+        "-o", "--output", type=Path, default=Path("paper"), help="folder for tables and figures"
+    )
+    arguments = parser.parse_args()
+    pictures.open_folder(arguments.output, FILES)
+    found = reproduce(arguments.meshes, progress=lambda what, done: print(f"{done:4.0%} {what}", end="\r"))
+    pictures.write_folder(arguments.output, {**found.texts(), **found.figures(pictures.Sight())})
+    print(found.tables().rstrip())
+
+
+if __name__ == "__main__":
+    main()

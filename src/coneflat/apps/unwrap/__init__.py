@@ -1,0 +1,1 @@
+"""Unwrapping for textures: the shortest seams for which a layout with free seams is nearly isometric."""

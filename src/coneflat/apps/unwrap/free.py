@@ -1,0 +1,68 @@
+"""Layouts with free seams: the two sides of a seam need not be equal, so that triangles are distorted least."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ... import TriangleMesh
+from ...base import ComplexArray
+from ...geometry import (
+    as_complex,
+    as_pairs,
+    cotangent_laplacian,
+    double_areas,
+    layout_curvature,
+    signed_double_areas,
+    vertex_log_scale,
+)
+from ...layout import StretchEnergy, relax
+from ...linalg import factorize
+from ...stages import Layout
+
+# The symmetric Dirichlet energy of an isometry; `StretchEnergy` is relative to it.
+ISOMETRIC = 4.0
+
+
+def freed(layout: Layout) -> tuple[Layout, float]:
+    """Return a layout in one chart with the least symmetric Dirichlet energy, and this energy, averaged by area.
+
+    The sides of seams move independently, and no triangle is flipped. If the given layout has flipped triangles, the
+    minimisation starts from an embedding of W. T. Tutte, "How to draw a graph", 1963.
+    """
+    mesh, areas = layout.mesh, double_areas(layout.lengths) / 2
+    disk = layout.disk or TriangleMesh(np.zeros((len(layout.points), 3)), layout.corners)
+    points = layout.points
+    if not (signed_double_areas(points[layout.corners]) > 0).all():
+        points = as_pairs(_tutte_embedding(disk))
+    energy, sides = StretchEnergy(1.0), layout.lengths
+    found = relax(disk, points, layout.corners, energy, lengths=sides)
+    # The relaxation keeps the lengths relative to the area at its start.
+    start = np.abs(signed_double_areas(points[layout.corners])).sum() / 2
+    points = found.points * np.sqrt(areas.sum() / start)
+    flat = np.abs(signed_double_areas(points[layout.corners])) / 2
+    curvature = layout_curvature(mesh, points[layout.corners])
+    free = replace(
+        layout,
+        points=points,
+        log_scale=vertex_log_scale(mesh, areas, flat),
+        target=curvature,
+        curvature=curvature,
+        is_open=np.ones(len(mesh.vertices), dtype=bool),
+        is_fixed=np.zeros(len(mesh.vertices), dtype=bool),
+    )
+    return free, ISOMETRIC * found.energy
+
+
+def _tutte_embedding(disk: TriangleMesh) -> ComplexArray:
+    """Return (n,) the vertices of a disk in the plane: the boundary on a circle, others at the mean of neighbours."""
+    count, loop = len(disk.vertices), disk.heads[disk.boundary_walk()]
+    points = np.zeros(count, dtype=np.complex128)
+    points[loop] = np.exp(2j * np.pi * np.arange(len(loop)) / len(loop))
+    inner = np.flatnonzero(~disk.is_boundary_vertex)
+    if len(inner):
+        laplacian = cotangent_laplacian(disk.faces, np.ones(disk.faces.shape), count)[inner]
+        right = as_pairs(-(laplacian @ points))
+        points[inner] = as_complex(factorize(laplacian[:, inner]).solve(right))
+    return points

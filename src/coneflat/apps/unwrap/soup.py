@@ -1,0 +1,93 @@
+"""Unwrapping of any triangles, whether or not they form a surface: each face gets UVs, in its own orientation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...atlas import pack_charts
+from ...base import FloatArray, IntArray
+from ...errors import ConeflatError
+from ...geometry import as_pairs, edge_lengths
+from ...layout import rest_sides
+from ...mesh import label_components, label_faces
+from .unwrap import unwrap
+
+
+@dataclass(frozen=True, eq=False)
+class UnwrappedSoup:
+    """The UVs of m triangles.
+
+    Attributes:
+        corner_uv: (m, 3, 2) the point of each corner in the unit square.
+        chart: (m,) the chart of each face, from 0; -1 for faces without area.
+        efficiency: covered fraction of the square.
+        scale: UV units per unit of length; 0 without any face that has area.
+        notes: what was done to the triangles, one sentence each.
+    """
+
+    corner_uv: FloatArray
+    chart: IntArray
+    efficiency: float
+    scale: float
+    notes: tuple[str, ...]
+
+
+def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> UnwrappedSoup:
+    """Return UVs for triangles.
+
+    Faces are joined along edges with two faces of the same orientation; vertices at the same position are the same.
+
+    Args:
+        vertices: (n, 3) positions.
+        faces: (m, 3) vertex indices.
+        options: those of `coneflat.unwrap`.
+    """
+    corner_uv, chart = np.zeros((len(faces), 3, 2)), np.full(len(faces), -1)
+    _, place = np.unique(vertices, axis=0, return_inverse=True)
+    one, two, three = place.ravel()[faces].T
+    is_face = (one != two) & (two != three) & (three != one) & np.isfinite(vertices[faces]).all(axis=(1, 2))
+    chosen = np.flatnonzero(is_face)
+    notes = [f"{len(faces) - len(chosen):,} faces without area."] if len(chosen) < len(faces) else []
+    if not len(chosen):
+        return UnwrappedSoup(corner_uv, chart, 0.0, 0.0, tuple(notes))
+    corner = _oriented(place.ravel()[faces[chosen]])
+    points = np.empty((int(corner.max()) + 1, 3))
+    points[corner] = vertices[faces[chosen]]
+    try:
+        result = unwrap(points, corner, repair=True, **options)
+    except ConeflatError as error:
+        notes.append(f"Each face is a chart of its own: {error}.")
+        lengths = edge_lengths(points, corner)
+        sides = rest_sides(lengths)
+        flat = np.stack([np.zeros(len(sides)), sides[:, 2], -sides[:, 1]], axis=1)
+        packed = pack_charts(as_pairs(flat.ravel()).reshape(-1, 3, 2), np.arange(len(chosen)))
+        corner_uv[chosen], chart[chosen] = packed.corner_uv, np.arange(len(chosen))
+        return UnwrappedSoup(corner_uv, chart, packed.efficiency, packed.scale, tuple(notes))
+    assert result.face_origin is not None
+    known = chosen[result.face_origin]
+    corner_uv[known] = result.corner_uv
+    chart[known] = label_faces(result.uv_faces, len(result.uv))[1]
+    return UnwrappedSoup(
+        corner_uv, chart, result.packing_efficiency, result.uv_scale, (*notes, *result.notes)
+    )
+
+
+def _oriented(faces: IntArray) -> IntArray:
+    """Return (m, 3) other vertices of faces, so that they form surfaces oriented as the faces are.
+
+    Two faces share an edge if no other face has it and they have opposite directions along it.
+    """
+    count = int(faces.max()) + 1
+    tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    keys, back = tails * count + heads, heads * count + tails
+    order = np.argsort(keys, kind="stable")
+    first, last = (np.searchsorted(keys[order], back, side=side) for side in ("left", "right"))
+    here = np.searchsorted(keys[order], keys, side="right") - np.searchsorted(keys[order], keys, side="left")
+    joined = np.flatnonzero((last - first == 1) & (here == 1))
+    twins = order[first[joined]]
+    following = np.arange(faces.size).reshape(-1, 3)[:, [1, 2, 0]].ravel()
+    # The start of a half-edge is the end of its twin.
+    return label_components(faces.size, joined, following[twins])[1].reshape(-1, 3)

@@ -1,0 +1,90 @@
+"""Unwrapping of meshes for textures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from ... import Flattening
+from ...base import Stopwatch, limit_threads, plural
+from ...errors import OptionError
+from ...evaluate import evaluate
+from ...flatten import Method, with_copies
+from ...io import as_input
+from ...metric import find_metric
+from ...options import Options, declarations, read_options, takes
+from ...source import Source, find_copies
+from ...stages import Layout, RelaxSpec, Surface
+from .free import ISOMETRIC
+from .options import UnwrapOptions
+from .search import CutSearch
+
+#: The `method` in the settings of a result.
+FREE = "free seams"
+
+
+@takes(UnwrapOptions)
+def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flattening:
+    """Return UVs for a texture: the shortest seams for which the layout is nearly isometric.
+
+    Unlike in `flatten`, the two sides of a seam may differ, which lowers the distortion. Cones are only the ends of
+    seams.
+
+    Args:
+        mesh, faces: as for `coneflat.flatten`.
+        options: see below.
+
+    Returns:
+        The layout in the unit square with its seams and measures. Its energy is `distortion.energy`.
+
+    Raises:
+        OptionError: the bound is not above 4, or an option is unknown or invalid.
+        MeshError, MeshFileError, CurvatureError, SeamError, MetricError, TooLargeError: as for `coneflat.flatten`.
+
+    References:
+        M. Li, D. Kaufman, V. Kim, J. Solomon, A. Sheffer, "OptCuts: joint optimization of surface cuts and
+        parameterization", 2018, for the problem. J. Smith, S. Schaefer, "Bijective parameterization with free
+        boundaries", 2015, for the energy.
+
+    Examples:
+        >>> result = coneflat.unwrap(coneflat.sample_path())
+        >>> result.distortion.energy < 4.1, result.distortion.flipped, result.distortion.overlapping_pairs
+        (True, 0, 0)
+    """
+    o = read_options(options, UnwrapOptions)
+    if not o.max_energy > ISOMETRIC:
+        raise OptionError(f"max_energy must be above 4, the energy of an isometry, not {o.max_energy:g}")
+    shared = Options(
+        **{name: getattr(o, name) for name in declarations(UnwrapOptions) if name != "max_energy"}
+    )
+    watch, source = Stopwatch(o.progress), Source(as_input(mesh, faces))
+    with watch("check"):
+        prepared = source.prepared(shared)
+    method = Method(RelaxSpec("off", 0.0), o.charts == "atlas", None, Stopwatch(), Surface.of, find_metric)
+    parts, found, energies = prepared.parts, dict[int, Layout](), list[float]()
+    with limit_threads(o.threads):
+        copies = find_copies(parts)
+        for i, part in enumerate(parts):
+            if copies[i] is None:
+                watch.share = 0.9 * len(part.faces) / len(prepared.checked.mesh.faces)
+                with watch("search", 1.0):
+                    best = CutSearch(part, o.max_energy, method).best()
+                found[i] = best.layout
+                energies.append(best.energy)
+                watch.end_component()
+    result = evaluate(prepared, with_copies(found, parts, copies), replace(shared, method=FREE), watch)
+    notes = (*result.notes, *_notes(energies, o.max_energy))
+    return replace(result, settings={**result.settings, "max_energy": o.max_energy}, notes=notes)
+
+
+def _notes(energies: Sequence[float], bound: float) -> Iterator[str]:
+    """Yield a note if the energy of a component is above the bound."""
+    above = [energy for energy in energies if energy > bound]
+    if above:
+        yield (
+            f"The energy of {plural(len(above), 'component')} is up to {max(above):.4g}, above the {bound:g} allowed: "
+            "refine the mesh, or allow more."
+        )

@@ -1,0 +1,157 @@
+"""Unwrapping for textures: the bound of the energy, the seams, and what cannot be reached."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapes
+from command import command
+
+import coneflat
+from coneflat import errors, measure_uv, unwrap
+from coneflat.apps.unwrap.free import freed
+from coneflat.base import Stopwatch
+from coneflat.flatten import Method, lay_out_part
+from coneflat.io import as_input
+from coneflat.metric import find_metric
+from coneflat.options import Options
+from coneflat.source import Source
+from coneflat.stages import RelaxSpec, Surface
+
+CLOSED = {"sphere": shapes.sphere(3), "two handles": shapes.genus(2), "box": shapes.box()}
+OPEN = {"hill": shapes.hill(), "annulus": shapes.annulus(), "cylinder": shapes.cylinder()}
+
+
+@pytest.mark.parametrize("bound", [4.02, 4.1, 4.5])
+@pytest.mark.parametrize("shape", [*CLOSED.values(), *OPEN.values()], ids=[*CLOSED, *OPEN])
+def test_the_energy_is_within_the_bound(shape, bound):
+    result = unwrap(*shape, max_energy=bound)
+    d = result.distortion
+    assert not any("allowed" in note for note in result.notes)
+    assert 4 - 1e-9 <= d.energy <= bound * (1 + 1e-9)
+    assert (d.flipped, d.degenerate, d.overlapping_pairs) == (0, 0, 0)
+
+
+def test_models_have_short_seams_within_the_bound(shared):
+    for name, most in (("spot.obj", 4.0), ("hand.obj", 4.0), ("fandisk.obj", 2.5)):
+        d = unwrap(shared(name)).distortion
+        assert d.energy <= 4.1
+        assert d.area_std <= 0.08
+        assert (d.flipped, d.overlapping_pairs) == (0, 0)
+        assert d.seam_length <= most
+
+
+def test_a_smaller_bound_needs_longer_seams():
+    lengths = [
+        unwrap(*shapes.sphere(3), max_energy=bound).distortion.seam_length for bound in (4.01, 4.05, 4.5)
+    ]
+    assert lengths[0] > lengths[1] > lengths[2]
+
+
+def test_freed_seams_lower_the_energy():
+    """At equal cones and cut, the layout with tied seams has more energy."""
+    tied = coneflat.flatten(*shapes.sphere(3), cone_count=6, stretch=1.0, charts="one")
+    source = Source(as_input(tied.vertices, tied.faces))
+    cones = dict(zip(tied.cones.tolist(), tied.curvatures.tolist(), strict=True))
+    part = source.prepared(Options(cones=cones)).parts[0]
+    method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
+    free, energy = freed(lay_out_part(part, method))
+    assert len(free.seams) == len(tied.seams)
+    assert 4 < energy < tied.distortion.energy - 1e-3
+
+
+def test_a_flipped_start_is_replaced():
+    part = Source(as_input(*shapes.hill())).prepared(Options()).parts[0]
+    method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
+    layout = lay_out_part(part, method)
+    points = layout.points.copy()
+    inner = int(np.flatnonzero(~part.mesh.is_boundary_vertex)[0])
+    points[layout.corners[part.mesh.faces == inner][0]] += 100.0
+    wanted, found = freed(layout)[1], freed(replace(layout, points=points))[1]
+    assert found == pytest.approx(wanted, rel=1e-3)
+
+
+@pytest.mark.parametrize("shape", [shapes.sphere(3), shapes.hill(20, 20)])
+def test_scale_motion_and_numbering_change_nothing(shape):
+    vertices, faces = shape
+    base = unwrap(vertices, faces).distortion
+    other_vertices, other_faces, _ = shapes.renumber(vertices, faces)
+    for mesh in (
+        (vertices * 1e-6, faces),
+        (vertices * 1e6, faces),
+        (vertices @ shapes.rotation().T, faces),
+        (other_vertices, other_faces),
+    ):
+        found = unwrap(*mesh).distortion
+        assert found.energy == pytest.approx(base.energy, rel=1e-6)
+        assert found.seam_length == pytest.approx(base.seam_length, rel=1e-6)
+
+
+def test_the_same_input_gives_the_same_output():
+    one, two = unwrap(*shapes.genus(2)), unwrap(*shapes.genus(2))
+    np.testing.assert_array_equal(one.uv, two.uv)
+    np.testing.assert_array_equal(one.uv_faces, two.uv_faces)
+
+
+def test_components_have_one_texel_density():
+    small, large = shapes.sphere(2), shapes.sphere(3)
+    result = unwrap(*shapes.join(small, (large[0] * 5, large[1])))
+    scale, split = result.distortion.log_area_scale, len(small[1])
+    assert np.median(scale[:split]) == pytest.approx(np.median(scale[split:]), abs=0.05)
+
+
+def test_a_bound_that_no_cut_reaches_gives_a_note():
+    result = unwrap(*shapes.sphere(1), max_energy=4.0001)
+    assert result.distortion.flipped == 0
+    assert "above the 4.0001 allowed" in result.notes[-1]
+    assert f"{result.distortion.energy:.3g}" in result.notes[-1]
+
+
+@pytest.mark.parametrize("bound", [4, 3.9, -1, np.nan])
+def test_a_bound_of_an_isometry_or_less_is_refused(bound):
+    with pytest.raises(errors.OptionError, match="max_energy"):
+        unwrap(*shapes.sphere(1), max_energy=bound)
+
+
+def test_unknown_options_are_refused():
+    with pytest.raises(errors.OptionError, match="unknown option distortion"):
+        unwrap(*shapes.sphere(1), distortion=0.1)
+
+
+def test_seams_of_the_user_are_cut():
+    vertices, faces = shapes.box()
+    edges = coneflat.check_mesh(vertices, faces).mesh.edges
+    result = unwrap(vertices, faces, seams=edges)
+    assert result.distortion.charts == len(faces)
+    assert result.distortion.energy == pytest.approx(4.0)
+
+
+def test_the_command_writes_what_it_reports(tmp_path):
+    mesh = shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(3))
+    done = command(
+        "unwrap",
+        mesh,
+        "-o",
+        tmp_path / "out.obj",
+        "--report",
+        tmp_path / "out.json",
+        "--require",
+        "energy<=4.1",
+    )
+    assert done.returncode == 0, done.stderr
+    assert "energy" in done.stdout
+    assert 4 < measure_uv(tmp_path / "out.obj").distortion.energy <= 4.1
+    refused = command("unwrap", mesh, "-o", tmp_path / "no.obj", "--max-energy", "4")
+    assert refused.returncode == 2
+    assert refused.stderr == "coneflat: error: max_energy must be above 4, the energy of an isometry, not 4\n"
+    assert not (tmp_path / "no.obj").exists()
+
+
+def test_the_energy_of_a_stretched_square():
+    mesh = coneflat.check_mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]).mesh
+    # Singular values 2 and 1: at the best scale (2^2 + 1) s^2 = (1/2^2 + 1) / s^2, and the sum of both is 5.
+    for scale in (1e-3, 1.0, 50.0):
+        stretched = scale * mesh.vertices[mesh.faces][:, :, :2] * [2, 1]
+        assert coneflat.measure(mesh, stretched).energy == pytest.approx(5.0)

@@ -1,0 +1,133 @@
+"""The interface of xatlas: types, shapes, and UVs for every face."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+
+import coneflat.xatlas as ours
+
+SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
+FACES = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
+RANDOM = np.random.default_rng(0)
+
+
+def areas(indices, uvs):
+    corners = uvs[indices].astype(np.float64)
+    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2
+
+
+SOUPS = {
+    "a square": (SQUARE, FACES),
+    "a closed surface": shapes.sphere(2),
+    "faces given twice": (SQUARE, np.concatenate([FACES, FACES])),
+    "opposite orientations": (SQUARE, np.array([[0, 1, 2], [0, 3, 2]])),
+    "four faces at an edge": (RANDOM.random((6, 3)), np.array([[0, 1, k] for k in (2, 3, 4, 5)])),
+    "separate triangles": (RANDOM.random((60, 3)), np.arange(60).reshape(-1, 3)),
+    "random triangles": (RANDOM.random((20, 3)), shapes.sphere(1)[1] % 20),
+}
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize("soup", SOUPS.values(), ids=SOUPS)
+def test_every_face_has_uvs_in_its_own_orientation(soup):
+    vertices, faces = soup
+    mapping, indices, uvs = ours.parametrize(vertices, faces)
+    assert (mapping.dtype, indices.dtype, uvs.dtype) == (np.uint32, np.uint32, np.float32)
+    assert uvs.shape == (len(mapping), 2)
+    np.testing.assert_array_equal(mapping[indices], faces)
+    one, two, three = np.asarray(faces).T
+    proper = (one != two) & (two != three) & (three != one)
+    assert (areas(indices, uvs)[proper] > 0).all()
+    assert 0 <= uvs.min() <= uvs.max() <= 1
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize(
+    ("vertices", "faces"),
+    [
+        (SQUARE, np.array([[0, 1, 2], [0, 2, 2], [1, 1, 1]])),
+        (np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]), np.array([[0, 1, 2]])),
+        (np.concatenate([SQUARE, [[np.nan] * 3]]), np.array([[0, 1, 2], [0, 2, 4]])),
+        (SQUARE, np.empty((0, 3), np.uint32)),
+        (np.empty((0, 3)), np.empty((0, 3), np.uint32)),
+    ],
+)
+def test_faces_without_area_get_points(vertices, faces):
+    mapping, indices, uvs = ours.parametrize(vertices, faces)
+    np.testing.assert_array_equal(mapping[indices], faces)
+    assert np.isfinite(uvs).all()
+    assert (areas(indices, uvs) >= 0).all()
+
+
+def test_an_atlas_of_several_meshes():
+    atlas = ours.Atlas()
+    ball = shapes.sphere(2)
+    atlas.add_mesh(*ball)
+    atlas.add_mesh(SQUARE, FACES, None, SQUARE[:, :2])
+    options = ours.PackOptions()
+    options.resolution, options.padding, options.create_image, options.bruteForce = 256, 4, True, True
+    atlas.generate(ours.ChartOptions(max_cost=1.0), pack_options=options, verbose=False)
+    assert (len(atlas), atlas.mesh_count, atlas.atlas_count) == (2, 2, 1)
+    assert (atlas.width, atlas.height) == (256, 256)
+    assert len(atlas.utilization) == 1
+    assert (
+        0 < atlas.utilization[0] == pytest.approx(sum(areas(*atlas[i][1:]).sum() for i in range(2)), rel=1e-5)
+    )
+    colored = (atlas.chart_image > 0).any(axis=2).mean()
+    assert colored == pytest.approx(atlas.utilization[0], abs=0.02)
+    assert len(np.unique(atlas.chart_image.reshape(-1, 3), axis=0)) == atlas.chart_count + 1
+    density = np.sqrt(areas(*atlas[1][1:]).sum()) * 256
+    assert density == pytest.approx(atlas.texels_per_unit, rel=0.1)
+    for index in (2, -1):
+        with pytest.raises(IndexError, match="not from 0 to 1"):
+            atlas[index]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((SQUARE[:, :2], FACES), "positions must have the shape"),
+        ((SQUARE, FACES.ravel()), "indices must have the shape"),
+        ((SQUARE, FACES + 2), "indices must be from 0 to 3"),
+        ((SQUARE, FACES, SQUARE[:, :2]), "normals must have the shape"),
+    ],
+)
+def test_wrong_arrays_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        ours.parametrize(*arguments)
+
+
+def test_an_image_that_was_not_requested():
+    atlas = ours.Atlas()
+    with pytest.raises(RuntimeError, match="create_image"):
+        _ = atlas.chart_image
+
+
+def test_export(tmp_path):
+    mapping, indices, uvs = ours.parametrize(SQUARE, FACES)
+    ours.export(tmp_path / "square.obj", SQUARE[mapping], indices, uvs, SQUARE[mapping])
+    text = (tmp_path / "square.obj").read_text()
+    assert text.count("\nvt ") == 4
+    assert "f 1/1/1 2/2/2" in text
+
+
+def test_the_types_of_xatlas(shared):
+    theirs = pytest.importorskip("xatlas")
+    vertices, faces = (np.asarray(each) for each in shapes.sphere(2))
+    for one, two in zip(theirs.parametrize(vertices, faces), ours.parametrize(vertices, faces), strict=True):
+        assert one.dtype == two.dtype
+        assert one.ndim == two.ndim
+    for name in ("ChartOptions", "PackOptions"):
+        fields = {key for key in dir(getattr(theirs, name)()) if not key.startswith("_")}
+        assert fields <= set(dir(getattr(ours, name)()))
+    missing = {key for key in dir(theirs.Atlas) if not key.startswith("_")} - set(dir(ours.Atlas))
+    assert missing <= {
+        "add_uv_mesh",
+        "get_chart_image",
+        "get_mesh_chart",
+        "get_mesh_chart_count",
+        "get_mesh_vertex_assignment",
+    } | set(vars(ours.Atlas()))
