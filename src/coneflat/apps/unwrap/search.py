@@ -1,7 +1,8 @@
 """Search for the cut of a texture.
 
 Cones choose the cut. The fewer they are, the shorter are the seams, and the higher is the energy of the layout with
-free seams. The candidates are the cones that the search finds for an area distortion, which is varied.
+free seams. The candidates are the cones that the search finds for an area distortion, which is varied. The tips of the
+best candidate's seams are then moved to where the energy is the largest allowed.
 """
 
 from __future__ import annotations
@@ -12,17 +13,36 @@ import numpy as np
 
 from ... import TriangleMesh
 from ...atlas import separate_overlaps
-from ...base import FloatArray
-from ...cones import close_search
+from ...base import FloatArray, IntArray
+from ...cones import close_search, find_cones
+from ...errors import CurvatureError, MetricError
 from ...flatten import Method, lay_out_part
+from ...geometry import find_overlaps, signed_double_areas
+from ...layout import lay_out
+from ...mesh import label_faces, open_along
 from ...seams import seam_costs
 from ...source import Part
-from ...stages import Layout, Surface
-from .free import freed
+from ...stages import Cut, Layout, Surface, VertexCurvatures
+from .free import ISOMETRIC, freed, seam_edges
+from .tips import find_tips, moved_tips, moves_for
 
 # The area distortion of the first candidate, and the maximum number of candidates: half as many for meshes with more
-# than MANY_TRIANGLES, for which each takes seconds. More than six shorten seams by less than 1%.
-FIRST_DISTORTION, MAX_CANDIDATES, MANY_TRIANGLES = 0.25, 6, 200_000
+# than MANY_TRIANGLES, for which each takes seconds.
+FIRST_DISTORTION, MAX_CANDIDATES, MANY_TRIANGLES = 0.25, 5, 200_000
+# Factors of the distortion from one candidate to the next.
+MIN_FACTOR, MAX_FACTOR = 1.15, 4.0
+# Number of candidates whose tips are moved if none of the moves before was within the bound, and of moves for each.
+MAX_MOVED, MAX_MOVES = 2, 4
+# Candidates whose energy exceeds that of an isometry by more than this factor of what is allowed are given up.
+REACH = 2.0
+# Cost of seams that lowers the energy to that of an isometry, relative to the square root of the area.
+COST_PER_ENERGY = 0.6
+# Candidates above the bound by less than this fraction of what is allowed may be within it once they are settled.
+NEARLY = 0.02
+# Tolerance of the energies of candidates, see `relax`.
+TOLERANCE = 1e-2
+# Where charts would touch themselves, this many rings of triangles stay, and after so many tries all.
+CONTACT_RINGS, MAX_CONTACTS = 4, 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,16 +50,16 @@ class Candidate:
     """A layout with free seams.
 
     Attributes:
-        distortion: the area distortion for which its cones were searched.
-        layout: the layout; if its energy is within the bound, without overlaps.
+        layout: the layout, without overlaps if its energy is in reach of the bound.
         energy: its mean symmetric Dirichlet energy.
-        cost: the cost of its seams if the energy is within the bound, else the energy.
+        cost: the cost of its seams.
+        distortion: the area distortion for which its cones were searched.
     """
 
-    distortion: float
     layout: Layout
     energy: float
     cost: float
+    distortion: float
 
 
 class CutSearch:
@@ -63,44 +83,159 @@ class CutSearch:
         Raises:
             CurvatureError, MetricError, SeamError: a candidate could not be laid out.
         """
-        within, beyond, distortion = list[Candidate](), list[Candidate](), FIRST_DISTORTION
-        is_large = len(self._part.faces) > MANY_TRIANGLES
-        for _ in range(MAX_CANDIDATES // 2 if is_large else MAX_CANDIDATES):
-            one = self._candidate(distortion)
-            (within if one.energy <= self._max_energy else beyond).append(one)
-            if not within:
-                distortion /= 2
-                continue
-            low = max(within, key=lambda each: each.distortion)
-            high = min(beyond, key=lambda each: each.distortion, default=None)
-            if not len(low.layout.seams) or (high and len(low.layout.cones) <= len(high.layout.cones) + 1):
-                break
-            distortion = 2 * distortion if high is None else float(np.sqrt(low.distortion * high.distortion))
-        best = min(within or beyond, key=lambda each: each.cost)
+        found = self._by_distortion()
+        near = [one for one in found if one.energy <= self._reach]
+        if near:
+            for one in sorted(near, key=self._expected_cost)[:MAX_MOVED]:
+                found.append(self._settled(one))
+                for moved in self._moved(found[-1]):
+                    found.append(self._settled(moved))
+                    if found[-1].energy <= self._max_energy:
+                        break
+                if found[-1].energy <= self._max_energy:
+                    break
         if self._surface is not None:
             close_search(self._surface)
             self._surface = None
-        return best if within else replace(best, layout=self._separated(best.layout))
+        within = [one for one in found if one.energy <= self._max_energy]
+        if within:
+            return min(within, key=lambda one: one.cost)
+        return self._separated(min(found, key=lambda one: one.energy))
 
-    def _candidate(self, distortion: float) -> Candidate:
-        spec = replace(self._part.cones, distortion=distortion)
-        layout, energy = freed(lay_out_part(replace(self._part, cones=spec), self._method))
-        if energy > self._max_energy:
-            return Candidate(distortion, layout, energy, energy)
-        layout = self._separated(layout)
-        return Candidate(distortion, layout, energy, self._cost(layout))
+    @property
+    def _reach(self) -> float:
+        return ISOMETRIC + REACH * (self._max_energy - ISOMETRIC)
 
-    def _separated(self, layout: Layout) -> Layout:
-        return separate_overlaps(layout, self._costs, self._part.seams) if self._method.separates else layout
+    def _by_distortion(self) -> list[Candidate]:
+        """Return candidates with energies around the bound."""
+        found, distortion = list[Candidate](), FIRST_DISTORTION
+        allowed = self._max_energy - ISOMETRIC
+        is_large = len(self._part.faces) > MANY_TRIANGLES
+        for _ in range(MAX_CANDIDATES // 2 if is_large else MAX_CANDIDATES):
+            spec = replace(self._part.cones, distortion=distortion)
+            layout = lay_out_part(replace(self._part, cones=spec), self._method)
+            same = [i for i, each in enumerate(found) if np.array_equal(each.layout.cones, layout.cones)]
+            one = (
+                replace(found.pop(same[0]), distortion=distortion)
+                if same
+                else self._candidate(layout, distortion)
+            )
+            found.append(one)
+            within = [each for each in found if each.energy <= self._max_energy]
+            beyond = [each for each in found if each.energy > self._max_energy]
+            low = max(within, key=lambda each: each.distortion, default=None)
+            high = min(beyond, key=lambda each: each.distortion, default=None)
+            if low and (
+                not len(low.layout.seams) or (high and len(low.layout.cones) <= len(high.layout.cones) + 1)
+            ):
+                break
+            if low and high:
+                distortion = float(np.sqrt(low.distortion * high.distortion))
+            else:
+                # The energy above that of an isometry is about a multiple of the square of the distortion.
+                factor = np.sqrt(allowed / max(one.energy - ISOMETRIC, 1e-9 * allowed))
+                factor = max(factor, MIN_FACTOR) if factor > 1 else min(factor, 1 / MIN_FACTOR)
+                distortion *= float(np.clip(factor, 1 / MAX_FACTOR, MAX_FACTOR))
+        return found
 
-    def _cost(self, layout: Layout) -> float:
-        """Return the length of the seams of a layout, weighted by the options for seams."""
-        ends = [len(self._part.mesh.vertices), 1]
-        is_seam = np.isin(np.sort(self._part.mesh.edges, axis=1) @ ends, np.sort(layout.seams, axis=1) @ ends)
-        return float(self._costs[is_seam].sum())
+    def _candidate(self, layout: Layout, distortion: float) -> Candidate:
+        layout, energy = freed(layout, tolerance=TOLERANCE)
+        one = Candidate(layout, energy, float(self._costs[seam_edges(layout)].sum()), distortion)
+        return one if energy > self._reach else self._separated(one)
+
+    def _separated(self, one: Candidate) -> Candidate:
+        """Return a candidate whose overlaps are separated."""
+        if not self._method.separates:
+            return one
+        layout = separate_charts(one.layout, self._costs, self._part)
+        return replace(one, layout=layout, cost=float(self._costs[seam_edges(layout)].sum()))
+
+    def _settled(self, one: Candidate) -> Candidate:
+        """Return a candidate with the least energy without overlaps: its separating cuts are free, too."""
+        is_free = np.ones(len(one.layout.points), dtype=bool)
+        for _ in range(MAX_CONTACTS):
+            layout, energy = freed(one.layout, is_free)
+            pairs = find_overlaps(side_by_side(layout).points[layout.corners]).pairs
+            if not (len(pairs) and self._method.separates):
+                return replace(one, layout=layout, energy=energy)
+            # Points where charts would touch themselves stay.
+            for _ in range(CONTACT_RINGS):
+                is_near = np.zeros(len(is_free), dtype=bool)
+                is_near[layout.corners[pairs]] = True
+                pairs = np.flatnonzero(is_near[layout.corners].any(axis=1))
+            is_free[layout.corners[pairs]] = False
+        return one
+
+    def _expected_cost(self, one: Candidate) -> float:
+        """Return the cost of the seams at which the energy would be the largest allowed, roughly."""
+        size, allowed = float(np.sqrt(one.layout.area)), self._max_energy - ISOMETRIC
+        return one.cost + (one.energy - self._max_energy) / allowed * COST_PER_ENERGY * size
+
+    def _moved(self, start: Candidate) -> list[Candidate]:
+        """Return candidates with the tips of the seams moved, so that the energy is about the largest allowed."""
+        seams, found = seam_edges(start.layout), list[Candidate]()
+        tips = find_tips(start.layout, seams, self._costs)
+        if not (tips.rates > 0).any():
+            return found
+        slack, allowed = self._max_energy - start.energy, self._max_energy - ISOMETRIC
+        # For each slack that was requested, the energy above the bound.
+        tried = list[tuple[float, float]]()
+        for _ in range(MAX_MOVES):
+            moves = moves_for(start.layout, tips, slack)
+            layout = self._with_tips(*moved_tips(start.layout, seams, tips, moves))
+            if layout is None:
+                break
+            one = self._candidate(layout, start.distortion)
+            excess = one.energy - self._max_energy
+            tried.append((slack, excess))
+            if excess <= NEARLY * allowed:
+                found.append(one)
+            if abs(excess) <= NEARLY * allowed:
+                break
+            low = max((pair for pair in tried if pair[1] <= 0), default=None)
+            high = min((pair for pair in tried if pair[1] > 0), default=None)
+            if low is not None and high is not None:
+                part = float(np.clip(low[1] / (low[1] - high[1]), 0.2, 0.8))
+                slack = low[0] + part * (high[0] - low[0])
+            else:
+                slack -= np.sign(excess) * max(abs(excess), NEARLY * allowed) * len(tried)
+        return sorted(found, key=lambda one: one.cost)
+
+    def _with_tips(self, seams: IntArray, cones: IntArray) -> Layout | None:
+        """Return the layout with given cones that is cut along given edges; None if there is none."""
+        mesh = self._part.mesh
+        if self._surface is None:
+            return None
+        cones = cones[np.isin(cones, mesh.edges[seams])]
+        given = VertexCurvatures(cones, np.full(len(cones), np.nan))
+        spec = replace(self._part.cones, strategy="given", given=given)
+        cut = open_along(mesh, seams)
+        try:
+            solution = find_cones(self._surface, spec, self._method.watch)
+            metric = self._method.find_metric(self._surface, solution, self._part.metric)
+            layout = lay_out(metric, Cut(cut.mesh, seams))
+        except (CurvatureError, MetricError):
+            return None
+        if not (signed_double_areas(layout.points[layout.corners]) > 0).all():
+            return None
+        return replace(layout, chart=label_faces(cut.mesh.faces, len(cut.origin))[1])
 
     def _surface_of(self, mesh: TriangleMesh, lengths: FloatArray, flips: bool) -> Surface:
         if self._surface is None:
             self._surface = Surface.of(mesh, lengths, flips)
             self._surface.is_reused = True
         return self._surface
+
+
+def side_by_side(layout: Layout) -> Layout:
+    """Return a layout whose charts do not overlap one another."""
+    place = np.zeros(len(layout.points))
+    place[layout.corners] = layout.chart[:, None]
+    width = 1.1 * float(np.ptp(layout.points[:, 0]))
+    return replace(layout, points=layout.points + np.stack([width * place, 0 * place], axis=1))
+
+
+def separate_charts(layout: Layout, costs: FloatArray, part: Part) -> Layout:
+    """Return a layout in any number of charts, split so that no chart overlaps itself."""
+    separated = separate_overlaps(side_by_side(layout), costs, part.seams)
+    return replace(separated, chart=label_faces(separated.corners, len(separated.points))[1])

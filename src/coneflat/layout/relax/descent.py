@@ -21,6 +21,9 @@ RELATIVE_ROUNDING = 1e-12
 MIN_PROGRESS = 1e-3
 # Maximum fraction of the distance per step if seams and sides have to rotate: with longer steps, sides fold over.
 TURNING_STRIDE = 0.1
+# Factor by which more unknowns than there are count for the choice of the solver, since matrices of one pattern are
+# factorized repeatedly: with 6,000 unknowns this halves the time.
+REPEATED = 6
 # If less than this fraction of the unknowns is in parts that have not converged, only these parts are continued.
 MIN_ACTIVE_SHARE = 0.6
 
@@ -98,7 +101,7 @@ def descend(
             part, parts, unknown_part = elements.part, elements.parts, elements.unknown_part
             maps, active, factor = elements.maps(places), np.ones(parts, dtype=bool), None
         gradient, pull, matrix = elements.newton_system(energy, maps, remaining)
-        factor = factorize(matrix, previous=factor, total_size=len(points))
+        factor = factorize(matrix, previous=factor, total_size=REPEATED * len(points))
         step = np.append(factor.solve(-gradient - pull), remaining)
         if not np.isfinite(step).all():
             raise MetricError(f"relaxation found no finite step of its {elements.count:,} unknowns")
