@@ -74,7 +74,7 @@ PAPER: Mapping[str, Any] = {
 #: Formats in which flattened meshes are written: file extensions.
 FORMATS = ("obj", "ply", "glb", "npz")
 #: Largest number of triangles that the page draws. Larger meshes, which a browser rotates slowly, are simplified.
-MOST_TRIANGLES = 500_000
+MAX_SHOWN_TRIANGLES = 500_000
 #: What the page of the viewer can show first.
 SHOWS = ("checker", "picture", "charts", "qc", "area", "curvature", "flat", "plain")
 

@@ -1,6 +1,6 @@
 // Alignment of a layout with the one before it, so that a small change of the settings changes little in view.
 
-const MOST_CHARTS = 2 ** 24;
+const CHART_BASE = 2 ** 24;
 const SAMPLED = 4000; // Triangles that are compared.
 
 /** Return the rotation matrix of a number of quarter turns in the plane. */
@@ -28,12 +28,12 @@ function keepChartNumbers(before, after) {
   const [old, now] = [before.arrays.chart, after.arrays.chart], shared = new Map();
   if (old === now) return;
   for (let i = 0; i < now.length; i++) {
-    const key = now[i] * MOST_CHARTS + old[i];
+    const key = now[i] * CHART_BASE + old[i];
     shared.set(key, (shared.get(key) ?? 0) + 1);
   }
   const numbers = new Map(), taken = new Set();
   for (const [key] of [...shared].sort((one, other) => other[1] - one[1])) {
-    const [mine, its] = [Math.floor(key / MOST_CHARTS), key % MOST_CHARTS];
+    const [mine, its] = [Math.floor(key / CHART_BASE), key % CHART_BASE];
     if (numbers.has(mine) || taken.has(its)) continue;
     numbers.set(mine, its);
     taken.add(its);

@@ -18,7 +18,7 @@ import numpy as np
 from ....base import short_repr
 from ....errors import OptionError
 from ....io import atomic_write, checked_target, read_picture
-from ....options import MOST_TRIANGLES, SHOWS
+from ....options import MAX_SHOWN_TRIANGLES, SHOWS
 from ..quantity import Quantity, own_quantity
 from .content import content_of
 from .payload import PageText, as_payload, head_and_block
@@ -42,7 +42,7 @@ def page_html(
     texture: str | PathLike[str] | None = None,
     up: str = "y",
     show: str | None = None,
-    most_triangles: int = MOST_TRIANGLES,
+    most_triangles: int = MAX_SHOWN_TRIANGLES,
     text: PageText | None = None,
     color: Quantity | str | None = None,
 ) -> str:
