@@ -122,7 +122,7 @@ def test_cones_of_the_users_own():
         ({"method": "magic"}, errors.OptionError, "unknown method"),
         ({"distorsion": 0.1}, errors.OptionError, "did you mean distortion"),
         ({"quantise": 1.5, "quantize": 1.5}, errors.OptionError, "different spellings"),
-        ({"distortion": 0}, errors.OptionError, "distortion must be a number above 0, not 0"),
+        ({"distortion": 0}, errors.OptionError, "distortion must be a number above 0, got 0"),
         ({"distortion": "x"}, errors.OptionError, "distortion must be a number"),
         ({"distortion": float("inf")}, errors.OptionError, "distortion"),
         ({"max_cones": -1}, errors.OptionError, "max_cones"),
@@ -142,7 +142,7 @@ def test_cones_of_the_users_own():
         ({"cones": [True, False]}, errors.OptionError, "integer"),
         ({"boundary": {1: 2.0, 2: None}}, errors.OptionError, "vertex 2 has none"),
         ({"cones": {1: 7.0, 2: None}}, errors.CurvatureError, "vertex 1 has 2.2282 pi"),
-        ({"cones": {1: float("nan")}}, errors.OptionError, "curvature of cone 1 must be finite, not nan"),
+        ({"cones": {1: float("nan")}}, errors.OptionError, "curvature of cone 1 must be finite, got nan"),
         ({"cones": {1: 2.0, 2: 3.0}}, errors.CurvatureError, r"must sum to 2 pi chi = 12\.56637"),
         (
             {"cones": {1: 2.5 * np.pi, 2: np.pi, 3: np.pi / 2}},

@@ -79,7 +79,7 @@ def find_cones(
         advice = "allow more of them (--max-cones)" if is_greedy else "add cones or move them"
         check_feasible(solution.cones, solution.curvatures, spec.names, advice)
     if too_many_handles:
-        note = f"The greedy search placed the cones, as a surface with {mesh.genus():,} handles needs so many of them."
+        note = f"The greedy search chose the cones, because {mesh.genus():,} handles need so many of them."
         return replace(solution, notes=(note,))
     return solution
 
@@ -242,7 +242,7 @@ def _unmet(genus: int, cone_count: int, distortion: float, spec: ConeSpec) -> tu
         return ()
     why = "no better cones were found within the given bounds"
     if spec.quantum is not None and genus and distortion <= spec.distortion * HOLONOMY_FACTOR:
-        why = "cones were moved a little to align the rotations along handles"
+        why = "cones were moved to align the rotations along handles"
     return (
         f"The area distortion is {distortion:.3g} with {plural(cone_count, 'cone')}, above the "
         f"{spec.distortion:g} allowed: {why}.",

@@ -103,7 +103,7 @@ def cotangent_laplacian(faces: IntArray, cots: FloatArray, vertex_count: int) ->
     """
     triangles, given = as_faces(faces, vertex_count), as_floats("cots", cots)
     if given.shape != triangles.shape:
-        raise ArrayShapeError(f"cots must have the shape {triangles.shape} of the faces, not {given.shape}")
+        raise ArrayShapeError(f"cots must have the shape {triangles.shape} of the faces, got {given.shape}")
     starts = np.zeros(vertex_count + 1, dtype=np.int32)
     rows = np.empty(6 * len(triangles) + vertex_count, dtype=np.int32)
     values = np.empty(len(rows))

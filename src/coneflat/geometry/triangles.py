@@ -43,13 +43,13 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
     points, triangles = as_floats("vertices", vertices), np.asarray(faces, dtype=np.int64)
     if points.ndim != 2:
         raise ArrayShapeError(
-            f"vertices must have the shape (n, 3), or (n, 2) in the plane, not {points.shape}"
+            f"vertices must have the shape (n, 3), or (n, 2) in the plane, got {points.shape}"
         )
     if triangles.ndim != 2 or triangles.shape[1] != 3:
-        raise ArrayShapeError(f"faces must have the shape (m, 3), not {triangles.shape}")
+        raise ArrayShapeError(f"faces must have the shape (m, 3), got {triangles.shape}")
     if triangles.size and not 0 <= triangles.min() <= triangles.max() < len(points):
         raise FaceIndexError(
-            f"faces name vertices from {triangles.min()} to {triangles.max()}, but there are {len(points)}, from 0 on"
+            f"faces refer to vertices {triangles.min()} to {triangles.max()}, but there are {len(points)}, from 0"
         )
     return measure_sides(points, triangles)
 
@@ -58,7 +58,7 @@ def as_triples(name: str, values: ArrayLike) -> FloatArray:
     """Return values as a contiguous (m, 3) float array, as compiled loops need; raise ArrayShapeError otherwise."""
     array = as_floats(name, values)
     if array.ndim != 2 or array.shape[1] != 3:
-        raise ArrayShapeError(f"{name} must have the shape (m, 3), not {array.shape}")
+        raise ArrayShapeError(f"{name} must have the shape (m, 3), got {array.shape}")
     return array
 
 

@@ -152,7 +152,7 @@ def as_written(result: Flattening, ending: str) -> Flattening:
         MeshFileError: numbers are out of range for the format.
     """
     if not isinstance(ending, str):
-        raise OptionError(f"ending must be text such as .glb, not {short_repr(ending)}")
+        raise OptionError(f"ending must be text such as .glb, got {short_repr(ending)}")
     stored, lost = result, left_out(result, ending)
     if ending == ".glb":
         stored = _in_single_precision(result)

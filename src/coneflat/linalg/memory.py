@@ -21,7 +21,7 @@ def check_memory(triangles: int) -> None:
     needed, free = triangles * BYTES_PER_TRIANGLE, free_memory()
     if needed > free:
         raise TooLargeError(
-            f"{triangles:,} triangles take about {_size(needed)} of memory, and {_size(free)} are free"
+            f"{triangles:,} triangles need about {_size(needed)} of memory, but {_size(free)} are free"
         )
 
 

@@ -157,7 +157,7 @@ def _check_arrays(
     """Raise an error for invalid arrays, with which compiled loops would read out of bounds."""
     if not isinstance(mesh, TriangleMesh):
         raise ArrayShapeError(
-            f"mesh must be a TriangleMesh, for example check_mesh(vertices, faces).mesh, not {short_repr(mesh)}"
+            f"mesh must be a TriangleMesh, for example check_mesh(vertices, faces).mesh, got {short_repr(mesh)}"
         )
     as_faces(mesh.faces, len(mesh.vertices))
     if not np.isfinite(as_floats("corner_uv", corner_uv)).all():
@@ -174,7 +174,7 @@ def _check_arrays(
         ),
     ):
         if found != wanted:
-            raise ArrayShapeError(f"{name} must have the shape {wanted}, to match the mesh, not {found}")
+            raise ArrayShapeError(f"{name} must have the shape {wanted}, to match the mesh, got {found}")
 
 
 def angle_sum_errors(

@@ -86,7 +86,7 @@ class Declaration:
     Attributes:
         kind: the values it takes.
         only: the method that alone supports it: "sparse" for cones, "exact" for the metric; or "".
-        one_mesh: it contains vertex indices, so its value fits one mesh only.
+        one_mesh: it contains vertex indices, so its value applies to one mesh only.
         flag: the commands have a flag for it.
         command_default: the default of the commands if it differs from that in Python; a comment gives the reason.
         name, type, default: those of the field.

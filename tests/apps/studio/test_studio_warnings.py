@@ -81,7 +81,7 @@ class TestAngles:
                 chosen.added(5, angle)
         plain = chosen.as_plain()
         plain["cones"][1]["angle"] = math.radians(3000)
-        with pytest.raises(StudioError, match="not 3,000"):
+        with pytest.raises(StudioError, match="got 3,000"):
             Choices.from_plain(plain)
 
     def test_what_typed_angles_leave_out_of_bounds_is_told(self, session):

@@ -60,7 +60,7 @@ def angle_based(
 
         Raises:
             ConvergenceError: the solver did not reach its tolerance, unless `best_effort`.
-            CurvatureError: a cone is too wide for its triangles.
+            CurvatureError: the angle of a cone is too large for its triangles.
         """
         notes: list[str] = []
         whole, curvature = mesh, solution.target
@@ -261,8 +261,8 @@ def wanted_angles(mesh: TriangleMesh, angles: FloatArray, curvature: FloatArray)
     if len(wide):
         worst = wide[0]
         raise CurvatureError(
-            f"{plural(len(wide), 'cone')} too wide for the triangles around: {count[worst]} of them cannot hold an "
-            f"angle of {wanted[worst] / np.pi:.4g} pi; choose others, or remesh"
+            f"{plural(len(wide), 'cone')} with angles too large for the triangles around: {count[worst]} of them "
+            f"cannot hold an angle of {wanted[worst] / np.pi:.4g} pi; choose others, or remesh"
         )
     scaled: FloatArray = angles.ravel() * (wanted / total)[at]
     too_wide = np.zeros(len(count), dtype=bool)

@@ -199,7 +199,7 @@ class ConeSearch:
             CurvatureError: `most` cones cannot carry the curvature.
         """
         if not 0 < distortion < math.inf:
-            raise OptionError(f"the distortion allowed must be a positive number, not {distortion:g}")
+            raise OptionError(f"the distortion allowed must be a positive number, got {distortion:g}")
         if most is not None:
             self.limits.check_count(most, len(self._required))
         most = self.most_cones if most is None else min(most, self.most_cones)

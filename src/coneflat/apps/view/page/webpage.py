@@ -72,7 +72,7 @@ def page_html(
         raise OptionError(f"unknown show {short_repr(show)}: choose from {', '.join(SHOWS)}")
     picture = None if texture is None else read_picture(texture)
     if isinstance(most_triangles, bool) or not isinstance(most_triangles, (int, np.integer)):
-        raise OptionError(f"most_triangles must be an integer, not {short_repr(most_triangles)}")
+        raise OptionError(f"most_triangles must be an integer, got {short_repr(most_triangles)}")
     own = color if color is None or isinstance(color, Quantity) else own_quantity(result, color)
     content = content_of(result, most_triangles, own=own)
     if name is None:
