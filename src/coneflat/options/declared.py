@@ -140,8 +140,8 @@ class ConeBounds:
             vertex; a map from vertex to number, 1 for the others; the name of a vertex property in the file; or color,
             which gives 1 to grey vertices and 100 to vertices of a pure colour.
         min_cone_angle: Smallest cone angle (2 pi minus the curvature). Sharper cones distort the triangles around them.
-        max_cone_angle: Largest cone angle, above 2 pi; none or inf: no bound. The triangles around a wider cone
-            cannot hold its angle.
+        max_cone_angle: Largest cone angle, above 2 pi; none or inf: no bound. Larger angles rarely fit the
+            triangles around a cone.
         positive_only: No cones of negative curvature (saddles).
     """
 

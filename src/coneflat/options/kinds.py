@@ -94,11 +94,11 @@ class Number(Kind):
     def text(self) -> str:
         """A description of the valid numbers, for messages."""
         noun = "an integer" if self.is_integer else "a number"
-        if self.is_positive:
-            return f"{noun} above 0"
-        if self.least == -math.inf:
-            return noun
-        return f"{noun} from {self.least:g}" + (f" to {self.most:,g}" if self.most < math.inf else "")
+        if self.is_positive or self.least == -math.inf:
+            return f"{noun} above 0" if self.is_positive else noun
+        if self.most == math.inf:
+            return f"{noun}, {self.least:g} or more"
+        return f"{noun} from {self.least:g} to {self.most:,g}"
 
 
 ANGLE, ANGLE_OR_NONE = Number(is_angle=True), Number(is_angle=True, optional=True)
