@@ -15,7 +15,11 @@ CGROUP = Path("/sys/fs/cgroup")
 
 
 def check_memory(triangles: int) -> None:
-    """Raise TooLargeError if a flattening of this number of triangles does not fit into the free memory."""
+    """Raise TooLargeError if a flattening of this number of triangles does not fit into the free memory.
+
+    Raises:
+        TooLargeError: the message has both sizes.
+    """
     if triangles < CHECKED_TRIANGLES:
         return
     needed, free = triangles * BYTES_PER_TRIANGLE, free_memory()

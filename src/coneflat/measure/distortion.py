@@ -88,7 +88,11 @@ class Distortion:
     curvature_error_max: float = float("nan")
 
     def rescaled(self, log_factor: float) -> Distortion:
-        """Return the measures of the layout scaled by exp(log_factor)."""
+        """Return the measures of the layout scaled by exp(log_factor).
+
+        Args:
+            log_factor: logarithm of the factor of lengths in the plane.
+        """
         return replace(self, log_area_scale=self.log_area_scale + log_factor)
 
 

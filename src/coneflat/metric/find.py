@@ -82,6 +82,10 @@ def loop_rotations(surface: Surface, spec: MetricSpec) -> Callable[[ConeSolution
     """Return a function from cones to the holonomy of loops across the handles in their metric, (2 genus,) radians.
 
     None for a linear metric, and for a mesh without handles.
+
+    Args:
+        surface: connected mesh with its operators.
+        spec: specification of its metric.
     """
     if spec.method != "exact" or not surface.mesh.genus():
         return None

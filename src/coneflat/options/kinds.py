@@ -214,7 +214,11 @@ class Direction(Kind):
 
 
 def as_number(name: str, value: object) -> float:
-    """Return a value as a float, or raise OptionError."""
+    """Return a value as a float, or raise OptionError.
+
+    Raises:
+        OptionError: the value is not a number; the message begins with `name`.
+    """
     import numpy as np
 
     is_scalar = np.ndim(value) == 0 if isinstance(value, np.ndarray) else not isinstance(value, (str, bytes))
@@ -227,7 +231,11 @@ def as_number(name: str, value: object) -> float:
 
 
 def as_integer(name: str, value: object) -> int:
-    """Return a value as an integer, or raise OptionError."""
+    """Return a value as an integer, or raise OptionError.
+
+    Raises:
+        OptionError: the value is not an integer; the message begins with `name`.
+    """
     import numpy as np
 
     number = math.nan if isinstance(value, (bool, np.bool_)) else as_number(name, value)
