@@ -137,7 +137,7 @@ def test_cones_of_the_users_own():
         ({"cones": [1.5]}, errors.OptionError, "integer"),
         ({"cones": 3.5}, errors.OptionError, "cones must be vertices"),
         ({"cones": 10}, errors.OptionError, "use cone_count=10"),
-        ({"cones": None}, errors.OptionError, "not NoneType"),
+        ({"cones": None}, errors.OptionError, "got NoneType"),
         ({"cones": {10**30: 1.0}}, errors.OptionError, "integer"),
         ({"cones": [True, False]}, errors.OptionError, "integer"),
         ({"boundary": {1: 2.0, 2: None}}, errors.OptionError, "vertex 2 has none"),

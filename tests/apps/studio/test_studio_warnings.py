@@ -75,9 +75,9 @@ class TestAngles:
         chosen = Choices().placed([4, 9]).with_angle(9, math.radians(720))
         assert chosen.cones[1].angle == MAX_CONE_ANGLE
         for angle in (0.0, math.radians(721), math.radians(3000), math.inf, math.nan):
-            with pytest.raises(StudioError, match="positive and at most 720 degrees, not"):
+            with pytest.raises(StudioError, match="positive and at most 720 degrees, got"):
                 chosen.with_angle(4, angle)
-            with pytest.raises(StudioError, match="positive and at most 720 degrees, not"):
+            with pytest.raises(StudioError, match="positive and at most 720 degrees, got"):
                 chosen.added(5, angle)
         plain = chosen.as_plain()
         plain["cones"][1]["angle"] = math.radians(3000)

@@ -342,7 +342,7 @@ def as_vertex(name: str, value: object) -> int:
 def _checked_angle(angle: float | None) -> float | None:
     if angle is not None and not 0 < angle <= MAX_CONE_ANGLE * (1 + 1e-12):
         raise StudioError(
-            f"a cone angle must be positive and at most {math.degrees(MAX_CONE_ANGLE):g} degrees, not "
+            f"a cone angle must be positive and at most {math.degrees(MAX_CONE_ANGLE):g} degrees, got "
             f"{math.degrees(angle):,g}"
         )
     return angle

@@ -205,6 +205,6 @@ def studio(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Studio:
         >>> coneflat.studio([[0.0, 0.0]], [[0, 1, 2]])
         Traceback (most recent call last):
             ...
-        coneflat.errors.ArrayShapeError: vertices must have the shape (n, 3), not (1, 2)
+        coneflat.errors.ArrayShapeError: vertices must have the shape (n, 3), got (1, 2)
     """
     return Studio(mesh, faces, **options)

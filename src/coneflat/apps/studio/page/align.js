@@ -9,13 +9,13 @@ function quarterTurns(count) {
   return [c, -s, 0, s, c, 0, 0, 0, 1];
 }
 
-/** Return the number of quarter turns with which a layout clearly is nearest to an earlier one of the same triangles, turned by its own. */
+/** Return the number of quarter turns with which a layout clearly is nearest to an earlier one of the same triangles, rotated by its own. */
 function nearestTurns(before, turns, after) {
   const {faces} = after.arrays, step = 3 * Math.max(1, Math.floor(faces.length / 3 / SAMPLED)), sums = [0, 0, 0, 0];
   for (let corner = 0; corner < faces.length; corner += step) {
-    const place = turned(quarterTurns(turns), before.flatPlace(before.arrays.faces[corner])), other = after.flatPlace(faces[corner]);
+    const place = rotated(quarterTurns(turns), before.flatPlace(before.arrays.faces[corner])), other = after.flatPlace(faces[corner]);
     for (let k = 0; k < 4; k++) {
-      const [x, y] = turned(quarterTurns(k), other);
+      const [x, y] = rotated(quarterTurns(k), other);
       sums[k] += Math.hypot(x - place[0], y - place[1]);
     }
   }

@@ -5,7 +5,7 @@ const MAX_ZOOM = 5000;
 const MIN_ZOOM = 0.05;
 
 /** Return the matrix product turn * point. */
-function turned(turn, p) {
+function rotated(turn, p) {
   return [0, 3, 6].map((row) => turn[row] * p[0] + turn[row + 1] * p[1] + turn[row + 2] * p[2]);
 }
 
@@ -110,7 +110,7 @@ class Camera {
 
   /** Return the pixel (from the upper left corner of the pane) and the nearness of a point. */
   project(p) {
-    const [x, y, z] = turned(this.turn, p);
+    const [x, y, z] = rotated(this.turn, p);
     return [this.width / 2 + (x - this.pan[0]) * this.scale, this.height / 2 - (y - this.pan[1]) * this.scale, z];
   }
 
