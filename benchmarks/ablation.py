@@ -56,7 +56,7 @@ def variants() -> dict[str, list[Patch]]:
         (linear_model, "VERTICES_PER_UNKNOWN", (8, 15, 30)),
         (linear_model, "MIN_SIZE", (200, 400, 800)),
         (linear_model, "MAX_SIZE", (600, 2000)),
-        (aggregation, "LARGEST_AGGREGATE", (4.0, 12.0)),
+        (aggregation, "MAX_AGGREGATE", (4.0, 12.0)),
         (aggregation, "MAX_SIZE_RATIO", (1.0, 2.0)),
     ):
         found |= {f"{name} {value}": [(module, name, value)] for value in values}
@@ -97,7 +97,7 @@ def patched(patches: list[Patch]) -> Iterator[None]:
             setattr(owner, name, value)
 
 
-OPENING = ("VERTICES", "MIN_SIZE", "MAX_SIZE", "MIN_COUPLING", "LARGEST_AGGREGATE", "TRIES")
+OPENING = ("VERTICES", "MIN_SIZE", "MAX_SIZE", "MIN_COUPLING", "MAX_AGGREGATE", "TRIES")
 
 
 def main() -> None:

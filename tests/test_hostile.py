@@ -132,7 +132,12 @@ def test_a_fault_that_its_own_note_names_is_no_breach(ball):
     turned, cause = planted(result, "flipped"), "flipped triangles, exact"
     for notes, is_breach in (
         ((), True),
-        (("2 cones too wide for the triangles around: that at vertex 3 has an angle of 3 pi.",), True),
+        (
+            (
+                "2 cones with angles too large for the triangles around: that at vertex 3 has an angle of 3 pi.",
+            ),
+            True,
+        ),
         (("5 pairs of triangles overlap in the atlas, on 0.1 of the covered area.",), True),
         (("There is 1 flipped triangle in the plane: refine the mesh there.",), False),
     ):

@@ -119,7 +119,7 @@ def test_a_quantum_outside_its_bounds_is_refused_with_them(quantum):
 
 
 def test_a_quantum_that_is_not_a_number_is_refused():
-    with pytest.raises(errors.OptionError, match="quantise must be a number, not nan"):
+    with pytest.raises(errors.OptionError, match="quantise must be a number, got nan"):
         coneflat.flatten(*shapes.sphere(1), quantise=math.nan)
 
 

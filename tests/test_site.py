@@ -15,7 +15,7 @@ import coneflat
 
 ROOT = Path(__file__).resolve().parents[1]
 IMAGES = ROOT / "docs" / "images"
-MOST_EACH, MOST_TOGETHER = 250_000, 6_000_000  # bytes
+MAX_FILE, MAX_SITE = 250_000, 6_000_000  # bytes
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +84,6 @@ def test_pictures_are_small_and_used():
     text = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs").glob("**/*.md"))
     text += (ROOT / "README.md").read_text(encoding="utf-8")
     sizes = {path.name: path.stat().st_size for path in IMAGES.iterdir()}
-    assert {name: size for name, size in sizes.items() if size > MOST_EACH} == {}
-    assert sum(sizes.values()) < MOST_TOGETHER
+    assert {name: size for name, size in sizes.items() if size > MAX_FILE} == {}
+    assert sum(sizes.values()) < MAX_SITE
     assert [name for name in sizes if f"images/{name}" not in text] == []

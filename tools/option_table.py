@@ -55,7 +55,12 @@ def _flag_table(group: type, command: str = "flatten") -> str:
 
 def _keyword_table(group: type) -> str:
     rows = [
-        (f"`{each.name}`", _python_values(each.kind), _python_default(each), each.doc)
+        (
+            f"`{each.name}`",
+            "(m, 3) numbers" if each.name == "lengths" else _python_values(each.kind),
+            _python_default(each),
+            each.doc,
+        )
         for each in declarations(group).values()
         if not _is_shared(each, group)
     ]
@@ -158,7 +163,7 @@ def _python_values(kind: kinds.Kind) -> str:
         case kinds.Number():
             return kind.text
         case kinds.Weights():
-            return "(n,) numbers from 0, some vertices with theirs, or the name of a property"
+            return "(n,) numbers, a map from vertex to number, or the name of a property"
     return "a function"
 
 

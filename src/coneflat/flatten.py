@@ -310,7 +310,7 @@ def _infeasible_notes(layout: Layout, part: Part) -> Iterator[str]:
     if len(infeasible):
         angle = 2 - layout.target[infeasible[0]] / np.pi
         yield (
-            f"{plural(len(infeasible), 'cone')} too wide for the triangles around: that at vertex "
+            f"{plural(len(infeasible), 'cone')} with angles too large for the triangles around: that at vertex "
             f"{part.cones.names[infeasible[0]]} has an angle of {angle:.3g} pi. Choose others, or refine the mesh."
         )
 

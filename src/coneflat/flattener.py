@@ -62,7 +62,12 @@ class Flattener:
         return self.flatten_as(read_options(options), on_preview)
 
     def flatten_as(self, options: Options, on_preview: Preview | None = None) -> Flattening:
-        """Return the flattening for parsed options; see `flatten`."""
+        """Return the flattening for parsed options; see `flatten`.
+
+        Args:
+            options: parsed options.
+            on_preview: called with an early result, if given.
+        """
         # The last digits of cached values depend on the number of threads.
         if options.threads != self._threads:
             self._surfaces, self._threads = {}, options.threads

@@ -208,11 +208,11 @@ class Flattening:
             UnknownFormatError, MeshFileError: a file cannot be read or written.
         """
         from .apps.view import check_page, open_page, page_html, write_page
-        from .options.declared import MOST_TRIANGLES
+        from .options.declared import MAX_SHOWN_TRIANGLES
 
         if path is not None:
             check_page(path)
-        most = MOST_TRIANGLES if most_triangles is None else most_triangles
+        most = MAX_SHOWN_TRIANGLES if most_triangles is None else most_triangles
         page = write_page(
             page_html(self, texture=texture, up=up, show=show, most_triangles=most, color=color), path
         )

@@ -190,7 +190,7 @@ class TestFormats:
         found = measure_uv(path).report()
         assert found["triangles"] == 4
         assert found["overlapping_pairs"] == 2
-        assert "Dropped 1 face given twice." in found["notes"][0]
+        assert "Dropped 1 duplicate face." in found["notes"][0]
         with pytest.raises(errors.NonManifoldError):
             measure_uv(path, strict=True)
 

@@ -46,9 +46,9 @@ class TestChecks:
             (
                 SIDES[:1],
                 errors.ArrayShapeError,
-                r"the shape \(2, 3\), a number for each side .* not \(1, 3\)",
+                r"the shape \(2, 3\), a number for each side .* got \(1, 3\)",
             ),
-            (SIDES.ravel(), errors.ArrayShapeError, r"not \(6,\)"),
+            (SIDES.ravel(), errors.ArrayShapeError, r"got \(6,\)"),
             (
                 changed(1, 2, np.nan),
                 errors.NonFiniteError,

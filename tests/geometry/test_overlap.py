@@ -315,8 +315,8 @@ def test_overlaps_of_a_layout_begin_at_its_seams():
 @pytest.mark.parametrize(
     ("points", "triangles", "kind", "message"),
     [
-        (np.zeros((3, 3)), [[0, 1, 2]], errors.ArrayShapeError, r"shape \(n, 2\), not \(3, 3\)"),
-        (np.zeros((4, 2)), None, errors.ArrayShapeError, r"shape \(m, 3, 2\), not \(4, 2\)"),
+        (np.zeros((3, 3)), [[0, 1, 2]], errors.ArrayShapeError, r"shape \(n, 2\), got \(3, 3\)"),
+        (np.zeros((4, 2)), None, errors.ArrayShapeError, r"shape \(m, 3, 2\), got \(4, 2\)"),
         ("nothing", None, errors.ArrayShapeError, "array of numbers"),
         (np.zeros((3, 2)), [[0, 1, 3]], errors.FaceIndexError, r"outside 0\.\.2"),
         (np.full((1, 3, 2), np.nan), None, errors.NonFiniteError, "3 vertices of 3"),
@@ -329,5 +329,5 @@ def test_bad_input_is_refused(points, triangles, kind, message):
 
 
 def test_bad_limit_is_refused():
-    with pytest.raises(errors.OptionError, match="1 or more, not 0"):
+    with pytest.raises(errors.OptionError, match="1 or more, got 0"):
         find_overlaps(np.zeros((1, 3, 2)), limit=0)

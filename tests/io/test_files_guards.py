@@ -132,7 +132,7 @@ class TestGltf:
     def test_indices_beyond_the_vertices(self):
         make = square()
         make.binary[make.tree["bufferViews"][1]["byteOffset"]] = 9
-        refused(make.glb(), "a.glb", "names vertex 9, but its primitive has 4 vertices")
+        refused(make.glb(), "a.glb", "refers to vertex 9, but its primitive has 4 vertices")
 
     @pytest.mark.parametrize(
         ("uri", "match"),
@@ -184,7 +184,7 @@ class TestGltf:
         mesh = read_mesh_from(make.glb(), "a.glb")
         assert mesh.vertices.tolist() == [[0, 0, 0], [1, 0, 0], [5, 6, 7], [0, 1, 0]]
         make.tree["accessors"][0]["count"] = 2
-        refused(make.glb(), "a.glb", "replaces element 2 of 2|names vertex")
+        refused(make.glb(), "a.glb", "replaces element 2 of 2|refers to vertex")
 
     def test_quantised_positions_are_fractions(self):
         make = square()

@@ -271,7 +271,7 @@ class TestBadFiles:
     @pytest.mark.parametrize("ending", [".off", ".ply"])
     def test_index_out_of_range(self, tmp_path, ending):
         text = tetra_text(ending).replace("3 0 2 1", "3 0 2 4")
-        with pytest.raises(FaceIndexError, match="face 0 names vertex 4"):
+        with pytest.raises(FaceIndexError, match="face 0 refers to vertex 4"):
             read_mesh(written(tmp_path, "x" + ending, text))
 
     @pytest.mark.parametrize("text", ["v 0 0 0\n", "f 1 2 3\n", "# nothing\n"])

@@ -83,9 +83,9 @@ class TestBlocks:
         ("ending", "old", "new", "message"),
         [
             (".obj", b"f 4/1/1", b"f x/1/1", "line 19: 'x/1/1' is not a number"),
-            (".obj", b"f 4/1/1", b"f 5/1/1", "line 19: a face names vertex 5"),
+            (".obj", b"f 4/1/1", b"f 5/1/1", "line 19: a face refers to vertex 5"),
             (".obj", b"v .5 2", b"v .5.2 2", "line 15: '.5.2' is not a number"),
-            (".obj", b"-2//1 -1", b"-2//1 -9", "line 13: a face names vertex -9"),
+            (".obj", b"-2//1 -1", b"-2//1 -9", "line 13: a face refers to vertex -9"),
             (".off", b"3 3 2 0", b"3 3 2 0x0", "line 12: '0x0' is not a number"),
             (".off", b"3 3 2 0", b"3.0 3 2 0", "line 12: '3.0' is not a number of corners"),
             (".off", b"3 3 2 0", b"3 3 2", "line 12: 'red' is not a number"),

@@ -56,7 +56,8 @@ class TestObj:
     def test_a_point_that_does_not_exist(self, tmp_path, number):
         text = SQUARE + f"vt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/{number}\n"
         with pytest.raises(
-            errors.FaceIndexError, match=rf"a.obj, line 9: a face names UV point {number}, but there are 3"
+            errors.FaceIndexError,
+            match=rf"a.obj, line 9: a face refers to UV point {number}, but there are 3",
         ):
             read_mesh(written(tmp_path, "a.obj", text))
 

@@ -107,7 +107,7 @@ class TestTriangulate:
         assert faces.shape == (len(shape) - 2, 3)
 
     def test_bad_input(self):
-        with pytest.raises(FaceIndexError, match="face 1 names vertex 4, but there are 4"):
+        with pytest.raises(FaceIndexError, match="face 1 refers to vertex 4, but there are 4"):
             triangulated(SQUARE, [0, 1, 2], [0, 1, 4])
         with pytest.raises(FaceIndexError, match="vertex -1"):
             triangulated(SQUARE, [0, 1, -1])

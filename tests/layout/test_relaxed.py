@@ -124,7 +124,7 @@ def test_it_is_the_same_for_the_same_mesh_at_any_size():
     ("options", "words"),
     [
         ({"relax": "some"}, "relax"),
-        ({"stretch": 1.5}, "from 0 to 1, not 1.5"),
+        ({"stretch": 1.5}, "from 0 to 1, got 1.5"),
         ({"stretch": float("nan")}, "stretch"),
         ({"stretch": 0.5, "method": "linear"}, "does not relax"),
         ({"relax": "whole", "method": "linear", "cones": "none"}, "does not relax"),

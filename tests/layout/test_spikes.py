@@ -40,7 +40,7 @@ def test_a_first_guess_that_is_far_off_does_not_matter():
 
 
 def test_a_refusal_never_speaks_of_nan():
-    assert error_text(np.nan) == error_text(np.inf) == "off by more than double precision can hold"
+    assert error_text(np.nan) == error_text(np.inf) == "off by more than double precision can represent"
     assert error_text(0.25) == "off by 0.25 rad"
     messages = []
     for seed in range(3):

@@ -29,7 +29,7 @@ def test_what_does_not_fit(monkeypatch):
     free(monkeypatch, 2e9)
     with pytest.raises(TooLargeError) as raised:
         check_memory(30_000_000)
-    assert str(raised.value) == "30,000,000 triangles take about 42 GB of memory, and 2 GB are free"
+    assert str(raised.value) == "30,000,000 triangles need about 42 GB of memory, but 2 GB are free"
     assert isinstance(raised.value, ConeflatError)
     assert isinstance(raised.value, MemoryError)
 

@@ -154,7 +154,7 @@ def test_arrays_that_do_not_fit_the_mesh_are_refused():
         measure(mesh, uv, prescribed=np.zeros(1))
     with pytest.raises(ArrayShapeError, match="corner_uv must have the shape"):
         measure(mesh, uv[:2])
-    with pytest.raises(FaceIndexError, match="from 0 to 19, but there are 3"):
+    with pytest.raises(FaceIndexError, match="vertices 0 to 19, but there are 3"):
         edge_lengths(vertices[:3], faces)
 
 

@@ -270,7 +270,7 @@ class TestRefusal:
             (
                 {"target": np.zeros(7)},
                 errors.ArrayShapeError,
-                r"target must have the shape \(162,\), .* not \(7,\)",
+                r"target must have the shape \(162,\), .* got \(7,\)",
             ),
             ({"target": "flat"}, errors.ArrayShapeError, "target must be an array of numbers"),
             ({"fixed": np.ones(3, dtype=bool)}, errors.ArrayShapeError, "fixed must have the shape"),
@@ -283,7 +283,7 @@ class TestRefusal:
             ),
             ({"lengths": np.ones((320, 2))}, errors.ArrayShapeError, "lengths must have the shape"),
             ({"lengths": np.tile([1.0, 1, 2.5], (320, 1))}, errors.LengthError, "different lengths"),
-            ({"mesh": shapes.sphere(2)}, errors.ArrayShapeError, "must be a TriangleMesh, .* not a tuple"),
+            ({"mesh": shapes.sphere(2)}, errors.ArrayShapeError, "must be a TriangleMesh, .* got a tuple"),
         ],
     )
     def test_arrays_that_do_not_fit(self, change, kind, message):

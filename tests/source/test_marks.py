@@ -78,7 +78,7 @@ def test_seams_through_numbers_and_settings():
         ({"up": [[1], [1, 2]]}, "up: setting an array"),
         ({"seams": "uv"}, "unknown seams"),
         ({"seams": "input"}, "no UV coordinates"),
-        ({"no_seams": [[0, 1, 2]]}, r"vertices \(k,\) or pairs of vertices \(k, 2\), not of shape \(1, 3\)"),
+        ({"no_seams": [[0, 1, 2]]}, r"vertices \(k,\) or pairs of vertices \(k, 2\), got shape \(1, 3\)"),
         ({"no_seams": [0.5]}, "vertices .* and type float64"),
         ({"sharp_angle": 0}, "between 0 and pi"),
         ({"sharp_angle": "x"}, "sharp_angle must be a number"),
@@ -145,7 +145,7 @@ def test_forbidden_edges_are_not_marked():
     assert {tuple(pair) for pair in sharp.tolist()} - {tuple(pair) for pair in top.tolist()} <= seam_pairs(
         result
     )
-    with pytest.raises(errors.SeamError, match=f"1 edge given as seams and .* {top[0, 0]}-{top[0, 1]}"):
+    with pytest.raises(errors.SeamError, match=f"1 edge given both as seams and .* {top[0, 0]}-{top[0, 1]}"):
         coneflat.flatten(vertices, faces, seams=top, no_seams=top[:1])
 
 

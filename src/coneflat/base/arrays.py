@@ -68,7 +68,7 @@ def as_faces(faces: ArrayLike, vertex_count: int) -> IntArray:
     if triangles.size == 0:
         raise EmptyMeshError("the mesh has no faces")
     if triangles.ndim != 2 or triangles.shape[1] != 3:
-        raise ArrayShapeError(f"faces must have the shape (m, 3), not {triangles.shape}")
+        raise ArrayShapeError(f"faces must have the shape (m, 3), got {triangles.shape}")
     if array.dtype.kind == "f" and (triangles != array).any():
         raise ArrayShapeError("faces must hold integers, vertex indices from 0")
     if triangles.min() < 0 or triangles.max() >= vertex_count:

@@ -50,7 +50,7 @@ class Stopwatch:
     def __init__(self, progress: Progress | None = None) -> None:
         if progress is not None and not callable(progress):
             raise OptionError(
-                f"progress must be a function of a text and a fraction, not {type(progress).__name__}"
+                f"progress must be a function of a text and a fraction, got {type(progress).__name__}"
             )
         self.seconds: dict[str, float] = {}
         self.done = 0.0

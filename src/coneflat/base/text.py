@@ -47,5 +47,5 @@ def short_repr(value: object) -> str:
 def error_text(residual: float, unit: str = " rad") -> str:
     """Return the part of a message that states an error: "off by 0.1 rad"."""
     if not math.isfinite(residual):
-        return "off by more than double precision can hold"
+        return "off by more than double precision can represent"
     return f"off by {residual:.2g}{unit}"

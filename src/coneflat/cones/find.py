@@ -79,13 +79,18 @@ def find_cones(
         advice = "allow more of them (--max-cones)" if is_greedy else "add cones or move them"
         check_feasible(solution.cones, solution.curvatures, spec.names, advice)
     if too_many_handles:
-        note = f"The greedy search placed the cones, as a surface with {mesh.genus():,} handles needs so many of them."
+        note = f"The greedy search chose the cones, because {mesh.genus():,} handles need so many of them."
         return replace(solution, notes=(note,))
     return solution
 
 
 def uses_sparse_search(mesh: TriangleMesh, spec: ConeSpec) -> bool:
-    """Return whether the sparse search is used for the cones of a mesh."""
+    """Return whether the sparse search is used for the cones of a mesh.
+
+    Args:
+        mesh: connected mesh.
+        spec: what is required of the cones.
+    """
     return spec.strategy == "sparse" or (
         spec.strategy == "auto"
         and (spec.needs_sparse_search or not (spec.prescribes_boundary or has_many_handles(mesh, spec)))
@@ -119,7 +124,12 @@ def polyhedron_corners(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
 
 
 def coneless_solution(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
-    """Return the solution without cones if no vertex may be a cone and no cone is needed; else None."""
+    """Return the solution without cones if no vertex may be a cone and no cone is needed; else None.
+
+    Args:
+        surface: connected mesh with its operators.
+        spec: what is required of the cones.
+    """
     mesh, absorbs = surface.mesh, spec.absorbs_curvature
     if (spec.is_allowed & ~absorbs).any() or not (absorbs.any() or mesh.euler_characteristic == 0):
         return None
@@ -128,7 +138,13 @@ def coneless_solution(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
 
 
 def open_search(surface: Surface, spec: ConeSpec, watch: Stopwatch) -> ConeSearch:
-    """Return a search for cones; a cached search of the surface is reused, restricted to the allowed vertices."""
+    """Return a search for cones; a cached search of the surface is reused, restricted to the allowed vertices.
+
+    Args:
+        surface: connected mesh with its operators.
+        spec: what is required of the cones.
+        watch: measures time and reports progress.
+    """
     from .sparse import ConeSearch
 
     mesh = surface.mesh
@@ -242,7 +258,7 @@ def _unmet(genus: int, cone_count: int, distortion: float, spec: ConeSpec) -> tu
         return ()
     why = "no better cones were found within the given bounds"
     if spec.quantum is not None and genus and distortion <= spec.distortion * HOLONOMY_FACTOR:
-        why = "cones were moved a little to align the rotations along handles"
+        why = "cones were moved to align the rotations along handles"
     return (
         f"The area distortion is {distortion:.3g} with {plural(cone_count, 'cone')}, above the "
         f"{spec.distortion:g} allowed: {why}.",

@@ -51,7 +51,7 @@ def greedy_cones(
         CurvatureError: `max_cones` is 0 for a closed surface that is not a torus.
     """
     if not epsilon > 0:
-        raise OptionError(f"epsilon must be positive, not {epsilon:g}")
+        raise OptionError(f"epsilon must be positive, got {epsilon:g}")
     if max_cones is not None and max_cones < 0:
         raise OptionError(f"the maximum number of cones cannot be negative ({max_cones})")
     search = _Search(laplacian, curvature, is_boundary, euler_characteristic, max_cones, tie_key)

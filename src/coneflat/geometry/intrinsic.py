@@ -50,7 +50,7 @@ def check_lengths(
     """
     if not isinstance(mesh, TriangleMesh):
         raise ArrayShapeError(
-            f"the mesh must be a TriangleMesh, as in check_mesh(vertices, faces).mesh, not a {type(mesh).__name__}"
+            f"the mesh must be a TriangleMesh, as in check_mesh(vertices, faces).mesh, got a {type(mesh).__name__}"
         )
     values = as_lengths(lengths, len(mesh.faces))
     with np.errstate(all="ignore"):
@@ -90,7 +90,7 @@ def as_lengths(lengths: ArrayLike, count: int) -> FloatArray:
     array = as_floats("lengths", lengths)
     if array.shape != (count, 3):
         raise ArrayShapeError(
-            f"lengths must have the shape {(count, 3)}, a number for each side of each triangle, not {array.shape}"
+            f"lengths must have the shape {(count, 3)}, a number for each side of each triangle, got {array.shape}"
         )
     return array
 

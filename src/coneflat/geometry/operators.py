@@ -12,7 +12,7 @@ from .triangles import double_areas
 
 # Smallest weight, relative to the largest; smaller weights are raised to it. With zero weights, the norm would be
 # degenerate.
-LEAST_WEIGHT = 1e-6
+MIN_WEIGHT = 1e-6
 # Products and sums of numbers up to this, and down to its inverse, neither overflow nor underflow.
 MAX_SAFE_NUMBER = 1e100
 
@@ -55,7 +55,7 @@ def weighted_areas(areas: FloatArray, weights: FloatArray | None) -> FloatArray:
         raise OptionError(f"importance weights must be {len(areas)} finite numbers that are not negative")
     if not weights.max() > 0:
         raise OptionError("importance weights are zero everywhere")
-    share = areas * np.maximum(at_unit_scale(weights), LEAST_WEIGHT)
+    share = areas * np.maximum(at_unit_scale(weights), MIN_WEIGHT)
     return np.asarray(share / share.sum())
 
 
@@ -103,7 +103,7 @@ def cotangent_laplacian(faces: IntArray, cots: FloatArray, vertex_count: int) ->
     """
     triangles, given = as_faces(faces, vertex_count), as_floats("cots", cots)
     if given.shape != triangles.shape:
-        raise ArrayShapeError(f"cots must have the shape {triangles.shape} of the faces, not {given.shape}")
+        raise ArrayShapeError(f"cots must have the shape {triangles.shape} of the faces, got {given.shape}")
     starts = np.zeros(vertex_count + 1, dtype=np.int32)
     rows = np.empty(6 * len(triangles) + vertex_count, dtype=np.int32)
     values = np.empty(len(rows))

@@ -75,7 +75,7 @@ def find_overlaps(
         overlap, take longer.
     """
     if limit is not None and not (isinstance(limit, Integral) and limit >= 1):
-        raise OptionError(f"the limit must be an integer, 1 or more, not {limit!r}")
+        raise OptionError(f"the limit must be an integer, 1 or more, got {limit!r}")
     corners, exponent = _at_unit_size(_corners(points, triangles))
     oriented, signs = _counterclockwise(corners)
     return _overlaps(oriented, exponent, np.flatnonzero(signs), limit)
@@ -113,7 +113,7 @@ def _corners(points: ArrayLike, triangles: ArrayLike | None) -> FloatArray:
     places = as_floats("points", points)
     shape = "(n, 2)" if triangles is not None else "(m, 3, 2)"
     if places.shape[1:] != ((2,) if triangles is not None else (3, 2)):
-        raise ArrayShapeError(f"points must have the shape {shape}, not {places.shape}")
+        raise ArrayShapeError(f"points must have the shape {shape}, got {places.shape}")
     if triangles is not None:
         faces = as_faces(triangles, len(places))
         require_finite(places, faces)

@@ -71,6 +71,9 @@ def map_factors(rest: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
 
     The map takes each triangle from its rest shape, with the sides `rest` (m, 3), to the plane. Its singular values
     are |a| + |b| and |a| - |b|. For triangles without area the result is NaN or infinite.
+
+    Args:
+        rest: (m, 3) sides of the triangles before the map, as complex numbers.
     """
     r0, r1 = rest[:, 0], rest[:, 1]
     area = r0 * np.conj(r1) - np.conj(r0) * r1
@@ -106,6 +109,10 @@ def vertex_log_scale(mesh: TriangleMesh, before: FloatArray, after: FloatArray) 
     """Return (n,) half the log of the ratio of the areas around each vertex, from triangle areas `before` and `after`.
 
     before, after: (m,) areas of the triangles.
+
+    Args:
+        mesh: triangle mesh with n vertices and m faces.
+        before, after: (m,) areas, in any unit.
     """
     ratio = []
     for areas in (before, after):

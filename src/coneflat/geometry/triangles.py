@@ -43,13 +43,13 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
     points, triangles = as_floats("vertices", vertices), np.asarray(faces, dtype=np.int64)
     if points.ndim != 2:
         raise ArrayShapeError(
-            f"vertices must have the shape (n, 3), or (n, 2) in the plane, not {points.shape}"
+            f"vertices must have the shape (n, 3), or (n, 2) in the plane, got {points.shape}"
         )
     if triangles.ndim != 2 or triangles.shape[1] != 3:
-        raise ArrayShapeError(f"faces must have the shape (m, 3), not {triangles.shape}")
+        raise ArrayShapeError(f"faces must have the shape (m, 3), got {triangles.shape}")
     if triangles.size and not 0 <= triangles.min() <= triangles.max() < len(points):
         raise FaceIndexError(
-            f"faces name vertices from {triangles.min()} to {triangles.max()}, but there are {len(points)}, from 0 on"
+            f"faces refer to vertices {triangles.min()} to {triangles.max()}, but there are {len(points)}, from 0"
         )
     return measure_sides(points, triangles)
 
@@ -58,12 +58,16 @@ def as_triples(name: str, values: ArrayLike) -> FloatArray:
     """Return values as a contiguous (m, 3) float array, as compiled loops need; raise ArrayShapeError otherwise."""
     array = as_floats(name, values)
     if array.ndim != 2 or array.shape[1] != 3:
-        raise ArrayShapeError(f"{name} must have the shape (m, 3), not {array.shape}")
+        raise ArrayShapeError(f"{name} must have the shape (m, 3), got {array.shape}")
     return array
 
 
 def slacks(lengths: FloatArray) -> FloatArray:
-    """Return (m, 3) the slack b + c - a of every side a; negative if the triangle inequality is broken."""
+    """Return (m, 3) the slack b + c - a of every side a; negative if the triangle inequality is broken.
+
+    Args:
+        lengths: (m, 3) side lengths, column i opposite corner i.
+    """
     lengths = as_triples("lengths", lengths)
     slack = np.empty_like(lengths)
     fill_slacks(lengths, slack)
@@ -71,12 +75,20 @@ def slacks(lengths: FloatArray) -> FloatArray:
 
 
 def is_broken(lengths: FloatArray) -> BoolArray:
-    """Return (m,) True where the three lengths break the triangle inequality (Section 2.3 of the paper)."""
+    """Return (m,) True where the three lengths break the triangle inequality (Section 2.3 of the paper).
+
+    Args:
+        lengths: (m, 3) side lengths, column i opposite corner i.
+    """
     return np.asarray(slacks(lengths).min(axis=1) < 0)
 
 
 def double_areas(lengths: FloatArray) -> FloatArray:
-    """Return (m,) twice the area of each triangle; 0 if the triangle inequality is broken."""
+    """Return (m,) twice the area of each triangle; 0 if the triangle inequality is broken.
+
+    Args:
+        lengths: (m, 3) side lengths, column i opposite corner i.
+    """
     lengths = as_triples("lengths", lengths)
     areas = np.empty(len(lengths))
     fill_double_areas(lengths, areas)
@@ -88,6 +100,9 @@ def corner_angles(lengths: FloatArray) -> FloatArray:
 
     If the triangle inequality is broken, the angles are complex numbers. Their real parts are returned: pi opposite the
     side that is too long and 0 at the others (Section 4.3 of the paper).
+
+    Args:
+        lengths: (m, 3) side lengths, column i opposite corner i.
     """
     slack = np.maximum(slacks(lengths), 0)
     perimeter = _perimeter(lengths)[:, None]
@@ -98,7 +113,11 @@ def corner_angles(lengths: FloatArray) -> FloatArray:
 
 
 def cotangents(lengths: FloatArray) -> FloatArray:
-    """Return (m, 3) cotangents of the corner angles; the triangles must have area."""
+    """Return (m, 3) cotangents of the corner angles; the triangles must have area.
+
+    Args:
+        lengths: (m, 3) side lengths, column i opposite corner i.
+    """
     lengths = as_triples("lengths", lengths)
     cots = np.empty(lengths.shape)
     fill_cotangents(lengths, cots)
@@ -197,18 +216,30 @@ def fill_double_areas(lengths: FloatArray, areas: FloatArray) -> None:
 
 
 def face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return (m, 3) normals of faces, whose lengths are twice the areas."""
+    """Return (m, 3) normals of faces, whose lengths are twice the areas.
+
+    Args:
+        vertices, faces: (n, 3) positions, (m, 3) indices.
+    """
     a, b, c = (np.take(vertices, faces[:, k], axis=0) for k in range(3))
     return np.asarray(np.cross(b - a, c - a))
 
 
 def vertex_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return (n, 3) unit normals of vertices, the area-weighted means of those of their faces; 0 if undefined."""
+    """Return (n, 3) unit normals of vertices, the area-weighted means of those of their faces; 0 if undefined.
+
+    Args:
+        vertices, faces: (n, 3) positions, (m, 3) indices.
+    """
     return unit_vectors(sums_at(faces, face_normals(vertices, faces)[:, None], len(vertices)))
 
 
 def corner_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Return (m, 3, 3) unit normals of corners: angle-weighted means over the faces up to the nearest creases."""
+    """Return (m, 3, 3) unit normals of corners: angle-weighted means over the faces up to the nearest creases.
+
+    Args:
+        vertices, faces: (n, 3) positions, (m, 3) indices.
+    """
     flat = unit_vectors(face_normals(vertices, faces))
     pairs = TriangleMesh(vertices, faces).edge_halfedges
     pairs = pairs[pairs[:, 1] >= 0]

@@ -94,7 +94,7 @@ def _check(vertex_count: int, corners: IntArray, offsets: IntArray, sizes: IntAr
     c = first_bad_corner(corners, vertex_count)
     if c is not None:
         i = int(np.searchsorted(offsets, c, side="right")) - 1
-        raise FaceIndexError(f"face {i} names vertex {corners[c]}, but there are {vertex_count} vertices")
+        raise FaceIndexError(f"face {i} refers to vertex {corners[c]}, but there are {vertex_count} vertices")
 
 
 def _splits_at_first_corner(vertices: FloatArray, quads: IntArray) -> BoolArray:

@@ -83,7 +83,7 @@ def _axes_with_up(axes: FloatArray, up: FloatArray) -> FloatArray:
     """Return (3, 3) orthonormal axes, as rows, of which the third is `up`."""
     length = np.linalg.norm(up) if up.shape == (3,) else np.nan
     if not (np.isfinite(length) and length > 0):
-        raise OptionError(f"up must be a direction: three numbers that are not all 0, not {up.tolist()}")
+        raise OptionError(f"up must be a direction: three numbers that are not all 0, got {up.tolist()}")
     up = up / length
     flat = axes - np.outer(axes @ up, up)
     first = flat[np.argmax(np.linalg.norm(2 * flat, axis=1) > 1)]

@@ -203,7 +203,7 @@ def atomic_write(path: PathName, mode: str = "wb") -> Iterator[IO[Any]]:
         MeshFileError: the file cannot be written, or the disk is full.
     """
     if mode not in ("w", "wb"):
-        raise ValueError(f"mode must be 'w' or 'wb', not {mode!r}")
+        raise ValueError(f"mode must be 'w' or 'wb', got {mode!r}")
     target = check_target(path)
     # Created by open() instead of tempfile, so that it has the default permissions of a new file.
     temporary = target.with_name(_temporary(target.name, secrets.token_hex(6)))

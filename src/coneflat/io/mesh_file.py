@@ -96,7 +96,7 @@ def check_corners(path: Path, mesh: MeshFile) -> None:
     if c is not None:
         i = int(np.searchsorted(mesh.offsets, c, side="right")) - 1
         raise FaceIndexError(
-            f"{path}: face {i} names vertex {mesh.corners[c]}, but there are {count} vertices, from 0"
+            f"{path}: face {i} refers to vertex {mesh.corners[c]}, but there are {count} vertices, from 0"
         )
 
 

@@ -245,7 +245,7 @@ def number(value: Any) -> Any:
         ValueError: the value is neither a number nor None.
     """
     if value is not None and not isinstance(value, (int, float)):
-        raise ValueError(f"its report has {str(value)[:20]!r} for a number")
+        raise ValueError(f"its report has {str(value)[:20]!r} instead of a number")
     return math.nan if value is None else value
 
 

@@ -177,14 +177,14 @@ def _check_corners(path: Path, content: bytes, mesh: MeshFile) -> None:
     if c is not None:
         line, given = _corner_line(path, content, c, 0)
         known = "OBJ counts from 1" if given == 0 else f"there are {len(mesh.vertices)} vertices"
-        raise FaceIndexError(f"{path}, line {line}: a face names vertex {given}, but {known}")
+        raise FaceIndexError(f"{path}, line {line}: a face refers to vertex {given}, but {known}")
     if mesh.texture is None or mesh.uv is None:
         return
     c = first_bad_corner(np.where(mesh.texture == -1, 0, mesh.texture), len(mesh.uv))
     if c is not None:
         line, given = _corner_line(path, content, c, 1)
         raise FaceIndexError(
-            f"{path}, line {line}: a face names UV point {given}, but there are {len(mesh.uv)} (vt lines)"
+            f"{path}, line {line}: a face refers to UV point {given}, but there are {len(mesh.uv)} (vt lines)"
         )
 
 

@@ -300,7 +300,7 @@ def _as_integers(path: Path, corners: Column) -> IntArray:
     numbers = corners.astype(np.int64, copy=False)
     if corners.dtype.kind == "f" and np.any(numbers != corners):
         odd = corners[np.argmax(numbers != corners)]
-        raise MeshFileError(f"{path}: a face names vertex {odd}, which is not an integer")
+        raise MeshFileError(f"{path}: a face refers to vertex {odd}, which is not an integer")
     return numbers
 
 

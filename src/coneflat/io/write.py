@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 #: Endings of the files that `write_flattening` writes.
 OUTPUT_FORMATS = tuple(f".{name}" for name in FORMATS)
 # Range of model sizes for which squares of small lengths are also 32-bit numbers, as other programs compute them.
-SMALLEST, LARGEST = 1e-15, 1e18
+MIN_SIZE, MAX_SIZE = 1e-15, 1e18
 _MATERIAL = re.compile(rb"^[ \t]*usemtl\s", re.MULTILINE)
 
 
@@ -152,7 +152,7 @@ def as_written(result: Flattening, ending: str) -> Flattening:
         MeshFileError: numbers are out of range for the format.
     """
     if not isinstance(ending, str):
-        raise OptionError(f"ending must be text such as .glb, not {short_repr(ending)}")
+        raise OptionError(f"ending must be text such as .glb, got {short_repr(ending)}")
     stored, lost = result, left_out(result, ending)
     if ending == ".glb":
         stored = _in_single_precision(result)
@@ -183,10 +183,10 @@ def _positions_in_glb(vertices: FloatArray) -> FloatArray:
     with np.errstate(over="ignore"):
         stored = vertices.astype(np.float32).astype(np.float64)
     largest = float(np.abs(vertices).max())
-    if not SMALLEST < largest < LARGEST:
+    if not MIN_SIZE < largest < MAX_SIZE:
         raise MeshFileError(
             f"positions of up to {largest:.3g} are beyond the 32-bit numbers of .glb, which support sizes from "
-            f"{SMALLEST:.0e} to {LARGEST:.0e}: scale the mesh, or write .ply"
+            f"{MIN_SIZE:.0e} to {MAX_SIZE:.0e}: scale the mesh, or write .ply"
         )
     return stored
 

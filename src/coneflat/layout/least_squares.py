@@ -17,7 +17,7 @@ from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh
 from ..mesh.ties import argmax_tied, tie_key
 
 # Minimum angle in radians, which replaces angles that are not positive, so that the shape of the triangle is finite.
-LEAST_ANGLE = 1e-3
+MIN_ANGLE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +53,12 @@ def shapes_of_lengths(lengths: FloatArray) -> TriangleShapes:
 def shapes_of_angles(angles: FloatArray) -> TriangleShapes:
     """Return the shapes of triangles given by their (m, 3) corner angles, radians, which sum to pi.
 
-    Angles that are not positive are replaced by `LEAST_ANGLE`, and the largest angle is reduced accordingly.
+    Angles that are not positive are replaced by `MIN_ANGLE`, and the largest angle is reduced accordingly.
     """
     rows = np.arange(len(angles))
     third = np.argmax(angles, axis=1)
     near = angles[rows, NEXT[third]], angles[rows, PREVIOUS[third]]
-    one, two = (np.where(angle > 0, angle, LEAST_ANGLE) for angle in near)
+    one, two = (np.where(angle > 0, angle, MIN_ANGLE) for angle in near)
     turn = np.sin(two) / np.sin(one + two) * np.exp(1j * one)
     return TriangleShapes(third, turn, angles.min(axis=1) <= 0)
 

@@ -12,7 +12,7 @@ from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, rows_of
 from ..base.jit import compiled
 from ..errors import LengthError, MetricError, SeamError
 from ..geometry import double_areas
-from ..geometry.operators import LEAST_WEIGHT, area_distortion, at_unit_scale, vertex_areas, weighted_areas
+from ..geometry.operators import MIN_WEIGHT, area_distortion, at_unit_scale, vertex_areas, weighted_areas
 from ..geometry.planar import layout_curvature, signed_double_areas, vertex_log_scale
 from ..geometry.straight import place_triangles
 from ..mesh.connectivity import TriangleMesh, label_components
@@ -171,7 +171,7 @@ class LayoutGroup:
         weights: FloatArray = 1 + MEAN_AREA_SHARE * means[self._of_face] / np.maximum(self.areas, least)
         for one, own, start in zip(self.layouts, self._given_weights, self._faces, strict=False):
             if own is not None:
-                at_vertices = np.maximum(at_unit_scale(own), LEAST_WEIGHT)
+                at_vertices = np.maximum(at_unit_scale(own), MIN_WEIGHT)
                 of_faces = at_vertices[one.mesh.faces].mean(axis=1)
                 weights[start : start + len(of_faces)] *= of_faces
         return weights

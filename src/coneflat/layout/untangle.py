@@ -14,7 +14,7 @@ from ..geometry.straight import FlatTriangles
 from .patches import DEGENERATE_HEIGHT, Patches
 
 # Minimum ratio of height to longest side of the target shapes.
-LEAST_HEIGHT = 0.1
+MIN_HEIGHT = 0.1
 # Maximum number of rings of triangles around the bad ones whose vertices may move; 1, 2, 4, and so on are tried.
 MAX_RINGS = 4
 # Wrong angle sums around a vertex differ by full turns; rounding errors of the sums are far below this value.
@@ -187,12 +187,12 @@ def _neighbourhood(faces: IntArray, seeds: IntArray, rings: int, count: int) -> 
 
 
 def _thickened(rest: ComplexArray) -> ComplexArray:
-    """Return (m, 3) the sides of triangles with their heights raised to `LEAST_HEIGHT` times the longest side."""
+    """Return (m, 3) the sides of triangles with their heights raised to `MIN_HEIGHT` times the longest side."""
     f = np.arange(len(rest))
     longest = np.abs(rest).argmax(axis=1)
     base = np.abs(rest[f, longest])
     apex = -rest[f, (longest + 2) % 3] / rest[f, longest]
-    apex = apex.real + 1j * np.maximum(apex.imag, LEAST_HEIGHT)
+    apex = apex.real + 1j * np.maximum(apex.imag, MIN_HEIGHT)
     wanted = np.empty_like(rest)
     wanted[f, longest] = base
     wanted[f, (longest + 1) % 3] = base * (apex - 1)

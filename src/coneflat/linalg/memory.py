@@ -15,13 +15,17 @@ CGROUP = Path("/sys/fs/cgroup")
 
 
 def check_memory(triangles: int) -> None:
-    """Raise TooLargeError if a flattening of this number of triangles does not fit into the free memory."""
+    """Raise TooLargeError if a flattening of this number of triangles does not fit into the free memory.
+
+    Raises:
+        TooLargeError: the message has both sizes.
+    """
     if triangles < CHECKED_TRIANGLES:
         return
     needed, free = triangles * BYTES_PER_TRIANGLE, free_memory()
     if needed > free:
         raise TooLargeError(
-            f"{triangles:,} triangles take about {_size(needed)} of memory, and {_size(free)} are free"
+            f"{triangles:,} triangles need about {_size(needed)} of memory, but {_size(free)} are free"
         )
 
 

@@ -142,7 +142,7 @@ class PardisoFactor(Factor):
         if code == Code.ZERO_PIVOT and self._kind == Kind.POSITIVE_DEFINITE:
             raise NotPositiveDefinite("a pivot is not positive")
         if code == Code.OUT_OF_MEMORY:
-            raise MemoryError(f"PARDISO has not enough memory for {len(self._order):,} unknowns")
+            raise MemoryError(f"PARDISO does not have enough memory for {len(self._order):,} unknowns")
         if code:
             raise RuntimeError(f"PARDISO failed with code {code} in phase {phase}")
 

@@ -88,7 +88,11 @@ class Distortion:
     curvature_error_max: float = float("nan")
 
     def rescaled(self, log_factor: float) -> Distortion:
-        """Return the measures of the layout scaled by exp(log_factor)."""
+        """Return the measures of the layout scaled by exp(log_factor).
+
+        Args:
+            log_factor: logarithm of the factor of lengths in the plane.
+        """
         return replace(self, log_area_scale=self.log_area_scale + log_factor)
 
 
@@ -157,7 +161,7 @@ def _check_arrays(
     """Raise an error for invalid arrays, with which compiled loops would read out of bounds."""
     if not isinstance(mesh, TriangleMesh):
         raise ArrayShapeError(
-            f"mesh must be a TriangleMesh, for example check_mesh(vertices, faces).mesh, not {short_repr(mesh)}"
+            f"mesh must be a TriangleMesh, for example check_mesh(vertices, faces).mesh, got {short_repr(mesh)}"
         )
     as_faces(mesh.faces, len(mesh.vertices))
     if not np.isfinite(as_floats("corner_uv", corner_uv)).all():
@@ -174,7 +178,7 @@ def _check_arrays(
         ),
     ):
         if found != wanted:
-            raise ArrayShapeError(f"{name} must have the shape {wanted}, to match the mesh, not {found}")
+            raise ArrayShapeError(f"{name} must have the shape {wanted}, to match the mesh, got {found}")
 
 
 def angle_sum_errors(

@@ -119,9 +119,9 @@ def as_rows(result: Flattening) -> list[Row]:
     untangled = ""
     if solve.untangled_vertices:
         untangled = (
-            f"flipped triangles; {plural(solve.untangled_triangles, 'was', 'were')}, until "
-            f"{plural(solve.untangled_vertices, 'vertex', 'vertices')} moved by at most "
-            f"{solve.untangled_move:.2g} edges"
+            f"flipped triangles; {solve.untangled_triangles:,} before "
+            f"{plural(solve.untangled_vertices, 'vertex', 'vertices')} were moved by at most "
+            f"{solve.untangled_move:.2g} edge lengths"
         )
     of_map = map_rows(d)
     if solve.relaxed_vertices:
@@ -198,7 +198,7 @@ def map_rows(d: Distortion) -> dict[str, Row]:
         (
             "texel density",
             number_text(d.density_spread, ".3f"),
-            "spread: 95% quantile over 5% quantile",
+            "spread: 95% quantile divided by 5% quantile",
         ),
         ("seam length", number_text(d.seam_length, ".3f"), "divided by the square root of the area"),
         (

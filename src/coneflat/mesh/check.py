@@ -118,7 +118,7 @@ def _as_vertices(vertices: ArrayLike) -> FloatArray:
     if points.size == 0:
         raise EmptyMeshError("the mesh has no vertices")
     if points.ndim != 2 or points.shape[1] != 3:
-        raise ArrayShapeError(f"vertices must have the shape (n, 3), not {points.shape}")
+        raise ArrayShapeError(f"vertices must have the shape (n, 3), got {points.shape}")
     return points
 
 
@@ -178,7 +178,7 @@ class _Check:
             if len(first) < len(self.faces):
                 keep = np.zeros(len(self.faces), dtype=bool)
                 keep[first] = True
-                self.notes.append(f"Dropped {plural(int((~keep).sum()), 'face')} given twice.")
+                self.notes.append(f"Dropped {plural(int((~keep).sum()), 'duplicate face')}.")
                 self._keep(keep)
 
     def is_manifold(self) -> bool:

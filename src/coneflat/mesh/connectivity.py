@@ -117,7 +117,11 @@ class TriangleMesh:
         return _permuted(self.faces, PREVIOUS)
 
     def ends_of(self, halfedges: IntArray) -> tuple[IntArray, IntArray]:
-        """Return the start and end vertices of given half-edges, without computing those of all half-edges."""
+        """Return the start and end vertices of given half-edges, without computing those of all half-edges.
+
+        Args:
+            halfedges: (k,) half-edges 3 f + i, opposite corner i of face f.
+        """
         flat = self.faces.ravel()
         start, end = end_corners(halfedges)
         return flat[start], flat[end]
@@ -247,7 +251,11 @@ def corner_fans(faces: IntArray, one: IntArray, two: IntArray) -> tuple[int, Int
 
 
 def end_corners(halfedges: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the start and end corners of half-edges, as indices into `faces.ravel()`."""
+    """Return the start and end corners of half-edges, as indices into `faces.ravel()`.
+
+    Args:
+        halfedges: (k,) half-edges 3 f + i, opposite corner i of face f.
+    """
     corner = halfedges % 3
     base = halfedges - corner
     return base + NEXT[corner], base + PREVIOUS[corner]

@@ -59,6 +59,9 @@ def tie_key(vertices: FloatArray) -> FloatArray:
     span its plane of mirror symmetry, if there is one, and their cross product distinguishes the two sides.
 
     vertices: (n, 3) positions.
+
+    Args:
+        vertices: (n, 3) positions.
     """
     centred = _centred(vertices)
     one, across = _shape_vectors(centred)

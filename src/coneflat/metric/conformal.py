@@ -20,7 +20,7 @@ from .hessian import GroundedInverse, HessianPattern, Inverse, conjugate_gradien
 # Residual, radians, at which the solve stops: the rounding error of a sum of a few angles.
 GOAL_RESIDUAL = 1e-13
 # Largest change of phi in one step. Beyond a factor e^5 of lengths, the quadratic model is meaningless.
-LARGEST_STEP = 5.0
+MAX_STEP = 5.0
 # A Newton step is computed with a relative error like the residual, but at most this; less accurate steps cost more
 # steps.
 MAX_RELATIVE_RESIDUAL = 0.05
@@ -195,7 +195,7 @@ def find_scale(
         start = problem.evaluate(np.where(problem.fixed, log_scale, 0.0))
     halvings = HALVINGS_BOUNDED if problem.is_bounded else HALVINGS
     best, steps = minimise(
-        problem, start, Limits(tolerance, max_steps, GOAL_RESIDUAL, halvings, largest_step=LARGEST_STEP)
+        problem, start, Limits(tolerance, max_steps, GOAL_RESIDUAL, halvings, largest_step=MAX_STEP)
     )
     return best if best is problem.last else problem.evaluate(best.variables), steps
 

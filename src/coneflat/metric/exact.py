@@ -176,7 +176,7 @@ def _per_vertex(name: str, values: ArrayLike, count: int) -> FloatArray:
     array = as_floats(name, values)
     if array.shape not in ((), (count,)):
         raise ArrayShapeError(
-            f"{name} must have the shape {(count,)}, a number for each vertex, not {array.shape}"
+            f"{name} must have the shape {(count,)}, a number for each vertex, got {array.shape}"
         )
     return np.broadcast_to(array, (count,))
 

@@ -35,7 +35,7 @@ from .solve import ExactChoices, exact_flat_metric
 # Largest number of steps, and largest error in radians at the end; about six steps are needed for well-placed cones.
 MAX_STEPS, TOLERANCE = 60, 1e-11
 # Largest change of the log of a length in one step. After a larger change, the derivatives are computed again.
-LARGEST_CHANGE = 0.2
+MAX_CHANGE = 0.2
 # Smallest fraction of a step that is taken. Below it, triangles are close to degenerate and the search fails.
 MIN_FRACTION = 1e-3
 # Weight of scaling in the norm of a strain, relative to shear: nearly zero, as scaling can be undone conformally.
@@ -82,6 +82,10 @@ def loop_rotations(surface: Surface, spec: MetricSpec) -> Callable[[ConeSolution
     """Return a function from cones to the holonomy of loops across the handles in their metric, (2 genus,) radians.
 
     None for a linear metric, and for a mesh without handles.
+
+    Args:
+        surface: connected mesh with its operators.
+        spec: specification of its metric.
     """
     if spec.method != "exact" or not surface.mesh.genus():
         return None
@@ -150,7 +154,7 @@ def corrected_flat_metric(
             changes = least_changes(holonomy, sides, shear_norm(mesh, lengths, solution.cones), fixed)
             inverse = np.eye(len(off))
         step = -inverse @ off
-        fraction = min(1.0, LARGEST_CHANGE / np.abs(changes @ step).max())
+        fraction = min(1.0, MAX_CHANGE / np.abs(changes @ step).max())
         sheared = _sheared(mesh, lengths, fraction * (changes @ step))
         while fraction > MIN_FRACTION and not slacks(sheared).min() > 0:
             fraction /= 2

@@ -4,7 +4,7 @@ from .combined import Options
 from .declared import (
     CONES,
     FORMATS,
-    MOST_TRIANGLES,
+    MAX_SHOWN_TRIANGLES,
     PAPER,
     SHOWS,
     AtlasOptions,
@@ -58,7 +58,7 @@ __all__ = [
     "FindOptions",
     "Flag",
     "Kind",
-    "MOST_TRIANGLES",
+    "MAX_SHOWN_TRIANGLES",
     "MetricOptions",
     "Number",
     "Options",

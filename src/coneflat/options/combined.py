@@ -43,7 +43,7 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
         least, widest, quantum = self.min_cone_angle, self.max_cone_angle, self.quantise
         if not 0 < least <= WIDEST_CONE:
             most = f"{WIDEST_CONE / math.pi:g} pi"
-            yield f"the smallest cone angle must be positive and at most {most}, not {least:g} radians"
+            yield f"the smallest cone angle must be positive and at most {most}, got {least:g} radians"
         if widest is not None and not widest > least:
             yield f"the largest cone angle ({widest:g} radians) must exceed the smallest ({least:g})"
         if not self.searches_cones:
@@ -58,7 +58,7 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
             yield "correct_handles needs quantised cones: set quantise, for example to pi/2"
         if quantum is not None and not MIN_QUANTUM <= quantum <= 2 * math.pi * (1 + TYPED_TOLERANCE):
             yield (
-                f"quantise must be from {MIN_QUANTUM:g} radians (a smaller quantum has no effect) to 2 pi, not "
+                f"quantise must be from {MIN_QUANTUM:g} radians (a smaller quantum has no effect) to 2 pi, got "
                 f"{quantum:g}"
             )
 
@@ -66,9 +66,9 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
         """Yield an error message for each conflict of the options of seams and atlas."""
         if not 0 <= self.padding < self.resolution / 4:
             most = f"a quarter of the resolution of {self.resolution:,}"
-            yield f"padding must be from 0 to {most}, not {self.padding:g}"
+            yield f"padding must be from 0 to {most}, got {self.padding:g}"
         if self.sharp_angle is not None and not 0 < self.sharp_angle < math.pi:
-            yield f"the sharp angle must be between 0 and pi, not {self.sharp_angle:g} radians"
+            yield f"the sharp angle must be between 0 and pi, got {self.sharp_angle:g} radians"
 
     def _is_set(self, name: str) -> bool:
         value = getattr(self, name)

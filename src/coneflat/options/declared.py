@@ -74,7 +74,7 @@ PAPER: Mapping[str, Any] = {
 #: Formats in which flattened meshes are written: file extensions.
 FORMATS = ("obj", "ply", "glb", "npz")
 #: Largest number of triangles that the page draws. Larger meshes, which a browser rotates slowly, are simplified.
-MOST_TRIANGLES = 500_000
+MAX_SHOWN_TRIANGLES = 500_000
 #: What the page of the viewer can show first.
 SHOWS = ("checker", "picture", "charts", "qc", "area", "curvature", "flat", "plain")
 
@@ -86,7 +86,7 @@ class Declaration:
     Attributes:
         kind: the values it takes.
         only: the method that alone supports it: "sparse" for cones, "exact" for the metric; or "".
-        one_mesh: it contains vertex indices, so its value fits one mesh only.
+        one_mesh: it contains vertex indices, so its value applies to one mesh only.
         flag: the commands have a flag for it.
         command_default: the default of the commands if it differs from that in Python; a comment gives the reason.
         name, type, default: those of the field.
@@ -140,8 +140,8 @@ class ConeBounds:
             vertex; a map from vertex to number, 1 for the others; the name of a vertex property in the file; or color,
             which gives 1 to grey vertices and 100 to vertices of a pure colour.
         min_cone_angle: Smallest cone angle (2 pi minus the curvature). Sharper cones distort the triangles around them.
-        max_cone_angle: Largest cone angle, above 2 pi; none or inf: no bound. The triangles around a wider cone
-            cannot hold its angle.
+        max_cone_angle: Largest cone angle, above 2 pi; none or inf: no bound. Larger angles rarely fit the
+            triangles around a cone.
         positive_only: No cones of negative curvature (saddles).
     """
 

@@ -56,7 +56,7 @@ class Flag(Kind):
         import numpy as np
 
         if not isinstance(value, (bool, np.bool_)):
-            raise OptionError(f"{name} must be True or False, not {short_repr(value)}")
+            raise OptionError(f"{name} must be True or False, got {short_repr(value)}")
         return bool(value)
 
 
@@ -87,18 +87,18 @@ class Number(Kind):
             value = float(value)
         number = as_integer(name, value) if self.is_integer else as_number(name, value)
         if not self.least <= number <= self.most or (self.is_positive and not 0 < number < math.inf):
-            raise OptionError(f"{name} must be {self.text}, not {number:,.6g}")
+            raise OptionError(f"{name} must be {self.text}, got {number:,.6g}")
         return number
 
     @property
     def text(self) -> str:
         """A description of the valid numbers, for messages."""
         noun = "an integer" if self.is_integer else "a number"
-        if self.is_positive:
-            return f"{noun} above 0"
-        if self.least == -math.inf:
-            return noun
-        return f"{noun} from {self.least:g}" + (f" to {self.most:,g}" if self.most < math.inf else "")
+        if self.is_positive or self.least == -math.inf:
+            return f"{noun} above 0" if self.is_positive else noun
+        if self.most == math.inf:
+            return f"{noun}, {self.least:g} or more"
+        return f"{noun} from {self.least:g} to {self.most:,g}"
 
 
 ANGLE, ANGLE_OR_NONE = Number(is_angle=True), Number(is_angle=True, optional=True)
@@ -125,7 +125,7 @@ class Vertices(Kind):
             return ()
         noun = name.replace("_", " ").removesuffix("s")
         if isinstance(value, Mapping):
-            raise OptionError(f"{noun}s must be a list of vertices without curvatures, not a map")
+            raise OptionError(f"{noun}s must be a list of vertices without curvatures, got a map")
         return tuple(given_vertices(noun, value))
 
 
@@ -180,7 +180,7 @@ class VerticesOrEdges(Kind):
         given = _indices(name, value)
         if given.ndim not in (1, 2) or given.shape[1:] not in ((), (2,)) or given.dtype.kind not in "iu":
             raise OptionError(
-                f"{name} must be vertices (k,) or pairs of vertices (k, 2), not of shape {given.shape} and type "
+                f"{name} must be vertices (k,) or pairs of vertices (k, 2), got shape {given.shape} and type "
                 f"{given.dtype}"
             )
         return given.astype(np.int64)
@@ -204,7 +204,7 @@ class Direction(Kind):
         is_one = direction.shape == (3,) and direction.dtype.kind in "fiu"
         if not (is_one and np.isfinite(direction).all() and direction.any()):
             raise OptionError(
-                f"{name} must be a direction, three numbers that are not all 0, not {short_repr(value)}"
+                f"{name} must be a direction, three numbers that are not all 0, got {short_repr(value)}"
             )
         direction = direction.astype(np.float64)
         largest = np.abs(direction).max()
@@ -214,25 +214,33 @@ class Direction(Kind):
 
 
 def as_number(name: str, value: object) -> float:
-    """Return a value as a float, or raise OptionError."""
+    """Return a value as a float, or raise OptionError.
+
+    Raises:
+        OptionError: the value is not a number; the message begins with `name`.
+    """
     import numpy as np
 
     is_scalar = np.ndim(value) == 0 if isinstance(value, np.ndarray) else not isinstance(value, (str, bytes))
     if not is_scalar or isinstance(value, (bool, np.bool_, complex, np.complexfloating)):
-        raise OptionError(f"{name} must be a number, not {short_repr(value)}")
+        raise OptionError(f"{name} must be a number, got {short_repr(value)}")
     try:
         return float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError) as error:
-        raise OptionError(f"{name} must be a number, not {short_repr(value)}") from error
+        raise OptionError(f"{name} must be a number, got {short_repr(value)}") from error
 
 
 def as_integer(name: str, value: object) -> int:
-    """Return a value as an integer, or raise OptionError."""
+    """Return a value as an integer, or raise OptionError.
+
+    Raises:
+        OptionError: the value is not an integer; the message begins with `name`.
+    """
     import numpy as np
 
     number = math.nan if isinstance(value, (bool, np.bool_)) else as_number(name, value)
     if not number.is_integer() or abs(number) >= 2**62:
-        raise OptionError(f"{name} must be an integer, not {short_repr(value)}")
+        raise OptionError(f"{name} must be an integer, got {short_repr(value)}")
     return int(number)
 
 
@@ -260,7 +268,7 @@ def _pairs(noun: str, given: object) -> IntArray:
         return np.empty((0, 2), dtype=np.int64)
     if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu":
         raise OptionError(
-            f"{noun} must be pairs of vertices (k, 2), not of shape {pairs.shape} and type {pairs.dtype}"
+            f"{noun} must be pairs of vertices (k, 2), got shape {pairs.shape} and type {pairs.dtype}"
         )
     return pairs.astype(np.int64)
 
@@ -285,7 +293,7 @@ def given_vertices(noun: str, vertices: object, may_differ: bool = False) -> dic
         }
     elif isinstance(vertices, Iterable) and not isinstance(vertices, (str, bytes)):
         if isinstance(vertices, np.ndarray) and np.ndim(vertices) != 1:
-            raise OptionError(f"{noun}s must be a list of vertices, not {short_repr(vertices)}")
+            raise OptionError(f"{noun}s must be a list of vertices, got {short_repr(vertices)}")
         listed = [as_integer(f"a {noun}'s vertex", v) for v in vertices]
         given = dict.fromkeys(listed)
         if len(given) < len(listed):
@@ -295,7 +303,7 @@ def given_vertices(noun: str, vertices: object, may_differ: bool = False) -> dic
         is_count = noun == "cone" and isinstance(vertices, Integral) and int(vertices) > 0
         advice = f": for a number of cones use cone_count={short_repr(vertices)}" if is_count else ""
         raise OptionError(
-            f"{noun}s must be vertices, or a map from vertex to curvature, not {type(vertices).__name__}{advice}"
+            f"{noun}s must be vertices, or a map from vertex to curvature, got {type(vertices).__name__}{advice}"
         )
     unknown = [v for v, k in given.items() if k is None]
     if unknown and len(unknown) < len(given) and not may_differ:
@@ -305,5 +313,5 @@ def given_vertices(noun: str, vertices: object, may_differ: bool = False) -> dic
         )
     for v, k in given.items():
         if k is not None and not math.isfinite(k):
-            raise OptionError(f"the curvature of {noun} {v} must be finite, not {k}")
+            raise OptionError(f"the curvature of {noun} {v} must be finite, got {k}")
     return given

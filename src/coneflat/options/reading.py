@@ -80,6 +80,9 @@ def takes(declared: Callable[P, Any]) -> Callable[[Callable[..., R]], OfMesh[P, 
 
     Type checkers and editors see the keywords of the group. At run time they are in the function's signature and
     docstring.
+
+    Args:
+        declared: dataclass whose fields are options.
     """
 
     def decorate(function: Callable[..., R]) -> OfMesh[P, R]:

@@ -20,7 +20,7 @@ SMOOTH, SHARP = np.radians(20), np.radians(60)
 # Cost factor of a full crease, and, if hiding is 1, of an edge that is almost invisible.
 CHEAPEST = 0.1
 # Minimum weight relative to the largest. It avoids detours of seams in regions of cost zero.
-LEAST_WEIGHT = 1e-3
+MIN_WEIGHT = 1e-3
 # Number of averages over neighbours, which remove noise from the visibility of single vertices.
 SMOOTHING_ROUNDS = 2
 
@@ -119,4 +119,4 @@ def _checked(weights: ArrayLike, count: int, noun: str) -> FloatArray:
             f"{values.max():g}"
         )
     values = at_safe_scale(values)
-    return np.maximum(values, LEAST_WEIGHT * values.max())
+    return np.maximum(values, MIN_WEIGHT * values.max())

@@ -165,12 +165,10 @@ def _weights(noun: str, weights: object, given: InputMesh) -> FloatArray:
     except (TypeError, ValueError, OverflowError) as error:
         raise OptionError(f"{noun} must be numbers, one for each vertex: {error}") from error
     if numbers.dtype.kind not in "fiub" and numbers.size:
-        raise OptionError(f"{noun} must be numbers, one for each vertex, not of type {numbers.dtype}")
+        raise OptionError(f"{noun} must be numbers, one for each vertex, got type {numbers.dtype}")
     values = numbers.astype(np.float64)
     if values.shape != (count,):
-        raise OptionError(
-            f"{noun} must be {count:,} numbers, one for each vertex, not of shape {values.shape}"
-        )
+        raise OptionError(f"{noun} must be {count:,} numbers, one for each vertex, got shape {values.shape}")
     if not np.isfinite(values).all():
         at = int(np.flatnonzero(~np.isfinite(values))[0])
         raise OptionError(f"{noun} must be finite; that of vertex {at} is {values[at]:g}")

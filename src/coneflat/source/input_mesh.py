@@ -24,7 +24,7 @@ from ..geometry.intrinsic import as_lengths, check_lengths
 from ..mesh.check import CheckedMesh
 
 # Smallest size of a mesh for which texels per unit of length, and similar ratios, are finite.
-SMALLEST = 1e-300
+MIN_COORDINATE = 1e-300
 Values = TypeVar("Values", IntArray, BoolArray, FloatArray)
 
 
@@ -85,7 +85,7 @@ def at_unit_size(checked: CheckedMesh) -> CheckedMesh:
         NonFiniteError: the mesh is so small that UV units per unit of length are not finite.
     """
     size = float(np.abs(checked.mesh.vertices).max())
-    if size < SMALLEST:
+    if size < MIN_COORDINATE:
         raise NonFiniteError(f"coordinates of at most {size:.3g} are too small: scale the mesh")
     exponent = -unit_exponent(checked.mesh.vertices)
     mesh = checked.mesh.moved_to(np.ldexp(checked.mesh.vertices, exponent))

@@ -48,7 +48,7 @@ def marked_edges(checked: CheckedMesh, options: Options, given: InputMesh, forbi
         if len(both):
             pair = checked.vertex_origin[mesh.edges[both[0]]]
             raise SeamError(
-                f"{plural(len(both), 'edge')} given as seams and by no_seams: the first is {pair[0]}-{pair[1]}"
+                f"{plural(len(both), 'edge')} given both as seams and as no_seams: the first is {pair[0]}-{pair[1]}"
             )
         marked[named] = True
     return marked & ~mesh.is_boundary_edge

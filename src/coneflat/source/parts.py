@@ -210,7 +210,7 @@ def _own_lengths(given: InputMesh, checked: CheckedMesh, options: Options) -> Fl
 
 def _isolated_note(pairs: IntArray) -> str:
     names = list_some([f"{a}-{b}" for a, b in pairs[:5].tolist()], len(pairs))
-    return f"Not cut: {plural(len(pairs), 'edge')} ({names}) marked as seams without a neighbouring seam or boundary."
+    return f"Not cut: {plural(len(pairs), 'edge')} ({names}) marked as seams that touch no other seam and no boundary."
 
 
 def _part(

@@ -121,7 +121,8 @@ def test_a_cone_without_room_is_refused():
     cones = {0: -3.5 * np.pi, 5: 1.9 * np.pi, 7: 1.9 * np.pi, 100: 1.9 * np.pi, 200: 1.8 * np.pi}
     for method in BOTH:
         with pytest.raises(
-            errors.CurvatureError, match=r"1 cone too wide .* 5 of them cannot hold an angle of 5.5 pi"
+            errors.CurvatureError,
+            match=r"1 cone with angles too large .* 5 of them cannot hold an angle of 5.5 pi",
         ):
             flatten_by(method, *shapes.sphere(3), cones=cones)
 

@@ -12,7 +12,7 @@ from shapes import laid_out, lengths_of
 from coneflat import TriangleMesh, errors
 from coneflat.apps.peers import flatten_by
 from coneflat.apps.peers.circle_patterns import circle_patterns
-from coneflat.apps.peers.pattern_angles import LEAST_MEETING, LEAST_PART, coherent_angles
+from coneflat.apps.peers.pattern_angles import MIN_ANGLE_FRACTION, MIN_MEETING, coherent_angles
 from coneflat.apps.peers.pattern_radii import RadiiProblem, circle_pattern
 from coneflat.cones import greedy_cones
 from coneflat.geometry import angle_defect, corner_angles, edge_lengths
@@ -69,17 +69,17 @@ def test_angles_are_the_nearest_as_another_solver_finds_them():
         lambda x: ((x - angles) ** 2).sum() / 2,
         angles,
         jac=lambda x: x - angles,
-        bounds=[(min(LEAST_PART * a, 0.02), None) for a in angles],
+        bounds=[(min(MIN_ANGLE_FRACTION * a, 0.02), None) for a in angles],
         constraints=[
             {"type": "eq", "fun": lambda x: (rows @ x - wanted)[:-1], "jac": lambda x: rows[:-1]},
-            {"type": "ineq", "fun": lambda x: np.pi - LEAST_MEETING - meeting @ x, "jac": lambda x: -meeting},
+            {"type": "ineq", "fun": lambda x: np.pi - MIN_MEETING - meeting @ x, "jac": lambda x: -meeting},
         ],
         method="SLSQP",
         options={"maxiter": 300, "ftol": 1e-14},
     )
     assert best.success
     np.testing.assert_allclose(found.angles, best.x, atol=1e-6)
-    assert (meeting @ found.angles > np.pi - LEAST_MEETING - 1e-9).any()
+    assert (meeting @ found.angles > np.pi - MIN_MEETING - 1e-9).any()
 
 
 class TestRadii:

@@ -110,7 +110,10 @@ def test_commands(tmp_path, ball):
     [
         (["compare", "missing.obj", "-o", "out"], "there is no such file"),
         (["compare", "ball.obj", "--methods", "exact,"], "unknown method ''"),
-        (["compare", "ball.obj", "--eye", "front"], "--eye is for pictures: add -o, or leave out --eye"),
+        (
+            ["compare", "ball.obj", "--eye", "front"],
+            "--eye has no effect without -o: add -o",
+        ),
         (["compare", "ball.obj", "-o", "out", "--eye", "nowhere"], "unknown eye 'nowhere'"),
         (["compare", "ball.obj", "-o", "busy"], "it is a folder"),
     ],

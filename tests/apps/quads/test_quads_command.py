@@ -71,7 +71,7 @@ def test_command_refuses_before_the_work(tmp_path, ball):
         (("-o", path), "the input and the output"),
         (("--grid", tmp_path / "grid.ply"), "integer grids are written as .obj, .npz"),
         (("--grid", path), "the input and the grid"),
-        (("--smooth", -1), "smooth must be an integer from 0"),
+        (("--smooth", -1), "smooth must be an integer, 0 or more"),
         (("--stretch", 2), "stretch must be a number from 0 to 1"),
     ):
         with pytest.raises(ConeflatError, match=message):

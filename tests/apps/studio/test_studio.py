@@ -73,7 +73,7 @@ class TestChoices:
             (
                 lambda c: c.with_angle(4, -1.0),
                 StudioError,
-                "positive and at most 720 degrees, not -57.2",
+                "positive and at most 720 degrees, got -57.2",
             ),
             (lambda c: c.cut((4,)), StudioError, "a path must be two or more vertices"),
             (lambda c: c.cut((4, 4)), StudioError, "a path must be two or more vertices"),

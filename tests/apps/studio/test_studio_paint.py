@@ -97,7 +97,7 @@ class TestPaint:
         [
             ("glue", None, "unknown layer 'glue'"),
             ("importance", 0, "an importance must be above 0"),
-            ("importance", "much", "an importance must be a number, not 'much'"),
+            ("importance", "much", "an importance must be a number, got 'much'"),
             ("importance", 1e9, "at most 1,000,000"),
             ("importance", None, "an importance must be a number"),
         ],

@@ -75,13 +75,13 @@ class TestAngles:
         chosen = Choices().placed([4, 9]).with_angle(9, math.radians(720))
         assert chosen.cones[1].angle == MAX_CONE_ANGLE
         for angle in (0.0, math.radians(721), math.radians(3000), math.inf, math.nan):
-            with pytest.raises(StudioError, match="positive and at most 720 degrees, not"):
+            with pytest.raises(StudioError, match="positive and at most 720 degrees, got"):
                 chosen.with_angle(4, angle)
-            with pytest.raises(StudioError, match="positive and at most 720 degrees, not"):
+            with pytest.raises(StudioError, match="positive and at most 720 degrees, got"):
                 chosen.added(5, angle)
         plain = chosen.as_plain()
         plain["cones"][1]["angle"] = math.radians(3000)
-        with pytest.raises(StudioError, match="not 3,000"):
+        with pytest.raises(StudioError, match="got 3,000"):
             Choices.from_plain(plain)
 
     def test_what_typed_angles_leave_out_of_bounds_is_told(self, session):

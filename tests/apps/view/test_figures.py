@@ -72,7 +72,7 @@ class TestFigures:
             ("curve", {}, "cone_curve"),
             ("cones", {"eyes": "above"}, "unknown eye 'above'"),
             ("cones", {"eyes": []}, "at least one direction"),
-            ("cones", {"up": "w"}, "not 'w'"),
+            ("cones", {"up": "w"}, "got 'w'"),
             ("cones", {"dpi": 0}, "between 10 and 2400"),
             ("cones", {"size": (50, 50)}, "225 million pixels"),
             ("cones", {"size": (-5, 5)}, "-5 by 5 inches"),

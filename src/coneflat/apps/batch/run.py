@@ -73,7 +73,7 @@ def run_batch(
     if processes is not None and processes < 1:
         raise OptionError(f"expected at least one process, got {processes}")
     if limit is not None and not limit > 0:
-        raise OptionError(f"the time limit must be positive, not {limit:g} s")
+        raise OptionError(f"the time limit must be positive, got {limit:g} s")
     if limit is not None and limit > threading.TIMEOUT_MAX:
         limit = None
     summary = folder / "summary.csv" if summary is None else summary
@@ -177,7 +177,7 @@ def check_summary(path: Path) -> None:
         MeshFileError: its folder is missing, or writing is not permitted.
     """
     if path.suffix.lower() != ".csv":
-        raise OptionError(f"the summary must be a .csv file, not {path.name}")
+        raise OptionError(f"the summary must be a .csv file, got {path.name}")
     check_target(path)
 
 

@@ -147,11 +147,11 @@ def _slowest(rows: Sequence[dict[str, Any]], elapsed: float) -> Iterator[str]:
 def _refuse_vertices(context: click.Context, options: dict[str, Any]) -> None:
     """Raise an error if an option refers to the vertices of one mesh."""
     for name, what in (
-        ("cones", "a list of vertices fits one mesh only"),
-        ("boundary", "a list of corners fits one mesh only"),
-        ("seams", "a file of seams fits one mesh only: write input"),
-        ("weights", "a file of weights fits one mesh only: give the name of a property, or color"),
-        ("seam_weights", "a file of weights fits one mesh only: give the name of a property"),
+        ("cones", "a list of vertices applies to one mesh only"),
+        ("boundary", "a list of corners applies to one mesh only"),
+        ("seams", "a file of seams applies to one mesh only: write input"),
+        ("weights", "a file of weights applies to one mesh only: give the name of a property, or color"),
+        ("seam_weights", "a file of weights applies to one mesh only: give the name of a property"),
     ):
         if not isinstance(options.get(name, ""), str):
             raise click.UsageError(f"{flag_name(name)}: {what}", context)

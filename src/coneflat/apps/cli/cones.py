@@ -66,7 +66,7 @@ def cones(
         picture = check_figure(flags.picture or Path(f"{mesh.stem}_cones.png"))
     for name in () if flags.curve else ("picture", "most"):
         if is_given(context, name):
-            raise click.UsageError(f"--{name} is for --curve only: add it, or leave out --{name}", context)
+            raise click.UsageError(f"--{name} has no effect without --curve: add --curve", context)
     if flags.output is not None:
         check_target(flags.output)
     with Console(verbosity) as console:

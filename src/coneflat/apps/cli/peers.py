@@ -65,7 +65,7 @@ def compare(
     refuse(context, [(flags.paper, declarations(FindOptions), "--paper fixes the cones")])
     for name in ("eye", "up") if flags.output is None else ():
         if is_given(context, name):
-            raise click.UsageError(f"--{name} is for pictures: add -o, or leave out --{name}", context)
+            raise click.UsageError(f"--{name} has no effect without -o: add -o", context)
     options = {**keywords(given, FindOptions), **(PAPER if flags.paper else {})}
     methods = METHODS if flags.methods is None else tuple(name.strip() for name in flags.methods.split(","))
     if flags.output is not None:

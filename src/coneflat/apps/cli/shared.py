@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from ...options import MOST_TRIANGLES
+from ...options import MAX_SHOWN_TRIANGLES
 
 if TYPE_CHECKING:
     from ...measure import Requirement
@@ -97,7 +97,7 @@ color_option = click.option(
 most_option = click.option(
     "--most-triangles",
     type=click.IntRange(1),
-    default=MOST_TRIANGLES,
+    default=MAX_SHOWN_TRIANGLES,
     show_default=True,
     help="Number of triangles to which a larger mesh is reduced, for display only.",
 )

@@ -26,7 +26,7 @@ from .shared import embedding_metric, failure_notes
 
 # Lower bound of angles, radians: those of needles can be rounded to 0, but their logs and relative squares must be
 # finite.
-LEAST_ANGLE = 1e-8
+MIN_ANGLE = 1e-8
 # ABF++: largest number of steps; tolerance of the conditions, radians and logs; and largest change of an angle by a
 # further step. Conditions must hold accurately, but the minimum need not be found to the last digits.
 STEPS, TOLERANCE, LAST_CHANGE = 100, 1e-9, 1e-6
@@ -60,7 +60,7 @@ def angle_based(
 
         Raises:
             ConvergenceError: the solver did not reach its tolerance, unless `best_effort`.
-            CurvatureError: a cone is too wide for its triangles.
+            CurvatureError: the angle of a cone is too large for its triangles.
         """
         notes: list[str] = []
         whole, curvature = mesh, solution.target
@@ -72,7 +72,7 @@ def angle_based(
                 )
         conditions = angle_conditions(whole, curvature)
         angles, steps, converged = solve(conditions, wanted_angles(whole, corner_angles(lengths), curvature))
-        residual = conditions.residual(np.clip(angles, LEAST_ANGLE, np.pi - LEAST_ANGLE))
+        residual = conditions.residual(np.clip(angles, MIN_ANGLE, np.pi - MIN_ANGLE))
         if not converged:
             what = "angle based flattening did not converge: the conditions on angles are"
             notes += failure_notes(what, steps, residual, "", best_effort)
@@ -247,11 +247,11 @@ def wanted_angles(mesh: TriangleMesh, angles: FloatArray, curvature: FloatArray)
         CurvatureError: a cone angle is 0, or at least pi times the number of its triangles.
     """
     at = mesh.faces.ravel()
-    angles = np.maximum(angles, LEAST_ANGLE)
+    angles = np.maximum(angles, MIN_ANGLE)
     count = np.bincount(at, minlength=len(mesh.vertices))
     total = np.bincount(at, angles.ravel(), len(mesh.vertices))
     wanted = np.where(mesh.is_boundary_vertex, total, 2 * np.pi - curvature)
-    low = np.flatnonzero(wanted <= LEAST_ANGLE)
+    low = np.flatnonzero(wanted <= MIN_ANGLE)
     if len(low):
         raise CurvatureError(
             f"{plural(len(low), 'cone')} whose angle is not positive: {wanted[low[0]] / np.pi:.4g} pi; "
@@ -261,8 +261,8 @@ def wanted_angles(mesh: TriangleMesh, angles: FloatArray, curvature: FloatArray)
     if len(wide):
         worst = wide[0]
         raise CurvatureError(
-            f"{plural(len(wide), 'cone')} too wide for the triangles around: {count[worst]} of them cannot hold an "
-            f"angle of {wanted[worst] / np.pi:.4g} pi; choose others, or remesh"
+            f"{plural(len(wide), 'cone')} with angles too large for the triangles around: {count[worst]} of them "
+            f"cannot hold an angle of {wanted[worst] / np.pi:.4g} pi; choose others, or remesh"
         )
     scaled: FloatArray = angles.ravel() * (wanted / total)[at]
     too_wide = np.zeros(len(count), dtype=bool)

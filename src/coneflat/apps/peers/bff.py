@@ -15,7 +15,7 @@ from .shared import embedding_metric
 
 # Largest relative change of lengths, root mean square, for which both sides of a seam get equal lengths. Equal lengths
 # have little effect on the gap of the curve if the two sides are nearly parallel; they then get separate lengths.
-LARGEST_CHANGE = 0.1
+MAX_CHANGE = 0.1
 
 
 def boundary_first(mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution) -> FlatMetric:
@@ -118,7 +118,7 @@ def best_fit_lengths(
     """
     _, joint = np.unique(edge, return_inverse=True)
     found = _closing_lengths(wanted, lengths, tangents, joint)
-    if np.average((found / wanted - 1) ** 2, weights=wanted) <= LARGEST_CHANGE**2:
+    if np.average((found / wanted - 1) ** 2, weights=wanted) <= MAX_CHANGE**2:
         return found
     return _closing_lengths(wanted, lengths, tangents, np.arange(len(edge)))
 

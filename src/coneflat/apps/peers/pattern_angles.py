@@ -11,13 +11,13 @@ from ...base import BoolArray, FloatArray, IntArray
 from ...geometry import IntrinsicTriangulation
 from ...linalg import Limits, Point, factorize, minimise
 
-# Lower bound of an angle: the fraction LEAST_PART of the given one, at most 0.02 radians and at least LEAST_ANGLE.
-LEAST_PART, LEAST_ANGLE = 0.5, 1e-5
+# Lower bound of an angle: MIN_ANGLE_FRACTION of the given one, at most 0.02 radians and at least MIN_ANGLE.
+MIN_ANGLE_FRACTION, MIN_ANGLE = 0.5, 1e-5
 # Least intersection angle of circles, radians. It also applies to the two coincident circumcircles of an inscribed
 # quad. The smaller it is, the worse conditioned the equations are.
-LEAST_MEETING = 1e-4
+MIN_MEETING = 1e-4
 # The largest sum of angles opposite an edge.
-WIDEST_PAIR = np.pi - LEAST_MEETING
+WIDEST_PAIR = np.pi - MIN_MEETING
 # Stopping criteria: largest error of a sum of angles, radians, which is also that of curvature; largest number of
 # Newton steps; rounding of a sum of some angles, radians; halvings after which a step counts as rounding; and fraction
 # of the gradient that a step must change, because without a solution the function is unbounded below.
@@ -77,7 +77,7 @@ def coherent_angles(
     )
     right = np.concatenate([np.full(rows, np.pi), sums[summed]])
 
-    least = np.clip(LEAST_PART * angles, LEAST_ANGLE, 0.02)
+    least = np.clip(MIN_ANGLE_FRACTION * angles, MIN_ANGLE, 0.02)
     problem = _Dual(angles, least, triangulation.twin, equations, right, bool(is_summed.all()))
     found, steps = minimise(problem, problem.evaluate(np.zeros(len(right))), ANGLE_LIMITS)
     return CoherentAngles(problem.project(found.variables)[0], found.largest, steps)

@@ -111,11 +111,11 @@ def compare_methods(
             )
     names = [*methods, *chosen]
 
-    def tell(what: str, done: int) -> None:
+    def report(what: str, done: int) -> None:
         if progress is not None:
             progress(what, done / (len(names) + 1))
 
-    tell("cones", 0)
+    report("cones", 0)
     method = options.pop("method", "exact")
     _warm_up(method)
     base = flatten_by(method, mesh, faces, **options)
@@ -129,7 +129,7 @@ def compare_methods(
         )
     entries = []
     for done, name in enumerate(names, 1):
-        tell(name, done)
+        report(name, done)
         try:
             if name in PEERS:
                 entries.append(Entry(name, *run_peer(name, base), PEERS[name].note))

@@ -22,7 +22,7 @@ from ... import ConeflatError, Flattener, Flattening
 from ...base import cancel_with
 from ...errors import DegenerateFaceError, NonManifoldError, NonOrientableError
 from ...io import Joined, read_joined
-from ...options import MOST_TRIANGLES
+from ...options import MAX_SHOWN_TRIANGLES
 from ..view import Model, PageText, Quantity, content_of, head_and_block, own_quantity, pack, shown_rows
 from .choices import Choices
 from .known import with_hashes
@@ -185,7 +185,7 @@ class JobRunner:
             result = replace(result, notes=())
         if self._model is None or not self._model.is_of(result):
             self._model = Model.of(result)
-        content = content_of(result, self._most or MOST_TRIANGLES, self._model, own)
+        content = content_of(result, self._most or MAX_SHOWN_TRIANGLES, self._model, own)
         show = "checker" if own is None else "own"
         head, block = head_and_block(result, content, None, name, "y", show, text)
         # A simplified mesh is sent in full, too, for painting and drawing, up to 4 million triangles.

@@ -92,7 +92,7 @@ class Choices:
         if name == "boundary" and value not in BOUNDARIES:
             raise OptionError(f"unknown boundary {short_repr(value)}: choose from {', '.join(BOUNDARIES)}")
         if name == "seams" and value not in (None, "input"):
-            raise OptionError(f"seams must be drawn or 'input', those of the file, not {short_repr(value)}")
+            raise OptionError(f"seams must be drawn or 'input', those of the file, got {short_repr(value)}")
         options, declared = dict(self.options), declarations(Options)[name]
         if value != "rectangle":
             value = declared.kind.parse(name, value)
@@ -335,14 +335,14 @@ def as_vertex(name: str, value: object) -> int:
     """
     vertex = as_integer(name, value)
     if vertex < 0:
-        raise StudioError(f"{name} must be an index from 0, not {vertex}")
+        raise StudioError(f"{name} must be an index, 0 or more, got {vertex}")
     return vertex
 
 
 def _checked_angle(angle: float | None) -> float | None:
     if angle is not None and not 0 < angle <= MAX_CONE_ANGLE * (1 + 1e-12):
         raise StudioError(
-            f"a cone angle must be positive and at most {math.degrees(MAX_CONE_ANGLE):g} degrees, not "
+            f"a cone angle must be positive and at most {math.degrees(MAX_CONE_ANGLE):g} degrees, got "
             f"{math.degrees(angle):,g}"
         )
     return angle

@@ -93,10 +93,10 @@ class Studio:
             return given.source.path
         vertices, triangles = np.asarray(given.vertices, dtype=np.float64), np.asarray(given.faces)
         if vertices.ndim != 2 or vertices.shape[1] != 3:
-            raise ArrayShapeError(f"vertices must have the shape (n, 3), not {vertices.shape}")
+            raise ArrayShapeError(f"vertices must have the shape (n, 3), got {vertices.shape}")
         if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
             raise ArrayShapeError(
-                f"faces must be integers of shape (m, 3), not of shape {triangles.shape} and type {triangles.dtype}"
+                f"faces must be integers of shape (m, 3), got shape {triangles.shape} and type {triangles.dtype}"
             )
         if folder is None:
             self._own_folder = tempfile.TemporaryDirectory(prefix="coneflat-")
@@ -181,7 +181,7 @@ def _proxied(through: str, port: int, token: str) -> str:
     """
     if "{port}" not in through:
         raise OptionError(
-            f"through must be an address that contains {{port}}, such as /proxy/{{port}}/, not {short_repr(through)}"
+            f"through must be an address that contains {{port}}, such as /proxy/{{port}}/, got {short_repr(through)}"
         )
     return f"{through.replace('{port}', str(port)).rstrip('/')}/?token={token}"
 
@@ -205,6 +205,6 @@ def studio(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Studio:
         >>> coneflat.studio([[0.0, 0.0]], [[0, 1, 2]])
         Traceback (most recent call last):
             ...
-        coneflat.errors.ArrayShapeError: vertices must have the shape (n, 3), not (1, 2)
+        coneflat.errors.ArrayShapeError: vertices must have the shape (n, 3), got (1, 2)
     """
     return Studio(mesh, faces, **options)

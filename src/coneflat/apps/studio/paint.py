@@ -45,7 +45,7 @@ class Region:
             StudioError: the text is not valid, or there are too many vertices.
         """
         if not isinstance(text, str):
-            raise StudioError(f"a region must be a text such as 3-17 20, not {short_repr(text)}")
+            raise StudioError(f"a region must be a text such as 3-17 20, got {short_repr(text)}")
         runs = []
         for word in text.split():
             found = _RUN.fullmatch(word)
@@ -142,7 +142,7 @@ class Paint:
         """
         if not 0 < weight <= MAX_IMPORTANCE:
             raise StudioError(
-                f"an importance must be above 0 and at most {MAX_IMPORTANCE:,.0f}, not {weight:g}"
+                f"an importance must be above 0 and at most {MAX_IMPORTANCE:,.0f}, got {weight:g}"
             )
         known = {each: region.without(where) for each, region in self.importance}
         if weight != 1:

@@ -279,7 +279,7 @@ class Session:
             raise StudioError(f"unknown format {short_repr(ending)} of quads: choose from {', '.join(QUADS)}")
         number = as_integer("the number of quads", count)
         if not 1 <= number <= MAX_QUADS:
-            raise StudioError(f"the number of quads must be from 1 to {MAX_QUADS:,}, not {number:,}")
+            raise StudioError(f"the number of quads must be from 1 to {MAX_QUADS:,}, got {number:,}")
         return self._request({"do": "quads", "ending": ending, "count": number})[1]
 
     def curve(self) -> dict[str, Any]:

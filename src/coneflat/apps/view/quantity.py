@@ -152,7 +152,7 @@ def curvature(result: Flattening, flat: bool) -> Quantity:
         counts[result.cones] = 0.0
     ticks = tuple((10.0**k, f"$10^{{{k}}}$") for k in (-15, -10, -5, 0))
     scale = ColorScale(1e-16, 1.0, "YlGnBu", "log", ticks)
-    label = "|K| after, cones aside" if flat else "|K| before"
+    label = "|K| after, without cones" if flat else "|K| before"
     return Quantity(label, np.abs(values), counts, scale, ".1e", result.faces)
 
 
@@ -203,7 +203,7 @@ def own_quantity(result: Flattening, name: str, archive: Path | None = None) -> 
         MeshFileError: the file cannot be read.
     """
     if not isinstance(name, str):
-        raise OptionError(f"color must be the name of a property or of a file, not {short_repr(name)}")
+        raise OptionError(f"color must be the name of a property or of a file, got {short_repr(name)}")
     label, values = _named(result, name, archive)
     if values.dtype.kind not in "fiub" or values.ndim != 1:
         raise OptionError(

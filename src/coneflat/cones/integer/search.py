@@ -176,7 +176,7 @@ def quantise_cones(
     lattice = make_lattice(search, quantum)
     goal = 0.0 if count is not None else distortion * distortion
     if not goal >= 0 or (count is None and not 0 < distortion < math.inf):
-        raise OptionError(f"the distortion allowed must be a positive number, not {distortion:g}")
+        raise OptionError(f"the distortion allowed must be a positive number, got {distortion:g}")
     most = min(search.most_cones, *(limit for limit in (count, most) if limit is not None), search.most_cones)
     search_coarse(search, lattice, goal, most)
     exact = Lattice(search.exact, lattice.quanta, lattice.total)
@@ -212,7 +212,7 @@ def make_lattice(search: ConeSearch, quantum: float) -> Lattice:
         CurvatureError: no multiples within the bounds have the required sum.
     """
     if not MIN_QUANTUM <= quantum <= math.tau * (1 + TYPED_TOLERANCE):
-        raise OptionError(f"quantum must be from {MIN_QUANTUM:g} radians to 2 pi, not {quantum:g}")
+        raise OptionError(f"quantum must be from {MIN_QUANTUM:g} radians to 2 pi, got {quantum:g}")
     parts = round(math.tau / quantum)
     if abs(parts * quantum - math.tau) <= TYPED_TOLERANCE * math.tau:
         quantum = math.tau / parts

@@ -16,7 +16,7 @@ from ...base.jit import compiled
 from ..solution import TIE_TOLERANCE
 
 # Largest coarsening factor of a level: an aggregate is a vertex with its neighbours.
-LARGEST_AGGREGATE = 7.0
+MAX_AGGREGATE = 7.0
 # Couplings below this fraction of the geometric mean of the diagonals do not join vertices. Such couplings are across
 # slivers, and to vertices of high valence, whose aggregates would otherwise absorb all their neighbours.
 MIN_COUPLING = 0.02
@@ -62,7 +62,7 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
     while level.shape[0] > 1.2 * size:
         level = _without_rounding(level, level.diagonal())
         ratio = level.shape[0] / size
-        steps = max(1, round(np.log(ratio) / np.log(LARGEST_AGGREGATE)))
+        steps = max(1, round(np.log(ratio) / np.log(MAX_AGGREGATE)))
         most = size if steps == 1 else None
         for min_coupling in (MIN_COUPLING, 0.0):  # 0 if all couplings are weak, as on slivers
             part = _smoothed_aggregates(level, order, ratio ** (1 / steps), most, min_coupling)

@@ -12,7 +12,7 @@ from ...base.jit import compiled
 from ..solution import TIE_TOLERANCE
 
 # Value added to the diagonal, relative to its largest entry, as cones at neighbouring vertices are nearly dependent.
-SMALLEST_PIVOT = 1e-13
+MIN_PIVOT = 1e-13
 # Violation of the sign of a multiplier, relative to the largest gradient, above which its bound is released.
 RELEASE_TOLERANCE = 1e-11
 # Number of steps after which the method that changes all bounds at once is stopped, as it may cycle. Changing them one
@@ -58,7 +58,7 @@ def inverse_with_sum(gram: FloatArray, has_sum: bool) -> FloatArray:
     unit = float(diagonal.max(initial=0.0)) or 1.0
     system = np.zeros((size + has_sum, size + has_sum))
     system[:size, :size] = gram
-    system.flat[: size * len(system) : len(system) + 1] += SMALLEST_PIVOT * unit
+    system.flat[: size * len(system) : len(system) + 1] += MIN_PIVOT * unit
     if not has_sum:
         return np.asarray(np.linalg.inv(system), dtype=np.float64)
     system[size, :size] = system[:size, size] = unit
@@ -158,7 +158,7 @@ def best_free(
             value = gram[free[i], free[j]]
             for m in range(j):
                 value -= lower[i, m] * lower[j, m]
-            lower[i, j] = math.sqrt(max(value, SMALLEST_PIVOT * largest)) if i == j else value / lower[j, j]
+            lower[i, j] = math.sqrt(max(value, MIN_PIVOT * largest)) if i == j else value / lower[j, j]
         for j in range(i):
             best[i] -= lower[i, j] * best[j]
             ones[i] -= lower[i, j] * ones[j]

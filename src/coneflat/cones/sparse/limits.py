@@ -49,7 +49,7 @@ class Limits:
             CurvatureError: cones of these angles cannot have the sum of curvatures of the surface.
         """
         if not 0 < min_cone_angle < math.inf:
-            raise OptionError(f"the smallest cone angle must be positive, not {min_cone_angle:g} radians")
+            raise OptionError(f"the smallest cone angle must be positive, got {min_cone_angle:g} radians")
         if max_cone_angle is not None and not max_cone_angle > min_cone_angle:
             raise OptionError(
                 f"the largest cone angle ({max_cone_angle:g} radians) must exceed the smallest ({min_cone_angle:g})"
@@ -115,7 +115,7 @@ class Limits:
     def check_count(self, count: int, required: int) -> None:
         """Raise an error if `count` cones, of which `required` are given, cannot carry the curvature."""
         if isinstance(count, bool) or count != int(count) or count < 0:
-            raise OptionError(f"the number of cones must be an integer and not negative, not {count!r}")
+            raise OptionError(f"the number of cones must be an integer and not negative, got {count!r}")
         if count < required:
             raise CurvatureError(f"{plural(required, 'cone')} required, but only {count} allowed")
         if count < self.fewest:

@@ -149,7 +149,11 @@ class ConeSearch:
         )
 
     def unknowns_of(self, vertices: IntArray) -> IntArray:
-        """Return the unknowns of inner vertices; -1 for boundary vertices."""
+        """Return the unknowns of inner vertices; -1 for boundary vertices.
+
+        Args:
+            vertices: (s,) vertex indices.
+        """
         unknown = np.full(len(self.curvature), -1, dtype=np.int64)
         unknown[self.operator.vertices] = np.arange(len(self.operator.vertices))
         return unknown[vertices]
@@ -199,7 +203,7 @@ class ConeSearch:
             CurvatureError: `most` cones cannot carry the curvature.
         """
         if not 0 < distortion < math.inf:
-            raise OptionError(f"the distortion allowed must be a positive number, not {distortion:g}")
+            raise OptionError(f"the distortion allowed must be a positive number, got {distortion:g}")
         if most is not None:
             self.limits.check_count(most, len(self._required))
         most = self.most_cones if most is None else min(most, self.most_cones)
@@ -211,6 +215,9 @@ class ConeSearch:
 
     def best_of(self, count: int) -> SparseCones:
         """Return the cones of smallest E that were found, at most `count` of them.
+
+        Args:
+            count: largest number of cones.
 
         Raises:
             OptionError: `count` is not valid.
@@ -225,7 +232,11 @@ class ConeSearch:
         return self._cones(self.exact.best.fewest(-1.0, count))
 
     def curve(self, most: int) -> list[SparseCones]:
-        """Return the best cones found for each number up to `most`, if their E is below that of fewer cones."""
+        """Return the best cones found for each number up to `most`, if their E is below that of fewer cones.
+
+        Args:
+            most: largest number of cones.
+        """
         most = min(most, self.most_cones)
         self.coarse.climb(0.0, most)
         self.coarse.descend(1, most)

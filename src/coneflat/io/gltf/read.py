@@ -263,7 +263,7 @@ def triangle_corners(data: GltfData, primitive: Item, count: int) -> IntArray:
         return np.empty(0, np.int64)
     order = np.arange(count) if primitive.get("indices") is None else data.indices(primitive["indices"])
     if len(order) and order.max() >= count:
-        data.fail(f"a face names vertex {order.max()}, but its primitive has {count} vertices, from 0")
+        data.fail(f"a face refers to vertex {order.max()}, but its primitive has {count} vertices, from 0")
     if mode == Mode.TRIANGLES:
         return order[: len(order) // 3 * 3]
     i = np.arange(max(len(order) - 2, 0))

@@ -247,7 +247,7 @@ def scene_losses(result: Flattening) -> tuple[str, ...]:
     copies = len(shown) - len({mesh for mesh, _ in shown})
     if copies:
         notes.append(
-            f"Meshes that several nodes show were copied, with separate UVs for each node: {copies:,} more of them."
+            f"Meshes of several nodes were copied, to have UVs for each node: {plural(copies, 'copy', 'copies')}."
         )
     materials = tree.get("materials", [])
     painted = {
@@ -259,7 +259,7 @@ def scene_losses(result: Flattening) -> tuple[str, ...]:
     }
     if painted:
         notes.append(
-            f"Textures are kept, but were made for the old UVs: those of {plural(len(painted), 'material')}."
+            f"The textures of {plural(len(painted), 'material')} are kept, but were made for the old UVs."
         )
     return tuple(notes)
 

@@ -68,9 +68,9 @@ class StretchEnergy:
 
     def __post_init__(self) -> None:
         if not (isinstance(self.stretch, Real) and np.isfinite(self.stretch) and self.stretch >= 0):
-            raise OptionError(f"stretch must be a number from 0, got {self.stretch!r}")
+            raise OptionError(f"stretch must be a number, 0 or more, got {self.stretch!r}")
         if not (isinstance(self.sharpness, Real) and np.isfinite(self.sharpness) and self.sharpness >= 1):
-            raise OptionError(f"sharpness must be a number from 1, got {self.sharpness!r}")
+            raise OptionError(f"sharpness must be a number, 1 or more, got {self.sharpness!r}")
 
     @property
     def least(self) -> float:

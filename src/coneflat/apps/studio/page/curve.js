@@ -7,7 +7,7 @@ class ConeCurve {
     this.studio = studio;
     this.part = (id) => document.getElementById(id);
     this.found = null; // {counts, distortions, knee, parts, key}
-    this.asking = false;
+    this.waiting = false;
     this.part("curve-ask").addEventListener("click", () => this.ask());
     this.part("curve").addEventListener("click", (event) => this.pick(event));
     new ResizeObserver(() => this.draw()).observe(this.part("curve"));
@@ -22,16 +22,16 @@ class ConeCurve {
 
   async ask() {
     const {studio} = this, key = this.key();
-    if (this.asking || !studio.viewer) return;
+    if (this.waiting || !studio.viewer) return;
     studio.refused = null;
-    this.asking = true;
+    this.waiting = true;
     studio.panel.show();
     try {
       this.found = {...(await studio.server.curve()), key};
     } catch (error) {
       studio.refuse(error);
     }
-    this.asking = false;
+    this.waiting = false;
     studio.panel.show();
   }
 
@@ -39,8 +39,8 @@ class ConeCurve {
     const isKnown = this.found?.key === this.key() && this.found.counts.length > 1;
     this.part("curve").hidden = !isKnown;
     this.part("curve-ask").hidden = isKnown;
-    this.part("curve-ask").disabled = this.asking || !this.studio.viewer;
-    this.part("curve-ask").textContent = this.asking ? "Comparing numbers of cones…" : "Compare numbers of cones";
+    this.part("curve-ask").disabled = this.waiting || !this.studio.viewer;
+    this.part("curve-ask").textContent = this.waiting ? "Comparing numbers of cones…" : "Compare numbers of cones";
     this.part("curve-of").hidden = !isKnown;
     if (!isKnown) return;
     const {parts} = this.found;

@@ -9,7 +9,7 @@ const BRUSHES = [
 ];
 const RADII = {least: 4, most: 150}; // pixels
 const SAMPLES_A_RADIUS = 2; // Samples of a stroke per radius of the brush.
-const MOST_WEIGHT = 1000; // Importance at which the colour is saturated.
+const MAX_SHADED_WEIGHT = 1000; // Importance at which the colour is saturated.
 
 /** Return numbers as a text of ranges: "3-17 20". */
 function regionText(numbers) {
@@ -100,7 +100,7 @@ class Paint {
 
 /** Return the tone of an importance, a byte; it is above half, so that the region is visible. */
 function toneOf(weight) {
-  return weight === 1 ? 0 : Math.round(255 * (0.6 + 0.4 * Math.min(Math.max(Math.log(weight) / Math.log(MOST_WEIGHT), 0), 1)));
+  return weight === 1 ? 0 : Math.round(255 * (0.6 + 0.4 * Math.min(Math.max(Math.log(weight) / Math.log(MAX_SHADED_WEIGHT), 0), 1)));
 }
 
 class Brush {

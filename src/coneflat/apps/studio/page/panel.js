@@ -1,7 +1,7 @@
 // The panel next to the panes, which shows and changes the choices.
 
 const WIDEST = 720; // degrees, as in `choices.py`
-const LEAST_STEP = 5; // Step in degrees by which keys change an angle without snapping.
+const DEFAULT_STEP = 5; // Step in degrees by which keys change an angle without snapping.
 
 class Panel {
   constructor(studio) {
@@ -99,7 +99,7 @@ class Panel {
   }
 
   step() {
-    return this.snap || LEAST_STEP;
+    return this.snap || DEFAULT_STEP;
   }
 
   // Display.

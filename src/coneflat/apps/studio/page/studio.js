@@ -134,7 +134,7 @@ class Studio {
     this.turns = nearestTurns(before.model, before.turns, model);
     camera.turn = camera.home = quarterTurns(this.turns);
     keepChartNumbers(before.model, model);
-    document.querySelector("#layout h2").textContent = this.turns ? `Layout, turned by ${90 * this.turns}°` : "Layout";
+    document.querySelector("#layout h2").textContent = this.turns ? `Layout, rotated by ${90 * this.turns}°` : "Layout";
   }
 
   /** Record the time until the layout, or its preview, was drawn. */

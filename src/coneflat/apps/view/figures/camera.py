@@ -103,7 +103,7 @@ def eye_direction(eye: Eye, up: str = "y") -> FloatArray:
     if not isinstance(eye, str):
         direction = np.asarray(eye, dtype=np.float64)
         if direction.shape != (3,) or not np.isfinite(direction).all() or not direction.any():
-            raise OptionError(f"the direction to the eye must be three numbers, not all 0, not {eye!r}")
+            raise OptionError(f"the direction to the eye must be three numbers, not all 0, got {eye!r}")
         return direction
     right = np.roll(upward, -1 if up == "y" else 1)
     front = np.cross(right, upward)
@@ -122,5 +122,5 @@ def eye_direction(eye: Eye, up: str = "y") -> FloatArray:
 
 def _upward(up: str) -> FloatArray:
     if not isinstance(up, str) or up not in ("x", "y", "z"):  # Arrays cannot be compared with strings.
-        raise OptionError(f'the upward axis must be "x", "y" or "z", not {short_repr(up)}')
+        raise OptionError(f'the upward axis must be "x", "y" or "z", got {short_repr(up)}')
     return np.eye(3)["xyz".index(up)]

@@ -282,6 +282,10 @@ def check_figure(path: str | PathLike[str]) -> Path:
 def save_figure(figure: Figure, path: str | PathLike[str]) -> Path:
     """Write a figure as PNG, SVG or PDF, by the extension of the path; no incomplete file is left.
 
+    Args:
+        figure: figure of `make_figure`.
+        path: file that ends in .png, .svg or .pdf.
+
     Raises:
         UnknownFormatError: the extension is none of these.
         MeshFileError: the file cannot be written.

@@ -132,4 +132,4 @@ def pixels_of(axes: Axes, dpi: float) -> tuple[int, int]:
 def check_dpi(dpi: float) -> None:
     """Raise OptionError if the resolution is not between 10 and 2400 dots per inch."""
     if not 10 <= dpi <= 2400:
-        raise OptionError(f"the resolution must be between 10 and 2400 dots per inch, not {dpi:g}")
+        raise OptionError(f"the resolution must be between 10 and 2400 dots per inch, got {dpi:g}")

@@ -127,7 +127,7 @@ def make_figure(shown: Flattening | ConeCurve | Quads, kind: str, **look: Any) -
     for name, fits, function in (("curve", is_curve, "cone_curve"), ("quads", is_quads, "quads")):
         if fits != (kind == name):
             raise OptionError(
-                f"results of `coneflat.{function}` are shown by figures of the kind {name!r} and no others"
+                f"results of `coneflat.{function}` are shown by figures of the kind {name!r} only"
             )
     if kind not in ("curve", "quads") and not hasattr(shown, "uv_faces"):
         raise OptionError(f"expected a result of `coneflat.flatten`, got {short_repr(shown)}")

@@ -1,11 +1,11 @@
 // An orthographic camera; its rotation has rows to the right, up, and towards the eye.
 
 const MARGIN = 0.94; // Fraction of the pane that the model fills after fitting.
-const MOST_ZOOM = 5000;
-const LEAST_ZOOM = 0.05;
+const MAX_ZOOM = 5000;
+const MIN_ZOOM = 0.05;
 
 /** Return the matrix product turn * point. */
-function turned(turn, p) {
+function rotated(turn, p) {
   return [0, 3, 6].map((row) => turn[row] * p[0] + turn[row + 1] * p[1] + turn[row + 2] * p[2]);
 }
 
@@ -110,7 +110,7 @@ class Camera {
 
   /** Return the pixel (from the upper left corner of the pane) and the nearness of a point. */
   project(p) {
-    const [x, y, z] = turned(this.turn, p);
+    const [x, y, z] = rotated(this.turn, p);
     return [this.width / 2 + (x - this.pan[0]) * this.scale, this.height / 2 - (y - this.pan[1]) * this.scale, z];
   }
 
@@ -131,7 +131,7 @@ class Camera {
 
   /** Zoom about a pixel, which remains fixed. */
   zoomAt(factor, x, y) {
-    const zoom = Math.min(Math.max(this.zoom * factor, LEAST_ZOOM), MOST_ZOOM);
+    const zoom = Math.min(Math.max(this.zoom * factor, MIN_ZOOM), MAX_ZOOM);
     const gain = 1 / this.scale - this.zoom / (this.scale * zoom);
     this.pan = [this.pan[0] + (x - this.width / 2) * gain, this.pan[1] - (y - this.height / 2) * gain];
     this.zoom = zoom;

@@ -213,7 +213,7 @@ def content_of(
         OptionError: `most` is not positive.
     """
     if most < 1:
-        raise OptionError(f"expected a limit of at least one triangle, got {most}")
+        raise OptionError(f"most_triangles must be 1 or more, got {most}")
     if not len(result.faces) or not len(result.uv) or np.shape(result.uv_faces) != np.shape(result.faces):
         raise ArrayShapeError(
             f"the result cannot be shown: it has {len(result.faces):,} triangles, {len(result.uv):,} UV points and "

@@ -1,6 +1,6 @@
 // Buttons, keys, the scale and the report, which show and change the state.
 
-const LEAST_SQUARES = 3, MOST_SQUARES = 9; // Logarithm to base 2 of the number of squares along the square root of the area.
+const MIN_LOG2_SQUARES = 3, MAX_LOG2_SQUARES = 9; // Logarithm to base 2 of the number of squares along the square root of the area.
 
 class Controls {
   /** viewer: {state, model, find(thing), takePicture(blob), panes, used}. */
@@ -115,7 +115,7 @@ class Controls {
     const arrows = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]};
     const zoom = (factor) => camera.zoomAt(factor, camera.width / 2, camera.height / 2);
     const squares = (step) => {
-      const exponent = Math.min(Math.max(Math.log2(state.get("squares")) + step, LEAST_SQUARES), MOST_SQUARES);
+      const exponent = Math.min(Math.max(Math.log2(state.get("squares")) + step, MIN_LOG2_SQUARES), MAX_LOG2_SQUARES);
       state.set({squares: 2 ** exponent});
     };
     const keys = {

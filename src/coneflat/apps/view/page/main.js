@@ -222,7 +222,7 @@ class Viewer {
     const within = middles.some((middle) => pane.sees(pane.camera.project(middle)));
     if (within && this.marks.isSeen(pane, thing, this.state)) return;
     const turn = pane.inPlane ? pane.camera.turn : this.turnTowards(thing, pane.camera.turn);
-    const place = turned(turn, middles[0]), {pan, scale} = pane.camera;
+    const place = rotated(turn, middles[0]), {pan, scale} = pane.camera;
     const off = [0, 1].map((k) => Math.abs(place[k] - pan[k]) * scale);
     const near = off[0] < 0.4 * pane.width && off[1] < 0.4 * pane.height;
     glide(pane.camera, turn, near ? pan : place.slice(0, 2));
@@ -237,7 +237,7 @@ class Viewer {
     const length = Math.hypot(...normal) || 1, facing = normal.map((value) => value / length);
     const middle = middleOf(this.model.shapeOf(thing, false)[0]);
     const free = tilted(facing).find((from) => !this.model.isHidden(middle, from, IN_FRONT)) ?? facing;
-    const [x, y, z] = turned(turn, free);
+    const [x, y, z] = rotated(turn, free);
     const side = Math.hypot(x, y);
     const axis = side > 1e-9 ? [y / side, -x / side, 0] : [0, 1, 0];
     return straightened(product(rotation(axis, Math.atan2(side, z)), turn));

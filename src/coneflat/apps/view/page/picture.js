@@ -1,6 +1,6 @@
 // Images for the model: one given by the user, or a board of numbered squares.
 
-const LARGEST = 4096; // Pixels along a side that every graphics card supports.
+const MAX_PIXELS = 4096; // Pixels along a side that every graphics card supports.
 const BOARD_SIZE = 1024, BOARD_SQUARES = 8;
 
 /** Return a canvas of squares A1 to H8, A1 at the lower left, where u and v are 0; each row has its own hue. */
@@ -32,7 +32,7 @@ async function pictureOf(blob) {
   } catch {
     throw new Error("this browser cannot show the picture");
   }
-  const share = Math.min(1, LARGEST / Math.max(picture.width, picture.height));
+  const share = Math.min(1, MAX_PIXELS / Math.max(picture.width, picture.height));
   if (share === 1) return picture;
   const size = {resizeWidth: Math.floor(picture.width * share), resizeHeight: Math.floor(picture.height * share)};
   return createImageBitmap(picture, {...size, resizeQuality: "high"});

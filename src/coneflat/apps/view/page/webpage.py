@@ -18,7 +18,7 @@ import numpy as np
 from ....base import short_repr
 from ....errors import OptionError
 from ....io import atomic_write, checked_target, read_picture
-from ....options import MOST_TRIANGLES, SHOWS
+from ....options import MAX_SHOWN_TRIANGLES, SHOWS
 from ..quantity import Quantity, own_quantity
 from .content import content_of
 from .payload import PageText, as_payload, head_and_block
@@ -42,7 +42,7 @@ def page_html(
     texture: str | PathLike[str] | None = None,
     up: str = "y",
     show: str | None = None,
-    most_triangles: int = MOST_TRIANGLES,
+    most_triangles: int = MAX_SHOWN_TRIANGLES,
     text: PageText | None = None,
     color: Quantity | str | None = None,
 ) -> str:
@@ -72,7 +72,7 @@ def page_html(
         raise OptionError(f"unknown show {short_repr(show)}: choose from {', '.join(SHOWS)}")
     picture = None if texture is None else read_picture(texture)
     if isinstance(most_triangles, bool) or not isinstance(most_triangles, (int, np.integer)):
-        raise OptionError(f"most_triangles must be an integer, not {short_repr(most_triangles)}")
+        raise OptionError(f"most_triangles must be an integer, got {short_repr(most_triangles)}")
     own = color if color is None or isinstance(color, Quantity) else own_quantity(result, color)
     content = content_of(result, most_triangles, own=own)
     if name is None:
