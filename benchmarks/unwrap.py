@@ -1,0 +1,231 @@
+"""Textures compared with other packages: `python benchmarks/unwrap.py` prints two Markdown tables.
+
+Models: those of `../shared/meshes`, decimated to 1,000, 5,000 and 20,000 triangles, and generated ones: a noisy surface
+with 50 handles, 3,000 components, extruded letters, and an assembly of 30 parts. Packages: `coneflat.unwrap` with its
+defaults, xatlas with 2 texels of padding at 1,024 texels, and uvunwrap with its defaults. All results are measured by
+`coneflat.measure` on the UVs that the packages return. Needs the extra `bench`.
+
+Options: --only NAME,... (models), --largest 120000 (triangles), --sizes 1000,5000,20000, --save FOLDER (the results).
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from common import MODELS, shapes
+
+from coneflat import check_mesh, measure, read_mesh, unwrap
+from coneflat.errors import ConeflatError
+from coneflat.geometry import double_areas, edge_lengths
+from coneflat.mesh.connectivity import TriangleMesh
+
+RESOLUTION, PADDING = 1024, 2
+COLUMNS = ("energy", "area_std", "flipped", "overlapping_pairs", "charts", "seam_length")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--only", default="")
+    parser.add_argument("--largest", type=int, default=120_000)
+    parser.add_argument("--sizes", default="1000,5000,20000")
+    parser.add_argument("--save", type=Path)
+    arguments = parser.parse_args()
+    only, sizes = set(filter(None, arguments.only.split(","))), [int(n) for n in arguments.sizes.split(",")]
+    print(
+        "| model | triangles | package | energy | area std | flipped | overlaps | charts | seams | covered | s |"
+    )
+    print("| --- " * 11 + "|")
+    unwrap(*shapes.sphere(2))
+    rows: dict[str, list[tuple[float, ...]]] = {name: [] for name in PACKAGES}
+    for name, mesh in models(sizes, arguments.largest):
+        if only and name not in only:
+            continue
+        for package, run in PACKAGES.items():
+            start = time.perf_counter()
+            corner_uv = run(mesh)
+            seconds = time.perf_counter() - start
+            found = measure(mesh, corner_uv)
+            values = *(float(getattr(found, key)) for key in COLUMNS), covered(corner_uv), seconds
+            rows[package].append(values)
+            energy, std, flipped, overlaps, charts, seams, share, _ = values
+            print(
+                f"| {name} | {len(mesh.faces):,} | {package} | {energy:.3f} | {std:.3f} | {flipped:.0f} | {overlaps:.0f} "
+                f"| {charts:.0f} | {seams:.2f} | {share:.3f} | {seconds:.2f} |",
+                flush=True,
+            )
+            if arguments.save and package == "coneflat":
+                arguments.save.mkdir(parents=True, exist_ok=True)
+                np.savez_compressed(
+                    arguments.save / f"{name}.npz",
+                    vertices=mesh.vertices,
+                    faces=mesh.faces,
+                    corner_uv=corner_uv,
+                )
+    summarize(rows)
+
+
+def summarize(rows: dict[str, list[tuple[float, ...]]]) -> None:
+    """Print a row for each package: worst energy, medians, and totals."""
+    print(
+        "\n| package | models | energy, worst | area std, worst | flipped | overlaps | charts | seams | covered | s |"
+    )
+    print("| --- " * 10 + "|")
+    ours = np.array(rows["coneflat"])
+    for package, values in rows.items():
+        if not values:
+            continue
+        energy, std, flipped, overlaps, charts, seams, share, seconds = np.array(values).T
+        print(
+            f"| {package} | {len(values)} | {np.nanmax(energy):.3f} | {np.nanmax(std):.3f} | {flipped.sum():.0f} | "
+            f"{(overlaps > 0).sum()} | {charts.sum():.0f} | {seams.sum():.1f} | {np.median(share):.3f} | "
+            f"{seconds.sum():.1f} |"
+        )
+        if package != "coneflat":
+            print(
+                f"| | | | | | | {charts.sum() / ours[:, 4].sum():.1f} times | {seams.sum() / ours[:, 5].sum():.2f} times "
+                f"| less on {(share < ours[:, 6]).sum()} | slower on {(seconds > ours[:, 7]).sum()} |"
+            )
+
+
+def models(sizes: list[int], largest: int) -> Iterator[tuple[str, TriangleMesh]]:
+    """Yield the names and meshes of all models."""
+    for path in sorted(MODELS.glob("*.*")):
+        if path.suffix == ".md":
+            continue
+        source = read_mesh(path)
+        try:
+            mesh = check_mesh(source.vertices, source.triangles, repair=True).mesh
+        except ConeflatError:
+            continue
+        if len(mesh.faces) <= largest:
+            yield path.stem, mesh
+        for size in sizes:
+            if size < len(mesh.faces):
+                yield f"{path.stem}-{size}", decimated(mesh, size)
+    yield "handles", check_mesh(*noisy_handles(), repair=True).mesh
+    yield "crumbs", check_mesh(*crumbs()).mesh
+    yield "letters", check_mesh(*letters(), repair=True).mesh
+    yield "assembly", check_mesh(*assembly()).mesh
+
+
+def decimated(mesh: TriangleMesh, count: int) -> TriangleMesh:
+    """Return a mesh with about so many triangles."""
+    import fast_simplification
+
+    vertices, faces = fast_simplification.simplify(
+        mesh.vertices.astype(np.float32), mesh.faces, 1 - count / len(mesh.faces)
+    )
+    return check_mesh(vertices.astype(np.float64), faces, repair=True).mesh
+
+
+def noisy_handles() -> tuple[np.ndarray, np.ndarray]:
+    """Return a surface by marching cubes of a block with about 50 tunnels and noise."""
+    from skimage.measure import marching_cubes
+
+    random = np.random.default_rng(1)
+    x, y, z = np.mgrid[-1.2:1.2:64j, -1.2:1.2:64j, -0.5:0.5:27j]
+    value = np.maximum.reduce([np.abs(x) - 1, np.abs(y) - 1, np.abs(z) - 0.35])
+    for a, b in np.stack(np.meshgrid(np.linspace(-0.85, 0.85, 7), np.linspace(-0.85, 0.85, 7)), -1).reshape(
+        -1, 2
+    ):
+        value = np.maximum(value, 0.075 - np.hypot(x - a, y - b))
+    value += 0.004 * random.standard_normal(value.shape)
+    vertices, faces, _, _ = marching_cubes(value, 0.0)
+    return vertices, faces
+
+
+def crumbs() -> tuple[np.ndarray, np.ndarray]:
+    """Return 3,000 small components."""
+    random = np.random.default_rng(2)
+    kinds = [shapes.sphere(1), shapes.box(), shapes.sphere(0)]
+    parts = []
+    for i in range(3000):
+        vertices, faces = kinds[i % 3]
+        parts.append((np.asarray(vertices) * random.uniform(0.2, 1, 3) + random.uniform(-40, 40, 3), faces))
+    return shapes.join(*parts)
+
+
+def letters() -> tuple[np.ndarray, np.ndarray]:
+    """Return extruded letters."""
+    from mapbox_earcut import triangulate_float64
+    from matplotlib.path import Path as Outline
+    from matplotlib.textpath import TextPath
+
+    vertices, faces = np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)
+    for i, letter in enumerate("GEOMETRY"):
+        rings = [ring[:-1] for ring in TextPath((10 * i, 0), letter, size=12).to_polygons()]
+        rings.sort(key=lambda ring: -np.ptp(ring, axis=0).prod())
+        outer = Outline(rings[0])
+        rings = [rings[0], *(ring for ring in rings[1:] if outer.contains_point(ring[0]))]
+        flat, ends = np.concatenate(rings), np.cumsum([len(ring) for ring in rings])
+        top = triangulate_float64(flat, ends.astype(np.uint32)).reshape(-1, 3).astype(np.int64)
+        count = len(flat)
+        # Sides of the outline, oriented as in the top.
+        sides = np.concatenate([top[:, [0, 1]], top[:, [1, 2]], top[:, [2, 0]]])
+        known = set(map(tuple, sides.tolist()))
+        border = np.array([side for side in known if side[::-1] not in known])
+        walls = np.concatenate(
+            [np.column_stack([border[:, ::-1], border[:, 0] + count]),
+             np.column_stack([border[:, 0] + count, border[:, 1] + count, border[:, 1]])]
+        )  # fmt: skip
+        part = np.concatenate([top, top[:, ::-1] + count, walls]) + len(vertices)
+        vertices = np.concatenate(
+            [vertices, np.pad(flat, ((0, 0), (0, 1)), constant_values=2.0), np.pad(flat, ((0, 0), (0, 1)))]
+        )
+        faces = np.concatenate([faces, part])
+    return vertices, faces
+
+
+def assembly() -> tuple[np.ndarray, np.ndarray]:
+    """Return an assembly of 30 boxes, tubes and rings."""
+    random = np.random.default_rng(3)
+    kinds = [shapes.subdivide(*shapes.subdivide(*shapes.box())), shapes.torus(36, 18), shapes.sphere(3)]
+    parts = []
+    for i in range(30):
+        vertices, faces = kinds[i % 3]
+        parts.append((np.asarray(vertices) * random.uniform(0.3, 2, 3) + random.uniform(-9, 9, 3), faces))
+    return shapes.join(*parts)
+
+
+def covered(corner_uv: np.ndarray) -> float:
+    """Return the fraction of the unit square inside triangles."""
+    one, two = corner_uv[:, 1] - corner_uv[:, 0], corner_uv[:, 2] - corner_uv[:, 0]
+    return float(np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]).sum() / 2)
+
+
+def by_coneflat(mesh: TriangleMesh) -> np.ndarray:
+    return unwrap(mesh.vertices, mesh.faces, resolution=RESOLUTION, padding=PADDING).corner_uv
+
+
+def by_xatlas(mesh: TriangleMesh) -> np.ndarray:
+    import xatlas
+
+    atlas, pack = xatlas.Atlas(), xatlas.PackOptions()
+    pack.padding, pack.resolution = PADDING, RESOLUTION
+    # xatlas depends on the unit of length.
+    area = double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum() / 2
+    atlas.add_mesh((mesh.vertices * (100 / np.sqrt(area))).astype(np.float32), mesh.faces.astype(np.uint32))
+    atlas.generate(xatlas.ChartOptions(), pack)
+    _, indices, uvs = atlas[0]
+    return uvs[indices].astype(np.float64) * [atlas.width, atlas.height] / max(atlas.width, atlas.height)
+
+
+def by_uvunwrap(mesh: TriangleMesh) -> np.ndarray:
+    import uvunwrap
+
+    given = uvunwrap.Mesh(mesh.vertices.ravel().tolist(), mesh.faces.ravel().tolist())
+    return np.array(uvunwrap.generate([given]).meshes[0].corner_uvs, dtype=np.float64).reshape(-1, 3, 2)
+
+
+PACKAGES: dict[str, Callable[[TriangleMesh], np.ndarray]] = {
+    "coneflat": by_coneflat,
+    "xatlas": by_xatlas,
+    "uvunwrap": by_uvunwrap,
+}
+
+if __name__ == "__main__":
+    main()
