@@ -16,14 +16,14 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from patterns import compare_with_patterns
+
 from coneflat import PAPER, ConeflatError, read_mesh
 from coneflat.apps.peers import pictures
 from coneflat.apps.peers.run import (
     Comparison,
     as_cell,
     as_csv,
-    compare_methods,
-    known_methods,
     markdown,
     notes,
 )
@@ -260,7 +260,7 @@ def reproduce(
         MeshError: none of the meshes can be flattened.
     """
     files = sorted({Path(file) for path in paths for file in find_meshes(str(path))}, key=_sort_key)
-    methods = known_methods(methods if "linear" in methods else ("linear", *methods))
+    methods = tuple(dict.fromkeys(methods if "linear" in methods else ("linear", *methods)))
     models, failed = [], []
     for number, file in enumerate(files):
 
@@ -270,7 +270,7 @@ def reproduce(
 
         tell("read", 0.0)
         try:
-            compared = compare_methods(read_mesh(file), methods=methods, peers=(), progress=tell, **PAPER)
+            compared = compare_with_patterns(read_mesh(file), methods=methods, progress=tell, **PAPER)
         except ConeflatError as error:
             failed.append((file.name, " ".join(str(error).split())))
             continue

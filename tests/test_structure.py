@@ -35,7 +35,7 @@ CEILINGS = {
     "apps.batch": 398,
     "apps.cli": 1529,
     "apps.measure_uv": 161,
-    "apps.peers": 958,
+    "apps.peers": 703,
     "apps.quads": 3251,
     "apps.studio": 1751,
     "apps.unwrap": 384,

@@ -14,11 +14,13 @@ from markers import ROOT
 
 import coneflat
 from coneflat.apps.cli.values import parse_angle
-from coneflat.apps.peers import Comparison, compare_methods, flatten_by
+from coneflat.apps.peers import Comparison, flatten_by
 from coneflat.options import Options, declarations
 
 sys.path.insert(0, str(ROOT / "tests"))
+sys.path.insert(0, str(ROOT / "benchmarks"))
 import shapes
+from patterns import compare_with_patterns
 
 Report = dict[str, Any]
 
@@ -80,7 +82,7 @@ class Measured:
         key = (model, methods, str(options))
         if key not in self._comparisons:
             print(f"  {model} by {len(methods)} methods", flush=True)
-            self._comparisons[key] = compare_methods(self.path(model), methods=methods, peers=(), **options)
+            self._comparisons[key] = compare_with_patterns(self.path(model), methods=methods, **options)
         return self._comparisons[key]
 
 

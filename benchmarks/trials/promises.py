@@ -15,7 +15,7 @@ from .topology import Topology
 TURN = 2 * np.pi
 #: Radians that angles may be off, and, relatively, the sides of a seam; beside what rounding of the points makes.
 ANGLE, SIDES = 1e-6, 1e-8
-#: The latter for circle patterns and the flow, which end sooner, and where triangles had to be opened by a hair.
+#: The latter where triangles had to be opened by a hair.
 LOOSE_SIDES = 1e-6
 #: A round boundary is found in rounds, each of which changes curvatures by less than the one before.
 ROUND = 0.02

@@ -15,14 +15,14 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags, vstack
 
 from ... import TriangleMesh
-from ...base import FloatArray, IntArray, plural
-from ...errors import CurvatureError
+from ...base import FloatArray, IntArray, error_text, plural
+from ...errors import ConvergenceError, CurvatureError
 from ...geometry import corner_angles, halfedge_twins, handle_loops
 from ...layout import fit_shapes, shapes_of_angles
 from ...linalg import factorize
 from ...mesh import NEXT, PREVIOUS
 from ...stages import ConeSolution, Cut, Embedding, FlatMetric, SolveStatistics
-from .shared import embedding_metric, failure_notes
+from .shared import embedding_metric
 
 # Lower bound of angles, radians: those of needles can be rounded to 0, but their logs and relative squares must be
 # finite.
@@ -74,8 +74,15 @@ def angle_based(
         angles, steps, converged = solve(conditions, wanted_angles(whole, corner_angles(lengths), curvature))
         residual = conditions.residual(np.clip(angles, MIN_ANGLE, np.pi - MIN_ANGLE))
         if not converged:
-            what = "angle based flattening did not converge: the conditions on angles are"
-            notes += failure_notes(what, steps, residual, "", best_effort)
+            failure = (
+                f"angle based flattening did not converge: the conditions on angles are {error_text(residual)} "
+                f"after {plural(steps, 'step')}"
+            )
+            if not best_effort or not np.isfinite(residual):
+                raise ConvergenceError(
+                    f"{failure}; method 'exact', other cones, a repair or remeshing may help"
+                )
+            notes.append(f"{failure[0].upper()}{failure[1:]}.")
         shapes = shapes_of_angles(angles.reshape(-1, 3))
         broken = int(shapes.is_broken.sum())
         if broken:

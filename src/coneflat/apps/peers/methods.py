@@ -18,23 +18,18 @@ from ...source import Source
 from ...stages import ConeSolution, FlatMetric, MetricSpec, Surface
 from .angle_based import angle_based, linear_angles, nearest_angles
 from .bff import boundary_first
-from .circle_patterns import circle_patterns
 from .disk_maps import least_squares_map
 
 #: The compared methods; each takes a connected mesh, its (m, 3) side lengths, and cones with their curvatures.
 PEERS: Mapping[str, Callable[..., FlatMetric]] = {
-    "circle-patterns": circle_patterns,
-    "circle-patterns/fixed": partial(circle_patterns, delaunay=False),
     "linear-abf": partial(angle_based, solve=linear_angles),
     "linear-abf/free": partial(angle_based, solve=linear_angles, is_free=True),
     "abf++": partial(angle_based, solve=nearest_angles),
     "lscm": least_squares_map,
     "bff": boundary_first,
 }
-#: Methods that may fail to converge, and accept `best_effort`.
-ITERATIVE = ("circle-patterns", "circle-patterns/fixed", "abf++")
-#: All methods of `flatten_by`. Those with a / are variants as used in 2008: circle patterns without flips, and angle
-#: based flattening that prescribes nothing at cones.
+#: All methods of `flatten_by`. That with a / is the variant as used in 2008: angle based flattening that prescribes
+#: nothing at cones.
 METHODS = ("exact", "linear", *PEERS)
 
 
@@ -57,7 +52,7 @@ def flatten_by(
     Args:
         name: one of `METHODS`.
         mesh, faces: as for `coneflat.flatten`.
-        best_effort: return a result with a note if a compared method did not converge.
+        best_effort: return a result with a note if ABF++ did not converge.
         options: those of `coneflat.flatten`, except the method. Options of the exact method alone raise an error for
             other methods.
 
@@ -74,7 +69,7 @@ def flatten_by(
     def find(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> FlatMetric:
         if name not in PEERS:
             return find_metric(surface, solution, spec)
-        given: dict[str, bool] = {"best_effort": best_effort} if name in ITERATIVE else {}
+        given = {"best_effort": best_effort} if name == "abf++" else {}
         return PEERS[name](surface.mesh, surface.lengths, solution, **given)
 
     return flatten_source(Source(as_input(mesh, faces)), read, find_metric=find)

@@ -136,7 +136,7 @@ def compare_methods(
                 continue
             _warm_up(name)
             result = base if name == method else flatten_by(name, same, same_faces, cones=cones, **shared)
-            entries.append(_entry(name, result, base))
+            entries.append(entry_of(name, result, base))
         except ConeflatError as error:
             entries.append(Entry(name, None, math.nan, " ".join(str(error).split())))
     named = mesh.path if isinstance(mesh, MeshFile) else mesh if isinstance(mesh, (str, PathLike)) else None
@@ -167,7 +167,7 @@ def _with_cones(mesh: Any, faces: ArrayLike | None, base: Flattening) -> tuple[A
     return base.vertices, base.faces
 
 
-def _entry(name: str, result: Flattening, base: Flattening) -> Entry:
+def entry_of(name: str, result: Flattening, base: Flattening) -> Entry:
     """Return the entry of a method, without the notes on the input that are already on the base result."""
     known = () if result is base else base.notes
     notes = [note.rstrip(".") for note in result.notes if note not in known]

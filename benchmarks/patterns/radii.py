@@ -8,10 +8,11 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from ...base import FloatArray, IntArray
-from ...errors import ConvergenceError
-from ...linalg import Point, factorize, minimise
-from .pattern_angles import ANGLE_LIMITS, CoherentAngles
+from coneflat.base import FloatArray, IntArray
+from coneflat.errors import ConvergenceError
+from coneflat.linalg import Point, factorize, minimise
+
+from .angles import ANGLE_LIMITS, CoherentAngles
 
 # Stopping criteria for the angles around the centre of a circle, radians; and largest change of a log radius per step.
 RADIUS_LIMITS = replace(ANGLE_LIMITS, steps=50, largest_step=5.0)
