@@ -207,7 +207,7 @@ _calls: Calls | None = None
 def _plain(options: dict[str, Any]) -> dict[str, Any]:
     """Return the options that the checks can use directly; others were consumed or have several types."""
     values = {
-        name: value.item() if isinstance(value, np.ndarray) and not value.ndim else value
+        name: value.item() if isinstance(value, (np.ndarray, np.generic)) and not value.ndim else value
         for name, value in options.items()
     }
     plain = {
