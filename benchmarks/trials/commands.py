@@ -176,7 +176,9 @@ def interrupt_command(rng: Random, outcome: Outcome) -> None:
         f"{' '.join(line[1:])}, {name} {'when it writes' if delay is None else f'after {delay:.2f} s'}"
     )
     # A worker ignores SIGINT, `nohup` SIGHUP, and so does what they start.
-    command = subprocess.Popen(line, stderr=subprocess.PIPE, text=True, preexec_fn=_handle_signals)
+    command = subprocess.Popen(
+        line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, preexec_fn=_handle_signals
+    )
     ends = time.perf_counter() + (PATIENCE if delay is None else delay)
     while time.perf_counter() < ends and command.poll() is None:
         if delay is None and len(os.listdir()) > 1:
