@@ -165,7 +165,7 @@ def test_cones_on_boundaries_and_loose_vertices_are_refused():
     vertices, faces = SHAPES["disk"]
     with pytest.raises(errors.OptionError, match="cone 0 lies on the boundary"):
         flatten(vertices, faces, cones=[0])
-    with pytest.raises(errors.OptionError, match="cone 0 cannot be used: no face"):
+    with pytest.raises(errors.OptionError, match="cone 0 is not a vertex of a face"):
         flatten(np.r_[vertices[:1], vertices], faces + 1, cones=[0])
 
 

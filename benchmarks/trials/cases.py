@@ -19,11 +19,11 @@ from typing import Any
 import numpy as np
 
 from .arguments import DOORS, Calls
-from .choices import in_short, make_options
-from .commands import make_command, run_command
+from .choices import cross_options, in_short, make_options
+from .commands import interrupt_command, make_command, run_command, run_without_streams
 from .files import make_file
-from .grids import grid_case
-from .meshes import make_mesh
+from .grids import grid_case, grid_of_mesh
+from .meshes import make_mesh, make_tiny
 from .outcome import LONGEST_MESSAGE, Outcome
 from .promises import check
 from .written import READERS, check_file, check_report
@@ -80,6 +80,21 @@ def _mesh(rng: Random, outcome: Outcome) -> None:
 
     vertices, faces, made = make_mesh(rng)
     options = make_options(rng, vertices, faces)
+    outcome.recipe = f"{made}; {in_short(options)}"
+    _flatten(rng, outcome, lambda: coneflat.flatten(vertices, faces, **options), options, (vertices, faces))
+
+
+def _tiny(rng: Random, outcome: Outcome) -> None:
+    """Flatten a mesh of few triangles with many options at once; one in four cases makes quads of it."""
+    import coneflat
+
+    vertices, faces, made = make_tiny(rng)
+    if rng.random() < 0.25:
+        options = {"sharp_angle": float(rng.choice([0.3, 0.8, 2.0]))} if rng.random() < 0.4 else {}
+        options["quads"] = int(rng.choice([1, 7, 40, 900]))
+        grid_of_mesh(rng, outcome, vertices, faces, made, size=None, **options)
+        return
+    options = cross_options(rng, vertices, faces)
     outcome.recipe = f"{made}; {in_short(options)}"
     _flatten(rng, outcome, lambda: coneflat.flatten(vertices, faces, **options), options, (vertices, faces))
 
@@ -192,7 +207,7 @@ _calls: Calls | None = None
 def _plain(options: dict[str, Any]) -> dict[str, Any]:
     """Return the options that the checks can use directly; others were consumed or have several types."""
     values = {
-        name: value.item() if isinstance(value, np.ndarray) and not value.ndim else value
+        name: value.item() if isinstance(value, (np.ndarray, np.generic)) and not value.ndim else value
         for name, value in options.items()
     }
     plain = {
@@ -209,6 +224,14 @@ def _plain(options: dict[str, Any]) -> dict[str, Any]:
 def _command(rng: Random, outcome: Outcome) -> None:
     """Run a command line with odd options."""
     _run(outcome, make_command(rng, Path()))
+
+
+def _process(rng: Random, outcome: Outcome) -> None:
+    """Run a command in its own process, with closed streams, or ended by a signal at a random time or as it writes."""
+    if rng.random() < 0.3:
+        run_without_streams(rng, outcome)
+    else:
+        interrupt_command(rng, outcome)
 
 
 def _run(outcome: Outcome, line: list[str]) -> None:
@@ -241,18 +264,20 @@ def _swell(rng: Random, outcome: Outcome) -> None:
     np.ones(200_000_000)
 
 
-#: The kinds of cases, and how many of twenty are of each. The last three put the workers to the test.
+#: The kinds of cases, and how many of forty are of each. The last three put the workers to the test.
 KINDS: dict[str, Callable[[Random, Outcome], None]] = {
     "mesh": _mesh,
     "file": _file,
     "argument": _argument,
     "command": _command,
+    "tiny": _tiny,
+    "process": _process,
     "grid": grid_case,
     "crash": _crash,
     "hang": _hang,
     "swell": _swell,
 }
-SHARES = {"mesh": 12, "file": 4, "argument": 2, "command": 2}
+SHARES = {"mesh": 20, "tiny": 8, "file": 6, "argument": 3, "command": 2, "process": 1}
 
 
 def cases(count: int, first: int, kinds: tuple[str, ...] = tuple(SHARES)) -> list[tuple[str, int]]:

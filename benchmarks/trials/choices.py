@@ -106,6 +106,15 @@ def make_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> dict[s
     return options
 
 
+def cross_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> dict[str, Any]:
+    """Return the options of several random choices at once, without those that exclude each other."""
+    options: dict[str, Any] = {}
+    for _ in range(int(rng.integers(2, 4))):
+        options |= make_options(rng, vertices, faces)
+    _drop_clashes(rng, options)
+    return options
+
+
 def _given_curvatures(
     rng: Random, inside: np.ndarray, topology: Topology, faces: np.ndarray
 ) -> dict[int, float]:

@@ -1,10 +1,14 @@
-"""Odd command lines, run in this process."""
+"""Odd command lines, run in this process; and commands in their own, without streams or ended by signals."""
 
 from __future__ import annotations
 
 import contextlib
 import io
+import os
+import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -12,6 +16,9 @@ from unittest import mock
 import click
 import numpy as np
 import shapes
+
+from .outcome import Outcome
+from .written import READERS
 
 Random = np.random.Generator
 
@@ -126,3 +133,67 @@ def run_command(line: list[str]) -> tuple[int, str, str]:
         except SystemExit as end:
             code = end.code if isinstance(end.code, int) else 1
     return code, out.getvalue(), err.getvalue()
+
+
+#: Seconds that a command in its own process may take.
+PATIENCE = 80.0
+
+
+def _make_process(rng: Random) -> tuple[list[str], Path]:
+    """Return a command line that writes a file, with its input in the folder, and the file."""
+    shapes.write_obj(Path("in.obj"), *shapes.sphere(int(rng.integers(2, 5))))
+    output = Path(f"out{rng.choice([*READERS])}")
+    line = [sys.executable, "-m", "coneflat", "flatten", "in.obj", "-o", str(output)]
+    return line + (["--report", "report.json"] if rng.random() < 0.3 else []), output
+
+
+def _handle_signals() -> None:
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
+def run_without_streams(rng: Random, outcome: Outcome) -> None:
+    """Run a command with closed standard streams, which must write its file all the same."""
+    line, output = _make_process(rng)
+    closed = str(rng.choice([">&-", "2>&-", "<&-", ">&- 2>&-", "<&- >&- 2>&-"]))
+    outcome.recipe = f"{' '.join(line[1:])} {closed}"
+    told = f'"$0" "$@" {closed}'
+    done = subprocess.run(
+        ["sh", "-c", told, *line], capture_output=True, text=True, timeout=PATIENCE, check=False
+    )
+    if done.returncode or "internal error" in done.stderr:
+        outcome.breach(f"process: exit code {done.returncode} with {closed}", done.stdout + done.stderr)
+    if not output.exists() or not len(READERS[output.suffix](output)[0]):
+        outcome.breach(f"process: no output with {closed}")
+
+
+def interrupt_command(rng: Random, outcome: Outcome) -> None:
+    """End a command by a signal, half of the cases as soon as it writes; it must leave all of its files or none."""
+    line, output = _make_process(rng)
+    name = str(rng.choice(["SIGTERM", "SIGINT", "SIGHUP"]))
+    delay = float(rng.uniform(0, 3)) if rng.random() < 0.5 else None
+    outcome.recipe = (
+        f"{' '.join(line[1:])}, {name} {'when it writes' if delay is None else f'after {delay:.2f} s'}"
+    )
+    # A worker ignores SIGINT, `nohup` SIGHUP, and so does what they start.
+    command = subprocess.Popen(
+        line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, preexec_fn=_handle_signals
+    )
+    ends = time.perf_counter() + (PATIENCE if delay is None else delay)
+    while time.perf_counter() < ends and command.poll() is None:
+        if delay is None and len(os.listdir()) > 1:
+            break
+        time.sleep(0.001)
+    number = getattr(signal, name)
+    command.send_signal(number)
+    _, said = command.communicate(timeout=PATIENCE)
+    # Before the command has set up, and after it has ended, Python itself handles the signal.
+    if command.returncode not in (0, 128 + number, -number, 1 if "KeyboardInterrupt" in said else 0):
+        outcome.breach(f"process: exit code {command.returncode} after {name}", said)
+    if "internal error" in said:
+        outcome.breach(f"process: internal error after {name}", said)
+    left = {*os.listdir()} - {"in.obj", "report.json", output.name}
+    if left:
+        outcome.breach(f"process: {name} leaves incomplete files", left)
+    if output.exists() and not len(READERS[output.suffix](output)[0]):
+        outcome.breach(f"process: {name} leaves an incomplete output", output)

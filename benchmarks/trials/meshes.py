@@ -234,6 +234,42 @@ def make_mesh(rng: Random) -> tuple[np.ndarray, np.ndarray, str]:
     return vertices, faces, f"{' + '.join(recipe)}, {len(vertices)} vertices, {len(faces)} faces"
 
 
+def pillow(rng: Random) -> Mesh:
+    """Two triangles back to back, or, one in two, two polygons of some triangles each."""
+    count = int(rng.choice([3, 3, 4, 7]))
+    angle = np.sort(rng.uniform(0, 2 * np.pi, count))
+    vertices = np.stack([np.cos(angle), np.sin(angle), np.zeros(count)], 1)
+    middle = np.arange(1, count - 1)
+    front = np.stack([np.zeros(count - 2, int), middle, middle + 1], 1)
+    return vertices, np.concatenate([front, front[:, ::-1]])
+
+
+def one_or_two(rng: Random) -> Mesh:
+    """One triangle, or two with a common edge."""
+    vertices, faces = shapes.grid(1, 1)
+    return vertices, faces[: int(rng.integers(1, 3))]
+
+
+#: Meshes of a few triangles.
+TINY = (pillow, pillow, one_or_two, fan, crate, ball, ring, tube, cone)
+#: Their most triangles.
+TINY_FACES = 24
+
+
+def make_tiny(rng: Random) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return vertices, faces and a description of a mesh of few triangles, one in three of them changed."""
+    faces = np.zeros((0, 3), dtype=np.int64)
+    while not 0 < len(faces) <= TINY_FACES:
+        maker = TINY[int(rng.integers(len(TINY)))]
+        vertices, faces = (np.array(one) for one in maker(rng))
+    vertices, faces, recipe = vertices.astype(np.float64), faces.astype(np.int64), [maker.__name__]
+    if rng.random() < 0.3:
+        change = CHANGES[int(rng.integers(len(CHANGES)))][0]
+        vertices, faces = change(vertices, faces, rng)
+        recipe.append(change.__name__)
+    return vertices, faces, f"{' + '.join(recipe)}, {len(vertices)} vertices, {len(faces)} faces"
+
+
 def hole(vertices: np.ndarray, faces: np.ndarray, rng: Random) -> Mesh:
     centre = vertices[faces[rng.integers(len(faces))]].mean(axis=0)
     away = np.linalg.norm(vertices[faces].mean(axis=1) - centre, axis=1)

@@ -276,3 +276,12 @@ class TestRegions:
         plain = flatten(vertices, faces, cones=cones)
         careful = flatten(vertices, faces, cones=cones, weights=np.where(important, 100.0, 1.0))
         assert spread(careful, important) < spread(plain, important)
+
+
+def test_all_copies_of_a_corner_that_repair_splits_are_corners():
+    one, two = shapes.grid(3, 3), shapes.grid(3, 3)
+    vertices, faces = shapes.join(one, (two[0] + np.array([1.0, 1, 0]), two[1]))
+    faces[faces == 16] = 15  # two squares with a common corner
+    result = flatten(vertices, faces, boundary=[0, 3, 12, 15, 19, 28, 31], repair=True)
+    copies = np.flatnonzero(result.vertex_origin == 15)
+    np.testing.assert_allclose(result.prescribed[copies], [np.pi / 2] * 2)

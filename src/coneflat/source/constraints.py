@@ -121,13 +121,10 @@ def locate_constraints(checked: CheckedMesh, options: Options, given: InputMesh)
 
 def _locate(checked: CheckedMesh, noun: str, given: Mapping[int, float | None]) -> VertexCurvatures:
     """Return given cones, which must be inner vertices, or given corners, which must be on the boundary."""
-    names = np.array(list(given), dtype=np.int64)
-    highest = int(checked.vertex_origin[-1])
-    for name in names[(names < 0) | (names > highest)]:
-        raise OptionError(f"{noun} {name} is not a vertex of a face: indices are from 0 to {highest}")
-    found = np.searchsorted(checked.vertex_origin, names)
-    for name in names[checked.vertex_origin[found] != names]:
-        raise OptionError(f"{noun} {name} cannot be used: no face uses this vertex")
+    names, origin = np.array(list(given), dtype=np.int64), checked.vertex_origin
+    for name in np.setdiff1d(names, origin):
+        raise OptionError(f"{noun} {name} is not a vertex of a face: indices are from 0 to {origin[-1]}")
+    found = np.searchsorted(origin, names)
     on_boundary = checked.mesh.is_boundary_vertex[found]
     if noun == "cone":
         for name in names[on_boundary]:
@@ -136,10 +133,12 @@ def _locate(checked: CheckedMesh, noun: str, given: Mapping[int, float | None]) 
                 "or prescribe the boundary's curvature (boundary)"
             )
     else:
-        for name in names[~on_boundary]:
+        # Repair may have split a corner. All of its copies on the boundary are corners.
+        found = np.flatnonzero(np.isin(origin, names) & checked.mesh.is_boundary_vertex)
+        for name in np.setdiff1d(names, origin[found]):
             raise OptionError(f"corner {name} does not lie on the boundary")
-    curvatures = np.array([np.nan if k is None else k for k in given.values()], dtype=np.float64)
-    return VertexCurvatures(found, curvatures)
+    values = (given[name] for name in origin[found].tolist())
+    return VertexCurvatures(found, np.array([np.nan if k is None else k for k in values], dtype=np.float64))
 
 
 def _weights_of_some(noun: str, weights: Mapping[Any, Any], count: int) -> FloatArray:

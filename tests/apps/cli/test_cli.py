@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -161,6 +162,23 @@ def test_interrupts_in_compiled_functions_are_interrupts(monkeypatch, capsys):
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 130
+    assert "interrupted" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has other signals")
+@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemError, ValueError])
+def test_a_signal_gives_its_exit_code_whatever_error_arrives(monkeypatch, capsys, error):
+    def interrupted(**_):
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+        raise error
+
+    before = signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    monkeypatch.setattr("coneflat.apps.cli.main.cli.main", interrupted)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    signal.signal(signal.SIGTERM, before)
+    assert ended.value.code == 128 + signal.SIGTERM
     assert "interrupted" in capsys.readouterr().err
 
 

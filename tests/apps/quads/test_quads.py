@@ -25,7 +25,7 @@ from shapes import grid as rectangle
 import coneflat
 from coneflat.apps.quads.extract import extract_quads
 from coneflat.apps.quads.nearest import surface_distances
-from coneflat.apps.quads.quad_mesh import degenerate_quads
+from coneflat.apps.quads.quad_mesh import degenerate_quads, least_jacobians
 from coneflat.apps.quads.quality import measure_quads
 from coneflat.errors import GridError
 
@@ -101,7 +101,7 @@ def test_what_is_no_grid_map_is_refused():
     grid = on_squares(*polycube(CUBE), 3)
     shifts = grid.shifts.copy()
     shifts[4] += 1
-    with pytest.raises(GridError, match=r"2 half-edges with a motion that is not the inverse"):
+    with pytest.raises(GridError, match="grid units apart|does not close"):
         extract_quads(broken(grid, shifts=shifts))
     corners = grid.corner_grid.copy()
     corners[5, 1] += 0.25
@@ -137,6 +137,46 @@ def test_quads_that_touch_in_a_point_have_a_vertex_each():
     assert (len(mesh.quads), len(mesh.vertices), mesh.left_out) == (2, 8, 2)
     assert (np.round(mesh.vertices, 9) == [1, 1, 0]).all(axis=1).sum() == 2
     assert mesh.area_left_out == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize("name", ["hill", "annulus", "rotated square"])
+def test_open_borders_are_covered_to_the_last_quad(name):
+    if name == "rotated square":  # its corners are kept, though the grid is not aligned with its sides
+        vertices, faces = shapes.grid(9, 9)
+        turn = np.exp(0.4j) * (vertices[:, 0] + 1j * vertices[:, 1])
+        grid = flat(np.column_stack([turn.real, turn.imag]) * 7, faces)
+        assert extract_quads(grid).left_out > 0
+        mesh, wanted = coneflat.quads(grid), 49.0
+        corners = np.array([0, 7, 7j, 7 + 7j]) * np.exp(0.4j)
+        off = np.abs(mesh.vertices[:, 0] + 1j * mesh.vertices[:, 1] - corners[:, None]).min(axis=1)
+        np.testing.assert_allclose(off, 0, atol=1e-9)
+    else:
+        vertices, faces = shapes.hill(12, 12) if name == "hill" else shapes.annulus(48, 8)
+        mesh = coneflat.quads(vertices, faces, quads=300, boundary="free")
+        wanted = area_of(vertices, faces)
+    assert (mesh.left_out, mesh.area_left_out) == (0, pytest.approx(0, abs=1e-9))
+    assert mesh.euler_characteristic == mesh.surface_euler
+    assert area_of(mesh.vertices, mesh.triangles) > 0.985 * wanted
+    border = mesh.surface.vertices[mesh.surface.is_boundary_vertex]
+    ends = mesh.vertices[mesh.edges[mesh.is_boundary_edge]]
+    along = (ends[:, :1] + np.linspace(0, 1, 20)[:, None] * (ends[:, 1:] - ends[:, :1])).reshape(-1, 3)
+    side = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).mean()
+    assert np.linalg.norm(border[:, None] - along, axis=2).min(axis=1).max() < 0.3 * side
+    assert (least_jacobians(mesh.vertices, mesh.quads) > 0).all()
+
+
+def area_of(vertices, faces):
+    a, b, c = vertices[faces].transpose(1, 0, 2)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+
+
+def test_edges_between_boundary_vertices_do_not_prevent_straight_sides():
+    """Triangles with two sides on the boundary degenerate where it is straight, unless the third side is split."""
+    vertices, faces = shapes.sphere(3, 0.2)
+    vertices, faces = vertices, faces[vertices[faces].mean(axis=1) @ [0.3, 0.2, 1] > -0.1]
+    mesh = coneflat.quads(vertices, faces, quads=300)
+    assert any(note.startswith("Split") and "between boundary vertices" in note for note in mesh.notes)
+    assert mesh.left_out == 0
 
 
 def test_measures_by_hand():

@@ -27,6 +27,10 @@ INTERNAL_ERROR = 1
 SIGNALLED = 128
 
 
+class Interrupted(KeyboardInterrupt):
+    """A signal; after a plain KeyboardInterrupt inside `exec`, Python ends with the code of SIGINT in any case."""
+
+
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="coneflat")
 def cli() -> None:
@@ -40,10 +44,16 @@ for command in (flatten, unwrap, batch, quads, measure, cones, figure, view, stu
 def main() -> NoReturn:
     """Run the command; every failure prints one line to stderr and gives a nonzero exit code."""
     _open_streams()
-    for name in ("SIGTERM", "SIGHUP"):
-        number = getattr(signal, name, None)  # Windows has no SIGHUP.
-        if number is not None and signal.getsignal(number) == signal.SIG_DFL:
-            signal.signal(number, _interrupt)
+    # The number of a signal does not always arrive with the error that it causes inside a compiled function.
+    received = list[int]()
+
+    def interrupt(number: int, _: FrameType | None) -> NoReturn:
+        received.append(number)
+        raise Interrupted
+
+    for number in {signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)}:  # Windows has no SIGHUP.
+        if signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, interrupt)
     # Imports allocate half a million objects and no garbage. Garbage collection after every 700 objects, the
     # default, takes a tenth of the time of a short run.
     gc.set_threshold(100_000, 50, 50)
@@ -58,8 +68,8 @@ def main() -> NoReturn:
         code = _fail(f"{error.format_message()}{_hint(error)}", USER_ERROR)
     except ConeflatError as error:
         code = _fail(str(error), USER_ERROR)
-    except (KeyboardInterrupt, click.exceptions.Abort) as error:
-        code = _fail_interrupted(error)
+    except (KeyboardInterrupt, click.exceptions.Abort):
+        code = _fail_interrupted(received)
     except BrokenPipeError:
         # The reader of the output has ended, as in `coneflat ... | head`. The shutdown must not print an error.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -72,9 +82,9 @@ def main() -> NoReturn:
     except Exception as error:
         if os.environ.get("CONEFLAT_DEBUG"):
             raise
-        # An interrupt inside a compiled function arrives as a SystemError that it caused.
-        if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
-            code = _fail_interrupted(error)
+        # An interrupt inside a compiled function arrives as another error, which it may or may not have as its cause.
+        if received or isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+            code = _fail_interrupted(received)
         else:
             code = _fail(
                 f"internal error, please report it: {type(error).__name__}: {error} "
@@ -104,14 +114,8 @@ def _open_streams() -> None:
         sys.stdout = open(own, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)  # noqa: SIM115
 
 
-def _interrupt(number: int, _: FrameType | None) -> NoReturn:
-    raise KeyboardInterrupt(number)
-
-
-def _fail_interrupted(error: BaseException) -> int:
-    cause = error if isinstance(error, KeyboardInterrupt) else error.__cause__ or error.__context__ or error
-    number = cause.args[0] if isinstance(cause, KeyboardInterrupt) and cause.args else signal.SIGINT
-    return _fail("interrupted; no incomplete file was left", SIGNALLED + number)
+def _fail_interrupted(received: list[int]) -> int:
+    return _fail("interrupted; no incomplete file was left", SIGNALLED + (received or [signal.SIGINT])[0])
 
 
 def _fail(message: str, code: int) -> int:

@@ -60,7 +60,13 @@ def exact_grid(grid: IntegerGrid) -> ExactGrid:
     twin = np.full(mesh.faces.size, -1, dtype=np.int64)
     one, two = mesh.edge_halfedges[~mesh.is_boundary_edge].T
     twin[one], twin[two] = two, one
-    turns, shifts = _crossings(grid, twin)
+    inner = np.flatnonzero(twin >= 0)
+    # The motions of a half-edge are those to its twin's triangle, the inverse of the given ones.
+    turns, shifts = np.zeros(len(twin), dtype=np.int64), np.zeros((len(twin), 2))
+    turns[inner], shifts[inner] = (
+        np.asarray(grid.turns)[twin[inner]] % 4,
+        np.asarray(grid.shifts)[twin[inner]],
+    )
     fans = _fans(mesh, twin)
     most = max(float(np.abs(given).max()), float(np.abs(shifts).max(initial=0.0)), 1.0)
     # Coordinates have two binary digits less than a double, so that sums of coordinates and shifts are exact.
@@ -79,24 +85,6 @@ def exact_grid(grid: IntegerGrid) -> ExactGrid:
     _require_map(exact, given, is_off)
     _require_cones(exact, grid)
     return exact
-
-
-def _crossings(grid: IntegerGrid, twin: IntArray) -> tuple[IntArray, FloatArray]:
-    """Return (3m,), (3m, 2) the motions from each half-edge's triangle to its twin's, inverse to the given ones."""
-    inner = twin >= 0
-    turns, shifts = np.zeros(len(twin), dtype=np.int64), np.zeros((len(twin), 2))
-    turns[inner] = np.asarray(grid.turns)[twin[inner]]
-    shifts[inner] = np.asarray(grid.shifts)[twin[inner]]
-    back = rotated(turns[inner] % 4, shifts[twin[inner]])
-    wrong = (turns[inner] + turns[twin[inner]]) % 4 != 0
-    wrong |= (back + shifts[inner] != 0).any(axis=1) | (turns[inner] < 0) | (turns[inner] > 3)
-    if wrong.any():
-        where = list_some(np.flatnonzero(inner)[wrong] // 3)
-        raise GridError(
-            f"{plural(int(wrong.sum()), 'half-edge')} with a motion that is not the inverse of the twin's, "
-            f"in faces {where}: this is not an integer-grid map"
-        )
-    return turns, shifts
 
 
 def rotated(turns: IntArray, points: FloatArray) -> FloatArray:

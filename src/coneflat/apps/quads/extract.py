@@ -1,20 +1,26 @@
-"""Extraction of a quad mesh from an integer-grid map.
+"""Extraction of a quad mesh from an integer-grid map, and a layer of quads where the boundary cuts squares.
 
 H.-C. Ebke, D. Bommes, M. Campen, L. Kobbelt, "QEx: robust quad mesh extraction", 2013.
 """
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
 
-from ...base import FloatArray, IntArray, list_some, plural
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from ...base import FloatArray, IntArray, dots, list_some, plural
 from ...errors import GridError
 from ...geometry import signed_double_areas
-from ...mesh import label_components
+from ...mesh import NEXT, PREVIOUS, label_components
 from .exact_grid import ExactGrid, exact_grid
+from .features import lengths_along
 from .grid_points import LOST, GridPoints, Ports, find_points, find_ports, join_ports
 from .integer_map import IntegerGrid
 from .quad_mesh import CoarseGridError, QuadMesh, degenerate_quads
+from .smooth import SHARP_ANGLE
 
 # Largest number of squares; at about a kilobyte of peak memory for each, many machines have enough.
 MAX_SQUARES = 20_000_000
@@ -53,12 +59,9 @@ def extract_quads(grid: IntegerGrid, leave_out: bool = False) -> QuadMesh:
     _require_pairs(mates, ports)
     following = _turn_left(mates, ports)
     darts, left_out = _close(following, ports)
-    is_closed = not exact.mesh.is_boundary_edge.any()
-    if is_closed and left_out:
-        raise GridError(f"{plural(left_out, 'square')} of the grid with other than four sides")
     area = float(signed_double_areas(exact.corners).sum()) / 2
     # The tolerance covers rounding of the sum over all triangles.
-    if is_closed and abs(area - len(darts)) > 1e-3:
+    if not exact.mesh.is_boundary_edge.any() and (left_out or abs(area - len(darts)) > 1e-3):
         raise GridError(f"{len(darts):,} quads cover a grid of {area:.3f} squares: some are missing")
     if not len(darts):
         raise GridError(
@@ -88,19 +91,12 @@ def extract_quads(grid: IntegerGrid, leave_out: bool = False) -> QuadMesh:
 
 def _require_pairs(mates: IntArray, ports: Ports) -> None:
     """Raise GridError unless each port leads to another port, which leads back, or to the boundary."""
-    points = ports.points
-    lost = np.flatnonzero(mates == LOST)
-    if len(lost):
-        raise GridError(
-            f"{plural(len(lost), 'grid line')} of {len(mates):,} that ends at no grid point, in faces "
-            f"{list_some(np.unique(ports.faces[lost]))}"
-        )
-    leads = np.flatnonzero(mates >= 0)
-    bad = leads[mates[mates[leads]] != leads]
+    leads = mates >= 0
+    bad = np.flatnonzero((mates == LOST) | (leads & (mates[mates] != np.arange(len(mates)))))
     if len(bad):
         raise GridError(
-            f"{plural(len(bad), 'grid line')} of {len(mates):,} that does not lead back, from points "
-            f"{list_some(np.unique(points[bad]))}"
+            f"{plural(len(bad), 'grid line')} of {len(mates):,} that ends at no grid point or does not lead back, in "
+            f"faces {list_some(np.unique(ports.faces[bad]))}"
         )
 
 
@@ -167,3 +163,105 @@ def _barycentric(exact: ExactGrid, found: GridPoints, points: IntArray) -> Float
         areas[side == 3 + i] = np.eye(3)[i]
     areas = np.maximum(areas, 0.0)
     return areas / areas.sum(axis=1, keepdims=True)
+
+
+def with_borders(quads: QuadMesh) -> QuadMesh:
+    """Return a quad mesh with a further layer of quads between each of its boundaries and that of the surface.
+
+    Each vertex on a boundary of the quads is joined to the nearest point of the boundary of the surface. These points
+    are smoothed along the boundary, and its corners are among them. There is no layer where two boundaries do not
+    correspond, because quads are missing at thin parts or cover a hole.
+    """
+    mesh, count = quads.surface, len(quads.vertices)
+    sides = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
+    leaving, loop_of, place = np.full((3, len(mesh.vertices)), -1)
+    leaving[mesh.tails[sides]] = sides
+    loops = [leaving[walk] for walk in _walks(mesh.tails[sides], mesh.heads[sides])]
+    for number, loop in enumerate(loops):
+        loop_of[mesh.tails[loop]], place[mesh.tails[loop]] = number, np.arange(len(loop))
+    lengths = lengths_along(mesh, np.arange(len(mesh.edges)))
+    graph = coo_matrix((lengths, mesh.edges.T), shape=(len(place), len(place))).tocsr()
+    away, _, source = dijkstra(graph, False, mesh.tails[sides], return_predecessors=True, min_only=True)
+    tails, heads = quads.quads.ravel(), np.roll(quads.quads, -1, axis=1).ravel()
+    alone = ~np.isin(tails * count + heads, heads * count + tails)
+    layers, faces, weights, taken, missing = [quads.quads], [quads.faces], [quads.barycentric], [-1], 0
+    for walk in _walks(tails[alone], heads[alone]):
+        points, corners = quads.vertices[walk], mesh.faces[quads.faces[walk]]
+        ways = np.linalg.norm(mesh.vertices[corners] - points[:, None], axis=2) + away[corners]
+        nearest = source[corners[np.arange(len(walk)), np.argmin(ways, axis=1)]]
+        loop = loops[number := int(np.bincount(loop_of[nearest]).argmax())]
+        starts = mesh.vertices[mesh.tails[loop]]
+        steps = mesh.vertices[mesh.heads[loop]] - starts
+        at, off = _places_along(points, np.minimum(place[nearest], len(loop) - 1), starts, steps)
+        is_there = off.max() <= 1e-9 * lengths.max()
+        if at is None or is_there or number in taken:
+            missing += not is_there
+            continue
+        taken.append(number)
+        ends = np.cumsum(np.sqrt(dots(steps, steps)))
+        edge = np.minimum(np.searchsorted(ends, at, side="right"), len(loop) - 1)
+        share = np.clip(1 - (ends[edge] - at) / np.sqrt(dots(steps, steps))[edge], 0, 1)[:, None]
+        side = loop[edge] % 3
+        outer, count = count + np.arange(len(walk)), count + len(walk)
+        layers.append(np.stack([np.roll(walk, -1), walk, outer, np.roll(outer, -1)], axis=1))
+        faces.append(loop[edge] // 3)
+        weights.append(
+            (1 - share) * np.eye(3)[np.take(NEXT, side)] + share * np.eye(3)[np.take(PREVIOUS, side)]
+        )
+    on, barycentric = np.concatenate(faces), np.concatenate(weights)
+    points = np.einsum("qi,qix->qx", barycentric, mesh.vertices[mesh.faces[on]])
+    found = replace(quads, vertices=points, quads=np.concatenate(layers), faces=on, barycentric=barycentric)
+    if missing:
+        return found
+    note = f"A layer of quads along the boundary replaces {plural(quads.left_out, 'square')} that it cuts."
+    return replace(found, left_out=0, area_left_out=0.0, notes=(*quads.notes, note))
+
+
+def _walks(tails: IntArray, heads: IntArray) -> list[IntArray]:
+    """Return the closed walks along directed edges, of which one leaves each vertex, as their vertices."""
+    following, walks = dict(zip(tails.tolist(), heads.tolist(), strict=True)), []
+    while following:
+        walk = [next(iter(following))]
+        while (vertex := following.pop(walk[-1], None)) is not None:
+            walk.append(vertex)
+        walks.append(np.array(walk[:-1], dtype=np.int64))
+    return walks
+
+
+def _places_along(
+    points: FloatArray, edge: IntArray, starts: FloatArray, steps: FloatArray
+) -> tuple[FloatArray | None, FloatArray]:
+    """Return (k,) positions along a closed polyline, and the distances of points (k, 3) from it.
+
+    Args:
+        points: the points, around the polyline.
+        edge: (k,) the edge of the polyline at whose start it is nearest to each point.
+        starts, steps: (b, 3) starts and vectors of the edges.
+
+    Returns:
+        Positions that increase, at least one at each corner; None if the points do not run once around. Distances.
+    """
+    lengths = np.sqrt(dots(steps, steps))
+    both = np.stack([edge, edge - 1])
+    share = np.clip(dots(points - starts[both], steps[both]) / lengths[both] ** 2, 0, 1)
+    off = np.linalg.norm(starts[both] + share[..., None] * steps[both] - points, axis=2)
+    ends, total = np.cumsum(lengths), lengths.sum()
+    at = np.where(off[0] <= off[1], *(ends[both] - lengths[both] * (1 - share)))
+    gaps = (np.roll(at, -1) - at + total / 2) % total - total / 2
+    if abs(gaps.sum() - total) > total / 2:
+        return None, off.min(axis=0)
+    at = at[0] + np.cumsum(gaps) - gaps
+    several = np.concatenate([at - total, at, at + total])
+    falling = np.minimum.accumulate(several[::-1])[::-1]
+    at = (np.maximum.accumulate(several) + falling)[len(at) : 2 * len(at)] / 2
+    for _ in range(60):  # smoothed until no gap is very small
+        before, after = np.append(at[-1] - total, at[:-1]), np.append(at[1:], at[0] + total)
+        if (after - at).min() >= 0.3 * total / len(at):
+            break
+        at = at / 2 + (before + after) / 4
+    cosines = dots(steps, np.roll(steps, 1, axis=0)) / (lengths * np.roll(lengths, 1))
+    bends = np.flatnonzero(cosines < np.cos(SHARP_ANGLE))
+    for corner in (ends - lengths)[bends[np.argsort(-cosines[bends], kind="stable")]]:  # the sharpest last
+        away = (corner - at + total / 2) % total - total / 2
+        at[np.argmin(np.abs(away))] += away[np.argmin(np.abs(away))]
+    return at % total, off.min(axis=0)

@@ -179,6 +179,16 @@ def split_faces(
     return _split(mesh, edges, origin, _chords(mesh, edges))
 
 
+def split_chords(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
+    """Return a mesh without inner edges between two boundary vertices, by splitting them, and their number.
+
+    Straight sides of a boundary would degenerate the triangles at such edges.
+    """
+    mesh, none = TriangleMesh(*_without_pillows(mesh.vertices, mesh.faces)), np.empty(0, dtype=np.int64)
+    chords = _chords(mesh, none)
+    return _split(mesh, none, none, chords)[0], int(chords.sum())
+
+
 def split_small_components(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     """Return a mesh with at least 60 triangles in each component, by splitting edges, and how many were smaller.
 
@@ -274,27 +284,31 @@ def _split(
     points = np.concatenate([mesh.vertices, mesh.vertices[mesh.edges[marked]].mean(axis=1)])
     sides = mesh.halfedge_edges.reshape(-1, 3)
     first = np.argmax(sides == _longest_sides(mesh, marked)[:, None], axis=1)
-    turn = (first[:, None] + np.arange(3)) % 3
-    a, b, c = np.take_along_axis(mesh.faces, turn, axis=1).T
-    bc, ca, ab = middle[np.take_along_axis(sides, turn, axis=1)].T
-    unsplit, on_ab, on_ca = bc < 0, ab >= 0, ca >= 0
-    halved = ~unsplit
-
-    def triangles(chosen: BoolArray, *corners: IntArray) -> IntArray:
-        return np.stack([corner[chosen] for corner in corners], axis=1)
-
-    parts = [
-        triangles(unsplit, a, b, c),
-        triangles(halved & ~on_ab, a, b, bc),
-        triangles(halved & on_ab, a, ab, bc),
-        triangles(halved & on_ab, ab, b, bc),
-        triangles(halved & ~on_ca, a, bc, c),
-        triangles(halved & on_ca, a, bc, ca),
-        triangles(halved & on_ca, ca, bc, c),
-    ]
-    finer = TriangleMesh(points, np.concatenate(parts))
+    origin_face, corners = split_pieces(marked[sides], first)
+    six = np.concatenate([mesh.faces, middle[sides]], axis=1)[origin_face]
+    finer = TriangleMesh(points, np.take_along_axis(six, corners, axis=1))
     pairs, at = mesh.edges[edges], middle[edges]
     is_cut = at >= 0
     halves = [np.stack([pairs[is_cut, end], at[is_cut]], axis=1) for end in range(2)]
     features = edge_indices(finer, np.concatenate([pairs[~is_cut], *halves]))
     return finer, features, np.concatenate([origin[~is_cut], origin[is_cut], origin[is_cut]])
+
+
+def split_pieces(is_split: BoolArray, first: IntArray) -> tuple[IntArray, IntArray]:
+    """Return (t,) the triangle of each piece into which triangles are divided, and (t, 3) its corners.
+
+    Corners 0 to 2 are those of the triangle, and 3 + i is the midpoint of the side opposite corner i.
+
+    Args:
+        is_split: (m, 3) whether each side is split.
+        first: (m,) the side that is split first, if any is.
+    """
+    turn = (first[:, None] + np.arange(3)) % 3
+    six = np.concatenate([turn, 3 + turn], axis=1)
+    one, two, three = np.take_along_axis(is_split, turn, axis=1).T
+    pieces = (
+        (~one, (0, 1, 2)), (one & ~three, (0, 1, 3)), (one & three, (0, 5, 3)), (one & three, (5, 1, 3)),
+        (one & ~two, (0, 3, 2)), (one & two, (0, 3, 4)), (one & two, (4, 3, 2)),
+    )  # fmt: skip
+    origin = np.concatenate([np.flatnonzero(chosen) for chosen, _ in pieces])
+    return origin, np.concatenate([six[chosen][:, corners] for chosen, corners in pieces])

@@ -74,15 +74,11 @@ def irregular_handles(quads: QuadMesh) -> list[Any]:
     """Return the legend handles of matplotlib for the dots, labelled with valences and counts."""
     from matplotlib.lines import Line2D
 
-    dot: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 5.5, "markeredgecolor": "black"}
+    dot: dict[str, Any] = {"linestyle": "", "marker": "o", "ms": 5.5, "mec": "black", "mew": 0.6}
     valences = quads.valences[quads.irregular]
     marks: list[Any] = []
     for color, chosen in ((FEWER_COLOR, valences[valences < 4]), (MORE_COLOR, valences[valences > 4])):
         if len(chosen):
             which = " and ".join(map(str, np.unique(chosen).tolist()))
-            marks.append(
-                Line2D(
-                    [], [], color=color, label=f"valence {which}: {len(chosen)}", markeredgewidth=0.6, **dot
-                )
-            )
+            marks.append(Line2D([], [], color=color, label=f"valence {which}: {len(chosen)}", **dot))
     return marks

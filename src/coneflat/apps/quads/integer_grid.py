@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from numbers import Real
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ... import Flattening, check_mesh, flatten
-from ...base import DISTORTION, THREADS, FloatArray, IntArray, Progress, Stopwatch, limit_threads, plural
+from ... import Flattening, TriangleMesh, check_mesh, flatten
+from ...base import DISTORTION, THREADS, Progress, Stopwatch, limit_threads, plural
 from ...errors import ConeflatError, ConvergenceError, CurvatureError, GridError, MetricError, OptionError
 from ...io import as_input
 from ...layout import StretchEnergy
 from ...measure import unmet_guarantees
 from ...mesh import CheckedMesh
 from ...options import WordOrVertices
-from .features import split_small_components
+from .features import split_chords, split_small_components
 from .integer_map import IntegerGrid
 from .layout import GRID_TOLERANCE, aligned
 from .options import QUADS, QuadOptions
@@ -33,6 +34,19 @@ OPTIONS = {
     "min_cone_angle": QuadOptions.min_cone_angle,
     "max_cone_angle": QuadOptions.max_cone_angle,
 }
+
+Split: TypeAlias = Callable[[TriangleMesh], tuple[TriangleMesh, int]]
+# How a mesh is split where flattening it fails, a note, and the noun for the number of splits.
+FEW_VERTICES = (
+    split_small_components,
+    "Split the triangles of {} with too few vertices for cones of a grid.",
+    "component",
+)
+CHORDS = (
+    split_chords,
+    "Split {} between boundary vertices, whose triangles straight sides degenerate.",
+    "edge",
+)
 
 
 def integer_grid(
@@ -170,25 +184,26 @@ class _Search:
         boundary = "free" if boundary == "auto" else boundary
         with self.stages("grid"):
             found, why = self._along_axes({**self.options, "sharp_angle": sharp_angle, "boundary": boundary})
-        if found is not None:
-            return found
-        return with_note(self._of_flattening(boundary), f"No sharp edge is on a grid line: {why}.")
+        none = f"No sharp edge is on a grid line: {why}."
+        return found or with_note(self._of_flattening(boundary), none)
 
     def _checked(self) -> CheckedMesh:
         given, repair = as_input(self.mesh, self.faces), bool(self.options.get("repair", False))
         return check_mesh(given.vertices, given.faces, repair=repair)
 
-    def _refined(self) -> tuple[tuple[FloatArray, IntArray], tuple[str, ...]]:
-        """Return the mesh with the triangles of small components split, and notes; no notes if none is small."""
-        checked = self._checked()
-        mesh, count = split_small_components(checked.mesh)
-        note = (
-            f"Split the triangles of {plural(count, 'component')} with too few vertices for cones of a grid."
-        )
-        return (np.ldexp(mesh.vertices, -checked.exponent), mesh.faces), (
-            *checked.notes,
-            note,
-        ) if count else ()
+    def _finer(self, how: tuple[Split, str, str], given: dict[str, Any]) -> Flattening | None:
+        """Return a flattening of a finer mesh with a note on the number of splits; None if there is none."""
+        # Arrays and vertices in options would not fit another mesh.
+        if not all(one is None or isinstance(one, (str, float, int)) for one in self.options.values()):
+            return None
+        checked, (split, note, noun) = self._checked(), how
+        mesh, count = split(checked.mesh)
+        with suppress(ConeflatError):
+            if count:
+                result = flatten(np.ldexp(mesh.vertices, -checked.exponent), mesh.faces, **given)
+                told = note.format(plural(count, noun))
+                return replace(result, notes=(*checked.notes, told, *result.notes))
+        return None
 
     def _of_flattening(self, boundary: Any, all_sides: bool = False) -> IntegerGrid:
         """Return the grid of a flattening with a boundary; `all_sides` requires all straight sides on grid lines.
@@ -199,21 +214,24 @@ class _Search:
         options = {**self.options, "boundary": boundary}
         self.stages.done = 0.0
         given = {**_defaults(options), **options, "progress": self.progress}
-        refined: tuple[str, ...] = ()
         with self.stages("flatten"):
             try:
                 result = flatten(self.mesh, self.faces, **given)
-            except CurvatureError as error:
-                finer, refined = self._refined()
-                if not refined:
+            except (CurvatureError, MetricError) as error:
+                split = FEW_VERTICES if isinstance(error, CurvatureError) else CHORDS
+                if (found := self._finer(split, given)) is None:
                     raise
-                try:
-                    result = flatten(finer, **given)
-                except ConeflatError:
-                    raise error from None
-        # Unmet guarantees of the map do not apply to the grid.
-        notes = (*refined, *(note for note in result.notes if note not in unmet_guarantees(result)))
+                result = found
+        if boundary == "straight":
+            with suppress(MetricError):
+                return self._with_notes(result, None, all_sides=True)
+            result = self._finer(CHORDS, given) or result
+        return self._with_notes(result, options, all_sides)
+
+    def _with_notes(self, result: Flattening, options: dict[str, Any] | None, all_sides: bool) -> IntegerGrid:
         found = self.of_result(result, options, all_sides)
+        # Unmet guarantees of the map do not apply to the grid.
+        notes = (note for note in result.notes if note not in unmet_guarantees(result))
         return replace(found, notes=(*notes, *found.notes))
 
     def of_result(
@@ -225,15 +243,10 @@ class _Search:
         with self.stages("grid"), limit_threads(result.settings.get("threads", THREADS)):
             try:
                 layout = aligned(result, self.quads, self.size)
-                starts = layout.ends[0][layout.border]
-                loose = int((~np.isin(starts, layout.sides.points)).sum()) if is_straight else 0
-                if not loose:
+                if not is_straight or np.isin(layout.ends[0][layout.border], layout.sides.points).all():
                     return grid_of(layout, self.energy)
-                why = (
-                    f"{plural(loose, 'edge')} of the boundary {'is' if loose == 1 else 'are'} not on a grid line: "
-                    "straight sides of different loops are not parallel up to quarter turns"
-                )
-            except GridError as error:
+                why = "straight sides of different loops are not parallel up to quarter turns, so not all on grid lines"
+            except MetricError as error:
                 # Straight sides may degenerate a triangle between them; edges that join two of them are split below.
                 if not is_straight:
                     raise
@@ -245,7 +258,7 @@ class _Search:
                     return rotated
             if all_sides or layout is None:
                 raise GridError(why)
-            return with_note(grid_of(layout, self.energy), f"{why}.")
+            return with_note(grid_of(layout, self.energy), f"{why.capitalize()}.")
 
     def _along_axes(self, options: dict[str, Any]) -> tuple[IntegerGrid | None, str]:
         """Return a grid with the boundary and as many sharp edges as possible on grid lines; or None and the reason."""

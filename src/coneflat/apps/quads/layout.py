@@ -16,11 +16,13 @@ from ...geometry import (
     double_areas,
     edge_lengths,
     mollify,
+    sides_between,
     signed_angles,
     signed_double_areas,
 )
 from ...layout import SeamChains, find_chains, rest_sides
 from ...mesh import NEXT, PREVIOUS, label_components, label_faces, point_vertices
+from .features import split_pieces
 
 # Tolerance, in radians or squares, for sides to be straight or parallel up to quarter turns, and for points to
 # coincide: far above rounding, far below relevant differences.
@@ -131,10 +133,11 @@ def aligned(result: Flattening, quads: float | None, size: float | None) -> Grid
     mesh = TriangleMesh(result.vertices, result.faces)
     own = edge_lengths(mesh.vertices, mesh.faces) if result.lengths is None else result.lengths
     lengths, _ = mollify(own)
-    flat = signed_double_areas(result.corner_uv)
-    if not (flat > 0).all():
+    flat, sides = signed_double_areas(result.corner_uv), np.abs(sides_between(result.corner_uv))
+    has_area = flat > GRID_TOLERANCE**2 * sides.max(axis=1) ** 2
+    if not has_area.all():
         raise GridError(
-            f"{int((flat <= 0).sum())} of {len(flat):,} triangles of the layout are flipped or have no area"
+            f"{int((~has_area).sum())} of {len(flat):,} triangles of the layout are flipped or have no area"
         )
     area = float(double_areas(lengths).sum()) / 2
     if size is None:
@@ -281,20 +284,6 @@ def first_points(vertex: IntArray) -> IntArray:
     return first
 
 
-# Triangles into which a triangle with split sides is divided, by their corners: 0 to 2 are its own, 3 + i is the
-# midpoint of the side opposite corner i. The bits of the index are the split sides.
-PIECES: tuple[tuple[tuple[int, int, int], ...], ...] = (
-    ((0, 1, 2),),
-    ((0, 1, 3), (0, 3, 2)),
-    ((1, 2, 4), (1, 4, 0)),
-    ((4, 3, 2), (0, 1, 3), (0, 3, 4)),
-    ((2, 0, 5), (2, 5, 1)),
-    ((5, 1, 3), (2, 0, 5), (2, 5, 3)),
-    ((0, 5, 4), (1, 2, 4), (1, 4, 5)),
-    ((0, 5, 4), (5, 1, 3), (4, 3, 2), (3, 4, 5)),
-)
-
-
 def between_nodes(layout: GridLayout) -> BoolArray:
     """Return (e,) whether each edge joins two vertices that must lie on grid points.
 
@@ -313,7 +302,8 @@ def split_edges(layout: GridLayout, is_split: BoolArray) -> GridLayout:
     number[is_split] = len(mesh.vertices) + np.arange(int(is_split.sum()))
     middle = mesh.vertices[mesh.edges[is_split]].mean(axis=1)
     own, pairs = _middle_points(corners, is_split[edge_of], len(points))
-    origin, piece = _pieces((is_split[edge_of] * [1, 2, 4]).sum(axis=1))
+    longest = np.argmax(np.where(is_split[edge_of], layout.lengths, -1), axis=1)
+    origin, piece = split_pieces(is_split[edge_of], longest)
     faces, new_corners = (
         np.take_along_axis(np.concatenate(both, axis=1)[origin], piece, axis=1)
         for both in ((mesh.faces, number[edge_of]), (corners, own))
@@ -329,19 +319,6 @@ def split_edges(layout: GridLayout, is_split: BoolArray) -> GridLayout:
     # Components whose boundary has straight sides still have them.
     sides = find_sides(split, np.isin(component, component[layout.sides.points]))
     return at_origin(replace(split, sides=sides), component)
-
-
-def _pieces(kind: IntArray) -> tuple[IntArray, IntArray]:
-    """Return (t,) the triangle of each piece, sorted, and (t, 3) its corners; `kind` (m,) encodes the split sides."""
-    origin, corners = [], []
-    for which, pieces in enumerate(PIECES):
-        at = np.flatnonzero(kind == which)
-        for piece in pieces:
-            origin.append(at)
-            corners.append(np.tile(piece, (len(at), 1)))
-    all_of = np.concatenate(origin)
-    order = np.argsort(all_of, kind="stable")
-    return all_of[order], np.concatenate(corners)[order]
 
 
 def _middle_points(corners: IntArray, is_split: BoolArray, count: int) -> tuple[IntArray, IntArray]:

@@ -5,96 +5,50 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from ...base import FloatArray, IntArray, compiled
+from ...base import FloatArray, IntArray, compiled, dots
 
-# Triangles per leaf of the tree of boxes.
-LEAF_TRIANGLES = 4
+# Points whose nearest triangles are found at once, which bounds memory.
+POINTS_AT_ONCE = 20_000
 
 
 def surface_distances(vertices: FloatArray, faces: IntArray, queries: FloatArray) -> FloatArray:
-    """Return (q,) the exact distances of points from a surface, by a tree of bounding boxes.
+    """Return (q,) the exact distances of points from a surface.
+
+    A triangle can only be nearest if its centroid is not farther away than the nearest vertex plus its own radius.
+    Triangles are searched in groups of similar radius, the smallest first.
 
     Args:
         vertices, faces: (n, 3), (m, 3) the surface.
         queries: (q, 3) points.
     """
     corners = np.ascontiguousarray(vertices[faces], dtype=np.float64)
-    order = _leaf_order(corners.mean(axis=1))
-    low, high = corners.min(axis=1)[order], corners.max(axis=1)[order]
-    low, high = (
-        low.reshape(-1, LEAF_TRIANGLES, 3).min(axis=1),
-        high.reshape(-1, LEAF_TRIANGLES, 3).max(axis=1),
-    )
-    boxes = [np.concatenate([low, high], axis=1)]
-    while len(low) > 1:
-        low, high = np.minimum(low[::2], low[1::2]), np.maximum(high[::2], high[1::2])
-        boxes.append(np.concatenate([low, high], axis=1))
-    tree = np.concatenate(boxes[::-1])
-    squares = np.empty(len(queries))
-    _fill_squares(tree, order, corners, np.ascontiguousarray(queries, dtype=np.float64), squares)
-    return np.sqrt(squares)
-
-
-def _leaf_order(centres: FloatArray) -> IntArray:
-    """Return triangles in the order of the tree's leaves, 2**k * `LEAF_TRIANGLES` of them; some occur twice."""
-    leaves = 2 ** max(0, int(np.ceil(np.log2(len(centres) / LEAF_TRIANGLES))))
-    order = np.arange(leaves * LEAF_TRIANGLES) * len(centres) // (leaves * LEAF_TRIANGLES)
-    groups = 1
-    while groups < leaves:
-        parts = order.reshape(groups, -1)
-        points = centres[parts]
-        widest = np.argmax(points.max(axis=1) - points.min(axis=1), axis=1)
-        keys = np.take_along_axis(points, widest[:, None, None], axis=2)[..., 0]
-        order = np.take_along_axis(parts, np.argsort(keys, axis=1, kind="stable"), axis=1).ravel()
-        groups *= 2
-    return order
+    centres = corners.mean(axis=1)
+    radii = np.sqrt(dots(corners - centres[:, None], corners - centres[:, None]).max(axis=1))
+    group = np.frexp(radii)[1]
+    best = cKDTree(corners.reshape(-1, 3)).query(queries)[0]
+    for own in (np.flatnonzero(group == one) for one in np.unique(group)):
+        tree, most = cKDTree(centres[own]), 1.0001 * radii[own].max()
+        for block in (slice(k, k + POINTS_AT_ONCE) for k in range(0, len(queries), POINTS_AT_ONCE)):
+            near = tree.query_ball_point(queries[block], best[block] + most)
+            ends = np.cumsum([len(one) for one in near])
+            candidates = own[np.concatenate([*near, []]).astype(np.int64)]
+            _lower(corners, candidates, ends, queries[block], best[block])
+    return best
 
 
 @compiled
-def _fill_squares(
-    tree: FloatArray, order: IntArray, corners: FloatArray, queries: FloatArray, squares: FloatArray
+def _lower(
+    corners: FloatArray, candidates: IntArray, ends: IntArray, queries: FloatArray, best: FloatArray
 ) -> None:
-    """Fill in (q,) the squared distances of points from triangles.
-
-    tree: (2 k - 1, 6) boxes, lowest and highest corner; the children of node i are 2 i + 1 and 2 i + 2. The last k
-        nodes are leaves with `LEAF_TRIANGLES` triangles each, in the order of `order`.
-    """
-    first_leaf = len(tree) // 2
-    stack = np.empty(128, dtype=np.int64)
-    weights = np.empty(3)
+    """Lower the distances of points to those from their candidates, which end at `ends` for each point."""
+    weights, k = np.empty(3), 0
     for q in range(len(queries)):
-        point = queries[q]
-        best, top = np.inf, 1
-        stack[0] = 0
-        while top > 0:
-            top -= 1
-            node = stack[top]
-            if _box_square(tree[node], point) >= best:
-                continue
-            if node >= first_leaf:
-                for i in range(
-                    LEAF_TRIANGLES * (node - first_leaf), LEAF_TRIANGLES * (node - first_leaf + 1)
-                ):
-                    c = corners[order[i]]
-                    best = min(best, nearest_in_triangle(point, c[0], c[1], c[2], weights))
-                continue
-            one, two = 2 * node + 1, 2 * node + 2
-            if _box_square(tree[one], point) < _box_square(tree[two], point):
-                one, two = two, one
-            stack[top] = one  # the farther child
-            stack[top + 1] = two
-            top += 2
-        squares[q] = best
-
-
-@compiled
-def _box_square(box: FloatArray, point: FloatArray) -> float:
-    total = 0.0
-    for x in range(3):
-        off = max(box[x] - point[x], point[x] - box[3 + x], 0.0)
-        total += off * off
-    return total
+        while k < ends[q]:
+            c = corners[candidates[k]]
+            best[q] = min(best[q], np.sqrt(nearest_in_triangle(queries[q], c[0], c[1], c[2], weights)))
+            k += 1
 
 
 @compiled

@@ -40,7 +40,7 @@ class QuadOptions(ConeNumber, ConeBounds, RunOptions):
         cones: auto: the search finds them. Or vertices, each with its curvature, a multiple of pi/2: pi/2 for three
             quads, -pi/2 for five. On surfaces with handles, a grid rarely exists for given cones.
         boundary: straight: the boundary lies on grid lines, between corners that the search finds together with the
-            cones, and no square is lost. free: the boundary cuts squares, which are left out. auto: straight if such a
+            cones. free: the boundary cuts squares, which a layer of quads along it replaces. auto: straight if such a
             grid is found and cones are not given, else free.
         min_cone_angle: Smallest cone angle, pi/2 for each quad at the cone; with a straight boundary it is pi/2, one
             quad, at corners.

@@ -28,7 +28,7 @@ class QuadMesh:
         quads: (p, 4) vertex indices, with the orientation of the surface.
         faces: (q,) the triangle of the surface that contains each vertex.
         barycentric: (q, 3) barycentric coordinates in this triangle.
-        left_out: number of squares of the grid that were left out because the boundary of the surface cuts them.
+        left_out: number of squares of the grid that the boundary of the surface cuts and no layer of quads replaces.
         area_left_out: area of the grid that quads do not cover, in squares, next to boundaries that are not on grid
             lines; negative if a quad covers a hole.
         surface: the triangle mesh.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...base import Stopwatch, plural
 from ...errors import OptionError
-from .extract import extract_quads
+from .extract import extract_quads, with_borders
 from .integer_grid import integer_grid
 from .integer_map import IntegerGrid
 from .options import ROUNDS
@@ -75,6 +75,7 @@ def quads(
                 raise
             coarse.append("More quads than wanted: with fewer, some have a vertex or an edge twice.")
             grid = search(size=grid.size / 1.6**0.5)
+    found = with_borders(found) if found.left_out else found
     with stages("smooth"):
         found = smooth_quads(found, smooth, grid.features)
         if smooth:

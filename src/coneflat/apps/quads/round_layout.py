@@ -172,35 +172,25 @@ def _make_grid(
     layout: GridLayout, smooth: ComplexArray, points: ComplexArray, found: Relaxed, tries: int
 ) -> IntegerGrid:
     mesh, corner_grid = layout.mesh, as_pairs(points)[layout.corners]
-    turns, shifts, _ = find_motions(mesh, corner_grid)
     quarters = quarters_around(mesh, sides_between(corner_grid))
-    qc_before, _ = _distortion(layout, smooth)
-    qc_mean, least_area = _distortion(layout, points)
-    move_rms, move_max = _moves(layout, smooth, points)
+    cones, corners = layout.cones, layout.sides.corners
     note = (
         f"The {plural(tries, 'nearest lattice point')} could not be reached without flipping triangles; the next "
         "one was used."
     )
-    return IntegerGrid(
-        vertices=mesh.vertices,
-        faces=mesh.faces,
-        corner_grid=corner_grid,
-        turns=turns,
-        shifts=shifts,
-        cones=layout.cones,
-        quarters=quarters[layout.cones],
-        corners=layout.sides.corners,
-        corner_quarters=quarters[layout.sides.corners],
-        size=layout.size,
-        move_rms=move_rms,
-        move_max=move_max,
-        energy_before=found.energy_before,
-        energy=found.energy,
-        qc_before=qc_before,
-        qc_mean=qc_mean,
-        least_area=least_area,
-        notes=(note,) if tries else (),
+    arrays = (
+        mesh.vertices,
+        mesh.faces,
+        corner_grid,
+        *find_motions(mesh, corner_grid)[:2],
+        cones,
+        quarters[cones],
     )
+    moves, energies = _moves(layout, smooth, points), (found.energy_before, found.energy)
+    qc = _distortion(layout, smooth)[0], *_distortion(layout, points)
+    # In the order of the attributes.
+    notes = (note,) if tries else ()
+    return IntegerGrid(*arrays, layout.size, *moves, *energies, *qc, notes, corners, quarters[corners])
 
 
 def _moves(layout: GridLayout, smooth: ComplexArray, points: ComplexArray) -> tuple[float, float]:

@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from ...base import BoolArray, FloatArray, IntArray, dots
 from ...errors import OptionError
-from ...mesh import NEXT
 from .features import edge_indices, sharp_edges
 from .nearest import Stars, slide_near
 from .options import ROUNDS
@@ -104,14 +103,9 @@ def _is_on_feature(quads: QuadMesh, features: IntArray) -> BoolArray:
     sharp[edge_indices(mesh, features)] = True
     has_sharp = np.zeros(len(mesh.vertices), dtype=bool)
     has_sharp[mesh.edges[sharp]] = True
-    within = quads.barycentric > 0
-    on_feature = np.zeros(len(quads.faces), dtype=bool)
-    edges = mesh.halfedge_edges.reshape(-1, 3)[quads.faces]
-    for i in range(3):
-        a, b = NEXT[i], NEXT[NEXT[i]]
-        on_feature |= ~within[:, i] & within[:, a] & within[:, b] & sharp[edges[:, i]]
-        on_feature |= within[:, i] & ~within[:, a] & ~within[:, b] & has_sharp[mesh.faces[quads.faces, i]]
-    return on_feature
+    zero, edges = quads.barycentric <= 0, mesh.halfedge_edges.reshape(-1, 3)[quads.faces]
+    at_corner = has_sharp[mesh.faces[quads.faces]] & ~zero & (zero.sum(axis=1) == 2)[:, None]
+    return ((zero & sharp[edges]) | at_corner).any(axis=1)
 
 
 def improve_worst(
