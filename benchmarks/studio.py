@@ -16,11 +16,13 @@ import threading
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import psutil
 from common import chromium, model
 
 from coneflat.apps.studio.serve import open_listener
 from coneflat.apps.studio.server import StudioServer
 from coneflat.apps.studio.session import Session
+from coneflat.apps.studio.worker import COMMAND
 
 SIZE = {"width": 1366, "height": 768}
 MOVES = 8
@@ -47,18 +49,24 @@ class Seconds:
     processor: list[float] = field(default_factory=list)
 
 
+def worker_process() -> int:
+    """Return the id of the worker process."""
+    (found,) = (each for each in psutil.Process().children() if COMMAND[-1] in each.cmdline())
+    return found.pid
+
+
 def moves(page: object, session: Session, count: int) -> Seconds:
     """Return the times of moves."""
     seconds = Seconds()
     for k in range(count):
-        started = processor(session.worker_process)
+        started = processor(worker_process())
         before = page.evaluate("studio.layout")  # type: ignore[attr-defined]
         page.evaluate(MOVE % k)  # type: ignore[attr-defined]
         page.wait_for_function(SETTLED.format(before), timeout=PATIENCE)  # type: ignore[attr-defined]
         seconds.sight.append(page.evaluate("studio.sight") / 1000)  # type: ignore[attr-defined]
         seconds.took.append(page.evaluate("studio.took") / 1000)  # type: ignore[attr-defined]
         seconds.metric.append(sum(session.stages.get(stage, 0.0) for stage in FLATTENED))
-        seconds.processor.append(processor(session.worker_process) - started)
+        seconds.processor.append(processor(worker_process()) - started)
     return seconds
 
 
@@ -97,9 +105,9 @@ def measure(browser: object, name: str, splits: int, count: int, folder: Path) -
         page.goto(f"http://127.0.0.1:{port}/?token=token")
         page.wait_for_selector("html[data-ready]", timeout=PATIENCE)
         page.wait_for_function(SETTLED.format(0), timeout=PATIENCE)
-        first = memory(session.worker_process)
+        first = memory(worker_process())
         seconds = moves(page, session, count)
-        last = memory(session.worker_process)
+        last = memory(worker_process())
         page.close()
         server.should_exit = True
         thread.join()

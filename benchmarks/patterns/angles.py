@@ -8,8 +8,9 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, identity
 
 from coneflat.base import BoolArray, FloatArray, IntArray
-from coneflat.geometry import IntrinsicTriangulation
-from coneflat.linalg import Limits, Point, factorize, minimise
+from coneflat.geometry.intrinsic import IntrinsicTriangulation
+from coneflat.linalg import factorize
+from coneflat.linalg.newton import Limits, Point, minimise
 
 # Lower bound of an angle: MIN_ANGLE_FRACTION of the given one, at most 0.02 radians and at least MIN_ANGLE.
 MIN_ANGLE_FRACTION, MIN_ANGLE = 0.5, 1e-5

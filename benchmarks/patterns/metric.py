@@ -11,17 +11,12 @@ import numpy as np
 from coneflat import TriangleMesh
 from coneflat.base import BoolArray, FloatArray, IntArray, error_text, plural
 from coneflat.errors import ConvergenceError
-from coneflat.geometry import (
-    IntrinsicTriangulation,
-    angle_defect,
-    corner_angles,
-    double_areas,
-    intrinsic_triangulation,
-    make_delaunay,
-    straight_triangles,
-    vertex_areas,
-)
-from coneflat.metric import checked_target
+from coneflat.geometry import angle_defect, corner_angles, double_areas
+from coneflat.geometry.delaunay import make_delaunay
+from coneflat.geometry.intrinsic import IntrinsicTriangulation, intrinsic_triangulation
+from coneflat.geometry.operators import vertex_areas
+from coneflat.geometry.straight import straight_triangles
+from coneflat.metric.exact import checked_target
 from coneflat.stages import ConeSolution, FlatMetric, SolveStatistics
 
 from .angles import CoherentAngles, coherent_angles

@@ -10,7 +10,8 @@ from scipy.sparse import csc_matrix
 
 from coneflat.base import FloatArray, IntArray
 from coneflat.errors import ConvergenceError
-from coneflat.linalg import Point, factorize, minimise
+from coneflat.linalg import factorize
+from coneflat.linalg.newton import Point, minimise
 
 from .angles import ANGLE_LIMITS, CoherentAngles
 

@@ -14,8 +14,6 @@ from ..geometry import visible_share
 from .quads.quads import quads
 from .quads.quality import measure_quads
 
-TAU = 2 * np.pi
-
 
 def compile_kernels() -> None:
     """Flatten small meshes of several types, so that every kernel is compiled."""
@@ -39,7 +37,7 @@ def compile_kernels() -> None:
 def _tube(closed: bool, around: int = 40, across: int = 24) -> tuple[FloatArray, IntArray]:
     """Return a torus with bumps, or the part of it over a rectangle of its parameters, which is a disk."""
     u, v = np.meshgrid(np.arange(around), np.arange(across), indexing="ij")
-    a, b = TAU * u / around, TAU * v / across
+    a, b = 2 * np.pi * u / around, 2 * np.pi * v / across
     radius = 0.4 + 0.05 * np.sin(3 * a) * np.cos(2 * b)
     ring = 1 + radius * np.cos(b)
     points = np.stack([ring * np.cos(a), ring * np.sin(a), radius * np.sin(b)], axis=-1).reshape(-1, 3)

@@ -23,9 +23,6 @@ from ..source import at_unit_size
 #: number of pairs can be quadratic.
 MAX_PAIRS_EACH, MIN_PAIRS = 8, 10_000
 
-#: Powers of two beyond it are not finite.
-MAX_EXPONENT = 1100
-
 #: Measures in addition to those of a map.
 COUNTS = (
     "vertices",
@@ -155,7 +152,7 @@ def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:
     cover = _cover(np.ldexp(every, -exponent))
     tiles = len(_tiles(checked.mesh, unit, exponent))
     with np.errstate(over="ignore"):  # A value that is not finite is reported as unknown.
-        covered = float(np.ldexp(cover.area, min(2 * exponent, MAX_EXPONENT)))
+        covered = float(np.ldexp(cover.area, 2 * exponent))
     counts = {
         "vertices": len(np.unique(mapped.faces)),
         "polygons": mapped.polygons,

@@ -1,11 +1,10 @@
 """Geometry: lengths, angles, areas, Laplacian, intrinsic triangulations, exact predicates, overlaps, visibility."""
 
 from .coverage import approximate_overlap_areas
-from .delaunay import euclidean_diagonal, intrinsic_delaunay, make_delaunay, relink
 from .handles import handle_loops
-from .intrinsic import IntrinsicTriangulation, halfedge_twins, intrinsic_triangulation
+from .intrinsic import halfedge_twins
 from .layers import MAX_CELLS
-from .operators import angle_defect, cotangent_laplacian, vertex_areas
+from .operators import angle_defect, cotangent_laplacian
 from .orientation import fill_orientations, orientation
 from .overlap import Overlaps, find_overlaps
 from .planar import (
@@ -18,7 +17,7 @@ from .planar import (
     signed_double_areas,
     vertex_log_scale,
 )
-from .straight import FlatTriangles, flat_triangles, straight_triangles
+from .straight import FlatTriangles, flat_triangles
 from .triangles import (
     CREASE_COSINE,
     corner_angles,
@@ -30,7 +29,6 @@ from .triangles import (
     face_normals,
     is_broken,
     mollify,
-    slacks,
     unit_vectors,
     vertex_normals,
 )
@@ -39,7 +37,6 @@ from .visibility import fill_nearest, visible_share
 __all__ = [
     "CREASE_COSINE",
     "FlatTriangles",
-    "IntrinsicTriangulation",
     "MAX_CELLS",
     "Overlaps",
     "angle_defect",
@@ -52,7 +49,6 @@ __all__ = [
     "dihedral_angles",
     "double_areas",
     "edge_lengths",
-    "euclidean_diagonal",
     "face_normals",
     "fill_nearest",
     "fill_orientations",
@@ -60,23 +56,16 @@ __all__ = [
     "flat_triangles",
     "halfedge_twins",
     "handle_loops",
-    "intrinsic_delaunay",
-    "intrinsic_triangulation",
     "is_broken",
     "approximate_overlap_areas",
     "layout_curvature",
-    "make_delaunay",
     "map_factors",
     "mollify",
     "orientation",
-    "relink",
     "sides_between",
     "signed_angles",
     "signed_double_areas",
-    "slacks",
-    "straight_triangles",
     "unit_vectors",
-    "vertex_areas",
     "vertex_log_scale",
     "vertex_normals",
     "visible_share",

@@ -1,17 +1,13 @@
-"""Sparse symmetric positive definite systems behind one small interface, and Newton's method for convex functions."""
+"""Sparse symmetric positive definite systems behind one small interface."""
 
 from .factors import Factor, HermitianFactor, SuperLUFactor, aligned, factorize
 from .memory import check_memory
-from .newton import Limits, Point, minimise
 
 __all__ = [
     "Factor",
     "HermitianFactor",
-    "Limits",
-    "Point",
     "SuperLUFactor",
     "aligned",
     "check_memory",
     "factorize",
-    "minimise",
 ]

@@ -1,7 +1,7 @@
 """Flat metrics: the linear metric of the paper and the exact discrete conformal metric."""
 
 from .boundary import straight_boundary
-from .exact import ExactMetric, checked_target, exact_metric
+from .exact import ExactMetric, exact_metric
 from .find import find_metric, loop_rotations
 from .linear import linear_flat_metric, scaled_lengths
 from .solve import ExactChoices, exact_flat_metric
@@ -9,7 +9,6 @@ from .solve import ExactChoices, exact_flat_metric
 __all__ = [
     "ExactChoices",
     "ExactMetric",
-    "checked_target",
     "exact_flat_metric",
     "exact_metric",
     "find_metric",

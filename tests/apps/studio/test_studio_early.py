@@ -25,7 +25,7 @@ from coneflat.base.progress import check_cancelled
 class Mute:
     """A process that is given jobs, and says nothing by itself."""
 
-    is_alive, process_id = True, None
+    is_alive = True
 
     def __init__(self):
         self.jobs = []

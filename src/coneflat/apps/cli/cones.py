@@ -57,7 +57,7 @@ def cones(
     from ... import cone_curve, find_cones
     from ...io import atomic_write, check_target, read_joined
     from ..view import check_figure, make_figure, new_figure, save_figure
-    from .run import FLATTENED, READ, Console
+    from .run import Console
 
     flags, options = pop_flags(given, ConeFlags), keywords(given, FindOptions)
     picture = None
@@ -73,9 +73,9 @@ def cones(
         with console.stage("read", 0.0):
             joined = read_joined(mesh, weld)
             source, options = joined.mesh, joined.map_options(options)
-        with console.stage("cones", READ):
+        with console.stage("cones", console.READ):
             found_cones = find_cones(
-                source, progress=console.part(READ, 0.5 if flags.curve else FLATTENED), **options
+                source, progress=console.part(end=0.5 if flags.curve else console.FLATTENED), **options
             )
         console.say(f"note: {note}" for note in joined.notes())
         wanted = options.pop("distortion", DISTORTION)
@@ -83,12 +83,12 @@ def cones(
         if flags.curve:
             with console.stage("curve", 0.5):
                 most = max(flags.most, len(found_cones.vertices))
-                found = cone_curve(source, most=most, progress=console.part(0.5, FLATTENED), **options)
+                found = cone_curve(source, most=most, progress=console.part(0.5), **options)
             console.say(_curve_lines(found, wanted))
         else:
             console.say(_cone_lines(found_cones, wanted if count is None else None))
         if picture is not None:
-            with console.stage("draw", FLATTENED):
+            with console.stage("draw"):
                 save_figure(make_figure(found, "curve", distortion=wanted, title=mesh.name), picture)
         if flags.output is not None:
             with atomic_write(flags.output, "w") as file:

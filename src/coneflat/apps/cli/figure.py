@@ -104,7 +104,7 @@ def figure(
     """
     from ... import cone_curve
     from ..view import Look, check_figure, make_figure, new_figure, own_quantity, save_figure
-    from .run import FLATTENED, READ, Console, archive_path, open_result
+    from .run import Console, archive_path, open_result
 
     flags = pop_flags(given, FigureFlags)
     kind = "color" if color is not None and not is_given(context, "kind") else flags.kind
@@ -125,8 +125,8 @@ def figure(
             with console.stage("read", 0.0):
                 surface, notes = _surface(mesh, weld)
             console.say(f"note: {note}" for note in notes)
-            with console.stage("cones", READ):
-                part = console.part(READ, FLATTENED)
+            with console.stage("cones", console.READ):
+                part = console.part()
                 shown = cone_curve(surface, most=flags.most, progress=part, **repair_keywords(repair))
         elif kind == "quads":
             count = flags.quads if is_given(context, "quads") else None
@@ -137,7 +137,7 @@ def figure(
             if color is not None:
                 look["own"] = own_quantity(shown, color, archive_path(mesh))
             console.say(f"note: {note}" for note in shown.notes)
-        with console.stage("draw", FLATTENED):
+        with console.stage("draw"):
             save_figure(make_figure(shown, kind, **look), output)
         console.finish([output])
 
@@ -161,7 +161,6 @@ def _quads(
     from ... import quads
     from ...io import read_joined
     from ..quads.files import read_quads
-    from .run import FLATTENED, READ
 
     with console.stage("read", 0.0):
         if file.suffix.lower() == ".npz":
@@ -170,7 +169,7 @@ def _quads(
             found = read_quads(file)
             return found, found.notes
         joined = read_joined(file, weld)
-    found = quads(joined.mesh, quads=count, progress=console.part(READ, FLATTENED), **repair_keywords(repair))
+    found = quads(joined.mesh, quads=count, progress=console.part(), **repair_keywords(repair))
     console.seconds.update(found.seconds)
     return found, joined.all_notes(found.notes)
 
@@ -199,7 +198,7 @@ def demo(output: Path, verbosity: str | None) -> None:
     from ... import sample_path
     from ...io import make_folder
     from ..view import demo_figure, new_figure, save_figure
-    from .run import FLATTENED, Console, flatten_file, save
+    from .run import Console, flatten_file, save
 
     new_figure(1, 1)  # A missing package is reported before the work starts.
     make_folder(output)
@@ -207,7 +206,7 @@ def demo(output: Path, verbosity: str | None) -> None:
     with Console(verbosity) as console:
         result = flatten_file(sample_path(), console, {"charts": "atlas"})
         result = save(result, console, mesh, report)
-        with console.stage("draw", FLATTENED):
+        with console.stage("draw"):
             save_figure(demo_figure(result), picture)
         console.finish([mesh, report, picture], result)
         console.say(["", "Now try your own:  coneflat flatten MESH -o OUT.obj"])

@@ -19,12 +19,8 @@ from .flatten import flatten, unwrap
 from .measure import measure
 from .peers import compare
 from .quads import quads
+from .shared import ExitCode
 from .view import studio, view
-
-USER_ERROR = 2
-INTERNAL_ERROR = 1
-#: Added to the number of a signal, as shells do.
-SIGNALLED = 128
 
 
 class Interrupted(KeyboardInterrupt):
@@ -63,22 +59,28 @@ def main() -> NoReturn:
         code = cli.main(standalone_mode=False)
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(error.format_message())
-        code = USER_ERROR
+        code = ExitCode.USER_ERROR
     except click.ClickException as error:
-        code = _fail(f"{error.format_message()}{_hint(error)}", USER_ERROR)
+        code = _fail(f"{error.format_message()}{_hint(error)}", ExitCode.USER_ERROR)
     except ConeflatError as error:
+<<<<<<< HEAD
         code = _fail(str(error), USER_ERROR)
     except (KeyboardInterrupt, click.exceptions.Abort):
         code = _fail_interrupted(received)
+=======
+        code = _fail(str(error), ExitCode.USER_ERROR)
+    except (KeyboardInterrupt, click.exceptions.Abort) as error:
+        code = _fail_interrupted(error)
+>>>>>>> peers
     except BrokenPipeError:
         # The reader of the output has ended, as in `coneflat ... | head`. The shutdown must not print an error.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = INTERNAL_ERROR
+        code = ExitCode.INTERNAL_ERROR
     except OSError as error:
         # Errors of files are raised as ConeflatError, so this one is from the terminal or a pipe.
-        code = _fail(f"cannot print: {error.strerror or error}", INTERNAL_ERROR)
+        code = _fail(f"cannot print: {error.strerror or error}", ExitCode.INTERNAL_ERROR)
     except MemoryError:
-        code = _fail("not enough memory for this mesh", INTERNAL_ERROR)
+        code = _fail("not enough memory for this mesh", ExitCode.INTERNAL_ERROR)
     except Exception as error:
         if os.environ.get("CONEFLAT_DEBUG"):
             raise
@@ -89,7 +91,7 @@ def main() -> NoReturn:
             code = _fail(
                 f"internal error, please report it: {type(error).__name__}: {error} "
                 "(CONEFLAT_DEBUG=1 shows where)",
-                INTERNAL_ERROR,
+                ExitCode.INTERNAL_ERROR,
             )
     # At exit, Python collects garbage among all objects three times: a tenth of the time of a short run.
     gc.freeze()
@@ -114,8 +116,19 @@ def _open_streams() -> None:
         sys.stdout = open(own, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)  # noqa: SIM115
 
 
+<<<<<<< HEAD
 def _fail_interrupted(received: list[int]) -> int:
     return _fail("interrupted; no incomplete file was left", SIGNALLED + (received or [signal.SIGINT])[0])
+=======
+def _interrupt(number: int, _: FrameType | None) -> NoReturn:
+    raise KeyboardInterrupt(number)
+
+
+def _fail_interrupted(error: BaseException) -> int:
+    cause = error if isinstance(error, KeyboardInterrupt) else error.__cause__ or error.__context__ or error
+    number = cause.args[0] if isinstance(cause, KeyboardInterrupt) and cause.args else signal.SIGINT
+    return _fail("interrupted; no incomplete file was left", ExitCode.SIGNALLED + number)
+>>>>>>> peers
 
 
 def _fail(message: str, code: int) -> int:

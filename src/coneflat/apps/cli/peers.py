@@ -59,7 +59,7 @@ def compare(
     from ...io import read_joined
     from ..peers.run import COMPARED as METHODS
     from ..peers.run import compare_methods, comparison_csv, comparison_lines, comparison_markdown
-    from .run import FLATTENED, READ, Console
+    from .run import Console
 
     flags = pop_flags(given, CompareFlags)
     refuse(context, [(flags.paper, declarations(FindOptions), "--paper fixes the cones")])
@@ -77,12 +77,12 @@ def compare(
             source = read_joined(mesh, weld)
         if flags.output is not None:
             open_folder(flags.output, COMPARED)
-        with console.stage("compare", READ):
+        with console.stage("compare", console.READ):
             found = compare_methods(
                 source.mesh,
                 methods=methods,
                 peers=() if flags.no_peers else None,
-                progress=console.part(READ, FLATTENED),
+                progress=console.part(),
                 **source.map_options(options),
             )
         console.say(f"note: {note}" for note in source.notes())
@@ -91,7 +91,7 @@ def compare(
             raise MetricError(f"no method found a layout: {why}")
         written: list[Path] = []
         if flags.output is not None:
-            with console.stage("draw", FLATTENED):
+            with console.stage("draw"):
                 texts = comparison_markdown(found), comparison_csv(found)
                 pictures = draw_layouts(found), draw_qualities(found, sight)
                 written = write_folder(flags.output, dict(zip(COMPARED, (*texts, *pictures), strict=True)))

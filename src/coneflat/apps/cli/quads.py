@@ -67,7 +67,7 @@ def quads(
     from ..quads.files import check_grid_output, check_quads_output
     from ..quads.page import page_of_quads
     from ..view import check_page, write_page
-    from .run import FLATTENED, READ, Console, require_distinct, write_report
+    from .run import Console, require_distinct, write_report
 
     _check_combinations(context, mesh)
     flags, options = pop_flags(given, QuadFlags), keywords(given, QuadOptions)
@@ -87,11 +87,11 @@ def quads(
         grid_map = _read_grid(mesh, console, options, weld)
         found = measures = None
         if output is not None or view is not None:
-            found = find_quads(grid_map, progress=console.part(READ, FLATTENED), **rounds)
+            found = find_quads(grid_map, progress=console.part(), **rounds)
             console.seconds.update(found.seconds)
-            with console.stage("measure", FLATTENED):
+            with console.stage("measure"):
                 measures = measure_quads(found)
-        with console.stage("write", FLATTENED):
+        with console.stage("write"):
             if grid is not None:
                 grid_map.save(grid)
             if found is not None and output is not None:
@@ -134,13 +134,12 @@ def _read_grid(mesh: Path, console: Console, options: dict[str, Any], weld: bool
     from ... import integer_grid
     from ...io import read_joined
     from ..quads.files import read_grid
-    from .run import FLATTENED, READ
 
     with console.stage("read", 0.0):
         if mesh.suffix.lower() == ".npz":
             return read_grid(mesh)
         joined = read_joined(mesh, weld)
-    found = integer_grid(joined.mesh, progress=console.part(READ, FLATTENED), **joined.map_options(options))
+    found = integer_grid(joined.mesh, progress=console.part(), **joined.map_options(options))
     console.seconds.update(found.seconds)
     return replace(found, notes=joined.all_notes(found.notes))
 

@@ -28,12 +28,8 @@ from .shared import QUIET, VERBOSE, repair_keywords
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-READ, FLATTENED = 0.03, 0.92
-"""Approximate fractions of all work that are completed when the mesh has been read, and when it is flattened."""
-
 AGAIN = "--again flattens the mesh again"
 
-INTERVAL = 1.0  # Seconds between lines of progress, and before the first one.
 #: The rows that are always printed, in this order; the others are printed if verbose.
 FIRST_ROWS = (
     "charts",
@@ -56,6 +52,11 @@ class Console:
     Attributes:
         seconds: wall time of each stage.
     """
+
+    #: Approximate fractions of all work that are completed when the mesh has been read, and when it is flattened.
+    READ, FLATTENED = 0.03, 0.92
+    #: Seconds between lines of progress, and before the first one.
+    INTERVAL = 1.0
 
     def __init__(self, verbosity: str | None = None) -> None:
         self.quiet, self.verbose = verbosity == QUIET, verbosity == VERBOSE
@@ -96,7 +97,7 @@ class Console:
             return
         with self._lock:
             self._current = (stage, fraction)
-            if not self.quiet and (self.verbose or self.elapsed - self._last_line > INTERVAL):
+            if not self.quiet and (self.verbose or self.elapsed - self._last_line > self.INTERVAL):
                 self._print_progress()
 
     def _print_progress(self) -> None:
@@ -106,18 +107,18 @@ class Console:
 
     def _repeat_progress(self) -> None:
         """Print the progress again if nothing has been printed for a while."""
-        while not self._is_finished.wait(INTERVAL / 4):
+        while not self._is_finished.wait(self.INTERVAL / 4):
             with self._lock, suppress(OSError, ValueError):  # The reader may have closed the stream.
-                late = self.elapsed - self._last_line > (2 * INTERVAL if self._last_line else INTERVAL)
+                late = self.elapsed - self._last_line > self.INTERVAL * (1 + bool(self._last_line))
                 if late and self._current[0] and not self._is_finished.is_set():
                     self._print_progress()
 
-    def part(self, begin: float, end: float) -> Listener:
+    def part(self, begin: float = READ, end: float = FLATTENED) -> Listener:
         """Return a listener for a part of the work, from fraction `begin` to fraction `end` of all work."""
         return lambda stage, fraction: self.progress(stage, begin + (end - begin) * fraction)
 
     @contextmanager
-    def stage(self, name: str, done: float) -> Iterator[None]:
+    def stage(self, name: str, done: float = FLATTENED) -> Iterator[None]:
         """Show and time a stage; `done` is the completed fraction of all work at its beginning."""
         self._stages.done = done
         with self._stages(name):
@@ -228,7 +229,7 @@ def open_result(
     if not again and has_uv(source.mesh):
         from ..view import own_flattening
 
-        with console.stage("measure", READ):
+        with console.stage("measure", console.READ):
             own = own_flattening(source, strict=not repair)
         if own is not None:
             return replace(own, notes=(f"The UVs of {file.name} are shown; {AGAIN}.", *own.notes))
@@ -257,7 +258,7 @@ def flatten_joined(
     source: Joined, console: Console, options: Mapping[str, Any], by: Callable[..., Flattening] = flatten
 ) -> Flattening:
     """Flatten a mesh that has been read, show the progress, and return the result."""
-    result = by(source.mesh, progress=console.part(READ, FLATTENED), **source.map_options(options))
+    result = by(source.mesh, progress=console.part(), **source.map_options(options))
     console.seconds.update(result.seconds)
     return replace(result, notes=source.all_notes(result.notes))
 
@@ -275,7 +276,7 @@ def save(
 
     stdout: stream to write to instead of `output`, in the format given by `ending`.
     """
-    with console.stage("write", FLATTENED):
+    with console.stage("write"):
         if stdout is None:
             result = write_measured(result, output, texture)
         else:

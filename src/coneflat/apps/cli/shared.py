@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from enum import IntEnum
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -23,8 +24,15 @@ BRIEF = (*RARE, "distortion", "cone_count", "stretch", "seams", "sharp_angle", "
 RARE_TITLE = "Less common options (all details: docs/reference/command-line.md)"
 #: Titles of groups of options in the help.
 GROUPS = ("Texture", "Quads", "Cones", "Metric", "Seams", "Atlas", "Input", "Output", RARE_TITLE)
-#: Exit code if a condition of `--require` is not met.
-NOT_MET = 3
+
+
+class ExitCode(IntEnum):
+    """Exit codes of the commands."""
+
+    INTERNAL_ERROR = 1
+    USER_ERROR = 2
+    NOT_MET = 3  # a condition of --require
+    SIGNALLED = 128  # to which the number of the signal is added, as shells do
 
 
 class Grouped(click.Option):
@@ -117,13 +125,13 @@ require_option = click.option(
     "required",
     metavar="MEASURE=VALUE",
     multiple=True,
-    help=f"Exit with code {NOT_MET} if the report does not meet this condition; examples: flipped=0,overlap=0 and "
-    "qc_mean<=1.05; also <, >, >=.",
+    help=f"Exit with code {ExitCode.NOT_MET} if the report does not meet this condition; examples: flipped=0,overlap=0 "
+    "and qc_mean<=1.05; also <, >, >=.",
 )
 
 
 def check_required(requirements: Iterable[Requirement], measures: dict[str, Any], written: str = "") -> None:
-    """Print the requirements that are not met, if any, and exit with code NOT_MET.
+    """Print the requirements that are not met, if any, and exit with code `ExitCode.NOT_MET`.
 
     written: name of the file that has been written nevertheless.
     """
@@ -136,7 +144,7 @@ def check_required(requirements: Iterable[Requirement], measures: dict[str, Any]
         click.echo(f"coneflat: not met: {line}", err=True)
     if written:
         click.echo(f"coneflat: {written} is written nevertheless", err=True)
-    raise click.exceptions.Exit(NOT_MET)
+    raise click.exceptions.Exit(ExitCode.NOT_MET)
 
 
 QUIET, VERBOSE = "quiet", "verbose"

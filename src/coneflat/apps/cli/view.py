@@ -73,7 +73,7 @@ def view(
     from ..quads.files import holds_quads, read_quads
     from ..quads.page import page_of_quads
     from ..view import check_page, open_page, own_quantity, page_html, write_page
-    from .run import FLATTENED, Console, archive_path, open_result
+    from .run import Console, archive_path, open_result
 
     # Errors that writing would raise are reported before the work starts.
     flags = pop_flags(given, ViewFlags)
@@ -88,11 +88,11 @@ def view(
                 raise click.UsageError("--color has no effect on quads: leave it out")
             with console.stage("read", 0.0):
                 quads = read_quads(file)
-            with console.stage("page", FLATTENED):
+            with console.stage("page"):
                 text = page_of_quads(quads, **look)
         else:
             result = open_result(file, console, again=again, repair=repair, weld=weld)
-            with console.stage("page", FLATTENED):
+            with console.stage("page"):
                 if color is not None:
                     look["color"] = own_quantity(result, color, archive_path(file))
                 text = page_html(result, **look)

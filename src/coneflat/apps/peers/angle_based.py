@@ -22,7 +22,7 @@ from ...layout import fit_shapes, shapes_of_angles
 from ...linalg import factorize
 from ...mesh import NEXT, PREVIOUS
 from ...stages import ConeSolution, Cut, Embedding, FlatMetric, SolveStatistics
-from .shared import embedding_metric
+from .disk_maps import embedding_metric
 
 # Lower bound of angles, radians: those of needles can be rounded to 0, but their logs and relative squares must be
 # finite.

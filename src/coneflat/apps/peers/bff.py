@@ -11,7 +11,7 @@ from ...geometry import angle_defect, corner_angles, cotangent_laplacian, cotang
 from ...layout import closed_chain
 from ...metric import linear_flat_metric
 from ...stages import ConeSolution, Cut, Embedding, FlatMetric
-from .shared import embedding_metric
+from .disk_maps import embedding_metric
 
 # Largest relative change of lengths, root mean square, for which both sides of a seam get equal lengths. Equal lengths
 # have little effect on the gap of the curve if the two sides are nearly parallel; they then get separate lengths.

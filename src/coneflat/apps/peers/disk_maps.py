@@ -1,6 +1,8 @@
-"""Maps of a disk that prescribe no cones: least squares conformal maps."""
+"""Methods that map the cut mesh directly: their metric, and least squares conformal maps, which prescribe no cones."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -11,7 +13,6 @@ from ...errors import MetricError
 from ...geometry import corner_angles, double_areas
 from ...layout import far_pins, pinned_least_squares
 from ...stages import ConeSolution, Cut, Embedding, FlatMetric
-from .shared import embedding_metric
 
 
 def least_squares_map(mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution) -> FlatMetric:
@@ -81,3 +82,32 @@ def conformal_equations(mesh: TriangleMesh, lengths: FloatArray) -> csr_matrix:
     sides = lengths * np.exp(1j * directions) / np.sqrt(2 * areas)[:, None]
     rows = np.repeat(np.arange(len(sides)), 3)
     return csr_matrix((sides.ravel(), (rows, mesh.faces.ravel())), shape=(len(sides), len(mesh.vertices)))
+
+
+def embedding_metric(
+    mesh: TriangleMesh,
+    lengths: FloatArray,
+    solution: ConeSolution,
+    embed: Callable[[Cut], Embedding],
+    has_target_cones: bool = True,
+) -> FlatMetric:
+    """Return the metric object of a method that maps the cut mesh directly; its boundary is free.
+
+    Args:
+        mesh: a connected mesh.
+        lengths: (m, 3) side lengths.
+        solution: the cones and their curvatures.
+        embed: maps the cut mesh.
+        has_target_cones: whether the method prescribes the cones' curvatures.
+    """
+    return FlatMetric(
+        mesh=mesh,
+        lengths=lengths,
+        cones=solution.cones,
+        target=solution.target,
+        log_scale=solution.log_scale,
+        is_open=mesh.is_boundary_vertex,
+        is_fixed=np.zeros(len(mesh.vertices), dtype=bool),
+        embed=embed,
+        has_target_cones=has_target_cones,
+    )

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
-from ... import Flattening, TriangleMesh, measure
+from ... import Flattening, TriangleMesh
 from ...base import FloatArray
 from ...errors import MetricError
 from ...geometry import double_areas, edge_lengths, signed_double_areas
-from ...mesh import uv_seams
+from ...io import as_uv_mesh
+from ..view import uv_flattening
 
 
 @dataclass(frozen=True)
@@ -54,36 +55,7 @@ def run_peer(name: str, base: Flattening) -> tuple[Flattening, float]:
     seconds = time.perf_counter() - start
     if corner_uv.shape != (len(base.faces), 3, 2) or not np.isfinite(corner_uv).all():
         raise MetricError(f"{name} did not return a finite map of all {len(base.faces):,} triangles")
-    return with_uv(base, corner_uv), seconds
-
-
-def with_uv(base: Flattening, corner_uv: FloatArray) -> Flattening:
-    """Return a flattening of the same mesh with other UVs and no cones."""
-    low = corner_uv.min(axis=(0, 1))
-    unit = (corner_uv - low) / max(float((corner_uv.max(axis=(0, 1)) - low).max()), np.finfo(np.float64).tiny)
-    at_vertex = np.column_stack([base.faces.ravel(), unit.reshape(-1, 2)])
-    rows, index = np.unique(at_vertex, axis=0, return_inverse=True)
-    mesh = TriangleMesh(base.vertices, base.faces)
-    return replace(
-        base,
-        uv=rows[:, 1:],
-        uv_faces=index.reshape(-1, 3),
-        uv_scale=float("nan"),
-        cones=base.cones[:0],
-        curvatures=base.curvatures[:0],
-        log_scale=np.full(len(base.vertices), np.nan),
-        curvature_residual=np.full(len(base.vertices), np.nan),
-        seams=mesh.edges[uv_seams(mesh, unit)],
-        packing_efficiency=_covered(unit),
-        distortion=measure(mesh, unit),
-        notes=(),
-        rotations=None,
-    )
-
-
-def _covered(corner_uv: FloatArray) -> float:
-    """Return the sum of the areas of the triangles in the plane."""
-    return float(np.abs(signed_double_areas(corner_uv)).sum() / 2)
+    return uv_flattening(as_uv_mesh(base.vertices, base.faces, corner_uv)), seconds
 
 
 def libigl_lscm(base: Flattening) -> FloatArray:
@@ -97,8 +69,8 @@ def libigl_lscm(base: Flattening) -> FloatArray:
         pins = np.array([0, int(np.argmax(((chart.vertices - chart.vertices[0]) ** 2).sum(axis=1)))])
         found: Any = igl.lscm(chart.vertices, chart.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))
         uv = np.asarray(found[0] if isinstance(found, tuple) else found, dtype=np.float64)[chart.faces]
-        space = float(double_areas(edge_lengths(chart.vertices, chart.faces)).sum()) / 2
-        uv *= np.sqrt(space / _covered(uv))
+        space = double_areas(edge_lengths(chart.vertices, chart.faces)).sum()
+        uv *= np.sqrt(space / np.abs(signed_double_areas(uv)).sum())
         corner_uv[faces] = uv + np.array([right - uv[..., 0].min(), 0.0])
         right += float(np.ptp(uv[..., 0]))
     return corner_uv

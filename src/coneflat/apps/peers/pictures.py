@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from ... import Flattening
 
 DPI = 200.0
-TALLEST = 2.4  # inches
-IN_A_ROW = 5
 
 
 @dataclass(frozen=True)
@@ -137,11 +135,11 @@ def figure_of(rows: Sequence[view.Row], *, marks_of: Flattening | None = None) -
 
 
 def in_rows(panels: Sequence[view.Panel], quantities: Sequence[view.Quantity] = ()) -> list[view.Row]:
-    """Return panels in rows of `IN_A_ROW`."""
-    wide = [panel.fit_label(TALLEST) for panel in panels]
-    return [
-        view.Row(wide[k : k + IN_A_ROW], quantities, tallest=TALLEST) for k in range(0, len(wide), IN_A_ROW)
-    ]
+    """Return panels in rows of about equal numbers, at most five."""
+    tallest = 2.4  # inches
+    wide = [panel.fit_label(tallest) for panel in panels]
+    rows = np.array_split(np.arange(len(wide)), -(-len(wide) // 5))
+    return [view.Row([wide[k] for k in row], quantities, tallest) for row in rows]
 
 
 def open_folder(folder: Path, names: Iterable[str]) -> None:

@@ -100,7 +100,9 @@ def compare_methods(
         OptionError: a method or peer is unknown or not installed.
         MeshError: the mesh cannot be flattened, or no cones were found.
     """
-    methods = known_methods(methods)
+    for name in methods or ("",):
+        if name not in METHODS:
+            raise OptionError(f"unknown method {name!r}: choose from {', '.join(METHODS)}")
     chosen = installed_peers() if peers is None else tuple(dict.fromkeys(peers))
     for name in chosen:
         if name not in installed_peers():
@@ -109,7 +111,7 @@ def compare_methods(
                 if name not in PEERS
                 else f"{name} is not installed"
             )
-    names = [*methods, *chosen]
+    names = [*dict.fromkeys(methods), *chosen]
 
     def report(what: str, done: int) -> None:
         if progress is not None:
@@ -141,19 +143,6 @@ def compare_methods(
             entries.append(Entry(name, None, math.nan, " ".join(str(error).split())))
     named = mesh.path if isinstance(mesh, MeshFile) else mesh if isinstance(mesh, (str, PathLike)) else None
     return Comparison("mesh" if named is None else str(named), len(base.faces), tuple(entries))
-
-
-def known_methods(names: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of methods without repetitions.
-
-    Raises:
-        OptionError: a name is unknown, or there are no names.
-    """
-    names = tuple(dict.fromkeys(names))
-    for name in names or ("",):
-        if name not in METHODS:
-            raise OptionError(f"unknown method {name!r}: choose from {', '.join(METHODS)}")
-    return names
 
 
 def _with_cones(mesh: Any, faces: ArrayLike | None, base: Flattening) -> tuple[Any, ArrayLike | None]:

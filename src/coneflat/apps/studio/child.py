@@ -30,8 +30,6 @@ from .messages import angle_warning, page_message, with_warnings
 from .outputs import bad_places, curve_data, quads_file, repaired, result_file, without_layout
 from .worker import Head, read_frame, write_frame
 
-#: Number of polygons from which on a preview is shown; for smaller meshes the final layout is as fast.
-EARLY_POLYGONS = 20_000
 #: The text that stands for unknown numbers, and the title of the preview.
 PLACEHOLDER = "…"
 BARE_TITLE = "No layout"
@@ -84,8 +82,8 @@ class JobRunner:
         result: result of the last flattening; None if it has failed.
     """
 
-    def __init__(self, early_from: int = EARLY_POLYGONS) -> None:
-        """early_from: number of polygons from which on a preview is shown."""
+    def __init__(self, early_from: int = 20_000) -> None:
+        """early_from: number of polygons from which on a preview is shown; for fewer the final layout is as fast."""
         self.result: Flattening | None = None
         self._early_from = early_from
         self._source: Joined | None = None

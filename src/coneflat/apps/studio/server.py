@@ -165,9 +165,7 @@ def studio_app(session: Session, token: str, port: int, **access: bool) -> ASGIA
             Route("/mesh", upload, methods=["POST"]),
             Route("/sample", sample, methods=["POST"]),
         ],
-        exception_handlers=dict.fromkeys(
-            (ConeflatError, ValueError, RecursionError, TooLarge, ClientDisconnect), _refused
-        ),
+        exception_handlers=dict.fromkeys(REFUSED, _refused),
     )
     return Guard(app, token, port, **access)
 

@@ -333,11 +333,6 @@ class Session:
         with self._changed:
             self._notify()
 
-    @property
-    def worker_process(self) -> int | None:
-        """Return the id of the worker process."""
-        return self._worker.process_id
-
     # Messages of the worker.
 
     def _on_message(self, head: Head, body: bytes) -> None:

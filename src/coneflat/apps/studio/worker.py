@@ -62,12 +62,6 @@ class Worker:
         process = self._process
         return process is not None and process.poll() is None
 
-    @property
-    def process_id(self) -> int | None:
-        """Return the id of the process; None if there is none."""
-        process = self._process
-        return None if process is None else process.pid
-
     def _started(self) -> subprocess.Popen[bytes]:
         if self._process is None or self._process.poll() is not None:
             try:

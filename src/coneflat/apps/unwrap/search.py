@@ -24,25 +24,24 @@ from ...seams import seam_costs
 from ...source import Part
 from ...stages import Cut, Layout, Surface, VertexCurvatures
 from .free import ISOMETRIC, freed, seam_edges
-from .tips import find_tips, moved_tips, moves_for
+from .tips import RINGS, find_tips, moved_tips, moves_for
 
-# The area distortion of the first candidate, and the maximum number of candidates: half as many for meshes with more
-# than MANY_TRIANGLES, for which each takes seconds.
-FIRST_DISTORTION, MAX_CANDIDATES, MANY_TRIANGLES = 0.25, 5, 200_000
-# Factors of the distortion from one candidate to the next.
-MIN_FACTOR, MAX_FACTOR = 1.15, 4.0
-# Number of candidates whose tips are moved if none of the moves before was within the bound, and of moves for each.
-MAX_MOVED, MAX_MOVES = 2, 4
+# The area distortion of the first candidate, and the maximum number of candidates.
+FIRST_DISTORTION, MAX_CANDIDATES = 0.25, 5
+# The first candidate within the bound is taken for parts with more triangles, as each candidate takes seconds, and for
+# parts with less than this share of the area.
+MANY_TRIANGLES, MINOR_SHARE = 200_000, 0.002
+# Least factor of the distortion from one candidate to the next.
+MIN_FACTOR = 1.15
+# Number of times that tips are moved to meet the bound, and that a layout is settled to avoid contacts.
+MAX_TRIES = 4
 # Candidates whose energy exceeds that of an isometry by more than this factor of what is allowed are given up.
 REACH = 2.0
 # Cost of seams that lowers the energy to that of an isometry, relative to the square root of the area.
 COST_PER_ENERGY = 0.6
-# Candidates above the bound by less than this fraction of what is allowed may be within it once they are settled.
-NEARLY = 0.02
-# Tolerance of the energies of candidates, see `relax`.
+# Tolerance of the energies of candidates, see `relax`. Those above the bound by less than twice as much may be within
+# it once they are settled.
 TOLERANCE = 1e-2
-# Where charts would touch themselves, this many rings of triangles stay, and after so many tries all.
-CONTACT_RINGS, MAX_CONTACTS = 4, 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +68,12 @@ class CutSearch:
         part: a connected part of the input.
         max_energy: largest symmetric Dirichlet energy.
         method: how the part is laid out.
+        share: its share of the area of all parts.
     """
 
-    def __init__(self, part: Part, max_energy: float, method: Method) -> None:
+    def __init__(self, part: Part, max_energy: float, method: Method, share: float = 1.0) -> None:
         self._part, self._max_energy = part, max_energy
+        self._is_quick = share < MINOR_SHARE or len(part.faces) > MANY_TRIANGLES
         self._method = replace(method, surface_of=self._surface_of)
         self._surface: Surface | None = None
         self._costs = seam_costs(part.mesh, part.lengths, part.seams)
@@ -86,8 +87,10 @@ class CutSearch:
         found = self._by_distortion()
         near = [one for one in found if one.energy <= self._reach]
         if near:
-            for one in sorted(near, key=self._expected_cost)[:MAX_MOVED]:
+            for one in sorted(near, key=self._expected_cost)[:2]:
                 found.append(self._settled(one))
+                if self._is_quick:
+                    break
                 for moved in self._moved(found[-1]):
                     found.append(self._settled(moved))
                     if found[-1].energy <= self._max_energy:
@@ -110,8 +113,7 @@ class CutSearch:
         """Return candidates with energies around the bound."""
         found, distortion = list[Candidate](), FIRST_DISTORTION
         allowed = self._max_energy - ISOMETRIC
-        is_large = len(self._part.faces) > MANY_TRIANGLES
-        for _ in range(MAX_CANDIDATES // 2 if is_large else MAX_CANDIDATES):
+        for tried in range(2 * MAX_CANDIDATES):
             spec = replace(self._part.cones, distortion=distortion)
             layout = lay_out_part(replace(self._part, cones=spec), self._method)
             same = [i for i, each in enumerate(found) if np.array_equal(each.layout.cones, layout.cones)]
@@ -126,16 +128,19 @@ class CutSearch:
             low = max(within, key=lambda each: each.distortion, default=None)
             high = min(beyond, key=lambda each: each.distortion, default=None)
             if low and (
-                not len(low.layout.seams) or (high and len(low.layout.cones) <= len(high.layout.cones) + 1)
+                self._is_quick
+                or tried >= MAX_CANDIDATES - 1
+                or not len(low.layout.seams)
+                or (high and len(low.layout.cones) <= len(high.layout.cones) + 1)
             ):
                 break
             if low and high:
                 distortion = float(np.sqrt(low.distortion * high.distortion))
             else:
                 # The energy above that of an isometry is about a multiple of the square of the distortion.
-                factor = np.sqrt(allowed / max(one.energy - ISOMETRIC, 1e-9 * allowed))
-                factor = max(factor, MIN_FACTOR) if factor > 1 else min(factor, 1 / MIN_FACTOR)
-                distortion *= float(np.clip(factor, 1 / MAX_FACTOR, MAX_FACTOR))
+                above = float(np.clip(one.energy - ISOMETRIC, allowed / 16, allowed * 16))
+                factor = np.sqrt(allowed / above)
+                distortion *= max(factor, MIN_FACTOR) if factor > 1 else min(factor, 1 / MIN_FACTOR)
         return found
 
     def _candidate(self, layout: Layout, distortion: float) -> Candidate:
@@ -153,13 +158,13 @@ class CutSearch:
     def _settled(self, one: Candidate) -> Candidate:
         """Return a candidate with the least energy without overlaps: its separating cuts are free, too."""
         is_free = np.ones(len(one.layout.points), dtype=bool)
-        for _ in range(MAX_CONTACTS):
+        for _ in range(MAX_TRIES):
             layout, energy = freed(one.layout, is_free)
             pairs = find_overlaps(side_by_side(layout).points[layout.corners]).pairs
             if not (len(pairs) and self._method.separates):
                 return replace(one, layout=layout, energy=energy)
             # Points where charts would touch themselves stay.
-            for _ in range(CONTACT_RINGS):
+            for _ in range(RINGS):
                 is_near = np.zeros(len(is_free), dtype=bool)
                 is_near[layout.corners[pairs]] = True
                 pairs = np.flatnonzero(is_near[layout.corners].any(axis=1))
@@ -180,7 +185,7 @@ class CutSearch:
         slack, allowed = self._max_energy - start.energy, self._max_energy - ISOMETRIC
         # For each slack that was requested, the energy above the bound.
         tried = list[tuple[float, float]]()
-        for _ in range(MAX_MOVES):
+        for _ in range(MAX_TRIES):
             moves = moves_for(start.layout, tips, slack)
             layout = self._with_tips(*moved_tips(start.layout, seams, tips, moves))
             if layout is None:
@@ -188,9 +193,9 @@ class CutSearch:
             one = self._candidate(layout, start.distortion)
             excess = one.energy - self._max_energy
             tried.append((slack, excess))
-            if excess <= NEARLY * allowed:
+            if excess <= 2 * TOLERANCE * allowed:
                 found.append(one)
-            if abs(excess) <= NEARLY * allowed:
+            if abs(excess) <= 2 * TOLERANCE * allowed:
                 break
             low = max((pair for pair in tried if pair[1] <= 0), default=None)
             high = min((pair for pair in tried if pair[1] > 0), default=None)
@@ -198,7 +203,7 @@ class CutSearch:
                 part = float(np.clip(low[1] / (low[1] - high[1]), 0.2, 0.8))
                 slack = low[0] + part * (high[0] - low[0])
             else:
-                slack -= np.sign(excess) * max(abs(excess), NEARLY * allowed) * len(tried)
+                slack -= np.sign(excess) * max(abs(excess), 2 * TOLERANCE * allowed) * len(tried)
         return sorted(found, key=lambda one: one.cost)
 
     def _with_tips(self, seams: IntArray, cones: IntArray) -> Layout | None:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import Flattening
@@ -13,6 +14,7 @@ from ...base import Stopwatch, limit_threads, plural
 from ...errors import OptionError
 from ...evaluate import evaluate
 from ...flatten import Method, with_copies
+from ...geometry import double_areas
 from ...io import as_input
 from ...metric import find_metric
 from ...options import Options, declarations, read_options, takes
@@ -65,13 +67,14 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         prepared = source.prepared(shared)
     method = Method(RelaxSpec("off", 0.0), o.charts == "atlas", None, Stopwatch(), Surface.of, find_metric)
     parts, found, energies = prepared.parts, dict[int, Layout](), list[float]()
+    areas = np.array([double_areas(part.lengths).sum() for part in parts])
     with limit_threads(o.threads):
         copies = find_copies(parts)
         for i, part in enumerate(parts):
             if copies[i] is None:
                 watch.share = 0.9 * len(part.faces) / len(prepared.checked.mesh.faces)
                 with watch("search", 1.0):
-                    best = CutSearch(part, o.max_energy, method).best()
+                    best = CutSearch(part, o.max_energy, method, areas[i] / areas.sum()).best()
                 found[i] = best.layout
                 energies.append(best.energy)
                 watch.end_component()
