@@ -53,8 +53,8 @@ def main() -> None:
             rows[package].append(values)
             energy, std, flipped, overlaps, charts, seams, share, _ = values
             print(
-                f"| {name} | {len(mesh.faces):,} | {package} | {energy:.3f} | {std:.3f} | {flipped:.0f} | {overlaps:.0f} "
-                f"| {charts:.0f} | {seams:.2f} | {share:.3f} | {seconds:.2f} |",
+                f"| {name} | {len(mesh.faces):,} | {package} | {energy:.3f} | {std:.3f} | {flipped:.0f} | "
+                f"{overlaps:.0f} | {charts:.0f} | {seams:.2f} | {share:.3f} | {seconds:.2f} |",
                 flush=True,
             )
             if arguments.save and package == "coneflat":
@@ -86,8 +86,8 @@ def summarize(rows: dict[str, list[tuple[float, ...]]]) -> None:
         )
         if package != "coneflat":
             print(
-                f"| | | | | | | {charts.sum() / ours[:, 4].sum():.1f} times | {seams.sum() / ours[:, 5].sum():.2f} times "
-                f"| less on {(share < ours[:, 6]).sum()} | slower on {(seconds > ours[:, 7]).sum()} |"
+                f"| | | | | | | {charts.sum() / ours[:, 4].sum():.1f} times | "
+                f"{seams.sum() / ours[:, 5].sum():.2f} times | less on {(share < ours[:, 6]).sum()} | slower on {(seconds > ours[:, 7]).sum()} |"
             )
 
 

@@ -63,15 +63,9 @@ def main() -> NoReturn:
     except click.ClickException as error:
         code = _fail(f"{error.format_message()}{_hint(error)}", ExitCode.USER_ERROR)
     except ConeflatError as error:
-<<<<<<< HEAD
-        code = _fail(str(error), USER_ERROR)
+        code = _fail(str(error), ExitCode.USER_ERROR)
     except (KeyboardInterrupt, click.exceptions.Abort):
         code = _fail_interrupted(received)
-=======
-        code = _fail(str(error), ExitCode.USER_ERROR)
-    except (KeyboardInterrupt, click.exceptions.Abort) as error:
-        code = _fail_interrupted(error)
->>>>>>> peers
     except BrokenPipeError:
         # The reader of the output has ended, as in `coneflat ... | head`. The shutdown must not print an error.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -116,19 +110,9 @@ def _open_streams() -> None:
         sys.stdout = open(own, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)  # noqa: SIM115
 
 
-<<<<<<< HEAD
 def _fail_interrupted(received: list[int]) -> int:
-    return _fail("interrupted; no incomplete file was left", SIGNALLED + (received or [signal.SIGINT])[0])
-=======
-def _interrupt(number: int, _: FrameType | None) -> NoReturn:
-    raise KeyboardInterrupt(number)
-
-
-def _fail_interrupted(error: BaseException) -> int:
-    cause = error if isinstance(error, KeyboardInterrupt) else error.__cause__ or error.__context__ or error
-    number = cause.args[0] if isinstance(cause, KeyboardInterrupt) and cause.args else signal.SIGINT
+    number = (received or [signal.SIGINT])[0]
     return _fail("interrupted; no incomplete file was left", ExitCode.SIGNALLED + number)
->>>>>>> peers
 
 
 def _fail(message: str, code: int) -> int:

@@ -21,11 +21,10 @@ RELATIVE_ROUNDING = 1e-12
 MIN_PROGRESS = 1e-3
 # Maximum fraction of the distance per step if seams and sides have to rotate: with longer steps, sides fold over.
 TURNING_STRIDE = 0.1
-# Factor by which more unknowns than there are count for the choice of the solver, since matrices of one pattern are
+# If less than this fraction of the unknowns is in parts that have not converged, only these parts are continued. And
+# factor by which more unknowns than there are count for the choice of the solver, since matrices of one pattern are
 # factorized repeatedly: with 6,000 unknowns this halves the time.
-REPEATED = 6
-# If less than this fraction of the unknowns is in parts that have not converged, only these parts are continued.
-MIN_ACTIVE_SHARE = 0.6
+MIN_ACTIVE_SHARE, REPEATED = 0.6, 6
 
 
 @dataclass(frozen=True, eq=False)
