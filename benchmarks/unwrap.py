@@ -85,9 +85,10 @@ def summarize(rows: dict[str, list[tuple[float, ...]]]) -> None:
             f"{seconds.sum():.1f} |"
         )
         if package != "coneflat":
+            times = charts.sum() / ours[:, 4].sum(), seams.sum() / ours[:, 5].sum()
+            fewer, slower = (share < ours[:, 6]).sum(), (seconds > ours[:, 7]).sum()
             print(
-                f"| | | | | | | {charts.sum() / ours[:, 4].sum():.1f} times | "
-                f"{seams.sum() / ours[:, 5].sum():.2f} times | less on {(share < ours[:, 6]).sum()} | slower on {(seconds > ours[:, 7]).sum()} |"
+                f"| | | | | | | {times[0]:.1f} times | {times[1]:.2f} times | less: {fewer} | slower: {slower} |"
             )
 
 

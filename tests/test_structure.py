@@ -33,7 +33,7 @@ CEILINGS = {
     "apps": 0,
     "apps.ahead": 37,
     "apps.batch": 398,
-    "apps.cli": 1530,
+    "apps.cli": 1529,
     "apps.measure_uv": 160,
     "apps.peers": 669,
     "apps.quads": 3248,
@@ -63,7 +63,7 @@ CEILINGS = {
     "xatlas": 2,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_856, 236, 25_901
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_856, 236, 25_900
 CONSTANTS, KERNELS, NAMES, LEVELS = 295, 110, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -162,8 +162,7 @@ def _flatten_and_save(
 
     requirements = parse_requirements(required, REPORTED)
     ending = f".{flags.format or 'obj'}"
-    named = PIPE if mesh == PIPE else Path(f"{mesh.stem}_uv{ending}")
-    output = named if flags.output is None else flags.output
+    output = flags.output or (PIPE if mesh == PIPE else Path(f"{mesh.stem}_uv{ending}"))
     if flags.format is not None and output.suffix.lower() not in ("", ending):
         raise click.UsageError(f"{output} is not a {ending} file: leave out --format", context)
     # Errors that writing would raise are reported before the work starts.
