@@ -158,7 +158,7 @@ def letters() -> tuple[np.ndarray, np.ndarray]:
 
     vertices, faces = np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)
     for i, letter in enumerate("GEOMETRY"):
-        rings = [ring[:-1] for ring in TextPath((10 * i, 0), letter, size=12).to_polygons()]
+        rings = [np.asarray(ring)[:-1] for ring in TextPath((10 * i, 0), letter, size=12).to_polygons()]
         rings.sort(key=lambda ring: -np.ptp(ring, axis=0).prod())
         outer = Outline(rings[0])
         rings = [rings[0], *(ring for ring in rings[1:] if outer.contains_point(ring[0]))]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 import shapes
@@ -131,3 +133,18 @@ def test_the_types_of_xatlas(shared):
         "get_mesh_chart_count",
         "get_mesh_vertex_assignment",
     } | set(vars(ours.Atlas()))
+
+
+def test_call_sites_work_with_another_import(monkeypatch):
+    """Pipelines take UVs by `parametrize` and index the vertices by its mapping; trimesh imports xatlas itself."""
+    trimesh = pytest.importorskip("trimesh")
+    vertices, faces = shapes.sphere(2)
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    mapping, indices, uvs = ours.parametrize(mesh.vertices, mesh.faces)
+    textured = trimesh.Trimesh(mesh.vertices[mapping], indices, process=False)
+    textured.visual = trimesh.visual.TextureVisuals(uv=uvs)
+    np.testing.assert_array_equal(textured.triangles, mesh.triangles)
+    monkeypatch.setitem(sys.modules, "xatlas", ours)
+    unwrapped = mesh.unwrap()
+    np.testing.assert_allclose(unwrapped.triangles, mesh.triangles)
+    np.testing.assert_array_equal(unwrapped.visual.uv, uvs.astype(np.float64))

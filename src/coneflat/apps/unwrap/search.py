@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ... import TriangleMesh
 from ...atlas import separate_overlaps
 from ...base import FloatArray, IntArray
 from ...cones import close_search, find_cones
 from ...errors import CurvatureError, MetricError
-from ...flatten import Method, lay_out_part
+from ...flatten import Method, lay_out_once
 from ...geometry import find_overlaps, signed_double_areas
 from ...layout import lay_out
 from ...mesh import label_faces, open_along
@@ -74,8 +73,9 @@ class CutSearch:
     def __init__(self, part: Part, max_energy: float, method: Method, share: float = 1.0) -> None:
         self._part, self._max_energy = part, max_energy
         self._is_quick = share < MINOR_SHARE or len(part.faces) > MANY_TRIANGLES
-        self._method = replace(method, surface_of=self._surface_of)
-        self._surface: Surface | None = None
+        self._method = method
+        self._surface = Surface.of(part.mesh, part.lengths, part.is_exact)
+        self._surface.is_reused = True
         self._costs = seam_costs(part.mesh, part.lengths, part.seams)
 
     def best(self) -> Candidate:
@@ -97,9 +97,7 @@ class CutSearch:
                         break
                 if found[-1].energy <= self._max_energy:
                     break
-        if self._surface is not None:
-            close_search(self._surface)
-            self._surface = None
+        close_search(self._surface)
         within = [one for one in found if one.energy <= self._max_energy]
         if within:
             return min(within, key=lambda one: one.cost)
@@ -115,7 +113,8 @@ class CutSearch:
         allowed = self._max_energy - ISOMETRIC
         for tried in range(2 * MAX_CANDIDATES):
             spec = replace(self._part.cones, distortion=distortion)
-            layout = lay_out_part(replace(self._part, cones=spec), self._method)
+            # Cones that their triangles cannot hold are no problem for free seams.
+            layout, _ = lay_out_once(self._surface, self._part, spec, self._method)
             same = [i for i, each in enumerate(found) if np.array_equal(each.layout.cones, layout.cones)]
             one = (
                 replace(found.pop(same[0]), distortion=distortion)
@@ -209,8 +208,6 @@ class CutSearch:
     def _with_tips(self, seams: IntArray, cones: IntArray) -> Layout | None:
         """Return the layout with given cones that is cut along given edges; None if there is none."""
         mesh = self._part.mesh
-        if self._surface is None:
-            return None
         cones = cones[np.isin(cones, mesh.edges[seams])]
         given = VertexCurvatures(cones, np.full(len(cones), np.nan))
         spec = replace(self._part.cones, strategy="given", given=given)
@@ -224,12 +221,6 @@ class CutSearch:
         if not (signed_double_areas(layout.points[layout.corners]) > 0).all():
             return None
         return replace(layout, chart=label_faces(cut.mesh.faces, len(cut.origin))[1])
-
-    def _surface_of(self, mesh: TriangleMesh, lengths: FloatArray, flips: bool) -> Surface:
-        if self._surface is None:
-            self._surface = Surface.of(mesh, lengths, flips)
-            self._surface.is_reused = True
-        return self._surface
 
 
 def side_by_side(layout: Layout) -> Layout:

@@ -88,6 +88,6 @@ def _notes(energies: Sequence[float], bound: float) -> Iterator[str]:
     above = [energy for energy in energies if energy > bound]
     if above:
         yield (
-            f"The energy of {plural(len(above), 'component')} is up to {max(above):.4g}, above the {bound:g} allowed: "
-            "refine the mesh, or allow more."
+            f"The energy of {plural(len(above), 'component')} is up to {max(above):.6g}, above the {bound:.6g} "
+            "allowed: refine the mesh, or allow more."
         )
