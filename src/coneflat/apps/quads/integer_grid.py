@@ -225,9 +225,7 @@ class _Search:
                 if (found := self._finer(split, given)) is None:
                     raise
                 result = found
-        if boundary == "straight":
-            with suppress(MetricError):
-                return self._with_notes(result, None, all_sides=True)
+        if boundary == "straight" and result.distortion.flipped + result.distortion.degenerate:
             result = self._finer(CHORDS, given) or result
         return self._with_notes(result, options, all_sides)
 
