@@ -195,7 +195,14 @@ def _argument(rng: Random, outcome: Outcome) -> None:
         return
     with outcome.guarded(expects_nan=True):
         result = _calls.function(name)(**arguments)
-    if name == "flatten" and result is not None and arguments["faces"] is _calls.good["flatten"]["faces"]:
+    # The result cannot be compared with a boundary that only the function could read.
+    is_read = "boundary" not in arguments or "boundary" in _plain(arguments)
+    if (
+        name == "flatten"
+        and is_read
+        and result is not None
+        and arguments["faces"] is _calls.good["flatten"]["faces"]
+    ):
         given = {key: value for key, value in arguments.items() if key not in ("mesh", "faces")}
         with outcome.guarded("checking: "):
             check(outcome, result, _plain(given), arguments["mesh"], arguments["faces"])

@@ -47,8 +47,8 @@ def main() -> NoReturn:
         received.append(number)
         raise Interrupted
 
-    for number in {signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)}:  # Windows has no SIGHUP.
-        if signal.getsignal(number) == signal.SIG_DFL:
+    for number in {1, 2, 15} & signal.valid_signals():  # SIGHUP, which Windows has not, SIGINT, SIGTERM
+        if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, interrupt)
     # Imports allocate half a million objects and no garbage. Garbage collection after every 700 objects, the
     # default, takes a tenth of the time of a short run.

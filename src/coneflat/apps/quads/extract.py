@@ -242,11 +242,12 @@ def _places_along(
         Positions that increase, at least one at each corner; None if the points do not run once around. Distances.
     """
     lengths = np.sqrt(dots(steps, steps))
-    both = np.stack([edge, edge - 1])
+    # Along a boundary of few edges, the nearest one need not be next to the nearest vertex.
+    both = np.stack([edge, edge - 1]) if len(steps) > 64 else np.arange(len(steps))[:, None] + 0 * edge
     share = np.clip(dots(points - starts[both], steps[both]) / lengths[both] ** 2, 0, 1)
     off = np.linalg.norm(starts[both] + share[..., None] * steps[both] - points, axis=2)
     ends, total = np.cumsum(lengths), lengths.sum()
-    at = np.where(off[0] <= off[1], *(ends[both] - lengths[both] * (1 - share)))
+    at = (ends[both] - lengths[both] * (1 - share))[off.argmin(axis=0), np.arange(len(points))]
     gaps = (np.roll(at, -1) - at + total / 2) % total - total / 2
     if abs(gaps.sum() - total) > total / 2:
         return None, off.min(axis=0)

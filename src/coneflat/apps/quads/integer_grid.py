@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import Flattening, TriangleMesh, check_mesh, flatten
-from ...base import DISTORTION, THREADS, Progress, Stopwatch, limit_threads, plural
+from ...base import DISTORTION, THREADS, Progress, Stopwatch, limit_threads, plural, unit_exponent
 from ...errors import ConeflatError, ConvergenceError, CurvatureError, GridError, MetricError, OptionError
 from ...io import as_input
 from ...layout import StretchEnergy
@@ -189,7 +189,10 @@ class _Search:
 
     def _checked(self) -> CheckedMesh:
         given, repair = as_input(self.mesh, self.faces), bool(self.options.get("repair", False))
-        return check_mesh(given.vertices, given.faces, repair=repair)
+        checked = check_mesh(given.vertices, given.faces, repair=repair)
+        exponent = -unit_exponent(checked.mesh.vertices)
+        mesh = checked.mesh.moved_to(np.ldexp(checked.mesh.vertices, exponent))
+        return replace(checked, mesh=mesh, exponent=exponent)
 
     def _finer(self, how: tuple[Split, str, str], given: dict[str, Any]) -> Flattening | None:
         """Return a flattening of a finer mesh with a note on the number of splits; None if there is none."""
@@ -222,9 +225,7 @@ class _Search:
                 if (found := self._finer(split, given)) is None:
                     raise
                 result = found
-        if boundary == "straight":
-            with suppress(MetricError):
-                return self._with_notes(result, None, all_sides=True)
+        if boundary == "straight" and result.distortion.flipped + result.distortion.degenerate:
             result = self._finer(CHORDS, given) or result
         return self._with_notes(result, options, all_sides)
 

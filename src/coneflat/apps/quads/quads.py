@@ -100,6 +100,7 @@ def _notes(found: QuadMesh) -> Iterator[str]:
             f"The Euler characteristic of the quads is {found.euler_characteristic}, that of the "
             f"surface {found.surface_euler}: leaving out squares has opened or split the mesh."
         )
-    flipped = int((least_jacobians(found.vertices, found.quads) <= 0).sum())
+    # An angle of 180 degrees is known up to rounding.
+    flipped = int((least_jacobians(found.vertices, found.quads) <= 1e-9).sum())
     if flipped:
         yield f"{plural(flipped, 'quad')} with an angle of 180 degrees or more: use more quads."
