@@ -152,3 +152,8 @@ def test_scale_motion_and_numbering_change_nothing():
     ]
     assert relative[1] == pytest.approx(relative[0], rel=1e-6)
     assert cut_for_packing([layout], [costs], GAP)[0].chart.tolist() == found.chart.tolist()
+
+
+def test_with_a_gap_that_leaves_no_space_nothing_is_cut():
+    layout, costs = layout_of(*grid(plus, 20))
+    assert cut_for_packing([layout, layout, layout], [costs] * 3, 0.6)[0] is layout

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ..base.progress import check_cancelled
+from ..errors import OptionError
 from ..linalg.shortest_paths import MultiGraph
 from ..mesh.charts import label_charts
 from ..mesh.connectivity import TriangleMesh
@@ -33,12 +34,9 @@ PRICE, SHARE = 0.1, 0.15
 MIN_PIECE, MAX_CHARTS = 0.02, 32
 # Points of a border between which cuts are searched. Cuts are alike if their ends are closer than NEAR of the border.
 SAMPLES, NEAR = 96, 0.06
-# Largest length of a cut relative to the square root of the area that it separates: it is 1.6 for half a disk.
-MAX_LENGTH = 2.0
 # Cuts tried per set of charts, sets continued per step, and steps without a gain after which the search ends.
 TRIED, CONTINUED, PATIENCE = 16, 3, 2
 QUICK = Effort(columns=128, tries=12)
-QUICK_TURNS = 8
 
 
 def cut_for_packing(layouts: Sequence[Layout], costs: Sequence[FloatArray], gap: float) -> list[Layout]:
@@ -90,7 +88,7 @@ class _Shape:
 
 @dataclass(frozen=True, eq=False)
 class _Cut:
-    """A cut of a piece in two.
+    """A cut of a piece.
 
     Attributes:
         piece: the piece.
@@ -195,7 +193,7 @@ class _Piece:
         smaller = np.minimum(part, self.shape.area - part)
         score = np.abs(loop[other] - loop[one]) / np.sqrt(np.maximum(smaller, self.least))
         order = np.argsort(score, kind="stable")
-        order = order[(smaller > self.least)[order] & (score < MAX_LENGTH)[order]]
+        order = order[smaller[order] > self.least]
         one, other, found = one[order], other[order], list[_Cut]()
         for _ in range(3 * TRIED):
             if not len(one) or len(found) == TRIED:
@@ -295,7 +293,7 @@ def _search(charts: Sequence[_Piece], area: float, budget: float, gap: float) ->
 
 
 def _covered(shapes: Sequence[_Shape], area: float, gap: float) -> float:
-    """Return about the fraction of a square that shapes of a total area cover."""
+    """Return about the fraction of a square that shapes of a total area cover; 0 if the gap leaves no space."""
     if len(shapes) == 1:
         points = shapes[0].sides.ravel()
         points = points * np.exp(1j * square_angle(points, np.empty(0)))
@@ -303,6 +301,9 @@ def _covered(shapes: Sequence[_Shape], area: float, gap: float) -> float:
     shapes = sorted(shapes, key=lambda one: -one.area)
     start = np.cumsum([0, *(len(one.sides) for one in shapes)])
     outlines = Outlines(np.concatenate([one.sides for one in shapes]), start)
-    angles = np.tile(np.arange(QUICK_TURNS) * (2 * np.pi / QUICK_TURNS), (len(shapes), 1))
-    found = pack(outlines, area, angles, np.ones(angles.shape, dtype=bool), gap, 1, QUICK)
+    angles = np.tile(np.arange(0, 2 * np.pi, np.pi / 4), (len(shapes), 1))
+    try:
+        found = pack(outlines, area, angles, np.ones(angles.shape, dtype=bool), gap, 1, QUICK)
+    except OptionError:
+        return 0.0
     return area / found.side**2

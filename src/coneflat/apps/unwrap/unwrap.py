@@ -34,7 +34,8 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     """Return UVs for a texture: the shortest seams for which the layout is nearly isometric.
 
     Unlike in `flatten`, the two sides of a seam may differ, which lowers the distortion. Cones are only the ends of
-    seams.
+    seams. Branches of charts are cut off where the texture gains more than the seams cost, unless `charts` is "one" or
+    `up` is given.
 
     Args:
         mesh, faces: as for `coneflat.flatten`.
