@@ -62,7 +62,8 @@ def main() -> None:
     for i, name in enumerate(peers):
         better = int((found[:, 1, 0] >= found[:, 2 + i, 0]).sum())
         print(f"\nEfficiency at least that of {name}: {better} of {len(rows)}.")
-    longer = found[:, 1, 2] / np.maximum(found[:, 0, 2], 1e-9) - 1
+    has_seams = found[:, 0, 2] > 0
+    longer = found[has_seams, 1, 2] / found[has_seams, 0, 2] - 1
     print(f"Seams are longer by {np.median(longer):.1%} in the median, {longer.max():.1%} at most.")
 
 

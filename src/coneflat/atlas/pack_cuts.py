@@ -32,8 +32,8 @@ PRICE, SHARE = 0.1, 0.15
 # Smallest area of a piece relative to that of all charts, and the largest number of charts that are considered. Smaller
 # charts fit between larger ones.
 MIN_PIECE, MAX_CHARTS = 0.02, 32
-# Points of a border between which cuts are searched. Cuts are alike if their ends are closer than NEAR of the border.
-SAMPLES, NEAR = 96, 0.06
+# Points of a border between which cuts are searched. Cuts are alike if their ends are closer than MIN_SEPARATION of the border.
+SAMPLES, MIN_SEPARATION = 96, 0.06
 # Cuts tried per set of charts, sets continued per step, and steps without a gain after which the search ends.
 TRIED, CONTINUED, PATIENCE = 16, 3, 2
 QUICK = Effort(columns=128, tries=12)
@@ -202,14 +202,14 @@ class _Piece:
             found += [] if cut is None else [cut]
             straight = np.maximum(self._away(one, one[0]), self._away(other, other[0]))
             crossed = np.maximum(self._away(one, other[0]), self._away(other, one[0]))
-            is_other = np.minimum(straight, crossed) >= NEAR
+            is_other = np.minimum(straight, crossed) >= MIN_SEPARATION
             one, other = one[is_other], other[is_other]
         return found
 
     def _cut_between(self, one: IntArray, other: IntArray) -> _Cut | None:
         """Return the shortest cut between the surroundings of two vertices of the border, if it makes two pieces."""
         every = np.arange(len(self._rim))
-        starts, ends = (self._rim[self._away(every, at) < NEAR / 3] for at in (one, other))
+        starts, ends = (self._rim[self._away(every, at) < MIN_SEPARATION / 3] for at in (one, other))
         paths = self.graph.shortest_paths(starts, ends)
         nearest = ends[np.argsort(paths.distance[ends], kind="stable")[:1]]
         path = np.append(paths.nodes_to(nearest), paths.source[nearest])
