@@ -9,9 +9,8 @@ import shapes
 import coneflat
 from coneflat.atlas import orient_charts, pack_charts
 from coneflat.atlas.charts import read_charts
-from coneflat.atlas.orient import border_directions
+from coneflat.atlas.orient import border_directions, straight_directions, straight_runs
 from coneflat.atlas.pack import arrange_charts
-from coneflat.atlas.straight import straight_directions, straight_runs
 
 CROSS = ((1, 0), (0, 1), (1, 1), (2, 1), (3, 1), (1, 2))
 ANGLES = (0.0, np.pi / 4, 1.234)

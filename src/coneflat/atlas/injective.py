@@ -95,16 +95,15 @@ def separate_overlaps(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layo
     mesh = layout.mesh
     costs = np.where(spec.is_avoided | spec.is_forbidden, costs + costs.sum(), costs)
     charts = injective_charts(mesh, layout.points, layout.corners, costs, layout.disk)
-    edges = Seams(mesh, charts).edges
-    count = int(spec.is_forbidden[edges].sum())
-    separated = replace(
-        layout,
-        points=charts.points,
-        corners=charts.corners,
-        chart=charts.chart,
-        disk=None,
-        seams=mesh.edges[edges],
-    )
+    separated = with_charts(layout, charts)
+    count = int(spec.is_forbidden[Seams(mesh, charts).edges].sum())
     if not count:
         return separated
     return separated.with_notes(f"{plural(count, 'forbidden edge')} had to be cut to separate overlaps.")
+
+
+def with_charts(layout: Layout, charts: ChartLayout) -> Layout:
+    """Return the layout in other charts."""
+    seams = layout.mesh.edges[Seams(layout.mesh, charts).edges]
+    points, corners, chart = charts.points, charts.corners, charts.chart
+    return replace(layout, points=points, corners=corners, chart=chart, disk=None, seams=seams)

@@ -14,9 +14,17 @@ from ..base.text import short_repr
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..geometry.planar import signed_double_areas
 from .charts import Charts, Outlines, read_charts
-from .orient import border_directions, mean_rise, orient_charts, square_angle, straight_angles
+from .orient import (
+    HALF_PI,
+    RELATIVE_TOLERANCE,
+    along_axes,
+    border_directions,
+    mean_rise,
+    orient_charts,
+    square_angle,
+    straight_angles,
+)
 from .place import Packing, pack
-from .straight import HALF_PI, RELATIVE_TOLERANCE, along_axes
 
 ROTATIONS = ("any", "quarter", "none")
 # MAX_PLACEMENTS limits the number of charts times the number of angles tried for each; for many charts quarter turns

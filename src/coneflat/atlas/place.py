@@ -14,12 +14,10 @@ from ..base.progress import check_cancelled
 from ..errors import OptionError
 from .charts import Outlines
 
-# Minimum number of columns of the grid, columns per square root of the number of charts, and the maximum number of
-# cells of all tiles.
-MIN_COLUMNS, COLUMNS_PER_CHART, MAX_CELLS = 400, 24.0, 4_000_000
-# Number of changes that are tried, and the work after which the search ends, in comparisons of runs of cells: about a
-# second.
-MAX_TRIES, MAX_WORK = 150, 40_000_000
+# Columns of the grid per square root of the number of charts, and the maximum number of cells of all tiles.
+COLUMNS_PER_CHART, MAX_CELLS = 24.0, 4_000_000
+# The work after which the search ends, in comparisons of runs of cells: about a second.
+MAX_WORK = 40_000_000
 # Up to OFFSET_CHARTS charts, a chart may be forced to the right, which happens in this fraction of the tries. With more
 # charts this makes the packing worse.
 OFFSET_CHARTS, OFFSET_SHARE = 5, 0.3
@@ -28,6 +26,19 @@ GROUPED_CHARTS, GROUP_RATIO = 1000, 1.02
 # Width of the grid relative to the width that charts without gaps would need, and to the longest chart. It is not a
 # round number, so that simple charts do not end at cell borders, where rounding would decide which cell is the last.
 GRID_MARGIN = 1.2347
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What a packing may cost.
+
+    Attributes:
+        columns: minimum number of columns of the grid.
+        tries: number of changes that are tried.
+    """
+
+    columns: int = 400
+    tries: int = 150
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +196,13 @@ class _Placed(NamedTuple):
 
 
 def pack(
-    outlines: Outlines, area: float, angles: FloatArray, allowed: BoolArray, gap: float, tiles: int
+    outlines: Outlines,
+    area: float,
+    angles: FloatArray,
+    allowed: BoolArray,
+    gap: float,
+    tiles: int,
+    effort: Effort = Effort(),
 ) -> Packing:
     """Return a tight packing of charts in square tiles, by rotations and translations alone.
 
@@ -201,6 +218,7 @@ def pack(
         allowed: (k, t) True for the angles that a chart may take, at least one per chart.
         gap: minimum distance between charts, relative to the side of a tile without its margins.
         tiles: number of tiles.
+        effort: what the search may cost.
 
     Returns:
         The best packing found.
@@ -209,7 +227,7 @@ def pack(
         OptionError: the gap is too wide for this number of charts.
     """
     rng = np.random.default_rng(0)
-    columns = int(max(MIN_COLUMNS, COLUMNS_PER_CHART * (len(outlines) / tiles) ** 0.5))
+    columns = int(max(effort.columns, COLUMNS_PER_CHART * (len(outlines) / tiles) ** 0.5))
     columns = min(columns, int((MAX_CELLS / tiles) ** 0.5))
     _, extent = rotated_boxes(outlines, angles)
     extent = np.where(allowed, extent, complex(np.inf, np.inf))
@@ -234,7 +252,7 @@ def pack(
                 "them: use less padding, a higher resolution or more tiles"
             )
     last, least, step, work = best, int(longest / masks.cell) + 1, width // 16, 0
-    for _ in range(MAX_TRIES):
+    for _ in range(effort.tries):
         goal = max(width - step, least)
         if goal >= width or work > MAX_WORK:
             break

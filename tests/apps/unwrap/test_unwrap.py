@@ -35,7 +35,7 @@ def test_the_energy_is_within_the_bound(shape, bound):
 
 
 def test_models_have_short_seams_within_the_bound(shared):
-    for name, most in (("spot.obj", 4.0), ("hand.obj", 4.0), ("fandisk.obj", 2.5)):
+    for name, most in (("spot.obj", 4.5), ("hand.obj", 4.5), ("fandisk.obj", 2.8)):
         d = unwrap(shared(name)).distortion
         assert d.energy <= 4.1
         assert d.area_std <= 0.08
@@ -157,3 +157,12 @@ def test_the_energy_of_a_stretched_square():
     for scale in (1e-3, 1.0, 50.0):
         stretched = scale * mesh.vertices[mesh.faces][:, :, :2] * [2, 1]
         assert coneflat.measure(mesh, stretched).energy == pytest.approx(5.0)
+
+
+def test_branching_charts_are_cut_to_fill_the_texture(shared, monkeypatch):
+    result = unwrap(shared("hand.obj"))
+    monkeypatch.setattr("coneflat.apps.unwrap.unwrap.cut_for_packing", lambda layouts, *_: layouts)
+    whole = unwrap(shared("hand.obj"))
+    assert result.packing_efficiency > 1.2 * whole.packing_efficiency
+    assert result.distortion.seam_length <= 1.3 * whole.distortion.seam_length
+    assert result.distortion.energy == pytest.approx(whole.distortion.energy, rel=1e-9)

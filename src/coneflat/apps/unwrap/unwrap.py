@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import Flattening
-from ...base import Stopwatch, limit_threads, plural
+from ...atlas import cut_for_packing
+from ...base import FloatArray, Stopwatch, limit_threads, plural
 from ...errors import OptionError
 from ...evaluate import evaluate
 from ...flatten import Method, with_copies
@@ -18,7 +19,8 @@ from ...geometry import double_areas
 from ...io import as_input
 from ...metric import find_metric
 from ...options import Options, declarations, read_options, takes
-from ...source import Source, find_copies
+from ...seams import seam_costs
+from ...source import Part, Source, find_copies
 from ...stages import Layout, RelaxSpec, Surface
 from .free import ISOMETRIC
 from .options import UnwrapOptions
@@ -33,7 +35,8 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     """Return UVs for a texture: the shortest seams for which the layout is nearly isometric.
 
     Unlike in `flatten`, the two sides of a seam may differ, which lowers the distortion. Cones are only the ends of
-    seams.
+    seams. Branches of charts are cut off where the texture gains more than the seams cost, unless `charts` is "one" or
+    `up` is given.
 
     Args:
         mesh, faces: as for `coneflat.flatten`.
@@ -78,9 +81,19 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
                 found[i] = best.layout
                 energies.append(best.energy)
                 watch.end_component()
-    result = evaluate(prepared, with_copies(found, parts, copies), replace(shared, method=FREE), watch)
+        layouts = with_copies(found, parts, copies)
+        if method.separates and o.up is None:
+            with watch("pack"):
+                layouts = cut_for_packing(layouts, [_costs(part) for part in parts], o.padding / o.resolution)
+    result = evaluate(prepared, layouts, replace(shared, method=FREE), watch)
     notes = (*result.notes, *_notes(energies, o.max_energy))
     return replace(result, settings={**result.settings, "max_energy": o.max_energy}, notes=notes)
+
+
+def _costs(part: Part) -> FloatArray:
+    """Return (e,) the costs of cutting the edges of a part, infinite for edges to avoid."""
+    is_avoided = part.seams.is_avoided | part.seams.is_forbidden
+    return np.where(is_avoided, np.inf, seam_costs(part.mesh, part.lengths, part.seams))
 
 
 def _notes(energies: Sequence[float], bound: float) -> Iterator[str]:
