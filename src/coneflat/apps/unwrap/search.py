@@ -33,7 +33,7 @@ MANY_TRIANGLES, MINOR_SHARE = 200_000, 0.002
 # Least factor of the distortion from one candidate to the next.
 MIN_FACTOR = 1.15
 # Number of times that tips are moved to meet the bound, and that a layout is settled to avoid contacts.
-MAX_TRIES = 4
+MAX_TRIES = 5
 # Candidates whose energy exceeds that of an isometry by more than this factor of what is allowed are given up.
 REACH = 2.0
 # Cost of seams that lowers the energy to that of an isometry, relative to the square root of the area.
@@ -77,6 +77,8 @@ class CutSearch:
         self._surface = Surface.of(part.mesh, part.lengths, part.is_exact)
         self._surface.is_reused = True
         self._costs = seam_costs(part.mesh, part.lengths, part.seams)
+        #: (e,) the costs of cutting the edges, infinite for edges to avoid.
+        self.costs = np.where(part.seams.is_avoided | part.seams.is_forbidden, np.inf, self._costs)
 
     def best(self) -> Candidate:
         """Return the candidate within the bound whose seams cost least, or else the one with the least energy.
@@ -86,22 +88,38 @@ class CutSearch:
         """
         found = self._by_distortion()
         near = [one for one in found if one.energy <= self._reach]
-        if near:
-            for one in sorted(near, key=self._expected_cost)[:2]:
-                found.append(self._settled(one))
-                if self._is_quick:
-                    break
-                for moved in self._moved(found[-1]):
-                    found.append(self._settled(moved))
-                    if found[-1].energy <= self._max_energy:
-                        break
-                if found[-1].energy <= self._max_energy:
-                    break
+        for one in sorted(near, key=self._expected_cost)[:2]:
+            found.append(self._settled(one))
+            if found[-1].energy > self._max_energy and not self._is_quick:
+                found.append(self.shortened(found[-1]))
+            if found[-1].energy <= self._max_energy:
+                break
         close_search(self._surface)
         within = [one for one in found if one.energy <= self._max_energy]
         if within:
-            return min(within, key=lambda one: one.cost)
+            return min(within, key=self._expected_cost)
         return self._separated(min(found, key=lambda one: one.energy))
+
+    def shortened(self, start: Candidate, layout: Layout | None = None) -> Candidate:
+        """Return a candidate with the tips of its seams moved to where its energy is about the largest allowed.
+
+        Args:
+            start: a candidate.
+            layout: its layout, if that was cut further.
+        """
+        if self._is_quick:
+            return start if layout is None else replace(start, layout=layout)
+        if layout is not None:
+            start = self._settled(replace(start, layout=layout, cost=self._cost(layout)))
+        for moved in map(self._settled, self._moved(start)):
+            if moved.energy <= self._max_energy and (
+                moved.cost < start.cost or start.energy > self._max_energy
+            ):
+                return moved
+        return start
+
+    def _cost(self, layout: Layout) -> float:
+        return float(self._costs[seam_edges(layout)].sum())
 
     @property
     def _reach(self) -> float:
@@ -144,7 +162,7 @@ class CutSearch:
 
     def _candidate(self, layout: Layout, distortion: float) -> Candidate:
         layout, energy = freed(layout, tolerance=TOLERANCE)
-        one = Candidate(layout, energy, float(self._costs[seam_edges(layout)].sum()), distortion)
+        one = Candidate(layout, energy, self._cost(layout), distortion)
         return one if energy > self._reach else self._separated(one)
 
     def _separated(self, one: Candidate) -> Candidate:
@@ -152,7 +170,7 @@ class CutSearch:
         if not self._method.separates:
             return one
         layout = separate_charts(one.layout, self._costs, self._part)
-        return replace(one, layout=layout, cost=float(self._costs[seam_edges(layout)].sum()))
+        return replace(one, layout=layout, cost=self._cost(layout))
 
     def _settled(self, one: Candidate) -> Candidate:
         """Return a candidate with the least energy without overlaps: its separating cuts are free, too."""
@@ -178,23 +196,28 @@ class CutSearch:
     def _moved(self, start: Candidate) -> list[Candidate]:
         """Return candidates with the tips of the seams moved, so that the energy is about the largest allowed."""
         seams, found = seam_edges(start.layout), list[Candidate]()
-        tips = find_tips(start.layout, seams, self._costs)
+        tips = find_tips(start.layout, seams, self.costs)
         if not (tips.rates > 0).any():
             return found
         slack, allowed = self._max_energy - start.energy, self._max_energy - ISOMETRIC
         # For each slack that was requested, the energy above the bound.
-        tried = list[tuple[float, float]]()
+        tried, known = list[tuple[float, float]](), [seams]
         for _ in range(MAX_TRIES):
-            moves = moves_for(start.layout, tips, slack)
-            layout = self._with_tips(*moved_tips(start.layout, seams, tips, moves))
+            moved = moved_tips(start.layout, seams, tips, moves_for(start.layout, tips, slack))
+            if any(np.array_equal(moved[0], each) for each in known):
+                # The tips move by whole edges.
+                slack += np.sign(slack) * allowed / 4
+                continue
+            layout = self._with_tips(*moved)
             if layout is None:
                 break
+            known.append(moved[0])
             one = self._candidate(layout, start.distortion)
             excess = one.energy - self._max_energy
             tried.append((slack, excess))
             if excess <= 2 * TOLERANCE * allowed:
                 found.append(one)
-            if abs(excess) <= 2 * TOLERANCE * allowed:
+            if -2 * TOLERANCE * allowed <= excess <= 0:
                 break
             low = max((pair for pair in tried if pair[1] <= 0), default=None)
             high = min((pair for pair in tried if pair[1] > 0), default=None)

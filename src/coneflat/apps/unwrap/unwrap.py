@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ... import Flattening
 from ...atlas import cut_for_packing
-from ...base import FloatArray, Stopwatch, limit_threads, plural
+from ...base import Stopwatch, limit_threads, plural
 from ...errors import OptionError
 from ...evaluate import evaluate
 from ...flatten import Method, with_copies
@@ -19,12 +19,11 @@ from ...geometry import double_areas
 from ...io import as_input
 from ...metric import find_metric
 from ...options import Options, declarations, read_options, takes
-from ...seams import seam_costs
-from ...source import Part, Source, find_copies
-from ...stages import Layout, RelaxSpec, Surface
+from ...source import Source, find_copies
+from ...stages import RelaxSpec, Surface
 from .free import ISOMETRIC
 from .options import UnwrapOptions
-from .search import CutSearch
+from .search import Candidate, CutSearch
 
 #: The `method` in the settings of a result.
 FREE = "free seams"
@@ -69,31 +68,32 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     with watch("check"):
         prepared = source.prepared(shared)
     method = Method(RelaxSpec("off", 0.0), o.charts == "atlas", None, Stopwatch(), Surface.of, find_metric)
-    parts, found, energies = prepared.parts, dict[int, Layout](), list[float]()
+    parts, found = prepared.parts, dict[int, Candidate]()
     areas = np.array([double_areas(part.lengths).sum() for part in parts])
     with limit_threads(o.threads):
         copies = find_copies(parts)
-        for i, part in enumerate(parts):
-            if copies[i] is None:
-                watch.share = 0.9 * len(part.faces) / len(prepared.checked.mesh.faces)
-                with watch("search", 1.0):
-                    best = CutSearch(part, o.max_energy, method, areas[i] / areas.sum()).best()
-                found[i] = best.layout
-                energies.append(best.energy)
-                watch.end_component()
-        layouts = with_copies(found, parts, copies)
-        if method.separates and o.up is None:
-            with watch("pack"):
-                layouts = cut_for_packing(layouts, [_costs(part) for part in parts], o.padding / o.resolution)
+        searches = {
+            i: CutSearch(part, o.max_energy, method, areas[i] / areas.sum())
+            for i, part in enumerate(parts)
+            if copies[i] is None
+        }
+        for i, search in searches.items():
+            watch.share = 0.8 * len(parts[i].faces) / len(prepared.checked.mesh.faces)
+            with watch("search", 1.0):
+                found[i] = search.best()
+            watch.end_component()
+        layouts = [found[i].layout for i in searches]
+        with watch("pack"):
+            if method.separates and o.up is None:
+                costs = [search.costs for search in searches.values()]
+                layouts = cut_for_packing(layouts, costs, o.padding / o.resolution)
+            for (i, search), layout in zip(searches.items(), layouts, strict=True):
+                found[i] = search.shortened(found[i], layout)
+    layouts = with_copies({i: one.layout for i, one in found.items()}, parts, copies)
+    energies = [one.energy for one in found.values()]
     result = evaluate(prepared, layouts, replace(shared, method=FREE), watch)
     notes = (*result.notes, *_notes(energies, o.max_energy))
     return replace(result, settings={**result.settings, "max_energy": o.max_energy}, notes=notes)
-
-
-def _costs(part: Part) -> FloatArray:
-    """Return (e,) the costs of cutting the edges of a part, infinite for edges to avoid."""
-    is_avoided = part.seams.is_avoided | part.seams.is_forbidden
-    return np.where(is_avoided, np.inf, seam_costs(part.mesh, part.lengths, part.seams))
 
 
 def _notes(energies: Sequence[float], bound: float) -> Iterator[str]:
