@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from .defaults import DISTORTION, MAX_CONE_ANGLE, MAX_CONES, MIN_CONE_ANGLE
 from .progress import Progress, Stopwatch, cancel_with
-from .text import error_text, list_some, plural, printable, short_repr
+from .text import list_some, plural, printable, short_repr
 from .threads import THREADS, limit_threads
 
 if TYPE_CHECKING:
@@ -34,7 +34,6 @@ __all__ = [
     "compiled",
     "dots",
     "list_some",
-    "error_text",
     "plural",
     "printable",
     "short_repr",
