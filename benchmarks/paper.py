@@ -11,12 +11,12 @@ import argparse
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from patterns import compare_with_patterns
+from methods import compare_all
 
 from coneflat import PAPER, ConeflatError, read_mesh
 from coneflat.apps.peers import pictures
@@ -25,9 +25,17 @@ from coneflat.apps.peers.run import (
     as_cell,
     as_csv,
     markdown,
-    notes,
 )
-from coneflat.apps.view import Panel, Row, draw_checker, draw_cones, draw_layout, layout_aspect
+from coneflat.apps.view import (
+    Panel,
+    Row,
+    compose,
+    draw_checker,
+    draw_cones,
+    draw_layout,
+    layout_aspect,
+    mark_handles,
+)
 from coneflat.base import Progress, plural
 from coneflat.errors import MeshError
 from coneflat.io import find_meshes
@@ -116,7 +124,7 @@ class Model:
     @property
     def is_same(self) -> bool:
         """Whether the mesh has the resolution of the paper's."""
-        return self.published is not None and self.published.has_same_size(self.comparison.triangles)
+        return self.published is not None and self.published.has_same_size(len(self.linear.faces))
 
     @property
     def linear(self) -> Flattening:
@@ -153,7 +161,7 @@ class Reproduction:
             if model.published is not None:
                 there, thousands = model.published.curvature_error, f"{model.published.thousands:g}K"
             cones = len(model.linear.cones)
-            rows.append([model.name, model.comparison.triangles, thousands, cones, here, there, here / there])
+            rows.append([model.name, len(model.linear.faces), thousands, cones, here, there, here / there])
         return rows
 
     def table_2(self) -> list[list[object]]:
@@ -187,7 +195,7 @@ class Reproduction:
         ]
         other = [model for model in self.models if model.published is not None and not model.is_same]
         if other:
-            listed = ", ".join(f"{m.name} ({m.comparison.triangles:,})" for m in other)
+            listed = ", ".join(f"{m.name} ({len(m.linear.faces):,})" for m in other)
             lines += [f"In another resolution than in the paper, so that numbers differ: {listed}.", ""]
         if self.missing:
             lines += [f"Not among the files: {', '.join(self.missing)}.", ""]
@@ -197,8 +205,19 @@ class Reproduction:
             ("Table 2: quasi-conformal distortion", TABLE_2, self.table_2(), FORMS_2),
         ):
             lines += [f"## {title}", "", markdown(headings, _cells(rows, forms))]
-        lines += [notes([replace(model.comparison, name=model.name) for model in self.models])]
+        lines += [self.notes()]
         return "\n".join(lines)
+
+    def notes(self) -> str:
+        """Return a line for each note on a method, with the names of the models."""
+        models: dict[tuple[str, str], list[str]] = {}
+        for model in self.models:
+            for entry in model.comparison.entries:
+                if entry.note:
+                    models.setdefault((entry.method, entry.note), []).append(model.name)
+        return "".join(
+            f"- {method} ({', '.join(names)}): {note}.\n" for (method, note), names in sorted(models.items())
+        )
 
     def texts(self) -> dict[str, str]:
         """Return the tables as Markdown and as comma-separated values, by file name."""
@@ -223,9 +242,9 @@ class Reproduction:
             texture = sight.panel(model.linear, draw_checker, model.name)
             textures.append(_row([texture, *pictures.quality_panels(linear, own, sight)], own))
         rows = (pictures.in_rows(cones), quality, layouts, textures)
-        marks = (self.models[0].linear, None, None, None)
+        marks = (mark_handles(self.models[0].linear), (), (), ())
         return {
-            name: pictures.figure_of(each, marks_of=marked)
+            name: compose(each, marks=marked, dpi=pictures.DPI, width=10.0)
             for name, each, marked in zip(FIGURES, rows, marks, strict=True)
         }
 
@@ -270,7 +289,7 @@ def reproduce(
 
         tell("read", 0.0)
         try:
-            compared = compare_with_patterns(read_mesh(file), methods=methods, progress=tell, **PAPER)
+            compared = compare_all(read_mesh(file), methods=methods, progress=tell, **PAPER)
         except ConeflatError as error:
             failed.append((file.name, " ".join(str(error).split())))
             continue

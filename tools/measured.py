@@ -20,7 +20,7 @@ from coneflat.options import Options, declarations
 sys.path.insert(0, str(ROOT / "tests"))
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import shapes
-from patterns import compare_with_patterns
+from methods import compare_all
 
 Report = dict[str, Any]
 
@@ -82,7 +82,7 @@ class Measured:
         key = (model, methods, str(options))
         if key not in self._comparisons:
             print(f"  {model} by {len(methods)} methods", flush=True)
-            self._comparisons[key] = compare_with_patterns(self.path(model), methods=methods, **options)
+            self._comparisons[key] = compare_all(self.path(model), methods=methods, **options)
         return self._comparisons[key]
 
 

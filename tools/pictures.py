@@ -21,8 +21,8 @@ from scipy.sparse import csr_matrix, identity
 from tables import ALLOWED, GALLERY, TRADED, TRADEOFF, tradeoff
 
 import coneflat
+from coneflat.apps.peers import METHODS
 from coneflat.apps.peers.pictures import draw_layouts
-from coneflat.apps.peers.run import COMPARED
 from coneflat.apps.view import (
     Panel,
     Quantity,
@@ -280,7 +280,7 @@ def atlases_figure(measured: Measured) -> Any:
 
 def methods_figure(measured: Measured) -> Any:
     """Return a figure of the layouts of one model by all methods."""
-    return draw_layouts(measured.comparison("rocker-arm", COMPARED))
+    return draw_layouts(measured.comparison("rocker-arm", METHODS))
 
 
 #: What is drawn of the trade: the largest number shown for each.

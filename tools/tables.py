@@ -19,7 +19,7 @@ sys.path.insert(0, str(ROOT / "benchmarks"))
 from paper import MODELS as PUBLISHED
 
 import coneflat
-from coneflat.apps.peers import METHODS, Comparison
+from coneflat.apps.peers import METHODS, Entry
 from coneflat.options import PAPER
 
 GALLERY = (
@@ -188,13 +188,11 @@ def methods_table(measured: Measured, body: str) -> str:
     """Return the measures of all methods on ten models with the same cones and cut."""
     if not measured.has(*COMPARED):
         return body
-    comparisons = []
-    for model in COMPARED:
-        comparisons.append(measured.comparison(model, METHODS))
+    comparisons = {model: measured.comparison(model, METHODS) for model in COMPARED}
     was = _rows_of(body)
     rows = []
     for name in METHODS:
-        found = np.array([_compared(comparison, name) for comparison in comparisons])
+        found = np.array([_compared(model, comparison[name]) for model, comparison in comparisons.items()])
         error, _, _, flipped, _, mismatch = found.T
         qc, std, overlap = found[:, [1, 2, 4]].mean(axis=0)
         rows.append(
@@ -214,10 +212,9 @@ def methods_table(measured: Measured, body: str) -> str:
     )
 
 
-def _compared(comparison: Comparison, name: str) -> list[float]:
-    entry = comparison[name]
+def _compared(model: str, entry: Entry) -> list[float]:
     if entry.result is None:
-        raise SystemExit(f"{name} on {comparison.name}: {entry.note}")
+        raise SystemExit(f"{entry.method} on {model}: {entry.note}")
     d = entry.result.distortion
     return [
         d.curvature_error_max,

@@ -75,20 +75,6 @@ def test_the_largest_step_is_kept():
     assert places[-1] == pytest.approx(0, abs=1e-9)
 
 
-def test_a_slope_without_an_end_is_left():
-    class Slope:
-        def evaluate(self, place):
-            return Point(place, np.ones(1))
-
-        def direction(self, here, exactly):
-            return np.ones(1), True
-
-    _, steps = minimise(
-        Slope(), Slope().evaluate(np.zeros(1)), Limits(1e-9, 50, 1e-13, 30, least_change=1e-6)
-    )
-    assert steps == 1
-
-
 def test_a_singular_hessian_leaves_the_best_so_far():
     class Singular(LogCosh):
         def direction(self, here, exactly):

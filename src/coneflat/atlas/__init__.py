@@ -1,17 +1,14 @@
 """Charts in the plane: splitting and gluing them, orienting them, and packing them into a texture."""
 
-from .injective import separate_overlaps
-from .orient import orient_charts
+from .charts import ChartLayout, Outlines
+from .injective import separate_overlaps, with_charts
+from .orient import orient_charts, square_angle, straight_angle
 from .pack import Packed, arrange_charts, pack_charts
-from .pack_cuts import cut_for_packing
+from .place import Effort, pack
+from .split import as_disk
 from .touch import separate_touching
 
 __all__ = [
-    "Packed",
-    "arrange_charts",
-    "cut_for_packing",
-    "orient_charts",
-    "pack_charts",
-    "separate_touching",
-    "separate_overlaps",
-]
+    "ChartLayout", "Effort", "Outlines", "Packed", "arrange_charts", "as_disk", "orient_charts", "pack", "pack_charts",
+    "separate_overlaps", "separate_touching", "square_angle", "straight_angle", "with_charts",
+]  # fmt: skip

@@ -105,5 +105,6 @@ def separate_overlaps(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layo
 def with_charts(layout: Layout, charts: ChartLayout) -> Layout:
     """Return the layout in other charts."""
     seams = layout.mesh.edges[Seams(layout.mesh, charts).edges]
-    points, corners, chart = charts.points, charts.corners, charts.chart
-    return replace(layout, points=points, corners=corners, chart=chart, disk=None, seams=seams)
+    return replace(
+        layout, points=charts.points, corners=charts.corners, chart=charts.chart, seams=seams, disk=None
+    )

@@ -23,7 +23,7 @@ from .orient import (
     orient_charts,
     square_angle,
     straight_angles,
-)
+)  # fmt: skip
 from .place import Packing, pack
 
 ROTATIONS = ("any", "quarter", "none")
@@ -127,11 +127,8 @@ def pack_known(
     else:
         area = float(np.abs(charts.sums(charts.areas) * density**2).sum())
         finest = QUARTER_TURNS * min(max(MAX_PLACEMENTS // (QUARTER_TURNS * charts.count), 1), 6)
-        turns = (
-            rotate
-            if isinstance(rotate, int)
-            else {"any": finest, "quarter": QUARTER_TURNS, "none": 1}[rotate]
-        )
+        choices = {"any": finest, "quarter": QUARTER_TURNS, "none": 1}
+        turns = rotate if isinstance(rotate, int) else choices[rotate]
         angles = np.tile(np.arange(turns) * (2 * np.pi / turns), (charts.count, 1))
         allowed = along_axes(directions, straight, angles)
         gap = padding / resolution / inner

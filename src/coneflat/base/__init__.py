@@ -9,8 +9,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from .defaults import DISTORTION, MAX_CONE_ANGLE, MAX_CONES, MIN_CONE_ANGLE
-from .progress import Progress, Stopwatch, cancel_with
-from .text import error_text, list_some, plural, printable, short_repr
+from .progress import Progress, Stopwatch, cancel_with, check_cancelled
+from .text import list_some, plural, printable, short_repr
 from .threads import THREADS, limit_threads
 
 if TYPE_CHECKING:
@@ -18,28 +18,10 @@ if TYPE_CHECKING:
     from .jit import compiled
 
 __all__ = [
-    "unit_exponent",
-    "BoolArray",
-    "ComplexArray",
-    "DISTORTION",
-    "FloatArray",
-    "IntArray",
-    "MAX_CONE_ANGLE",
-    "MIN_CONE_ANGLE",
-    "MAX_CONES",
-    "Progress",
-    "Stopwatch",
-    "THREADS",
-    "cancel_with",
-    "compiled",
-    "dots",
-    "list_some",
-    "error_text",
-    "plural",
-    "printable",
-    "short_repr",
-    "limit_threads",
-]
+    "BoolArray", "ComplexArray", "DISTORTION", "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE",
+    "MIN_CONE_ANGLE", "Progress", "Stopwatch", "THREADS", "cancel_with", "check_cancelled", "compiled",
+    "dots", "limit_threads", "list_some", "plural", "printable", "short_repr", "unit_exponent",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

@@ -1,7 +1,6 @@
 """Geometry: lengths, angles, areas, Laplacian, intrinsic triangulations, exact predicates, overlaps, visibility."""
 
 from .coverage import approximate_overlap_areas
-from .handles import handle_loops
 from .intrinsic import halfedge_twins
 from .layers import MAX_CELLS
 from .operators import angle_defect, cotangent_laplacian
@@ -55,7 +54,6 @@ __all__ = [
     "find_overlaps",
     "flat_triangles",
     "halfedge_twins",
-    "handle_loops",
     "is_broken",
     "approximate_overlap_areas",
     "layout_curvature",

@@ -1,7 +1,7 @@
 """Layout of a flat metric on a disk as points in the plane."""
 
 from .lay_out import lay_out
-from .least_squares import far_pins, fit_shapes, least_squares_layout, pinned_least_squares, shapes_of_angles
+from .least_squares import far_pins, least_squares_layout, pinned_least_squares
 from .relax import Lines, PointConstraints, Relaxed, StretchEnergy, relax
 from .relax.relax import rest_sides
 from .relax.seam_chains import SeamChains, find_chains
@@ -18,7 +18,6 @@ __all__ = [
     "closed_chain",
     "far_pins",
     "find_chains",
-    "fit_shapes",
     "untangle_seams",
     "lay_out",
     "least_squares_layout",
@@ -26,6 +25,5 @@ __all__ = [
     "relax",
     "relax_layouts",
     "rest_sides",
-    "shapes_of_angles",
     "unfold",
 ]

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ..base.arrays import ComplexArray, FloatArray, IntArray
 from ..errors import MetricError
 from ..geometry import corner_angles, is_broken
 from ..geometry.planar import as_pairs
@@ -15,52 +13,6 @@ from ..linalg import HermitianFactor
 from ..linalg.shortest_paths import MultiGraph
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh
 from ..mesh.ties import argmax_tied, tie_key
-
-# Minimum angle in radians, which replaces angles that are not positive, so that the shape of the triangle is finite.
-MIN_ANGLE = 1e-3
-
-
-@dataclass(frozen=True, eq=False)
-class TriangleShapes:
-    """Shapes of triangles, up to similarity.
-
-    Attributes:
-        third: (m,) the corner p3 opposite the longest side p1 p2, counterclockwise.
-        turn: (m,) the complex number (l13 / l12) e^(i a1) with p3 - p1 = turn (p2 - p1).
-        is_broken: (m,) True where no triangle has the given lengths or angles.
-    """
-
-    third: IntArray
-    turn: ComplexArray
-    is_broken: BoolArray
-
-
-def shapes_of_lengths(lengths: FloatArray) -> TriangleShapes:
-    """Return the shapes of triangles given by their (m, 3) side lengths.
-
-    Where the triangle inequality is violated, the angles are the real parts of the complex ones: p3 is on
-    the side p1 p2 and divides it as l13 : l32.
-    """
-    rows = np.arange(len(lengths))
-    third = np.argmax(lengths, axis=1)
-    first, second = NEXT[third], PREVIOUS[third]
-    l13, l32 = lengths[rows, second], lengths[rows, first]
-    l12 = np.minimum(lengths[rows, third], l13 + l32)  # a side that is too long is shortened
-    turn = l13 / l12 * np.exp(1j * corner_angles(lengths)[rows, first])
-    return TriangleShapes(third, turn, is_broken(lengths))
-
-
-def shapes_of_angles(angles: FloatArray) -> TriangleShapes:
-    """Return the shapes of triangles given by their (m, 3) corner angles, radians, which sum to pi.
-
-    Angles that are not positive are replaced by `MIN_ANGLE`, and the largest angle is reduced accordingly.
-    """
-    rows = np.arange(len(angles))
-    third = np.argmax(angles, axis=1)
-    near = angles[rows, NEXT[third]], angles[rows, PREVIOUS[third]]
-    one, two = (np.where(angle > 0, angle, MIN_ANGLE) for angle in near)
-    turn = np.sin(two) / np.sin(one + two) * np.exp(1j * one)
-    return TriangleShapes(third, turn, angles.min(axis=1) <= 0)
 
 
 def least_squares_layout(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
@@ -78,28 +30,11 @@ def least_squares_layout(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
     """
     if not np.isfinite(lengths).all():
         raise MetricError(f"{int((~np.isfinite(lengths)).sum())} of the metric's lengths are not finite")
-    return fit_shapes(disk, shapes_of_lengths(lengths), lengths)
-
-
-def fit_shapes(disk: TriangleMesh, shapes: TriangleShapes, lengths: FloatArray) -> FloatArray:
-    """Return (n, 2) points of a disk, up to a similarity, whose triangles fit given shapes in the least squares sense.
-
-    The equation of a triangle with longest side p1 p2 is p3 - p1 = (l13 / l12) e^(i a1) (p2 - p1).
-
-    Args:
-        disk: a topological disk.
-        shapes: shapes of its triangles.
-        lengths: (m, 3) side lengths, used to choose two distant pins.
-
-    Raises:
-        MetricError: the system has no finite solution.
-    """
-    pins = far_pins(disk, lengths, shapes.is_broken)
-    points = pinned_least_squares(_equations(disk, shapes), pins)
+    points = pinned_least_squares(_equations(disk, lengths), far_pins(disk, lengths))
     if not np.isfinite(points).all():
         raise MetricError(
             f"the layout of {len(disk.faces)} triangles has no finite solution: "
-            f"{int(shapes.is_broken.sum())} of them violate the triangle inequality"
+            f"{int(is_broken(lengths).sum())} of them violate the triangle inequality"
         )
     return as_pairs(points)
 
@@ -123,30 +58,38 @@ def pinned_least_squares(equations: csr_matrix, pins: IntArray) -> ComplexArray:
     return z
 
 
-def _equations(disk: TriangleMesh, shapes: TriangleShapes) -> csr_matrix:
-    """Return the complex (m, n) matrix whose row for a triangle gives 0 if the triangle has its given shape."""
-    rows = np.arange(len(disk.faces))
-    third, turn = shapes.third, shapes.turn
-    columns = disk.faces[rows[:, None], np.stack([NEXT[third], PREVIOUS[third], third], axis=1)]
+def _equations(disk: TriangleMesh, lengths: FloatArray) -> csr_matrix:
+    """Return the complex (m, n) matrix whose row for a triangle gives 0 if the triangle has its (m, 3) side lengths.
+
+    The equation of a triangle with longest side p1 p2 is p3 - p1 = (l13 / l12) e^(i a1) (p2 - p1). Where the triangle
+    inequality is violated, the angles are the real parts of the complex ones: p3 is on the side p1 p2 and divides it as
+    l13 : l32.
+    """
+    rows = np.arange(len(lengths))
+    third = np.argmax(lengths, axis=1)
+    first, second = NEXT[third], PREVIOUS[third]
+    l13, l32 = lengths[rows, second], lengths[rows, first]
+    l12 = np.minimum(lengths[rows, third], l13 + l32)  # a side that is too long is shortened
+    turn = l13 / l12 * np.exp(1j * corner_angles(lengths)[rows, first])
+    columns = disk.faces[rows[:, None], np.stack([first, second, third], axis=1)]
     values = np.stack([turn - 1, -turn, np.ones(len(rows))], axis=1)
     return csr_matrix(
         (values.ravel(), (np.repeat(rows, 3), columns.ravel())), shape=(len(rows), len(disk.vertices))
     )
 
 
-def far_pins(disk: TriangleMesh, lengths: FloatArray, avoided: BoolArray | None = None) -> IntArray:
-    """Return (2,) two distant vertices that are not in broken triangles.
+def far_pins(disk: TriangleMesh, lengths: FloatArray) -> IntArray:
+    """Return (2,) two distant vertices that are not in triangles that violate the triangle inequality.
 
     Two pins that are close together, or in a triangle without a valid shape, make the system nearly singular.
 
     Args:
         disk: a topological disk.
         lengths: (m, 3) side lengths.
-        avoided: (m,) True for triangles without pins; None for those that violate the triangle inequality.
     """
     graph = MultiGraph(len(disk.vertices), disk.edges, lengths.ravel()[disk.edge_halfedges[:, 0]])
     allowed = np.ones(len(disk.vertices), dtype=bool)
-    allowed[disk.faces[is_broken(lengths) if avoided is None else avoided]] = False
+    allowed[disk.faces[is_broken(lengths)]] = False
     if allowed.sum() < 2:
         allowed[:] = True
     key = tie_key(disk.vertices)

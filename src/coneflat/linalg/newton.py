@@ -69,20 +69,15 @@ class Limits:
         tolerance: gradient that counts as converged. Below it, the method goes on as long as steps halve the gradient.
         steps: largest number of Newton steps.
         goal: gradient at the level of rounding, at which the method stops.
-        halvings: largest number of halvings of a step.
-        halvings_below: the same when the gradient is below the tolerance.
+        halvings: largest number of halvings of a step; below the tolerance, steps are not halved.
         largest_step: largest change of a variable in one step.
-        least_change: smallest relative change of the gradient in a step; the method stops below it, as the function
-            then decreases without a minimum.
     """
 
     tolerance: float
     steps: int
     goal: float
     halvings: int
-    halvings_below: int = 0
     largest_step: float = np.inf
-    least_change: float = 0.0
 
 
 def minimise(function: Convex[P], start: P, limits: Limits) -> tuple[P, int]:
@@ -116,7 +111,7 @@ def minimise(function: Convex[P], start: P, limits: Limits) -> tuple[P, int]:
             break
         if not is_reached and np.abs(step).max() <= ROUNDING * np.abs(here.variables).max():
             break
-        halvings = limits.halvings_below if is_reached else limits.halvings
+        halvings = 0 if is_reached else limits.halvings
         found = _search_line(function, here, step, best.largest, halvings, limits.largest_step)
         if found is None:
             if is_exact or is_reached:
@@ -125,13 +120,10 @@ def minimise(function: Convex[P], start: P, limits: Limits) -> tuple[P, int]:
             continue
         exactly = False
         is_halved = found.largest <= best.largest / 2
-        changed = np.abs(found.residual - here.residual).max()
         here = found
         if here.largest < best.largest:
             best = here
         if best.largest <= limits.tolerance and not is_halved:
-            break
-        if limits.least_change and changed <= limits.least_change * here.largest:
             break
     return best, steps
 

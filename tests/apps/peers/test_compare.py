@@ -15,11 +15,11 @@ from command import command
 import coneflat
 from coneflat import errors, flatten
 from coneflat.apps.cli.main import cli
-from coneflat.apps.peers import compare_methods, flatten_by
+from coneflat.apps.peers import METHODS, compare_methods, flatten_by
 from coneflat.apps.peers.methods import PEERS as METHODS_OF_OTHERS
 from coneflat.apps.peers.packages import PEERS, Peer, installed_peers, run_peer
 from coneflat.apps.peers.pictures import Sight, aligned_layouts, draw_layouts, draw_qualities
-from coneflat.apps.peers.run import COLUMNS, COMPARED, Comparison, Entry, comparison_csv, comparison_markdown
+from coneflat.apps.peers.run import COLUMNS, Comparison, Entry, comparison_csv, comparison_markdown
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ def compared(ball):
 
 
 def test_every_method_has_the_same_cones_and_cut(compared):
-    assert [entry.method for entry in compared.entries] == list(COMPARED)
+    assert [entry.method for entry in compared.entries] == list(METHODS)
     first = compared["exact"].result
     for entry in compared.entries:
         assert entry.result is not None, entry.note
@@ -45,17 +45,16 @@ def test_every_method_has_the_same_cones_and_cut(compared):
 
 def test_conformal_methods_agree(compared):
     reached = {entry.method: entry.result.distortion.qc_mean for entry in compared.entries}
-    held = [reached[name] for name in ("exact", "linear-abf", "abf++")]
-    assert np.ptp(held) < 1e-3, reached
+    assert abs(reached["exact"] - reached["linear"]) < 0.01, reached
     assert all(1.04 < qc < 1.12 for qc in reached.values()), reached
 
 
 def test_tables_hold_what_was_measured(compared):
     table = comparison_markdown(compared)
-    assert table.count("| ") >= (len(COMPARED) + 2) * len(COLUMNS)
+    assert table.count("| ") >= (len(METHODS) + 2) * len(COLUMNS)
     assert "- lscm: " in table
     rows = list(csv.DictReader(io.StringIO(comparison_csv(compared))))
-    assert [row["method"] for row in rows] == list(COMPARED)
+    assert [row["method"] for row in rows] == list(METHODS)
     assert set(COLUMNS) < set(rows[0])
     assert float(rows[0]["QC mean"]) == compared["exact"].result.distortion.qc_mean
 
@@ -139,14 +138,14 @@ def test_what_cannot_work_is_refused_before_the_work(words, message, tmp_path, b
 def test_scale_motion_and_numbering():
     vertices, faces = shapes.sphere(3)
     other_vertices, other_faces, new = shapes.renumber(vertices, faces)
-    base = flatten_by("abf++", vertices, faces, cones="greedy")
+    base = flatten_by("bff", vertices, faces, cones="greedy")
     for mesh in (
         (vertices * 1e-6, faces),
         (vertices * 1e6, faces),
         (vertices @ shapes.rotation().T, faces),
         (other_vertices, other_faces),
     ):
-        other = flatten_by("abf++", *mesh, cones="greedy")
+        other = flatten_by("bff", *mesh, cones="greedy")
         assert other.distortion.qc_mean == pytest.approx(base.distortion.qc_mean, rel=1e-7)
         assert other.distortion.qc_max == pytest.approx(base.distortion.qc_max, rel=1e-6)
     np.testing.assert_array_equal(other.cones, new[base.cones])
@@ -188,7 +187,7 @@ def test_no_text_runs_into_another_or_over_the_edge(stretch):
     vertices, faces = shapes.sphere(1)
     result = coneflat.flatten(vertices * [1, stretch, 1], faces)
     entries = tuple(Entry(LONG, result, 1.0) for _ in range(7))
-    comparison = Comparison("x", len(faces), entries)
+    comparison = Comparison(entries)
     for figure in (draw_layouts(comparison), draw_qualities(comparison, Sight())):
         width, height = figure.get_size_inches() * figure.dpi
         boxes = [text.get_window_extent() for text in figure.texts]

@@ -23,7 +23,7 @@ class CompareFlags:
 
     Attributes:
         output: Folder for the table (Markdown and CSV) and the pictures.  [default: none; the table is printed]
-        methods: Methods to compare, separated by commas.  [default: all whose name contains no /]
+        methods: Methods to compare, separated by commas.  [default: all]
         eye: Direction from which pictures show the model: front, back, left, right, top, bottom, two of these, or
             X,Y,Z.
         no_peers: Leave out other packages (libigl, xatlas, uvunwrap).
@@ -57,8 +57,8 @@ def compare(
     """
     from ...errors import MetricError
     from ...io import read_joined
-    from ..peers.run import COMPARED as METHODS
-    from ..peers.run import compare_methods, comparison_csv, comparison_lines, comparison_markdown
+    from ..peers import METHODS, compare_methods
+    from ..peers.run import comparison_csv, comparison_lines, comparison_markdown
     from .run import Console
 
     flags = pop_flags(given, CompareFlags)

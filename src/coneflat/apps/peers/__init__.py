@@ -3,7 +3,7 @@
 Examples:
     >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
     >>> faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
-    >>> coneflat.peers.flatten_by("abf++", vertices, faces)
+    >>> coneflat.peers.flatten_by("bff", vertices, faces)
     <Flattening: 4 triangles, 4 cones, 1 chart, QC 1.0000>
     >>> "lscm" in coneflat.peers.METHODS
     True

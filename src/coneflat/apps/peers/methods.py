@@ -4,32 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ... import Flattening
+from ... import Flattening, TriangleMesh
+from ...base import FloatArray
 from ...flatten import flatten_source
 from ...io import as_input
 from ...metric import find_metric
 from ...options import Choice, Options, option, read_options
 from ...source import Source
 from ...stages import ConeSolution, FlatMetric, MetricSpec, Surface
-from .angle_based import angle_based, linear_angles, nearest_angles
 from .bff import boundary_first
 from .disk_maps import least_squares_map
 
 #: The compared methods; each takes a connected mesh, its (m, 3) side lengths, and cones with their curvatures.
-PEERS: Mapping[str, Callable[..., FlatMetric]] = {
-    "linear-abf": partial(angle_based, solve=linear_angles),
-    "linear-abf/free": partial(angle_based, solve=linear_angles, is_free=True),
-    "abf++": partial(angle_based, solve=nearest_angles),
+PEERS: Mapping[str, Callable[[TriangleMesh, FloatArray, ConeSolution], FlatMetric]] = {
     "lscm": least_squares_map,
     "bff": boundary_first,
 }
-#: All methods of `flatten_by`. That with a / is the variant as used in 2008: angle based flattening that prescribes
-#: nothing at cones.
+#: All methods of `flatten_by`.
 METHODS = ("exact", "linear", *PEERS)
 
 
@@ -44,15 +39,12 @@ class PeerOptions(Options):
     method: str = option("exact", Choice(METHODS))
 
 
-def flatten_by(
-    name: str, mesh: Any, faces: ArrayLike | None = None, *, best_effort: bool = False, **options: Any
-) -> Flattening:
+def flatten_by(name: str, mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flattening:
     """Flatten a triangle mesh by a given method; the default is one chart per component, which all methods support.
 
     Args:
         name: one of `METHODS`.
         mesh, faces: as for `coneflat.flatten`.
-        best_effort: return a result with a note if ABF++ did not converge.
         options: those of `coneflat.flatten`, except the method. Options of the exact method alone raise an error for
             other methods.
 
@@ -69,7 +61,6 @@ def flatten_by(
     def find(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> FlatMetric:
         if name not in PEERS:
             return find_metric(surface, solution, spec)
-        given = {"best_effort": best_effort} if name == "abf++" else {}
-        return PEERS[name](surface.mesh, surface.lengths, solution, **given)
+        return PEERS[name](surface.mesh, surface.lengths, solution)
 
     return flatten_source(Source(as_input(mesh, faces)), read, find_metric=find)

@@ -64,14 +64,13 @@ def draw_layouts(comparison: Comparison) -> Figure:
         )
         for entry, quantity, result in zip(shown, quantities, aligned_layouts(shown), strict=True)
     ]
-    return figure_of(in_rows(panels, quantities[:1]))
+    return _figure_of(panels, quantities)
 
 
 def draw_qualities(comparison: Comparison, sight: Sight) -> Figure:
     """Return a figure of the model with the quasi-conformal distortion of all methods on one scale."""
     quantities = same_scale(comparison.drawn)
-    panels = quality_panels(comparison.drawn, quantities, sight)
-    return figure_of(in_rows(panels, quantities[:1]))
+    return _figure_of(quality_panels(comparison.drawn, quantities, sight), quantities)
 
 
 def quality_panels(
@@ -127,11 +126,9 @@ def same_scale(entries: Sequence[Entry]) -> list[view.Quantity]:
     return [replace(one, scale=scale, label=name) for one, name in zip(quantities, names, strict=True)]
 
 
-def figure_of(rows: Sequence[view.Row], *, marks_of: Flattening | None = None) -> Figure:
-    """Return a figure of rows of panels with the width of a page."""
-    return view.compose(
-        rows, marks=[] if marks_of is None else view.mark_handles(marks_of), dpi=DPI, width=10.0
-    )
+def _figure_of(panels: Sequence[view.Panel], quantities: Sequence[view.Quantity]) -> Figure:
+    """Return a figure of panels with the width of a page, and one colour bar for a row."""
+    return view.compose(in_rows(panels, quantities[:1]), dpi=DPI, width=10.0)
 
 
 def in_rows(panels: Sequence[view.Panel], quantities: Sequence[view.Quantity] = ()) -> list[view.Row]:

@@ -8,14 +8,13 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from os import PathLike
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ... import ConeflatError, Flattening, MeshFile
-from ...base import Progress, list_some
+from ... import ConeflatError, Flattening
+from ...base import Progress
 from ...errors import OptionError
 from .methods import METHODS, flatten_by
 from .packages import PEERS, installed_peers, run_peer
@@ -29,8 +28,6 @@ SHARED = (
 VERTEX_OPTIONS = ("seams", "no_seams", "seam_weights")
 # The stages from cones and cut to a layout.
 TIMED = ("metric", "layout")
-#: The default methods, without the variants as used in 2008.
-COMPARED = tuple(name for name in METHODS if "/" not in name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,13 +52,9 @@ class Comparison:
     """The results of several methods on one mesh.
 
     Attributes:
-        name: name of the mesh.
-        triangles: its number of triangles.
         entries: one for each method and each peer.
     """
 
-    name: str
-    triangles: int
     entries: tuple[Entry, ...]
 
     @property
@@ -78,7 +71,7 @@ def compare_methods(
     mesh: Any,
     faces: ArrayLike | None = None,
     *,
-    methods: Sequence[str] = COMPARED,
+    methods: Sequence[str] = METHODS,
     peers: Iterable[str] | None = None,
     progress: Progress | None = None,
     **options: Any,
@@ -87,7 +80,7 @@ def compare_methods(
 
     Args:
         mesh, faces: as for `coneflat.flatten`.
-        methods: names of `METHODS`; by default those without a /.
+        methods: names of `METHODS`; all by default.
         peers: names of methods of other packages, from `PEERS`; by default those that are installed.
         progress: called with the current step and the completed fraction.
         options: options of `coneflat.flatten`, with one chart by default. The cones and the cut are those of the method
@@ -141,8 +134,7 @@ def compare_methods(
             entries.append(entry_of(name, result, base))
         except ConeflatError as error:
             entries.append(Entry(name, None, math.nan, " ".join(str(error).split())))
-    named = mesh.path if isinstance(mesh, MeshFile) else mesh if isinstance(mesh, (str, PathLike)) else None
-    return Comparison("mesh" if named is None else str(named), len(base.faces), tuple(entries))
+    return Comparison(tuple(entries))
 
 
 def _with_cones(mesh: Any, faces: ArrayLike | None, base: Flattening) -> tuple[Any, ArrayLike | None]:
@@ -233,21 +225,12 @@ def comparison_rows(comparison: Comparison) -> list[list[str]]:
 
 def comparison_markdown(comparison: Comparison) -> str:
     """Return the table of methods and their notes as Markdown."""
-    return f"{markdown(['method', *COLUMNS], comparison_rows(comparison))}\n{notes([comparison])}"
+    return f"{markdown(['method', *COLUMNS], comparison_rows(comparison))}\n{_notes(comparison)}"
 
 
-def notes(comparisons: Sequence[Comparison]) -> str:
-    """Return a line for each note on a method, with the names of the meshes if there are several."""
-    meshes: dict[tuple[str, str], list[str]] = {}
-    for comparison in comparisons:
-        for entry in comparison.entries:
-            if entry.note:
-                meshes.setdefault((entry.method, entry.note), []).append(comparison.name)
-    about = len(comparisons) > 1
-    return "".join(
-        f"- {method}{f' ({list_some(names)})' if about else ''}: {note}.\n"
-        for (method, note), names in sorted(meshes.items())
-    )
+def _notes(comparison: Comparison) -> str:
+    """Return a line for each note on a method."""
+    return "".join(f"- {entry.method}: {entry.note}.\n" for entry in comparison.entries if entry.note)
 
 
 def comparison_csv(comparison: Comparison) -> str:
@@ -273,4 +256,4 @@ def comparison_lines(comparison: Comparison) -> Iterator[str]:
     for name, *cells in rows:
         numbers = (f"{cell:>{width}}" for cell, width in zip(cells, widths, strict=True))
         yield "  ".join([f"{name:{first}}", *numbers]).rstrip()
-    yield from notes([comparison]).splitlines()
+    yield from _notes(comparison).splitlines()

@@ -19,7 +19,7 @@ from ...geometry import (
     sides_between,
     signed_angles,
     signed_double_areas,
-)
+)  # fmt: skip
 from ...layout import SeamChains, find_chains, rest_sides
 from ...mesh import NEXT, PREVIOUS, label_components, label_faces, point_vertices
 from .features import split_pieces

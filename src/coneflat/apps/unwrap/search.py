@@ -30,12 +30,8 @@ FIRST_DISTORTION, MAX_CANDIDATES = 0.25, 5
 # The first candidate within the bound is taken for parts with more triangles, as each candidate takes seconds, and for
 # parts with less than this share of the area.
 MANY_TRIANGLES, MINOR_SHARE = 200_000, 0.002
-# Least factor of the distortion from one candidate to the next.
-MIN_FACTOR = 1.15
 # Number of times that tips are moved to meet the bound, and that a layout is settled to avoid contacts.
 MAX_TRIES = 5
-# Candidates whose energy exceeds that of an isometry by more than this factor of what is allowed are given up.
-REACH = 2.0
 # Cost of seams that lowers the energy to that of an isometry, relative to the square root of the area.
 COST_PER_ENERGY = 0.6
 # Tolerance of the energies of candidates, see `relax`. Those above the bound by less than twice as much may be within
@@ -123,7 +119,8 @@ class CutSearch:
 
     @property
     def _reach(self) -> float:
-        return ISOMETRIC + REACH * (self._max_energy - ISOMETRIC)
+        """The energy above which a candidate is given up."""
+        return ISOMETRIC + 2 * (self._max_energy - ISOMETRIC)
 
     def _by_distortion(self) -> list[Candidate]:
         """Return candidates with energies around the bound."""
@@ -157,7 +154,7 @@ class CutSearch:
                 # The energy above that of an isometry is about a multiple of the square of the distortion.
                 above = float(np.clip(one.energy - ISOMETRIC, allowed / 16, allowed * 16))
                 factor = np.sqrt(allowed / above)
-                distortion *= max(factor, MIN_FACTOR) if factor > 1 else min(factor, 1 / MIN_FACTOR)
+                distortion *= max(factor, 8 / 7) if factor > 1 else min(factor, 7 / 8)
         return found
 
     def _candidate(self, layout: Layout, distortion: float) -> Candidate:

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import Flattening
-from ...atlas import cut_for_packing
 from ...base import Stopwatch, limit_threads, plural
 from ...errors import OptionError
 from ...evaluate import evaluate
@@ -23,6 +22,7 @@ from ...source import Source, find_copies
 from ...stages import RelaxSpec, Surface
 from .free import ISOMETRIC
 from .options import UnwrapOptions
+from .pack_cuts import cut_for_packing
 from .search import Candidate, CutSearch
 
 #: The `method` in the settings of a result.

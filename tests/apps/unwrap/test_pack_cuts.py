@@ -9,8 +9,8 @@ import pytest
 import shapes
 
 from coneflat import TriangleMesh
-from coneflat.atlas import cut_for_packing, pack_charts
-from coneflat.atlas.pack_cuts import MIN_PIECE, SHARE
+from coneflat.apps.unwrap.pack_cuts import MIN_PIECE, SHARE, cut_for_packing
+from coneflat.atlas import pack_charts
 from coneflat.base import Stopwatch
 from coneflat.flatten import Method, lay_out_part
 from coneflat.geometry import signed_double_areas

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from coneflat import TriangleMesh
-from coneflat.base import BoolArray, FloatArray, IntArray, error_text, plural
+from coneflat.base import BoolArray, FloatArray, IntArray, plural
+from coneflat.base.text import error_text
 from coneflat.errors import ConvergenceError
 from coneflat.geometry import angle_defect, corner_angles, double_areas
 from coneflat.geometry.delaunay import make_delaunay
@@ -19,8 +20,8 @@ from coneflat.geometry.straight import straight_triangles
 from coneflat.metric.exact import checked_target
 from coneflat.stages import ConeSolution, FlatMetric, SolveStatistics
 
-from .angles import CoherentAngles, coherent_angles
-from .radii import circle_pattern
+from .pattern_angles import CoherentAngles, coherent_angles
+from .pattern_radii import circle_pattern
 
 # Largest curvature error of a metric that has converged, radians.
 TOLERANCE = 1e-9

@@ -13,18 +13,13 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from ..base.progress import check_cancelled
-from ..errors import OptionError
-from ..linalg.shortest_paths import MultiGraph
-from ..mesh.charts import label_charts
-from ..mesh.connectivity import TriangleMesh
-from ..stages import Layout
-from .charts import ChartLayout, Outlines
-from .injective import with_charts
-from .orient import square_angle, straight_angle
-from .place import Effort, pack
-from .split import as_disk
+from ... import TriangleMesh
+from ...atlas import ChartLayout, Effort, Outlines, as_disk, pack, square_angle, straight_angle, with_charts
+from ...base import BoolArray, ComplexArray, FloatArray, IntArray, check_cancelled
+from ...errors import OptionError
+from ...linalg import MultiGraph
+from ...mesh import label_charts
+from ...stages import Layout
 
 # A cut must increase the covered fraction of the square by PRICE for each length of the square root of the area, and
 # all cuts together may cost SHARE of the charts' borders, in which a seam counts twice.

@@ -20,9 +20,9 @@ MIN_MEETING = 1e-4
 # The largest sum of angles opposite an edge.
 WIDEST_PAIR = np.pi - MIN_MEETING
 # Stopping criteria: largest error of a sum of angles, radians, which is also that of curvature; largest number of
-# Newton steps; rounding of a sum of some angles, radians; halvings after which a step counts as rounding; and fraction
-# of the gradient that a step must change, because without a solution the function is unbounded below.
-ANGLE_LIMITS = Limits(1e-10, 40, goal=1e-12, halvings=40, halvings_below=40, least_change=1e-6)
+# Newton steps; rounding of a sum of some angles, radians; and halvings after which a step counts as rounding. Without a
+# solution the function is unbounded below, and the number of steps ends the search.
+ANGLE_LIMITS = Limits(1e-10, 40, goal=1e-12, halvings=40)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from coneflat.errors import ConvergenceError
 from coneflat.linalg import factorize
 from coneflat.linalg.newton import Point, minimise
 
-from .angles import ANGLE_LIMITS, CoherentAngles
+from .pattern_angles import ANGLE_LIMITS, CoherentAngles
 
 # Stopping criteria for the angles around the centre of a circle, radians; and largest change of a log radius per step.
 RADIUS_LIMITS = replace(ANGLE_LIMITS, steps=50, largest_step=5.0)

@@ -14,19 +14,24 @@ from typing import TypeAlias
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags, vstack
 
-from ... import TriangleMesh
-from ...base import FloatArray, IntArray, error_text, plural
-from ...errors import ConvergenceError, CurvatureError
-from ...geometry import corner_angles, halfedge_twins, handle_loops
-from ...layout import fit_shapes, shapes_of_angles
-from ...linalg import factorize
-from ...mesh import NEXT, PREVIOUS
-from ...stages import ConeSolution, Cut, Embedding, FlatMetric, SolveStatistics
-from .disk_maps import embedding_metric
+from coneflat import TriangleMesh
+from coneflat.apps.peers.disk_maps import embedding_metric
+from coneflat.base import FloatArray, IntArray, plural
+from coneflat.base.text import error_text
+from coneflat.errors import ConvergenceError, CurvatureError
+from coneflat.geometry import corner_angles, halfedge_twins
+from coneflat.geometry.handles import handle_loops
+from coneflat.geometry.planar import as_pairs
+from coneflat.layout import far_pins, pinned_least_squares
+from coneflat.linalg import factorize
+from coneflat.mesh import NEXT, PREVIOUS
+from coneflat.stages import ConeSolution, Cut, Embedding, FlatMetric, SolveStatistics
 
 # Lower bound of angles, radians: those of needles can be rounded to 0, but their logs and relative squares must be
 # finite.
 MIN_ANGLE = 1e-8
+# Angle in radians that replaces linear angles that are not positive, so that the shape of the triangle is finite.
+LEAST_SHAPE = 1e-3
 # ABF++: largest number of steps; tolerance of the conditions, radians and logs; and largest change of an angle by a
 # further step. Conditions must hold accurately, but the minimum need not be found to the last digits.
 STEPS, TOLERANCE, LAST_CHANGE = 100, 1e-9, 1e-6
@@ -41,7 +46,6 @@ def angle_based(
     lengths: FloatArray,
     solution: ConeSolution,
     solve: Solve,
-    best_effort: bool = False,
     is_free: bool = False,
 ) -> FlatMetric:
     """Return the angle based flattening of a mesh.
@@ -51,7 +55,6 @@ def angle_based(
         lengths: (m, 3) its side lengths.
         solution: cones and their curvatures.
         solve: `linear_angles` or `nearest_angles`.
-        best_effort: accept angles that did not converge.
         is_free: cut first and prescribe nothing at cones and seams, as in 2008; seams are then a free boundary.
     """
 
@@ -59,7 +62,7 @@ def angle_based(
         """Return the least squares reconstruction from angles, with the area of the mesh.
 
         Raises:
-            ConvergenceError: the solver did not reach its tolerance, unless `best_effort`.
+            ConvergenceError: the solver did not reach its tolerance.
             CurvatureError: the angle of a cone is too large for its triangles.
         """
         notes: list[str] = []
@@ -74,23 +77,41 @@ def angle_based(
         angles, steps, converged = solve(conditions, wanted_angles(whole, corner_angles(lengths), curvature))
         residual = conditions.residual(np.clip(angles, MIN_ANGLE, np.pi - MIN_ANGLE))
         if not converged:
-            failure = (
+            raise ConvergenceError(
                 f"angle based flattening did not converge: the conditions on angles are {error_text(residual)} "
-                f"after {plural(steps, 'step')}"
+                f"after {plural(steps, 'step')}; method 'exact', other cones, a repair or remeshing may help"
             )
-            if not best_effort or not np.isfinite(residual):
-                raise ConvergenceError(
-                    f"{failure}; method 'exact', other cones, a repair or remeshing may help"
-                )
-            notes.append(f"{failure[0].upper()}{failure[1:]}.")
-        shapes = shapes_of_angles(angles.reshape(-1, 3))
-        broken = int(shapes.is_broken.sum())
+        by_triangle = angles.reshape(-1, 3)
+        broken = int((by_triangle.min(axis=1) <= 0).sum())
         if broken:
             notes.append(f"{plural(broken, 'triangle')} with an angle below 0: method 'abf++' avoids this.")
         statistics = SolveStatistics(newton_steps=steps, residual=residual, broken=broken)
-        return Embedding(fit_shapes(cut.mesh, shapes, lengths), statistics, tuple(notes))
+        return Embedding(least_squares_points(cut.mesh, by_triangle, lengths), statistics, tuple(notes))
 
     return embedding_metric(mesh, lengths, solution, embed, has_target_cones=not is_free)
+
+
+def least_squares_points(disk: TriangleMesh, angles: FloatArray, lengths: FloatArray) -> FloatArray:
+    """Return (n, 2) points of a disk, up to a similarity, whose corner angles fit given ones (Section 5 of ABF++).
+
+    Angles that are not positive are replaced by `LEAST_SHAPE`, and the largest angle is reduced accordingly.
+
+    Args:
+        disk: a topological disk.
+        angles: (m, 3) radians, which sum to pi.
+        lengths: (m, 3) side lengths, used to choose two distant pins.
+    """
+    rows = np.arange(len(angles))
+    third = np.argmax(angles, axis=1)
+    first, second = NEXT[third], PREVIOUS[third]
+    one, two = (
+        np.where(angle > 0, angle, LEAST_SHAPE) for angle in (angles[rows, first], angles[rows, second])
+    )
+    turn = np.sin(two) / np.sin(one + two) * np.exp(1j * one)
+    values = np.stack([turn - 1, -turn, np.ones(len(rows))], axis=1)
+    columns = disk.faces[rows[:, None], np.stack([first, second, third], axis=1)]
+    equations = csr_matrix((values.ravel(), (np.repeat(rows, 3), columns.ravel())))
+    return as_pairs(pinned_least_squares(equations, far_pins(disk, lengths)))
 
 
 def nearest_angles(conditions: AngleConditions, wanted: FloatArray) -> tuple[FloatArray, int, bool]:
