@@ -97,9 +97,8 @@ def separate_overlaps(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layo
     charts = injective_charts(mesh, layout.points, layout.corners, costs, layout.disk)
     separated = with_charts(layout, charts)
     count = int(spec.is_forbidden[Seams(mesh, charts).edges].sum())
-    if not count:
-        return separated
-    return separated.with_notes(f"{plural(count, 'forbidden edge')} had to be cut to separate overlaps.")
+    note = f"{plural(count, 'forbidden edge')} had to be cut to separate overlaps."
+    return separated.with_notes(note) if count else separated
 
 
 def with_charts(layout: Layout, charts: ChartLayout) -> Layout:

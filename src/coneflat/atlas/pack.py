@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -192,7 +191,7 @@ def _check(resolution: int, padding: float, margin: float, rotate: str | int, ti
             raise OptionError(f"{name} must be a positive integer, got {short_repr(count)}")
     for name, texels in (("padding", padding), ("margin", margin)):
         is_number = isinstance(texels, (int, float, np.number)) and not isinstance(texels, bool)
-        if not is_number or not 0 <= texels < math.inf:
+        if not is_number or not 0 <= texels < np.inf:
             raise OptionError(f"{name} must be a number of texels, 0 or more, got {short_repr(texels)}")
     if isinstance(rotate, int) and not isinstance(rotate, bool):
         if not 1 <= rotate <= MAX_TURNS:
