@@ -33,12 +33,12 @@ CEILINGS = {
     "apps": 0,
     "apps.ahead": 37,
     "apps.batch": 398,
-    "apps.cli": 1529,
+    "apps.cli": 1525,
     "apps.measure_uv": 160,
     "apps.peers": 478,
     "apps.quads": 3249,
     "apps.studio": 1741,
-    "apps.unwrap": 854,
+    "apps.unwrap": 857,
     "apps.view": 1623,
     "atlas": 1492,
     "base": 328,
@@ -63,7 +63,7 @@ CEILINGS = {
     "xatlas": 2,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_804, 235, 25_873
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_804, 235, 25_872
 CONSTANTS, KERNELS, NAMES, LEVELS = 295, 110, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -12,7 +12,7 @@ import pytest
 import shapes
 from click.testing import CliRunner
 
-from coneflat import errors
+from coneflat import errors, measure_uv
 from coneflat.apps.batch import find_jobs, run_batch
 from coneflat.apps.batch.process import Child
 from coneflat.apps.cli.main import cli
@@ -52,6 +52,17 @@ def test_failures_stop_nothing(models, tmp_path):
     assert float(rows["ball.obj"]["curvature_error_max"]) < 1e-10
     assert (out / "ball.obj").read_text().count("\nvt ") > 100
     assert not (out / "broken.obj").exists()
+
+
+def test_textures(models, tmp_path):
+    result = invoke(
+        "batch", models / "ball.obj", "--out", tmp_path, "--max-energy", 4.2, "--require", "energy<=4.2"
+    )
+    assert result.exit_code == 0, result.output
+    assert 4 < measure_uv(tmp_path / "ball.obj").distortion.energy <= 4.2
+    refused = invoke("batch", models, "--out", tmp_path, "--max-energy", 4)
+    assert refused.exit_code == 1
+    assert "above 4" in str(refused.exception)
 
 
 def test_a_further_run_does_what_is_left(models, tmp_path):

@@ -147,7 +147,7 @@ def test_the_command_writes_what_it_reports(tmp_path):
     assert 4 < measure_uv(tmp_path / "out.obj").distortion.energy <= 4.1
     refused = command("unwrap", mesh, "-o", tmp_path / "no.obj", "--max-energy", "4")
     assert refused.returncode == 2
-    assert refused.stderr == "coneflat: error: max_energy must be above 4, the energy of an isometry, not 4\n"
+    assert refused.stderr == "coneflat: error: max_energy must be above 4, the energy of an isometry, got 4\n"
     assert not (tmp_path / "no.obj").exists()
 
 

@@ -13,7 +13,7 @@ from .jobs import COLUMNS
 
 def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
     """Flatten a mesh file, write the result, and return its row of the summary; errors give a row, too."""
-    from ... import ConeflatError, flatten
+    from ... import ConeflatError, flatten, unwrap
     from ...io import read_joined, write_measured
     from ...measure import REPORTED, breaches, parse_requirements
 
@@ -21,7 +21,7 @@ def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
     row: dict[str, Any] = {"mesh": job["mesh"], "output": job["output"]}
     try:
         source = read_joined(job["mesh"], job["weld"])
-        result = flatten(source.mesh, **job["options"])
+        result = (unwrap if "max_energy" in job["options"] else flatten)(source.mesh, **job["options"])
         result = write_measured(result, job["output"])
         report = result.report()
         unmet = breaches(parse_requirements(job["required"], REPORTED), report)

@@ -27,7 +27,7 @@ class Job:
 
     Attributes:
         mesh, output: absolute paths.
-        options: keyword arguments of `coneflat.flatten`, as JSON values.
+        options: keyword arguments of `coneflat.flatten`, or of `unwrap` with `max_energy`, as JSON values.
         weld: merge vertices at the same position; None for the default, see `coneflat.io.read.read_joined`.
         mark: checksum of the size and time of the mesh file, the options and the version; "" if the file is missing.
         required: conditions on measures, such as "flipped=0"; a mesh that does not meet them has failed.

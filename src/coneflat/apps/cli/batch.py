@@ -12,6 +12,7 @@ import click
 
 from ...base import plural, printable
 from ...options import FORMATS, Options, read_options
+from ..unwrap.options import UnwrapOptions
 from .options import (
     check_combinations,
     flag,
@@ -37,6 +38,7 @@ class BatchFlags:
         time_limit: Time limit per mesh in seconds.
         dask: Address of a Dask scheduler whose cluster is used, for example tcp://host:8786.
         redo: Also flatten meshes that are done.
+        max_energy: Unwrap for textures within this energy, for example 4.1, as `coneflat unwrap` does.
     """
 
     out: Path = path_flag(required=True)
@@ -46,6 +48,7 @@ class BatchFlags:
     time_limit: float = flag(3600.0, type=float)
     dask: str | None = flag(metavar="ADDRESS")
     redo: bool = flag(False, is_flag=True)
+    max_energy: float | None = flag(type=float)
 
 
 @click.command(cls=GroupedCommand, short_help="Flatten many meshes, on this machine or on a Dask cluster.")
@@ -85,10 +88,12 @@ def batch(
     flags = pop_flags(given, BatchFlags)
     if flags.jobs is not None and flags.dask is not None:
         raise click.UsageError("--jobs has no effect with --dask: leave out --jobs", context)
-    options = keywords(given)
+    textures = {} if flags.max_energy is None else {"max_energy": flags.max_energy}
+    options = keywords(given) | textures
     _refuse_vertices(context, options)
     parse_requirements(required, REPORTED)
-    read_options(options)  # Options are checked before the work starts.
+    # Options are checked before the work starts.
+    read_options(options, UnwrapOptions if textures else Options)
     todo = find_jobs(patterns, flags.out.absolute(), f".{flags.format}", options, weld, required)
     make_folder(flags.out)
     rows = []

@@ -22,9 +22,7 @@ from ...layout import StretchEnergy, relax
 from ...linalg import factorize
 from ...mesh import label_faces, open_along
 from ...stages import Layout
-
-# The symmetric Dirichlet energy of an isometry; `StretchEnergy` is relative to it.
-ISOMETRIC = 4.0
+from .options import ISOMETRIC
 
 
 def freed(layout: Layout, free: BoolArray | None = None, tolerance: float = 1e-3) -> tuple[Layout, float]:

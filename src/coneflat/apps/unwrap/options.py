@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ...errors import OptionError
 from ...options import AtlasOptions, Number, RunOptions, SeamOptions, option
 
-#: Default bound of the energy; 4 is isometric.
-MAX_ENERGY = 4.1
+#: The symmetric Dirichlet energy of an isometry, and the default bound.
+ISOMETRIC, MAX_ENERGY = 4.0, 4.1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,3 +21,9 @@ class UnwrapOptions(SeamOptions, AtlasOptions, RunOptions):
     """
 
     max_energy: float = option(MAX_ENERGY, Number(is_positive=True))
+
+    def __post_init__(self) -> None:
+        if not self.max_energy > ISOMETRIC:
+            raise OptionError(
+                f"max_energy must be above 4, the energy of an isometry, got {self.max_energy:g}"
+            )

@@ -22,7 +22,8 @@ from ...mesh import label_faces, open_along
 from ...seams import seam_costs
 from ...source import Part
 from ...stages import Cut, Layout, Surface, VertexCurvatures
-from .free import ISOMETRIC, freed, seam_edges
+from .free import freed, seam_edges
+from .options import ISOMETRIC
 from .tips import RINGS, find_tips, moved_tips, moves_for
 
 # The area distortion of the first candidate, and the maximum number of candidates.

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 from ... import Flattening
 from ...base import Stopwatch, limit_threads, plural
-from ...errors import OptionError
 from ...evaluate import evaluate
 from ...flatten import Method, with_copies
 from ...geometry import double_areas
@@ -20,7 +19,6 @@ from ...metric import find_metric
 from ...options import Options, declarations, read_options, takes
 from ...source import Source, find_copies
 from ...stages import RelaxSpec, Surface
-from .free import ISOMETRIC
 from .options import UnwrapOptions
 from .pack_cuts import cut_for_packing
 from .search import Candidate, CutSearch
@@ -59,8 +57,6 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         (True, 0, 0)
     """
     o = read_options(options, UnwrapOptions)
-    if not o.max_energy > ISOMETRIC:
-        raise OptionError(f"max_energy must be above 4, the energy of an isometry, not {o.max_energy:g}")
     shared = Options(
         **{name: getattr(o, name) for name in declarations(UnwrapOptions) if name != "max_energy"}
     )
