@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...atlas import separate_overlaps
+from ... import TriangleMesh
+from ...atlas import ChartLayout, separate_overlaps, with_charts
 from ...base import FloatArray, IntArray
 from ...cones import close_search, find_cones
 from ...errors import CurvatureError, MetricError
@@ -32,7 +33,7 @@ FIRST_DISTORTION, MAX_CANDIDATES = 0.25, 5
 # parts with less than this share of the area.
 MANY_TRIANGLES, MINOR_SHARE = 200_000, 0.002
 # Number of times that tips are moved to meet the bound, and that a layout is settled to avoid contacts.
-MAX_TRIES = 5
+MAX_TRIES = 4
 # Cost of seams that lowers the energy to that of an isometry, relative to the square root of the area.
 COST_PER_ENERGY = 0.6
 # Tolerance of the energies of candidates, see `relax`. Those above the bound by less than twice as much may be within
@@ -215,7 +216,8 @@ class CutSearch:
             tried.append((slack, excess))
             if excess <= 2 * TOLERANCE * allowed:
                 found.append(one)
-            if -2 * TOLERANCE * allowed <= excess <= 0:
+            # A start beyond the bound only has to get within it: the tips move again after the cuts for packing.
+            if excess <= 0 and (excess >= -2 * TOLERANCE * allowed or start.energy > self._max_energy):
                 break
             low = max((pair for pair in tried if pair[1] <= 0), default=None)
             high = min((pair for pair in tried if pair[1] > 0), default=None)
@@ -254,5 +256,32 @@ def side_by_side(layout: Layout) -> Layout:
 
 def separate_charts(layout: Layout, costs: FloatArray, part: Part) -> Layout:
     """Return a layout in any number of charts, split so that no chart overlaps itself."""
-    separated = separate_overlaps(side_by_side(layout), costs, part.seams)
-    return replace(separated, chart=label_faces(separated.corners, len(separated.points))[1])
+    if not layout.chart.any():
+        separated = separate_overlaps(layout, costs, part.seams)
+        return replace(separated, chart=label_faces(separated.corners, len(separated.points))[1])
+    pairs = find_overlaps(side_by_side(layout).points[layout.corners]).pairs
+    label, notes = layout.chart.copy(), layout.notes
+    for chart in np.unique(layout.chart[pairs[:, 0]]).tolist():
+        faces = np.flatnonzero(layout.chart == chart)
+        used, corners = np.unique(layout.corners[faces], return_inverse=True)
+        points = layout.points[used]
+        disk = TriangleMesh(np.pad(points, ((0, 0), (0, 1))), corners.reshape(-1, 3))
+        sides = disk.edge_halfedges[:, 0]
+        edges = layout.mesh.halfedge_edges[3 * faces[sides // 3] + sides % 3]
+        avoided, forbidden = part.seams.is_avoided[edges], part.seams.is_forbidden[edges]
+        alone = replace(
+            layout,
+            notes=notes,
+            mesh=disk,
+            points=points,
+            corners=disk.faces,
+            chart=np.zeros(len(faces), dtype=np.int64),
+            disk=None,
+        )
+        spec = replace(part.seams, is_avoided=avoided, is_forbidden=forbidden)
+        separated = separate_overlaps(alone, costs[edges], spec)
+        notes, pieces = separated.notes, separated.chart
+        label[faces] = np.where(pieces > 0, label.max() + pieces, chart)
+    return with_charts(
+        layout, ChartLayout(layout.points, layout.corners, layout.chart).split(label).renumbered()
+    )
