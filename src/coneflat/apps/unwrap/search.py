@@ -31,7 +31,7 @@ from .tips import RINGS, find_tips, moved_tips, moves_for
 FIRST_DISTORTION, MAX_CANDIDATES = 0.25, 5
 # The first candidate within the bound is taken for parts with more triangles, as each candidate takes seconds, and for
 # parts with less than this share of the area.
-MANY_TRIANGLES, MINOR_SHARE = 200_000, 0.002
+MANY_TRIANGLES, MINOR_SHARE = 60_000, 0.002
 # Number of times that tips are moved to meet the bound, and that a layout is settled to avoid contacts.
 MAX_TRIES = 4
 # Cost of seams that lowers the energy to that of an isometry, relative to the square root of the area.
@@ -86,9 +86,9 @@ class CutSearch:
         """
         found = self._by_distortion()
         near = [one for one in found if one.energy <= self._reach]
-        for one in sorted(near, key=self._expected_cost)[:2]:
+        for one in [] if self._is_quick else sorted(near, key=self._expected_cost)[:2]:
             found.append(self._settled(one))
-            if found[-1].energy > self._max_energy and not self._is_quick:
+            if found[-1].energy > self._max_energy:
                 found.append(self.shortened(found[-1]))
             if found[-1].energy <= self._max_energy:
                 break
