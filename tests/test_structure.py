@@ -38,7 +38,7 @@ CEILINGS = {
     "apps.peers": 478,
     "apps.quads": 3249,
     "apps.studio": 1741,
-    "apps.unwrap": 857,
+    "apps.unwrap": 885,
     "apps.view": 1623,
     "atlas": 1492,
     "base": 328,
@@ -63,7 +63,7 @@ CEILINGS = {
     "xatlas": 2,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_804, 235, 25_872
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_804, 235, 25_900
 CONSTANTS, KERNELS, NAMES, LEVELS = 295, 110, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
