@@ -38,7 +38,7 @@ CEILINGS = {
     "apps.peers": 478,
     "apps.quads": 3249,
     "apps.studio": 1741,
-    "apps.unwrap": 885,
+    "apps.unwrap": 1058,
     "apps.view": 1623,
     "atlas": 1492,
     "base": 328,
@@ -62,9 +62,11 @@ CEILINGS = {
     "stages": 223,
     "xatlas": 2,
 }
-#: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_804, 235, 25_900
-CONSTANTS, KERNELS, NAMES, LEVELS = 295, 110, 30, 8
+#: Applications with a ceiling of their own, which the ceilings of everything else leave out.
+OWN_CEILING = ("apps.unwrap", "apps.blender", "apps.brains", "apps.transfer")
+#: The largest size of the core, and of everything else.
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_804, 226, 25_015
+CONSTANTS, KERNELS, NAMES, LEVELS = 273, 110, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
 
@@ -80,7 +82,8 @@ def test_packages_are_within_their_ceilings():
 
 def test_the_whole_is_within_its_ceilings():
     found = sizes()
-    core, everything = total(found, core=True), total(found, core=False)
+    rest = {name: size for name, size in found.items() if name not in OWN_CEILING}
+    core, everything = total(rest, core=True), total(rest, core=False)
     assert (core.files <= CORE_FILES, core.lines <= CORE_LINES) == (True, True), core
     assert (everything.files <= ALL_FILES, everything.lines <= ALL_LINES) == (True, True), everything
     assert (everything.constants <= CONSTANTS, everything.kernels <= KERNELS) == (True, True), everything

@@ -166,3 +166,14 @@ def test_branching_charts_are_cut_to_fill_the_texture(shared, monkeypatch):
     assert result.packing_efficiency > 1.2 * whole.packing_efficiency
     assert result.distortion.seam_length <= 1.3 * whole.distortion.seam_length
     assert max(result.distortion.energy, whole.distortion.energy) <= 4.1
+
+
+def test_the_cut_of_a_large_mesh_is_searched_on_a_coarse_one(monkeypatch):
+    """The seams are hardly longer than those found on the mesh itself."""
+    shape = shapes.torus(120, 40)
+    coarse = unwrap(*shape).distortion
+    monkeypatch.setattr("coneflat.apps.unwrap.search.COARSE", len(shape[1]))
+    fine = unwrap(*shape).distortion
+    assert max(coarse.energy, fine.energy) <= 4.1
+    assert (coarse.flipped, coarse.overlapping_pairs) == (0, 0)
+    assert coarse.seam_length <= 1.25 * fine.seam_length

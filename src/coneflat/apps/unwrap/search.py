@@ -2,7 +2,8 @@
 
 Cones choose the cut. The fewer they are, the shorter are the seams, and the higher is the energy of the layout with
 free seams. The candidates are the cones that the search finds for an area distortion, which is varied. The tips of the
-best candidate's seams are then moved to where the energy is the largest allowed.
+best candidate's seams are then moved to where the energy is the largest allowed. On large meshes, both are done on a
+coarse mesh, and only the cones found there are taken over.
 """
 
 from __future__ import annotations
@@ -22,17 +23,21 @@ from ...layout import lay_out
 from ...mesh import label_faces, open_along
 from ...seams import seam_costs
 from ...source import Part
-from ...stages import Cut, Layout, Surface, VertexCurvatures
+from ...stages import ConeSpec, Cut, Layout, Surface, VertexCurvatures
+from .coarse import coarse_part
 from .free import freed, seam_edges
 from .options import ISOMETRIC
 from .tips import RINGS, find_tips, moved_tips, moves_for
 
 # The area distortion of the first candidate, and the maximum number of candidates.
 FIRST_DISTORTION, MAX_CANDIDATES = 0.25, 5
-# The first candidate within the bound is taken for parts with more triangles, as each candidate takes seconds, and for
-# parts with less than this share of the area.
-MANY_TRIANGLES, MINOR_SHARE = 60_000, 0.002
-# Number of times that tips are moved to meet the bound, and that a layout is settled to avoid contacts.
+# Number of triangles of a coarse mesh; number of coarse searches to meet the bound on the given mesh; and what its
+# energy has more, relative to what is allowed above that of an isometry.
+COARSE, COARSE_TRIES, COARSE_EXCESS = 4_000, 3, 0.15
+# Tips of larger meshes are moved only to meet the bound, as each try takes seconds.
+MANY_TRIANGLES = 60_000
+# Number of times that tips are moved to meet the bound, half as often on large meshes, and that a layout is settled to
+# avoid contacts.
 MAX_TRIES = 4
 # Cost of seams that lowers the energy to that of an isometry, relative to the square root of the area.
 COST_PER_ENERGY = 0.6
@@ -65,13 +70,12 @@ class CutSearch:
         part: a connected part of the input.
         max_energy: largest symmetric Dirichlet energy.
         method: how the part is laid out.
-        share: its share of the area of all parts.
+        is_quick: whether the first candidate within the bound is taken.
     """
 
-    def __init__(self, part: Part, max_energy: float, method: Method, share: float = 1.0) -> None:
-        self._part, self._max_energy = part, max_energy
-        self._is_quick = share < MINOR_SHARE or len(part.faces) > MANY_TRIANGLES
-        self._method = method
+    def __init__(self, part: Part, max_energy: float, method: Method, is_quick: bool = False) -> None:
+        self._part, self._max_energy, self._is_quick = part, max_energy, is_quick
+        self._method, self._is_large = method, len(part.faces) > 2 * COARSE
         self._surface = Surface.of(part.mesh, part.lengths, part.is_exact)
         self._surface.is_reused = True
         self._costs = seam_costs(part.mesh, part.lengths, part.seams)
@@ -84,6 +88,8 @@ class CutSearch:
         Raises:
             CurvatureError, MetricError, SeamError: a candidate could not be laid out.
         """
+        if self._is_large and not (self._part.seams.is_avoided | self._part.seams.is_forbidden).any():
+            return self._from_coarse()
         found = self._by_distortion()
         near = [one for one in found if one.energy <= self._reach]
         for one in [] if self._is_quick else sorted(near, key=self._expected_cost)[:2]:
@@ -105,10 +111,13 @@ class CutSearch:
             start: a candidate.
             layout: its layout, if that was cut further.
         """
-        if self._is_quick:
+        if self._is_quick or (len(self._part.faces) > MANY_TRIANGLES and start.energy <= self._max_energy):
             return start if layout is None else replace(start, layout=layout)
         if layout is not None:
             start = self._settled(replace(start, layout=layout, cost=self._cost(layout)))
+        slack = self._max_energy - start.energy
+        if self._is_large and 0 <= slack <= 10 * TOLERANCE * (self._max_energy - ISOMETRIC):
+            return start
         for moved in map(self._settled, self._moved(start)):
             if moved.energy <= self._max_energy and (
                 moved.cost < start.cost or start.energy > self._max_energy
@@ -123,6 +132,25 @@ class CutSearch:
     def _reach(self) -> float:
         """The energy above which a candidate is given up."""
         return ISOMETRIC + 2 * (self._max_energy - ISOMETRIC)
+
+    def _from_coarse(self) -> Candidate:
+        """Return a candidate with the cones that are best on a coarse mesh, for a bound that the mesh itself meets."""
+        coarse, kept = coarse_part(self._part, COARSE)
+        bound, found = self._max_energy + COARSE_EXCESS * (self._max_energy - ISOMETRIC), list[Candidate]()
+        for _ in range(COARSE_TRIES):
+            best = CutSearch(coarse, bound, self._method, self._is_quick).best()
+            spec = self._with_cones(kept[best.layout.cones])
+            layout, _ = lay_out_once(self._surface, self._part, spec, self._method)
+            one = self._candidate(layout, best.distortion)
+            if one.energy > self._max_energy:
+                one = self.shortened(self._settled(one))
+            found.append(one)
+            excess = one.energy - self._max_energy
+            if excess <= 0:
+                break
+            bound = max(bound - excess, (bound + ISOMETRIC) / 2)
+        close_search(self._surface)
+        return min(found, key=lambda one: one.energy)
 
     def _by_distortion(self) -> list[Candidate]:
         """Return candidates with energies around the bound."""
@@ -201,7 +229,7 @@ class CutSearch:
         slack, allowed = self._max_energy - start.energy, self._max_energy - ISOMETRIC
         # For each slack that was requested, the energy above the bound.
         tried, known = list[tuple[float, float]](), [seams]
-        for _ in range(MAX_TRIES):
+        for _ in range(MAX_TRIES // 2 if self._is_large and slack > 0 else MAX_TRIES):
             moved = moved_tips(start.layout, seams, tips, moves_for(start.layout, tips, slack))
             if any(np.array_equal(moved[0], each) for each in known):
                 # The tips move by whole edges.
@@ -231,9 +259,7 @@ class CutSearch:
     def _with_tips(self, seams: IntArray, cones: IntArray) -> Layout | None:
         """Return the layout with given cones that is cut along given edges; None if there is none."""
         mesh = self._part.mesh
-        cones = cones[np.isin(cones, mesh.edges[seams])]
-        given = VertexCurvatures(cones, np.full(len(cones), np.nan))
-        spec = replace(self._part.cones, strategy="given", given=given)
+        spec = self._with_cones(cones[np.isin(cones, mesh.edges[seams])])
         cut = open_along(mesh, seams)
         try:
             solution = find_cones(self._surface, spec, self._method.watch)
@@ -244,6 +270,11 @@ class CutSearch:
         if not (signed_double_areas(layout.points[layout.corners]) > 0).all():
             return None
         return replace(layout, chart=label_faces(cut.mesh.faces, len(cut.origin))[1])
+
+    def _with_cones(self, cones: IntArray) -> ConeSpec:
+        """Return the specification of given cones, whose curvatures are found."""
+        given = VertexCurvatures(cones, np.full(len(cones), np.nan))
+        return replace(self._part.cones, strategy="given", given=given)
 
 
 def side_by_side(layout: Layout) -> Layout:

@@ -23,6 +23,8 @@ from .options import UnwrapOptions
 from .pack_cuts import cut_for_packing
 from .search import Candidate, CutSearch
 
+# For parts with less than this share of the area the first cut within the bound is taken.
+MINOR_SHARE = 0.002
 #: The `method` in the settings of a result.
 FREE = "free seams"
 
@@ -69,7 +71,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     with limit_threads(o.threads):
         copies = find_copies(parts)
         searches = {
-            i: CutSearch(part, o.max_energy, method, areas[i] / areas.sum())
+            i: CutSearch(part, o.max_energy, method, areas[i] < MINOR_SHARE * areas.sum())
             for i, part in enumerate(parts)
             if copies[i] is None
         }

@@ -1,0 +1,192 @@
+"""Coarse meshes on which cuts are searched: edges collapse to one of their ends."""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import replace
+
+import numpy as np
+
+from ... import TriangleMesh
+from ...base import BoolArray, FloatArray, IntArray, compiled
+from ...geometry import edge_lengths, mollify
+from ...mesh import tie_key
+from ...source import Part
+
+# Cosine of the largest rotation of a triangle by a collapse; the double area of a triangle, relative to half the sum of
+# its squared sides, below which its normal is not considered; and the weight of the length of an edge in its cost:
+# lengths decide where the surface is flat.
+MAX_ROTATION, MIN_SHAPE, LENGTH_WEIGHT = 0.2, 0.1, 0.1
+
+
+def coarse_part(part: Part, count: int) -> tuple[Part, IntArray]:
+    """Return a part with about `count` triangles, and (k,) the vertices of the given part that it keeps.
+
+    The topology is that of the given part.
+
+    References:
+        M. Garland, P. Heckbert, "Surface simplification using quadric error metrics", 1997.
+    """
+    mesh = part.mesh
+    faces = mesh.faces.copy()
+    points, key = mesh.vertices - mesh.vertices.mean(axis=0), tie_key(mesh.vertices)
+    collapse_edges(points, faces, _quadrics(mesh, points), mesh.is_boundary_vertex, key, count)
+    kept, corners = np.unique(faces[faces[:, 0] >= 0], return_inverse=True)
+    coarse = TriangleMesh(mesh.vertices[kept], corners.reshape(-1, 3))
+    lengths, _ = mollify(edge_lengths(coarse.vertices, coarse.faces))
+    seams, none = part.seams, np.zeros(len(coarse.edges), dtype=bool)
+    return Part(
+        coarse,
+        part.vertices[kept],
+        np.flatnonzero(faces[:, 0] >= 0),
+        lengths,
+        replace(
+            part.cones,
+            is_allowed=part.cones.is_allowed[kept],
+            absorbs_curvature=part.cones.absorbs_curvature[kept],
+            names=part.cones.names[kept],
+        ),
+        replace(part.metric, keeps_length=part.metric.keeps_length[kept], names=part.metric.names[kept]),
+        replace(
+            seams,
+            visibility=None if seams.visibility is None else seams.visibility[kept],
+            weights=None if seams.weights is None else seams.weights[kept],
+            is_avoided=none,
+            is_forbidden=none,
+        ),
+    ), kept
+
+
+def _quadrics(mesh: TriangleMesh, points: FloatArray) -> FloatArray:
+    """Return (n, 16) for each vertex the squared distances to the planes of its triangles, multiplied by areas.
+
+    Planes through boundary edges, perpendicular to the triangles, keep the shape of the boundary.
+    """
+    one, two, three = points[mesh.faces].transpose(1, 0, 2)
+    normals = np.cross(two - one, three - one)
+    sides = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
+    tails, heads = mesh.ends_of(sides)
+    along = points[heads] - points[tails]
+    across = np.cross(along, _unit(normals[sides // 3])) * np.linalg.norm(along, axis=1, keepdims=True)
+    found = np.zeros((16, len(points)))
+    for normal, place, vertices in (
+        (normals, one, mesh.faces.T),
+        (across, points[tails], np.stack([tails, heads])),
+    ):
+        plane = np.column_stack([_unit(normal), -(_unit(normal) * place).sum(axis=1)])
+        weighted = plane * np.linalg.norm(normal, axis=1, keepdims=True)
+        squares = (plane[:, :, None] * weighted[:, None]).reshape(-1, 16).T
+        for vertex in vertices:
+            found += [np.bincount(vertex, each, len(points)) for each in squares]
+    return found.T
+
+
+def _unit(vectors: FloatArray) -> FloatArray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
+
+
+@compiled
+def collapse_edges(
+    points: FloatArray,
+    faces: IntArray,
+    quadrics: FloatArray,
+    is_boundary: BoolArray,
+    key: FloatArray,
+    count: int,
+) -> None:
+    """Collapse edges, the cheapest first, until at most `count` triangles are left; those removed become -1.
+
+    Args:
+        points: (n, 3) vertices.
+        faces: (m, 3) vertex indices, modified.
+        quadrics: (n, 16), modified: a vertex gets those of the vertices that collapse to it.
+        is_boundary: (n,) the vertices of the boundary, which collapse only along it.
+        key: (n,) keys that break ties, see `tie_key`.
+        count: the number of triangles.
+    """
+    age = np.zeros(len(points), np.int64)
+
+    def entry(tail: int, head: int) -> tuple[float, float, int, int, int]:
+        cost, square = 0.0, 0.0
+        for i in range(4):
+            x = 1.0 if i == 3 else points[head, i]
+            square += 0.0 if i == 3 else (x - points[tail, i]) ** 2
+            for j in range(4):
+                y = 1.0 if j == 3 else points[head, j]
+                cost += x * y * (quadrics[tail, 4 * i + j] + quadrics[head, 4 * i + j])
+        return cost + LENGTH_WEIGHT * square**2, key[tail], tail, head, age[tail] + age[head]
+
+    def normal(one: int, two: int, three: int) -> tuple[float, float, float, float, float]:
+        x, y, z = points[one, 0], points[one, 1], points[one, 2]
+        a, b, c = points[two, 0] - x, points[two, 1] - y, points[two, 2] - z
+        d, e, f = points[three, 0] - x, points[three, 1] - y, points[three, 2] - z
+        g, h, i = b * f - c * e, c * d - a * f, a * e - b * d
+        size = np.sqrt(g * g + h * h + i * i)
+        sides = a * a + b * b + c * c + d * d + e * e + f * f - (a * d + b * e + c * f)
+        return g, h, i, size, size / sides
+
+    corners, left, before = faces.ravel(), len(faces), len(faces) + 1
+    # The corners of each vertex are a linked list.
+    first, last, after = np.full(len(points), -1), np.full(len(points), -1), np.full(len(corners), -1)
+    seen, stamp = np.full(len(points), -1), 0
+    for corner, vertex in enumerate(corners):
+        last[vertex] = corner if first[vertex] < 0 else last[vertex]
+        after[corner] = first[vertex]
+        first[vertex] = corner
+    # Edges that could not collapse are tried again after the others.
+    while count < left < before:
+        before = left
+        heap = [
+            entry(corners[corner], corners[corner - 2 if corner % 3 == 2 else corner + 1])
+            for corner in range(len(corners))
+            if corners[corner] >= 0
+        ]
+        heapq.heapify(heap)
+        while left > count and len(heap):
+            _, _, tail, head, known = heapq.heappop(heap)
+            if known != age[tail] + age[head] or first[tail] < 0 or first[head] < 0:
+                continue
+            shared, common, is_bad, stamp = 0, 0, False, stamp + 1
+            corner = first[tail]
+            while corner >= 0:
+                face = corner - corner % 3
+                one, two = corners[face + (corner + 1) % 3], corners[face + (corner + 2) % 3]
+                if one >= 0:
+                    seen[one] = seen[two] = stamp
+                if head in (one, two):
+                    shared += 1
+                elif one >= 0:
+                    a, b, c, old, shape = normal(tail, one, two)
+                    d, e, f, new, new_shape = normal(head, one, two)
+                    is_bad |= not new_shape > min(shape, MIN_SHAPE)
+                    is_bad |= shape > MIN_SHAPE and a * d + b * e + c * f < MAX_ROTATION * old * new
+                corner = after[corner]
+            corner = first[head]
+            while corner >= 0:
+                face = corner - corner % 3
+                for step in range(1, 3):
+                    vertex = corners[face + (corner + step) % 3]
+                    if vertex >= 0 and seen[vertex] == stamp:
+                        common += 1
+                        seen[vertex] = -1
+                corner = after[corner]
+            # The topology stays if the ends have no common neighbours but those in their common triangles.
+            if is_bad or common != shared or (is_boundary[tail] and shared != 1):
+                continue
+            after[last[tail]], chain = first[head], first[tail]
+            first[tail] = first[head] = -1
+            quadrics[head] += quadrics[tail]
+            age[head] += 1
+            while chain >= 0:
+                corner, chain = chain, after[chain]
+                face = corner - corner % 3
+                one, two = corners[face + (corner + 1) % 3], corners[face + (corner + 2) % 3]
+                if corners[corner] == tail and head in (one, two):
+                    corners[face : face + 3] = -1
+                    left -= 1
+                elif corners[corner] >= 0:
+                    corners[corner] = head
+                    last[head] = corner if first[head] < 0 else last[head]
+                    after[corner], first[head] = first[head], corner
+                    heapq.heappush(heap, entry(head, one))
+                    heapq.heappush(heap, entry(one, head))
