@@ -153,6 +153,7 @@ def as_rows(result: Flattening) -> list[Row]:
         ),
         *(of_map[name] for name in ("flipped", "degenerate", "overlap", "charts")),
         packing_row(result.packing_efficiency),
+        *_texture_rows(result),
         *(of_map[name] for name in ("texel density", "seam length", "seam mismatch")),
         *_rotation_rows(result),
     ]
@@ -208,6 +209,15 @@ def map_rows(d: Distortion) -> dict[str, Row]:
         ),
     )
     return {row[0]: row for row in rows}
+
+
+def _texture_rows(result: Flattening) -> list[Row]:
+    """Return the row on the texture, if its size is known."""
+    side = result.settings.get("resolution")
+    density = "" if side is None else number_text(result.uv_scale * side, ".4g")
+    return (
+        [] if side is None else [("texture", f"{side:,}", f"texels per side; {density} per unit of length")]
+    )
 
 
 def packing_row(efficiency: float, tiles: str = "") -> Row:

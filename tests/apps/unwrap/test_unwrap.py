@@ -177,3 +177,18 @@ def test_the_cut_of_a_large_mesh_is_searched_on_a_coarse_one(monkeypatch):
     assert max(coarse.energy, fine.energy) <= 4.1
     assert (coarse.flipped, coarse.overlapping_pairs) == (0, 0)
     assert coarse.seam_length <= 1.25 * fine.seam_length
+
+
+@pytest.mark.parametrize("tiles", [1, 3])
+def test_the_resolution_follows_from_the_texel_density(tiles):
+    result = unwrap(*shapes.torus(), texel_density=200.0, tiles=tiles)
+    side = result.settings["resolution"]
+    assert side % 4 == 0
+    assert 200 <= result.uv_scale * side <= 200 * (1 + 12 / side)
+    scaled = unwrap(shapes.torus()[0] * 1e-3, shapes.torus()[1], texel_density=200e3, tiles=tiles)
+    assert scaled.settings["resolution"] == side
+
+
+def test_a_texel_density_that_needs_too_large_a_texture_is_refused():
+    with pytest.raises(errors.OptionError, match="texel_density is too large"):
+        unwrap(*shapes.torus(), texel_density=1e9)

@@ -18,9 +18,12 @@ class UnwrapOptions(SeamOptions, AtlasOptions, RunOptions):
     Attributes:
         max_energy: Largest symmetric Dirichlet energy of each component, averaged by area: the sum of the squares of
             the singular values and of their inverses, 4 if nothing is stretched. A smaller value needs longer seams.
+        texel_density: Texels per unit of length of the model. The resolution is then the smallest multiple of 4 that
+            has at least this density.
     """
 
     max_energy: float = option(MAX_ENERGY, Number(is_positive=True))
+    texel_density: float | None = option(None, Number(is_positive=True, optional=True))
 
     def __post_init__(self) -> None:
         if not self.max_energy > ISOMETRIC:

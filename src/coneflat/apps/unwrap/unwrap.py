@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from ... import Flattening
 from ...base import Stopwatch, limit_threads, plural
+from ...errors import OptionError
 from ...evaluate import evaluate
 from ...flatten import Method, with_copies
 from ...geometry import double_areas
@@ -25,6 +26,10 @@ from .search import Candidate, CutSearch
 
 # For parts with less than this share of the area the first cut within the bound is taken.
 MINOR_SHARE = 0.002
+# Options that the flattening does not have.
+OWN = ("max_energy", "texel_density")
+# Fraction of a texture that charts cover, roughly; the largest resolution; and the number of packings to find it.
+COVERED, MAX_RESOLUTION, MAX_PACKINGS = 0.65, 2**16, 4
 #: The `method` in the settings of a result.
 FREE = "free seams"
 
@@ -59,15 +64,16 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         (True, 0, 0)
     """
     o = read_options(options, UnwrapOptions)
-    shared = Options(
-        **{name: getattr(o, name) for name in declarations(UnwrapOptions) if name != "max_energy"}
-    )
+    shared = Options(**{name: getattr(o, name) for name in declarations(UnwrapOptions) if name not in OWN})
     watch, source = Stopwatch(o.progress), Source(as_input(mesh, faces))
     with watch("check"):
         prepared = source.prepared(shared)
     method = Method(RelaxSpec("off", 0.0), o.charts == "atlas", None, Stopwatch(), Surface.of, find_metric)
     parts, found = prepared.parts, dict[int, Candidate]()
     areas = np.array([double_areas(part.lengths).sum() for part in parts])
+    if o.texel_density is not None:
+        side = np.sqrt(areas.sum() / 2 / COVERED / o.tiles) / 2.0**prepared.checked.exponent
+        shared = replace(shared, resolution=_resolution(o.texel_density, side))
     with limit_threads(o.threads):
         copies = find_copies(parts)
         searches = {
@@ -84,14 +90,34 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         with watch("pack"):
             if method.separates and o.up is None:
                 costs = [search.costs for search in searches.values()]
-                layouts = cut_for_packing(layouts, costs, o.padding / o.resolution)
+                layouts = cut_for_packing(layouts, costs, o.padding / shared.resolution)
             for (i, search), layout in zip(searches.items(), layouts, strict=True):
                 found[i] = search.shortened(found[i], layout)
     layouts = with_copies({i: one.layout for i, one in found.items()}, parts, copies)
     energies = [one.energy for one in found.values()]
-    result = evaluate(prepared, layouts, replace(shared, method=FREE), watch)
+    shared = replace(shared, method=FREE)
+    result = evaluate(prepared, layouts, shared, watch)
+    for _ in range(MAX_PACKINGS if o.texel_density else 0):
+        # The padding, and with it the scale, depends on the resolution.
+        resolution = _resolution(o.texel_density, 1 / result.uv_scale)
+        if resolution == shared.resolution:
+            break
+        shared = replace(shared, resolution=resolution)
+        result = evaluate(prepared, layouts, shared, watch)
     notes = (*result.notes, *_notes(energies, o.max_energy))
-    return replace(result, settings={**result.settings, "max_energy": o.max_energy}, notes=notes)
+    own = {name: getattr(o, name) for name in OWN}
+    return replace(result, settings={**result.settings, **own}, notes=notes)
+
+
+def _resolution(density: float, side: float) -> int:
+    """Return the resolution for a number of texels per unit of length, and the length of the side of a texture."""
+    resolution = 4 * int(np.ceil(min(density * side / 4, MAX_RESOLUTION)))
+    if resolution > MAX_RESOLUTION:
+        raise OptionError(
+            f"texel_density is too large: it needs a texture of {density * side:.3g} texels per side, and "
+            f"{MAX_RESOLUTION} are possible; expected less, or more tiles"
+        )
+    return resolution
 
 
 def _notes(energies: Sequence[float], bound: float) -> Iterator[str]:
