@@ -135,7 +135,7 @@ class SeamSpec:
     """Specification of the seams of a connected mesh with n vertices and e edges.
 
     Attributes:
-        follows_sharp: sharp edges are cheaper.
+        creases: strength of the preference for sharp edges, from 0 to 1.
         hiding: strength of the preference for hidden places, from 0.
         visibility: (n,) fraction of directions from which each vertex is visible; None if `hiding` is 0.
         weights: (n,) factors of the cost, or None.
@@ -143,7 +143,7 @@ class SeamSpec:
         is_forbidden: (e,) edges that must not be cut.
     """
 
-    follows_sharp: bool
+    creases: float
     hiding: float
     visibility: FloatArray | None
     weights: FloatArray | None

@@ -125,21 +125,21 @@ class TestCosts:
         sharp = np.abs(dihedral_angles(mesh)) > 1
         lengths = lengths_of(mesh)
         # A tree of 7 of the 12 edges of the cube.
-        seams = find_seams(mesh, corners, edge_costs(mesh, lengths, creases=True))
+        seams = find_seams(mesh, corners, edge_costs(mesh, lengths, creases=1.0))
         assert sharp[seams].all()
         assert lengths[seams].sum() == pytest.approx(7)
         # Between opposite corners the way over the faces is shorter than that along three edges.
         opposite = corners[
             [0, np.argmax(np.linalg.norm(mesh.vertices[corners] - mesh.vertices[corners[0]], axis=1))]
         ]
-        seams = find_seams(mesh, opposite, edge_costs(mesh, lengths, creases=True))
+        seams = find_seams(mesh, opposite, edge_costs(mesh, lengths, creases=1.0))
         assert sharp[seams].all()
         assert lengths[seams].sum() == pytest.approx(3)
         assert lengths[find_seams(mesh, opposite, lengths)].sum() < 2.9
 
     def test_full_creases_cost_a_tenth(self):
         mesh = TriangleMesh(*shapes.box(4))
-        costs = edge_costs(mesh, lengths_of(mesh), creases=True) / lengths_of(mesh)
+        costs = edge_costs(mesh, lengths_of(mesh), creases=1.0) / lengths_of(mesh)
         sharp = np.abs(dihedral_angles(mesh)) > 1
         np.testing.assert_allclose(costs[sharp], 0.1)
         np.testing.assert_allclose(costs[~sharp], 1.0)
@@ -223,11 +223,11 @@ class TestCosts:
     def test_costs_do_not_depend_on_numbers_place_or_size(self):
         vertices, faces = SURFACES["genus 1"]
         mesh = TriangleMesh(vertices, faces)
-        ratio = edge_costs(mesh, lengths_of(mesh), creases=True, hiding=1) / lengths_of(mesh)
+        ratio = edge_costs(mesh, lengths_of(mesh), creases=1.0, hiding=1) / lengths_of(mesh)
         for seed, size in ((1, 1e-6), (3, 1e6)):
             moved, turned, new = shapes.renumber(vertices, faces, seed)
             other = TriangleMesh(size * (moved @ shapes.rotation(seed).T + [1, 2, 3]), turned)
-            found = edge_costs(other, lengths_of(other), creases=True, hiding=1) / lengths_of(other)
+            found = edge_costs(other, lengths_of(other), creases=1.0, hiding=1) / lengths_of(other)
             ends = np.sort(new[mesh.edges], axis=1)
             place = np.lexsort((ends[:, 1], ends[:, 0]))
             same = np.lexsort((other.edges[:, 1], other.edges[:, 0]))

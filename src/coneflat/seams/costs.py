@@ -29,7 +29,7 @@ def edge_costs(
     mesh: TriangleMesh,
     lengths: FloatArray,
     *,
-    creases: bool = False,
+    creases: float = 0.0,
     hiding: float = 0.0,
     visibility: FloatArray | None = None,
     vertex_weights: ArrayLike | None = None,
@@ -40,8 +40,8 @@ def edge_costs(
     Args:
         mesh: the mesh.
         lengths: (e,) lengths of its edges, positive.
-        creases: whether seams prefer sharp edges: an edge with a dihedral angle of 60 degrees or more costs a tenth of
-            its length.
+        creases: preference for sharp edges, 0 to 1: at 1, an edge with a dihedral angle of 60 degrees or more costs a
+            tenth of its length.
         hiding: preference for hidden edges, 0 to 10: at 1, an almost invisible edge costs a tenth, at 2 a hundredth.
         visibility: (n,) visible fraction of each vertex, 0 to 1; by default the result of `visible_share`.
         vertex_weights: (n,) weights, not negative; an edge gets the mean of its two ends.
@@ -55,7 +55,7 @@ def edge_costs(
     costs = np.array(lengths, dtype=np.float64)
     angles = dihedral_angles(mesh) if creases or hiding else np.zeros(len(costs))
     if creases:
-        costs *= CHEAPEST ** np.clip((np.abs(angles) - SMOOTH) / (SHARP - SMOOTH), 0.0, 1.0)
+        costs *= CHEAPEST ** (creases * np.clip((np.abs(angles) - SMOOTH) / (SHARP - SMOOTH), 0.0, 1.0))
     if hiding:
         share = visible_share(mesh.vertices, mesh.faces) if visibility is None else visibility
         costs *= CHEAPEST ** (hiding * _hidden(mesh, share, angles))
@@ -83,7 +83,7 @@ def seam_costs(
     return edge_costs(
         mesh,
         lengths.ravel()[mesh.edge_halfedges[:, 0]],
-        creases=follows_sharp or spec.follows_sharp,
+        creases=1.0 if follows_sharp else spec.creases,
         hiding=spec.hiding,
         visibility=spec.visibility,
         vertex_weights=spec.weights,

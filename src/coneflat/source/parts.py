@@ -269,7 +269,7 @@ def _part(
         names=limits.names,
     )
     seams = SeamSpec(
-        follows_sharp=options.sharp_angle is not None,
+        creases=float(options.sharp_angle is not None),
         hiding=options.hide_seams,
         visibility=visibility,
         weights=limits.seam_weights,

@@ -74,8 +74,9 @@ class CutSearch:
     """
 
     def __init__(self, part: Part, max_energy: float, method: Method, is_quick: bool = False) -> None:
-        self._part, self._max_energy, self._is_quick = part, max_energy, is_quick
-        self._method, self._is_large = method, len(part.faces) > 2 * COARSE
+        self._part, self._max_energy, self._method = part, max_energy, method
+        self._is_coarse = len(part.faces) > 2 * COARSE and not part.seams.is_forbidden.any()
+        self._is_quick = is_quick or (len(part.faces) > MANY_TRIANGLES and not self._is_coarse)
         self._surface = Surface.of(part.mesh, part.lengths, part.is_exact)
         self._surface.is_reused = True
         self._costs = seam_costs(part.mesh, part.lengths, part.seams)
@@ -88,7 +89,7 @@ class CutSearch:
         Raises:
             CurvatureError, MetricError, SeamError: a candidate could not be laid out.
         """
-        if self._is_large and not (self._part.seams.is_avoided | self._part.seams.is_forbidden).any():
+        if self._is_coarse:
             return self._from_coarse()
         found = self._by_distortion()
         near = [one for one in found if one.energy <= self._reach]
@@ -116,7 +117,7 @@ class CutSearch:
         if layout is not None:
             start = self._settled(replace(start, layout=layout, cost=self._cost(layout)))
         slack = self._max_energy - start.energy
-        if self._is_large and 0 <= slack <= 10 * TOLERANCE * (self._max_energy - ISOMETRIC):
+        if self._is_coarse and 0 <= slack <= 10 * TOLERANCE * (self._max_energy - ISOMETRIC):
             return start
         for moved in map(self._settled, self._moved(start)):
             if moved.energy <= self._max_energy and (
@@ -226,10 +227,10 @@ class CutSearch:
         tips = find_tips(start.layout, seams, self.costs)
         if not (tips.rates > 0).any():
             return found
-        slack, allowed = self._max_energy - start.energy, self._max_energy - ISOMETRIC
+        wanted, allowed = self._max_energy - start.energy, self._max_energy - ISOMETRIC
         # For each slack that was requested, the energy above the bound.
-        tried, known = list[tuple[float, float]](), [seams]
-        for _ in range(MAX_TRIES // 2 if self._is_large and slack > 0 else MAX_TRIES):
+        slack, tried, known = wanted, [(0.0, -wanted)], [seams]
+        for _ in range(MAX_TRIES // 2 if self._is_coarse and wanted > 0 else MAX_TRIES):
             moved = moved_tips(start.layout, seams, tips, moves_for(start.layout, tips, slack))
             if any(np.array_equal(moved[0], each) for each in known):
                 # The tips move by whole edges.
@@ -253,7 +254,8 @@ class CutSearch:
                 part = float(np.clip(low[1] / (low[1] - high[1]), 0.2, 0.8))
                 slack = low[0] + part * (high[0] - low[0])
             else:
-                slack -= np.sign(excess) * max(abs(excess), 2 * TOLERANCE * allowed) * len(tried)
+                change = excess + wanted
+                slack *= float(np.clip(wanted / change, 1.25, 3)) if change * wanted > 0 else 3.0
         return sorted(found, key=lambda one: one.cost)
 
     def _with_tips(self, seams: IntArray, cones: IntArray) -> Layout | None:

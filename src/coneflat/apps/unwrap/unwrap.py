@@ -14,11 +14,11 @@ from ...base import Stopwatch, limit_threads, plural
 from ...errors import OptionError
 from ...evaluate import evaluate
 from ...flatten import Method, with_copies
-from ...geometry import double_areas
+from ...geometry import dihedral_angles, double_areas
 from ...io import as_input
 from ...metric import find_metric
 from ...options import Options, declarations, read_options, takes
-from ...source import Source, find_copies
+from ...source import Part, Source, find_copies
 from ...stages import RelaxSpec, Surface
 from .options import UnwrapOptions
 from .pack_cuts import cut_for_packing
@@ -26,6 +26,9 @@ from .search import Candidate, CutSearch
 
 # For parts with less than this share of the area the first cut within the bound is taken.
 MINOR_SHARE = 0.002
+# Dihedral angle of sharp edges in radians; and the preference for seams along them if only they bend the surface: twice
+# their length costs as much as that of other edges.
+SHARP, CREASES = np.radians(40), 0.3
 # Options that the flattening does not have.
 OWN = ("max_energy", "texel_density")
 # Fraction of a texture that charts cover, roughly; the largest resolution; and the number of packings to find it.
@@ -69,7 +72,11 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     with watch("check"):
         prepared = source.prepared(shared)
     method = Method(RelaxSpec("off", 0.0), o.charts == "atlas", None, Stopwatch(), Surface.of, find_metric)
-    parts, found = prepared.parts, dict[int, Candidate]()
+    parts = [
+        replace(each, seams=replace(each.seams, creases=max(CREASES, each.seams.creases)))
+        for each in prepared.parts
+    ]
+    found = dict[int, Candidate]()
     areas = np.array([double_areas(part.lengths).sum() for part in parts])
     if o.texel_density is not None:
         side = np.sqrt(areas.sum() / 2 / COVERED / o.tiles) / 2.0**prepared.checked.exponent
@@ -97,7 +104,9 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     energies = [one.energy for one in found.values()]
     shared = replace(shared, method=FREE)
     result = evaluate(prepared, layouts, shared, watch)
-    for _ in range(MAX_PACKINGS if o.texel_density else 0):
+    for _ in range(MAX_PACKINGS):
+        if o.texel_density is None:
+            break
         # The padding, and with it the scale, depends on the resolution.
         resolution = _resolution(o.texel_density, 1 / result.uv_scale)
         if resolution == shared.resolution:
@@ -107,6 +116,14 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     notes = (*result.notes, *_notes(energies, o.max_energy))
     own = {name: getattr(o, name) for name in OWN}
     return replace(result, settings={**result.settings, **own}, notes=notes)
+
+
+def along_sharp_edges(part: Part) -> Part:
+    """Return a part with a preference for seams along sharp edges, as far as these are what bends its surface."""
+    mesh, angles = part.mesh, np.abs(dihedral_angles(part.mesh))
+    bending = angles * part.lengths.ravel()[mesh.edge_halfedges[:, 0]]
+    share = float(bending[angles > SHARP].sum() / max(bending.sum(), 1e-300))
+    return replace(part, seams=replace(part.seams, creases=max(CREASES * share, part.seams.creases)))
 
 
 def _resolution(density: float, side: float) -> int:
