@@ -153,3 +153,16 @@ def test_two_triangles_back_to_back(count):
     mesh = quads(vertices, np.array([[0, 1, 2], [0, 2, 1]]), quads=count, sharp_angle=0.8)
     assert mesh.euler_characteristic == 2
     assert abs(len(mesh.quads) - count) < 0.1 * count + 5
+
+
+def test_a_patch_has_at_most_as_many_cones_as_squares():
+    """Each triangle of a pyramid is a patch of two squares, in which more cones would not find grid points."""
+    angle = np.pi / 6 * np.arange(12)
+    around = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    sides = [[i, (i + 1) % 12, 12] for i in range(12)]
+    base = [[(i + 1) % 12, i, 13] for i in range(12)]
+    grid = integer_grid(
+        np.vstack([around, [[0, 0, 6.8], [0, 0, -0.07]]]), sides + base, quads=40, sharp_angle=0.3
+    )
+    check_features(grid)
+    assert not any("not on grid lines" in note for note in grid.notes)
