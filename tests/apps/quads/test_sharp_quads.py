@@ -162,7 +162,7 @@ def test_a_patch_has_at_most_as_many_cones_as_squares():
     sides = [[i, (i + 1) % 12, 12] for i in range(12)]
     base = [[(i + 1) % 12, i, 13] for i in range(12)]
     grid = integer_grid(
-        np.vstack([around, [[0, 0, 6.8], [0, 0, -0.07]]]), sides + base, quads=40, sharp_angle=0.3
+        np.vstack([around, [[0, 0, 6.8], [0, 0, -0.4]]]), sides + base, quads=40, sharp_angle=0.3
     )
     check_features(grid)
     assert not any("not on grid lines" in note for note in grid.notes)
