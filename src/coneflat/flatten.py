@@ -19,7 +19,6 @@ from .base.threads import concurrently, limit_threads
 from .cones import MAX_SEARCHED, close_search, find_cones, uses_sparse_search
 from .errors import CurvatureError, MetricError, SeamError
 from .evaluate import evaluate
-from .geometry import double_areas
 from .geometry.operators import area_distortion, weighted_areas
 from .geometry.overlap import UNKNOWN_OVERLAPS
 from .geometry.planar import signed_double_areas
@@ -288,7 +287,7 @@ def _excess(part: Part, layout: Layout) -> float:
     is_bounded = part.is_exact and spec.count is None and spec.weights is None and spec.quantum is None
     if not (is_bounded and uses_sparse_search(part.mesh, spec)):
         return 0.0
-    areas, flat = double_areas(layout.lengths), signed_double_areas(layout.points[layout.corners])
+    areas, flat = part.double_areas, signed_double_areas(layout.points[layout.corners])
     chosen = (areas > 0) & (flat > 0)
     log_scale = np.log(flat[chosen] / areas[chosen]) / 2
     return area_distortion(log_scale, areas[chosen]) / (spec.distortion * TOLERATED_EXCESS)

@@ -17,6 +17,7 @@ from coneflat.layout.relax.constraints import check_constraints
 from coneflat.layout.relax.elements import Elements, number_pairs
 from coneflat.layout.relax.motions import find_motions
 from coneflat.layout.relax.relax import rest_sides
+from coneflat.layout.relax.seam_chains import find_chains
 from coneflat.layout.unfold import unfold
 from coneflat.mesh import cut_open
 from coneflat.seams import find_seams
@@ -342,3 +343,11 @@ def test_pairs_are_numbered_by_column_and_row():
         np.testing.assert_array_equal(slots[inside], expected)
         np.testing.assert_array_equal(indices[:number], keys % 100)
         np.testing.assert_array_equal(indptr, np.searchsorted(keys // 100, np.arange(k + 1)))
+
+
+@pytest.mark.parametrize("collapsed", [0.0, np.nan])
+def test_seam_edges_without_length_are_counted(collapsed: float):
+    mesh = TriangleMesh(np.eye(4, 3), np.array([[0, 1, 2], [0, 2, 3]]))
+    corners, points = np.arange(6).reshape(2, 3), np.full(6, collapsed, dtype=np.complex128)
+    with pytest.raises(errors.SeamError, match="1 seam edges have no length"):
+        find_chains(mesh, corners, points, np.empty(0, dtype=np.int64))

@@ -12,6 +12,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 import coneflat
+from coneflat.measure.seam_data import seam_rotations
 from coneflat.mesh.connectivity import TriangleMesh
 
 RIGHT = np.pi / 2
@@ -229,3 +230,13 @@ class TestArchives:
         np.savez(tmp_path / "old.npz", **arrays)
         old = coneflat.read_flattening(tmp_path / "old.npz").seam_data
         np.testing.assert_array_equal(old.seam_rotation, result.seam_data.seam_rotation)
+
+
+@pytest.mark.parametrize("collapsed", [0, 1])
+def test_a_side_without_length_has_no_rotation(collapsed: int):
+    mesh = TriangleMesh(np.eye(4, 3), np.array([[0, 1, 2], [0, 2, 3]]))
+    corners = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], [[0.0, 0.0], [1.0, 2.0], [0.0, 1.0]]])
+    assert seam_rotations(mesh, corners, 1.0)[0] > 0.01
+    side = [0, 2] if collapsed == 0 else [0, 1]
+    corners[collapsed, side] = 0.25
+    assert seam_rotations(mesh, corners, 1.0)[0] == 0.0

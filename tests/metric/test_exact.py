@@ -203,6 +203,15 @@ class TestInvariance:
         np.testing.assert_array_equal(one.log_scale, two.log_scale)
         np.testing.assert_array_equal(one.flips, two.flips)
 
+    def test_a_start_of_a_huge_range_takes_no_more_steps_than_none(self):
+        mesh = TriangleMesh(*shapes.hill(12, 10))
+        target = np.where(mesh.is_boundary_vertex, 2 * np.pi / mesh.is_boundary_vertex.sum(), 0.0)
+        start = np.linspace(-120, 120, len(target))
+        one, two = (exact_metric(mesh, lengths_of(mesh), target, start=each) for each in (None, start))
+        assert two.converged
+        assert two.steps == one.steps
+        np.testing.assert_array_equal(one.log_scale, two.log_scale)
+
     def test_components_do_not_see_each_other(self):
         two = TriangleMesh(*shapes.join(shapes.sphere(2), shapes.torus(20, 10)))
         one = TriangleMesh(*shapes.sphere(2))

@@ -68,6 +68,14 @@ def test_places(ball):
     assert not np.isin(flatten(vertices, faces, forbidden_cones=forbidden).cones, forbidden).any()
 
 
+def test_a_required_cone_that_no_seam_can_reach_is_refused():
+    vertices, faces = shapes.hill(4, 3)
+    mesh = TriangleMesh(vertices, faces)
+    inside = mesh.edges[~mesh.is_boundary_edge]
+    with pytest.raises(errors.SeamError, match="needed to open the mesh"):
+        flatten(vertices, faces, required_cones=[6], no_seams=inside, method="linear")
+
+
 def test_bounds(ball):
     vertices, faces, _ = ball
     result = flatten(*shapes.genus(2), min_cone_angle=np.pi, max_cone_angle=3 * np.pi)

@@ -130,11 +130,11 @@ def coneless_solution(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
         surface: connected mesh with its operators.
         spec: what is required of the cones.
     """
-    mesh, absorbs = surface.mesh, spec.absorbs_curvature
-    if (spec.is_allowed & ~absorbs).any() or not (absorbs.any() or mesh.euler_characteristic == 0):
+    absorbs, chi = spec.absorbs_curvature, surface.mesh.euler_characteristic
+    is_searched = len(spec.required) or (spec.is_allowed & ~absorbs).any()
+    if is_searched or not (absorbs.any() or chi == 0):
         return None
-    given = surface.laplacian, surface.curvature, absorbs, mesh.euler_characteristic
-    return cones_at(*given, np.empty(0, dtype=np.int64))
+    return cones_at(surface.laplacian, surface.curvature, absorbs, chi, np.empty(0, dtype=np.int64))
 
 
 def open_search(surface: Surface, spec: ConeSpec, watch: Stopwatch) -> ConeSearch:

@@ -230,5 +230,6 @@ def ratios_across(mesh: TriangleMesh, corner_uv: FloatArray) -> ComplexArray:
 
 def _rotations(mesh: TriangleMesh, corner_uv: FloatArray) -> FloatArray:
     """Return (k,) the rotation between the two sides of each inner edge, radians; 0 where a side has no length."""
-    turns: FloatArray = np.angle(ratios_across(mesh, corner_uv))
-    return np.where(np.isfinite(turns), turns, 0.0)
+    ratios = ratios_across(mesh, corner_uv)
+    # The argument of an infinite complex number is finite.
+    return np.where(np.isfinite(ratios) & (ratios != 0), np.angle(ratios), 0.0)

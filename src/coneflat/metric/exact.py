@@ -19,8 +19,9 @@ from .hessian import Inverse
 
 # Largest error of the Gauss-Bonnet sum of prescribed curvatures, radians; typed decimals are more accurate.
 SUM_TOLERANCE = 1e-8
-# Largest range of an initial phi; with a larger range, the squares of lengths overflow.
-MAX_RANGE = 1000.0
+# Largest range of an initial phi. Lengths that differ by a larger factor than exp(100) are beyond any use, and Newton's
+# method needs many steps to return from there.
+MAX_RANGE = 100.0
 
 
 @dataclass(frozen=True, eq=False)

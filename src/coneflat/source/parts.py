@@ -11,7 +11,7 @@ import numpy as np
 from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..base.text import list_some, plural
 from ..errors import OptionError
-from ..geometry import edge_lengths, mollify
+from ..geometry import double_areas, edge_lengths, mollify
 from ..geometry.visibility import visible_share
 from ..linalg.memory import check_memory
 from ..mesh.check import CheckedMesh, check_mesh
@@ -32,6 +32,7 @@ class Part:
         mesh: the mesh.
         vertices, faces: (n,), (m,) indices in the whole mesh; a vertex on a marked seam may occur several times.
         lengths: (m, 3) side lengths, with which every triangle has area.
+        double_areas: (m,) twice the areas of the triangles before any were opened.
         cones, metric, seams: specifications.
     """
 
@@ -39,6 +40,7 @@ class Part:
     vertices: IntArray
     faces: IntArray
     lengths: FloatArray
+    double_areas: FloatArray
     cones: ConeSpec
     metric: MetricSpec
     seams: SeamSpec
@@ -186,10 +188,8 @@ def _open_triangles(
 def _pieces(mesh: TriangleMesh, marked: IntArray, lengths: FloatArray) -> tuple[Piece, ...]:
     """Return the connected parts of a mesh after cutting it along edges (k,)."""
     opened = open_along(mesh, marked) if len(marked) else CutMesh(mesh, np.arange(len(mesh.vertices)))
-    parts = []
-    for part, vertices, faces in opened.mesh.split_components():
-        parts.append((part, opened.origin[vertices], faces, lengths[faces]))
-    return tuple(parts)
+    parts = opened.mesh.split_components()
+    return tuple((part, opened.origin[at], faces, lengths[faces]) for part, at, faces in parts)
 
 
 def _forbid_unreachable(constraints: Constraints, mesh: TriangleMesh, is_forbidden: BoolArray) -> Constraints:
@@ -234,8 +234,7 @@ def _part(
     has_boundary, sides = bool(mesh.is_boundary_vertex.any()), mesh.edge_halfedges[:, 0]
     is_free = not has_boundary or (options.boundary_kind == "polygon" and not len(limits.corners))
     kind = "free" if is_free else options.boundary_kind
-    on_marks = np.zeros(len(vertices), dtype=bool) if limits.on_marks is None else limits.on_marks
-    on_marks = mesh.is_boundary_vertex & on_marks
+    on_marks = mesh.is_boundary_vertex & (False if limits.on_marks is None else limits.on_marks)
     cones = ConeSpec(
         strategy=options.cone_choice,
         needs_sparse_search=options.asks_for_search,
@@ -276,4 +275,5 @@ def _part(
         is_avoided=is_diagonal.ravel()[sides],
         is_forbidden=is_forbidden.ravel()[sides],
     )
-    return Part(mesh, vertices, faces, lengths, cones, metric, seams)
+    own = edge_lengths(mesh.vertices, mesh.faces) if options.lengths is None else lengths
+    return Part(mesh, vertices, faces, lengths, double_areas(own), cones, metric, seams)

@@ -11,7 +11,7 @@ from test_integer_grid import check_laws
 
 from coneflat import errors, integer_grid, quads
 from coneflat.apps.quads.extract import extract_quads
-from coneflat.apps.quads.features import edge_indices, sharp_edges
+from coneflat.apps.quads.features import edge_indices, sharp_edges, split_for_features
 from coneflat.apps.quads.quality import measure_quads
 from coneflat.layout.relax.elimination import orthogonal_solutions, sparse_solutions
 from coneflat.mesh.connectivity import TriangleMesh
@@ -153,3 +153,24 @@ def test_two_triangles_back_to_back(count):
     mesh = quads(vertices, np.array([[0, 1, 2], [0, 2, 1]]), quads=count, sharp_angle=0.8)
     assert mesh.euler_characteristic == 2
     assert abs(len(mesh.quads) - count) < 0.1 * count + 5
+
+
+def test_a_patch_has_at_most_as_many_cones_as_squares():
+    """Each triangle of a pyramid is a patch of two squares, in which more cones would not find grid points."""
+    angle = np.pi / 6 * np.arange(12)
+    around = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    sides = [[i, (i + 1) % 12, 12] for i in range(12)]
+    base = [[(i + 1) % 12, i, 13] for i in range(12)]
+    grid = integer_grid(
+        np.vstack([around, [[0, 0, 6.8], [0, 0, -0.4]]]), sides + base, quads=40, sharp_angle=0.3
+    )
+    check_features(grid)
+    assert not any("not on grid lines" in note for note in grid.notes)
+
+
+def test_needles_are_not_split_without_bound():
+    vertices = np.array([[0.0, 0.0, 0.0], [12.0, -0.2, 0.0], [28.0, -0.4, 0.0]])
+    fine, _, _ = split_for_features(
+        vertices, np.array([[0, 1, 2], [2, 1, 0]]), np.array([[0, 1], [1, 2]]), 0.04
+    )
+    assert len(fine.faces) < 100_000

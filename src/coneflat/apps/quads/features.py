@@ -146,7 +146,8 @@ def split_for_features(
 ) -> tuple[TriangleMesh, IntArray, IntArray]:
     """Return a finer mesh of the same surface, (f,) its feature edges, and (f,) the given feature that contains each.
 
-    Edges are split until none is longer than `longest`, or than a quarter of the square root of the area of its patch.
+    Edges are split until none is longer than `longest`, or than a quarter of the square root of the area of its patch,
+    unless that takes far too many triangles.
     Edges that join two vertices on features or the boundary, without being such edges, are split too, because straight
     sides could degenerate their triangles. The longest edge of a triangle is always split first, so that angles do not
     become arbitrarily small.
@@ -163,7 +164,9 @@ def split_for_features(
     edges, origin = edge_indices(mesh, features), np.arange(len(features))
     for _ in range(30):  # each round halves edges
         marked = _too_long(mesh, edges, longest)
-        if not marked.any():
+        # Needles become far more triangles than their area suggests, as they stay similar until the short sides are
+        # short enough. A patch of two triangles needs about 100.
+        if not marked.any() or len(mesh.faces) > 2**15 + 64 * len(faces):
             break
         mesh, edges, origin = _split(mesh, edges, origin, _with_longest_sides(mesh, marked))
     return _split(mesh, edges, origin, _chords(mesh, edges))

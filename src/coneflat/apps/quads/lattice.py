@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
+from scipy.sparse import csr_matrix
 
 from ...base import FloatArray, IntArray, compiled
 from ...errors import GridError
@@ -93,7 +94,9 @@ class Lattice:
         within = integer_solutions((row @ self.basis)[None], np.array([value - int(row @ self.one)]))
         if within is None:
             return None
-        return replace(self, one=self.one + self.basis @ within.one, basis=self.basis @ within.basis)
+        # Products of sparse integer matrices are faster than those of dense ones, which no library accelerates.
+        basis = self.basis @ csr_matrix(within.basis)
+        return replace(self, one=self.one + self.basis @ within.one, basis=basis)
 
     def reduced(self) -> Lattice:
         """Return the same lattice with a nearly orthogonal basis."""
@@ -121,12 +124,12 @@ class Lattice:
         order = np.argsort(squares[:number], kind="stable")
         return self.one + found[order] @ basis.T
 
-    def _reduction(self) -> tuple[FloatArray, IntArray]:
+    def _reduction(self) -> tuple[FloatArray, csr_matrix]:
         """Return the Cholesky factor of the reduced basis' Gram matrix, and (k, k) the change of basis."""
         change = np.eye(self.basis.shape[1], dtype=np.int64)
         root = np.ascontiguousarray(scipy.linalg.cholesky(self.basis.T @ self.gram @ self.basis))
         reduce_basis(root, change)
-        return root, change
+        return root, csr_matrix(change)
 
 
 @compiled

@@ -78,10 +78,11 @@ def _flat_patches(
         # The overall distortion is a root mean square weighted by area, to which small patches contribute little.
         share = float(areas[faces].sum() / areas.mean() / len(areas))
         distortion = options.distortion * min(max(1.0, 1 / np.sqrt(len(parts) * share)), 3.0)
+        # Each cone needs a grid point inside. By Pick's theorem, there are fewer of them than squares.
+        most = int(np.ceil(areas[faces].sum() / 2 / size**2))
+        own = replace(options, distortion=distortion, max_cones=most)
         try:
-            plane, at, inside = _flat_patch(
-                part, lengths[faces], opened.quarters[vertices], distortion, options
-            )
+            plane, at, inside = _flat_patch(part, lengths[faces], opened.quarters[vertices], own)
         except (CurvatureError, MetricError, SeamError) as error:
             raise PatchError(faces, str(error)) from error
         flipped.append(faces[signed_double_areas(plane[at]) <= 0])
@@ -100,7 +101,7 @@ def _flat_patches(
 
 
 def _flat_patch(
-    mesh: TriangleMesh, lengths: FloatArray, quarters: IntArray, distortion: float, options: Options
+    mesh: TriangleMesh, lengths: FloatArray, quarters: IntArray, options: Options
 ) -> tuple[FloatArray, IntArray, IntArray]:
     """Return the conformal flattening of a connected patch, with multiples of pi/2 as angles on its boundary.
 
@@ -111,15 +112,14 @@ def _flat_patch(
         mesh: the patch.
         lengths: (m, 3) side lengths.
         quarters: (n,) the angle at each boundary vertex in quarter turns.
-        distortion: largest area distortion allowed: standard deviation of the log scale, weighted by area.
-        options: other options of the cones.
+        options: options of the cones.
 
     Raises:
         CurvatureError: no inner cones have the total curvature that the corners require.
         ConvergenceError, MetricError: no metric was found.
     """
     corners = np.where(mesh.is_boundary_vertex, (np.pi / 2) * (2 - quarters), 0.0)
-    solution = _cones(mesh, lengths, corners, distortion, options)
+    solution = _cones(mesh, lengths, corners, options)
     choices = ExactChoices(scale_at_cones=False, boundary=straight_boundary(mesh, solution.target))
     # Holonomy along handles is not yet a multiple of a quarter turn, and different boundary loops are not yet parallel.
     # Both are corrected when the patches are joined.
@@ -129,9 +129,7 @@ def _flat_patch(
     return layout.points, layout.corners, solution.cones
 
 
-def _cones(
-    mesh: TriangleMesh, lengths: FloatArray, corners: FloatArray, distortion: float, options: Options
-) -> ConeSolution:
+def _cones(mesh: TriangleMesh, lengths: FloatArray, corners: FloatArray, options: Options) -> ConeSolution:
     """Return the inner cones of a patch with prescribed corners (n,), whose curvature is subtracted from its own."""
     surface = Surface.of(mesh, lengths)
     inside = ~mesh.is_boundary_vertex
@@ -150,13 +148,13 @@ def _cones(
             allowed=inside,
             max_angles=max_angles.astype(np.float64),
         )
-        found = quantise_cones(search, np.pi / 2, distortion=distortion).solution
+        found = quantise_cones(search, np.pi / 2, distortion=options.distortion, most=options.max_cones)
     except CurvatureError as error:
         raise CurvatureError(
             f"a patch of {len(mesh.faces):,} triangles with corners of {corners.sum() / np.pi:.3g} pi in all: {error}"
         ) from error
-    target = np.where(inside, found.target, corners)
-    return ConeSolution(found.cones, target, found.log_scale)
+    target = np.where(inside, found.solution.target, corners)
+    return ConeSolution(found.solution.cones, target, found.solution.log_scale)
 
 
 def _along_axes(mesh: TriangleMesh, corners: IntArray, points: ComplexArray) -> ComplexArray:

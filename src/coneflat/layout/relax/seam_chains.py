@@ -155,7 +155,7 @@ def _rotating(vertices: IntArray, sides: IntArray, turns: ComplexArray, is_node:
 def _check_rigid(edges: IntArray, vertices: IntArray, one: ComplexArray, two: ComplexArray) -> None:
     lengths: FloatArray = np.abs(one)
     if not (lengths > 0).all():
-        raise SeamError(f"{int((lengths <= 0).sum())} seam edges have no length in the plane")
+        raise SeamError(f"{int((~(lengths > 0)).sum())} seam edges have no length in the plane")
     off = np.abs(np.abs(two) / lengths - 1)
     if (off > RIGID_TOLERANCE).any():
         worst = int(off.argmax())
