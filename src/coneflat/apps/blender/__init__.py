@@ -28,8 +28,6 @@ SHOWN: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 #: Files of the extension that are copied into the zip; its version is filled in.
 _MANIFEST = "blender_manifest.toml"
-#: A fixed time, so that the same version gives the same zip.
-_TIME = (2020, 1, 1, 0, 0, 0)
 
 
 def build_extension(path: str | PathLike[str]) -> Path:
@@ -50,7 +48,8 @@ def build_extension(path: str | PathLike[str]) -> Path:
     files["options.json"] = json.dumps(option_records(), indent=1)
     with atomic_write(path) as stream, zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, text in files.items():
-            archive.writestr(zipfile.ZipInfo(name, _TIME), text, zipfile.ZIP_DEFLATED)
+            # A ZipInfo has a fixed time, so that the same version gives the same zip.
+            archive.writestr(zipfile.ZipInfo(name), text, zipfile.ZIP_DEFLATED)
     return path
 
 

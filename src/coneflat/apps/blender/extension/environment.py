@@ -11,17 +11,18 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from .job import Failure
+from .job import Failure, popen_options
 
 #: The version of the extension, and the options of the commands.
 KNOWN = json.loads(Path(__file__).with_name("options.json").read_text(encoding="utf-8"))
 #: Seconds to wait for a program that only prints its version.
 _PATIENCE = 60.0
 _HINT = "choose Install in the preferences of the extension"
+_WHEELS = "name a folder of wheels in the preferences of the extension"
 #: Prints whether a Python can make environments that coneflat supports.
 _CAN_MAKE = "import sys, venv, ensurepip; print(sys.version_info >= (3, 10))"
 
@@ -61,21 +62,17 @@ def find(named: str, own: Path) -> Environment:
         path = Path(named).expanduser()
         return _checked((str(python_in(path) if path.is_dir() else path), "-m", "coneflat"))
     reason = f"coneflat is not installed: {_HINT}"
-    for command in _candidates(own):
-        try:
-            return _checked(command)
-        except Failure as failure:
-            reason = str(failure) if command[0] == str(python_in(own)) else reason
-    raise Failure(reason)
-
-
-def _candidates(own: Path) -> Iterator[tuple[str, ...]]:
-    if python_in(own).exists():
-        yield str(python_in(own)), "-m", "coneflat"
-    for name, rest in (("coneflat", ()), ("python3", ("-m", "coneflat")), ("python", ("-m", "coneflat"))):
+    module = ("-m", "coneflat")
+    own_python = str(python_in(own))
+    programs = ((own_python, module), ("coneflat", ()), ("python3", module), ("python", module))
+    for name, rest in programs:
         program = shutil.which(name)
-        if program is not None:
-            yield program, *rest
+        try:
+            if program is not None:
+                return _checked((program, *rest))
+        except Failure as failure:
+            reason = str(failure) if name == own_python else reason
+    raise Failure(reason)
 
 
 def _checked(command: Sequence[str]) -> Environment:
@@ -103,23 +100,13 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 def _output(command: Sequence[str]) -> tuple[int, str]:
     """Return the exit code of a program and what it prints; 1 and the reason if it does not run."""
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONHOME"}
     try:
-        done = subprocess.run(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            env=environment,
-            timeout=_PATIENCE,
-            creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
-            check=False,
-        )
+        done = subprocess.run(command, timeout=_PATIENCE, check=False, **popen_options())
     except OSError as error:
         return 1, error.strerror or str(error)
     except subprocess.TimeoutExpired:
         return 1, f"no answer within {_PATIENCE:.0f} s"
-    return done.returncode, done.stdout.decode("utf-8", "replace")
+    return done.returncode, done.stdout
 
 
 def install_commands(
@@ -140,8 +127,7 @@ def install_commands(
         raise Failure(f"{wheels}, the folder of wheels, does not exist")
     if not wheels and not is_online:
         raise Failure(
-            "coneflat is not installed, and online access is off: allow it in Blender's preferences, under System, "
-            "or name a folder of wheels in those of the extension"
+            "coneflat is not installed, and online access is off: allow it in the preferences, or " + _WHEELS
         )
     source = ["--no-index", "--find-links", wheels] if wheels else ["--retries", "1"]
     quiet = ["--disable-pip-version-check", "--no-input", "--progress-bar", "off"]
@@ -159,6 +145,8 @@ def _base_python() -> str:
     """Return a Python that can make environments: Blender's own, which is always there, or one on the PATH."""
     own = sys.executable if Path(sys.executable).name.lower().startswith("python") else None
     for program in (own, *map(shutil.which, ("python3.12", "python3.11", "python3.10", "python3", "python"))):
-        if program and _output([program, "-c", _CAN_MAKE]) [1].strip().endswith("True"):
+        if program and _output([program, "-c", _CAN_MAKE])[1].strip().endswith("True"):
             return program
-    raise Failure("no Python 3.10 or later with venv was found: name a Python that has coneflat in the preferences")
+    raise Failure(
+        "no Python 3.10 or later with venv was found: name a Python that has coneflat in the preferences"
+    )

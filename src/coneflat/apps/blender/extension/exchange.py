@@ -74,7 +74,9 @@ def arguments(records: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -
             is_default = value == record["default"]
         if not is_default:
             # The angles that are wanted exactly are integers in degrees.
-            text = f"{math.degrees(value):.5g}deg" if kind == "angle" else name if kind == "weights" else value
+            text = (
+                f"{math.degrees(value):.5g}deg" if kind == "angle" else name if kind == "weights" else value
+            )
             found.append(f"--{name.replace('_', '-')}={f'{text:.7g}' if kind == 'number' else text}")
     return found
 

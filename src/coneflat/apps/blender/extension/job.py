@@ -12,12 +12,25 @@ from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 #: A line of progress of a command: seconds, percent and stage.
 _PROGRESS = re.compile(r"\s*[\d.]+ s +(\d+)%\s+(\S.*)")
 _ERROR = re.compile(r"(?:coneflat: )?error: (.+)", re.IGNORECASE)
 #: Seconds to wait for the end of a process that was killed.
 _PATIENCE = 5.0
+
+
+def popen_options() -> dict[str, Any]:
+    """Return the options of a process that prints UTF-8 into one pipe, without a window or a terminal."""
+    environment = {**os.environ, "PYTHONIOENCODING": "utf-8"}
+    environment.pop("PYTHONHOME", None)  # Blender's own
+    pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+    text = {"text": True, "encoding": "utf-8", "errors": "replace"}
+    apart = (
+        {"start_new_session": True} if os.name == "posix" else {"creationflags": 0x08000000}
+    )  # CREATE_NO_WINDOW
+    return {"env": environment, **pipes, **text, **apart}
 
 
 class Failure(Exception):
@@ -46,22 +59,8 @@ class Job:
         """
         self.name, self.stage, self.fraction = name, "", 0.0
         self._lines = deque[str](maxlen=50)
-        environment = {**os.environ, "PYTHONIOENCODING": "utf-8", "COLUMNS": "500"}
-        environment.pop("PYTHONHOME", None)  # Blender's own
         try:
-            self._process = subprocess.Popen(
-                command,
-                cwd=folder,
-                env=environment,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                text=True,
-                encoding="utf-8",
-                errors="replace",
-                start_new_session=os.name == "posix",
-                creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
-            )
+            self._process = subprocess.Popen(command, cwd=folder, **popen_options())
         except OSError as error:
             raise Failure(f"{command[0]} cannot be started: {error.strerror or error}") from error
         self._reader = threading.Thread(target=self._read, daemon=True)

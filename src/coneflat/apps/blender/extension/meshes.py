@@ -256,7 +256,10 @@ def add_quads(source: Source, found: dict[str, NDArray[Any]], select: bool) -> A
     frame = np.array(added.matrix_basis, np.float64)  # This has no shear, which parents can cause.
     points = found["vertices"] * ([-1, 1, 1] if source.is_mirrored else [1, 1, 1]) - frame[:3, 3]
     local = np.linalg.solve(frame[:3, :3], points.T).T
-    mesh.from_pydata(local.tolist(), [], found["quads"].tolist())
+    quads = found["quads"]
+    # Blender 5.0 crashes at the selection of edges that it has found itself.
+    edges = np.unique(np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], -1).reshape(-1, 2)), axis=0)
+    mesh.from_pydata(local.tolist(), edges.tolist(), quads.tolist())
     for material in item.data.materials:
         mesh.materials.append(material)
     if select:

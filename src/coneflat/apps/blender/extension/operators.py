@@ -15,7 +15,7 @@ from . import environment, exchange, meshes
 from .job import Failure, Job
 from .settings import COMMANDS, Preferences, own_folder, preferences
 
-OLDEST = (4, 2, 0)
+OLDEST = "4.2"
 #: Seconds between looks at the process.
 INTERVAL = 0.1
 #: What passes to Blender while a process runs: turning the view, but no editing.
@@ -199,9 +199,8 @@ class Command(Runner):
 
     def work(self, context: Any) -> Work:
         """Read the chosen faces, run the command, and write its result."""
-        if bpy.app.version < OLDEST:
-            needed, given = (".".join(map(str, version)) for version in (OLDEST[:2], bpy.app.version))
-            raise Failure(f"Blender {needed} or later is needed, this is {given}")
+        if bpy.app.version < tuple(map(int, OLDEST.split("."))):
+            raise Failure(f"Blender {OLDEST} or later is needed, this is {bpy.app.version_string}")
         objects = meshes.chosen_objects(context)
         in_edit = meshes.leave_edit_mode(context)
         try:

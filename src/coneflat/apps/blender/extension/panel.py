@@ -15,7 +15,7 @@ _COMMANDS = (CONEFLAT_OT_unwrap, CONEFLAT_OT_flatten, CONEFLAT_OT_quads)
 def _draw_main(self: Any, context: Any) -> None:
     """Draw what all commands share, and the progress."""
     layout, settings = self.layout, context.scene.coneflat
-    layout.use_property_split = True
+    layout.use_property_split, layout.use_property_decorate = True, False
     running = Runner.running
     if running is not None:
         text, fraction = running.progress
@@ -30,7 +30,7 @@ def _draw_command(operator: Any) -> Any:
 
     def draw(self: Any, context: Any) -> None:
         layout, command = self.layout, operator.command
-        layout.use_property_split = True
+        layout.use_property_split, layout.use_property_decorate = True, False
         layout.operator(operator.bl_idname)
         group, title = getattr(context.scene.coneflat, command), ""
         for record in COMMANDS[command]:
@@ -72,5 +72,6 @@ MENUS = ("VIEW3D_MT_uv_map", "IMAGE_MT_uvs")
 def draw_menu(self: Any, context: Any) -> None:
     """Draw the entries of the menu UV."""
     self.layout.separator()
+    self.layout.label(text="coneflat")
     for operator in _COMMANDS:
         self.layout.operator(operator.bl_idname)

@@ -14,27 +14,21 @@ from .environment import KNOWN, Environment
 COMMANDS: dict[str, list[dict[str, Any]]] = KNOWN["commands"]
 
 
-def _items(*rows: tuple[str, str, str]) -> list[tuple[str, str, str]]:
-    return list(rows)
-
-
 def _property(record: dict[str, Any]) -> Any:
     """Return the property of an option; 0 stands for no value."""
     title = record["name"].replace("_", " ").capitalize()
     doc = record["doc"].rstrip(".")
     look = {"name": title, "description": doc if record["default"] != 0 else f"{doc}. 0: no value"}
-    match record["kind"]:
-        case "integer":
-            bounds = {"min": int(min(record["least"], record["default"])), "max": int(record["most"])}
-            return IntProperty(**look, **bounds, default=int(record["default"]))
-        case "number":
-            bounds = {"min": min(record["least"], record["default"]), "max": record["most"]}
-            return FloatProperty(**look, **bounds, default=record["default"], precision=3)
-        case "angle":
-            return FloatProperty(**look, min=0.0, default=record["default"], subtype="ANGLE")
-        case "weights":
-            look["description"] = f"Vertex group. {doc}"
-            return StringProperty(**look)
+    if record["kind"] in ("integer", "number"):
+        kind, make = (int, IntProperty) if record["kind"] == "integer" else (float, FloatProperty)
+        default = kind(record["default"])
+        return make(
+            **look, min=min(kind(record["least"]), default), max=kind(record["most"]), default=default
+        )
+    if record["kind"] == "angle":
+        return FloatProperty(**look, min=0.0, default=record["default"], subtype="ANGLE")
+    if record["kind"] == "weights":
+        return StringProperty(**{**look, "description": f"Vertex group. {doc}"})
     words = [(word, word.replace("_", " ").capitalize(), "") for word in record["words"]]
     return EnumProperty(**look, items=words, default=record["default"])
 
@@ -48,42 +42,28 @@ def _group(command: str) -> type:
 
 GROUPS = {command: _group(command) for command in COMMANDS}
 
+_MARKS = [
+    ("OWN", "Yours", "Cut the seams that you have marked, not those that coneflat has marked"),
+    ("ALL", "All", "Cut all marked seams"),
+    ("NONE", "None", "Ignore marked seams"),
+]
+_SELECTED = [
+    ("NONE", "Unchanged", "Keep the selection"),
+    ("SEAMS", "Seams", "Select the cut edges"),
+    ("CONES", "Cones", "Select the cone vertices, which are the irregular vertices of quads"),
+]
+_ATLAS = "Put all selected objects into one atlas, at one texel density; otherwise each has its own"
+_MAP = "UV map to write, which is added if it does not exist. Empty: the active one"
+_MARK = "Mark the cut edges as seams, instead of those that coneflat has marked before"
+_APPLY = "Make quads of the mesh with its modifiers and shape keys, in object mode"
 _OWN = {
-    "marks": EnumProperty(
-        name="Marked seams",
-        description="Marked seams that are cut",
-        items=_items(
-            ("OWN", "Yours", "Cut the seams that you have marked, not those that coneflat has marked"),
-            ("ALL", "All", "Cut all marked seams"),
-            ("NONE", "None", "Ignore marked seams"),
-        ),
-    ),
+    "marks": EnumProperty(name="Marked seams", description="Marked seams that are cut", items=_MARKS),
     "sharp": BoolProperty(name="Cut sharp edges", description="Also cut edges that are marked as sharp"),
-    "together": BoolProperty(
-        name="One atlas",
-        description="Put all selected objects into one atlas, at one texel density; otherwise each has its own",
-        default=True,
-    ),
-    "uv_map": StringProperty(
-        name="UV map", description="UV map to write, which is added if it does not exist. Empty: the active one"
-    ),
-    "mark": BoolProperty(
-        name="Mark seams", description="Mark the cut edges as seams, instead of those marked last", default=True
-    ),
-    "select": EnumProperty(
-        name="Select",
-        description="What to select in the result",
-        items=_items(
-            ("NONE", "Unchanged", "Keep the selection"),
-            ("SEAMS", "Seams", "Select the cut edges"),
-            ("CONES", "Cones", "Select the cone vertices, which are the irregular vertices of quads"),
-        ),
-    ),
-    "modifiers": BoolProperty(
-        name="Apply modifiers",
-        description="Make quads of the mesh with its modifiers and shape keys, in object mode",
-        default=True,
-    ),
+    "together": BoolProperty(name="One atlas", description=_ATLAS, default=True),
+    "uv_map": StringProperty(name="UV map", description=_MAP),
+    "mark": BoolProperty(name="Mark seams", description=_MARK, default=True),
+    "select": EnumProperty(name="Select", description="What to select in the result", items=_SELECTED),
+    "modifiers": BoolProperty(name="Apply modifiers", description=_APPLY, default=True),
 }
 _POINTERS = {command: PointerProperty(type=group) for command, group in GROUPS.items()}
 #: All settings, which are stored with each scene.
@@ -92,26 +72,22 @@ Settings = type(
 )
 
 
+_PYTHON = (
+    "Python executable, or folder of an environment, that has coneflat. Empty: the extension's own environment, or one "
+    "on the PATH"
+)
+_WHEELS = "Install from the wheels in this folder, without a network. Empty: from the package index"
+_PACKAGE = "What pip installs, for example coneflat[fast]. Empty: coneflat, this version or later"
+
+
 class Preferences(bpy.types.AddonPreferences):
     """Where coneflat is, and how it is installed."""
 
     bl_idname = __package__
     __annotations__ = {
-        "python": StringProperty(
-            name="Python",
-            description="Python executable, or folder of an environment, that has coneflat. Empty: the "
-            "extension's own environment, or one on the PATH",
-            subtype="FILE_PATH",
-        ),
-        "wheels": StringProperty(
-            name="Folder of wheels",
-            description="Install from the wheels in this folder, without a network. Empty: from the package index",
-            subtype="DIR_PATH",
-        ),
-        "requirement": StringProperty(
-            name="Package",
-            description="What pip installs, for example coneflat[fast]. Empty: coneflat, this version or later",
-        ),
+        "python": StringProperty(name="Python", description=_PYTHON, subtype="FILE_PATH"),
+        "wheels": StringProperty(name="Folder of wheels", description=_WHEELS, subtype="DIR_PATH"),
+        "requirement": StringProperty(name="Package", description=_PACKAGE),
     }
     #: The environment that was found last, and why there is none.
     found: Environment | None = None
