@@ -296,13 +296,13 @@ def failures():
     settings().uv_map = "ninth"
     assert "Error: cube has 8 UV maps, and ninth cannot be added" in run("unwrap")
     settings().uv_map = ""
-    operators, found = module("operators"), module("settings").Preferences
+    operators = module("operators")
     operators.OLDEST = "99.1"
     assert "Error: Blender 99.1 or later is needed, this is " in run("unwrap")
     operators.OLDEST = "4.2"
-    preferences().python, found.found = "/missing/python", None
+    preferences().python = "/missing/python"
     assert "Error: /missing/python does not run coneflat: No such file" in run("unwrap")
-    preferences().python, found.found = "", None
+    preferences().python = ""
     os.environ["PATH"] = ""
     assert "Error: coneflat is not installed, and online access is off" in run("unwrap")
     preferences().wheels = os.environ["BLENDER_USER_RESOURCES"]

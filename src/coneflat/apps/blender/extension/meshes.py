@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,12 +60,20 @@ def chosen_objects(context: Any) -> list[Any]:
     return sorted(found.values(), key=lambda each: each.name)
 
 
-def leave_edit_mode(context: Any) -> bool:
-    """Change to object mode, in which the data of meshes can be accessed; return whether it was edit mode."""
+@contextmanager
+def object_mode(context: Any, returns: bool = True) -> Iterator[bool]:
+    """Be in object mode, in which the data of meshes can be accessed, and yield whether it was edit mode.
+
+    returns: return to edit mode.
+    """
     in_edit = context.mode == "EDIT_MESH"
     if in_edit:
         bpy.ops.object.mode_set(mode="OBJECT")
-    return in_edit
+    try:
+        yield in_edit
+    finally:
+        if in_edit and returns:
+            bpy.ops.object.mode_set(mode="EDIT")
 
 
 def values(rows: Any, name: str, kind: type = np.int64, width: int = 1) -> NDArray[Any]:
@@ -76,7 +85,7 @@ def values(rows: Any, name: str, kind: type = np.int64, width: int = 1) -> NDArr
 
 
 def read_source(
-    item: Any, mesh: Any, *, selected: bool, marks: str, sharp: bool, groups: dict[str, str]
+    item: Any, mesh: Any, *, selected: bool, groups: dict[str, str], marks: str = "NONE", sharp: bool = False
 ) -> Source | None:
     """Return the faces of an object's mesh; None if there are none to use.
 
@@ -84,9 +93,9 @@ def read_source(
         item: the object.
         mesh: its mesh, or the one that its modifiers make.
         selected: use the selected faces only.
+        groups: names of vertex groups by the option that takes their weights; those that it lacks are left out.
         marks: which marked seams are cut: OWN for those that coneflat has not marked, ALL or NONE.
         sharp: also cut edges that are marked as sharp.
-        groups: names of vertex groups by the option that takes their weights; those that it lacks are left out.
 
     Raises:
         Failure: the object has no volume in the scene.
@@ -118,18 +127,12 @@ def read_source(
         is_cut |= values(mesh.edges, "use_edge_sharp", bool)
     inner = used[(times > 1) & is_cut[used]]
     ends = values(mesh.edges, "vertices", np.int64, 2)[inner]
-    part = Part(
-        name=item.name,
-        positions=positions,
-        corners=corners.reshape(-1),
-        sizes=sizes,
-        cut=np.searchsorted(vertices, ends).reshape(-1, 2),
-        weights={
-            option: _weights(mesh, item.vertex_groups[name].index)[vertices]
-            for option, name in groups.items()
-            if name in item.vertex_groups
-        },
-    )
+    known = {option: name for option, name in groups.items() if name in item.vertex_groups}
+    weights = {
+        option: _weights(mesh, item.vertex_groups[name].index)[vertices] for option, name in known.items()
+    }
+    cut = np.searchsorted(vertices, ends).reshape(-1, 2)
+    part = Part(item.name, positions, corners.reshape(-1), sizes, cut, weights)
     return Source(item.name, part, vertices, loops, edges, bool(determinant < 0), counts(mesh))
 
 
@@ -158,10 +161,8 @@ def own_seams(mesh: Any) -> NDArray[np.bool_]:
 
 def left_as_is(item: Any, applied: bool) -> list[str]:
     """Return a note that says which modifiers and shape keys of an object are used or not, or no note."""
-    modifiers = [each.name for each in item.modifiers if each.show_viewport]
-    words = []
-    if modifiers:
-        words.append(f"modifiers {', '.join(modifiers)} are {'applied' if applied else 'not applied'}")
+    names = ", ".join(each.name for each in item.modifiers if each.show_viewport)
+    words = [f"modifiers {names} are {'applied' if applied else 'not applied'}"] if names else []
     if item.data.shape_keys is not None:
         words.append("shape keys are applied" if applied else "of the shape keys, the basis is used")
     return [f"{item.name}: {'; '.join(words)}"] if words else []

@@ -121,36 +121,33 @@ class Runner:
     def _show(self, context: Any) -> None:
         text, fraction = self.progress
         context.window_manager.progress_update(100 * fraction)
-        if context.workspace is not None:
-            context.workspace.status_text_set(f"{text}  {fraction:.0%}   Esc: stop")
-        _redraw(context)
+        _set_status(context, f"{text}  {fraction:.0%}   Esc: stop")
 
     def _leave(self, context: Any) -> None:
         Runner.running = None
-        manager = context.window_manager
         if self._timer is not None:
-            manager.event_timer_remove(self._timer)
-            manager.progress_end()
-        if context.workspace is not None:
-            context.workspace.status_text_set(None)
-        _redraw(context)
+            context.window_manager.event_timer_remove(self._timer)
+            context.window_manager.progress_end()
+        _set_status(context, None)
 
 
-def _redraw(context: Any) -> None:
+def _set_status(context: Any, text: str | None) -> None:
+    """Show a text in the status bar, and the progress in the panels."""
+    if context.workspace is not None:
+        context.workspace.status_text_set(text)
     for area in context.screen.areas if context.screen is not None else ():
-        if area.type in ("VIEW_3D", "IMAGE_EDITOR", "PREFERENCES"):
-            area.tag_redraw()
+        area.tag_redraw()
 
 
-def _install(context: Any) -> Work:
-    """Yield the jobs that make the extension's environment."""
+def _install(context: Any) -> Generator[Job, None, environment.Environment]:
+    """Yield the jobs that make the extension's environment, and return it."""
     own, chosen = own_folder(), preferences(context)
     wheels = bpy.path.abspath(chosen.wheels) if chosen.wheels else ""
     commands = environment.install_commands(own, chosen.requirement, wheels, bpy.app.online_access)
     for name, command in commands:
         with Job(name, command) as job:
             yield job
-    _find(context)
+    return _find(context)
 
 
 def _find(context: Any) -> environment.Environment:
@@ -159,7 +156,8 @@ def _find(context: Any) -> environment.Environment:
     Raises:
         Failure: there is none.
     """
-    Preferences.found, named = None, preferences(context).python
+    named = preferences(context).python
+    Preferences.found, Preferences.named = None, named
     try:
         Preferences.found = environment.find(bpy.path.abspath(named) if named else "", own_folder())
     except Failure as failure:
@@ -170,15 +168,16 @@ def _find(context: Any) -> environment.Environment:
 
 def _environment(context: Any) -> Generator[Job, None, tuple[str, ...]]:
     """Return the command that runs coneflat; install it if there is none and none is named."""
-    if Preferences.found is None or not Path(Preferences.found.command[0]).exists():
+    named = preferences(context).python
+    found = Preferences.found if Preferences.named == named else None
+    if found is None or not Path(found.command[0]).exists():
         try:
-            _find(context)
+            found = _find(context)
         except Failure:
-            if preferences(context).python:
+            if named:
                 raise
-            yield from _install(context)
-    assert Preferences.found is not None
-    return Preferences.found.command
+            found = yield from _install(context)
+    return found.command
 
 
 class Command(Runner):
@@ -202,24 +201,22 @@ class Command(Runner):
         if bpy.app.version < tuple(map(int, OLDEST.split("."))):
             raise Failure(f"Blender {OLDEST} or later is needed, this is {bpy.app.version_string}")
         objects = meshes.chosen_objects(context)
-        in_edit = meshes.leave_edit_mode(context)
-        try:
+        with meshes.object_mode(context) as in_edit:
             sources = self.read(context, objects, in_edit)
-        finally:
-            _return_to_edit_mode(in_edit)
         command = yield from _environment(context)
         together = self.command != "quads" and context.scene.coneflat.together
-        for chosen in [sources] if together else [[source] for source in sources]:
-            with ExitStack() as stack:
+        with ExitStack() as stack:
+            done = []
+            for chosen in [sources] if together else [[source] for source in sources]:
                 folder = Path(stack.enter_context(TemporaryDirectory(prefix="coneflat-")))
                 files = exchange.write_parts(folder, [source.part for source in chosen])
                 arguments = [*command, self.command, *files, *self.arguments(context)]
                 yield stack.enter_context(Job(self.title, arguments, folder))
-                meshes.leave_edit_mode(context)
-                try:
+                done.append((folder, chosen))
+            # Nothing changes before all processes have ended well.
+            with meshes.object_mode(context, returns=self.command != "quads"):
+                for folder, chosen in done:
                     self.write(context, folder, chosen)
-                finally:
-                    _return_to_edit_mode(in_edit and self.command != "quads")
 
     def arguments(self, context: Any) -> list[str]:
         """Return the options of the command that the settings change."""
@@ -248,17 +245,11 @@ class Command(Runner):
             if not is_quads:
                 meshes.check_uv_map(each, settings.uv_map)
             self._say(meshes.left_as_is(each, applied))
-            evaluated = each.evaluated_get(context.evaluated_depsgraph_get()) if applied else None
-            source = meshes.read_source(
-                each,
-                each.data if evaluated is None else evaluated.to_mesh(),
-                selected=in_edit,
-                marks="NONE" if is_quads else settings.marks,
-                sharp=settings.sharp and not is_quads,
-                groups=groups,
-            )
-            if evaluated is not None:
-                evaluated.to_mesh_clear()
+            marks = {"marks": settings.marks, "sharp": settings.sharp} if not is_quads else {}
+            mesh = each.data
+            if applied:
+                mesh = each.evaluated_get(context.evaluated_depsgraph_get()).to_mesh()
+            source = meshes.read_source(each, mesh, selected=in_edit, groups=groups, **marks)
             found += [source] if source is not None else []
         if not found:
             raise Failure("no faces are selected" if in_edit else "the selected objects have no faces")
@@ -271,10 +262,8 @@ class Command(Runner):
         for source, found in zip(sources, maps, strict=True):
             meshes.write_map(source, found, settings.uv_map, mark=settings.mark, select=settings.select)
             if found.torn:
-                self.report(
-                    {"WARNING"},
-                    f"{source.name}: faces that seams divide, so that they need to be triangulated: {found.torn}",
-                )
+                said = f"{source.name}: faces that seams divide, so that they need to be triangulated: {found.torn}"
+                self.report({"WARNING"}, said)
         if settings.select != "NONE":
             context.tool_settings.mesh_select_mode = _SELECT_MODES[settings.select]
         self._say(measures["notes"])
@@ -287,11 +276,6 @@ class Command(Runner):
     def _say(self, lines: Sequence[str]) -> None:
         for line in lines:
             self.report({"INFO"}, line)
-
-
-def _return_to_edit_mode(in_edit: bool) -> None:
-    if in_edit:
-        bpy.ops.object.mode_set(mode="EDIT")
 
 
 class CONEFLAT_OT_unwrap(Command, bpy.types.Operator):
@@ -335,8 +319,8 @@ class CONEFLAT_OT_install(Runner, bpy.types.Operator):
 
     def work(self, context: Any) -> Work:
         """Make the environment."""
-        yield from _install(context)
-        self.report({"INFO"}, f"installed: {Preferences.found}")
+        found = yield from _install(context)
+        self.report({"INFO"}, f"installed: {found}")
 
 
 class CONEFLAT_OT_check(bpy.types.Operator):
@@ -354,10 +338,5 @@ class CONEFLAT_OT_check(bpy.types.Operator):
         return {"FINISHED"}
 
 
-OPERATORS = (
-    CONEFLAT_OT_unwrap,
-    CONEFLAT_OT_flatten,
-    CONEFLAT_OT_quads,
-    CONEFLAT_OT_install,
-    CONEFLAT_OT_check,
-)
+COMMAND_OPERATORS = (CONEFLAT_OT_unwrap, CONEFLAT_OT_flatten, CONEFLAT_OT_quads)
+OPERATORS = (*COMMAND_OPERATORS, CONEFLAT_OT_install, CONEFLAT_OT_check)

@@ -6,10 +6,8 @@ from typing import Any
 
 import bpy
 
-from .operators import CONEFLAT_OT_flatten, CONEFLAT_OT_quads, CONEFLAT_OT_unwrap, Runner
+from .operators import COMMAND_OPERATORS, Runner
 from .settings import COMMANDS
-
-_COMMANDS = (CONEFLAT_OT_unwrap, CONEFLAT_OT_flatten, CONEFLAT_OT_quads)
 
 
 def _draw_main(self: Any, context: Any) -> None:
@@ -52,12 +50,12 @@ def _panels(space: str, prefix: str) -> list[type]:
     place = {"bl_space_type": space, "bl_region_type": "UI", "bl_category": "coneflat"}
     main = f"{prefix}_PT_coneflat"
     found = [type(main, (bpy.types.Panel,), {**place, "bl_label": "coneflat", "draw": _draw_main})]
-    for operator in _COMMANDS:
+    for operator in COMMAND_OPERATORS:
         body = {
             **place,
             "bl_label": operator.bl_label,
             "bl_parent_id": main,
-            "bl_options": set() if operator is CONEFLAT_OT_unwrap else {"DEFAULT_CLOSED"},
+            "bl_options": set() if operator.command == "unwrap" else {"DEFAULT_CLOSED"},
             "draw": _draw_command(operator),
         }
         found.append(type(f"{main}_{operator.command}", (bpy.types.Panel,), body))
@@ -73,5 +71,5 @@ def draw_menu(self: Any, context: Any) -> None:
     """Draw the entries of the menu UV."""
     self.layout.separator()
     self.layout.label(text="coneflat")
-    for operator in _COMMANDS:
+    for operator in COMMAND_OPERATORS:
         self.layout.operator(operator.bl_idname)

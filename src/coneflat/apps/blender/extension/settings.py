@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
@@ -89,9 +89,10 @@ class Preferences(bpy.types.AddonPreferences):
         "wheels": StringProperty(name="Folder of wheels", description=_WHEELS, subtype="DIR_PATH"),
         "requirement": StringProperty(name="Package", description=_PACKAGE),
     }
-    #: The environment that was found last, and why there is none.
-    found: Environment | None = None
-    reason = "not checked yet"
+    #: The environment that was found last, why there is none, and the Python that was named then.
+    found: ClassVar[Environment | None] = None
+    reason: ClassVar[str] = "not checked yet"
+    named: ClassVar[str] = ""
 
     def draw(self, context: Any) -> None:
         """Draw the environment and how to change it."""
