@@ -69,7 +69,7 @@ def option_records() -> dict[str, Any]:
 def _record(declaration: Declaration) -> dict[str, Any]:
     """Return an option as numbers and texts; numbers without a default have 0, words the first."""
     kind, default = declaration.kind, declaration.default
-    record = {"name": declaration.name, "group": declaration.group, "doc": declaration.doc}
+    record: dict[str, Any] = {"name": declaration.name, "group": declaration.group, "doc": declaration.doc}
     match kind:
         case Number():
             word = "angle" if kind.is_angle else "integer" if kind.is_integer else "number"

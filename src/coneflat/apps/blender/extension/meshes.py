@@ -76,10 +76,10 @@ def object_mode(context: Any, returns: bool = True) -> Iterator[bool]:
             bpy.ops.object.mode_set(mode="EDIT")
 
 
-def values(rows: Any, name: str, kind: type = np.int64, width: int = 1) -> NDArray[Any]:
+def values(rows: Any, name: str, kind: Any = np.int64, width: int = 1) -> NDArray[Any]:
     """Return one property of all elements of a collection."""
-    types = {np.int64: np.int32, np.float64: np.float32, bool: bool}
-    flat = np.empty(len(rows) * width, types[kind])
+    stored: Any = {np.int64: np.int32, np.float64: np.float32}.get(kind, bool)
+    flat = np.empty(len(rows) * width, stored)
     rows.foreach_get(name, flat)
     return flat.astype(kind).reshape((len(rows), width) if width > 1 else -1)
 
