@@ -389,9 +389,5 @@ def main():
         os._exit(code)
 
 
-SESSIONS = (
-    three_objects, again, selected_faces, sharp_edges, vertex_groups, quads, unapplied, failures, escape,
-)  # fmt: skip
-
 if __name__ == "__main__":
     main()

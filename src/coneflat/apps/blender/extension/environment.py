@@ -15,14 +15,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from .job import Failure, popen_options
+from .job import WHEELS, Failure, popen_options
 
 #: The version of the extension, and the options of the commands.
 KNOWN = json.loads(Path(__file__).with_name("options.json").read_text(encoding="utf-8"))
 #: Seconds to wait for a program that only prints its version.
 _PATIENCE = 60.0
 _HINT = "choose Install in the preferences of the extension"
-_WHEELS = "name a folder of wheels in the preferences of the extension"
 #: Prints whether a Python can make environments that coneflat supports.
 _CAN_MAKE = "import sys, venv, ensurepip; print(sys.version_info >= (3, 10))"
 
@@ -127,7 +126,7 @@ def install_commands(
         raise Failure(f"{wheels}, the folder of wheels, does not exist")
     if not wheels and not is_online:
         raise Failure(
-            "coneflat is not installed, and online access is off: allow it in the preferences, or " + _WHEELS
+            "coneflat is not installed, and online access is off: allow it in the preferences, or " + WHEELS
         )
     source = ["--no-index", "--find-links", wheels] if wheels else ["--retries", "1"]
     quiet = ["--disable-pip-version-check", "--no-input", "--progress-bar", "off"]

@@ -17,6 +17,7 @@ from typing import Any
 #: A line of progress of a command: seconds, percent and stage.
 _PROGRESS = re.compile(r"\s*[\d.]+ s +(\d+)%\s+(\S.*)")
 _ERROR = re.compile(r"(?:coneflat: )?error: (.+)", re.IGNORECASE)
+WHEELS = "name a folder of wheels in the preferences of the extension"
 #: Seconds to wait for the end of a process that was killed.
 _PATIENCE = 5.0
 
@@ -111,6 +112,8 @@ class Job:
         if code == 0:
             return
         self._reader.join(_PATIENCE)
+        if any("connection broken" in line for line in self._lines):
+            raise Failure(f"{self.name}: there is no network; {WHEELS}")
         errors = [match[1] for line in self._lines if (match := _ERROR.match(line))]
         if errors:
             raise Failure(f"{self.name}: {errors[-1]}")
@@ -118,5 +121,5 @@ class Job:
         if code < 0:
             with suppress(ValueError):
                 ended = f"crashed or was ended by {signal.Signals(-code).name}"
-        last = [line for line in self._lines if not line.startswith((" ", "nanobind", "See "))][-1:]
+        last = [line[:200] for line in self._lines if not line.startswith((" ", "nanobind", "See "))][-1:]
         raise Failure(": ".join([f"{self.name} {ended}", *last]))
