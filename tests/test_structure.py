@@ -33,7 +33,8 @@ CEILINGS = {
     "apps": 0,
     "apps.ahead": 37,
     "apps.batch": 398,
-    "apps.cli": 1525,
+    "apps.blender": 890,
+    "apps.cli": 1537,
     "apps.measure_uv": 160,
     "apps.peers": 478,
     "apps.quads": 3249,
@@ -63,8 +64,8 @@ CEILINGS = {
     "xatlas": 2,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_804, 235, 25_900
-CONSTANTS, KERNELS, NAMES, LEVELS = 295, 110, 30, 8
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_804, 244, 26_802
+CONSTANTS, KERNELS, NAMES, LEVELS = 300, 110, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
 

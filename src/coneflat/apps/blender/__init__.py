@@ -62,7 +62,8 @@ def option_records() -> dict[str, Any]:
     for command, names in SHOWN.items():
         declared = declarations(known[command])
         found["commands"][command] = [_record(declared[name]) for name in names]
-    next(each for each in found["commands"]["quads"] if each["name"] == "quads")["default"] = QUADS
+    number = next(each for each in found["commands"]["quads"] if each["name"] == "quads")
+    number |= {"default": QUADS, "is_optional": False}
     return found
 
 
@@ -70,6 +71,7 @@ def _record(declaration: Declaration) -> dict[str, Any]:
     """Return an option as numbers and texts; numbers without a default have 0, words the first."""
     kind, default = declaration.kind, declaration.default
     record: dict[str, Any] = {"name": declaration.name, "group": declaration.group, "doc": declaration.doc}
+    record["is_optional"] = isinstance(kind, Number) and default is None
     match kind:
         case Number():
             word = "angle" if kind.is_angle else "integer" if kind.is_integer else "number"

@@ -86,10 +86,8 @@ def _checked(command: Sequence[str]) -> Environment:
         last = ([line.strip() for line in text.splitlines() if line.strip()] or [f"code {code}"])[-1]
         raise Failure(f"{command[0]} does not run coneflat: {last}")
     if _numbers(match[1]) < _numbers(KNOWN["version"]):
-        raise Failure(
-            f"coneflat {match[1]} of {command[0]} is older than the extension, {KNOWN['version']}: {_HINT}, "
-            "or update it"
-        )
+        needed = KNOWN["version"]
+        raise Failure(f"coneflat {match[1]} of {command[0]} is older than the extension, {needed}: {_HINT}")
     return Environment(tuple(command), match[1])
 
 
@@ -125,9 +123,7 @@ def install_commands(
     if wheels and not Path(wheels).is_dir():
         raise Failure(f"{wheels}, the folder of wheels, does not exist")
     if not wheels and not is_online:
-        raise Failure(
-            "coneflat is not installed, and online access is off: allow it in the preferences, or " + WHEELS
-        )
+        raise Failure(f"coneflat is not installed, and online access is off: allow it, or {WHEELS}")
     source = ["--no-index", "--find-links", wheels] if wheels else ["--retries", "1"]
     quiet = ["--disable-pip-version-check", "--no-input", "--progress-bar", "off"]
     python = str(python_in(own))
@@ -147,5 +143,5 @@ def _base_python() -> str:
         if program and _output([program, "-c", _CAN_MAKE])[1].strip().endswith("True"):
             return program
     raise Failure(
-        "no Python 3.10 or later with venv was found: name a Python that has coneflat in the preferences"
+        "no Python 3.10 or later with venv was found: name one that has coneflat in the preferences"
     )

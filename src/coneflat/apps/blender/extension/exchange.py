@@ -74,10 +74,9 @@ def arguments(records: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -
             is_default = value == record["default"]
         if not is_default:
             # The angles that are wanted exactly are integers in degrees.
-            text = (
-                f"{math.degrees(value):.5g}deg" if kind == "angle" else name if kind == "weights" else value
-            )
-            found.append(f"--{name.replace('_', '-')}={f'{text:.7g}' if kind == 'number' else text}")
+            texts = {"angle": "{1:.5g}deg", "number": "{0:.7g}", "weights": name}
+            text = texts.get(kind, "{0}").format(value, math.degrees(value) if kind == "angle" else 0)
+            found.append(f"--{name.replace('_', '-')}={text}")
     return found
 
 
@@ -103,10 +102,8 @@ def write_parts(folder: Path, parts: Sequence[Part]) -> list[str]:
     is_corner[heads] = False
     words[heads], words[is_corner] = sizes, corners
     properties = "".join(f"property double {name}\n" for name, _ in kinds)
-    header = (
-        f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\n{properties}element face {len(sizes)}\n"
-        "property list int int vertex_indices\nend_header\n"
-    )
+    properties += f"element face {len(sizes)}\nproperty list int int vertex_indices\n"
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\n{properties}end_header\n"
     (folder / MESH).write_bytes(header.encode() + rows.tobytes() + words.tobytes())
     found = [MESH, "-o", RESULT, "--no-weld"]
     cut = np.concatenate([part.cut + start for part, start in zip(parts, starts, strict=False)])
@@ -153,20 +150,19 @@ def read_maps(folder: Path, parts: Sequence[Part]) -> tuple[list[Map], dict[str,
     uv[corner[is_there]] = points[is_there]
     differs = is_there & (uv[corner] != points).any(axis=2)
     torn = np.unique(polygon[differs.any(axis=1)])
-    first_corner = np.concatenate([[0], np.cumsum([len(part.corners) for part in parts])])
-    first_polygon = np.concatenate([[0], np.cumsum([len(part.sizes) for part in parts])])
     seams, cones = origin[found["seams"]].reshape(-1, 2), origin[found["cones"]]
+    lengths = [(len(part.positions), len(part.corners), len(part.sizes)) for part in parts]
+    # The part of each vertex, corner and polygon.
+    of_vertex, of_corner, of_polygon = (
+        np.repeat(np.arange(len(parts)), each) for each in zip(*lengths, strict=True)
+    )
     maps = []
-    for i in range(len(parts)):
-        begin, end = starts[i], starts[i + 1]
-        maps.append(
-            Map(
-                uv=uv[first_corner[i] : first_corner[i + 1]],
-                seams=seams[(begin <= seams[:, 0]) & (seams[:, 0] < end)] - begin,
-                cones=cones[(begin <= cones) & (cones < end)] - begin,
-                torn=int(((first_polygon[i] <= torn) & (torn < first_polygon[i + 1])).sum()),
-            )
+    for i, start in enumerate(starts[:-1]):
+        own_seams, own_cones = (
+            seams[of_vertex[seams[:, 0]] == i] - start,
+            cones[of_vertex[cones] == i] - start,
         )
+        maps.append(Map(uv[of_corner == i], own_seams, own_cones, int((of_polygon[torn] == i).sum())))
     return maps, json.loads(str(found["report"]))
 
 

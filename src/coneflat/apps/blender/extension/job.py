@@ -28,9 +28,10 @@ def popen_options() -> dict[str, Any]:
     environment.pop("PYTHONHOME", None)  # Blender's own
     pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
     text = {"text": True, "encoding": "utf-8", "errors": "replace"}
-    apart = (
-        {"start_new_session": True} if os.name == "posix" else {"creationflags": 0x08000000}
-    )  # CREATE_NO_WINDOW
+    apart = {
+        "start_new_session": os.name == "posix",
+        "creationflags": getattr(subprocess, "CREATE_NO_WINDOW", 0),
+    }
     return {"env": environment, **pipes, **text, **apart}
 
 

@@ -127,10 +127,8 @@ def read_source(
         is_cut |= values(mesh.edges, "use_edge_sharp", bool)
     inner = used[(times > 1) & is_cut[used]]
     ends = values(mesh.edges, "vertices", np.int64, 2)[inner]
-    known = {option: name for option, name in groups.items() if name in item.vertex_groups}
-    weights = {
-        option: _weights(mesh, item.vertex_groups[name].index)[vertices] for option, name in known.items()
-    }
+    found = {option: item.vertex_groups.get(name) for option, name in groups.items()}
+    weights = {option: _weights(mesh, each.index)[vertices] for option, each in found.items() if each}
     cut = np.searchsorted(vertices, ends).reshape(-1, 2)
     part = Part(item.name, positions, corners.reshape(-1), sizes, cut, weights)
     return Source(item.name, part, vertices, loops, edges, bool(determinant < 0), counts(mesh))

@@ -17,14 +17,13 @@ COMMANDS: dict[str, list[dict[str, Any]]] = KNOWN["commands"]
 def _property(record: dict[str, Any]) -> Any:
     """Return the property of an option; 0 stands for no value."""
     title = record["name"].replace("_", " ").capitalize()
-    doc = record["doc"].rstrip(".")
-    look = {"name": title, "description": doc if record["default"] != 0 else f"{doc}. 0: no value"}
+    doc = record["doc"].rstrip(".") + (". 0: no value" if record["is_optional"] else "")
+    look = {"name": title, "description": doc}
     if record["kind"] in ("integer", "number"):
         kind, make = (int, IntProperty) if record["kind"] == "integer" else (float, FloatProperty)
         default = kind(record["default"])
-        return make(
-            **look, min=min(kind(record["least"]), default), max=kind(record["most"]), default=default
-        )
+        look |= {"min": min(kind(record["least"]), default), "max": kind(record["most"])}
+        return make(**look, default=default)
     if record["kind"] == "angle":
         return FloatProperty(**look, min=0.0, default=record["default"], subtype="ANGLE")
     if record["kind"] == "weights":
@@ -33,14 +32,16 @@ def _property(record: dict[str, Any]) -> Any:
     return EnumProperty(**look, items=words, default=record["default"])
 
 
-def _group(command: str) -> type:
-    """Return the class of the options of a command."""
-    annotations = {record["name"]: _property(record) for record in COMMANDS[command]}
-    name = f"CONEFLAT_PG_{command}"
-    return type(name, (bpy.types.PropertyGroup,), {"__annotations__": annotations})
+def _group(name: str, properties: dict[str, Any]) -> type:
+    """Return the class of a group of properties."""
+    return type(f"CONEFLAT_PG_{name}", (bpy.types.PropertyGroup,), {"__annotations__": properties})
 
 
-GROUPS = {command: _group(command) for command in COMMANDS}
+#: The classes of the options of each command.
+GROUPS = {
+    command: _group(command, {record["name"]: _property(record) for record in records})
+    for command, records in COMMANDS.items()
+}
 
 _MARKS = [
     ("OWN", "Yours", "Cut the seams that you have marked, not those that coneflat has marked"),
@@ -67,14 +68,11 @@ _OWN = {
 }
 _POINTERS = {command: PointerProperty(type=group) for command, group in GROUPS.items()}
 #: All settings, which are stored with each scene.
-Settings = type(
-    "CONEFLAT_PG_settings", (bpy.types.PropertyGroup,), {"__annotations__": {**_OWN, **_POINTERS}}
-)
+Settings = _group("settings", {**_OWN, **_POINTERS})
 
 
 _PYTHON = (
-    "Python executable, or folder of an environment, that has coneflat. Empty: the extension's own environment, or one "
-    "on the PATH"
+    "Python or environment that has coneflat. Empty: the extension's own environment, or one on the PATH"
 )
 _WHEELS = "Install from the wheels in this folder, without a network. Empty: from the package index"
 _PACKAGE = "What pip installs, for example coneflat[fast]. Empty: coneflat, this version or later"
@@ -97,9 +95,8 @@ class Preferences(bpy.types.AddonPreferences):
     def draw(self, context: Any) -> None:
         """Draw the environment and how to change it."""
         found = type(self).found
-        self.layout.label(
-            text=str(found) if found else type(self).reason, icon="CHECKMARK" if found else "INFO"
-        )
+        icon = "CHECKMARK" if found else "INFO"
+        self.layout.label(text=str(found or type(self).reason), icon=icon)
         for name in self.__annotations__:
             self.layout.prop(self, name)
         row = self.layout.row()
