@@ -33,7 +33,7 @@ CEILINGS = {
     "apps": 0,
     "apps.ahead": 37,
     "apps.batch": 398,
-    "apps.blender": 890,
+    "apps.blender": 885,
     "apps.cli": 1537,
     "apps.measure_uv": 160,
     "apps.peers": 478,
@@ -64,7 +64,7 @@ CEILINGS = {
     "xatlas": 2,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_804, 244, 26_802
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_804, 243, 26_797
 CONSTANTS, KERNELS, NAMES, LEVELS = 300, 110, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

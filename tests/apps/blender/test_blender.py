@@ -69,8 +69,8 @@ def test_every_session_is_run():
 
 def test_the_command_writes_the_same_zip_each_time(archive, tmp_path):
     done = command("blender", cwd=tmp_path)
-    assert (done.returncode, done.stdout) == (0, "wrote coneflat.zip\n")
-    assert (tmp_path / "coneflat.zip").read_bytes() == archive.read_bytes()
+    assert (done.returncode, done.stdout) == (0, "wrote coneflat_blender.zip\n")
+    assert (tmp_path / "coneflat_blender.zip").read_bytes() == archive.read_bytes()
     done = command("blender", "-o", "coneflat.blend", cwd=tmp_path)
     assert done.returncode == 2
     assert len(done.stderr.splitlines()) == 1

@@ -147,7 +147,7 @@ def studio(
     "-o",
     "--output",
     type=click.Path(path_type=Path),
-    default="coneflat.zip",
+    default="coneflat_blender.zip",
     show_default=True,
     help="File to write, .zip.",
 )
@@ -159,7 +159,7 @@ def blender(output: Path) -> None:
 
     \b
     Example:
-      coneflat blender -o coneflat.zip
+      coneflat blender -o coneflat_blender.zip
     """
     from ..blender import build_extension
 
