@@ -1,7 +1,8 @@
 """Sessions in Blender, without a window: `python session.py NAME EXTENSION` runs one of the functions below.
 
-The settings of Blender are in the folder BLENDER_USER_RESOURCES. Each runs in a process of its own, since bpy cannot be
-reset, and hangs at the exit of Python once a class is registered.
+The settings of Blender are in the folder BLENDER_USER_RESOURCES. CONEFLAT_PYTHON runs coneflat, by default this Python.
+Each session has a process of its own, since bpy cannot be reset, and hangs at the exit of Python once a class is
+registered.
 """
 
 from __future__ import annotations
@@ -309,6 +310,37 @@ def failures():
     lines = run("install")
     assert "Error: install coneflat: No matching distribution found for coneflat" in lines, lines
     assert not flags(cube.data).any()
+
+
+def disable():
+    """The extension can be disabled and enabled; settings of the scene remain."""
+    settings().unwrap.resolution = 512
+    bpy.ops.preferences.addon_disable(module=NAME)
+    assert not hasattr(bpy.context.scene, "coneflat")
+    assert not hasattr(bpy.types, "CONEFLAT_OT_unwrap")
+    bpy.ops.preferences.addon_enable(module=NAME)
+    assert settings().unwrap.resolution == 512
+
+
+def edited_together():
+    """Objects that are edited together share an atlas and stay in edit mode; of two with one mesh, one is used."""
+    ring, ball = add("torus", "ring"), add("uv_sphere", "ball", location=(3, 0, 0))
+    select(ring, ball)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    settings().select = "SEAMS"
+    assert "ball, ring: charts" in run("unwrap")
+    assert {item.name for item in bpy.context.objects_in_mode} == {"ball", "ring"}
+    assert tuple(bpy.context.tool_settings.mesh_select_mode) == (False, True, False)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for item in (ring, ball):
+        assert (flags(item.data, "select") == flags(item.data)).all()
+    twin = bpy.data.objects.new("twin", ring.data)
+    bpy.context.collection.objects.link(twin)
+    select(ring, ball, twin)
+    settings().together = False
+    lines = run("unwrap")
+    assert [line.split()[1] for line in lines.splitlines() if "charts" in line] == ["ball:", "ring:"], lines
 
 
 class Manager:

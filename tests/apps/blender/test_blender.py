@@ -25,7 +25,7 @@ from coneflat.apps.cli.main import cli
 SESSION = Path(__file__).with_name("session.py")
 SESSIONS = (
     "three_objects", "again", "selected_faces", "sharp_edges", "vertex_groups", "quads", "unapplied", "failures",
-    "escape",
+    "escape", "disable", "edited_together",
 )  # fmt: skip
 
 
