@@ -21,24 +21,10 @@ Row: TypeAlias = tuple[str, str, str]
 
 #: Measures of any map of a mesh to the plane.
 MAP_MEASURES = (
-    "qc_mean",
-    "qc_p95",
-    "qc_max",
-    "area_std",
-    "energy",
-    "flipped",
-    "degenerate",
-    "degenerate_input",
-    "charts",
-    "mirrored_charts",
-    "seam_length",
-    "seam_mismatch",
-    "seam_mismatch_max",
-    "seam_motion_mismatch",
-    "density_spread",
-    "overlap",
-    "overlapping_pairs",
-)
+    "qc_mean", "qc_p95", "qc_max", "area_std", "energy", "flipped", "degenerate", "degenerate_input", "charts",
+    "mirrored_charts", "seam_length", "seam_mismatch", "seam_mismatch_max", "seam_motion_mismatch", "density_spread",
+    "overlap", "overlapping_pairs",
+)  # fmt: skip
 #: Measures of a flattening.
 MEASURES = ("curvature_error", "curvature_error_max", "angle_sum_error", *MAP_MEASURES)
 

@@ -20,7 +20,7 @@ from .measure import measure
 from .peers import compare
 from .quads import quads
 from .shared import ExitCode
-from .view import studio, view
+from .view import blender, studio, view
 
 
 class Interrupted(KeyboardInterrupt):
@@ -33,7 +33,7 @@ def cli() -> None:
     """Flatten triangle meshes into the plane: conformal UV maps with automatic cones and seams."""
 
 
-for command in (flatten, unwrap, batch, quads, measure, cones, figure, view, studio, compare, demo):
+for command in (flatten, unwrap, batch, quads, measure, cones, figure, view, studio, blender, compare, demo):
     cli.add_command(command)
 
 

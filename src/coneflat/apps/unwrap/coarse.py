@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray, compiled
-from ...geometry import edge_lengths, mollify
+from ...geometry import double_areas, edge_lengths, mollify
 from ...mesh import tie_key
 from ...source import Part
 
@@ -33,13 +33,15 @@ def coarse_part(part: Part, count: int) -> tuple[Part, IntArray]:
     collapse_edges(points, faces, _quadrics(mesh, points), mesh.is_boundary_vertex, key, count)
     kept, corners = np.unique(faces[faces[:, 0] >= 0], return_inverse=True)
     coarse = TriangleMesh(mesh.vertices[kept], corners.reshape(-1, 3))
-    lengths, _ = mollify(edge_lengths(coarse.vertices, coarse.faces))
+    own = edge_lengths(coarse.vertices, coarse.faces)
+    lengths, _ = mollify(own)
     seams, none = part.seams, np.zeros(len(coarse.edges), dtype=bool)
     return Part(
         coarse,
         part.vertices[kept],
         np.flatnonzero(faces[:, 0] >= 0),
         lengths,
+        double_areas(own),
         replace(
             part.cones,
             is_allowed=part.cones.is_allowed[kept],

@@ -1,0 +1,184 @@
+"""What passes between Blender and the commands: meshes as PLY, options as arguments, results as NPZ; without bpy."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .job import Failure
+
+#: The names of the files of a job in its folder.
+MESH, SEAMS, RESULT = "mesh.ply", "seams.txt", "result.npz"
+#: The factor of a vertex with the full weight of a vertex group, as for vertices of a pure colour.
+FULL_WEIGHT = 100.0
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Faces of one mesh, with only the vertices that they use.
+
+    Attributes:
+        name: of the object.
+        positions: (n, 3) in the space of the scene.
+        corners: (c,) vertex of every polygon corner, polygon after polygon.
+        sizes: (p,) numbers of corners of the polygons.
+        cut: (k, 2) edges to be cut, as pairs of vertices.
+        weights: (n,) weights of vertex groups, 0 to 1, by the name of their option.
+    """
+
+    name: str
+    positions: NDArray[np.float64]
+    corners: NDArray[np.int64]
+    sizes: NDArray[np.int64]
+    cut: NDArray[np.int64]
+    weights: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Map:
+    """The UVs of a part.
+
+    Attributes:
+        uv: (c, 2) point of every polygon corner; NaN for those of dropped polygons.
+        seams: (k, 2) edges that were cut, as pairs of vertices.
+        cones: (s,) vertices.
+        torn: number of polygons that a cut divides, whose UVs are not a polygon.
+    """
+
+    uv: NDArray[np.float64]
+    seams: NDArray[np.int64]
+    cones: NDArray[np.int64]
+    torn: int
+
+
+def arguments(records: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -> list[str]:
+    """Return the arguments of a command for options that do not have their defaults.
+
+    Args:
+        records: the options of the command.
+        values: their values by name; weights are the names of vertex groups.
+    """
+    found = list[str]()
+    for record in records:
+        name, value, kind = record["name"], values[record["name"]], record["kind"]
+        if kind in ("number", "angle"):  # Blender's numbers have single precision.
+            is_default = np.float32(value) == np.float32(record["default"])
+        else:
+            is_default = value == record["default"]
+        if not is_default:
+            # The angles that are wanted exactly are integers in degrees.
+            texts = {"angle": "{1:.5g}deg", "number": "{0:.7g}", "weights": name}
+            text = texts.get(kind, "{0}").format(value, math.degrees(value) if kind == "angle" else 0)
+            found.append(f"--{name.replace('_', '-')}={text}")
+    return found
+
+
+def write_parts(folder: Path, parts: Sequence[Part]) -> list[str]:
+    """Write meshes as one PLY with a component for each or more, and return the arguments that refer to its files.
+
+    Vertices at the same position are not merged, since objects that touch must stay separate.
+    """
+    starts = _starts(parts)
+    names = sorted(set().union(*(part.weights for part in parts)))
+    kinds = [*((axis, "<f8") for axis in "xyz"), *((name, "<f8") for name in names)]
+    rows = np.empty(starts[-1], kinds)
+    for axis, column in zip("xyz", np.concatenate([part.positions for part in parts]).T, strict=True):
+        rows[axis] = column
+    for name in names:
+        whole = [part.weights.get(name, np.zeros(len(part.positions))) for part in parts]
+        rows[name] = FULL_WEIGHT ** np.clip(np.concatenate(whole), 0, 1)
+    sizes, corners = _joined(parts)
+    # Each polygon is its number of corners and its corners, all of them 32-bit integers.
+    words = np.empty(len(sizes) + len(corners), "<i4")
+    heads = np.cumsum(sizes) - sizes + np.arange(len(sizes))
+    is_corner = np.ones(len(words), bool)
+    is_corner[heads] = False
+    words[heads], words[is_corner] = sizes, corners
+    properties = "".join(f"property double {name}\n" for name, _ in kinds)
+    properties += f"element face {len(sizes)}\nproperty list int int vertex_indices\n"
+    header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\n{properties}end_header\n"
+    (folder / MESH).write_bytes(header.encode() + rows.tobytes() + words.tobytes())
+    found = [MESH, "-o", RESULT, "--no-weld"]
+    cut = np.concatenate([part.cut + start for part, start in zip(parts, starts, strict=False)])
+    if len(cut):
+        np.savetxt(folder / SEAMS, cut, fmt="%d")
+        found += ["--seams", SEAMS]
+    return found
+
+
+def _starts(parts: Sequence[Part]) -> list[int]:
+    """Return the first vertex of each part, and the number of all vertices."""
+    return [0, *np.cumsum([len(part.positions) for part in parts]).tolist()]
+
+
+def _joined(parts: Sequence[Part]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the sizes and the corners of the polygons of all parts."""
+    corners = [part.corners + start for part, start in zip(parts, _starts(parts), strict=False)]
+    return np.concatenate([part.sizes for part in parts]), np.concatenate(corners)
+
+
+def read_maps(folder: Path, parts: Sequence[Part]) -> tuple[list[Map], dict[str, Any]]:
+    """Return the UVs of each part from the result of a command, and the report of the command.
+
+    The result has triangles: k - 2 for a polygon of k corners, in the order of the polygons. Repair may have dropped,
+    reversed or subdivided some, and duplicated vertices.
+
+    Raises:
+        Failure: the result does not fit the parts.
+    """
+    found = _load(folder)
+    sizes, corners = _joined(parts)
+    starts = _starts(parts)
+    count = starts[-1]
+    origin = found["vertex_origin"]
+    polygon = np.repeat(np.arange(len(sizes)), sizes - 2)[found["face_origin"]]
+    wanted = polygon[:, None] * count + origin[found["faces"]]
+    known = np.repeat(np.arange(len(sizes)), sizes) * count + corners
+    order = np.argsort(known)
+    place = np.minimum(np.searchsorted(known, wanted, sorter=order), len(known) - 1)
+    corner = order[place]
+    is_there = known[corner] == wanted
+    points = found["uv"][found["uv_faces"]]
+    uv = np.full((len(corners), 2), np.nan)
+    uv[corner[is_there]] = points[is_there]
+    differs = is_there & (uv[corner] != points).any(axis=2)
+    torn = np.unique(polygon[differs.any(axis=1)])
+    seams, cones = origin[found["seams"]].reshape(-1, 2), origin[found["cones"]]
+    lengths = [(len(part.positions), len(part.corners), len(part.sizes)) for part in parts]
+    # The part of each vertex, corner and polygon.
+    of_vertex, of_corner, of_polygon = (
+        np.repeat(np.arange(len(parts)), each) for each in zip(*lengths, strict=True)
+    )
+    maps = []
+    for i, start in enumerate(starts[:-1]):
+        own_seams, own_cones = (
+            seams[of_vertex[seams[:, 0]] == i] - start,
+            cones[of_vertex[cones] == i] - start,
+        )
+        maps.append(Map(uv[of_corner == i], own_seams, own_cones, int((of_polygon[torn] == i).sum())))
+    return maps, json.loads(str(found["report"]))
+
+
+def read_quads(folder: Path) -> tuple[dict[str, NDArray[Any]], list[str]]:
+    """Return vertices, quads and irregular vertices of the result of `coneflat quads`, and its notes.
+
+    Raises:
+        Failure: there is no result.
+    """
+    found = _load(folder)
+    return found, json.loads(str(found["report"]))["notes"]
+
+
+def _load(folder: Path) -> dict[str, NDArray[Any]]:
+    try:
+        with np.load(folder / RESULT, allow_pickle=False) as archive:
+            return dict(archive)
+    except (OSError, ValueError) as error:
+        raise Failure(f"the result of coneflat cannot be read: {' '.join(str(error).split())}") from error

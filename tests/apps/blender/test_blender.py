@@ -1,0 +1,309 @@
+"""The Blender extension: its zip, what runs without bpy, and sessions in Blender where bpy can be imported."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import os
+import subprocess
+import sys
+import time
+import types
+import zipfile
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command import command
+from shapes import box, torus
+
+import coneflat
+from coneflat.apps.blender import SHOWN, build_extension
+from coneflat.apps.cli.main import cli
+
+SESSION = Path(__file__).with_name("session.py")
+SESSIONS = (
+    "three_objects", "again", "selected_faces", "sharp_edges", "vertex_groups", "quads", "unapplied", "failures",
+    "escape", "disable", "edited_together",
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    return build_extension(tmp_path_factory.mktemp("blender") / "coneflat.zip")
+
+
+@pytest.fixture(scope="module")
+def extension(archive):
+    """The modules of the extension that do not need bpy, as they are in the zip."""
+    folder = archive.parent / "extension"
+    with zipfile.ZipFile(archive) as opened:
+        opened.extractall(folder)
+    package = types.ModuleType("coneflat_extension")
+    package.__path__ = [str(folder)]
+    sys.modules[package.__name__] = package
+    for name in ("job", "environment", "exchange"):
+        setattr(package, name, importlib.import_module(f"{package.__name__}.{name}"))
+    return package
+
+
+@pytest.mark.skipif(find_spec("bpy") is None, reason="bpy is not installed")
+@pytest.mark.parametrize("name", SESSIONS)
+def test_session(name, archive, tmp_path):
+    source = str(Path(coneflat.__file__).parents[1])
+    environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path), "PYTHONPATH": source}
+    done = subprocess.run(
+        [sys.executable, SESSION, name, archive], env=environment, capture_output=True, text=True, timeout=900
+    )
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+
+
+def test_every_session_is_run():
+    tree = ast.parse(SESSION.read_text(encoding="utf-8"))
+    functions = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
+    assert set(SESSIONS) <= functions.keys()
+    called = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    assert functions.keys() - called - {"main"} == set(SESSIONS)
+
+
+def test_the_command_writes_the_same_zip_each_time(archive, tmp_path):
+    done = command("blender", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (0, "wrote coneflat_blender.zip\n")
+    assert (tmp_path / "coneflat_blender.zip").read_bytes() == archive.read_bytes()
+    done = command("blender", "-o", "coneflat.blend", cwd=tmp_path)
+    assert done.returncode == 2
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_the_manifest_has_what_blender_requires(archive):
+    tomllib = pytest.importorskip("tomllib")
+    with zipfile.ZipFile(archive) as opened:
+        manifest = tomllib.loads(opened.read("blender_manifest.toml").decode())
+        names = opened.namelist()
+    assert "__init__.py" in names
+    assert manifest["version"] == coneflat.__version__
+    assert manifest["blender_version_min"] == "4.2.0"
+    # Limits of Blender's validation.
+    texts = [manifest["tagline"], *manifest["permissions"].values()]
+    assert all(len(text) <= 64 and text[-1].isalnum() for text in texts)
+    assert set(manifest) >= {"schema_version", "id", "name", "maintainer", "type", "license"}
+
+
+def test_the_extension_imports_only_what_blender_has(archive):
+    with zipfile.ZipFile(archive) as opened:
+        for name in opened.namelist():
+            if not name.endswith(".py"):
+                continue
+            for node in ast.walk(ast.parse(opened.read(name))):
+                found = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+                if isinstance(node, ast.ImportFrom) and node.level == 0:
+                    found = [node.module]
+                assert node.level < 2 if isinstance(node, ast.ImportFrom) else True
+                roots = {each.split(".")[0] for each in found}
+                assert roots <= {"bpy", "numpy", *sys.stdlib_module_names}, name
+
+
+@pytest.mark.parametrize("name", sorted(SHOWN))
+def test_every_option_is_one_of_the_command(name, extension):
+    records = extension.environment.KNOWN["commands"][name]
+    assert [record["name"] for record in records] == list(SHOWN[name])
+    flags = {flag for each in cli.commands[name].params for flag in each.opts}
+    defaults = {record["name"]: record["default"] for record in records}
+    assert extension.exchange.arguments(records, defaults) == []
+    for record in records:
+        other = {"choice": "none of these", "weights": "group"}.get(record["kind"], record["default"] + 1
+            if record["kind"] in ("number", "integer", "angle") else None)  # fmt: skip
+        (argument,) = extension.exchange.arguments(records, {**defaults, record["name"]: other})
+        assert argument.split("=")[0] in flags
+
+
+def test_numbers_of_single_precision_are_written_as_they_were_typed(extension):
+    records = extension.environment.KNOWN["commands"]["flatten"]
+    values = {record["name"]: record["default"] for record in records}
+    values |= {"distortion": float(np.float32(0.1)), "quantise": float(np.float32(np.pi / 2)), "up": "-x"}
+    found = extension.exchange.arguments(records, values)
+    assert found == ["--distortion=0.1", "--quantise=90deg", "--up=-x"]
+    values["distortion"] = float(np.float32(0.2))
+    assert "--distortion" not in " ".join(extension.exchange.arguments(records, values))
+
+
+def test_maps_of_two_meshes_in_one_atlas(extension, tmp_path):
+    """A mesh of quads with a marked loop and one of triangles: seams are where UVs differ, and densities agree."""
+    exchange = extension.exchange
+    around, across = 24, 12
+    i, j = (each.ravel() for each in np.mgrid[:around, :across])
+    u, v = 2 * np.pi * i / around, 2 * np.pi * j / across
+    ring = np.stack([(2 + np.cos(v)) * np.cos(u), (2 + np.cos(v)) * np.sin(u), np.sin(v)], axis=1)
+    steps = ((0, 0), (1, 0), (1, 1), (0, 1))
+    quads = np.stack([(i + a) % around * across + (j + b) % across for a, b in steps], axis=1)
+    loop = np.stack([np.arange(across), np.roll(np.arange(across), -1)], axis=1)
+    points, faces = box(3)
+    none = np.empty((0, 2), np.int64)
+    parts = [
+        exchange.Part("ring", ring, quads.ravel(), np.full(len(quads), 4), loop),
+        exchange.Part(
+            "box",
+            points + np.array([1, 0, 0]),  # They intersect, which does not matter.
+            faces.ravel(),
+            np.full(len(faces), 3),
+            none,
+            {"seam_weights": np.linspace(0, 1, len(points))},
+        ),
+    ]
+    arguments = exchange.write_parts(tmp_path, parts)
+    done = command("unwrap", *arguments, "--seam-weights=seam_weights", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    maps, report = exchange.read_maps(tmp_path, parts)
+    assert report["flipped"] == 0
+    densities = []
+    for part, found in zip(parts, maps, strict=True):
+        assert np.isfinite(found.uv).all()
+        assert found.torn == 0
+        size = part.sizes[0]
+        corners, uv = part.corners.reshape(-1, size), found.uv.reshape(-1, size, 2)
+        seen, torn = {}, set()
+        for polygon, at in zip(corners, uv, strict=True):
+            for k in range(size):
+                ends = {int(polygon[k - 1]): tuple(at[k - 1]), int(polygon[k]): tuple(at[k])}
+                if seen.setdefault(frozenset(ends), ends) != ends:
+                    torn.add(frozenset(ends))
+        assert torn == {frozenset(pair) for pair in found.seams.tolist()}
+        d = uv[:, 2:] - uv[:, :1], uv[:, 1:-1] - uv[:, :1]
+        flat = (d[1][..., 0] * d[0][..., 1] - d[1][..., 1] * d[0][..., 0]).sum(axis=1) / 2
+        assert (flat > 0).all()
+        p = part.positions[corners]
+        area = np.linalg.norm(np.cross(p[:, 1:-1] - p[:, :1], p[:, 2:] - p[:, :1]), axis=2).sum() / 2
+        densities.append(flat.sum() / area)
+    assert max(densities) < 1.1 * min(densities)
+    assert {frozenset(pair) for pair in loop.tolist()} <= {frozenset(p) for p in maps[0].seams.tolist()}
+
+
+def test_a_mesh_that_is_repaired_keeps_its_corners(extension, tmp_path):
+    """A reversed triangle and one that occurs twice: corners get their points, and dropped ones none."""
+    exchange = extension.exchange
+    points, faces = torus(16, 8)
+    faces = np.concatenate([faces, faces[:1]])
+    faces[5] = faces[5][::-1]
+    none = np.empty((0, 2), np.int64)
+    part = exchange.Part("torus", points, faces.ravel(), np.full(len(faces), 3), none)
+    arguments = exchange.write_parts(tmp_path, [part])
+    assert command("flatten", *arguments, cwd=tmp_path).returncode == 0
+    (found,), _ = exchange.read_maps(tmp_path, [part])
+    uv = found.uv.reshape(-1, 3, 2)
+    one, two = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    flat = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+    assert np.isnan(flat[[0, -1]]).sum() == 1
+    assert flat[5] < 0
+    assert (np.delete(flat, [0, 5, len(flat) - 1]) > 0).all()
+
+
+def test_a_result_that_is_missing(extension, tmp_path):
+    with pytest.raises(extension.job.Failure, match="cannot be read: .*No such file"):
+        extension.exchange.read_quads(tmp_path)
+
+
+def wait(job):
+    while not job.is_done:
+        time.sleep(0.01)
+
+
+def python(extension, code, name="Work"):
+    return extension.job.Job(name, [sys.executable, "-c", code])
+
+
+def test_a_job_reports_its_progress(extension):
+    lines = "print('  1.2 s   43%  check mesh', flush=True); import time; time.sleep(60)"
+    with python(extension, lines) as job:
+        while not job.stage:
+            time.sleep(0.01)
+        assert (job.stage, job.fraction) == ("check mesh", 0.43)
+        assert not job.is_done
+    assert job.is_done
+
+
+@pytest.mark.parametrize(
+    ("code", "message"),
+    [
+        ("print('coneflat: error: no faces'); raise SystemExit(2)", "Work: no faces"),
+        ("print('ERROR: no wheel\\n leaked'); raise SystemExit(1)", "Work: no wheel"),
+        ("raise ValueError('bad')", "Work ended with code 1: ValueError: bad"),
+        ("print('x' * 10**6); raise SystemExit(2)", "Work ended with code 2: x"),
+    ],
+)
+def test_an_error_is_one_line(code, message, extension):
+    with python(extension, code) as job:
+        wait(job)
+        with pytest.raises(extension.job.Failure, match=message) as raised:
+            job.check()
+    assert "\n" not in str(raised.value)
+    assert len(str(raised.value)) < 300
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there are no signals")
+def test_a_crash_is_one_line(extension):
+    with python(extension, "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)") as job:
+        wait(job)
+        with pytest.raises(extension.job.Failure, match="^Work crashed or was ended by SIGSEGV$"):
+            job.check()
+
+
+def test_a_program_that_does_not_exist(extension):
+    with pytest.raises(extension.job.Failure, match="missing cannot be started: No such file"):
+        extension.job.Job("Work", ["missing"])
+
+
+def fake(folder, version):
+    """Return a program that prints a version of coneflat."""
+    program = folder / "python"
+    program.write_text(f"#!/bin/sh\necho coneflat, version {version}\n")
+    program.chmod(0o755)
+    return str(program)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the programs are scripts of a shell")
+def test_the_environment_is_found(extension, tmp_path, monkeypatch):
+    environment, failure = extension.environment, extension.job.Failure
+    monkeypatch.setenv("PYTHONPATH", str(Path(coneflat.__file__).parents[1]))
+    own = tmp_path / "own"
+    found = environment.find(sys.executable, own)
+    assert found.command == (sys.executable, "-m", "coneflat")
+    assert found.version == coneflat.__version__
+    with pytest.raises(failure, match="older than the extension"):
+        environment.find(fake(tmp_path, "0.1.0"), own)
+    fake(tmp_path, "99.0")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert environment.find("", own).command == (str(tmp_path / "python"), "-m", "coneflat")
+    (own / "bin").mkdir(parents=True)
+    fake(own / "bin", "99.1")
+    assert environment.find("", own).version == "99.1"
+    assert environment.find(str(own), tmp_path).version == "99.1"
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(failure, match="coneflat is not installed: choose Install"):
+        environment.find("", tmp_path)
+
+
+def test_an_environment_without_a_network(extension, tmp_path, monkeypatch):
+    commands, failure = extension.environment.install_commands, extension.job.Failure
+    with pytest.raises(failure, match="online access is off"):
+        commands(tmp_path, "", "", False)
+    with pytest.raises(failure, match="wheels, does not exist"):
+        commands(tmp_path, "", str(tmp_path / "none"), True)
+    for name in [name for name in os.environ if name.startswith("PIP_")]:
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
+    monkeypatch.setenv("PIP_INDEX_URL", "http://127.0.0.1:9/simple")
+    make, install, _ = commands(tmp_path / "own", "", "", True)
+    assert install[1][-1] == f"coneflat>={coneflat.__version__}"
+    with extension.job.Job(*make) as job:
+        wait(job)
+        job.check()
+    with extension.job.Job(*install) as job:
+        wait(job)
+        with pytest.raises(failure, match="^install coneflat: there is no network; name a folder of wheels"):
+            job.check()
+    install = commands(tmp_path / "own", "coneflat", str(tmp_path), False)[1]
+    with extension.job.Job(*install) as job:
+        wait(job)
+        with pytest.raises(failure, match="^install coneflat: No matching distribution found for coneflat"):
+            job.check()
