@@ -129,8 +129,8 @@ def studio(
 
     The address of the page is printed first. It can be used on this machine only, and contains a secret token. A mesh
     can also be dropped on the page. The choices are saved in the current folder in a project, MESH's name with
-    _studio.json, from which the studio can continue, and of which `coneflat flatten --project` computes the same
-    layout. Ctrl-C ends the studio.
+    _studio.json, from which the studio can continue, and of which `coneflat flatten --project` or `coneflat unwrap
+    --project` computes the same layout. Ctrl-C ends the studio.
 
     \b
     Examples:
