@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -176,6 +177,18 @@ class TestOwnUVs:
         done = run(command, square, "-o", f"b.{ending}", "--again")
         assert done.exit_code == 0
         assert "are shown; --again" not in done.stdout
+
+    def test_a_page_shows_the_map_for_a_texture_instead(self, square):
+        done = run("view", square, "-o", "a.html", "--unwrap")
+        assert done.exit_code == 0, done.output
+        energy = coneflat.unwrap(square).distortion.energy
+        assert re.search(rf"^energy +{energy:.4f} ", done.stdout, re.MULTILINE)
+        assert "are shown; --again" not in done.stdout
+        coneflat.unwrap(square).save("own.npz")
+        assert run("view", "own.npz", "-o", "b.html").exit_code == 0
+        done = run("view", "own.npz", "-o", "b.html", "--unwrap")
+        assert done.exit_code == 2
+        assert "--unwrap needs a mesh, and own.npz is a result" in done.output
 
     def test_they_are_those_of_the_file(self, square):
         from coneflat.apps.view.from_uv import own_flattening

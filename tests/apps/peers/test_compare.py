@@ -19,7 +19,14 @@ from coneflat.apps.peers import METHODS, compare_methods, flatten_by
 from coneflat.apps.peers.methods import PEERS as METHODS_OF_OTHERS
 from coneflat.apps.peers.packages import PEERS, Peer, installed_peers, run_peer
 from coneflat.apps.peers.pictures import Sight, aligned_layouts, draw_layouts, draw_qualities
-from coneflat.apps.peers.run import COLUMNS, Comparison, Entry, comparison_csv, comparison_markdown
+from coneflat.apps.peers.run import (
+    COLUMNS,
+    Comparison,
+    Entry,
+    comparison_csv,
+    comparison_markdown,
+    numbers,
+)
 
 
 @pytest.fixture(scope="module")
@@ -78,6 +85,17 @@ def test_peers_are_measured_like_us(ball, name):
     found = compare_methods(*ball, methods=("exact",), peers=(name,))
     assert found[name].result is not None, found[name].note
     assert found[name].result.distortion.qc_mean < 1.5
+
+
+def test_the_map_for_textures_is_a_row_with_its_energy(ball):
+    found = compare_methods(*ball, methods=("exact",), peers=("unwrap",))
+    expected = coneflat.unwrap(*ball).distortion
+    energy, charts = (list(COLUMNS).index(name) for name in ("energy", "charts"))
+    row = numbers(found["unwrap"])
+    assert row[energy] == pytest.approx(expected.energy, rel=1e-9)
+    assert row[energy] <= 4.1 < numbers(found["exact"])[energy]
+    assert row[charts] == expected.charts
+    assert "unwrap: short seams with free sides" in comparison_markdown(found)
 
 
 def test_uvs_of_others_are_welded_and_measured(ball, monkeypatch):

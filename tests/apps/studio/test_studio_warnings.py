@@ -12,13 +12,12 @@ import pytest
 import shapes
 
 import coneflat
-from coneflat.apps.studio.choices import Choices
+from coneflat.apps.studio.choices import DECLARED, Choices
 from coneflat.apps.studio.messages import CONTROLS, misplaced_warning, page_message, vertices_in
 from coneflat.apps.studio.paint import Region
 from coneflat.apps.studio.session import Session
 from coneflat.base.defaults import MAX_CONE_ANGLE
 from coneflat.errors import StudioError
-from coneflat.options import Options, declarations
 
 PAGE = files("coneflat.apps.studio.page")
 SOURCES = Path(coneflat.__file__).parent
@@ -111,7 +110,7 @@ class TestWords:
             PAGE.joinpath(name).read_text() for name in ("panel.html", "tools.js", "paint.js", "panel.js")
         )
         for name, control in CONTROLS.items():
-            assert name in declarations(Options)
+            assert name in DECLARED
             assert control in page
 
     @pytest.mark.parametrize(

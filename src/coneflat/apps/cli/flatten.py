@@ -38,22 +38,13 @@ class FileFlags:
         format: Format for standard output, or if -o is not given.  [default: obj]
         texture: Texture of a .glb: a checkerboard, or an image file.
         report: JSON file for all measures.
+        project: Project of `coneflat studio` (.json) with the mesh and the options.
     """
 
     output: Path | None = path_flag()
     format: str | None = flag(type=click.Choice(FORMATS))
     texture: str | None = flag(metavar="checker|IMAGE")
     report: Path | None = path_flag()
-
-
-@dataclass(frozen=True, kw_only=True)
-class FlattenFlags(FileFlags):
-    """Output.
-
-    Attributes:
-        project: Project of `coneflat studio` (.json) to flatten instead of MESH.
-    """
-
     project: Path | None = path_flag()
 
 
@@ -63,22 +54,14 @@ class FlattenFlags(FileFlags):
     context_settings={"allow_extra_args": True},
 )
 @click.argument("mesh", type=click.Path(path_type=Path), required=False)
-@option_flags(FlattenFlags)
+@option_flags(FileFlags)
 @paper_option
 @option_flags(Options)
 @input_options
 @require_option
 @verbosity_options
 @click.pass_context
-def flatten(
-    context: click.Context,
-    /,
-    mesh: Path | None,
-    required: tuple[str, ...],
-    weld: bool | None,
-    verbosity: str | None,
-    **given: Any,
-) -> None:
+def flatten(context: click.Context, /, **given: Any) -> None:
     """Flatten MESH and write it with UV coordinates.
 
     MESH is a file (.obj, .ply, .stl, .off, .gltf, .glb), or - for standard input.
@@ -96,39 +79,24 @@ def flatten(
     if context.args:
         raise click.UsageError(
             f"expected one mesh, got {1 + len(context.args)}: `coneflat batch "
-            f"{mesh} {context.args[0]} ... --out FOLDER` flattens many",
+            f"{given['mesh']} {context.args[0]} ... --out FOLDER` flattens many",
             context,
         )
     from ... import flatten as find
 
     check_combinations(context)
-    flags, add_notes = pop_flags(given, FlattenFlags), None
-    if flags.project is not None:
-        mesh, options, add_notes = project_arguments(context, flags.project)
-    elif mesh is None:
-        raise click.MissingParameter(ctx=context, param_hint="'MESH'", param_type="argument")
-    else:
-        options = keywords(given)
-    _flatten_and_save(context, mesh, flags, options, required, weld, verbosity, find, add_notes)
+    _flatten_and_save(context, find, Options, **given)
 
 
 @click.command(cls=GroupedCommand, short_help="Unwrap a mesh for textures, with short seams.")
-@click.argument("mesh", type=click.Path(path_type=Path))
+@click.argument("mesh", type=click.Path(path_type=Path), required=False)
 @option_flags(FileFlags)
 @option_flags(UnwrapOptions)
 @input_options
 @require_option
 @verbosity_options
 @click.pass_context
-def unwrap(
-    context: click.Context,
-    /,
-    mesh: Path,
-    required: tuple[str, ...],
-    weld: bool | None,
-    verbosity: str | None,
-    **given: Any,
-) -> None:
+def unwrap(context: click.Context, /, **given: Any) -> None:
     """Write MESH with UV coordinates for a texture: nearly isometric, with the shortest seams.
 
     MESH is a file (.obj, .ply, .stl, .off, .gltf, .glb), or - for standard input.
@@ -137,29 +105,36 @@ def unwrap(
     Examples:
       coneflat unwrap horse.ply -o horse.glb
       coneflat unwrap hand.obj -o hand.obj --max-energy 4.05 --resolution 2048
+      coneflat unwrap --project hand_studio.json -o hand.glb
     """
     from ... import unwrap as find
 
-    flags, options = pop_flags(given, FileFlags), keywords(given, UnwrapOptions)
-    _flatten_and_save(context, mesh, flags, options, required, weld, verbosity, find)
+    _flatten_and_save(context, find, UnwrapOptions, **given)
 
 
 def _flatten_and_save(
     context: click.Context,
-    mesh: Path,
-    flags: FileFlags,
-    options: dict[str, Any],
+    by: Callable[..., Flattening],
+    group: type,
+    *,
+    mesh: Path | None,
     required: tuple[str, ...],
     weld: bool | None,
     verbosity: str | None,
-    by: Callable[..., Flattening],
-    add_notes: Callable[[Flattening], Flattening] | None = None,
+    **given: Any,
 ) -> None:
-    """Flatten a file by a function, and write the result and its report."""
+    """Flatten a file by a function with a group of options, and write the result and its report."""
     from ...io import PIPE, check_output, check_target
     from ...measure import REPORTED, parse_requirements
     from .run import Console, flatten_file, redirect_prints, require_distinct, save
 
+    flags, add_notes = pop_flags(given, FileFlags), None
+    if flags.project is not None:
+        mesh, options, add_notes = _project_arguments(context, flags.project, group)
+    elif mesh is None:
+        raise click.MissingParameter(ctx=context, param_hint="'MESH'", param_type="argument")
+    else:
+        options = keywords(given, group)
     requirements = parse_requirements(required, REPORTED)
     ending = f".{flags.format or 'obj'}"
     output = flags.output or (PIPE if mesh == PIPE else Path(f"{mesh.stem}_uv{ending}"))
@@ -179,17 +154,18 @@ def _flatten_and_save(
     check_required(requirements, result.report(), str(output))
 
 
-def project_arguments(
-    context: click.Context, project: Path
+def _project_arguments(
+    context: click.Context, project: Path, group: type
 ) -> tuple[Path, dict[str, Any], Callable[[Flattening], Flattening]]:
-    """Return the mesh of a project, its keyword arguments of `coneflat.flatten`, and a function that adds its notes."""
+    """Return the mesh of a project, its options of a group, and a function that adds its notes."""
     from ..studio.messages import with_warnings
     from ..studio.project import read_project
 
-    for name in (*declarations(Options), "mesh", "paper", "weld"):
+    for name in (*declarations(group), "mesh", "paper", "weld"):
         if name in context.params and is_given(context, name):
             what = "MESH" if name == "mesh" else flag_name(name)
             raise click.UsageError(f"a project contains mesh and options: leave out {what}", context)
     opened = read_project(project)
     opened.check_mesh()
-    return opened.mesh, opened.choices.keywords(), lambda result: with_warnings(result, opened.choices)
+    choices = opened.choices.with_texture(group is UnwrapOptions)
+    return opened.mesh, choices.keywords(), lambda result: with_warnings(result, choices)

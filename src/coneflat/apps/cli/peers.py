@@ -26,7 +26,7 @@ class CompareFlags:
         methods: Methods to compare, separated by commas.  [default: all]
         eye: Direction from which pictures show the model: front, back, left, right, top, bottom, two of these, or
             X,Y,Z.
-        no_peers: Leave out other packages (libigl, xatlas, uvunwrap).
+        no_peers: Leave out `unwrap` and other packages (libigl, xatlas, uvunwrap).
         paper: Use the cones of the published method (greedy, epsilon 1).
     """
 
@@ -48,7 +48,7 @@ class CompareFlags:
 def compare(
     context: click.Context, /, mesh: Path, up: str, weld: bool | None, verbosity: str | None, **given: Any
 ) -> None:
-    """Flatten MESH by all methods, and by other packages that are installed, and compare the results.
+    """Flatten MESH by all methods, by `unwrap`, and by other packages that are installed, and compare the results.
 
     \b
     Examples:

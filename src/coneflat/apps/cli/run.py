@@ -209,9 +209,15 @@ def redirect_prints(output: Path) -> Iterator[IO[bytes] | None]:
 
 
 def open_result(
-    file: Path, console: Console, *, again: bool = False, repair: bool = True, weld: bool | None = None
+    file: Path,
+    console: Console,
+    *,
+    again: bool = False,
+    repair: bool = True,
+    weld: bool | None = None,
+    by: Callable[..., Flattening] = flatten,
 ) -> Flattening:
-    """Return the result in a .npz file, the UVs of a mesh file as a result, or else the mesh flattened.
+    """Return the result in a .npz file, the UVs of a mesh file as a result, or else the mesh flattened by a function.
 
     again: also flatten a mesh that has UVs.
     """
@@ -226,7 +232,7 @@ def open_result(
             own = own_flattening(source, strict=not repair)
         if own is not None:
             return replace(own, notes=(f"The UVs of {file.name} are shown; {AGAIN}.", *own.notes))
-    return flatten_joined(source, console, {"charts": "atlas", **repair_keywords(repair)})
+    return flatten_joined(source, console, {"charts": "atlas", **repair_keywords(repair)}, by)
 
 
 def archive_path(file: Path) -> Path | None:

@@ -32,11 +32,13 @@ class ViewFlags:
         output: Page to write, .html.  [default: FILE's name with _view; it is opened in the browser]
         texture: Image for the model: PNG, JPEG, GIF or WebP.
         show: Display mode at the start.  [default: checker, or picture with --texture]
+        unwrap: Unwrap the mesh for textures instead of flattening it or showing its UVs.
     """
 
     output: Path | None = path_flag()
     texture: Path | None = path_flag()
     show: str | None = flag(type=click.Choice(SHOWS))
+    unwrap: bool = flag(False, is_flag=True)
 
 
 @click.command(short_help="Show a mesh and its layout in the browser.")
@@ -59,18 +61,20 @@ def view(
 ) -> None:
     """Write a page that shows FILE and its layout side by side.
 
-    FILE is a mesh (.obj, .ply, .stl, .off, .gltf, .glb) or a result (.npz) of `coneflat flatten` or `coneflat quads`. A
-    mesh without UVs is flattened first, with default options. The page is a single HTML file.
+    FILE is a mesh (.obj, .ply, .stl, .off, .gltf, .glb) or a result (.npz) of `coneflat flatten`, `coneflat unwrap` or
+    `coneflat quads`. A mesh without UVs is flattened first, with default options. The page is a single HTML file.
 
     \b
     Examples:
       coneflat view horse.ply
       coneflat view horse_uv.obj --show qc
+      coneflat view horse.ply --unwrap
       coneflat view horse.npz -o horse.html --show qc
       coneflat view scan.ply --color quality
       coneflat view hand.obj -o hand.html --texture leather.jpg
       coneflat quads hand.obj -o hand.npz && coneflat view hand.npz
     """
+    from ... import flatten, unwrap
     from ...io import read_picture
     from ..quads.files import holds_quads, read_quads
     from ..quads.page import page_of_quads
@@ -80,6 +84,8 @@ def view(
     # Errors that writing would raise are reported before the work starts.
     flags = pop_flags(given, ViewFlags)
     page = check_page(Path(f"{file.stem}_view.html") if flags.output is None else flags.output)
+    if flags.unwrap and archive_path(file) is not None:
+        raise click.UsageError(f"--unwrap needs a mesh, and {file.name} is a result: leave it out")
     if flags.texture is not None:
         read_picture(flags.texture)
     with Console(verbosity) as console:
@@ -93,7 +99,8 @@ def view(
             with console.stage("page"):
                 text = page_of_quads(quads, **look)
         else:
-            result = open_result(file, console, again=again, repair=repair, weld=weld)
+            by, again = (unwrap, True) if flags.unwrap else (flatten, again)
+            result = open_result(file, console, again=again, repair=repair, weld=weld, by=by)
             with console.stage("page"):
                 if color is not None:
                     look["color"] = own_quantity(result, color, archive_path(file))
@@ -124,8 +131,8 @@ def studio(
 
     The address of the page is printed first. It can be used on this machine only, and contains a secret token. A mesh
     can also be dropped on the page. The choices are saved in the current folder in a project, MESH's name with
-    _studio.json, from which the studio can continue, and of which `coneflat flatten --project` computes the same
-    layout. Ctrl-C ends the studio.
+    _studio.json, from which the studio can continue, and of which `coneflat flatten --project` or `coneflat unwrap
+    --project` computes the same layout. Ctrl-C ends the studio.
 
     \b
     Examples:

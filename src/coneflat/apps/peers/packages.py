@@ -1,4 +1,4 @@
-"""Methods of other packages that flatten meshes, if these are installed."""
+"""Methods that flatten meshes with cuts of their own: `coneflat.unwrap`, and other packages if these are installed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ... import Flattening, TriangleMesh
+from ... import Flattening, TriangleMesh, unwrap
 from ...base import FloatArray
 from ...errors import MetricError
 from ...geometry import double_areas, edge_lengths, signed_double_areas
@@ -21,7 +21,7 @@ from ..view import uv_flattening
 
 @dataclass(frozen=True)
 class Peer:
-    """A method of another package.
+    """A method with a cut of its own, or of another package.
 
     Attributes:
         module: the module to import.
@@ -56,6 +56,11 @@ def run_peer(name: str, base: Flattening) -> tuple[Flattening, float]:
     if corner_uv.shape != (len(base.faces), 3, 2) or not np.isfinite(corner_uv).all():
         raise MetricError(f"{name} did not return a finite map of all {len(base.faces):,} triangles")
     return uv_flattening(as_uv_mesh(base.vertices, base.faces, corner_uv)), seconds
+
+
+def unwrap_charts(base: Flattening) -> FloatArray:
+    """Return the UVs of `coneflat.unwrap` with its default options."""
+    return unwrap(base.vertices, base.faces).corner_uv
 
 
 def libigl_lscm(base: Flattening) -> FloatArray:
@@ -97,6 +102,7 @@ def uvunwrap_charts(base: Flattening) -> FloatArray:
 
 #: Peers by name.
 PEERS = {
+    "unwrap": Peer("coneflat", unwrap_charts, "short seams with free sides, for textures"),
     "libigl LSCM": Peer("igl", libigl_lscm, "our cut; prescribes no cones"),
     "xatlas": Peer("xatlas", xatlas_charts, "charts of its own"),
     "uvunwrap": Peer("uvunwrap", uvunwrap_charts, "charts of its own"),

@@ -81,7 +81,7 @@ def compare_methods(
     Args:
         mesh, faces: as for `coneflat.flatten`.
         methods: names of `METHODS`; all by default.
-        peers: names of methods of other packages, from `PEERS`; by default those that are installed.
+        peers: names of methods with other cuts or of other packages, from `PEERS`; by default those installed.
         progress: called with the current step and the completed fraction.
         options: options of `coneflat.flatten`, with one chart by default. The cones and the cut are those of the method
             in the options, "exact" by default, and are used for all methods.
@@ -168,18 +168,19 @@ def _warm_up(method: str) -> None:
         flatten_by(method, vertices, faces, cones=dict.fromkeys(range(4), np.pi))
 
 
-#: Heading of each column, and the format of its numbers.
+#: Heading of each column, its measure, and the format of its numbers.
 COLUMNS = {
-    "curvature error, pi": ".1e",
-    "QC mean": ".4f",
-    "QC 95%": ".4f",
-    "area std": ".3f",
-    "flipped": ",d",
-    "overlap": ".2%",
-    "charts": ",d",
-    "seam length": ".2f",
-    "seam mismatch": ".1e",
-    "time, s": ".2f",
+    "curvature error, pi": ("curvature_error_max", ".1e"),
+    "QC mean": ("qc_mean", ".4f"),
+    "QC 95%": ("qc_p95", ".4f"),
+    "area std": ("area_std", ".3f"),
+    "energy": ("energy", ".3f"),
+    "flipped": ("flipped", ",d"),
+    "overlap": ("overlap", ".2%"),
+    "charts": ("charts", ",d"),
+    "seam length": ("seam_length", ".2f"),
+    "seam mismatch": ("seam_mismatch_max", ".1e"),
+    "time, s": ("seconds", ".2f"),
 }
 
 
@@ -188,18 +189,8 @@ def numbers(entry: Entry) -> list[float | int]:
     if entry.result is None:
         return [math.nan] * len(COLUMNS)
     d = entry.result.distortion
-    return [
-        d.curvature_error_max,
-        d.qc_mean,
-        d.qc_p95,
-        d.area_std,
-        d.flipped + d.degenerate,
-        d.overlap,
-        d.charts,
-        d.seam_length,
-        d.seam_mismatch_max,
-        entry.seconds,
-    ]
+    found = {**vars(d), "flipped": d.flipped + d.degenerate, "seconds": entry.seconds}
+    return [found[measure] for measure, _ in COLUMNS.values()]
 
 
 def as_cell(value: float | int, form: str) -> str:
@@ -217,10 +208,8 @@ def markdown(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def comparison_rows(comparison: Comparison) -> list[list[str]]:
     """Return a row of cell texts for each method, without its note."""
-    return [
-        [entry.method, *(as_cell(n, form) for n, form in zip(numbers(entry), COLUMNS.values(), strict=True))]
-        for entry in comparison.entries
-    ]
+    forms = [form for _, form in COLUMNS.values()]
+    return [[entry.method, *map(as_cell, numbers(entry), forms)] for entry in comparison.entries]
 
 
 def comparison_markdown(comparison: Comparison) -> str:

@@ -18,7 +18,7 @@ from typing import IO
 
 import numpy as np
 
-from ... import ConeflatError, Flattener, Flattening
+from ... import ConeflatError, Flattener, Flattening, unwrap
 from ...base import cancel_with
 from ...errors import DegenerateFaceError, NonManifoldError, NonOrientableError
 from ...io import Joined, read_joined
@@ -118,8 +118,11 @@ class JobRunner:
 
         chosen = Choices.from_plain(job["choices"])
         words = source.map_options(chosen.keywords())
-        is_large = len(source.mesh.offsets) - 1 >= self._early_from
-        result = flattener.flatten(on_preview=show_first if is_large else None, progress=report_max, **words)
+        if chosen.for_texture:
+            result = unwrap(source.mesh, progress=report_max, **words)
+        else:
+            on_preview = show_first if len(source.mesh.offsets) - 1 >= self._early_from else None
+            result = flattener.flatten(on_preview=on_preview, progress=report_max, **words)
         result = with_warnings(replace(result, notes=source.all_notes(result.notes)), chosen)
         report("picture", 1.0)
         head, body = self._coloured(job, result, name)

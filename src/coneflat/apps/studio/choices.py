@@ -1,4 +1,4 @@
-"""The choices of the user of the studio, and their conversion to options of `coneflat.flatten`.
+"""The choices of the user of the studio, and their conversion to options of `flatten` or `unwrap` of `coneflat`.
 
 They are also converted to a command line and to Python code that give the same result without the studio.
 """
@@ -18,13 +18,16 @@ import numpy as np
 from ...base import MAX_CONE_ANGLE, short_repr
 from ...errors import OptionError, StudioError
 from ...options import Flag, Options, as_integer, as_number, declarations, read_options
+from ..unwrap.options import UnwrapOptions
 from .paint import Paint, Region
 
 #: Options that the studio sets directly; cones and seams are edited individually.
 PLAIN_OPTIONS = (
     "distortion", "cone_count", "boundary", "stretch", "charts", "seams", "sharp_angle", "hide_seams",
-    "resolution", "padding", "repair",
+    "resolution", "padding", "repair", "max_energy",
 )  # fmt: skip
+#: Declarations of all options, by name.
+DECLARED = declarations(UnwrapOptions) | declarations(Options)
 #: Options that determine the number of cones of a search; at most one of them is set.
 NUMBERS = ("distortion", "cone_count")
 #: Shapes of the boundary; the four corners of a rectangle are picked by the user.
@@ -68,6 +71,7 @@ class Choices:
         paint: painted regions.
         corners: corners of a rectangle, vertices on the boundary, ascending.
         units: unit of length of the file, and the one in which lengths are shown, of `UNITS`.
+        for_texture: whether the map is that of `coneflat.unwrap`, which uses neither cones nor a boundary.
     """
 
     options: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
@@ -78,6 +82,7 @@ class Choices:
     paint: Paint = field(default_factory=Paint)
     corners: Path = ()
     units: tuple[str, str] = ("", "")
+    for_texture: bool = False
 
     # Options.
 
@@ -93,7 +98,7 @@ class Choices:
             raise OptionError(f"unknown boundary {short_repr(value)}: choose from {', '.join(BOUNDARIES)}")
         if name == "seams" and value not in (None, "input"):
             raise OptionError(f"seams must be drawn or 'input', those of the file, got {short_repr(value)}")
-        options, declared = dict(self.options), declarations(Options)[name]
+        options, declared = dict(self.options), DECLARED[name]
         if value != "rectangle":
             value = declared.kind.parse(name, value)
         for other in NUMBERS if name in NUMBERS else (name,):
@@ -104,9 +109,13 @@ class Choices:
         return chosen.with_search() if name in NUMBERS else chosen
 
     def with_search(self) -> Choices:
-        """Return choices with a search, which keeps the locked cones."""
+        """Return choices with a search for cones of a conformal map, which keeps the locked cones."""
         locked = tuple(replace(cone, angle=None) for cone in self.cones if cone.locked)
-        return replace(self, by_hand=False, cones=locked)
+        return replace(self, by_hand=False, cones=locked, for_texture=False)
+
+    def with_texture(self, for_texture: bool) -> Choices:
+        """Return choices for a map for a texture, or for a conformal map; both keep the settings of the other."""
+        return replace(self, for_texture=for_texture)
 
     # Cones.
 
@@ -114,8 +123,8 @@ class Choices:
         """Return choices without a search: the cones that it has found, at these vertices, become placed cones."""
         if self.by_hand:
             return self
-        known = {cone.vertex: cone for cone in self.cones}
-        return self._with_cones(by_hand=True, cones=known | {v: Cone(v) for v in found if v not in known})
+        cones = {vertex: Cone(vertex) for vertex in found} | self._by_vertex()
+        return replace(self, by_hand=True)._with_cones(cones)
 
     def added(self, vertex: int, angle: float | None = None) -> Choices:
         """Return choices with a further cone.
@@ -125,7 +134,7 @@ class Choices:
         """
         if vertex in self._by_vertex():
             raise StudioError(f"vertex {vertex} is a cone already")
-        return self._with_cones(cones=self._by_vertex() | {vertex: Cone(vertex, _checked_angle(angle))})
+        return self._with_cones(self._by_vertex() | {vertex: Cone(vertex, _checked_angle(angle))})
 
     def moved(self, vertex: int, to: int) -> Choices:
         """Return choices with a cone moved to another vertex.
@@ -135,12 +144,10 @@ class Choices:
         """
         if vertex == to:
             return self
-        cones = self._by_vertex()
-        cone = self._cone(vertex)
-        if to in cones:
+        cone, others = self._cone(vertex), self.removed(vertex)._by_vertex()
+        if to in others:
             raise StudioError(f"vertex {to} is a cone already")
-        del cones[vertex]
-        return self._with_cones(cones=cones | {to: replace(cone, vertex=to)})
+        return self._with_cones(others | {to: replace(cone, vertex=to)})
 
     def removed(self, vertex: int) -> Choices:
         """Return choices without a cone.
@@ -149,7 +156,7 @@ class Choices:
             StudioError: the vertex is not a cone.
         """
         self._cone(vertex)
-        return self._with_cones(cones={v: cone for v, cone in self._by_vertex().items() if v != vertex})
+        return self._with_cones({v: cone for v, cone in self._by_vertex().items() if v != vertex})
 
     def with_angle(self, vertex: int, angle: float | None) -> Choices:
         """Return choices with another angle of a cone, in radians; None if it must be computed.
@@ -158,18 +165,14 @@ class Choices:
             StudioError: the vertex is not a cone, or the angle is not valid.
         """
         cone = replace(self._cone(vertex), angle=_checked_angle(angle))
-        return self._with_cones(cones=self._by_vertex() | {vertex: cone})
+        return self._with_cones(self._by_vertex() | {vertex: cone})
 
     def locked(self, vertex: int, locked: bool) -> Choices:
         """Return choices with a cone locked or unlocked; locking also works for cones that a search has found."""
-        cones = self._by_vertex()
-        cone = replace(cones.get(vertex, Cone(vertex)), locked=locked)
-        if vertex not in cones and (self.by_hand or not locked):
-            raise StudioError(f"vertex {vertex} is not a cone")
-        cones[vertex] = cone
         if not self.by_hand and not locked:
-            del cones[vertex]
-        return self._with_cones(cones=cones)
+            return self.removed(vertex)
+        cone = self._cone(vertex) if self.by_hand else self._by_vertex().get(vertex, Cone(vertex))
+        return self._with_cones(self._by_vertex() | {vertex: replace(cone, locked=locked)})
 
     # Seams.
 
@@ -188,9 +191,9 @@ class Choices:
             StudioError: there is no such path.
         """
         edge = frozenset((one, two))
-        cuts = tuple(path for path in self.cuts if edge not in edges_of(path))
-        kept = tuple(path for path in self.kept if edge not in edges_of(path))
-        if len(cuts) + len(kept) == len(self.cuts) + len(self.kept):
+        both = self.cuts, self.kept
+        cuts, kept = (tuple(path for path in paths if edge not in edges_of(path)) for paths in both)
+        if (cuts, kept) == both:
             raise StudioError(f"no path contains the edge {one}-{two}")
         return replace(self, cuts=cuts, kept=kept)
 
@@ -231,7 +234,7 @@ class Choices:
     # Conversion.
 
     def keywords(self) -> dict[str, Any]:
-        """Return the keyword arguments of `coneflat.flatten` for these choices.
+        """Return the keyword arguments of `coneflat.flatten`, or of `coneflat.unwrap`, for these choices.
 
         They are not cached, because for painted regions they need much more memory than the choices, of which the
         history stores hundreds.
@@ -265,8 +268,15 @@ class Choices:
         # If all angles are given, weights have no effect.
         if paint.importance and (not self.by_hand or any(cone.angle is None for cone in self.cones)):
             words["weights"] = paint.weights()
-        read_options(words)
+        group = UnwrapOptions if self.for_texture else Options
+        words = {name: value for name, value in words.items() if name in declarations(group)}
+        read_options(words, group)
         return words
+
+    @property
+    def command(self) -> str:
+        """Return the name of the command, and of the function of `coneflat`, that computes the map."""
+        return "unwrap" if self.for_texture else "flatten"
 
     def as_plain(self) -> dict[str, Any]:
         """Return the choices as values for JSON."""
@@ -279,6 +289,7 @@ class Choices:
             **({"paint": self.paint.as_plain()} if self.paint else {}),
             **({"corners": list(self.corners)} if self.corners else {}),
             **({"units": list(self.units)} if any(self.units) else {}),
+            **({"for_texture": True} if self.for_texture else {}),
         }
 
     @classmethod
@@ -299,15 +310,13 @@ class Choices:
             if vertex in cones:
                 raise StudioError(f"vertex {vertex} is given as a cone twice")
             cones[vertex] = Cone(vertex, _checked_angle(angle), each["locked"] is True)
-        chosen = chosen._with_cones(by_hand=plain["by_hand"] is True, cones=cones)
-        for path in plain["cuts"]:
-            chosen = chosen.cut(tuple(path))
-        for path in plain["kept"]:
-            chosen = chosen.with_kept(tuple(path))
-        chosen = replace(chosen, paint=Paint.from_plain(plain.get("paint", {})))
+        chosen = replace(chosen, by_hand=plain["by_hand"] is True)._with_cones(cones)
+        cuts, kept = (tuple(map(_checked, plain[name])) for name in ("cuts", "kept"))
+        chosen = replace(chosen, cuts=cuts, kept=kept, paint=Paint.from_plain(plain.get("paint", {})))
         for vertex in dict.fromkeys(plain.get("corners", ())):
             chosen = chosen.with_corner(as_vertex("a corner", vertex))
-        chosen = chosen.with_units(*plain.get("units", ("", "")))
+        units, for_texture = plain.get("units", ("", "")), plain.get("for_texture") is True
+        chosen = chosen.with_units(*units).with_texture(for_texture)
         chosen.keywords()
         return chosen
 
@@ -320,10 +329,11 @@ class Choices:
             raise StudioError(f"vertex {vertex} is not a cone")
         return cones[vertex]
 
-    def _with_cones(self, *, cones: Mapping[int, Cone], by_hand: bool | None = None) -> Choices:
-        by_hand = self.by_hand if by_hand is None else by_hand
+    def _with_cones(self, cones: Mapping[int, Cone]) -> Choices:
+        if self.for_texture:
+            raise StudioError("a map for a texture has no cones to edit")
         # Cones are sorted by vertex, so that the same cones are equal choices.
-        return replace(self, by_hand=by_hand, cones=tuple(cones[v] for v in sorted(cones)))
+        return replace(self, cones=tuple(cones[v] for v in sorted(cones)))
 
 
 def as_vertex(name: str, value: object) -> int:
@@ -372,10 +382,10 @@ LISTED_NUMBERS = 12
 
 
 def command_line(mesh: str, project: str, choices: Choices) -> str:
-    """Return a command that flattens a mesh with these choices; drawn paths and paint need the project file."""
+    """Return a command that maps a mesh with these choices; drawn paths and paint need the project file."""
     if choices.cuts or choices.kept or choices.paint:
-        return shlex.join(["coneflat", "flatten", "--project", project])
-    parts = ["coneflat", "flatten", mesh]
+        return shlex.join(["coneflat", choices.command, "--project", project])
+    parts = ["coneflat", choices.command, mesh]
     for name, value in choices.keywords().items():
         flag = "--" + name.replace("_", "-")
         if name == "repair":
@@ -390,11 +400,11 @@ def command_line(mesh: str, project: str, choices: Choices) -> str:
 
 
 def python_lines(mesh: str, choices: Choices) -> str:
-    """Return Python code that flattens a mesh with these choices."""
+    """Return Python code that maps a mesh with these choices."""
     given = [f"    {name}={_written(value)}," for name, value in choices.keywords().items()]
     if sum(map(len, given)) > 20_000:  # Characters in the panel.
         return "# The drawn paths and the paint are too large to be shown here; they are in the project file."
-    call = "\n".join([f"result = coneflat.flatten(\n    {mesh!r},", *given, ")"])
+    call = "\n".join([f"result = coneflat.{choices.command}(\n    {mesh!r},", *given, ")"])
     return f"import coneflat\n\n{call}"
 
 

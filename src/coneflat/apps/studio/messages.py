@@ -37,6 +37,7 @@ CONTROLS = {
     "charts": "Charts",
     "resolution": "Texels per side",
     "padding": "Texels between charts",
+    "max_energy": "Energy at most",
     "repair": "Repair the mesh",
 }
 #: A flag, or the name of an option; names that are ordinary words count at the beginning of a message only.
@@ -61,7 +62,7 @@ def _control(found: re.Match[str]) -> str:
 def misplaced_warning(chosen: Choices) -> tuple[str, ...]:
     """Return a sentence on cones in regions painted as "no cones", or nothing; these regions restrict searches only."""
     inside = vertices_in(chosen.paint.no_cone, [cone.vertex for cone in chosen.cones])
-    if not inside:
+    if not inside or chosen.for_texture:
         return ()
     verb, what = ("lies", "vertex") if len(inside) == 1 else ("lie", "vertices")
     return (
@@ -81,7 +82,7 @@ def angle_warning(chosen: Choices, result: Flattening) -> tuple[str, ...]:
     """Return a sentence on computed cone angles that are out of bounds because of typed ones, or nothing."""
     least, most = MIN_CONE_ANGLE, MAX_CONE_ANGLE
     typed = {cone.vertex for cone in chosen.cones if cone.angle is not None}
-    if not (chosen.by_hand and typed):
+    if chosen.for_texture or not (chosen.by_hand and typed):
         return ()
     slack = 1e-9 * most  # Tolerance for rounding.
     names = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]

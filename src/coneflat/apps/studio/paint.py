@@ -79,21 +79,14 @@ class Region:
 
     def without(self, other: Region) -> Region:
         """Return the vertices of this region that are not in another."""
-        left, at = [], 0
-        taken = (*other.runs, (2**53, 2**53))  # Above all vertices.
-        for first, last in self.runs:
-            begin = first
-            while taken[at][1] < begin:
-                at += 1
-            while taken[at][0] <= last:
-                if begin < taken[at][0]:
-                    left.append((begin, taken[at][0] - 1))
-                begin = taken[at][1] + 1
-                if begin > last:
-                    break
-                at += 1
-            if begin <= last:
-                left.append((begin, last))
+        # At each end of a run, the number of runs of this or the other region that contain the next vertices changes.
+        ends = [(at, way, 0) for first, last in self.runs for at, way in ((first, 1), (last + 1, -1))]
+        ends += [(at, 0, way) for first, last in other.runs for at, way in ((first, 1), (last + 1, -1))]
+        left, begin, inside, taken = list[tuple[int, int]](), 0, 0, 0
+        for at, change, other_change in sorted(ends):
+            if inside and not taken and begin < at:
+                left.append((begin, at - 1))
+            begin, inside, taken = at, inside + change, taken + other_change
         return Region.of_runs(left)
 
     def __bool__(self) -> bool:

@@ -118,8 +118,9 @@ class Session:
             action: its key `do` is "set" for an option (`name`, `value`); "hand" to place the cones by hand; "add",
                 "move", "remove", "angle" or "lock" for a cone (`vertex`; `to`, `degrees`, `locked`); "cut" or "keep"
                 for a `path`; "erase" for an `edge`; "paint" for a `layer` (`where`; `weight`); "corner" to add or
-                remove a corner (`vertex`); "units" for units of length (`of_file`, `shown`); "undo", "redo", or
-                "again" to flatten again. Actions of one `stroke` are undone together.
+                remove a corner (`vertex`); "units" for units of length (`of_file`, `shown`); "texture" for a map for a
+                texture or for a conformal one (`value`); "undo", "redo", or "again" to flatten again. Actions of one
+                `stroke` are undone together.
 
         Raises:
             StudioError: the action is not valid, or is not possible now.

@@ -41,6 +41,7 @@ STEPS: dict[str, Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]]
         action["layer"], Region.of_text(action["where"]), action.get("weight")
     ),
     "corner": lambda chosen, action, found: chosen.with_corner(_vertex(action)),
+    "texture": lambda chosen, action, found: chosen.with_texture(action["value"] is True),
     "units": lambda chosen, action, found: chosen.with_units(action["of_file"], action["shown"]),
 }
 

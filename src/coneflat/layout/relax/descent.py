@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arrays import ComplexArray, FloatArray
+from ...base import ComplexArray, FloatArray, check_cancelled
 from ...errors import MetricError
 from ...linalg import Factor, factorize
 from ...linalg.newton import ARMIJO, HALVINGS
@@ -77,7 +77,7 @@ def descend(
     """
     remaining = 1.0 if motions.has_offset else 0.0
     together = motions.has_offset
-    places = points
+    places, taken = points, 0
     maps = elements.maps(places)
     part = np.zeros_like(elements.part) if together else elements.part
     parts = 1 if together else elements.parts
@@ -91,7 +91,6 @@ def descend(
     total, unknowns = np.zeros(elements.count + 1), np.arange(elements.count)
     active = np.ones(parts, dtype=bool)
     factor: Factor | None = None
-    taken = 0
     while taken < steps and ((elements.count and active.any()) or remaining > RELATIVE_ROUNDING):
         if not together and elements.count and active[unknown_part].mean() < MIN_ACTIVE_SHARE:
             done += float(here[~active].sum())
@@ -99,6 +98,7 @@ def descend(
             unknowns, here, least = unknowns[of_chosen], here[active], least[active]
             part, parts, unknown_part = elements.part, elements.parts, elements.unknown_part
             maps, active, factor = elements.maps(places), np.ones(parts, dtype=bool), None
+        check_cancelled()
         gradient, pull, matrix = elements.newton_system(energy, maps, remaining)
         factor = factorize(matrix, previous=factor, total_size=REPEATED * len(points))
         step = np.append(factor.solve(-gradient - pull), remaining)

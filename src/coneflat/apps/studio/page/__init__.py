@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 
-from ....options import Options, declarations
 from ...view import page_around
-from ..choices import PLAIN_OPTIONS
+from ..choices import DECLARED, PLAIN_OPTIONS
 
 #: Content security policy: only connections to the server of the page are allowed.
 POLICY = (
@@ -25,7 +24,7 @@ _SCRIPTS = (
 @cache
 def studio_page(formats: Sequence[str]) -> str:
     """Return the page as text; formats: extensions of meshes that can be dropped on it."""
-    defaults = {name: declarations(Options)[name].default for name in PLAIN_OPTIONS}
+    defaults = {name: DECLARED[name].default for name in PLAIN_OPTIONS}
     scripts = [f"const DEFAULTS = {json.dumps(defaults)};", *(_read(f"{name}.js") for name in _SCRIPTS)]
     return page_around(
         POLICY,

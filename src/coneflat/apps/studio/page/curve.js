@@ -22,7 +22,7 @@ class ConeCurve {
 
   async ask() {
     const {studio} = this, key = this.key();
-    if (this.waiting || !studio.viewer) return;
+    if (this.waiting || !studio.viewer || studio.forTexture) return;
     studio.refused = null;
     this.waiting = true;
     studio.panel.show();

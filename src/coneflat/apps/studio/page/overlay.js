@@ -20,7 +20,7 @@ class Overlay {
     this.studio.brush.draw(pen, pane);
     for (const place of this.studio.viewer.model.head.bad ?? []) this.bad(pen, pane, this.studio.verticesOf(place));
     for (const vertex of this.studio.verticesOf(this.studio.cornersShown())) this.diamond(pen, pane, vertex);
-    for (const cone of choices.cones) {
+    for (const cone of this.studio.forTexture ? [] : choices.cones) {
       const [vertex] = this.studio.verticesOf([cone.vertex]);
       if (vertex === undefined) continue;
       if (cone.locked) this.box(pen, pane, vertex);

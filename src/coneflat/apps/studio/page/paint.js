@@ -38,9 +38,9 @@ class Paint {
 
   /** Show the chosen paint if it has changed, and a stroke. */
   show() {
-    const {viewer, choices} = this.studio;
+    const {viewer} = this.studio;
     if (!viewer) return;
-    const key = JSON.stringify(choices.paint ?? {});
+    const key = JSON.stringify(this.chosen);
     if (this.shown?.model === viewer.model && this.shown.key === key && this.shown.preview === this.preview?.numbers.size) return;
     this.shown = {model: viewer.model, key, preview: this.preview?.numbers.size};
     viewer.renderer.setMarks(this.isBare() ? null : this.marks());
@@ -59,12 +59,18 @@ class Paint {
     this.show();
   }
 
+  /** The chosen paint that has an effect on the map. */
+  get chosen() {
+    const {choices, forTexture} = this.studio, {no_seam, ...more} = choices.paint ?? {};
+    return {...(no_seam ? {no_seam} : {}), ...(forTexture ? {} : more)};
+  }
+
   isBare() {
-    return !Object.keys(this.studio.choices.paint ?? {}).length && !this.preview;
+    return !Object.keys(this.chosen).length && !this.preview;
   }
 
   marks() {
-    const {viewer, choices} = this.studio, {arrays} = viewer.model, paint = choices.paint ?? {};
+    const {arrays} = this.studio.viewer.model, paint = this.chosen;
     const looks = new Uint8Array(arrays.places.length);
     const set = (vertices, layer, weight) => {
       const [channel, value] = {no_cone: [0, 255], no_seam: [1, 255], importance: [2, toneOf(weight)]}[layer] ?? [];

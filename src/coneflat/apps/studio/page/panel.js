@@ -15,10 +15,10 @@ class Panel {
 
   fill() {
     this.part("tools").append(
-      ...TOOLS.map(([key, name, letter]) => button(name, `${name} (${letter})`, () => this.studio.setTool(key), {className: "toggle", id: `tool-${key}`})),
+      ...TOOLS.map(([key, name, letter]) => button(name, `${name} (${letter})`, () => this.studio.setTool(key), {className: `toggle ${useOf(key)}`, id: `tool-${key}`})),
     );
     this.part("brushes").append(
-      ...BRUSHES.map(([key, name, letter]) => button(name, `${name} (${letter})`, () => this.studio.setTool(key), {className: `toggle brush ${key}`, id: `tool-${key}`})),
+      ...BRUSHES.map(([key, name, letter]) => button(name, `${name} (${letter})`, () => this.studio.setTool(key), {className: `toggle brush ${key} ${useOf(key)}`, id: `tool-${key}`})),
     );
     this.part("exports").append(
       ...["obj", "ply", "glb", "npz", "svg"].map((ending) => button(ending.toUpperCase(), `Save as .${ending}`, () => this.studio.save(ending), {id: `save-${ending}`})),
@@ -48,6 +48,8 @@ class Panel {
     this.slider("hide", (value) => ({do: "set", name: "hide_seams", value}));
     for (const name of ["boundary", "charts"]) this.part(name).addEventListener("change", (event) => set(name, event.target.value));
     this.part("boundary").addEventListener("change", (event) => event.target.value === "rectangle" && studio.setTool("corner"));
+    this.part("purpose").addEventListener("change", (event) => act({do: "texture", value: event.target.value === "texture"}));
+    this.part("max-energy").addEventListener("change", (event) => set("max_energy", Number(event.target.value)));
     for (const name of ["resolution", "padding"]) this.part(name).addEventListener("change", (event) => set(name, Number(event.target.value)));
     this.part("own-seams").addEventListener("change", (event) => set("seams", event.target.checked ? "input" : null));
     this.part("follow").addEventListener("change", (event) => studio.setFollowing(event.target.checked));
@@ -108,9 +110,13 @@ class Panel {
     const {news, choices, tools} = this.studio, options = {...DEFAULTS, ...choices.options};
     this.part("undo").disabled = !news?.undo;
     this.part("redo").disabled = !news?.redo;
+    const {forTexture} = this.studio;
+    this.part("purpose").value = forTexture ? "texture" : "angles";
+    this.value("max-energy", options.max_energy);
+    for (const part of document.querySelectorAll(".for-angles, .for-texture")) part.hidden = forTexture !== part.classList.contains("for-texture");
     for (const [key, , , hint] of [...TOOLS, ...BRUSHES]) {
       this.part(`tool-${key}`).setAttribute("aria-pressed", String(tools.mode === key));
-      if (tools.mode === key) this.part("hint").textContent = hint;
+      if (tools.mode === key) this.part("hint").textContent = forTexture && key === "look" ? "Drag to rotate the model." : hint;
     }
     const by = choices.by_hand ? "hand" : "cone_count" in choices.options ? "cone_count" : "distortion";
     this.part("cones-by").value = by;
@@ -124,7 +130,7 @@ class Panel {
     this.part("hide-value").textContent = options.hide_seams;
     this.part("own-seams").checked = options.seams === "input";
     this.value("boundary", options.boundary);
-    this.part("boundary").closest("label").hidden = this.part("tool-corner").hidden = !this.studio.hasBoundary();
+    this.part("boundary").closest("label").hidden = this.part("tool-corner").hidden = forTexture || !this.studio.hasBoundary();
     this.value("resolution", options.resolution);
     this.value("padding", options.padding);
     this.value("stretch", options.stretch);
@@ -200,7 +206,7 @@ class Panel {
 
   showCorners() {
     const {choices} = this.studio, {boundary} = choices.options, left = 4 - (choices.corners ?? []).length;
-    this.part("corners-left").hidden = boundary !== "rectangle" || !left;
+    this.part("corners-left").hidden = this.studio.forTexture || boundary !== "rectangle" || !left;
     this.part("corners-left").textContent = `Click ${left === 4 ? "its four corners" : left === 1 ? "one more corner" : `${left} more corners`} with the tool Corner.`;
   }
 
@@ -312,6 +318,11 @@ function rove(bar, selector, vertical = false) {
     const usable = all().filter((one) => !one.hidden && !one.disabled);
     usable[(usable.indexOf(event.target) + step + usable.length) % usable.length]?.focus();
   });
+}
+
+/** Return the class of the button of a tool: some tools have no effect on maps for textures. */
+function useOf(tool) {
+  return CONE_TOOLS.includes(tool) ? "for-angles" : "";
 }
 
 /** Return the text of a stage of the computation. */

@@ -20,6 +20,7 @@ class Studio {
     this.brush = new Brush(this);
     this.making = ""; // The output that is being computed, other than layouts.
     this.keyed = false; // The keyboard was used last, not the mouse.
+    this.shownForTexture = false;
     this.follows = true; // Paths follow sharp edges.
     this.overlay = new Overlay(this);
     this.panel = new Panel(this);
@@ -69,10 +70,19 @@ class Studio {
     if (model) this.take(model);
     if (model) this.layout = news.layout;
     this.paint.hear();
+    this.showPurpose();
     this.panel.show();
     this.viewer?.remark();
     if (!this.news.busy) document.documentElement.dataset.ready ??= String(Math.round(performance.now()));
     document.documentElement.dataset.settled = String(!this.news.busy);
+  }
+
+  /** After a change of the kind of map, show cones on conformal maps only, and end tools without effect. */
+  showPurpose() {
+    if (!this.viewer || this.shownForTexture === this.forTexture) return;
+    this.shownForTexture = this.forTexture;
+    this.viewer.state.set({cones: !this.forTexture});
+    if (this.forTexture && CONE_TOOLS.includes(this.tools.mode)) this.setTool("look");
   }
 
   /** Show a layout. */
@@ -109,11 +119,12 @@ class Studio {
     requestAnimationFrame(() => requestAnimationFrame(() => this.noteTime(asked, news.early)));
   }
 
-  /** Add the charts, the packing and the overlap to the title; a preview does not have them. */
+  /** Add the charts, the packing, the overlap and the energy to the title; a preview does not have them. */
   showMeasures({rows}) {
     const values = new Map(rows.map(([name, value]) => [name, value])), charts = values.get("charts");
     if (!(Number(charts?.replaceAll(",", "")) > 0)) return;
     const more = [`${charts} ${charts === "1" ? "chart" : "charts"}`, `packing ${values.get("packing")}`, `overlap ${values.get("overlap")}`];
+    if (this.forTexture) more.unshift(`energy ${values.get("energy")}`);
     const place = document.getElementById("title");
     place.textContent = place.title = [place.textContent, ...more].join("  ·  ");
   }
@@ -215,6 +226,7 @@ class Studio {
   }
 
   setTool(mode) {
+    if (this.forTexture && CONE_TOOLS.includes(mode)) return;
     const {head, arrays} = this.viewer?.model ?? {};
     if (!["look", "cone"].includes(mode) && head?.left_out && !arrays.whole_faces) {
       this.refuse(new Refusal(`a mesh of ${grouped(head.triangles)} triangles is too large to draw or paint on here`));
@@ -307,7 +319,7 @@ class Studio {
   }
 
   selectedNumber() {
-    return this.selected === null || !this.viewer ? null : this.numberOf(this.selected);
+    return this.selected === null || !this.viewer || this.forTexture ? null : this.numberOf(this.selected);
   }
 
   /** Pick a cone, and make it visible. */
@@ -323,6 +335,11 @@ class Studio {
     return this.news?.choices ?? NO_CHOICES;
   }
 
+  /** Whether the map is one for a texture, without cones to edit. */
+  get forTexture() {
+    return Boolean(this.choices.for_texture);
+  }
+
   hasLayout() {
     return Boolean(this.viewer) && !this.news.bare;
   }
@@ -334,6 +351,7 @@ class Studio {
 
   /** Return the chosen or found cones, {vertex, degrees, chosen, locked}, with vertices of the user. */
   coneRows() {
+    if (this.forTexture) return [];
     const model = this.viewer?.model, shown = new Map();
     if (model) model.arrays.cones.forEach((vertex, i) => shown.set(this.numberOf(vertex), 360 - (model.head.cone_curvatures[i] * 180) / Math.PI));
     const own = new Map(this.choices.cones.map((cone) => [cone.vertex, cone]));
@@ -445,6 +463,7 @@ class Studio {
 
   /** Return the corners of the rectangle, if the boundary is one. */
   cornersShown() {
+    if (this.forTexture) return [];
     return this.tools.mode === "corner" || this.choices.options.boundary === "rectangle" ? this.choices.corners ?? [] : [];
   }
 }

@@ -8,6 +8,7 @@ const TOOLS = [
   ["keep", "Keep whole", "k", "Click points: the shortest paths between them are not cut. Esc, or Keep whole again, ends the path."],
   ["corner", "Corner", "o", "Click four points of the boundary: the corners of a rectangle. Click a corner to remove it."],
 ];
+const CONE_TOOLS = ["cone", "corner", "no_cone", "importance"]; // Without effect on maps for textures.
 const PICK_RADIUS = 12; // Pick radius of a click in pixels.
 const CONE_RADIUS = 5; // That of a cone, which a seam in front may cover.
 
@@ -97,6 +98,7 @@ class Tools {
   /** Return the cone at a pixel, or the nearest visible one within a number of pixels; null if there is none. */
   coneAt(pane, x, y, reach) {
     const {viewer} = this.studio, {model} = viewer;
+    if (this.studio.forTexture) return null;
     const thing = viewer.renderer.pick(pane, x, y, viewer.state);
     if (thing?.kind === "cone") return thing;
     if (!viewer.state.get("cones")) return null;

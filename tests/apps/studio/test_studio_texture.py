@@ -1,0 +1,238 @@
+"""Maps for textures in the studio: choices, replay from projects, cancellation, and the page."""
+# ruff: noqa: F811  (fixtures that are imported)
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+import shapes
+from click.testing import CliRunner
+from studio_browsing import sample, studio, visit  # noqa: F401
+
+import coneflat
+from coneflat.apps.cli.main import cli
+from coneflat.apps.studio.child import JobRunner
+from coneflat.apps.studio.choices import DECLARED, Choices, command_line, python_lines
+from coneflat.apps.studio.messages import with_warnings
+from coneflat.apps.studio.outputs import curve_options
+from coneflat.apps.studio.paint import Region
+from coneflat.apps.studio.project import Project, file_hash, read_project
+from coneflat.apps.studio.session import Session
+from coneflat.apps.unwrap.options import MAX_ENERGY, UnwrapOptions
+from coneflat.base import cancel_with
+from coneflat.errors import OptionError, StudioError
+from coneflat.options import declarations
+
+CONES = (3, 60, 200, 410, 500)
+
+
+def both_kinds():
+    """Return choices with settings of both kinds of maps, for a texture."""
+    chosen = Choices().placed(CONES).locked(200, True).cut((1, 2)).with_kept((7, 8))
+    for name, value in {"max_energy": 4.05, "stretch": 0.25, "boundary": "disk", "padding": 4}.items():
+        chosen = chosen.with_option(name, value)
+    return chosen.painted("no_cone", Region.of_text("3")).painted("importance", Region.of_text("9"), 10)
+
+
+@pytest.fixture
+def mesh(tmp_path):
+    return shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(3))
+
+
+@pytest.fixture
+def session(tmp_path, mesh):
+    opened = Session(tmp_path)
+    opened.open(mesh)
+    yield opened
+    opened.close()
+
+
+class TestChoices:
+    def test_each_kind_of_map_has_its_own_options(self):
+        conformal, texture = both_kinds().keywords(), both_kinds().with_texture(True).keywords()
+        assert set(texture) == {"max_energy", "padding", "seams", "no_seams"}
+        assert set(texture) <= set(declarations(UnwrapOptions))
+        assert set(conformal) == {"cones", "stretch", "boundary", "padding", "seams", "no_seams", "weights"}
+        assert both_kinds().with_texture(True).with_texture(False) == both_kinds()
+
+    def test_the_default_bound_is_that_of_the_function(self):
+        assert DECLARED["max_energy"].default == MAX_ENERGY
+        assert Choices().with_option("max_energy", MAX_ENERGY) == Choices()
+
+    @pytest.mark.parametrize("value", [4, 3.9, -1, "much", math.nan])
+    def test_a_bound_that_cannot_be_met_is_refused(self, value):
+        with pytest.raises(OptionError, match="max_energy must be"):
+            Choices().with_texture(True).with_option("max_energy", value).keywords()
+
+    @pytest.mark.parametrize(
+        "change",
+        [
+            lambda chosen: chosen.placed([7]),
+            lambda chosen: chosen.added(7),
+            lambda chosen: chosen.locked(7, True),
+        ],
+    )
+    def test_there_are_no_cones_to_edit(self, change):
+        with pytest.raises(StudioError, match="a map for a texture has no cones to edit"):
+            change(Choices().with_texture(True))
+
+    def test_a_number_of_cones_belongs_to_a_conformal_map(self):
+        assert not Choices().with_texture(True).with_option("cone_count", 8).for_texture
+        assert set(curve_options(both_kinds().with_texture(True))) == set(curve_options(both_kinds()))
+
+    def test_they_come_back_from_json(self):
+        chosen = both_kinds().with_texture(True)
+        assert Choices.from_plain(json.loads(json.dumps(chosen.as_plain()))) == chosen
+        assert "for_texture" not in both_kinds().as_plain()
+
+    def test_warnings_on_cones_are_those_of_conformal_maps(self, mesh):
+        narrow = both_kinds().with_angle(60, 0.8 * math.pi)
+        result = coneflat.flatten(mesh, cones={3: 1.6 * math.pi, 60: 1.2 * math.pi, 410: 1.2 * math.pi})
+        assert len(with_warnings(result, narrow).notes) == len(result.notes) + 2
+        assert with_warnings(result, narrow.with_texture(True)).notes == result.notes
+
+
+class TestReplay:
+    def test_the_command_line_means_what_is_chosen(self, tmp_path, mesh, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        chosen = Choices().with_texture(True).with_option("max_energy", 4.3).with_option("stretch", 1)
+        line = command_line("ball.obj", "p.json", chosen)
+        assert line == "coneflat unwrap ball.obj --max-energy 4.3"
+        assert CliRunner().invoke(cli, [*line.split()[1:], "-o", "a.npz"]).exit_code == 0
+        names: dict = {}
+        exec(python_lines("ball.obj", chosen), names)
+        np.testing.assert_array_equal(coneflat.read_flattening(tmp_path / "a.npz").uv, names["result"].uv)
+
+    def test_drawn_paths_are_in_the_project(self):
+        chosen = Choices().with_texture(True).cut((1, 2))
+        assert command_line("b.obj", "p.json", chosen) == "coneflat unwrap --project p.json"
+
+    @pytest.mark.parametrize("for_texture", [False, True])
+    def test_a_project_has_both_maps(self, tmp_path, mesh, for_texture):
+        chosen = Choices().with_option("max_energy", 4.3).with_option("distortion", 0.3)
+        path = tmp_path / "p.json"
+        Project(mesh, file_hash(mesh), chosen.with_texture(for_texture)).save(path)
+        expected = {
+            "flatten": coneflat.flatten(mesh, distortion=0.3),
+            "unwrap": coneflat.unwrap(mesh, max_energy=4.3),
+        }
+        for command, result in expected.items():
+            output = tmp_path / f"{command}.npz"
+            done = CliRunner().invoke(cli, [command, "--project", str(path), "-o", str(output)])
+            assert done.exit_code == 0, done.output
+            np.testing.assert_array_equal(coneflat.read_flattening(output).uv, result.uv)
+
+    def test_a_project_has_its_own_options(self, tmp_path, mesh):
+        path = tmp_path / "p.json"
+        Project(mesh, file_hash(mesh), Choices()).save(path)
+        for more, what in {"--max-energy 4.2": "--max-energy", "x.obj": "MESH", "--weld": "--weld"}.items():
+            done = CliRunner().invoke(cli, ["unwrap", "--project", str(path), *more.split()])
+            assert done.exit_code == 2
+            assert f"leave out {what}" in done.output
+        done = CliRunner().invoke(cli, ["unwrap"])
+        assert done.exit_code == 2
+        assert "Missing argument 'MESH'" in done.output
+
+
+class TestSession:
+    def test_the_kind_of_map_is_a_step(self, session, mesh):
+        assert session.wait_until_idle(120)
+        first = session.picture()[0]["title"]
+        session.act({"do": "texture", "value": True})
+        session.act({"do": "set", "name": "max_energy", "value": 4.3})
+        assert session.wait_until_idle(120)
+        assert session.state()["trouble"] is None
+        (tmp_npz := mesh.with_suffix(".npz")).write_bytes(session.export(".npz"))
+        found = coneflat.read_flattening(tmp_npz)
+        np.testing.assert_array_equal(found.uv, coneflat.unwrap(mesh, max_energy=4.3).uv)
+        assert read_project(session.project_file).choices.for_texture
+        for _ in range(2):
+            session.act({"do": "undo"})
+        assert session.wait_until_idle(120)
+        assert session.picture()[0]["title"] == first
+        assert not read_project(session.project_file).choices.for_texture
+
+    def test_what_cannot_be_is_refused(self, session):
+        session.act({"do": "texture", "value": True})
+        with pytest.raises(StudioError, match="has no cones to edit"):
+            session.act({"do": "add", "vertex": 5})
+        with pytest.raises(OptionError, match="max_energy must be above 4"):
+            session.act({"do": "set", "name": "max_energy", "value": 4})
+        with pytest.raises(StudioError, match="is not valid"):
+            session.act({"do": "texture"})
+        assert session.wait_until_idle(120)
+        assert session.state()["trouble"] is None
+
+    def test_a_change_cancels_the_search(self, mesh):
+        class Changed(Exception):
+            pass
+
+        calls = 0
+
+        def check():
+            nonlocal calls
+            calls += 1
+            if calls == 30:
+                raise Changed
+
+        job = {"mesh": str(mesh), "sha256": "", "choices": Choices().with_texture(True).as_plain()}
+        with pytest.raises(Changed), cancel_with(check):
+            JobRunner().flatten(job, lambda stage, fraction: None, lambda head, body: None)
+        assert calls == 30
+
+
+HIDDEN = (
+    "#tool-cone",
+    "#tool-corner",
+    "#tool-no_cone",
+    "#tool-importance",
+    "#cones-by",
+    "#stretch",
+    "#boundary",
+)
+
+
+def test_the_page_switches_between_the_maps(visit, studio):
+    visit.settle()
+    page, cones = visit.page, visit.cones()
+    page.keyboard.press("a")
+    assert page.is_hidden("#max-energy")
+    page.select_option("#purpose", "texture")
+    visit.settle()
+    assert [name for name in HIDDEN if page.is_visible(name)] == []
+    assert page.input_value("#max-energy") == "4.1"
+    assert "energy 4.0" in page.inner_text("#title")
+    assert visit.cones() == []
+    assert visit.run("[studio.tools.mode, coneflat.state.get('cones')]") == ["look", False]
+
+    # Keys of cones have no effect, and those of seams have.
+    page.locator("#model").focus()
+    for key in ("a", "p", "n", "m", "l", "q", "Delete"):
+        page.keyboard.press(key)
+    visit.settle()
+    assert visit.run("[studio.tools.mode, studio.news.undo, studio.refused]") == ["look", 1, None]
+    page.keyboard.press("x")
+    assert visit.run("studio.tools.mode") == "cut"
+
+    page.fill("#max-energy", "4")
+    page.keyboard.press("Enter")
+    visit.wait("studio.refused")
+    visit.troubles.clear()  # The browser reports the refused request.
+    assert (
+        page.inner_text("#refusal-text")
+        == "“Energy at most” must be above 4, the energy of an isometry, got 4."
+    )
+    page.fill("#max-energy", "4.4")
+    page.keyboard.press("Enter")
+    visit.settle()
+    assert page.text_content("#command") == "coneflat unwrap sample.obj --max-energy 4.4"
+    assert studio.session.state()["choices"]["options"] == {"max_energy": 4.4}
+
+    page.select_option("#purpose", "angles")
+    visit.settle()
+    assert page.is_visible("#cones-by")
+    assert visit.cones() == cones
+    assert visit.run("coneflat.state.get('cones')")
