@@ -20,7 +20,17 @@ from .packages import as_input
 from .ply import write_parts
 from .read import INPUT_FORMATS, find_meshes, read_joined, read_mesh, read_mesh_from
 from .split import shading_normals, split_at_seams
-from .texture import CELLS, DARK_CELL, LIGHT_CELL, Texture, cell_side, check_cells, read_picture
+from .texture import (
+    CELLS,
+    DARK_CELL,
+    LIGHT_CELL,
+    Texture,
+    cell_side,
+    check_cells,
+    decode_image,
+    encode_png,
+    read_picture,
+)
 from .write import OUTPUT_FORMATS, as_written, check_output, write_flattening, write_measured, write_stream
 
 __all__ = [
@@ -50,6 +60,8 @@ __all__ = [
     "check_output",
     "check_target",
     "checked_target",
+    "decode_image",
+    "encode_png",
     "find_meshes",
     "has_uv",
     "known_ending",

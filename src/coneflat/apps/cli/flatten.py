@@ -1,4 +1,4 @@
-"""`coneflat flatten` and `coneflat unwrap`."""
+"""`coneflat flatten`, `coneflat unwrap` and `coneflat transfer`."""
 
 from __future__ import annotations
 
@@ -193,3 +193,49 @@ def project_arguments(
     opened = read_project(project)
     opened.check_mesh()
     return opened.mesh, opened.choices.keywords(), lambda result: with_warnings(result, opened.choices)
+
+
+_PATH = click.Path(path_type=Path)
+
+
+@click.command(short_help="Bake the textures of a model into other UVs.")
+@click.argument("old", type=_PATH)
+@click.argument("new", type=_PATH)
+@click.option(
+    "-o", "--output", type=_PATH, help="File to write: .glb or .png.  [default: NEW's name with _baked]"
+)
+@click.option("--resolution", type=int, default=2048, show_default=True, help="Texels along a side.")
+@click.option("--texture", type=_PATH, help="Image of the UVs of OLD, instead of its materials.")
+@verbosity_options
+def transfer(
+    old: Path,
+    new: Path,
+    output: Path | None,
+    resolution: int,
+    texture: Path | None,
+    verbosity: str | None,
+) -> None:
+    """Bake the textures or vertex colours of OLD into the UVs of NEW, a model of the same shape.
+
+    Colours continue around the charts. A .png gets the base colour only.
+
+    \b
+    Examples:
+      coneflat unwrap chair.glb -o chair_uv.glb
+      coneflat transfer chair.glb chair_uv.glb -o chair_baked.glb
+    """
+    from ... import io
+    from ..transfer import ENDINGS
+    from ..transfer import transfer as bake
+    from .run import Console, require_distinct
+
+    output = output or Path(f"{new.stem}_baked.glb")
+    io.checked_target(output, ENDINGS, "textures are written as")
+    require_distinct({"old model": old, "new model": new, "texture": texture, "output": output})
+    with Console(verbosity) as console:
+        with console.stage("bake", 0.0):
+            baked = bake(old, new, resolution=resolution, texture=texture)
+        with console.stage("write"):
+            baked.save(output)
+        console.say(f"note: {note}" for note in baked.notes)
+        console.finish([output])

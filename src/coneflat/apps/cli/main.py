@@ -15,7 +15,7 @@ from ... import ConeflatError, __version__
 from .batch import batch
 from .cones import cones
 from .figure import demo, figure
-from .flatten import flatten, unwrap
+from .flatten import flatten, transfer, unwrap
 from .measure import measure
 from .peers import compare
 from .quads import quads
@@ -33,7 +33,9 @@ def cli() -> None:
     """Flatten triangle meshes into the plane: conformal UV maps with automatic cones and seams."""
 
 
-for command in (flatten, unwrap, batch, quads, measure, cones, figure, view, studio, compare, demo):
+for command in (
+    flatten, unwrap, transfer, batch, quads, measure, cones, figure, view, studio, compare, demo,
+):  # fmt: skip
     cli.add_command(command)
 
 
