@@ -33,14 +33,15 @@ CEILINGS = {
     "apps": 0,
     "apps.ahead": 37,
     "apps.batch": 398,
-    "apps.cli": 1560,
+    "apps.cli": 1625,
     "apps.measure_uv": 160,
     "apps.peers": 478,
     "apps.quads": 3322,
     "apps.studio": 1741,
     "apps.transfer": 313,
+    "apps.brains": 261,
     "apps.unwrap": 885,
-    "apps.view": 1623,
+    "apps.view": 1628,
     "atlas": 1492,
     "base": 328,
     "cone_curve": 108,
@@ -49,7 +50,7 @@ CEILINGS = {
     "flatten": 222,
     "flattener": 35,
     "geometry": 1587,
-    "io": 2828,
+    "io": 2923,
     "layout": 2218,
     "linalg": 453,
     "measure": 851,
@@ -64,8 +65,8 @@ CEILINGS = {
     "xatlas": 2,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_827, 238, 26_343
-CONSTANTS, KERNELS, NAMES, LEVELS = 300, 113, 30, 8
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_922, 244, 26_770
+CONSTANTS, KERNELS, NAMES, LEVELS = 303, 113, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
 

@@ -1,5 +1,6 @@
 """Reading of meshes from files, and writing of flattened meshes to files."""
 
+from .brains import VALUES, nibabel, read_label, read_vertex_values
 from .files import (
     PIPE,
     as_path,
@@ -46,6 +47,7 @@ __all__ = [
     "LIGHT_CELL",
     "MATERIAL",
     "UVMesh",
+    "VALUES",
     "OUTPUT_FORMATS",
     "PIPE",
     "Texture",
@@ -67,15 +69,18 @@ __all__ = [
     "known_ending",
     "lines_of",
     "make_folder",
+    "nibabel",
     "number",
     "parse_obj",
     "read_archive",
     "read_bytes",
     "read_flattening",
     "read_joined",
+    "read_label",
     "read_mesh",
     "read_mesh_from",
     "read_picture",
+    "read_vertex_values",
     "remove_unfinished",
     "shading_normals",
     "split_at_seams",

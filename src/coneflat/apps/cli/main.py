@@ -13,6 +13,7 @@ import click
 
 from ... import ConeflatError, __version__
 from .batch import batch
+from .brain import brain
 from .cones import cones
 from .figure import demo, figure
 from .flatten import flatten, transfer, unwrap
@@ -34,7 +35,7 @@ def cli() -> None:
 
 
 for command in (
-    flatten, unwrap, transfer, batch, quads, measure, cones, figure, view, studio, compare, demo,
+    flatten, unwrap, transfer, batch, brain, quads, measure, cones, figure, view, studio, compare, demo,
 ):  # fmt: skip
     cli.add_command(command)
 
