@@ -126,6 +126,10 @@ def test_colours_of_ten_models_arrive(name, tmp_path):
 def test_vertex_colours_arrive_on_other_triangles(folder, tmp_path):
     fine = tmp_path / "fine.glb"
     fine.write_bytes(model(torus, count=150, image=False, colours=True))
+    coneflat.flatten(str(fine), repair=True).save(tmp_path / "coloured.glb")
+    out = transfer(folder / "old.glb", tmp_path / "coloured.glb", resolution=16).save(tmp_path / "out.glb")
+    primitive = coneflat.read_mesh(out).scene.data.tree["meshes"][0]["primitives"][0]
+    assert "COLOR_0" not in primitive["attributes"]  # viewers would multiply the image by it
     baked = transfer(fine, folder / "new.glb", resolution=256)
     assert mean_difference(baked.save(tmp_path / "out.glb")) < 4.0
     assert baked.notes == ()

@@ -99,7 +99,7 @@ def transfer(
     side = int(Number(1, MAX_RESOLUTION, is_integer=True).parse("resolution", resolution) or 1)
     painted = Painted(as_path(old), None if texture is None else as_path(texture))
     new = as_path(new)
-    target = io.uv_mesh_of(io.read_joined(new, False)) if new.suffix.lower() != ".npz" else io.as_uv_mesh(new)
+    target = io.as_uv_mesh(new, weld=False)
     known = np.flatnonzero(target.has_uv)
     corner_uv = target.corner_uv[known]
     if corner_uv.min(initial=0) < -1 / side or corner_uv.max(initial=1) > 1 + 1 / side:
@@ -113,13 +113,13 @@ def transfer(
         raise OptionError(f"no texel of {side} x {side} is in a triangle of {new}: raise the resolution")
     images, farthest = _bake(painted, target.vertices[target.faces[known]], texels, owner)
     source = distance_transform_edt(owner < 0, return_distances=False, return_indices=True)
-    notes = []
+    notes = list(target.notes)
     if twice:
         notes.append(f"UVs overlap: {twice:,} texels are in several triangles, and show one of them.")
     if farthest > FAR:
         notes.append(f"The models differ: points are up to {farthest:.1%} of the size from the old surface.")
     filled = {channel.name: image[tuple(source)] for channel, image in images.items()}
-    return Baked(filled, _material(painted, filled), (*target.notes, *notes), new, target)
+    return Baked(filled, _material(painted, filled), tuple(notes), new, target)
 
 
 def _bake(
@@ -214,7 +214,9 @@ def _material(painted: Painted, names: Collection[str]) -> dict[str, Any]:
 
 def _with_material(baked: Baked) -> io.Glb:
     """Return the model as GLB, with one material instead of its own."""
-    if baked.model.suffix.lower() == ".glb":
+    source = baked.uv_mesh.source
+    scene = None if source is None else source.scene
+    if scene is not None and baked.model.suffix.lower() == ".glb" and len(scene.data.tree["buffers"]) == 1:
         content = io.read_bytes(baked.model)
     else:
         stream = BytesIO()
@@ -239,5 +241,6 @@ def _with_material(baked: Baked) -> io.Glb:
     for mesh in tree["meshes"]:
         for primitive in mesh["primitives"]:
             primitive["material"] = 0
+            primitive["attributes"].pop("COLOR_0", None)  # it is in the image
             primitive.get("extensions", {}).pop("KHR_materials_variants", None)
     return glb
