@@ -38,7 +38,7 @@ CEILINGS = {
     "apps.peers": 478,
     "apps.quads": 3322,
     "apps.studio": 1741,
-    "apps.transfer": 316,
+    "apps.transfer": 317,
     "apps.brains": 261,
     "apps.pyvista": 26,
     "apps.unwrap": 885,
@@ -66,7 +66,7 @@ CEILINGS = {
     "xatlas": 2,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_922, 245, 26_799
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_922, 245, 26_800
 CONSTANTS, KERNELS, NAMES, LEVELS = 303, 113, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -158,7 +158,10 @@ def test_normal_maps_turn_with_the_uvs(tmp_path):
     make.tree |= {
         "images": [{"bufferView": make.view(stream.getvalue()), "mimeType": "image/png"}],
         "textures": [{"source": 0}],
-        "materials": [{"normalTexture": {"index": 0}, "alphaMode": "MASK", "emissiveFactor": [1, 0, 0]}, {}],
+        "materials": [
+            {"normalTexture": {"index": 0, "scale": 0.5}, "alphaMode": "MASK", "emissiveFactor": [1, 0, 0]},
+            {},
+        ],
         "nodes": [{"mesh": 0}],
         "scenes": [{"nodes": [0]}],
     }
@@ -172,8 +175,8 @@ def test_normal_maps_turn_with_the_uvs(tmp_path):
         (tmp_path / f"{name}.glb").write_bytes(make.glb())
     baked = transfer(tmp_path / "old.glb", tmp_path / "new.glb", resolution=8)
     normal = baked.images["normalTexture"]
-    # The normal pointed along x, which is downwards in the new image.
-    assert np.abs(normal[..., :3].astype(int) - [128, 0, 128]).max() <= 1
+    # The normal pointed along x, which is downwards in the new image; its scale is a half.
+    assert np.abs(normal[..., :3].astype(int) - [128, 64, 192]).max() <= 1
     assert (baked.material["alphaMode"], baked.material["emissiveFactor"]) == ("MASK", [1, 0, 0])
     tree = coneflat.read_mesh(baked.save(tmp_path / "out.glb")).scene.data.tree
     assert (len(tree["images"]), len(tree["materials"])) == (2, 1)

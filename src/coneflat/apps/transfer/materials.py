@@ -152,7 +152,9 @@ class Painted:
         for i in self.used:
             own, slot = np.flatnonzero(self.material[faces] == i), self.value(channel.name, i)
             if slot:
-                values[own] = self._sampled(slot, faces[own], weights[own], channel.is_colour)
+                sampled = self._sampled(slot, faces[own], weights[own], channel.is_colour)
+                # Normals have a scale, and occlusion has a strength.
+                values[own] += slot.get("scale", slot.get("strength", 1.0)) * (sampled - values[own])
             values[own] *= self.factor(channel, i)
         if channel is BASE and self.colours is not None:
             values *= np.einsum("qi,qic->qc", weights, self.colours[faces])
