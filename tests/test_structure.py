@@ -34,13 +34,17 @@ CEILINGS = {
     "apps.ahead": 37,
     "apps.batch": 398,
     "apps.blender": 885,
-    "apps.cli": 1537,
+    "apps.cli": 1525,
     "apps.measure_uv": 160,
-    "apps.peers": 478,
-    "apps.quads": 3249,
+    "apps.peers": 470,
+    "apps.quads": 3322,
     "apps.studio": 1741,
+    "apps.transfer": 317,
+    "apps.brains": 344,
+    "apps.cli.more": 83,
+    "apps.pyvista": 26,
     "apps.unwrap": 1095,
-    "apps.view": 1623,
+    "apps.view": 1591,
     "atlas": 1492,
     "base": 328,
     "cone_curve": 108,
@@ -49,10 +53,10 @@ CEILINGS = {
     "flatten": 221,
     "flattener": 35,
     "geometry": 1587,
-    "io": 2805,
+    "io": 2795,
     "layout": 2218,
     "linalg": 453,
-    "measure": 844,
+    "measure": 829,
     "mesh": 710,
     "metric": 999,
     "options": 553,
@@ -64,10 +68,18 @@ CEILINGS = {
     "xatlas": 2,
 }
 #: Applications with a ceiling of their own, which the ceilings of everything else leave out.
-OWN_CEILING = ("apps.unwrap", "apps.blender", "apps.brains", "apps.transfer")
+OWN_CEILING = (
+    "apps.cli.more",
+    "apps.unwrap",
+    "apps.quads",
+    "apps.blender",
+    "apps.brains",
+    "apps.pyvista",
+    "apps.transfer",
+)
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_804, 226, 25_015
-CONSTANTS, KERNELS, NAMES, LEVELS = 273, 110, 30, 8
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_770, 203, 21_690
+CONSTANTS, KERNELS, NAMES, LEVELS = 259, 101, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
 

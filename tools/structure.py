@@ -50,6 +50,8 @@ HOLDS = {
     "xatlas": "the interface of xatlas",
     "__main__": "python -m coneflat",
 }
+#: Files whose lines count as those of another package, or as their own.
+COUNTED_AS = {"io.brains": "apps.brains", "apps.cli.more": "apps.cli.more"}
 
 
 @dataclass(frozen=True)
@@ -134,10 +136,10 @@ def package_of(name: str) -> str:
 
 
 def sizes(package: Path = PACKAGE) -> dict[str, Size]:
-    """Return the sizes of the packages."""
+    """Return the sizes of the packages; the formats of brains count as that application."""
     found: dict[str, Size] = {}
     for name, module in read_modules(package).items():
-        key = package_of(name)
+        key = COUNTED_AS.get(name) or package_of(name)
         found[key] = found.get(key, Size(0, 0, 0, 0)) + size_of(module.path)
     return found
 

@@ -154,7 +154,7 @@ class Flattening:
         return to_trimesh(self)
 
     def to_pyvista(self) -> pyvista.PolyData:
-        """Return a PyVista surface with active texture coordinates, whose points are split at seams.
+        """Return a PyVista surface with 32-bit active texture coordinates, whose points are split at seams.
 
         The point data `vertex` is the vertex of the result, the cell data `chart` the chart.
 

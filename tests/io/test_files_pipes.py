@@ -11,6 +11,7 @@ import coneflat
 from coneflat.apps.cli.main import cli
 from coneflat.errors import MeshFileError
 from coneflat.io import INPUT_FORMATS, read_mesh_from
+from coneflat.io.brains import FREESURFER
 
 trimesh = pytest.importorskip("trimesh")
 
@@ -33,7 +34,7 @@ def contents():
 
 
 def test_content_tells_the_format(contents):
-    assert {ending.split()[0] for ending in contents} == set(INPUT_FORMATS) - {".gltf"}
+    assert {ending.split()[0] for ending in contents} == set(INPUT_FORMATS) - {".gltf", ".gii", *FREESURFER}
     for ending, content in contents.items():
         there = read_mesh_from(content, "-", weld=False)
         here = read_mesh_from(content, "a", weld=False, ending=ending.split()[0])

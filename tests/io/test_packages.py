@@ -34,6 +34,11 @@ class TestTrimesh:
         check(result, mesh.vertices, mesh.faces, mesh.visual.uv, mesh.vertex_attributes["vertex"])
         np.testing.assert_array_equal(mesh.face_attributes["chart"], result.seam_data.face_chart)
 
+    def test_what_it_exports_has_uvs(self, result, tmp_path):
+        pytest.importorskip("trimesh")
+        result.to_trimesh().export(tmp_path / "out.glb")
+        assert len(coneflat.read_mesh(tmp_path / "out.glb").uv) == len(result.uv)
+
 
 class TestMeshio:
     def test_uvs_survive(self, result):
@@ -56,10 +61,23 @@ class TestPyVista:
         mesh = result.to_pyvista()
         padded = mesh.faces.reshape(-1, 4)
         assert (padded[:, 0] == 3).all()
-        check(result, mesh.points, padded[:, 1:], mesh.active_texture_coordinates, mesh.point_data["vertex"])
+        uv = result.uv[result.uv_faces].astype(np.float32)
+        assert np.array_equal(mesh.active_texture_coordinates[padded[:, 1:]], uv)
+        assert np.array_equal(mesh.points[padded[:, 1:]], result.vertices[result.faces])
+        assert np.array_equal(mesh.point_data["vertex"][padded[:, 1:]], result.faces)
         np.testing.assert_array_equal(mesh.cell_data["chart"], result.seam_data.face_chart)
         again = coneflat.flatten(mesh)
         assert len(again.faces) == len(result.faces)
+
+    def test_uvs_survive(self, result):
+        pyvista = pytest.importorskip("pyvista")
+        mesh = result.to_pyvista()
+        assert isinstance(mesh, pyvista.PolyData)
+        faces = mesh.faces.reshape(-1, 4)[:, 1:]
+        assert np.array_equal(mesh.points[faces], result.vertices[result.faces])
+        assert np.array_equal(mesh.active_texture_coordinates[faces], result.corner_uv.astype(np.float32))
+        assert np.array_equal(mesh.point_data["vertex"][faces], result.faces)
+        assert len(coneflat.flatten(mesh).faces) == len(result.faces)
 
 
 @pytest.mark.parametrize("module", ["trimesh", "pyvista", "meshio"])

@@ -1,5 +1,6 @@
 """Reading of meshes from files, and writing of flattened meshes to files."""
 
+from .brains import VALUES, nibabel, read_label, read_vertex_values
 from .files import (
     PIPE,
     as_path,
@@ -20,55 +21,26 @@ from .packages import as_input
 from .ply import write_parts
 from .read import INPUT_FORMATS, find_meshes, read_joined, read_mesh, read_mesh_from
 from .split import shading_normals, split_at_seams
-from .texture import CELLS, DARK_CELL, LIGHT_CELL, Texture, cell_side, check_cells, read_picture
+from .texture import (
+    CELLS,
+    DARK_CELL,
+    LIGHT_CELL,
+    Texture,
+    cell_side,
+    check_cells,
+    decode_image,
+    encode_png,
+    read_picture,
+)
 from .write import OUTPUT_FORMATS, as_written, check_output, write_flattening, write_measured, write_stream
 
 __all__ = [
-    "uv_mesh_of",
-    "CELLS",
-    "CheckedArrays",
-    "DARK_CELL",
-    "FOR_INDICES",
-    "FOR_VERTICES",
-    "Glb",
-    "INPUT_FORMATS",
-    "Joined",
-    "LIGHT_CELL",
-    "MATERIAL",
-    "UVMesh",
-    "OUTPUT_FORMATS",
-    "PIPE",
-    "Texture",
-    "as_input",
-    "as_uv_mesh",
-    "as_path",
-    "as_written",
-    "atomic_write",
-    "bounds",
-    "cell_side",
-    "check_cells",
-    "check_output",
-    "check_target",
-    "checked_target",
-    "find_meshes",
-    "has_uv",
-    "known_ending",
-    "lines_of",
-    "make_folder",
-    "number",
-    "parse_obj",
-    "read_archive",
-    "read_bytes",
-    "read_flattening",
-    "read_joined",
-    "read_mesh",
-    "read_mesh_from",
-    "read_picture",
-    "remove_unfinished",
-    "shading_normals",
-    "split_at_seams",
-    "write_flattening",
-    "write_measured",
-    "write_parts",
+    "uv_mesh_of", "CELLS", "CheckedArrays", "DARK_CELL", "FOR_INDICES", "FOR_VERTICES", "Glb", "INPUT_FORMATS",
+    "Joined", "LIGHT_CELL", "MATERIAL", "UVMesh", "VALUES", "OUTPUT_FORMATS", "PIPE", "Texture", "as_input",
+    "as_uv_mesh", "as_path", "as_written", "atomic_write", "bounds", "cell_side", "check_cells", "check_output",
+    "check_target", "checked_target", "decode_image", "encode_png", "find_meshes", "has_uv", "known_ending",
+    "lines_of", "make_folder", "nibabel", "number", "parse_obj", "read_archive", "read_bytes", "read_flattening",
+    "read_joined", "read_label", "read_mesh", "read_mesh_from", "read_picture", "read_vertex_values",
+    "remove_unfinished", "shading_normals", "split_at_seams", "write_flattening", "write_measured", "write_parts",
     "write_stream",
-]
+]  # fmt: skip

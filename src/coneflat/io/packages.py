@@ -108,7 +108,7 @@ def to_trimesh(result: Flattening) -> Any:
         split.vertices,
         split.faces,
         visual=trimesh.visual.TextureVisuals(uv=split.uv),
-        vertex_attributes={"vertex": split.own},
+        vertex_attributes={"vertex": split.own.astype(np.uint32)},  # the integers of glTF
         face_attributes={"chart": result.seam_data.face_chart},
         process=False,
     )
@@ -123,7 +123,8 @@ def to_pyvista(result: Flattening) -> Any:
     mesh = pyvista.PolyData(split.vertices, padded.ravel())
     mesh.point_data["vertex"] = split.own
     mesh.cell_data["chart"] = result.seam_data.face_chart
-    mesh.active_texture_coordinates = split.uv
+    # VTK's writer of PLY crashes at 64-bit texture coordinates.
+    mesh.active_texture_coordinates = split.uv.astype(np.float32)
     return mesh
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from ..base.text import short_repr
 from ..errors import EmptyMeshError, MeshFileError, OptionError, UnknownFormatError
 from ..mesh.check import weld as weld_vertices
+from .brains import FREESURFER, is_freesurfer, is_gifti, parse_freesurfer, parse_gifti
 from .files import PIPE, PathName, as_path, known_ending, read_bytes, read_input, readable
 from .gltf.read import parse_gltf
 from .join import Joined, join_borders
@@ -31,6 +32,8 @@ _READERS: dict[str, Callable[[Path, bytes], MeshFile]] = {
     ".off": parse_off,
     ".gltf": parse_gltf,
     ".glb": parse_gltf,
+    ".gii": parse_gifti,
+    **dict.fromkeys(FREESURFER, parse_freesurfer),
 }
 #: STL has no shared vertices; glTF repeats a vertex wherever a normal or a UV differs.
 _WELDED_BY_DEFAULT = {".stl", ".gltf", ".glb"}
@@ -42,8 +45,9 @@ INPUT_FORMATS = tuple(_READERS)
 def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
     """Return the mesh of a file, with its polygons, in the file's own order of vertices and faces.
 
-    The format is given by the path's ending, in upper or lower case: .obj, .ply, .stl, .off, .gltf, .glb. All meshes of
-    a glTF scene are combined, each transformed by its nodes. NaN and infinite coordinates are not rejected here.
+    The format is given by the path's ending, in upper or lower case: .obj, .ply, .stl, .off, .gltf, .glb; .gii and
+    names such as lh.pial for brains. All meshes of a glTF scene are combined, each transformed by its nodes. NaN and
+    infinite coordinates are not rejected here.
 
     OBJ, OFF, PLY and STL have parsers in this package, because libraries renumber vertices, split polygons, or drop the
     groups, materials and comments that are needed to write an OBJ.
@@ -127,6 +131,10 @@ def format_of(content: bytes) -> str:
     head = content[:512].removeprefix(b"\xef\xbb\xbf").lstrip()
     if content.startswith(b"glTF"):
         return ".glb"
+    if is_freesurfer(content):
+        return FREESURFER[0]
+    if is_gifti(content):
+        return ".gii"
     if head.startswith(b"{"):
         return ".gltf"
     if content.startswith(b"ply"):

@@ -6,6 +6,7 @@ from io import BytesIO
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.arrays import FloatArray, IntArray
 from ..errors import MeshFileError, OptionError
@@ -76,19 +77,37 @@ def find_texture(texture: PathName, result: Flattening | None = None) -> Texture
         OptionError: Pillow is not installed.
         MeshFileError: the file does not exist, or is not an image.
     """
-    try:
-        from PIL import Image
-    except ImportError as error:
-        raise OptionError('textures need Pillow: pip install "coneflat[figures]"') from error
+    pillow = _pillow()
     if isinstance(texture, str) and texture == "checker":
-        return None if result is None else _checkerboard(result, Image)
+        return None if result is None else _checkerboard(result, pillow)
     path = as_path(texture)
     content = read_bytes(path)
-    with readable(path, "image"), Image.open(BytesIO(content)) as image:
+    with readable(path, "image"), pillow.open(BytesIO(content)) as image:
         image.load()
         if image.format in EMBEDDED and image.mode != "CMYK":
             return Texture(content, EMBEDDED[image.format])
         return Texture(_png(image.convert("RGBA")), EMBEDDED["PNG"])
+
+
+def decode_image(content: bytes, name: PathName) -> NDArray[np.uint8]:
+    """Return (h, w, 4) the RGBA of the content of an image file; `name` is for messages.
+
+    Raises:
+        OptionError: Pillow is not installed.
+        MeshFileError: it is not an image that Pillow reads.
+    """
+    with readable(as_path(name), "image"), _pillow().open(BytesIO(content)) as image:
+        return np.asarray(image.convert("RGBA"))
+
+
+def encode_png(pixels: NDArray[np.uint8]) -> Texture:
+    """Return (h, w, 4) RGBA as a PNG file, without alpha if nothing is transparent.
+
+    Raises:
+        OptionError: Pillow is not installed.
+    """
+    shown = pixels if pixels[..., 3].min() < 255 else np.ascontiguousarray(pixels[..., :3])
+    return Texture(_png(_pillow().fromarray(shown)), EMBEDDED["PNG"])
 
 
 def image_kind(content: bytes) -> str | None:
@@ -113,6 +132,14 @@ def read_picture(path: PathName) -> Texture:
         size = f"{len(content) / 2**20:.0f} MiB; the limit for a page is {MAX_BYTES / 2**20:.0f}"
         raise MeshFileError(f"the picture {path} has {size}")
     return Texture(content, kind)
+
+
+def _pillow() -> Any:
+    try:
+        from PIL import Image
+    except ImportError as error:
+        raise OptionError('textures need Pillow: pip install "coneflat[figures]"') from error
+    return Image
 
 
 def _checkerboard(result: Flattening, image: Any) -> Texture:

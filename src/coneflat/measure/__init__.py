@@ -16,25 +16,10 @@ if TYPE_CHECKING:
     from .report import MAP_MEASURES, Row, as_rows, map_rows, number_text, packing_row, path_text
 
 __all__ = [
-    "as_rows",
-    "angle_sum_errors",
-    "Distortion",
-    "MAP_MEASURES",
-    "REPORTED",
-    "Requirement",
-    "Row",
-    "breaches",
-    "unmet_guarantees",
-    "map_rows",
-    "measure",
-    "measure_map",
-    "number_text",
-    "packing_row",
-    "parse_requirements",
-    "path_text",
-    "quantile",
-    "sum_angles",
-]
+    "as_rows", "angle_sum_errors", "Distortion", "MAP_MEASURES", "REPORTED", "Requirement", "Row", "breaches",
+    "unmet_guarantees", "map_rows", "measure", "measure_map", "number_text", "packing_row", "parse_requirements",
+    "path_text", "quantile", "sum_angles",
+]  # fmt: skip
 
 _DISTORTION = ("angle_sum_errors", "Distortion", "measure", "measure_map", "quantile", "sum_angles")
 

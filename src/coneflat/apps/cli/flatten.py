@@ -1,4 +1,4 @@
-"""`coneflat flatten` and `coneflat unwrap`."""
+"""`coneflat flatten`, `coneflat unwrap` and `coneflat transfer`."""
 
 from __future__ import annotations
 

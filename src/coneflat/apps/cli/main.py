@@ -17,10 +17,11 @@ from .cones import cones
 from .figure import demo, figure
 from .flatten import flatten, unwrap
 from .measure import measure
+from .more import blender, brain, transfer
 from .peers import compare
 from .quads import quads
 from .shared import ExitCode
-from .view import blender, studio, view
+from .view import studio, view
 
 
 class Interrupted(KeyboardInterrupt):
@@ -33,7 +34,9 @@ def cli() -> None:
     """Flatten triangle meshes into the plane: conformal UV maps with automatic cones and seams."""
 
 
-for command in (flatten, unwrap, batch, quads, measure, cones, figure, view, studio, blender, compare, demo):
+for command in (
+    flatten, unwrap, transfer, batch, brain, quads, measure, cones, figure, view, studio, blender, compare, demo
+):  # fmt: skip
     cli.add_command(command)
 
 

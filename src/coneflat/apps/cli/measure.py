@@ -19,11 +19,13 @@ if TYPE_CHECKING:
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--report", type=click.Path(path_type=Path), help="JSON file for all measures.")
 @click.option("--json", "as_json", is_flag=True, help="Print all measures as JSON instead of a table.")
+@click.option("--surface", type=click.Path(path_type=Path), help="Brain surface of which FILE is a flat map.")
 @require_option
 @input_options
 @verbosity_options
 def measure(
     file: Path,
+    surface: Path | None,
     report: Path | None,
     as_json: bool,
     required: tuple[str, ...],
@@ -41,26 +43,32 @@ def measure(
     """
     from ...io import as_uv_mesh, check_target
     from ...measure import parse_requirements
+    from ..brains import FLAT_MEASURES, measure_flat, read_flat
     from ..measure_uv import MEASURED, measure_mapped
     from .run import Console, require_distinct, write_report
 
-    requirements = parse_requirements(required, MEASURED)
+    requirements = parse_requirements(required, MEASURED if surface is None else (*MEASURED, *FLAT_MEASURES))
     if report is not None:
         check_target(report)
     require_distinct({"input": file, "report": report})
     with Console(verbosity) as console:
         with console.stage("read", 0.0):
-            mapped = as_uv_mesh(file, weld=weld)
+            mapped = as_uv_mesh(file, weld=weld) if surface is None else read_flat(file, surface)
+        flat = None
         with console.stage("measure", 0.3):
-            measured = measure_mapped(mapped, strict=not repair)
-        found = measured.report()
+            if surface is None:
+                measured = measure_mapped(mapped, strict=not repair)
+            else:
+                flat = measure_flat(mapped, strict=not repair)
+                measured = flat.uv
+        found = measured.report() if flat is None else flat.report()
         if report is not None:
             write_report(report, found)
         if as_json and verbosity != QUIET:
             click.echo(json.dumps(found, indent=2))
         elif not as_json:
             console.say(f"note: {note}" for note in measured.notes)
-            console.table(rows_of_measures(measured))
+            console.table([*([] if flat is None else flat.rows()), *rows_of_measures(measured)])
             console.finish([] if report is None else [report])
     check_required(requirements, found)
 

@@ -32,7 +32,7 @@ AGAIN = "--again flattens the mesh again"
 
 #: The rows that are always printed, in this order; the others are printed if verbose.
 FIRST_ROWS = (
-    "charts", "overlap", "flipped", "texture", "texel density", "seam length", "QC distortion", "energy", "cones",
+    "charts", "overlap", "flipped", "texture", "texel density", "seam length", "QC distortion", "energy", "cones"
 )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""`coneflat view` and `coneflat studio`, the pages in the browser, and `coneflat blender`."""
+"""`coneflat view` and `coneflat studio`: the pages in the browser."""
 
 from __future__ import annotations
 
@@ -20,8 +20,6 @@ from .shared import (
     up_option,
     verbosity_options,
 )
-
-ZIP = "coneflat_blender.zip"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,20 +147,3 @@ def studio(
 
     log = click.echo if verbosity == VERBOSE else None
     run_studio(file, port, opens=not no_open, say=say, log=log, color=color, most_triangles=most_triangles)
-
-
-@click.command(short_help="Write the Blender extension.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), default=ZIP, show_default=True)
-def blender(output: Path) -> None:
-    """Write the extension for Blender 4.2 or later as a zip.
-
-    Blender installs it by Edit > Preferences > Get Extensions > Install from Disk, or when it is dropped on its window.
-    The commands are then in the menu UV, and in the tab coneflat of the sidebar.
-
-    \b
-    Example:
-      coneflat blender -o coneflat_blender.zip
-    """
-    from ..blender import build_extension
-
-    click.echo(f"wrote {build_extension(output)}")

@@ -5,50 +5,140 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from ...base import FloatArray, IntArray, compiled, dots
+from ...base import FloatArray, IntArray, compiled
+from ...geometry import face_normals
 
-# Points whose nearest triangles are found at once, which bounds memory.
-POINTS_AT_ONCE = 20_000
+#: Triangles per leaf of the tree; fewer make the tree deeper, more make each leaf slower.
+LEAF = 4
+#: A triangle that faces away from the normal of a point counts as farther by this fraction of the model's diagonal,
+#: so that the two sides of a thin wall are not confused.
+OPPOSITE = 0.01
 
 
-def surface_distances(vertices: FloatArray, faces: IntArray, queries: FloatArray) -> FloatArray:
-    """Return (q,) the exact distances of points from a surface.
-
-    A triangle can only be nearest if its centroid is not farther away than the nearest vertex plus its own radius.
-    Triangles are searched in groups of similar radius, the smallest first.
+class TriangleTree:
+    """A binary tree of boxes around triangles; node i has the children 2 i + 1 and 2 i + 2.
 
     Args:
         vertices, faces: (n, 3), (m, 3) the surface.
-        queries: (q, 3) points.
     """
-    corners = np.ascontiguousarray(vertices[faces], dtype=np.float64)
-    centres = corners.mean(axis=1)
-    radii = np.sqrt(dots(corners - centres[:, None], corners - centres[:, None]).max(axis=1))
-    group = np.frexp(radii)[1]
-    best = cKDTree(corners.reshape(-1, 3)).query(queries)[0]
-    for own in (np.flatnonzero(group == one) for one in np.unique(group)):
-        tree, most = cKDTree(centres[own]), 1.0001 * radii[own].max()
-        for block in (slice(k, k + POINTS_AT_ONCE) for k in range(0, len(queries), POINTS_AT_ONCE)):
-            near = tree.query_ball_point(queries[block], best[block] + most)
-            ends = np.cumsum([len(one) for one in near])
-            candidates = own[np.concatenate([*near, []]).astype(np.int64)]
-            _lower(corners, candidates, ends, queries[block], best[block])
-    return best
+
+    def __init__(self, vertices: FloatArray, faces: IntArray) -> None:
+        corners = np.ascontiguousarray(vertices[faces])
+        centres, count = corners.mean(axis=1), len(faces)
+        self._levels = max(int(np.ceil(np.log2(count / LEAF))), 0)
+        order = np.arange(count)
+        for level in range(self._levels):
+            start = self._starts(level, count)
+            sizes = np.diff(start)
+            spread = np.maximum.reduceat(centres[order], start[:-1]) - np.minimum.reduceat(
+                centres[order], start[:-1]
+            )
+            axis = np.repeat(spread.argmax(axis=1), sizes)
+            order = order[np.lexsort((centres[order, axis], np.repeat(np.arange(len(sizes)), sizes)))]
+        self._order, self._leaves = order, self._starts(self._levels, count)
+        low = np.minimum.reduceat(corners.min(axis=1)[order], self._leaves[:-1])
+        high = np.maximum.reduceat(corners.max(axis=1)[order], self._leaves[:-1])
+        boxes = [np.stack([low, high], axis=1)]
+        for _ in range(self._levels):
+            below = boxes[0].reshape(-1, 2, 2, 3)
+            boxes.insert(0, np.stack([below[:, :, 0].min(axis=1), below[:, :, 1].max(axis=1)], axis=1))
+        self._boxes = np.concatenate(boxes)
+        self._corners, self._normals = corners, face_normals(vertices, faces)
+        self.diagonal = float(np.linalg.norm(np.ptp(corners.reshape(-1, 3), axis=0)))
+
+    @staticmethod
+    def _starts(level: int, count: int) -> IntArray:
+        """Return (2^level + 1,) where the triangles of each node of a level begin, and the end."""
+        return (np.arange(2**level + 1) * count) >> level
+
+    def nearest(self, points: FloatArray, normals: FloatArray | None = None) -> tuple[IntArray, FloatArray]:
+        """Return (q,) the triangles nearest to points, and (q, 3) the barycentric coordinates of the nearest points.
+
+        Args:
+            points: (q, 3), the faster the closer each is to the one before.
+            normals: (q, 3) direction to which the surface of each point faces; triangles that face away are avoided.
+        """
+        normals = np.zeros_like(points) if normals is None else normals
+        found, weights = np.empty(len(points), np.int64), np.empty((len(points), 3))
+        _search(
+            self._boxes, self._leaves, self._order, self._corners, self._normals,
+            (OPPOSITE * self.diagonal) ** 2, points, normals, found, weights,
+        )  # fmt: skip
+        return found, weights
 
 
 @compiled
-def _lower(
-    corners: FloatArray, candidates: IntArray, ends: IntArray, queries: FloatArray, best: FloatArray
+def _search(
+    boxes: FloatArray,
+    leaves: IntArray,
+    order: IntArray,
+    corners: FloatArray,
+    normals: FloatArray,
+    opposite: float,
+    points: FloatArray,
+    directions: FloatArray,
+    found: IntArray,
+    weights: FloatArray,
 ) -> None:
-    """Lower the distances of points to those from their candidates, which end at `ends` for each point."""
-    weights, k = np.empty(3), 0
-    for q in range(len(queries)):
-        while k < ends[q]:
-            c = corners[candidates[k]]
-            best[q] = min(best[q], np.sqrt(nearest_in_triangle(queries[q], c[0], c[1], c[2], weights)))
-            k += 1
+    """Find the nearest triangle of each point, depth first, the nearer child first."""
+    first_leaf = len(leaves) - 2
+    stack, trial = np.empty(128, np.int64), np.empty(3)
+    last = order[0]
+    for q in range(len(points)):
+        # The triangle of the point before gives a first bound.
+        best = _square_to(corners[last], normals[last], points[q], directions[q], opposite, trial)
+        found[q], weights[q] = last, trial
+        stack[0], size = 0, 1
+        while size > 0:
+            size -= 1
+            node = stack[size]
+            if _square_to_box(boxes[node], points[q]) > best:
+                continue
+            if node < first_leaf:
+                left, right = 2 * node + 1, 2 * node + 2
+                if _square_to_box(boxes[left], points[q]) < _square_to_box(boxes[right], points[q]):
+                    left, right = right, left
+                stack[size], stack[size + 1] = left, right
+                size += 2
+                continue
+            for k in range(leaves[node - first_leaf], leaves[node - first_leaf + 1]):
+                f = order[k]
+                square = _square_to(corners[f], normals[f], points[q], directions[q], opposite, trial)
+                if square <= best:
+                    best, found[q], weights[q] = square, f, trial
+        last = found[q]
+
+
+@compiled
+def _square_to(
+    corners: FloatArray,
+    normal: FloatArray,
+    point: FloatArray,
+    direction: FloatArray,
+    opposite: float,
+    weights: FloatArray,
+) -> float:
+    """Return the squared distance of a point from a triangle, more if it faces away, and fill in `weights`."""
+    square = nearest_in_triangle(point, corners[0], corners[1], corners[2], weights)
+    along = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2]
+    return square + opposite if along < 0 else square
+
+
+@compiled
+def _square_to_box(box: FloatArray, point: FloatArray) -> float:
+    total = 0.0
+    for k in range(3):
+        outside = max(box[0, k] - point[k], point[k] - box[1, k], 0.0)
+        total += outside * outside
+    return total
+
+
+def surface_distances(vertices: FloatArray, faces: IntArray, queries: FloatArray) -> FloatArray:
+    """Return (q,) the exact distances of points (q, 3) from a surface of vertices (n, 3) and triangles (m, 3)."""
+    on, weights = TriangleTree(vertices, faces).nearest(queries)
+    points = np.einsum("qi,qix->qx", weights, vertices[faces[on]])
+    return np.asarray(np.linalg.norm(points - queries, axis=1))
 
 
 @compiled

@@ -13,6 +13,7 @@ from ... import TriangleMesh
 from ...base import FloatArray, IntArray, short_repr
 from ...errors import MeshFileError, OptionError
 from ...geometry import angle_defect, corner_angles, double_areas, edge_lengths
+from ...io import VALUES, read_vertex_values
 from ...measure import quantile
 
 if TYPE_CHECKING:
@@ -194,8 +195,9 @@ def own_quantity(result: Flattening, name: str, archive: Path | None = None) -> 
 
     Args:
         result: the flattening on which they are shown.
-        name: name of a vertex property in the file of the mesh (PLY) or of an array in `archive`; path of a .npy file;
-            or FILE.npz:NAME. There is one value for each vertex, or for each triangle, of the result or of the input.
+        name: name of a vertex property in the file of the mesh (PLY) or of an array in `archive`; path of a .npy file,
+            or of values of a brain such as lh.sulc; or FILE.npz:NAME. There is one value for each vertex, or for each
+            triangle, of the result or of the input.
         archive: the .npz file that the result was read from, if any.
 
     Raises:
@@ -230,6 +232,8 @@ def _named(result: Flattening, name: str, archive: Path | None) -> tuple[str, Fl
     path, _, array = name.rpartition(":") if ".npz:" in name.lower() else (name, "", "")
     if Path(path).suffix.lower() in (".npy", ".npz"):
         return array or Path(path).stem, _read(Path(path), array)
+    if Path(name).suffix.lower() in VALUES and Path(name).is_file():
+        return Path(name).name, read_vertex_values(name)
     if archive is not None:
         return name, _read(archive, name)
     has = "it has " + ", ".join(properties) if properties else "it has none"
@@ -260,6 +264,8 @@ def _fitted(result: Flattening, label: str, values: FloatArray) -> tuple[FloatAr
         return values, result.faces
     if count == len(result.faces):
         return values, None
+    if result.source is None and origin is not None and count > origin.max(initial=0):  # from an archive
+        return values[origin], result.faces
     raise OptionError(
         f"{label} has {count:,} numbers, but there are {len(result.vertices):,} vertices and "
         f"{len(result.faces):,} triangles"

@@ -259,7 +259,8 @@ def scene_losses(result: Flattening) -> tuple[str, ...]:
     }
     if painted:
         notes.append(
-            f"The textures of {plural(len(painted), 'material')} are kept, but were made for the old UVs."
+            f"The textures of {plural(len(painted), 'material')} are kept, but were made for the old UVs; `coneflat "
+            "transfer` bakes them into the new ones."
         )
     return tuple(notes)
 

@@ -1,0 +1,102 @@
+"""Files of flat maps: GIFTI surfaces and FreeSurfer's patches, read and written."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from ...base import BoolArray, FloatArray, IntArray
+from ...errors import MeshFileError, OptionError
+from ...io import UVMesh, atomic_write, known_ending, nibabel, read_bytes, read_mesh
+
+#: Endings of flat maps; FreeSurfer's patches, such as lh.flat.patch.3d, have the ending .3d.
+FLAT_FORMATS = (".gii", ".3d")
+_PATCH = np.dtype([("vertex", ">i4"), ("point", ">f4", 3)])
+_SIDES = {
+    "left": r"(^|[._-])(lh|l|left|hemi-l)([._-]|$)",
+    "right": r"(^|[._-])(rh|r|right|hemi-r)([._-]|$)",
+}
+
+
+def side_of(path: Path) -> str:
+    """Return "left", "right" or "", the hemisphere that a file name tells: lh.pial, sub_hemi-R_pial.gii."""
+    found = [side for side, form in _SIDES.items() if re.search(form, path.name.lower())]
+    return found[0] if len(found) == 1 else ""
+
+
+def check_same_side(surface: Path, others: dict[str, Path]) -> None:
+    """Raise OptionError if a file is of the other hemisphere than the surface, by their names."""
+    for what, path in others.items():
+        if {side_of(surface), side_of(path)} == {"left", "right"}:
+            raise OptionError(
+                f"{what} {path} must be of the {side_of(surface)} hemisphere, like {surface}, got the "
+                f"{side_of(path)} one"
+            )
+
+
+def write_gifti(path: Path, points: FloatArray, faces: IntArray, side: str) -> None:
+    """Write a flat map (n, 2) with triangles (m, 3) as a GIFTI surface, z = 0."""
+    package = nibabel()
+    image, gifti = package.GiftiImage(), package.gifti
+    meta = {"GeometricType": "Flat"} | (
+        {"AnatomicalStructurePrimary": f"Cortex{side.title()}"} if side else {}
+    )
+    for values, intent in ((np.pad(points, ((0, 0), (0, 1))), "POINTSET"), (faces, "TRIANGLE")):
+        kind = np.float32 if intent == "POINTSET" else np.int32
+        more = {"meta": gifti.GiftiMetaData(meta)} if intent == "POINTSET" else {}
+        image.add_gifti_data_array(
+            gifti.GiftiDataArray(values.astype(kind), intent=f"NIFTI_INTENT_{intent}", datatype=kind, **more)
+        )
+    with atomic_write(path) as stream:
+        stream.write(image.to_bytes())
+
+
+def write_patch(path: Path, points: FloatArray, vertices: IntArray, is_border: BoolArray) -> None:
+    """Write the vertices (k,) of a surface and their points (n, 2) as a FreeSurfer patch; borders are negative."""
+    rows = np.empty(len(vertices), _PATCH)
+    rows["vertex"] = np.where(is_border, -1 - vertices, vertices + 1)
+    rows["point"] = np.pad(points, ((0, 0), (0, 1)))[vertices]
+    with atomic_write(path) as stream:
+        stream.write(np.array([-1, len(rows)], ">i4").tobytes() + rows.tobytes())
+
+
+def read_flat(path: Path, surface: Path) -> UVMesh:
+    """Return a flat map with the positions of a surface: a GIFTI surface, or a FreeSurfer patch.
+
+    Triangles of a patch are those of the surface whose vertices are all in it.
+
+    Raises:
+        MeshFileError: a file cannot be read.
+        OptionError: the flat map has other vertices than the surface, or is of the other hemisphere.
+    """
+    known_ending(path, FLAT_FORMATS, "flat maps are read from")
+    check_same_side(surface, {"the flat map": path})
+    mesh = read_mesh(surface, weld=False)
+    count, faces = len(mesh.vertices), mesh.triangles
+    points = np.full((count, 2), np.nan)
+    if path.suffix.lower() == ".gii":
+        flat = read_mesh(path, weld=False)
+        faces, vertices, planar = flat.triangles, np.arange(len(flat.vertices)), flat.vertices
+    else:
+        vertices, planar = _read_patch(path)
+    if (len(vertices) and vertices.max() >= count) or (
+        path.suffix.lower() == ".gii" and len(planar) != count
+    ):
+        raise OptionError(
+            f"{path} must be a flat map of {surface} with {count:,} vertices, got {vertices.max() + 1:,}"
+        )
+    points[vertices] = planar[:, :2]
+    faces = faces[np.isfinite(points[faces]).all(axis=(1, 2))]
+    return UVMesh(mesh.vertices, faces, points[faces], len(faces), 0, 0, source=mesh)
+
+
+def _read_patch(path: Path) -> tuple[IntArray, FloatArray]:
+    """Return the (k,) vertices of a patch and their (k, 3) points."""
+    content = read_bytes(path)
+    head = np.frombuffer(content[:8], ">i4") if len(content) >= 8 else np.zeros(2)
+    if head[0] != -1 or len(content) != 8 + _PATCH.itemsize * head[1]:
+        raise MeshFileError(f"{path} must be a FreeSurfer patch, got {len(content):,} bytes that are not")
+    rows = np.frombuffer(content, _PATCH, offset=8)
+    return np.abs(rows["vertex"].astype(np.int64)) - 1, rows["point"].astype(np.float64)

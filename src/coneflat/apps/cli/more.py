@@ -1,0 +1,146 @@
+"""The commands of further applications: `coneflat brain`, `coneflat transfer` and `coneflat blender`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ...options import FORMATS, ConeNumber, RunOptions, option, strength
+from .measure import rows_of_measures
+from .options import flag, keywords, option_flags, path_flag, pop_flags
+from .shared import GroupedCommand, verbosity_options
+
+_PATH = click.Path(path_type=Path)
+
+
+@dataclass(frozen=True, kw_only=True)
+class BrainOptions(ConeNumber, RunOptions):
+    """Cones.
+
+    Attributes:
+        stretch: Trade-off between angles (0) and distances (1).
+    """
+
+    stretch: float = option(1.0, strength(1.0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class BrainFlags:
+    """Output.
+
+    Attributes:
+        output: File to write: a GIFTI surface (.gii), a FreeSurfer patch (.3d), or a result (.npz, .obj, .ply, .glb),
+            which view and figure show; repeat for several.  [default: SURFACE's name with .flat.gii]
+        remove_label: Label to cut off, such as the medial wall: FILE.label, or FILE:NAME for an .annot or a label .gii;
+            repeat for several.
+        keep_label: Label that no cut crosses.
+        report: JSON file for all measures.
+    """
+
+    output: tuple[Path, ...] = flag((), type=click.Path(path_type=Path), multiple=True)
+    remove_label: tuple[str, ...] = flag((), multiple=True, metavar="LABEL")
+    keep_label: tuple[str, ...] = flag((), multiple=True, metavar="LABEL")
+    report: Path | None = path_flag()
+
+
+@click.command(cls=GroupedCommand, short_help="Make a flat map of a brain's cortex.")
+@click.argument("surface", type=click.Path(path_type=Path))
+@option_flags(BrainFlags)
+@option_flags(BrainOptions)
+@verbosity_options
+@click.pass_context
+def brain(context: click.Context, /, surface: Path, verbosity: str | None, **given: Any) -> None:
+    """Make a flat map of SURFACE, the cortex of one hemisphere (.gii, or FreeSurfer's lh.pial).
+
+    \b
+    Examples:
+      coneflat brain lh.pial --remove-label lh.aparc.annot:unknown -o lh.flat.gii
+      coneflat brain lh.white --remove-label lh.Medial_wall.label -o lh.flat.patch.3d -o lh.npz
+      coneflat figure lh.npz --color lh.sulc
+      coneflat measure lh.flat.gii --surface lh.white
+    """
+    from ...io import check_target, checked_target
+    from ..brains import FLAT_FORMATS, flatten_cortex, measure_flat
+    from .run import Console, require_distinct, write_report
+
+    flags, options = pop_flags(given, BrainFlags), keywords({**given, "repair": True}, BrainOptions)
+    outputs = flags.output or (Path(f"{surface.name}.flat.gii"),)
+    formats = (*FLAT_FORMATS, *(f".{name}" for name in FORMATS))
+    for path in outputs:
+        checked_target(path, formats, "flat maps are written as")
+    if flags.report is not None:
+        check_target(flags.report)
+    require_distinct({"surface": surface, "report": flags.report, **{str(path): path for path in outputs}})
+    with Console(verbosity) as console:
+        found = flatten_cortex(
+            surface, remove=flags.remove_label, keep=flags.keep_label, progress=console.part(), **options
+        )
+        console.seconds.update(found.result.seconds)
+        with console.stage("write"):
+            for path in outputs:
+                (found if path.suffix.lower() in FLAT_FORMATS else found.result).save(path)
+        with console.stage("measure"):
+            measured = measure_flat(found.uv_mesh(outputs[0]))
+        if flags.report is not None:
+            write_report(flags.report, {**measured.report(), "seconds": dict(console.seconds)})
+        console.say(f"note: {note}" for note in (*found.result.notes, *measured.uv.notes))
+        console.finish([*outputs, *([] if flags.report is None else [flags.report])])
+        shown = ("triangles", "charts", "QC distortion", "area distortion")
+        rows = [row for row in rows_of_measures(measured.uv) if row[0] in shown]
+        console.table([*measured.rows(), *rows])
+
+
+@click.command(short_help="Bake the textures of a model into other UVs.")
+@click.argument("old", type=_PATH)
+@click.argument("new", type=_PATH)
+@click.option("-o", "--output", type=_PATH, help="Model or picture.  [default: NEW's name with _baked]")
+@click.option("--resolution", type=int, default=2048, show_default=True, help="Texels along a side.")
+@click.option("--texture", type=_PATH, help="Image of the UVs of OLD, instead of its materials.")
+@verbosity_options
+def transfer(
+    old: Path, new: Path, output: Path | None, resolution: int, texture: Path | None, verbosity: str | None
+) -> None:
+    """Bake the textures or vertex colours of OLD into the UVs of NEW, a model of the same shape.
+
+    Colours continue around the charts. A .png gets the base colour only.
+
+    \b
+    Examples:
+      coneflat unwrap chair.glb -o chair_uv.glb
+      coneflat transfer chair.glb chair_uv.glb -o chair_baked.glb
+    """
+    from ... import io
+    from ..transfer import ENDINGS
+    from ..transfer import transfer as bake
+    from .run import Console, require_distinct
+
+    output = output or Path(f"{new.stem}_baked.glb")
+    io.checked_target(output, ENDINGS, "textures are written as")
+    require_distinct({"old model": old, "new model": new, "texture": texture, "output": output})
+    with Console(verbosity) as console:
+        with console.stage("bake", 0.0):
+            baked = bake(old, new, resolution=resolution, texture=texture)
+        with console.stage("write"):
+            baked.save(output)
+        console.say(f"note: {note}" for note in baked.notes)
+        console.finish([output])
+
+
+@click.command(short_help="Write the Blender extension.")
+@click.option("-o", "--output", type=_PATH, default="coneflat_blender.zip", show_default=True)
+def blender(output: Path) -> None:
+    """Write the extension for Blender 4.2 or later as a zip.
+
+    Blender installs it by Edit > Preferences > Get Extensions > Install from Disk, or when it is dropped on its window.
+    The commands are then in the menu UV, and in the tab coneflat of the sidebar.
+
+    \b
+    Example:
+      coneflat blender -o coneflat_blender.zip
+    """
+    from ..blender import build_extension
+
+    click.echo(f"wrote {build_extension(output)}")

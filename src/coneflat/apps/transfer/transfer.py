@@ -1,0 +1,246 @@
+"""Baking of colours from the surface of one model into the UVs of another, and writing of the result."""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Collection
+from dataclasses import dataclass
+from io import BytesIO
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from ... import io
+from ...base import FloatArray, IntArray, check_cancelled, compiled
+from ...errors import OptionError
+from ...geometry import unit_vectors
+from ...io import UVMesh, as_path
+from ...options import Number
+from ..quads.nearest import TriangleTree
+from ..view import uv_flattening
+from .materials import BASE, NORMAL, Channel, Painted, to_srgb
+
+#: Texels that are baked at once, which bounds memory.
+TEXELS_AT_ONCE = 2**18
+#: Largest side of a texture: that of most graphics cards.
+MAX_RESOLUTION = 16384
+#: Distance of the models, as a fraction of the diagonal, from which on a note reports it: above the error of 32 bits.
+FAR = 0.01
+ENDINGS = (".glb", ".png")
+#: Channels whose image belongs to the metallic-roughness model in a material.
+SURFACE = ("baseColorTexture", "metallicRoughnessTexture")
+
+
+@dataclass(frozen=True, eq=False)
+class Baked:
+    """Textures for the UVs of a model.
+
+    Attributes:
+        images: (r, r, 4) RGBA by channel of glTF, such as "baseColorTexture"; the first row is the upper one.
+        material: the glTF material, without its images.
+        notes: what the user should know, one sentence each.
+        model: the file of the model.
+        uv_mesh: its triangles and UVs.
+    """
+
+    images: dict[str, NDArray[np.uint8]]
+    material: dict[str, Any]
+    notes: tuple[str, ...]
+    model: Path
+    uv_mesh: UVMesh
+
+    def save(self, path: str | PathLike[str]) -> Path:
+        """Write the model with its textures (.glb), or the image of its base colour (.png), and return the path.
+
+        Raises:
+            UnknownFormatError, MeshFileError: the file cannot be written.
+        """
+        path = io.checked_target(path, ENDINGS, "textures are written as")
+        with io.atomic_write(path) as stream:
+            if path.suffix.lower() == ".png":
+                stream.write(io.encode_png(self.images[BASE.name]).content)
+            else:
+                _with_material(self).write(stream)
+        return path
+
+
+def transfer(
+    old: str | PathLike[str],
+    new: str | PathLike[str],
+    *,
+    resolution: int = 2048,
+    texture: str | PathLike[str] | None = None,
+) -> Baked:
+    """Bake the colours of a model into the UVs of another model of the same shape.
+
+    Each texel gets the colour at the nearest point of the old surface; texels without a triangle get the colour of the
+    nearest texel with one. The materials of the old model become one. The triangles may differ.
+
+    Args:
+        old: a file with textures (.gltf, .glb), with vertex colours (also .ply, .obj), or with UVs for `texture`.
+        new: a file with UVs, in the same position and scale.
+        resolution: texels along a side of the new textures.
+        texture: the image of the UVs of `old`, instead of its materials.
+
+    Raises:
+        OptionError: Pillow is not installed; `old` has no colours; UVs of `new` are outside the unit square.
+        MissingUVError: `new` has no UVs.
+        MeshFileError: a file or an image cannot be read.
+
+    Examples:
+        >>> from coneflat.apps.transfer import transfer
+        >>> transfer("old.glb", "new.glb").save("baked.glb")  # doctest: +SKIP
+    """
+    side = int(Number(1, MAX_RESOLUTION, is_integer=True).parse("resolution", resolution) or 1)
+    painted = Painted(as_path(old), None if texture is None else as_path(texture))
+    new = as_path(new)
+    target = io.as_uv_mesh(new, weld=False)
+    known = np.flatnonzero(target.has_uv)
+    corner_uv = target.corner_uv[known]
+    if corner_uv.min(initial=0) < -1 / side or corner_uv.max(initial=1) > 1 + 1 / side:
+        raise OptionError(
+            f"the UVs of {new} must be in the unit square, got {corner_uv.min():.3g} to {corner_uv.max():.3g}"
+        )
+    texels = np.ascontiguousarray(corner_uv * [side, -side] + [0, side])
+    owner = np.full((side, side), -1)
+    twice = _rasterize(texels, owner)
+    if owner.max() < 0:
+        raise OptionError(f"no texel of {side} x {side} is in a triangle of {new}: raise the resolution")
+    images, farthest = _bake(painted, target.vertices[target.faces[known]], texels, owner)
+    source = distance_transform_edt(owner < 0, return_distances=False, return_indices=True)
+    notes = list(target.notes)
+    if twice:
+        notes.append(f"UVs overlap: {twice:,} texels are in several triangles, and show one of them.")
+    if farthest > FAR:
+        notes.append(f"The models differ: points are up to {farthest:.1%} of the size from the old surface.")
+    filled = {channel.name: image[tuple(source)] for channel, image in images.items()}
+    return Baked(filled, _material(painted, filled), tuple(notes), new, target)
+
+
+def _bake(
+    painted: Painted, corners: FloatArray, texels: FloatArray, owner: IntArray
+) -> tuple[dict[Channel, NDArray[np.uint8]], float]:
+    """Return the images of all channels, filled where a texel has an owner, and the largest relative distance.
+
+    Args:
+        painted: the old model.
+        corners, texels: (m, 3, 3), (m, 3, 2) corners of the new triangles in space and in the texture.
+        owner: (r, r) the triangle of each texel, -1 for none.
+    """
+    tree, farthest, side = TriangleTree(painted.vertices, painted.faces), 0.0, len(owner)
+    images = {channel: np.zeros((side, side, 4), np.uint8) for channel in painted.channels()}
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    if NORMAL in images:
+        axes, old_axes = _tangents(corners, texels), _tangents(painted.vertices[painted.faces], painted.uv(0))
+    every = np.flatnonzero(owner.reshape(-1) >= 0)
+    for begin in range(0, len(every), TEXELS_AT_ONCE):
+        check_cancelled()
+        place = every[begin : begin + TEXELS_AT_ONCE]
+        faces = owner.reshape(-1)[place]
+        weights = _barycentric(texels[faces], np.stack([place % side, place // side], axis=1) + 0.5)
+        points = np.einsum("qi,qix->qx", weights, corners[faces])
+        on, at = tree.nearest(points, normals[faces])
+        nearest = np.einsum("qi,qix->qx", at, painted.vertices[painted.faces[on]])
+        farthest = max(farthest, float(np.linalg.norm(nearest - points, axis=1).max()) / tree.diagonal)
+        for channel, image in images.items():
+            values = painted.at(channel, on, at)
+            if channel is NORMAL:
+                turns = np.einsum("qax,qbx->qab", axes[faces], old_axes[on])
+                values[:, :2] = 0.5 + np.einsum("qab,qb->qa", turns, values[:, :2] - 0.5)
+            if channel.is_colour:
+                values[:, :3] = to_srgb(np.clip(values[:, :3], 0, 1))
+            image.reshape(-1, 4)[place] = np.round(255 * np.clip(values, 0, 1))
+    return images, farthest
+
+
+def _tangents(corners: FloatArray, uv: FloatArray) -> FloatArray:
+    """Return (q, 2, 3) orthonormal directions of u and of v upwards on triangles (q, 3, 3) with UVs (v downwards)."""
+    (b, c), (s, t) = ((x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]) for x in (corners, uv))
+    sign = np.sign(s[:, :1] * t[:, 1:] - s[:, 1:] * t[:, :1])
+    along = unit_vectors((b * t[:, 1:] - c * s[:, 1:]) * sign)
+    return np.stack([along, np.cross(along, unit_vectors(np.cross(b, c))) * sign], axis=1)
+
+
+def _barycentric(corners: FloatArray, points: NDArray[Any]) -> FloatArray:
+    """Return (q, 3) the barycentric coordinates of points (q, 2) in triangles (q, 3, 2)."""
+    sides = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+    to = points[:, None] - np.roll(corners, -1, axis=1)
+    doubles = sides[..., 0] * to[..., 1] - sides[..., 1] * to[..., 0]
+    return np.asarray(doubles / doubles.sum(axis=1, keepdims=True))
+
+
+@compiled
+def _rasterize(texels: FloatArray, owner: IntArray) -> int:
+    """Fill in a triangle (m, 3, 2) at each texel whose centre it covers; return how many texels several ones cover."""
+    twice = 0
+    rows, columns = owner.shape
+    for f in range(len(texels)):
+        t = texels[f]
+        double = (t[1, 0] - t[0, 0]) * (t[2, 1] - t[0, 1]) - (t[1, 1] - t[0, 1]) * (t[2, 0] - t[0, 0])
+        if double == 0:
+            continue
+        for i in range(max(int(t[:, 1].min() - 0.5), 0), min(int(t[:, 1].max() + 0.5) + 1, rows)):
+            for j in range(max(int(t[:, 0].min() - 0.5), 0), min(int(t[:, 0].max() + 0.5) + 1, columns)):
+                least = np.inf
+                for k in range(3):
+                    a, b = t[k], t[(k + 1) % 3]
+                    area = (b[0] - a[0]) * (i + 0.5 - a[1]) - (b[1] - a[1]) * (j + 0.5 - a[0])
+                    least = min(least, area / double)
+                twice += least > 0 and owner[i, j] >= 0
+                if least >= 0:
+                    owner[i, j] = f
+    return twice
+
+
+def _material(painted: Painted, names: Collection[str]) -> dict[str, Any]:
+    """Return a glTF material without images, like the first one of a model; `names`: channels that get images."""
+    used = [painted.materials[i] for i in painted.used]
+    surface = used[0].get("pbrMetallicRoughness", {"metallicFactor": 0.0})
+    kept = () if "metallicRoughnessTexture" in names else ("metallicFactor", "roughnessFactor")
+    item: dict[str, Any] = {
+        name: used[0][name] for name in ("alphaCutoff", "emissiveFactor") if name in used[0]
+    }
+    item |= {"emissiveFactor": [1.0] * 3} if "emissiveTexture" in names else {}
+    item["doubleSided"] = any(each.get("doubleSided", False) for each in used)
+    modes = [each.get("alphaMode", "OPAQUE") for each in used]
+    item["alphaMode"] = max(modes, key=("OPAQUE", "MASK", "BLEND").index)
+    return item | {"pbrMetallicRoughness": {name: surface[name] for name in kept if name in surface}}
+
+
+def _with_material(baked: Baked) -> io.Glb:
+    """Return the model as GLB, with one material instead of its own."""
+    source = baked.uv_mesh.source
+    scene = None if source is None else source.scene
+    if scene is not None and baked.model.suffix.lower() == ".glb" and len(scene.data.tree["buffers"]) == 1:
+        content = io.read_bytes(baked.model)
+    else:
+        stream = BytesIO()
+        io.write_stream(uv_flattening(baked.uv_mesh), stream, ".glb")
+        content = stream.getvalue()
+    (length,) = struct.unpack_from("<I", content, 12)
+    tree, binary = json.loads(content[20 : 20 + length]), content[28 + length :]
+    unused = {image.get("bufferView") for image in tree.pop("images", [])}
+    glb = io.Glb({name: tree[name] for name in tree if name not in ("materials", "textures", "samplers")})
+    for i, view in enumerate(tree["bufferViews"]):
+        start = view.get("byteOffset", 0)
+        # The content of old images is replaced by a few bytes, so that views keep their numbers.
+        kept = bytes(4) if i in unused else binary[start : start + view["byteLength"]]
+        view |= {"byteOffset": glb.append(kept), "byteLength": len(kept)}
+    item = baked.material | {"pbrMetallicRoughness": dict(baked.material["pbrMetallicRoughness"])}
+    for name, image in baked.images.items():
+        texture = io.encode_png(image)
+        number = glb.add("images", {"bufferView": glb.add_view(texture.content), "mimeType": texture.kind})
+        place = item["pbrMetallicRoughness"] if name in SURFACE else item
+        place[name] = {"index": glb.add("textures", {"source": number})}
+    glb.add("materials", item)
+    for mesh in tree["meshes"]:
+        for primitive in mesh["primitives"]:
+            primitive["material"] = 0
+            primitive["attributes"].pop("COLOR_0", None)  # it is in the image
+            primitive.get("extensions", {}).pop("KHR_materials_variants", None)
+    return glb

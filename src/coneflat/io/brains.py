@@ -1,0 +1,144 @@
+"""Files of brain surfaces: GIFTI and FreeSurfer surfaces, values at vertices, and labels.
+
+GIFTI, annotations and MGH are read by nibabel (the extra `brains`); FreeSurfer's surfaces need nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.arrays import FloatArray, IntArray
+from ..base.text import list_some
+from ..errors import MeshFileError, OptionError
+from .files import PathName, as_path, read_bytes, readable
+from .mesh_file import MeshFile
+
+#: Names of FreeSurfer's surfaces, which stand in the place of an ending: lh.pial.
+FREESURFER = (".pial", ".white", ".inflated", ".sphere", ".orig", ".smoothwm")
+#: Endings of files with one value for each vertex, in addition to names such as lh.sulc.
+VALUES = (".gii", ".mgh", ".mgz", ".sulc", ".curv", ".thickness", ".area", ".volume")
+_MAGIC = b"\xff\xff\xfe"
+
+
+def nibabel() -> Any:
+    """Return the package nibabel.
+
+    Raises:
+        OptionError: it is not installed.
+    """
+    try:
+        return import_module("nibabel")
+    except ImportError as error:
+        raise OptionError('files of brain surfaces need nibabel: pip install "coneflat[brains]"') from error
+
+
+def is_freesurfer(content: bytes) -> bool:
+    """Return True if a file begins as FreeSurfer's surfaces of triangles do."""
+    return content.startswith(_MAGIC)
+
+
+def is_gifti(content: bytes) -> bool:
+    """Return True if a file begins as GIFTI files do."""
+    head = content[:512].lstrip()
+    return head.startswith(b"<") and b"GIFTI" in head
+
+
+def parse_freesurfer(path: Path, content: bytes) -> MeshFile:
+    """Return the mesh of a FreeSurfer surface: three bytes, two lines, two counts, positions and triangles.
+
+    Raises:
+        MeshFileError: it is not one, or is truncated.
+    """
+    begin = content.find(b"\n\n") + 2
+    if not is_freesurfer(content) or begin < 2:
+        raise MeshFileError(f"{path} is not a FreeSurfer surface of triangles")
+    vertices, faces = (int(count) for count in np.frombuffer(content, ">i4", 2, begin))
+    need = begin + 8 + 12 * (vertices + faces)
+    if min(vertices, faces) < 0 or len(content) < need:
+        raise MeshFileError(f"{path} must have {need:,} bytes for its triangles, got {len(content):,}")
+    points = np.frombuffer(content, ">f4", 3 * vertices, begin + 8).reshape(-1, 3)
+    corners = np.frombuffer(content, ">i4", 3 * faces, begin + 8 + 12 * vertices)
+    return _triangles(path, points, corners)
+
+
+def parse_gifti(path: Path, content: bytes) -> MeshFile:
+    """Return the mesh of a GIFTI surface.
+
+    Raises:
+        MeshFileError: the file contains no surface.
+        OptionError: nibabel is not installed.
+    """
+    if not is_gifti(content):
+        raise MeshFileError(f"{path} is not a GIFTI file")
+    image = nibabel().GiftiImage.from_bytes(content)
+    points, faces = (image.agg_data(kind) for kind in ("pointset", "triangle"))
+    for values, kind in ((points, "positions"), (faces, "triangles")):
+        if np.ndim(values) != 2 or np.shape(values)[1] != 3:
+            raise MeshFileError(f"{path} must be a surface, got a GIFTI file without {kind}")
+    return _triangles(path, points, faces)
+
+
+def _triangles(path: Path, points: Any, corners: Any) -> MeshFile:
+    corners = np.asarray(corners, dtype=np.int64).reshape(-1)
+    return MeshFile(path, np.asarray(points, dtype=np.float64), corners, np.arange(0, len(corners) + 1, 3))
+
+
+def read_vertex_values(path: PathName) -> FloatArray:
+    """Return (n,) the values of a file with one for each vertex, such as sulcal depth: GIFTI, FreeSurfer's, MGH.
+
+    Raises:
+        MeshFileError: the file cannot be read, or has more than one value for each vertex.
+        OptionError: nibabel is not installed.
+    """
+    path = as_path(path)
+    read_bytes(path)
+    package, ending = nibabel(), path.suffix.lower()
+    with readable(path, "file of values at vertices"):
+        if ending == ".gii":
+            values = package.load(path).agg_data()
+        elif ending in (".mgh", ".mgz"):
+            values = np.squeeze(np.asarray(package.load(path).dataobj))
+        else:
+            values = package.freesurfer.read_morph_data(path)
+    if np.ndim(values) != 1:
+        raise MeshFileError(f"{path} must have one value for each vertex, got shape {np.shape(values)}")
+    return np.asarray(values, dtype=np.float64)
+
+
+def read_label(text: str) -> IntArray:
+    """Return (k,) the vertices of a label.
+
+    Args:
+        text: a FreeSurfer label (.label); or FILE:NAME for a label of an annotation (.annot) or of a GIFTI file; or a
+            GIFTI file or one of values alone, for the vertices whose value is not 0.
+
+    Raises:
+        MeshFileError: the file cannot be read.
+        OptionError: there is no such label, or nibabel is not installed.
+    """
+    file, _, name = (text, "", "") if Path(text).exists() else text.rpartition(":")
+    path = as_path(file or text)
+    read_bytes(path)
+    package, ending = nibabel(), path.suffix.lower()
+    with readable(path, "label"):
+        if ending == ".label":
+            return np.atleast_1d(np.asarray(package.freesurfer.read_label(path), dtype=np.int64))
+        if ending == ".annot":
+            values, _, names = package.freesurfer.read_annot(path)
+            keys = {one.decode(): number for number, one in enumerate(names)}
+        else:
+            values = read_vertex_values(path)
+            keys = {}
+            if ending == ".gii":
+                keys = {one.label: one.key for one in package.load(path).labeltable.labels}
+    if not name and ending != ".annot":
+        return np.flatnonzero(values)
+    if name not in keys:
+        raise OptionError(
+            f"{path} must have the label {name!r}, got {list_some(sorted(keys)) or 'no labels'}"
+        )
+    return np.flatnonzero(values == keys[name])

@@ -1,0 +1,254 @@
+"""Flat maps of the cortex: formats that nibabel and nilearn read, labels, and the field's measures."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command import command
+from shapes import grid, sphere
+
+import coneflat
+from coneflat.apps.brains import flatten_cortex, measure_flat, metric_distortion, read_flat
+from coneflat.errors import MeshFileError, OptionError, UnknownFormatError
+from coneflat.io import read_label, read_vertex_values
+
+nibabel = pytest.importorskip("nibabel")
+
+
+def write_gifti(path, *arrays, labels=None):
+    image = nibabel.GiftiImage()
+    for values, intent in arrays:
+        kind = "NIFTI_TYPE_INT32" if np.issubdtype(values.dtype, np.integer) else "NIFTI_TYPE_FLOAT32"
+        values = values.astype(np.int32 if "INT" in kind else np.float32)
+        image.add_gifti_data_array(
+            nibabel.gifti.GiftiDataArray(values, intent=f"NIFTI_INTENT_{intent}", datatype=kind)
+        )
+    for key, name in (labels or {}).items():
+        label = nibabel.gifti.GiftiLabel(key)
+        label.label = name
+        image.labeltable.labels.append(label)
+    nibabel.save(image, path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a ball as a left hemisphere, and labels of a cap, its "medial wall", and of another."""
+    here = tmp_path_factory.mktemp("brain")
+    vertices, faces = sphere(4)
+    vertices = (60 * vertices).astype(np.float32)
+    nibabel.freesurfer.write_geometry(here / "lh.pial", vertices, faces)
+    write_gifti(here / "lh.pial.gii", (vertices, "POINTSET"), (faces, "TRIANGLE"))
+    depth = vertices[:, 2].astype(np.float32)
+    wall, patch = depth > 45, vertices[:, 0] > 40
+    numbers = np.where(wall, 1, 2 * patch).astype(np.int32)
+    nibabel.freesurfer.write_morph_data(here / "lh.sulc", depth)
+    nibabel.save(nibabel.freesurfer.MGHImage(depth[:, None, None], np.eye(4)), here / "lh.depth.mgz")
+    write_gifti(here / "lh.sulc.gii", (depth, "SHAPE"))
+    write_gifti(here / "lh.parts.gii", (numbers, "LABEL"), labels={0: "rest", 1: "wall", 2: "patch"})
+    table = np.array([[9, 9, 9, 0], [200, 0, 0, 0], [0, 200, 0, 0]])
+    nibabel.freesurfer.write_annot(
+        here / "lh.aparc.annot", numbers, table, ["rest", "wall", "patch"], fill_ctab=True
+    )
+    rows = [f"{v} 0 0 0 0" for v in np.flatnonzero(wall)]
+    (here / "lh.wall.label").write_text("\n".join(["#!ascii label", str(len(rows)), *rows]) + "\n")
+    return here
+
+
+@pytest.fixture(scope="module")
+def flat(folder):
+    return flatten_cortex(folder / "lh.pial", remove=[f"{folder}/lh.wall.label"])
+
+
+def test_surfaces_are_read_as_nibabel_reads_them(folder):
+    vertices, faces = nibabel.freesurfer.read_geometry(folder / "lh.pial")
+    for name in ("lh.pial", "lh.pial.gii"):
+        mesh = coneflat.read_mesh(folder / name)
+        assert np.array_equal(mesh.vertices, vertices)
+        assert np.array_equal(mesh.triangles, faces)
+
+
+def test_values_and_labels_are_read_in_all_formats(folder):
+    depth = nibabel.freesurfer.read_morph_data(folder / "lh.sulc")
+    for name in ("lh.sulc", "lh.sulc.gii", "lh.depth.mgz"):
+        assert np.array_equal(read_vertex_values(folder / name), depth)
+    for name in ("lh.wall.label", "lh.aparc.annot:wall", "lh.parts.gii:wall"):
+        assert np.array_equal(read_label(f"{folder}/{name}"), np.flatnonzero(depth > 45)), name
+    parts = nibabel.load(folder / "lh.parts.gii").agg_data()
+    assert np.array_equal(read_label(f"{folder}/lh.parts.gii"), np.flatnonzero(parts))
+
+
+def test_a_gifti_map_is_read_by_other_libraries(folder, flat, tmp_path):
+    path = flat.save(tmp_path / "lh.flat.gii")
+    image = nibabel.load(path)
+    points, faces = image.agg_data("pointset"), image.agg_data("triangle")
+    assert np.array_equal(points[:, :2], flat.points.astype(np.float32))
+    assert np.array_equal(faces, flat.faces)
+    assert (len(points), np.abs(points[:, 2]).max()) == (len(flat.surface.vertices), 0)
+    assert image.darrays[0].meta["AnatomicalStructurePrimary"] == "CortexLeft"
+    surface = pytest.importorskip("nilearn.surface")
+    mesh = surface.load_surf_mesh(str(path))
+    assert np.array_equal(mesh.coordinates, points)
+    assert np.array_equal(mesh.faces, faces)
+
+
+def test_a_patch_has_the_layout_of_freesurfer(flat, tmp_path):
+    """Two big-endian numbers, then a number and a point for each vertex; pycortex reads it by this record."""
+    path = flat.save(tmp_path / "lh.flat.patch.3d")
+    content = path.read_bytes()
+    rows = np.frombuffer(content[8:], [("vert", ">i4"), ("x", ">f4"), ("y", ">f4"), ("z", ">f4")])
+    assert np.frombuffer(content[:8], ">i4").tolist() == [-1, len(rows)]
+    inner, border = rows[rows["vert"] > 0]["vert"] - 1, -rows[rows["vert"] < 0]["vert"] - 1
+    vertices = np.concatenate([inner, border])
+    assert len(np.unique(vertices)) == len(vertices)
+    points = np.stack([rows["x"], rows["y"]], axis=1)
+    assert np.array_equal(points, flat.points[np.abs(rows["vert"]) - 1].astype(np.float32))
+    # The surface's triangles with all vertices in the patch are those of the map, and the border is theirs.
+    faces = flat.surface.triangles
+    faces = faces[np.isin(faces, vertices).all(axis=1)]
+    assert {tuple(face) for face in faces.tolist()} == {
+        tuple(face) for face in flat.uv_mesh(path).faces.tolist()
+    }
+    mesh = coneflat.check_mesh(flat.surface.vertices, faces).mesh
+    assert set(border.tolist()) == set(np.unique(faces)[mesh.is_boundary_vertex].tolist())
+
+
+@pytest.mark.parametrize("ending", [".gii", ".3d"])
+def test_what_is_read_back_measures_the_same(folder, flat, tmp_path, ending):
+    path = flat.save(tmp_path / f"lh.flat{ending}")
+    here, there = measure_flat(flat.uv_mesh(path)), measure_flat(read_flat(path, folder / "lh.pial"))
+    assert here.report() | {"input": ""} == there.report() | {"input": ""}
+    assert (here.inverted, here.uv.distortion.overlap) == (0, 0)
+
+
+def test_no_cut_crosses_a_label_that_is_kept(folder):
+    found = flatten_cortex(
+        folder / "lh.pial",
+        remove=[f"{folder}/lh.wall.label"],
+        keep=[f"{folder}/lh.aparc.annot:patch"],
+        distortion=0.05,
+    )
+    patch = read_label(f"{folder}/lh.aparc.annot:patch")
+    kept = np.zeros(len(found.surface.vertices), dtype=bool)
+    kept[patch] = True
+    origin = found.result.vertex_origin
+    assert len(found.result.seams) > 0
+    assert not kept[origin[found.result.seams]].all(axis=1).any()
+    # Cones may be on the border of the label, where seams end.
+    faces = found.surface.triangles
+    border = np.unique(faces[~kept[faces].all(axis=1)])
+    assert not kept[np.setdiff1d(origin[found.result.cones], border)].any()
+
+
+def test_separate_pieces_are_left_out(folder, tmp_path):
+    island = read_label(f"{folder}/lh.wall.label")[40:60]
+    faces = coneflat.read_mesh(folder / "lh.pial").triangles
+    wall = np.setdiff1d(read_label(f"{folder}/lh.wall.label"), faces[np.isin(faces, island).any(axis=1)])
+    values = np.zeros(faces.max() + 1, np.float32)
+    values[wall] = 1
+    nibabel.freesurfer.write_morph_data(tmp_path / "lh.curv", values)
+    found = flatten_cortex(folder / "lh.pial", remove=[f"{tmp_path}/lh.curv"])
+    assert found.result.distortion.charts == 1
+
+
+def test_metric_distortion_of_a_flat_sheet_is_small_and_has_no_scale():
+    vertices, faces = grid(20, 20)
+    flat = vertices[:, :2]
+    exact = metric_distortion(vertices, faces, flat)
+    assert 0 <= exact < 3  # paths along edges and diagonals are slightly too long
+    assert metric_distortion(vertices, faces, 5 * flat) == pytest.approx(exact)
+    assert metric_distortion(vertices, faces, flat * [2, 0.5]) > 30
+
+
+def test_metric_distortion_by_hand():
+    """Two triangles of a square: four sides, and two diagonals, one of which is unfolded."""
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    assert metric_distortion(square, faces, square[:, :2]) == pytest.approx(0, abs=1e-12)
+    bent = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0.5, 0.5, np.sqrt(0.5)]])
+    assert metric_distortion(bent, faces, square[:, :2]) == pytest.approx(0, abs=1e-12)
+    wide = square[:, :2] * [2, 0.5]
+    sides, diagonals = 2 * 1.0 + 2 * 0.5, 2 * (np.hypot(2, 0.5) - np.sqrt(2))
+    assert metric_distortion(square, faces, wide) == pytest.approx(
+        100 * (sides + diagonals) / (4 + 2 * np.sqrt(2))
+    )
+
+
+def fsaverage(name):
+    nilearn = pytest.importorskip("nilearn")
+    return gzip.decompress(
+        (Path(nilearn.__file__).parent / f"datasets/data/fsaverage5/{name}.gii.gz").read_bytes()
+    )
+
+
+@pytest.mark.parametrize("kind", ["pial", "white"])
+def test_freesurfers_own_map_is_worse_in_all_measures(tmp_path, kind):
+    for name, content in (("lh.surface", fsaverage(f"{kind}_left")), ("lh.flat", fsaverage("flat_left"))):
+        (tmp_path / f"{name}.gii").write_bytes(content)
+    surface = tmp_path / "lh.surface.gii"
+    theirs = measure_flat(read_flat(tmp_path / "lh.flat.gii", surface))
+    assert theirs.uv.distortion.qc_mean == pytest.approx(1.595, abs=0.005)
+    missing = np.ones(10242, np.float32)
+    missing[coneflat.read_mesh(tmp_path / "lh.flat.gii").triangles] = 0
+    nibabel.freesurfer.write_morph_data(tmp_path / "lh.curv", missing)
+    ours = flatten_cortex(surface, remove=[f"{tmp_path}/lh.curv"])
+    ours = measure_flat(ours.uv_mesh(tmp_path / "x.gii"))
+    assert ours.uv.distortion.qc_mean < theirs.uv.distortion.qc_mean
+    assert ours.uv.distortion.area_std < theirs.uv.distortion.area_std
+    assert (ours.metric < theirs.metric, ours.areal < theirs.areal, ours.inverted) == (True, True, 0)
+
+
+def test_bad_input_is_named(folder, flat, tmp_path):
+    wall = f"{folder}/lh.wall.label"
+    with pytest.raises(OptionError, match=r"must have the label 'wal', got patch, rest, wall"):
+        flatten_cortex(folder / "lh.pial", remove=[f"{folder}/lh.aparc.annot:wal"])
+    with pytest.raises(MeshFileError, match="no such file"):
+        flatten_cortex(folder / "lh.pial", remove=["lh.none.label"])
+    (tmp_path / "rh.wall.label").write_text(Path(wall).read_text())
+    with pytest.raises(OptionError, match="must be of the left hemisphere, like .*, got the right one"):
+        flatten_cortex(folder / "lh.pial", remove=[f"{tmp_path}/rh.wall.label"])
+    (tmp_path / "lh.far.label").write_text("#!ascii label\n1\n99999 0 0 0 0\n")
+    with pytest.raises(OptionError, match=r"with 2,562 vertices, got vertex 99999"):
+        flatten_cortex(folder / "lh.pial", remove=[f"{tmp_path}/lh.far.label"])
+    with pytest.raises(OptionError, match="must leave triangles"):
+        flatten_cortex(folder / "lh.pial", remove=[wall, f"{folder}/lh.sulc"])
+    with pytest.raises(UnknownFormatError):
+        flat.save(tmp_path / "flat.obj")
+    with pytest.raises(MeshFileError, match="got a GIFTI file without positions"):
+        coneflat.read_mesh(folder / "lh.sulc.gii")
+    (tmp_path / "lh.pial").write_bytes((folder / "lh.pial").read_bytes()[:-5])
+    with pytest.raises(MeshFileError, match=r"must have .* bytes for its triangles"):
+        coneflat.read_mesh(tmp_path / "lh.pial")
+    (tmp_path / "lh.bad.3d").write_bytes(b"12345678")
+    with pytest.raises(MeshFileError, match="must be a FreeSurfer patch"):
+        read_flat(tmp_path / "lh.bad.3d", folder / "lh.pial")
+
+
+def test_the_commands_write_measure_and_draw(folder, tmp_path):
+    done = command(
+        "brain", folder / "lh.pial", "--remove-label", folder / "lh.wall.label", "-o", "lh.flat.gii", "-o", "lh.npz",
+        "--report", "r.json", cwd=tmp_path,
+    )  # fmt: skip
+    assert (done.returncode, "metric distortion" in done.stdout) == (0, True), done.stderr
+    assert json.loads((tmp_path / "r.json").read_text())["inverted"] == 0
+    done = command(
+        "measure",
+        "lh.flat.gii",
+        "--surface",
+        folder / "lh.pial",
+        "--require",
+        "inverted=0,metric_distortion<20",
+        cwd=tmp_path,
+    )
+    assert (done.returncode, "areal distortion" in done.stdout) == (0, True), done.stderr
+    pytest.importorskip("matplotlib")
+    done = command(
+        "figure", "lh.npz", "--color", folder / "lh.sulc", "-o", "a.png", "--dpi", 50, cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    done = command("brain", folder / "lh.pial", "--remove-label", "lh.none.label", cwd=tmp_path)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)

@@ -1,0 +1,68 @@
+"""The accessor of PyVista, with the real package."""
+
+from __future__ import annotations
+
+from importlib.metadata import entry_points
+
+import numpy as np
+import pytest
+
+import coneflat
+
+pyvista = pytest.importorskip("pyvista", minversion="0.48")
+
+
+@pytest.fixture(autouse=True)
+def accessor():
+    """The module that PyVista imports by the entry point of an installed package."""
+    from coneflat.apps import pyvista as accessor
+
+    return accessor
+
+
+@pytest.fixture(scope="module")
+def ball():
+    mesh = pyvista.Sphere(theta_resolution=20, phi_resolution=20)
+    mesh["height"] = mesh.points[:, 2]
+    return mesh
+
+
+def test_the_entry_point_leads_to_the_accessor(accessor):
+    found = [point for point in entry_points(group="pyvista.accessors") if point.name == "coneflat"]
+    if not found:
+        pytest.skip("an older version of the package is installed")
+    assert found[0].load() is accessor
+    assert "coneflat" in {each.name for each in pyvista.registered_accessors()}
+
+
+def test_flatten_is_that_of_the_package(ball):
+    mesh, result = ball.coneflat.flatten(), coneflat.flatten(ball)
+    uv = np.asarray(mesh.active_texture_coordinates)
+    faces = mesh.faces.reshape(-1, 4)[:, 1:]
+    assert np.allclose(uv[faces], result.corner_uv, atol=1e-6)  # PyVista may store 32 bits
+    assert np.allclose(mesh.points[faces], result.vertices[result.faces])
+    assert np.allclose(mesh["height"], mesh.points[:, 2])
+    assert mesh.field_data["charts"][0] == result.distortion.charts
+    assert np.array_equal(mesh.cell_data["chart"], result.seam_data.face_chart)
+
+
+def test_options_reach_the_functions(ball):
+    assert ball.coneflat.flatten(cone_count=3, charts="one").field_data["charts"][0] == 1
+    assert ball.coneflat.unwrap(max_energy=4.5).field_data["flipped"][0] == 0
+    with pytest.raises(coneflat.ConeflatError):
+        ball.coneflat.flatten(cone_count=-1)
+
+
+def test_quads_are_four_sided(ball):
+    mesh = ball.coneflat.quads(quads=100)
+    assert set(mesh.faces[::5]) == {4}
+    assert mesh.n_open_edges == 0
+
+
+def test_what_is_written_is_read_back(ball, tmp_path):
+    mesh = ball.coneflat.flatten()
+    mesh.save(tmp_path / "ball.ply")
+    mesh.save(tmp_path / "ball.vtp")
+    again = pyvista.read(tmp_path / "ball.vtp")
+    assert np.array_equal(again.active_texture_coordinates, mesh.active_texture_coordinates)
+    assert len(coneflat.read_mesh(tmp_path / "ball.ply").triangles) == mesh.n_cells
