@@ -36,7 +36,7 @@ CEILINGS = {
     "apps.cli": 1525,
     "apps.measure_uv": 160,
     "apps.peers": 478,
-    "apps.quads": 3249,
+    "apps.quads": 3749,
     "apps.studio": 1741,
     "apps.unwrap": 885,
     "apps.view": 1623,
@@ -54,17 +54,17 @@ CEILINGS = {
     "measure": 851,
     "mesh": 710,
     "metric": 999,
-    "options": 553,
+    "options": 554,
     "result": 96,
     "sample": 5,
     "seams": 177,
-    "source": 522,
+    "source": 523,
     "stages": 223,
     "xatlas": 2,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_804, 235, 25_900
-CONSTANTS, KERNELS, NAMES, LEVELS = 295, 110, 30, 8
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_806, 238, 26_400
+CONSTANTS, KERNELS, NAMES, LEVELS = 319, 110, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
 

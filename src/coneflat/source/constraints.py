@@ -106,9 +106,10 @@ def locate_constraints(checked: CheckedMesh, options: Options, given: InputMesh)
     is_allowed = ~np.isin(names, list(options.forbidden_cones))
     for name in names[required.vertices[~is_allowed[required.vertices]]]:
         raise OptionError(f"vertex {name} is both a required and a forbidden cone")
+    noun = "cone or corner" if options.boundary_kind == "straight" else "cone"
     return Constraints(
         names,
-        _locate(checked, "cone", options.named_cones),
+        _locate(checked, noun, options.named_cones),
         _locate(checked, "corner", options.corners),
         required,
         is_allowed,
@@ -120,7 +121,7 @@ def locate_constraints(checked: CheckedMesh, options: Options, given: InputMesh)
 
 
 def _locate(checked: CheckedMesh, noun: str, given: Mapping[int, float | None]) -> VertexCurvatures:
-    """Return given cones, which must be inner vertices, or given corners, which must be on the boundary."""
+    """Return given cones, which must be inner vertices, given corners, which must be on the boundary, or both."""
     names, origin = np.array(list(given), dtype=np.int64), checked.vertex_origin
     for name in np.setdiff1d(names, origin):
         raise OptionError(f"{noun} {name} is not a vertex of a face: indices are from 0 to {origin[-1]}")
@@ -132,7 +133,7 @@ def _locate(checked: CheckedMesh, noun: str, given: Mapping[int, float | None]) 
                 f"cone {name} lies on the boundary, where the curvature is free: choose inner vertices, "
                 "or prescribe the boundary's curvature (boundary)"
             )
-    else:
+    elif noun == "corner":
         # Repair may have split a corner. All of its copies on the boundary are corners.
         found = np.flatnonzero(np.isin(origin, names) & checked.mesh.is_boundary_vertex)
         for name in np.setdiff1d(names, origin[found]):

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import ComplexArray, FloatArray, IntArray
+from ...base import BoolArray, ComplexArray, FloatArray, IntArray
 from ...cones import CONE_ANGLE_PER_TRIANGLE, ConeSearch, quantise_cones
 from ...errors import CurvatureError, GridError, MetricError, OptionError, SeamError
 from ...geometry import as_complex, as_pairs, double_areas, signed_double_areas
@@ -52,12 +52,27 @@ def sharp_layout(
         ConvergenceError: no layout was found in which the patches match.
         GridError: the nearest axes of sides and seams contradict each other.
     """
-    layout = _flat_patches(opened, lengths, size, options, tell)
-    layout, component = joined_charts(replace(layout, points=_fitting(opened, layout)))
-    flat = float(layout.double_areas().sum())
-    points = layout.points * np.sqrt(float(double_areas(lengths).sum()) / flat) / size
-    layout = replace(layout, points=points)
-    return at_origin(replace(layout, sides=_all_sides(opened, layout, layout.chains())), component)
+    return straightened(_flat_patches(opened, lengths, size, options, tell), opened.is_feature)
+
+
+def straightened(layout: GridLayout, is_feature: BoolArray | None = None) -> GridLayout:
+    """Return a layout with all sides of the boundary along the axes, and features, which are seams, too.
+
+    Args:
+        layout: a layout whose sides and seams are along the axes up to less than 45 degrees.
+        is_feature: (e,) whether each edge of its mesh is a feature; None for no features.
+
+    Raises:
+        ConvergenceError: no such layout without flipped triangles was found.
+        GridError: the nearest axes of sides and seams contradict each other.
+    """
+    if is_feature is None:
+        is_feature = np.zeros(len(layout.mesh.edges), dtype=bool)
+        layout = replace(layout, sides=find_sides(layout, np.ones(len(layout.points), dtype=bool)))
+    area = float(double_areas(layout.lengths).sum()) / layout.size**2
+    layout, component = joined_charts(replace(layout, points=_fitting(layout, is_feature)))
+    layout = replace(layout, points=layout.points * np.sqrt(area / float(layout.double_areas().sum())))
+    return at_origin(replace(layout, sides=_all_sides(layout, is_feature, layout.chains())), component)
 
 
 def _flat_patches(
@@ -167,14 +182,14 @@ def _along_axes(mesh: TriangleMesh, corners: IntArray, points: ComplexArray) -> 
     return points * np.exp(-1j * angle)
 
 
-def _fitting(opened: Opened, layout: GridLayout) -> ComplexArray:
+def _fitting(layout: GridLayout, is_feature: BoolArray) -> ComplexArray:
     """Return the relaxed points of patches: sides are along the axes, and both sides of seams match by quarter turns.
 
     Raises:
         ConvergenceError: no such layout without flipped triangles was found.
         GridError: the nearest axes of sides and seams contradict each other.
     """
-    sides = _all_sides(opened, layout, layout.chains(quarter_turns=True))
+    sides = _all_sides(layout, is_feature, layout.chains(quarter_turns=True))
     offsets = np.full(len(sides.axis), np.nan)
     constraints = PointConstraints(
         lines=Lines(sides.points, sides.side, sides.directions, offsets) if len(offsets) else None,
@@ -192,11 +207,11 @@ def _fitting(opened: Opened, layout: GridLayout) -> ComplexArray:
     return as_complex(found.points)
 
 
-def _all_sides(opened: Opened, layout: GridLayout, chains: SeamChains) -> Sides:
+def _all_sides(layout: GridLayout, is_feature: BoolArray, chains: SeamChains) -> Sides:
     """Return the sides along the axes: sides of the boundary, and the left sides of feature chains."""
     points = layout.points
     border = find_sides(layout, np.ones(len(points), dtype=bool))
-    feature = opened.is_feature[chains.edges]
+    feature = is_feature[chains.edges]
     left, chain = chains.left[feature], chains.chain[feature]
     along = points[left[:, 1]] - points[left[:, 0]]
     # The doubled angle makes opposite directions equal.
