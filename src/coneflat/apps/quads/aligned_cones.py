@@ -29,8 +29,9 @@ FAR_PLACES = 250
 RADII, PLACES_NEAR = (1.0, 0.6, 0.35, 0.2), 10
 # Largest number of steps of a descent, and least decrease of the cost of a step.
 MAX_STEPS, MIN_GAIN = 300, 1e-3
-# How often the cost of areas is doubled to meet the bound on the distortion, and the tolerance of the bound.
-MAX_DOUBLINGS, TOLERATED_EXCESS = 3, 1.15
+# How often the cost of areas is doubled to meet the bound, and the bound for a distortion of 1: the log of the ratio of
+# the 95% and 5% quantiles of the areas of quads.
+MAX_DOUBLINGS, SPREAD = 3, np.log(2.0) / 0.1
 
 
 def aligned_cones(
@@ -54,7 +55,7 @@ def aligned_cones(
     areas = COST_OF_AREAS
     for _ in range(MAX_DOUBLINGS + 1):
         search.descend_all(_Costs(areas / distortion**2))
-        if model.distortion <= TOLERATED_EXCESS * distortion:
+        if model.spread <= SPREAD * distortion:
             break
         areas *= 2
     if search.indices[-1]:

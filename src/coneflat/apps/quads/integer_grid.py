@@ -31,10 +31,10 @@ from ...options import WordOrVertices, read_options
 from .aligned_cones import aligned_cones
 from .features import split_chords, split_small_components
 from .integer_map import IntegerGrid
-from .layout import GRID_TOLERANCE, aligned
+from .layout import GRID_TOLERANCE, GridLayout, aligned
 from .options import DISTORTION, QUADS, QuadOptions
-from .patch_layout import straightened
-from .round_layout import grid_near, grid_of, with_note
+from .patch_layout import sharp_ends, straightened, with_sharp_lines
+from .round_layout import grid_about, grid_near, grid_of, split_between_nodes, with_note
 from .sharp import sharp_layouts
 
 # Options of the flattening for a grid: three, five or six quads at a cone, and rotations by quarter turns.
@@ -49,6 +49,10 @@ OPTIONS = {
 
 # With fewer quads, cones cost more in proportion.
 QUADS_PER_CONE = 2_000
+# Largest fraction of the edges that are split because they join two vertices on sharp edges.
+MAX_CHORDS = 0.05
+# Largest mean quasi-conformal distortion of a grid with sharp edges on grid lines.
+MAX_SHARP_QC = 1.11
 # Options that only the search for the fewest cones takes into account.
 SPARSE_OPTIONS = ("cone_count", "required_cones", "forbidden_cones", "weights", "positive_only", "max_cones")
 
@@ -205,6 +209,9 @@ class _Search:
         for split, note, noun in (FEW_VERTICES, CHORDS):
             mesh, count = split(mesh)
             notes += [note.format(plural(count, noun))] if count else []
+        finer, count = split_chords(mesh, sharp_ends(mesh))
+        # On coarse meshes these are most edges, and their triangles would get thin.
+        mesh = finer if count < MAX_CHORDS * len(mesh.edges) else mesh
         bounds = (
             int(np.ceil((2 * np.pi - (options.max_cone_angle or np.inf)) / (np.pi / 2) - GRID_TOLERANCE)),
             int(np.floor((2 * np.pi - options.min_cone_angle) / (np.pi / 2) + GRID_TOLERANCE)),
@@ -224,7 +231,7 @@ class _Search:
         with self.stages("flatten"):
             vertices = np.ldexp(mesh.vertices, -checked.exponent)
             result = flatten(vertices, mesh.faces, **given, progress=self.progress)
-        return self._with_notes(replace(result, notes=(*notes, *result.notes)), True)
+        return self._with_notes(replace(result, notes=(*notes, *result.notes)), True, True)
 
     def _with_fewest_cones(self, boundary: Any) -> IntegerGrid:
         """Return a grid with the fewest cones for the option `boundary` of `integer_grid`."""
@@ -291,18 +298,28 @@ class _Search:
             result = self._finer(CHORDS, given) or result
         return self._with_notes(result, all_sides)
 
-    def _with_notes(self, result: Flattening, all_sides: bool) -> IntegerGrid:
-        found = self.of_result(result, all_sides)
+    def _with_notes(self, result: Flattening, all_sides: bool, sharp_lines: bool = False) -> IntegerGrid:
+        found = self.of_result(result, all_sides, sharp_lines)
         # Unmet guarantees of the map do not apply to the grid.
         notes = (note for note in result.notes if note not in unmet_guarantees(result))
         return replace(found, notes=(*notes, *found.notes))
 
-    def of_result(self, result: Flattening, all_sides: bool = False) -> IntegerGrid:
-        """Return the grid of a flattening; `all_sides` requires all straight sides on grid lines."""
+    def of_result(
+        self, result: Flattening, all_sides: bool = False, sharp_lines: bool = False
+    ) -> IntegerGrid:
+        """Return the grid of a flattening.
+
+        Args:
+            result: the flattening.
+            all_sides: require all straight sides on grid lines.
+            sharp_lines: put sharp edges that are nearly along the axes on grid lines, if possible.
+        """
         is_straight = result.settings.get("boundary") == "straight"
         self.stages.done = 1.0
         with self.stages("grid"), limit_threads(result.settings.get("threads", THREADS)):
             layout = aligned(result, self.quads, self.size)
+            if sharp_lines and (found := self._with_sharp_lines(layout)):
+                return found
             if not is_straight or np.isin(layout.ends[0][layout.border], layout.sides.points).all():
                 return grid_of(layout, self.energy)
             with suppress(ConvergenceError, GridError, OptionError):
@@ -312,6 +329,16 @@ class _Search:
             if all_sides:
                 raise GridError(why)
             return with_note(grid_of(layout, self.energy), f"{why.capitalize()}.")
+
+    def _with_sharp_lines(self, layout: GridLayout) -> IntegerGrid | None:
+        """Return a grid with sharp edges on grid lines, or None if there are none or it is much distorted."""
+        layout, _ = split_between_nodes(layout)
+        with suppress(GridError, MetricError, OptionError, SeamError):
+            straight, edges = with_sharp_lines(layout, self.energy)
+            found = grid_about(straight, self.energy) if len(edges) else None
+            if found is not None and found.qc_mean < MAX_SHARP_QC:
+                return replace(found, features=layout.mesh.edges[edges])
+        return None
 
     def _along_axes(self, options: dict[str, Any]) -> tuple[IntegerGrid | None, str]:
         """Return a grid with the boundary and as many sharp edges as possible on grid lines; or None and the reason."""

@@ -116,9 +116,12 @@ class MapModel:
         self._base_loops = np.exp(4j * self._rotations.around_loops(self._log_scale))
 
     @property
-    def distortion(self) -> float:
-        """The area distortion of the cones at which the model is linearised."""
-        return float(np.sqrt(self._poisson.share @ self._log_scale**2))
+    def spread(self) -> float:
+        """The log of the ratio of the 95% and 5% quantiles of the areas of quads, for the cones of `linearise`."""
+        order = np.argsort(self._log_scale)
+        number = np.cumsum(self._poisson.share[order] * np.exp(2 * self._log_scale[order]))
+        low, high = np.interp([0.05, 0.95], number / number[-1], self._log_scale[order])
+        return float(2 * (high - low))
 
     def state(self, indices: IntArray) -> tuple[FloatArray, ComplexArray, ComplexArray]:
         """Return the log scale of regions (r,), the crosses of samples (s,), and the rotations of loops (l,)."""
@@ -152,7 +155,7 @@ def _regions(mesh: TriangleMesh, key: FloatArray) -> tuple[IntArray, IntArray, I
         centre = int(farthest[np.argmax(key[farthest])])
         limit = np.inf if number == 0 else float(distance[centre])
         found = dijkstra(graph, indices=centre, limit=limit)
-        nearer = found < distance
+        nearer = found < distance - 1e-9 * scale
         distance[nearer], region[nearer] = found[nearer], number
         centres.append(centre)
         larger = region.copy() if number < SAMPLES else larger
