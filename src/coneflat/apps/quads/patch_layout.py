@@ -30,6 +30,9 @@ from .layout import GridLayout, Sides, at_origin, find_sides, joined_charts
 MAX_TURN = np.deg2rad(20.0)
 # Squares: shorter chains of sharp edges are not put on lines.
 SHORTEST = 4.0
+# Largest numbers of Newton steps: to join patches, and to move sharp edges to lines, which takes about ten steps, or
+# does not converge.
+PATCH_STEPS, LINE_STEPS = 200, 40
 # Patches of equal scale are easier to join.
 PATCHES = StretchEnergy(1.0)
 
@@ -214,7 +217,13 @@ def _fitting(layout: GridLayout, is_feature: BoolArray, energy: StretchEnergy) -
     points = as_pairs(layout.points)
     try:
         found = relax(
-            layout.mesh, points, layout.corners, energy, constraints, lengths=layout.lengths, steps=200
+            layout.mesh,
+            points,
+            layout.corners,
+            energy,
+            constraints,
+            lengths=layout.lengths,
+            steps=PATCH_STEPS if energy is PATCHES else LINE_STEPS,
         )
     except OptionError as error:
         raise GridError(f"sides and seams cannot all lie along the axes: {error}") from error
