@@ -36,7 +36,7 @@ CEILINGS = {
     "apps.cli": 1525,
     "apps.measure_uv": 160,
     "apps.peers": 478,
-    "apps.quads": 3815,
+    "apps.quads": 3818,
     "apps.studio": 1741,
     "apps.unwrap": 885,
     "apps.view": 1623,
@@ -63,7 +63,7 @@ CEILINGS = {
     "xatlas": 2,
 }
 #: The largest size of the core, and of everything.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_806, 238, 26_470
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_806, 238, 26_472
 CONSTANTS, KERNELS, NAMES, LEVELS = 324, 110, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -17,7 +17,12 @@ from scipy.sparse.csgraph import dijkstra
 from ... import TriangleMesh
 from ...base import ComplexArray, FloatArray, IntArray
 from ...errors import CurvatureError
-from .cross_field import field_indices, preferred_directions, smoothest_cross_field
+from .cross_field import (
+    field_indices,
+    preferred_directions,
+    sharp_ends,
+    smoothest_cross_field,
+)
 from .map_model import MapModel, vertex_graph
 
 # Cost of an area distortion as large as allowed, of crosses that are off by 22.5 degrees on average, and of a rotation
@@ -93,6 +98,11 @@ class _Search:
     def __init__(self, mesh: TriangleMesh, model: MapModel, start: IntArray, price: float) -> None:
         self.model, self.graph, self.key = model, vertex_graph(mesh), model.key
         inside = np.clip(start[model.places], model.least[:-1], model.most[:-1])
+        # Cones at corners of the surface, where sharp edges meet, stay there.
+        edges_at = np.bincount(sharp_ends(mesh).ravel(), minlength=len(mesh.vertices))[model.places]
+        is_corner = (inside != 0) & (edges_at > 2) & (np.abs(model.curvature - inside) < 0.5)
+        fixed = np.flatnonzero(is_corner)
+        model.least[fixed] = model.most[fixed] = inside[fixed]
         self.indices = np.append(inside, start.sum() - inside.sum())
         self.price = np.append(np.full(len(inside), price), COST_OF_MISSING)
 

@@ -88,6 +88,13 @@ def sharp_or_boundary(mesh: TriangleMesh, shortest: float) -> IntArray:
     return np.union1d(sharp[total[label[ends[:, 0]]] > shortest], np.flatnonzero(mesh.is_boundary_edge))
 
 
+def sharp_ends(mesh: TriangleMesh) -> IntArray:
+    """Return (k, 2) the vertices of the sharp edges of a mesh, without the boundary."""
+    scale = float(np.sqrt(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum() / 2))
+    edges = sharp_or_boundary(mesh, SHARP_LENGTH * scale)
+    return mesh.edges[edges[~mesh.is_boundary_edge[edges]]]
+
+
 def _curvature_tensors(mesh: TriangleMesh, areas: FloatArray, radius: float) -> FloatArray:
     """Return (m, 2, 2) the curvature tensors of triangles in their frames, averaged over a radius.
 

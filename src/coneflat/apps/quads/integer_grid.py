@@ -29,11 +29,12 @@ from ...measure import unmet_guarantees
 from ...mesh import CheckedMesh
 from ...options import WordOrVertices, read_options
 from .aligned_cones import aligned_cones
+from .cross_field import sharp_ends
 from .features import split_chords, split_small_components
 from .integer_map import IntegerGrid
 from .layout import GRID_TOLERANCE, GridLayout, aligned
 from .options import DISTORTION, QUADS, QuadOptions
-from .patch_layout import sharp_ends, straightened, with_sharp_lines
+from .patch_layout import straightened, with_sharp_lines
 from .round_layout import grid_about, grid_near, grid_of, split_between_nodes, with_note
 from .sharp import sharp_layouts
 
@@ -333,7 +334,7 @@ class _Search:
     def _with_sharp_lines(self, layout: GridLayout) -> IntegerGrid | None:
         """Return a grid with sharp edges on grid lines, or None if there are none or it is much distorted."""
         layout, _ = split_between_nodes(layout)
-        with suppress(GridError, MetricError, OptionError, SeamError):
+        with suppress(GridError, MetricError, OptionError, SeamError), np.errstate(all="ignore"):
             straight, edges = with_sharp_lines(layout, self.energy)
             found = grid_about(straight, self.energy) if len(edges) else None
             if found is not None and found.qc_mean < MAX_SHARP_QC:

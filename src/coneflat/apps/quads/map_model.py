@@ -42,6 +42,7 @@ class MapModel:
     Attributes:
         places: (p,) vertices at which cones are searched, in an order that does not depend on the numbering.
         key: (p,) numbers by which they are sorted.
+        curvature: (p,) the angle defects of the surface there, in quarter turns.
         centres: indices of places that are the centres of regions; each is far from the previous ones.
         spacing: mean distance of the centres.
         scales: (r, p + 1) change of the mean log scale of each region by a quarter turn, times the root of the region's
@@ -80,7 +81,7 @@ class MapModel:
         samples = order[np.concatenate([[True], np.diff(of_face[order]) > 0])]
         self._number = np.searchsorted(of_face[samples], of_face)
         self.places = _places(key, np.union1d(centres, required))
-        self.key = key[self.places]
+        self.key, self.curvature = key[self.places], self._defect[self.places] / QUARTER
         number = np.empty(count, dtype=np.int64)
         number[self.places] = np.arange(len(self.places))
         self.centres = number[centres]

@@ -15,14 +15,14 @@ from ... import TriangleMesh
 from ...base import BoolArray, ComplexArray, FloatArray, IntArray
 from ...cones import CONE_ANGLE_PER_TRIANGLE, ConeSearch, quantise_cones
 from ...errors import CurvatureError, GridError, MetricError, OptionError, SeamError
-from ...geometry import as_complex, as_pairs, double_areas, edge_lengths, signed_angles, signed_double_areas
+from ...geometry import as_complex, as_pairs, double_areas, signed_angles, signed_double_areas
 from ...layout import Lines, PointConstraints, SeamChains, StretchEnergy, lay_out, relax
 from ...mesh import NEXT, PREVIOUS, cut_open, open_along, tie_key
 from ...metric import ExactChoices, exact_flat_metric, straight_boundary
 from ...options import Options
 from ...seams import find_seams
 from ...stages import ConeSolution, Cut, Surface
-from .cross_field import SHARP_LENGTH, sharp_or_boundary
+from .cross_field import sharp_ends
 from .features import Opened, edge_indices, without_stubs
 from .layout import GridLayout, Sides, at_origin, find_sides, joined_charts
 
@@ -249,13 +249,6 @@ def _all_sides(layout: GridLayout, is_feature: BoolArray, chains: SeamChains) ->
         np.concatenate([border.side, both[:, 1] + len(border.axis)]),
         np.concatenate([border.axis, axis]),
     )
-
-
-def sharp_ends(mesh: TriangleMesh) -> IntArray:
-    """Return (k, 2) the vertices of the sharp edges of a mesh, without the boundary."""
-    scale = float(np.sqrt(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum() / 2))
-    edges = sharp_or_boundary(mesh, SHARP_LENGTH * scale)
-    return mesh.edges[edges[~mesh.is_boundary_edge[edges]]]
 
 
 def with_sharp_lines(layout: GridLayout, energy: StretchEnergy) -> tuple[GridLayout, IntArray]:
