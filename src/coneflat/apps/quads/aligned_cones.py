@@ -100,7 +100,7 @@ class _Search:
         inside = np.clip(start[model.places], model.least[:-1], model.most[:-1])
         # Cones at corners of the surface, where sharp edges meet, stay there.
         edges_at = np.bincount(sharp_ends(mesh).ravel(), minlength=len(mesh.vertices))[model.places]
-        is_corner = (inside != 0) & (edges_at > 2) & (np.abs(model.curvature - inside) < 0.5)
+        is_corner = (inside != 0) & (edges_at > 2) & (np.abs(model.curvature - inside) < 0.25)
         fixed = np.flatnonzero(is_corner)
         model.least[fixed] = model.most[fixed] = inside[fixed]
         self.indices = np.append(inside, start.sum() - inside.sum())
