@@ -1,10 +1,10 @@
 """Quad meshes compared with those of other packages: `python benchmarks/quads.py` prints a Markdown table.
 
-Every model of `../shared/meshes` that is a manifold, by coneflat, and by what can be installed with pip: QuadriFlow
-(`pyquadriflow`) and Instant Meshes (`pynanoinstantmeshes`), with their defaults, at several counts of quads. With
-`--dial`, ours once more with the least `stretch` of some whose edge lengths vary at most 1.2 times as much as those of
-Instant Meshes. Everybody's meshes are written as OBJ and measured on the file by the same program, `--tool`, which is
-not ours. Each runs in a process of its own; seconds are of the call alone, without start-up.
+Every model of `../shared/meshes` that is a manifold, some also decimated, and mechanical shapes with fillets, holes and
+ribs, by coneflat and by what can be installed with pip: QuadriFlow (`pyquadriflow`) and Instant Meshes
+(`pynanoinstantmeshes`), each also with its options for boundaries and sharp edges. Everybody's meshes are written as
+OBJ and measured on the file by the same program, `--tool`, which is not ours. Each runs in a process of its own;
+seconds are CPU time of the call alone, without start-up. The medians over closed models come last.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -24,6 +25,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import mechanical
 import numpy as np
 from common import MODELS, shapes
 
@@ -31,10 +33,23 @@ from coneflat import check_mesh, quads, read_mesh
 from coneflat.errors import ConeflatError
 from coneflat.mesh.connectivity import TriangleMesh
 
-TOOL = MODELS.parent / "tools" / "quads.py"
-STRETCHES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0)
-#: Largest ratio of the variation of edge lengths to that of Instant Meshes.
-EVEN = 1.2
+TOOL = MODELS.parent / "tools" / "quads_aligned.py"
+#: Models above this number of triangles are measured decimated, too.
+DECIMATED = 20_000
+#: Columns: the name, the key in the output of the tool, and the format.
+COLUMNS = (
+    ("irregular", "irregular", "{:.0f}"),
+    ("off 90, mean", "off_mean", "{:.2f}"),
+    ("95%", "off_p95", "{:.1f}"),
+    ("worst", "off_max", "{:.0f}"),
+    ("area 95/5", "area_95_5", "{:.2f}"),
+    ("creases within 10 degrees", "crease_angle_lt10", "{:.0%}"),
+    ("off curvature", "curv_off", "{:.1f}"),
+    ("Hausdorff, edges", "haus_edges", "{:.2f}"),
+    ("self-intersections", "self", "{:.0f}"),
+    ("inverted", "J_neg", "{:.0f}"),
+    ("s", "seconds", "{:.1f}"),
+)
 
 Polygons = tuple[np.ndarray, list[list[int]]]
 Maker = Callable[[np.ndarray, np.ndarray, int], Polygons]
@@ -43,78 +58,102 @@ Maker = Callable[[np.ndarray, np.ndarray, int], Polygons]
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--models", default="", help="of all, those whose names are given; with commas")
-    parser.add_argument("--quads", default="1000,5000,20000", help="how many are asked for; with commas")
-    parser.add_argument("--methods", default="coneflat,QuadriFlow,Instant Meshes", help="with commas")
-    parser.add_argument("--dial", action="store_true", help="ours with edges as even as Instant Meshes', too")
-    parser.add_argument("--tool", type=Path, default=TOOL, help="measures quads in an OBJ file")
+    parser.add_argument("--quads", default="1000,3000,10000", help="how many are asked for; with commas")
+    parser.add_argument("--methods", default=",".join(METHODS), help="with commas")
+    parser.add_argument(
+        "--tool", type=Path, default=TOOL, help="measures quads in an OBJ file against a surface"
+    )
     arguments = parser.parse_args()
     if not arguments.tool.exists():
         sys.exit(f"{arguments.tool} is not there: name a program that measures quads with --tool")
-    methods = arguments.methods.split(",")
-    print("| model | asked | method | quads | others | irregular | off 90 | edge cv | least J | Euler | s |")
-    print("| --- " * 11 + "|")
+    methods = [name for name in arguments.methods.split(",") if find_spec(METHODS[name][0])]
+    found: dict[tuple[int, str], list[dict[str, float]]] = defaultdict(list)
+    failed: dict[tuple[int, str], int] = defaultdict(int)
+    names = [name for name, _, _ in COLUMNS]
+    print("| model | asked | method | quads | " + " | ".join(names) + " |")
+    print("| --- " * (4 + len(names)) + "|")
     for name, mesh in models([word for word in arguments.models.split(",") if word]):
         for count in map(int, arguments.quads.split(",")):
-            even = float("nan")
-            for method, make in makers(methods):
-                measures, text = trial(mesh, count, make, arguments.tool)
+            for method in methods:
+                measures, error = trial(mesh, count, METHODS[method][1], arguments.tool)
+                text = row(measures) if measures else f"{error} |" + " |" * len(names)
                 print(f"| {name} | {count:,} | {method} | {text}", flush=True)
-                even = measures["edge_cv"] if method == "Instant Meshes" and measures else even
-            if arguments.dial and even == even:
-                stretch, text = as_even(mesh, count, EVEN * even, arguments.tool)
-                print(f"| {name} | {count:,} | coneflat, stretch {stretch:g} | {text}", flush=True)
+                if measures and not mesh.is_boundary_edge.any():
+                    found[count, method].append(measures)
+                failed[count, method] += not measures
+    print("\nMedians over closed models:\n")
+    print("| asked | method | models | failed | with inverted quads | " + " | ".join(names) + " |")
+    print("| --- " * (5 + len(names)) + "|")
+    for (count, method), rows in sorted(found.items()):
+        middle = {key: median([each[key] for each in rows if key in each]) for _, key, _ in COLUMNS}
+        inverted = sum(each["J_neg"] > 0 for each in rows)
+        cells = " | ".join(form.format(middle[key]) for _, key, form in COLUMNS)
+        print(
+            f"| {count:,} | {method} | {len(rows)} | {failed[count, method]} | {inverted} | {cells} |",
+            flush=True,
+        )
+
+
+def median(values: list[float]) -> float:
+    return float(np.median(values)) if values else float("nan")
 
 
 def models(names: list[str]) -> Iterator[tuple[str, TriangleMesh]]:
+    """Yield the models, decimated ones, and mechanical shapes; of all, those with the given names."""
     for path in sorted(MODELS.glob("*.*")):
         if path.suffix == ".md" or (names and path.stem not in names):
             continue
         source = read_mesh(path)
         try:
-            yield path.stem, check_mesh(source.vertices, source.triangles).mesh
+            mesh = check_mesh(source.vertices, source.triangles).mesh
         except ConeflatError:
             continue
+        yield path.stem, mesh
+        if len(mesh.faces) > DECIMATED and find_spec("fast_simplification"):
+            import fast_simplification
+
+            small = fast_simplification.simplify(
+                mesh.vertices, mesh.faces, 1 - DECIMATED / 4 / len(mesh.faces)
+            )
+            try:
+                yield f"{path.stem}, decimated", check_mesh(*small).mesh
+            except ConeflatError:
+                continue
+    for name, shape in mechanical.shapes().items():
+        if not names or name in names:
+            yield name, check_mesh(*shape).mesh
 
 
-def makers(names: list[str]) -> Iterator[tuple[str, Maker]]:
-    """Yield the named methods whose packages are installed."""
-    for name in names:
-        module, make = METHODS[name]
-        if find_spec(module) is not None:
-            yield name, make
+def row(measures: dict[str, float]) -> str:
+    """Return the cells of a row."""
+    cells = [form.format(measures[key]) if key in measures else "" for _, key, form in COLUMNS]
+    return f"{measures['quads']:,.0f} | " + " | ".join(cells) + " |"
 
 
-def as_even(mesh: TriangleMesh, count: int, cv: float, tool: Path) -> tuple[float, str]:
-    """Return the least stretch for which edge lengths vary little enough, or the last one, and its result."""
-    text = ""
-    for stretch in STRETCHES:
-        measures, text = trial(mesh, count, partial(by_coneflat, stretch=stretch), tool)
-        if measures and measures["edge_cv"] <= cv:
-            return stretch, text
-    return STRETCHES[-1], text
-
-
-def trial(mesh: TriangleMesh, count: int, make: Maker, tool: Path) -> tuple[dict[str, Any], str]:
-    """Return the measures of a method on a mesh, and the end of its row; a failure is reported there."""
+def trial(mesh: TriangleMesh, count: int, make: Maker, tool: Path) -> tuple[dict[str, float], str]:
+    """Return the measures of a method on a mesh, or none and the error."""
     with tempfile.TemporaryDirectory() as folder, ProcessPoolExecutor(1) as pool:
-        path = Path(folder) / "quads.obj"
+        surface, path = Path(folder) / "surface.obj", Path(folder) / "quads.obj"
+        write_polygons(surface, mesh.vertices, mesh.faces.tolist())
         try:
             pool.submit(be_silent).result()
             pool.submit(warm_up, make).result()
             seconds = pool.submit(write, path, mesh, count, make).result()
-            found = json.loads(subprocess.check_output([sys.executable, tool, path]))
+            found = json.loads(
+                subprocess.check_output([sys.executable, tool, surface, path], stderr=subprocess.DEVNULL)
+            )
         except BrokenProcessPool:
-            return {}, "crashed | " + "| " * 7
+            return {}, "crashed"
         except Exception as error:  # Other packages raise any type.
-            return {}, f"{type(error).__name__}: {str(error)[:120]} | " + "| " * 7
-    wanted = mesh.euler_characteristic
-    euler = "right" if found["euler"] == wanted else f"{found['euler']}, not {wanted}"
-    if found["nonmanifold"]:
-        euler += f"; {found['nonmanifold']} edges of three"
-    return found, (
-        f"{found['quads']:,} | {found['faces'] - found['quads']:,} | {found['irregular']} | "
-        f"{found['angle_mean']:.2f} | {found['edge_cv']:.3f} | {found['jacobian_min']:.2f} | {euler} | {seconds:.1f} |"
-    )
+            return {}, f"{type(error).__name__}: {str(error)[:120]}"
+    return {**numbers(found), "quads": found["topo"]["F"], "seconds": seconds}, ""
+
+
+def numbers(found: dict[str, Any]) -> dict[str, float]:
+    """Return the measures of the tool that are numbers; self-intersecting pairs are the first of two."""
+    pairs = found.get("selfint")
+    plain = {key: float(value) for key, value in found.items() if isinstance(value, (int, float))}
+    return {**plain, **({"self": float(pairs[0])} if isinstance(pairs, list) else {})}
 
 
 def be_silent() -> None:
@@ -130,41 +169,56 @@ def warm_up(make: Maker) -> None:
 
 def write(path: Path, mesh: TriangleMesh, count: int, make: Maker) -> float:
     """Write the result of a method on a mesh as OBJ, and return its seconds."""
-    start = time.perf_counter()
+    start = time.process_time()
     vertices, polygons = make(mesh.vertices, mesh.faces, count)
-    seconds = time.perf_counter() - start
-    with path.open("w") as file:
-        file.writelines(f"v {x!r} {y!r} {z!r}\n" for x, y, z in vertices.tolist())
-        file.writelines(f"f {' '.join(str(corner + 1) for corner in each)}\n" for each in polygons)
+    seconds = time.process_time() - start
+    write_polygons(path, vertices, polygons)
     return seconds
 
 
-def by_coneflat(vertices: np.ndarray, faces: np.ndarray, count: int, stretch: float = 0.0) -> Polygons:
-    found = quads(vertices, faces, quads=count, stretch=stretch)
+def write_polygons(path: Path, vertices: np.ndarray, polygons: list[list[int]]) -> None:
+    with path.open("w") as file:
+        file.writelines(f"v {x!r} {y!r} {z!r}\n" for x, y, z in vertices.tolist())
+        file.writelines(f"f {' '.join(str(corner + 1) for corner in each)}\n" for each in polygons)
+
+
+def by_coneflat(vertices: np.ndarray, faces: np.ndarray, count: int, **options: Any) -> Polygons:
+    found = quads(vertices, faces, quads=count, **options)
     return found.vertices, found.quads.tolist()
 
 
-def by_quadriflow(vertices: np.ndarray, faces: np.ndarray, count: int) -> Polygons:
+def by_quadriflow(vertices: np.ndarray, faces: np.ndarray, count: int, sharp: bool = False) -> Polygons:
+    """Return the quads of QuadriFlow; `sharp` preserves sharp edges and the boundary."""
     from pyQuadriFlow.pyQuadriFlow import pyquadriflow
 
-    found = pyquadriflow(count, 0, vertices.tolist(), faces.tolist(), False, False, False, False, False)
+    found = pyquadriflow(count, 0, vertices.tolist(), faces.tolist(), sharp, sharp, False, False, False)
     return np.array(found["vertices"]), found["faces"]
 
 
-def by_instant_meshes(vertices: np.ndarray, faces: np.ndarray, count: int) -> Polygons:
+def by_instant_meshes(vertices: np.ndarray, faces: np.ndarray, count: int, **options: Any) -> Polygons:
     """Convert the number: the package counts vertices before it splits all faces into quads, usually four."""
     import pynanoinstantmeshes
 
     points, found = pynanoinstantmeshes.remesh(
-        vertices.astype(np.float32), faces.astype(np.uint32), vertex_count=count // 4, deterministic=True
+        vertices.astype(np.float32),
+        faces.astype(np.uint32),
+        vertex_count=count // 4,
+        deterministic=True,
+        **options,
     )
     return points.astype(np.float64), found.tolist()
 
 
 METHODS: dict[str, tuple[str, Maker]] = {
     "coneflat": ("coneflat", by_coneflat),
+    "coneflat; fewest cones": ("coneflat", partial(by_coneflat, cones="sparse", distortion=0.2)),
     "QuadriFlow": ("pyQuadriFlow", by_quadriflow),
+    "QuadriFlow; sharp": ("pyQuadriFlow", partial(by_quadriflow, sharp=True)),
     "Instant Meshes": ("pynanoinstantmeshes", by_instant_meshes),
+    "Instant Meshes; sharp": (
+        "pynanoinstantmeshes",
+        partial(by_instant_meshes, align_to_boundaries=True, creaseAngle=30.0),
+    ),
 }
 
 if __name__ == "__main__":

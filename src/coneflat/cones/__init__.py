@@ -17,18 +17,7 @@ from .sparse.limits import MAX_SEARCHED
 from .sparse.search import ConeSearch
 
 __all__ = [
-    "ConeSearch",
-    "GroundedLaplacian",
-    "CONE_ANGLE_PER_TRIANGLE",
-    "MAX_SEARCHED",
-    "SparseCones",
-    "close_search",
-    "cones_at",
-    "cones_with_curvature",
-    "find_cones",
-    "greedy_cones",
-    "coneless_solution",
-    "open_search",
-    "quantise_cones",
-    "uses_sparse_search",
-]
+    "ConeSearch", "GroundedLaplacian", "CONE_ANGLE_PER_TRIANGLE", "MAX_SEARCHED", "SparseCones", "close_search",
+    "cones_at", "cones_with_curvature", "find_cones", "greedy_cones", "coneless_solution", "open_search",
+    "quantise_cones", "uses_sparse_search",
+]  # fmt: skip

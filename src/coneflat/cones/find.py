@@ -69,7 +69,7 @@ def find_cones(
         solution = greedy_cones(
             *given, max_cones=spec.max_count, tie_key=mesh_tie_key(mesh), progress=watch.report
         )
-    elif len(spec.given):
+    elif len(spec.given) or spec.searches_corners:
         solution = _fit_given(surface, spec)
     else:  # "none", or no given cone is on this component
         solution = cones_at(*given, spec.given.vertices)
@@ -205,16 +205,16 @@ def linear_model(surface: Surface, spec: ConeSpec) -> LinearModel:
 
 
 def _fit_given(surface: Surface, spec: ConeSpec) -> ConeSolution:
-    """Return the given cones; curvatures that are not given are fitted."""
-    on_boundary = replace(spec, absorbs_curvature=surface.mesh.is_boundary_vertex)
-    return fitted_cones(
-        linear_model(surface, on_boundary),
+    """Return the given cones; curvatures that are not given are fitted. On a straight boundary they are its corners."""
+    found = fitted_cones(
+        linear_model(surface, spec),
         surface.mesh.euler_characteristic,
         spec.given.vertices,
         spec.given.curvatures,
         min_cone_angle=spec.min_angle,
         max_cone_angle=spec.max_angle,
     )
+    return replace(found, cones=found.cones[~surface.mesh.is_boundary_vertex[found.cones]])
 
 
 def _search(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holonomy | None) -> ConeSolution:

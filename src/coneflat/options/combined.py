@@ -47,12 +47,14 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
         if widest is not None and not widest > least:
             yield f"the largest cone angle ({widest:g} radians) must exceed the smallest ({least:g})"
         if not self.searches_cones:
-            # The curvatures of given cones without one minimize the weighted area distortion.
-            is_fitted = any(k is None for k in self.named_cones.values())
+            # The curvatures of given cones without one minimize the weighted area distortion. If all are given, handles
+            # can be corrected to a quantum, and a straight boundary has corners among them.
+            is_fitted = None in self.named_cones.values()
+            allowed = "weights" if is_fitted else "quantise" if self.cone_choice == "given" else ""
             for name in SEARCH_OPTIONS:
-                if self._is_set(name) and not (name == "weights" and is_fitted):
+                if self._is_set(name) and name != allowed:
                     yield f"{name} is an option of cones 'sparse', not of cones {self.cone_choice!r}"
-            if self.boundary_kind == "straight":
+            if self.boundary_kind == "straight" and allowed != "quantise":
                 yield "boundary 'straight' needs the cone search, which finds its corners: use cones 'sparse'"
         if quantum is None and self.correct_handles:
             yield "correct_handles needs quantised cones: set quantise, for example to pi/2"

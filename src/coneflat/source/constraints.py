@@ -108,7 +108,9 @@ def locate_constraints(checked: CheckedMesh, options: Options, given: InputMesh)
         raise OptionError(f"vertex {name} is both a required and a forbidden cone")
     return Constraints(
         names,
-        _locate(checked, "cone", options.named_cones),
+        _locate(
+            checked, {"straight": "cone or corner"}.get(options.boundary_kind, "cone"), options.named_cones
+        ),
         _locate(checked, "corner", options.corners),
         required,
         is_allowed,
@@ -120,7 +122,7 @@ def locate_constraints(checked: CheckedMesh, options: Options, given: InputMesh)
 
 
 def _locate(checked: CheckedMesh, noun: str, given: Mapping[int, float | None]) -> VertexCurvatures:
-    """Return given cones, which must be inner vertices, or given corners, which must be on the boundary."""
+    """Return given cones, which must be inner vertices, given corners, which must be on the boundary, or both."""
     names, origin = np.array(list(given), dtype=np.int64), checked.vertex_origin
     for name in np.setdiff1d(names, origin):
         raise OptionError(f"{noun} {name} is not a vertex of a face: indices are from 0 to {origin[-1]}")
@@ -132,7 +134,7 @@ def _locate(checked: CheckedMesh, noun: str, given: Mapping[int, float | None]) 
                 f"cone {name} lies on the boundary, where the curvature is free: choose inner vertices, "
                 "or prescribe the boundary's curvature (boundary)"
             )
-    else:
+    elif noun == "corner":
         # Repair may have split a corner. All of its copies on the boundary are corners.
         found = np.flatnonzero(np.isin(origin, names) & checked.mesh.is_boundary_vertex)
         for name in np.setdiff1d(names, origin[found]):

@@ -93,7 +93,7 @@ def test_the_grid_is_written_and_made_into_the_same_quads(tmp_path, ball, quads_
     told = json.loads((tmp_path / "grid.json").read_text())
     assert "quads" not in told
     assert told["grid"]["size"] == IntegerGrid.load(npz).size
-    assert list(told["seconds"]) == ["read", "flatten", "grid", "write"]
+    assert list(told["seconds"]) == ["read", "cones", "flatten", "grid", "write"]
     assert run(npz, "-o", both, "--grid", obj).exit_code == 0
     np.testing.assert_array_equal(IntegerGrid.load(obj).turns, IntegerGrid.load(npz).turns)
     again = QuadMesh.load(both)

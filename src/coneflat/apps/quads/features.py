@@ -182,13 +182,14 @@ def split_faces(
     return _split(mesh, edges, origin, _chords(mesh, edges))
 
 
-def split_chords(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
+def split_chords(mesh: TriangleMesh, ends: IntArray | None = None) -> tuple[TriangleMesh, int]:
     """Return a mesh without inner edges between two boundary vertices, by splitting them, and their number.
 
-    Straight sides of a boundary would degenerate the triangles at such edges.
+    Straight sides of a boundary would degenerate the triangles at such edges. The same holds for features, given by
+    their two vertices (k, 2).
     """
     mesh, none = TriangleMesh(*_without_pillows(mesh.vertices, mesh.faces)), np.empty(0, dtype=np.int64)
-    chords = _chords(mesh, none)
+    chords = _chords(mesh, none if ends is None else edge_indices(mesh, ends))
     return _split(mesh, none, none, chords)[0], int(chords.sum())
 
 

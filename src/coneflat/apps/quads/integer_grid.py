@@ -12,28 +12,50 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import Flattening, TriangleMesh, check_mesh, flatten
-from ...base import DISTORTION, THREADS, Progress, Stopwatch, limit_threads, plural, unit_exponent
-from ...errors import ConeflatError, ConvergenceError, CurvatureError, GridError, MetricError, OptionError
+from ...base import THREADS, Progress, Stopwatch, limit_threads, plural, unit_exponent
+from ...errors import (
+    ConeflatError,
+    ConvergenceError,
+    CurvatureError,
+    GridError,
+    MetricError,
+    OptionError,
+    SeamError,
+)
+from ...geometry import double_areas, edge_lengths
 from ...io import as_input
 from ...layout import StretchEnergy
 from ...measure import unmet_guarantees
 from ...mesh import CheckedMesh
-from ...options import WordOrVertices
+from ...options import WordOrVertices, read_options
+from .aligned_cones import aligned_cones
+from .cross_field import sharp_ends
 from .features import split_chords, split_small_components
 from .integer_map import IntegerGrid
-from .layout import GRID_TOLERANCE, aligned
-from .options import QUADS, QuadOptions
-from .round_layout import grid_near, grid_of, with_note
-from .sharp import sharp_layouts, unsupported
+from .layout import GRID_TOLERANCE, GridLayout, aligned
+from .options import DISTORTION, QUADS, QuadOptions
+from .patch_layout import straightened, with_sharp_lines
+from .round_layout import grid_about, grid_near, grid_of, split_between_nodes, with_note
+from .sharp import sharp_layouts
 
 # Options of the flattening for a grid: three, five or six quads at a cone, and rotations by quarter turns.
 OPTIONS = {
     "quantise": np.pi / 2,
     "correct_handles": True,
     "charts": "one",
+    "distortion": DISTORTION,
     "min_cone_angle": QuadOptions.min_cone_angle,
     "max_cone_angle": QuadOptions.max_cone_angle,
 }
+
+# With fewer quads, cones cost more in proportion.
+QUADS_PER_CONE = 2_000
+# Largest fraction of the edges that are split because they join two vertices on sharp edges.
+MAX_CHORDS = 0.05
+# Largest mean quasi-conformal distortion of a grid with sharp edges on grid lines.
+MAX_SHARP_QC = 1.11
+# Options that only the search for the fewest cones takes into account.
+SPARSE_OPTIONS = ("cone_count", "required_cones", "forbidden_cones", "weights", "positive_only", "max_cones")
 
 Split: TypeAlias = Callable[[TriangleMesh], tuple[TriangleMesh, int]]
 # How a mesh is split where flattening it fails, a note, and the noun for the number of splits.
@@ -131,7 +153,7 @@ def _defaults(options: Mapping[str, Any]) -> dict[str, Any]:
                 f"cones of a grid must have curvatures that are multiples of pi/2; that of vertex {vertex} is "
                 f"{'not given' if curvature is None else f'{curvature:g}'}"
             )
-    return {"charts": "one"}
+    return {"charts": "one", "quantise": np.pi / 2, "correct_handles": True}
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +188,54 @@ class _Search:
 
     def with_boundary(self, boundary: Any) -> IntegerGrid:
         """Return a grid for the option `boundary` of `integer_grid`."""
+        if not self._may_align(boundary):
+            return self._with_fewest_cones(boundary)
+        try:
+            return self._of_aligned_cones()
+        except (ConvergenceError, CurvatureError, GridError, MetricError, SeamError) as error:
+            note = f"Quads follow no sharp edges or curvature, because no grid with such cones was found: {error}."
+        return with_note(self._with_fewest_cones(boundary), note)
+
+    def _may_align(self, boundary: Any) -> bool:
+        """Return whether the options leave open which cones a grid has."""
+        cones = self.options.get("cones", "auto")
+        if not (isinstance(cones, str) and cones == "auto") or any(n in self.options for n in SPARSE_OPTIONS):
+            return False
+        return boundary in ("auto", "straight") or not self._checked().mesh.is_boundary_edge.any()
+
+    def _of_aligned_cones(self) -> IntegerGrid:
+        """Return a grid whose cones are chosen for even sizes and for the directions of the surface."""
+        checked, options = self._checked(), read_options(self.options, QuadOptions)
+        mesh, notes = checked.mesh, list(checked.notes)
+        for split, note, noun in (FEW_VERTICES, CHORDS):
+            mesh, count = split(mesh)
+            notes += [note.format(plural(count, noun))] if count else []
+        finer, count = split_chords(mesh, sharp_ends(mesh))
+        # On coarse meshes these are most edges, and their triangles would get thin.
+        mesh = finer if count < MAX_CHORDS * len(mesh.edges) else mesh
+        bounds = (
+            int(np.ceil((2 * np.pi - (options.max_cone_angle or np.inf)) / (np.pi / 2) - GRID_TOLERANCE)),
+            int(np.floor((2 * np.pi - options.min_cone_angle) / (np.pi / 2) + GRID_TOLERANCE)),
+        )
+        cones: dict[int, float] = {}
+        area = float(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum()) / 2
+        quads = area / np.ldexp(self.size, checked.exponent) ** 2 if self.size else self.quads
+        price = max(1.0, QUADS_PER_CONE / quads)
+        with self.stages("cones"), limit_threads(options.threads):
+            for part, vertices, _ in mesh.split_components():
+                found = aligned_cones(part, options.distortion, *bounds, price)
+                cones |= {int(vertices[v]): k * np.pi / 2 for v, k in found.items()}
+        given = {name: one for name, one in self.options.items() if name not in OPTIONS}
+        given |= {**_defaults({"cones": cones}), "cones": cones}
+        if mesh.is_boundary_edge.any():
+            given["boundary"] = "straight"
+        with self.stages("flatten"):
+            vertices = np.ldexp(mesh.vertices, -checked.exponent)
+            result = flatten(vertices, mesh.faces, **given, progress=self.progress)
+        return self._with_notes(replace(result, notes=(*notes, *result.notes)), True, True)
+
+    def _with_fewest_cones(self, boundary: Any) -> IntegerGrid:
+        """Return a grid with the fewest cones for the option `boundary` of `integer_grid`."""
         if boundary != "auto":
             return self._of_flattening(boundary)
         may_be_straight = isinstance(self.options.get("cones", "auto"), str)
@@ -227,39 +297,49 @@ class _Search:
                 result = found
         if boundary == "straight" and result.distortion.flipped + result.distortion.degenerate:
             result = self._finer(CHORDS, given) or result
-        return self._with_notes(result, options, all_sides)
+        return self._with_notes(result, all_sides)
 
-    def _with_notes(self, result: Flattening, options: dict[str, Any] | None, all_sides: bool) -> IntegerGrid:
-        found = self.of_result(result, options, all_sides)
+    def _with_notes(self, result: Flattening, all_sides: bool, sharp_lines: bool = False) -> IntegerGrid:
+        found = self.of_result(result, all_sides, sharp_lines)
         # Unmet guarantees of the map do not apply to the grid.
         notes = (note for note in result.notes if note not in unmet_guarantees(result))
         return replace(found, notes=(*notes, *found.notes))
 
     def of_result(
-        self, result: Flattening, options: dict[str, Any] | None = None, all_sides: bool = False
+        self, result: Flattening, all_sides: bool = False, sharp_lines: bool = False
     ) -> IntegerGrid:
-        """Return the grid of a flattening; `options` are None if the user gave the flattening."""
+        """Return the grid of a flattening.
+
+        Args:
+            result: the flattening.
+            all_sides: require all straight sides on grid lines.
+            sharp_lines: put sharp edges that are nearly along the axes on grid lines, if possible.
+        """
         is_straight = result.settings.get("boundary") == "straight"
         self.stages.done = 1.0
         with self.stages("grid"), limit_threads(result.settings.get("threads", THREADS)):
-            try:
-                layout = aligned(result, self.quads, self.size)
-                if not is_straight or np.isin(layout.ends[0][layout.border], layout.sides.points).all():
-                    return grid_of(layout, self.energy)
-                why = "straight sides of different loops are not parallel up to quarter turns, so not all on grid lines"
-            except MetricError as error:
-                # Straight sides may degenerate a triangle between them; edges that join two of them are split below.
-                if not is_straight:
-                    raise
-                layout, why = None, str(error)
-            if options is not None and not unsupported(options, OPTIONS):
+            layout = aligned(result, self.quads, self.size)
+            if sharp_lines and (found := self._with_sharp_lines(layout)):
+                return found
+            if not is_straight or np.isin(layout.ends[0][layout.border], layout.sides.points).all():
+                return grid_of(layout, self.energy)
+            with suppress(ConvergenceError, GridError, OptionError):
                 # Relaxing rotates the sides, which is not conformal.
-                rotated, _ = self._along_axes(options)
-                if rotated is not None:
-                    return rotated
-            if all_sides or layout is None:
+                return grid_of(straightened(layout), self.energy)
+            why = "straight sides of different loops are not parallel up to quarter turns, so not all on grid lines"
+            if all_sides:
                 raise GridError(why)
             return with_note(grid_of(layout, self.energy), f"{why.capitalize()}.")
+
+    def _with_sharp_lines(self, layout: GridLayout) -> IntegerGrid | None:
+        """Return a grid with sharp edges on grid lines, or None if there are none or it is much distorted."""
+        layout, _ = split_between_nodes(layout)
+        with suppress(GridError, MetricError, OptionError, SeamError), np.errstate(all="ignore"):
+            straight, edges = with_sharp_lines(layout, self.energy)
+            found = grid_about(straight, self.energy) if len(edges) else None
+            if found is not None and found.qc_mean < MAX_SHARP_QC:
+                return replace(found, features=layout.mesh.edges[edges])
+        return None
 
     def _along_axes(self, options: dict[str, Any]) -> tuple[IntegerGrid | None, str]:
         """Return a grid with the boundary and as many sharp edges as possible on grid lines; or None and the reason."""

@@ -12,7 +12,7 @@ from ...errors import GridError
 from ...geometry import (
     as_complex,
     as_pairs,
-    dihedral_angles,
+    corner_angles,
     double_areas,
     edge_lengths,
     mollify,
@@ -22,6 +22,7 @@ from ...geometry import (
 )  # fmt: skip
 from ...layout import SeamChains, find_chains, rest_sides
 from ...mesh import NEXT, PREVIOUS, label_components, label_faces, point_vertices
+from .cross_field import halfedge_angles, preferred_directions
 from .features import split_pieces
 
 # Tolerance, in radians or squares, for sides to be straight or parallel up to quarter turns, and for points to
@@ -149,7 +150,7 @@ def aligned(result: Flattening, quads: float | None, size: float | None) -> Grid
     apart = GridLayout(mesh, lengths, result.uv_faces, points, cones, Sides(), size)
     layout, component = joined_charts(apart)
     is_straight, angles = _side_angles(layout, component)
-    angles = np.where(is_straight, angles, _crease_angles(layout, component))
+    angles = np.where(is_straight, angles, _preferred_angles(layout, component))
     layout = replace(layout, points=layout.points * np.exp(-1j * angles)[component])
     return at_origin(replace(layout, sides=find_sides(layout, is_straight[component])), component)
 
@@ -190,17 +191,16 @@ def at_origin(layout: GridLayout, component: IntArray) -> GridLayout:
     return replace(layout, points=layout.points - origins[component])
 
 
-def _crease_angles(layout: GridLayout, component: IntArray) -> FloatArray:
-    """Return (c,) the main direction of the creases of each component, an angle up to quarter turns.
-
-    The weight of an edge is its length times its dihedral angle (Cohen-Steiner and Morvan 2003); boundary edges count
-    with a right angle.
-    """
+def _preferred_angles(layout: GridLayout, component: IntArray) -> FloatArray:
+    """Return (c,) the rotation of each component up to quarter turns at which it follows preferred directions best."""
     mesh, (starts, ends) = layout.mesh, layout.ends
-    one = mesh.edge_halfedges[:, 0]
-    bend = np.where(mesh.is_boundary_edge, np.pi / 2, np.abs(dihedral_angles(mesh)))
-    side = layout.points[ends[one]] - layout.points[starts[one]]
-    return _directions(layout.lengths.ravel()[one] * bend, side, component, component[starts[one]])
+    wanted = preferred_directions(mesh).both
+    # A triangle rotates as its half-edges do on average.
+    before = layout.lengths.ravel() * np.exp(1j * halfedge_angles(corner_angles(layout.lengths)))
+    turned = ((layout.points[ends] - layout.points[starts]) * before.conj()).reshape(-1, 3).sum(axis=1)
+    return _directions(
+        np.abs(wanted), turned * np.exp(0.25j * np.angle(wanted)), component, component[starts[::3]]
+    )
 
 
 def _side_angles(layout: GridLayout, component: IntArray) -> tuple[BoolArray, FloatArray]:

@@ -22,6 +22,8 @@ from ...options import (
 
 #: Defaults: the number of quads, and the rounds of smoothing; further rounds change little.
 QUADS, ROUNDS = 10_000, 10
+#: Default bound of the area distortion: the areas of 90% of the quads differ by a factor of two.
+DISTORTION = 0.1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,23 +39,29 @@ class QuadOptions(ConeNumber, ConeBounds, RunOptions):
         smooth: Rounds of smoothing on the surface; 0 for none.
         sharp_angle: Put edges with a larger dihedral angle, and the boundary, on grid lines, so that edges of quads
             follow them.
-        cones: auto: the search finds them. Or vertices, each with its curvature, a multiple of pi/2: pi/2 for three
-            quads, -pi/2 for five. On surfaces with handles, a grid rarely exists for given cones.
+        cones: auto: cones for which quads have even sizes and follow sharp edges, the boundary and directions of
+            curvature. sparse: the fewest for the distortion allowed. Or vertices, each with its curvature, a multiple
+            of pi/2: pi/2 for three quads, -pi/2 for five.
         boundary: straight: the boundary lies on grid lines, between corners that the search finds together with the
             cones. free: the boundary cuts squares, which a layer of quads along it replaces. auto: straight if such a
             grid is found and cones are not given, else free.
         min_cone_angle: Smallest cone angle, pi/2 for each quad at the cone; with a straight boundary it is pi/2, one
             quad, at corners.
         max_cone_angle: Largest cone angle; 3pi is six quads.
+        distortion: Variation of the sizes of quads: the standard deviation of the log of their edges that should not be
+            exceeded. A larger value needs fewer irregular vertices.
         max_cones: Largest number of cones per component, at which the search stops.
     """
 
+    distortion: float = option(DISTORTION, Number(is_positive=True))
     quads: int | None = option(None, COUNT)
     size: float | None = option(None, Number(is_positive=True, optional=True))
     stretch: float = option(0.0, strength(1))
     smooth: int = option(ROUNDS, COUNT)
     sharp_angle: float | None = option(None, ANGLE_OR_NONE)
-    cones: str | Mapping[int, float] = option("auto", WordOrVertices(("auto",), "cone"), one_mesh=True)
+    cones: str | Mapping[int, float] = option(
+        "auto", WordOrVertices(("auto", "sparse"), "cone"), one_mesh=True
+    )
     boundary: str = option("auto", Choice(("auto", "straight", "free")))
     min_cone_angle: float = option(1.5 * math.pi, ANGLE)
     max_cone_angle: float | None = option(3 * math.pi, ANGLE_OR_NONE)

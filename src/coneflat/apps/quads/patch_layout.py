@@ -1,4 +1,8 @@
-"""Layouts with sharp edges along the axes: the patches between them are flattened with straight sides and joined."""
+"""Layouts with sharp edges along the axes.
+
+Either the patches between them are flattened with straight sides and joined, or those that are nearly along the axes of
+a layout are moved there.
+"""
 
 from __future__ import annotations
 
@@ -8,18 +12,29 @@ from dataclasses import replace
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import ComplexArray, FloatArray, IntArray
+from ...base import BoolArray, ComplexArray, FloatArray, IntArray
 from ...cones import CONE_ANGLE_PER_TRIANGLE, ConeSearch, quantise_cones
 from ...errors import CurvatureError, GridError, MetricError, OptionError, SeamError
-from ...geometry import as_complex, as_pairs, double_areas, signed_double_areas
+from ...geometry import as_complex, as_pairs, double_areas, signed_angles, signed_double_areas
 from ...layout import Lines, PointConstraints, SeamChains, StretchEnergy, lay_out, relax
-from ...mesh import NEXT, PREVIOUS, cut_open, tie_key
+from ...mesh import NEXT, PREVIOUS, cut_open, open_along, tie_key
 from ...metric import ExactChoices, exact_flat_metric, straight_boundary
 from ...options import Options
 from ...seams import find_seams
 from ...stages import ConeSolution, Cut, Surface
-from .features import Opened
+from .cross_field import sharp_ends
+from .features import Opened, edge_indices, without_stubs
 from .layout import GridLayout, Sides, at_origin, find_sides, joined_charts
+
+# Edges are put on a line if their direction differs from an axis by less, radians.
+MAX_TURN = np.deg2rad(20.0)
+# Squares: shorter chains of sharp edges are not put on lines.
+SHORTEST = 4.0
+# Largest numbers of Newton steps: to join patches, and to move sharp edges to lines, which takes about ten steps, or
+# does not converge.
+PATCH_STEPS, LINE_STEPS = 200, 40
+# Patches of equal scale are easier to join.
+PATCHES = StretchEnergy(1.0)
 
 
 class PatchError(GridError):
@@ -52,12 +67,30 @@ def sharp_layout(
         ConvergenceError: no layout was found in which the patches match.
         GridError: the nearest axes of sides and seams contradict each other.
     """
-    layout = _flat_patches(opened, lengths, size, options, tell)
-    layout, component = joined_charts(replace(layout, points=_fitting(opened, layout)))
-    flat = float(layout.double_areas().sum())
-    points = layout.points * np.sqrt(float(double_areas(lengths).sum()) / flat) / size
-    layout = replace(layout, points=points)
-    return at_origin(replace(layout, sides=_all_sides(opened, layout, layout.chains())), component)
+    return straightened(_flat_patches(opened, lengths, size, options, tell), opened.is_feature)
+
+
+def straightened(
+    layout: GridLayout, is_feature: BoolArray | None = None, energy: StretchEnergy = PATCHES
+) -> GridLayout:
+    """Return a layout with all sides of the boundary along the axes, and features, which are seams, too.
+
+    Args:
+        layout: a layout whose sides and seams are along the axes up to less than 45 degrees.
+        is_feature: (e,) whether each edge of its mesh is a feature; None for no features.
+        energy: what the layout minimises.
+
+    Raises:
+        ConvergenceError: no such layout without flipped triangles was found.
+        GridError: the nearest axes of sides and seams contradict each other.
+    """
+    if is_feature is None:
+        is_feature = np.zeros(len(layout.mesh.edges), dtype=bool)
+        layout = replace(layout, sides=find_sides(layout, np.ones(len(layout.points), dtype=bool)))
+    area = float(double_areas(layout.lengths).sum()) / layout.size**2
+    layout, component = joined_charts(replace(layout, points=_fitting(layout, is_feature, energy)))
+    layout = replace(layout, points=layout.points * np.sqrt(area / float(layout.double_areas().sum())))
+    return at_origin(replace(layout, sides=_all_sides(layout, is_feature, layout.chains())), component)
 
 
 def _flat_patches(
@@ -165,36 +198,41 @@ def _along_axes(mesh: TriangleMesh, corners: IntArray, points: ComplexArray) -> 
     return points * np.exp(-1j * angle)
 
 
-def _fitting(opened: Opened, layout: GridLayout) -> ComplexArray:
+def _fitting(layout: GridLayout, is_feature: BoolArray, energy: StretchEnergy) -> ComplexArray:
     """Return the relaxed points of patches: sides are along the axes, and both sides of seams match by quarter turns.
 
     Raises:
         ConvergenceError: no such layout without flipped triangles was found.
         GridError: the nearest axes of sides and seams contradict each other.
     """
-    sides = _all_sides(opened, layout, layout.chains(quarter_turns=True))
+    sides = _all_sides(layout, is_feature, layout.chains(quarter_turns=True))
     offsets = np.full(len(sides.axis), np.nan)
     constraints = PointConstraints(
         lines=Lines(sides.points, sides.side, sides.directions, offsets) if len(offsets) else None,
         quarter_turns=True,
         nodes=layout.nodes,
     )
-    # Patches of equal scale are easier to join.
-    points, energy = as_pairs(layout.points), StretchEnergy(1.0)
+    points = as_pairs(layout.points)
     try:
         found = relax(
-            layout.mesh, points, layout.corners, energy, constraints, lengths=layout.lengths, steps=200
+            layout.mesh,
+            points,
+            layout.corners,
+            energy,
+            constraints,
+            lengths=layout.lengths,
+            steps=PATCH_STEPS if energy is PATCHES else LINE_STEPS,
         )
     except OptionError as error:
         raise GridError(f"sides and seams cannot all lie along the axes: {error}") from error
     return as_complex(found.points)
 
 
-def _all_sides(opened: Opened, layout: GridLayout, chains: SeamChains) -> Sides:
+def _all_sides(layout: GridLayout, is_feature: BoolArray, chains: SeamChains) -> Sides:
     """Return the sides along the axes: sides of the boundary, and the left sides of feature chains."""
     points = layout.points
     border = find_sides(layout, np.ones(len(points), dtype=bool))
-    feature = opened.is_feature[chains.edges]
+    feature = is_feature[chains.edges]
     left, chain = chains.left[feature], chains.chain[feature]
     along = points[left[:, 1]] - points[left[:, 0]]
     # The doubled angle makes opposite directions equal.
@@ -209,3 +247,36 @@ def _all_sides(opened: Opened, layout: GridLayout, chains: SeamChains) -> Sides:
         np.concatenate([border.side, both[:, 1] + len(border.axis)]),
         np.concatenate([border.axis, axis]),
     )
+
+
+def with_sharp_lines(layout: GridLayout, energy: StretchEnergy) -> tuple[GridLayout, IntArray]:
+    """Return a layout relaxed so that sharp edges along the axes are on lines, and these edges (k,).
+
+    Raises:
+        ConvergenceError: no such layout without flipped triangles was found.
+        GridError: the nearest axes of sides and seams contradict each other.
+    """
+    mesh, points, (starts, ends) = layout.mesh, layout.points, layout.ends
+    sharp = edge_indices(mesh, sharp_ends(mesh))
+    one = mesh.edge_halfedges[sharp, 0]
+    off = np.abs(np.angle((points[ends[one]] - points[starts[one]]) ** 4)) / 4
+    sharp = sharp[off < MAX_TURN]
+    edges = sharp[without_stubs(mesh, sharp, SHORTEST * layout.size)]
+    places = points[layout.corners]
+    angles = signed_angles(places[:, PREVIOUS] - places[:, NEXT])
+    cut = open_along(mesh, edges)
+    sums = np.bincount(cut.mesh.faces.ravel(), angles.ravel(), len(cut.origin)) / (np.pi / 2)
+    quarters = np.where(cut.mesh.is_boundary_vertex, np.maximum(np.rint(sums), 1).astype(np.int64), 0)
+    nodes = np.setdiff1d(Opened(mesh, edges, cut, quarters).nodes, layout.cones)
+    is_feature = np.zeros(len(mesh.edges), dtype=bool)
+    is_feature[edges] = True
+    inner = ~mesh.is_boundary_edge
+    there, back = mesh.edge_halfedges[inner].T
+    is_seam = is_feature.copy()
+    is_seam[inner] |= (starts[there] != ends[back]) | (ends[there] != starts[back])
+    opened = open_along(mesh, np.flatnonzero(is_seam))
+    moved = np.zeros(len(opened.origin), dtype=np.complex128)
+    moved[opened.mesh.faces.ravel()] = points[layout.corners.ravel()]
+    sides = Sides(np.union1d(nodes, layout.sides.corners))
+    cut_layout = replace(layout, corners=opened.mesh.faces, points=moved, sides=sides)
+    return straightened(cut_layout, is_feature, energy), edges

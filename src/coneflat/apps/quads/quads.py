@@ -14,9 +14,12 @@ from ...errors import OptionError
 from .extract import extract_quads, with_borders
 from .integer_grid import integer_grid
 from .integer_map import IntegerGrid
-from .options import ROUNDS
+from .options import DISTORTION, ROUNDS
 from .quad_mesh import CoarseGridError, QuadMesh, least_jacobians
 from .smooth import smooth_quads, untangled
+
+# How often more quads are tried where some meet themselves.
+FINER_TRIES = 2
 
 
 def quads(
@@ -64,7 +67,9 @@ def quads(
     grid, coarse = mesh if is_given else search(quads=quads, size=size), list[str]()
     # Where the surface is as thin as a square, quads have a vertex twice. Then 1.6 times as many quads are tried, at
     # most twice. If that does not help, these quads are left out.
-    for retries in (0,) if is_given else (2, 1, 0):
+    is_fixed = sharp_angle is not None or bool(options.keys() & {"cones", "distortion"})
+    most = 0 if is_given else FINER_TRIES + (not is_fixed)
+    for retries in range(most, -1, -1):
         stages.done = 1.0
         try:
             with stages("extract"):
@@ -74,7 +79,11 @@ def quads(
             if not retries:
                 raise
             coarse.append("More quads than wanted: with fewer, some have a vertex or an edge twice.")
-            grid = search(size=grid.size / 1.6**0.5)
+            finer = 1.6
+            if retries == FINER_TRIES + 1:
+                # The fewest cones need the least room.
+                search, finer = partial(search, cones="sparse", distortion=2 * DISTORTION), 1.0
+            grid = search(size=grid.size / finer**0.5)
     found = with_borders(found) if found.left_out else found
     with stages("smooth"):
         found = smooth_quads(found, smooth, grid.features)

@@ -29,10 +29,24 @@ def grid_of(layout: GridLayout, energy: StretchEnergy) -> IntegerGrid:
     Raises:
         GridError: no grid was found.
     """
-    is_split = between_nodes(layout)
-    split = int(is_split.sum())
+    layout, split = split_between_nodes(layout)
+    found = grid_about(layout, energy)
     if split:
-        layout = split_edges(layout, is_split)
+        found = with_note(
+            found,
+            f"Split {plural(split, 'edge')} between cones, so that no triangle has grid points at all corners.",
+        )
+    return found
+
+
+def split_between_nodes(layout: GridLayout) -> tuple[GridLayout, int]:
+    """Return a layout with the edges between vertices on grid points split, and their number."""
+    is_split = between_nodes(layout)
+    return (split_edges(layout, is_split) if is_split.any() else layout), int(is_split.sum())
+
+
+def grid_about(layout: GridLayout, energy: StretchEnergy) -> IntegerGrid:
+    """Return the grid of a smooth layout in which no edge between cones needs to be split; see `grid_of`."""
     wanted, found, why, most = layout.area, None, "", 4
     for finer in (2.0**k for k in range(most + 1)):
         found, why = grid_near(layout.scaled(finer), energy)
@@ -57,11 +71,6 @@ def grid_of(layout: GridLayout, energy: StretchEnergy) -> IntegerGrid:
     squares = _squares(found)
     if abs(squares - wanted) > NOTED_SHARE * wanted:
         found = with_note(found, f"The grid has an area of {squares:,.0f} squares, not {wanted:,.0f}.")
-    if split:
-        found = with_note(
-            found,
-            f"Split {plural(split, 'edge')} between cones, so that no triangle has grid points at all corners.",
-        )
     return found
 
 

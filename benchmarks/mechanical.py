@@ -1,0 +1,193 @@
+"""Mechanical shapes with sharp edges, fillets, holes and ribs, as closed triangle meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+from scipy.spatial import Delaunay
+
+Mesh = tuple[np.ndarray, np.ndarray]
+
+
+def shapes() -> dict[str, Mesh]:
+    """Return the shapes by name, of 4,000 to 20,000 triangles."""
+    return {name: make() for name, make in SHAPES.items()}
+
+
+def bracket() -> Mesh:
+    """Return an L-shaped bracket with a fillet in its corner and three holes."""
+    fillet = arc((1.0, 1.0), 0.4, 1.5 * np.pi, np.pi)
+    outer = polygon([(0, 0), (3, 0), (3, 0.6), *fillet, (0.6, 2.5), (0, 2.5)])
+    holes = [arc((2.5, 0.3), 0.15), arc((1.6, 0.3), 0.15), arc((0.3, 2.1), 0.17)]
+    return extruded([outer, *map(polygon, holes)], 0.8)
+
+
+def ribs() -> Mesh:
+    """Return a plate with four ribs."""
+    corners: list[tuple[float, float]] = [(0, 0), (4, 0), (4, 0.3)]
+    for left in (3.3, 2.3, 1.3, 0.3):
+        corners += [(left + 0.4, 0.3), (left + 0.4, 1.1), (left, 1.1), (left, 0.3)]
+    return extruded([polygon([*corners, (0, 0.3)])], 2.0)
+
+
+def plate() -> Mesh:
+    """Return a rounded plate with a slot and four holes."""
+    outer = [
+        point
+        for k in range(4)
+        for point in arc(CORNERS[k] * (1.2, 0.7), 0.3, k * np.pi / 2, (k + 1) * np.pi / 2)
+    ]
+    slot = [*arc((0.4, 0), 0.2, -np.pi / 2, np.pi / 2), *arc((-0.4, 0), 0.2, np.pi / 2, 1.5 * np.pi)]
+    holes = [arc(corner * (1.15, 0.65), 0.12) for corner in CORNERS]
+    return extruded([polygon(one) for one in (outer, slot, *holes)], 0.35)
+
+
+def gear() -> Mesh:
+    """Return a gear of twelve teeth with a bore."""
+    angles = (2 * np.pi / 12 * (np.arange(12)[:, None] + [0, 0.2, 0.45, 0.65])).ravel()
+    radii = np.tile([0.8, 1.05, 1.05, 0.8], 12)
+    teeth = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
+    return extruded([polygon(teeth), polygon(arc((0, 0), 0.3))], 0.5)
+
+
+def shaft() -> Mesh:
+    """Return a stepped shaft with a fillet, turned about the z axis."""
+    fillet = arc((0.65, 1.35), 0.15, np.pi, 1.5 * np.pi)
+    return turned(
+        [
+            (0, 0),
+            (0.3, 0),
+            (0.3, 0.5),
+            (0.5, 0.5),
+            (0.5, 1.2),
+            *fillet[::-1],
+            (0.9, 1.2),
+            (0.9, 1.6),
+            (0, 1.6),
+        ]
+    )
+
+
+def wedge() -> Mesh:
+    """Return a block with two slanted sides."""
+    return extruded([polygon([(0, 0), (2, 0), (2, 0.5), (1.2, 1.3), (0, 1.3)])], 1.0)
+
+
+SHAPES: dict[str, Callable[[], Mesh]] = {
+    one.__name__: one for one in (bracket, gear, plate, ribs, shaft, wedge)
+}
+CORNERS = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
+#: Edge length of the meshes.
+SPACING = 0.05
+
+
+def arc(
+    centre: tuple[float, float] | np.ndarray, radius: float, start: float = 0.0, end: float = 2 * np.pi
+) -> list:
+    """Return points on an arc; a full circle has no point twice."""
+    whole = abs(end - start) > 6.2
+    count = max(5, int(np.ceil(abs(end - start) * radius / SPACING)))
+    angle = np.linspace(start, end, count, endpoint=not whole)
+    return (np.asarray(centre) + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)).tolist()
+
+
+def polygon(corners: list | np.ndarray) -> np.ndarray:
+    """Return points along a closed polygon at most SPACING apart."""
+    points = np.asarray(corners, dtype=np.float64)
+    parts = []
+    for one, two in zip(points, np.roll(points, -1, axis=0), strict=True):
+        count = max(1, int(np.ceil(np.linalg.norm(two - one) / SPACING - 1e-9)))
+        parts.append(one + (two - one) * (np.arange(count) / count)[:, None])
+    return np.concatenate(parts)
+
+
+def extruded(loops: list[np.ndarray], height: float) -> Mesh:
+    """Return the prism over the region inside the first loop and outside the others."""
+    border = np.concatenate(loops)
+    flat = np.concatenate([border, _inner_points(loops)])
+    faces = Delaunay(flat).simplices
+    one, two, three = (flat[faces[:, i]] for i in range(3))
+    turn = _cross(two - one, three - one)
+    # Three points on a line make triangles without area.
+    kept = _is_inside(flat[faces].mean(axis=1), loops) & (np.abs(turn) > 1e-9)
+    faces = np.where((turn > 0)[:, None], faces, faces[:, ::-1])[kept]
+    layers, count = int(np.ceil(height / SPACING)), len(flat)
+    vertices = [np.column_stack([flat, np.full(count, z)]) for z in (0.0, height)]
+    levels = height * np.arange(1, layers) / layers
+    vertices += [np.column_stack([border, np.full(len(border), z)]) for z in levels]
+    starts = np.concatenate([[0], 2 * count + len(border) * np.arange(layers - 1), [count]])
+    sides = []
+    for low, high in pairwise(starts):
+        first = 0
+        for loop in loops:
+            here = first + np.arange(len(loop))
+            after = np.roll(here, -1)
+            first += len(loop)
+            area = _cross(loop, np.roll(loop, -1, axis=0)).sum()
+            outer = area > 0 if loop is loops[0] else area < 0
+            a, b = (here, after) if outer else (after, here)
+            sides += [np.stack([low + a, low + b, high + b], 1), np.stack([low + a, high + b, high + a], 1)]
+    return np.concatenate(vertices), np.concatenate([faces[:, ::-1], faces + count, *sides])
+
+
+def _inner_points(loops: list[np.ndarray]) -> np.ndarray:
+    low, high = loops[0].min(axis=0), loops[0].max(axis=0)
+    rows = np.arange(low[1], high[1], SPACING * np.sqrt(0.75))
+    columns = np.arange(low[0], high[0], SPACING)
+    flat = np.concatenate(
+        [
+            np.column_stack([columns + SPACING / 2 * (k % 2), np.full(len(columns), y)])
+            for k, y in enumerate(rows)
+        ]
+    )
+    flat = flat[_is_inside(flat, loops)]
+    gaps = np.linalg.norm(flat[:, None] - np.concatenate(loops), axis=2).min(axis=1)
+    return flat[gaps > 0.6 * SPACING]
+
+
+def _cross(one: np.ndarray, two: np.ndarray) -> np.ndarray:
+    return one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+
+
+def _is_inside(points: np.ndarray, loops: list[np.ndarray]) -> np.ndarray:
+    """Return whether each point is inside an odd number of loops."""
+    inside = np.zeros(len(points), dtype=bool)
+    for loop in loops:
+        for one, two in zip(loop, np.roll(loop, -1, axis=0), strict=True):
+            crosses = (one[1] > points[:, 1]) != (two[1] > points[:, 1])
+            with np.errstate(divide="ignore", invalid="ignore"):
+                x = one[0] + (points[:, 1] - one[1]) / (two[1] - one[1]) * (two[0] - one[0])
+            inside ^= crosses & (points[:, 0] < x)
+    return inside
+
+
+def turned(profile: list, around: int = 96) -> Mesh:
+    """Return the solid of revolution of a profile (radius, z) that starts and ends on the axis."""
+    points = np.asarray(profile, dtype=np.float64)
+    inner = [
+        one + (two - one) * t
+        for one, two in pairwise(points)
+        for count in [max(1, int(np.ceil(np.linalg.norm(two - one) / SPACING - 1e-9)))]
+        for t in np.arange(count) / count
+    ][1:]
+    rings = np.array(inner)
+    angle = 2 * np.pi * np.arange(around) / around
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    vertices = [np.column_stack([radius * circle, np.full(around, z)]) for radius, z in rings]
+    poles = np.array([[0, 0, points[0, 1]], [0, 0, points[-1, 1]]])
+    at, after = np.arange(around), np.roll(np.arange(around), -1)
+    faces = []
+    for k in range(len(rings) - 1):
+        low, high = around * k, around * (k + 1)
+        faces += [
+            np.stack([low + at, low + after, high + after], 1),
+            np.stack([low + at, high + after, high + at], 1),
+        ]
+    count, last = around * len(rings), around * (len(rings) - 1)
+    faces += [
+        np.stack([np.full(around, count), after, at], 1),
+        np.stack([np.full(around, count + 1), last + at, last + after], 1),
+    ]
+    return np.concatenate([*vertices, poles]), np.concatenate(faces)

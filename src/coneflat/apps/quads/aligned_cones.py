@@ -1,0 +1,186 @@
+"""Cones of a quad mesh: few, for even sizes, and for grid lines along preferred directions.
+
+The search starts from the singular vertices of the smoothest cross field. In the linear model of conformal maps, the
+log scale and the rotation of each triangle are linear functions of the cones' curvatures. The search adds a quarter
+turn at one vertex and subtracts one at another as long as the cost decreases. This moves cones, and adds or removes
+pairs of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse.csgraph import dijkstra
+
+from ... import TriangleMesh
+from ...base import ComplexArray, FloatArray, IntArray
+from ...errors import CurvatureError
+from .cross_field import (
+    field_indices,
+    preferred_directions,
+    sharp_ends,
+    smoothest_cross_field,
+)
+from .map_model import MapModel, vertex_graph
+
+# Cost of an area distortion as large as allowed, of crosses that are off by 22.5 degrees on average, and of a rotation
+# along a handle that is off by 45 degrees; a cone costs 1 for each quarter turn, a missing one more than all others.
+COST_OF_AREAS, COST_OF_DIRECTIONS, COST_OF_HANDLES, COST_OF_MISSING = 15.0, 200.0, 60.0, 1e4
+# Number of places all over the mesh at which pairs of cones are tried.
+FAR_PLACES = 250
+# Radii within which cones move, relative to the distance between the centres of regions, and tried places in each.
+RADII, PLACES_NEAR = (1.0, 0.6, 0.35, 0.2), 10
+# Largest number of steps of a descent, and least decrease of the cost of a step.
+MAX_STEPS, MIN_GAIN = 300, 1e-3
+# How often the cost of areas is doubled to meet the bound, and the bound for a distortion of 1: the log of the ratio of
+# the 95% and 5% quantiles of the areas of quads.
+MAX_DOUBLINGS, SPREAD = 3, np.log(2.0) / 0.1
+
+
+def aligned_cones(
+    mesh: TriangleMesh, distortion: float, least: int = -2, most: int = 1, price: float = 1.0
+) -> dict[int, int]:
+    """Return cones of a connected mesh, and corners of its boundary, with their curvature in quarter turns.
+
+    Args:
+        mesh: connected mesh.
+        distortion: area distortion that should not be exceeded: the standard deviation of the log scale.
+        least, most: bounds of the curvature of cones.
+        price: cost of a cone, 1 by default.
+
+    Raises:
+        CurvatureError: the mesh has too few vertices for the cones that it needs.
+    """
+    directions = preferred_directions(mesh)
+    start = field_indices(mesh, smoothest_cross_field(mesh, directions))
+    model = MapModel(mesh, directions.both, np.flatnonzero(start), least, most)
+    search = _Search(mesh, model, start, price)
+    areas = COST_OF_AREAS
+    for _ in range(MAX_DOUBLINGS + 1):
+        search.descend_all(_Costs(areas / distortion**2))
+        if model.spread <= SPREAD * distortion:
+            break
+        areas *= 2
+    if search.indices[-1]:
+        raise CurvatureError(f"{len(mesh.vertices):,} vertices are too few for the cones")
+    found = np.flatnonzero(search.indices[:-1])
+    return dict(zip(model.places[found].tolist(), search.indices[found].tolist(), strict=True))
+
+
+class _Costs(NamedTuple):
+    """Costs of the squared area distortion, of directions and of handles."""
+
+    areas: float
+    directions: float = COST_OF_DIRECTIONS
+    handles: float = COST_OF_HANDLES
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """The model at some places.
+
+    Attributes:
+        places: (k,) indices of the places.
+        scales: (r, k), waves: (s, k), loops: (l, k), as in the model.
+    """
+
+    places: IntArray
+    scales: FloatArray
+    waves: ComplexArray
+    loops: ComplexArray
+
+
+class _Search:
+    """The descent; `indices` (p + 1,) are the curvatures at the places, the last one those without a place yet."""
+
+    def __init__(self, mesh: TriangleMesh, model: MapModel, start: IntArray, price: float) -> None:
+        self.model, self.graph, self.key = model, vertex_graph(mesh), model.key
+        inside = np.clip(start[model.places], model.least[:-1], model.most[:-1])
+        # Cones at corners of the surface, where sharp edges meet, stay there.
+        edges_at = np.bincount(sharp_ends(mesh).ravel(), minlength=len(mesh.vertices))[model.places]
+        is_corner = (inside != 0) & (edges_at > 2) & (np.abs(model.curvature - inside) < 0.25)
+        fixed = np.flatnonzero(is_corner)
+        model.least[fixed] = model.most[fixed] = inside[fixed]
+        self.indices = np.append(inside, start.sum() - inside.sum())
+        self.price = np.append(np.full(len(inside), price), COST_OF_MISSING)
+
+    def descend_all(self, costs: _Costs) -> None:
+        """Decrease the cost by steps between places all over the mesh, then by steps nearby."""
+        self.model.linearise(self.indices)
+        first = np.append(self.model.centres[:FAR_PLACES], len(self.indices) - 1)
+        first = np.union1d(first, np.flatnonzero(self.indices))
+        self._descend(first, first, costs)
+        for radius in RADII:
+            cones = np.flatnonzero(self.indices[:-1])
+            if len(cones):
+                self._descend(cones, np.union1d(cones, self._near(cones, radius * self.model.spacing)), costs)
+            self.model.linearise(self.indices)
+
+    def _near(self, cones: IntArray, radius: float) -> IntArray:
+        """Return some places near cones; both are indices of places."""
+        places, found = self.model.places, [cones]
+        for row in dijkstra(self.graph, indices=places[cones], limit=radius)[:, places]:
+            near = np.flatnonzero(np.isfinite(row))
+            order = np.lexsort((self.key[near], np.round(row[near] / self.model.spacing, 9)))
+            chosen = np.unique(np.linspace(0, len(near) - 1, PLACES_NEAR + 1).astype(np.int64))
+            found.append(near[order[chosen]])
+        return np.concatenate(found)
+
+    def _descend(self, one: IntArray, two: IntArray, costs: _Costs) -> None:
+        """Decrease the cost by steps between a place of `one` and a place of `two`, in both directions."""
+        model, indices, price = self.model, self.indices, self.price
+        first, second = self._block(one), self._block(two)
+        is_same = np.array_equal(one, two)
+        gram = first.scales.T @ second.scales
+        squares = (first.scales**2).sum(axis=0)[:, None] + (second.scales**2).sum(axis=0) - 2 * gram
+        for _ in range(MAX_STEPS):
+            scale, waves, loops = model.state(indices)
+            now = _direction_cost(waves.sum()[None], loops.sum()[None], model, costs)[0]
+            rise = np.where(indices < model.most, np.abs(indices + 1) - np.abs(indices), np.inf) * price
+            fall = np.where(indices > model.least, np.abs(indices - 1) - np.abs(indices), np.inf) * price
+            slopes = 2 * (scale @ first.scales)[:, None] - 2 * (scale @ second.scales)
+            best = -MIN_GAIN
+            for sign in (1, -1)[: 1 if is_same else 2]:
+                waves_of, loops_of = (
+                    (state[:, None] * (one_part if sign > 0 else one_part.conj())).T
+                    @ (two_part.conj() if sign > 0 else two_part)
+                    for state, one_part, two_part in (
+                        (waves, first.waves, second.waves),
+                        (loops, first.loops, second.loops),
+                    )
+                )
+                cost = (
+                    costs.areas * (squares + sign * slopes)
+                    + _direction_cost(waves_of, loops_of, model, costs)
+                    - now
+                )
+                cost += rise[one][:, None] + fall[two] if sign > 0 else fall[one][:, None] + rise[two]
+                cost[one[:, None] == two] = np.inf
+                i, j = np.unravel_index(np.argmin(np.round(cost, 6)), cost.shape)
+                if cost[i, j] < best:
+                    best, plus, minus = (
+                        float(cost[i, j]),
+                        *((one[i], two[j]) if sign > 0 else (two[j], one[i])),
+                    )
+            if best == -MIN_GAIN:
+                return
+            indices[plus] += 1
+            indices[minus] -= 1
+
+    def _block(self, places: IntArray) -> _Block:
+        model = self.model
+        return _Block(
+            places,
+            model.scales[:, places],
+            np.exp(1j * model.turns[:, places]),
+            np.exp(1j * model.loops[:, places]),
+        )
+
+
+def _direction_cost(waves: ComplexArray, loops: ComplexArray, model: MapModel, costs: _Costs) -> FloatArray:
+    """Return the cost of directions for sums of crosses over the samples, and of phases over the loops."""
+    off = 1 - np.abs(waves) / model.weight
+    total: FloatArray = costs.directions * off + costs.handles * (len(model.loops) - loops.real) / 2
+    return total

@@ -1,0 +1,312 @@
+"""The linear model of conformal maps: log scale and rotation of triangles as functions of the curvatures of cones."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import coo_matrix, csc_matrix, csr_matrix
+from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
+
+from ... import TriangleMesh
+from ...base import ComplexArray, FloatArray, IntArray
+from ...geometry import (
+    angle_defect,
+    corner_angles,
+    cotangent_laplacian,
+    cotangents,
+    double_areas,
+    edge_lengths,
+    mollify,
+)
+from ...linalg import Factor, factorize
+from ...mesh import tie_key
+from .cross_field import edge_rotations, halfedge_angles
+
+RIGHT_ANGLE = np.pi / 2
+# Numbers of regions over which the log scale and the directions are summed, and largest number of vertices that can be
+# cones.
+REGIONS, SAMPLES, MAX_PLACES = 500, 250, 20_000
+# Number of right-hand sides that are solved at once.
+BLOCK = 64
+# Radians for each triangle at a cone, up to which straight sides can hold its angle.
+CONE_ANGLE_PER_TRIANGLE = 0.6 * np.pi
+
+
+class MapModel:
+    """The linear model of a connected mesh.
+
+    The last column of all matrices, of zeros, is for curvature without a place.
+    Rotations are linearised at given cones. There, directions within a region agree best.
+
+    Attributes:
+        places: (p,) vertices at which cones are searched, in an order that does not depend on the numbering.
+        key: (p,) numbers by which they are sorted.
+        curvature: (p,) the angle defects of the surface there, in quarter turns.
+        centres: indices of places that are the centres of regions; each is far from the previous ones.
+        spacing: mean distance of the centres.
+        scales: (r, p + 1) change of the mean log scale of each region by a quarter turn, times the root of the region's
+            share of the area.
+        turns: (s, p + 1) four times the rotation of samples by a quarter turn.
+        loops: (l, p + 1) the same for the rotations along handles.
+        least, most: (p + 1,) bounds of the curvatures.
+        weight: the total weight of preferred directions.
+    """
+
+    def __init__(
+        self, mesh: TriangleMesh, wanted: ComplexArray, required: IntArray, least: int, most: int
+    ) -> None:
+        """Set up the model.
+
+        Args:
+            mesh: connected mesh.
+            wanted: (m,) preferred crosses of triangles, weighted.
+            required: vertices that must be places.
+            least, most: bounds of the curvature of cones, in quarter turns.
+        """
+        lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces))
+        angles, count = corner_angles(lengths), len(mesh.vertices)
+        areas, key = double_areas(lengths), tie_key(mesh.vertices)
+        share = np.bincount(mesh.faces.ravel(), areas.repeat(3), count) / (3 * areas.sum())
+        centres, region, larger = _regions(mesh, key)
+        self._wanted, self.weight = wanted, max(float(np.abs(wanted).sum()), np.finfo(float).tiny)
+        self._defect = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
+        self._poisson = _Poisson(cotangent_laplacian(mesh.faces, cotangents(lengths), count), share)
+        self._rotations = _Rotations(mesh, angles)
+        self._means = _region_means(region, share)
+        # A triangle belongs to the first region of its corners. The sample is its triangle of largest weight.
+        of_face = larger[mesh.faces].min(axis=1)
+        rank = -np.round(np.abs(wanted) / self.weight, 9)
+        order = np.lexsort((key[mesh.faces].sum(axis=1), rank, of_face))
+        samples = order[np.concatenate([[True], np.diff(of_face[order]) > 0])]
+        self._number = np.searchsorted(of_face[samples], of_face)
+        self.places = _places(key, np.union1d(centres, required))
+        self.key, self.curvature = key[self.places], self._defect[self.places] / RIGHT_ANGLE
+        number = np.empty(count, dtype=np.int64)
+        number[self.places] = np.arange(len(self.places))
+        self.centres = number[centres]
+        self.spacing = float(np.sqrt(areas.sum() / 2 / len(centres)))
+        self._along = self._rotations.loops()
+        to_samples = self._rotations.to_frames(samples) + self._rotations.mean_change[samples]
+        self.scales = self._functional(self._means)
+        self.turns, self.loops = 4 * self._functional(to_samples), 4 * self._functional(self._along)
+        triangles = np.bincount(mesh.faces.ravel(), minlength=count)[self.places]
+        border = mesh.is_boundary_vertex[self.places]
+        straight = np.where(border, 2, 4)
+        widest = np.floor(CONE_ANGLE_PER_TRIANGLE * triangles / RIGHT_ANGLE).astype(np.int64)
+        low = np.minimum(np.maximum(np.where(border, -1, least), straight - widest), 0)
+        self.least = np.append(low, -(10**9))
+        self.most = np.append(np.where(border, 1, np.where(triangles > 2, most, 0)), 10**9)
+
+    def _functional(self, rows: csr_matrix) -> FloatArray:
+        found = self._poisson.functional(rows, self.places)
+        return np.concatenate([found, np.zeros((len(found), 1))], axis=1)
+
+    def linearise(self, indices: IntArray) -> None:
+        """Linearise the rotations at the cones with given curvatures (p + 1,), in quarter turns."""
+        curvature = -self._defect
+        curvature[self.places] += RIGHT_ANGLE * indices[:-1]
+        self._log_scale = self._poisson.solve(curvature[:, None])[:, 0]
+        turned = self._rotations.of_frames(self._log_scale) + self._rotations.mean_change @ self._log_scale
+        crosses = self._wanted * np.exp(4j * turned)
+        self._at, count = indices.copy(), len(self.turns)
+        self._base = np.bincount(self._number, crosses.real, count) + 1j * np.bincount(
+            self._number, crosses.imag, count
+        )
+        self._base_scale = self._means @ self._log_scale
+        self._base_loops = np.exp(4j * self._rotations.around_loops(self._log_scale))
+
+    @property
+    def spread(self) -> float:
+        """The log of the ratio of the 95% and 5% quantiles of the areas of quads, for the cones of `linearise`."""
+        order = np.argsort(self._log_scale)
+        number = np.cumsum(self._poisson.share[order] * np.exp(2 * self._log_scale[order]))
+        low, high = np.interp([0.05, 0.95], number / number[-1], self._log_scale[order])
+        return float(2 * (high - low))
+
+    def state(self, indices: IntArray) -> tuple[FloatArray, ComplexArray, ComplexArray]:
+        """Return the log scale of regions (r,), the crosses of samples (s,), and the rotations of loops (l,)."""
+        step = indices - self._at
+        used = np.flatnonzero(step)
+        turned, looped = (each[:, used] @ step[used] for each in (self.turns, self.loops))
+        scale = self._base_scale + self.scales[:, used] @ step[used]
+        return scale, self._base * np.exp(1j * turned), self._base_loops * np.exp(1j * looped)
+
+
+def vertex_graph(mesh: TriangleMesh) -> csr_matrix:
+    """Return (n, n) the lengths of edges."""
+    one, two = mesh.edges.T
+    lengths = np.linalg.norm(mesh.vertices[one] - mesh.vertices[two], axis=1)
+    both = np.concatenate([one, two]), np.concatenate([two, one])
+    return csr_matrix((np.tile(lengths, 2), both), shape=(len(mesh.vertices),) * 2)
+
+
+def _regions(mesh: TriangleMesh, key: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
+    """Return the centres of regions, each as far as possible from the previous ones, and regions of the vertices.
+
+    The regions (n,) are those of all centres, and those of the first SAMPLES centres alone.
+    """
+    graph, count = vertex_graph(mesh), min(REGIONS, len(key))
+    scale = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+    distance, region, centres = np.full(len(key), np.inf), np.zeros(len(key), dtype=np.int64), list[int]()
+    larger = region
+    for number in range(count):
+        # The choice among vertices at equal distances does not depend on the numbering.
+        farthest = np.flatnonzero(distance >= distance.max() - 1e-9 * scale)
+        centre = int(farthest[np.argmax(key[farthest])])
+        limit = np.inf if number == 0 else float(distance[centre])
+        found = dijkstra(graph, indices=centre, limit=limit)
+        nearer = found < distance - 1e-9 * scale
+        distance[nearer], region[nearer] = found[nearer], number
+        centres.append(centre)
+        larger = region.copy() if number < SAMPLES else larger
+    return np.array(centres), region, larger
+
+
+def _region_means(region: IntArray, share: FloatArray) -> csr_matrix:
+    """Return (r, n) the matrix to the mean of each region, times the root of its share of the area."""
+    count, total = int(region.max()) + 1, np.bincount(region, share)
+    root = np.sqrt(np.maximum(total, np.finfo(float).tiny))
+    return csr_matrix((share / root[region], (region, np.arange(len(region)))), shape=(count, len(region)))
+
+
+def _places(key: FloatArray, required: IntArray) -> IntArray:
+    """Return the vertices at which cones are searched, sorted by the key: all, or some of a large mesh."""
+    order = np.argsort(key, kind="stable")
+    is_place = np.zeros(len(key), dtype=bool)
+    is_place[required] = True
+    is_place[order[:: int(np.ceil(len(key) / MAX_PLACES))]] = True
+    return order[is_place[order]]
+
+
+class _Poisson:
+    """Solves L x = y on a connected mesh for y without its mean; x has mean 0 by area."""
+
+    def __init__(self, laplacian: csc_matrix, share: FloatArray) -> None:
+        self.share = share
+        pinned = csc_matrix(laplacian[1:, 1:])
+        pinned.sort_indices()
+        self.factor: Factor = factorize(pinned)
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Return (n, k) the solutions for right-hand sides (n, k)."""
+        right = right - self.share[:, None] * right.sum(axis=0)
+        found = np.zeros_like(right)
+        found[1:] = self.factor.solve(np.ascontiguousarray(right[1:]))
+        return found - self.share @ found
+
+    def functional(self, rows: csr_matrix, places: IntArray) -> FloatArray:
+        """Return (k, p) the values of linear functionals (k, n) of the log scale for a quarter turn at each place."""
+        found = np.empty((rows.shape[0], len(places)))
+        for start in range(0, rows.shape[0], BLOCK):
+            block = slice(start, start + BLOCK)
+            found[block] = RIGHT_ANGLE * self.solve(rows[block].toarray().T)[places].T
+        return found
+
+
+class _Rotations:
+    """Rotations of the first half-edges of triangles in the plane, and along loops, by a tree in the dual graph."""
+
+    def __init__(self, mesh: TriangleMesh, angles: FloatArray) -> None:
+        self.mesh, count = mesh, len(mesh.faces)
+        self.inner = np.flatnonzero(~mesh.is_boundary_edge)
+        one, two = mesh.edge_halfedges[self.inner].T
+        self.by_edge = edge_rotations(mesh, halfedge_angles(angles))
+        # The linear model of the angles: see `_angle_changes`.
+        change = _angle_changes(mesh, angles)
+        self.change = csr_matrix(change[one] - change[two])
+        # A triangle rotates as its three half-edges do on average.
+        self.mean_change = csr_matrix((change[0::3] + change[1::3] + change[2::3]) / 3)
+        centres = mesh.vertices[mesh.faces].mean(axis=1)
+        self.one, self.two = one // 3, two // 3
+        steps = np.linalg.norm(centres[self.one] - centres[self.two], axis=1)
+        steps += 1e-9 * steps.max(initial=1.0)
+        ends = np.concatenate([self.one, self.two]), np.concatenate([self.two, self.one])
+        graph = csr_matrix((np.tile(steps, 2), ends), shape=(count, count))
+        root = int(np.argmax(tie_key(centres)))
+        _, before = dijkstra(graph, indices=root, return_predecessors=True)
+        self.root, self.before = root, np.where(before < 0, root, before).astype(np.int64)
+        # Two triangles can share several edges; the one of the tree is the last.
+        pairs = zip(self.one.tolist(), self.two.tolist(), strict=True)
+        number = {pair: k for k, pair in enumerate(pairs)}
+        self.edge, self.sign = np.full(count, -1), np.zeros(count)
+        for face, previous in enumerate(self.before.tolist()):
+            if face != root:
+                forth = number.get((previous, face), -1)
+                self.edge[face] = forth if forth >= 0 else number[(face, previous)]
+                self.sign[face] = 1.0 if forth >= 0 else -1.0
+
+    def of_frames(self, log_scale: FloatArray) -> FloatArray:
+        """Return (m,) the rotations of first half-edges in the plane for a log scale (n,)."""
+        steps = np.pi - self.by_edge + self.change @ log_scale
+        total, before = np.where(self.edge < 0, 0.0, self.sign * steps[self.edge]), self.before
+        while (before != self.root).any():
+            total = total + np.where(before == self.root, 0.0, total[before])
+            before = before[before]
+        return total
+
+    def to_frames(self, faces: IntArray) -> csr_matrix:
+        """Return (k, n) the matrix from the log scale to the rotation of the first half-edges of triangles."""
+        rows, edges, signs = [faces[:0]], [faces[:0]], [self.sign[:0]]
+        row, here = np.arange(len(faces)), faces
+        while len(here):
+            kept = here != self.root
+            row, here = row[kept], here[kept]
+            rows.append(row)
+            edges.append(self.edge[here])
+            signs.append(self.sign[here])
+            here = self.before[here]
+        parts = np.concatenate(signs), (np.concatenate(rows), np.concatenate(edges))
+        return csr_matrix(csr_matrix(parts, shape=(len(faces), len(self.one))) @ self.change)
+
+    @cached_property
+    def closing(self) -> IntArray:
+        """The inner edges that close a loop along a handle with the tree."""
+        mesh = self.mesh
+        in_tree = np.zeros(len(mesh.edges), dtype=bool)
+        in_tree[self.inner[self.edge[self.edge >= 0]]] = True
+        left = np.flatnonzero(~in_tree)
+        lengths = np.linalg.norm(np.diff(mesh.vertices[mesh.edges[left]], axis=1)[:, 0], axis=1)
+        # Edges of the boundary come first, so that loops around holes are not among the others.
+        weights = lengths / max(float(lengths.max(initial=0.0)), np.finfo(float).tiny) + np.where(
+            mesh.is_boundary_edge[left], 1.0, 3.0
+        )
+        one, two = mesh.edges[left].T
+        graph = csr_matrix((weights, (one, two)), shape=(len(mesh.vertices),) * 2)
+        tree = minimum_spanning_tree(graph).tocoo()
+        chosen = set(zip(tree.row.tolist(), tree.col.tolist(), strict=True))
+        is_left = np.array(
+            [pair not in chosen for pair in zip(one.tolist(), two.tolist(), strict=True)], dtype=bool
+        )
+        is_left &= ~mesh.is_boundary_edge[left]
+        return np.searchsorted(self.inner, left[is_left])
+
+    def loops(self) -> csr_matrix:
+        """Return (l, n) the matrix from the log scale to the rotations of loops."""
+        edges = self.closing
+        there, back = self.to_frames(self.one[edges]), self.to_frames(self.two[edges])
+        return csr_matrix(there + self.change[edges] - back)
+
+    def around_loops(self, log_scale: FloatArray) -> FloatArray:
+        """Return (l,) the rotations around loops for a log scale (n,)."""
+        edges, in_plane = self.closing, self.of_frames(log_scale)
+        steps = np.pi - self.by_edge[edges] + self.change[edges] @ log_scale
+        return in_plane[self.one[edges]] + steps - in_plane[self.two[edges]]
+
+
+def _angle_changes(mesh: TriangleMesh, angles: FloatArray) -> csr_matrix:
+    """Return (3m, n) the matrix from the log scale to the change of the directions of half-edges in their triangles.
+
+    A corner i changes by (cot k (u_j - u_i) + cot j (u_k - u_i)) / 2.
+    """
+    half, faces, count = 0.5 / np.tan(angles), mesh.faces, len(mesh.faces)
+    rows, columns, values = [], [], []
+    # The second half-edge has the direction pi - corner 2, the third pi + corner 1.
+    for halfedge, corner, sign in ((1, 2, -1.0), (2, 1, 1.0)):
+        j, k = (corner + 1) % 3, (corner + 2) % 3
+        row = 3 * np.arange(count) + halfedge
+        rows += [row, row, row]
+        columns += [faces[:, j], faces[:, k], faces[:, corner]]
+        values += [sign * half[:, k], sign * half[:, j], -sign * (half[:, j] + half[:, k])]
+    parts = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+    return csr_matrix(coo_matrix(parts, shape=(3 * count, len(mesh.vertices))))
