@@ -48,18 +48,18 @@ CEILINGS = {
     "atlas": 1492,
     "base": 328,
     "cone_curve": 108,
-    "cones": 2109,
+    "cones": 2098,
     "evaluate": 194,
     "flatten": 221,
     "flattener": 35,
-    "geometry": 1587,
+    "geometry": 1560,
     "io": 2795,
     "layout": 2218,
     "linalg": 453,
     "measure": 829,
     "mesh": 710,
     "metric": 999,
-    "options": 554,
+    "options": 522,
     "result": 96,
     "sample": 5,
     "seams": 177,
@@ -68,17 +68,11 @@ CEILINGS = {
     "xatlas": 2,
 }
 #: Applications with a ceiling of their own, which the ceilings of everything else leave out.
-OWN_CEILING = (
-    "apps.cli.more",
-    "apps.unwrap",
-    "apps.quads",
-    "apps.blender",
-    "apps.brains",
-    "apps.pyvista",
-    "apps.transfer",
-)
+OWN_CEILING = {
+    "apps.blender", "apps.brains", "apps.cli.more", "apps.pyvista", "apps.quads", "apps.transfer", "apps.unwrap",
+}  # fmt: skip
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_770, 203, 21_690
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_701, 203, 21_620
 CONSTANTS, KERNELS, NAMES, LEVELS = 259, 101, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -96,21 +96,18 @@ def locate_constraints(checked: CheckedMesh, options: Options, given: InputMesh)
     Raises:
         OptionError: a vertex does not exist or cannot be a cone or a corner; weights are invalid.
     """
-    names, input_count = checked.vertex_origin, len(np.asarray(given.vertices))
+    names, count = checked.vertex_origin, len(np.asarray(given.vertices))
     required = _locate(checked, "cone", dict.fromkeys(options.required_cones))
     for vertex in options.forbidden_cones:
-        if not 0 <= vertex < input_count:
-            raise OptionError(
-                f"forbidden cone {vertex} is not a vertex: indices are from 0 to {input_count - 1}"
-            )
+        if not 0 <= vertex < count:
+            raise OptionError(f"forbidden cone {vertex} is not a vertex: indices are from 0 to {count - 1}")
     is_allowed = ~np.isin(names, list(options.forbidden_cones))
     for name in names[required.vertices[~is_allowed[required.vertices]]]:
         raise OptionError(f"vertex {name} is both a required and a forbidden cone")
+    noun = "cone or corner" if options.boundary_kind == "straight" else "cone"
     return Constraints(
         names,
-        _locate(
-            checked, {"straight": "cone or corner"}.get(options.boundary_kind, "cone"), options.named_cones
-        ),
+        _locate(checked, noun, options.named_cones),
         _locate(checked, "corner", options.corners),
         required,
         is_allowed,
