@@ -2,8 +2,8 @@
 
 The first table has a row for each model and package, the second one, that of the README, a row for each package. The
 models are those of `../shared/meshes` that are manifolds, and a bumpy sphere. The packages are coneflat with its
-default cones and with more of them; boundary first flattening (BFF) as `coneflat.peers` implements it, with the default
-cones and one chart; xatlas and uvunwrap with their defaults, where they are installed. All results are measured by
+default cones, with more of them, and its maps for textures; boundary first flattening (BFF) as `coneflat.peers`
+implements it, with the default cones and one chart; xatlas and uvunwrap with their defaults, where they are installed. All results are measured by
 `coneflat.measure` on the UV points that the packages return; seam lengths are divided by the square root of the area.
 
 With `--matched`, the results of coneflat have the area distortion of the others: by `stretch` with the fewest cones
@@ -19,7 +19,7 @@ from collections.abc import Iterator
 import numpy as np
 from common import MODELS, shapes, with_cones_for
 
-from coneflat import Flattening, check_mesh, flatten, read_mesh
+from coneflat import Flattening, check_mesh, flatten, read_mesh, unwrap
 from coneflat.apps.peers import flatten_by
 from coneflat.apps.peers.packages import installed_peers, run_peer
 from coneflat.errors import ConeflatError
@@ -46,6 +46,7 @@ def main() -> None:
     )
     print("| --- " * 11 + "|")
     flatten(*shapes.sphere(2), charts="atlas")
+    unwrap(*shapes.sphere(2))
     sums: dict[str, list[tuple[float, ...]]] = {}
     for name, mesh in models([word for word in arguments.models.split(",") if word], arguments.largest):
         for method, result, seconds in (
@@ -97,6 +98,9 @@ def flattened(mesh: TriangleMesh, more: float) -> Iterator[tuple[str, Flattening
         start = time.perf_counter()
         ours = flatten(mesh.vertices, mesh.faces, charts="atlas", **options)
         yield method, ours, time.perf_counter() - start
+    start = time.perf_counter()
+    texture = unwrap(mesh.vertices, mesh.faces)
+    yield "coneflat unwrap", texture, time.perf_counter() - start
     start = time.perf_counter()
     boundary_first = flatten_by("bff", mesh.vertices, mesh.faces)
     yield "BFF", boundary_first, time.perf_counter() - start
