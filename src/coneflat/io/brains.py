@@ -130,6 +130,9 @@ def read_label(text: str) -> IntArray:
         if ending == ".annot":
             values, _, names = package.freesurfer.read_annot(path)
             keys = {one.decode(): number for number, one in enumerate(names)}
+            # FreeSurfer leaves vertices without a label; nibabel numbers them -1.
+            if (values < 0).any():
+                values = np.where(values < 0, keys.setdefault("unknown", -1), values)
         else:
             values = read_vertex_values(path)
             keys = {}

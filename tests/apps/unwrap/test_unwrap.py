@@ -192,3 +192,19 @@ def test_the_resolution_follows_from_the_texel_density(tiles):
 def test_a_texel_density_that_needs_too_large_a_texture_is_refused():
     with pytest.raises(errors.OptionError, match="texel_density is too large"):
         unwrap(*shapes.torus(), texel_density=1e9)
+
+
+def test_a_resolution_and_a_texel_density_cannot_be_combined():
+    with pytest.raises(errors.OptionError, match="cannot be combined"):
+        unwrap(*shapes.box(), texel_density=50.0, resolution=512)
+
+
+@pytest.mark.parametrize("density", [1e-6, 4.885, 8.869])
+def test_a_small_texel_density_is_reached(density):
+    result = unwrap(*shapes.box(), texel_density=density)
+    assert result.uv_scale * result.settings["resolution"] >= density
+
+
+def test_a_mesh_that_cannot_be_made_coarse_is_searched_itself(monkeypatch):
+    monkeypatch.setattr("coneflat.apps.unwrap.search.COARSE", 2)
+    assert unwrap(*shapes.torus(16, 8)).distortion.flipped == 0

@@ -113,11 +113,12 @@ def _vertices(mesh: MeshFile, labels: Sequence[str]) -> IntArray:
     for label in labels:
         check_same_side(mesh.path, {"the label": Path(label.rpartition(":")[0] or label)})
         vertices = read_label(label)
-        if len(vertices) and vertices.max() >= len(mesh.vertices):
+        for vertex in vertices[(vertices < 0) | (vertices >= len(mesh.vertices))]:
             raise OptionError(
-                f"{label} must be a label of {mesh.path} with {len(mesh.vertices):,} vertices, got vertex "
-                f"{vertices.max()}"
+                f"{label} must be a label of {mesh.path} with {len(mesh.vertices):,} vertices, got vertex {vertex}"
             )
+        if not len(vertices):
+            raise OptionError(f"{label} must have vertices, got none: choose another label")
         found.append(vertices)
     return np.unique(np.concatenate(found))
 

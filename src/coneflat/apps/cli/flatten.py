@@ -1,4 +1,4 @@
-"""`coneflat flatten`, `coneflat unwrap` and `coneflat transfer`."""
+"""`coneflat flatten` and `coneflat unwrap`."""
 
 from __future__ import annotations
 

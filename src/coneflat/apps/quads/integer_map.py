@@ -49,7 +49,7 @@ class IntegerGrid:
         >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
         >>> grid = coneflat.integer_grid(*square, quads=4)
         >>> grid.corner_grid.shape, grid.turns.shape, grid.shifts.shape
-        ((8, 3, 2), (24,), (24, 2))
+        ((128, 3, 2), (384,), (384, 2))
         >>> len(grid.cones), len(coneflat.quads(grid).quads)
         (0, 4)
     """

@@ -216,7 +216,8 @@ def _with_material(baked: Baked) -> io.Glb:
     """Return the model as GLB, with one material instead of its own."""
     source = baked.uv_mesh.source
     scene = None if source is None else source.scene
-    if scene is not None and baked.model.suffix.lower() == ".glb" and len(scene.data.tree["buffers"]) == 1:
+    buffers = [] if scene is None else scene.data.tree["buffers"]
+    if baked.model.suffix.lower() == ".glb" and len(buffers) == 1 and "uri" not in buffers[0]:
         content = io.read_bytes(baked.model)
     else:
         stream = BytesIO()

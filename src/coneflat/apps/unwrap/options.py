@@ -18,8 +18,8 @@ class UnwrapOptions(SeamOptions, AtlasOptions, RunOptions):
     Attributes:
         max_energy: Largest symmetric Dirichlet energy of each component, averaged by area: the sum of the squares of
             the singular values and of their inverses, 4 if nothing is stretched. A smaller value needs longer seams.
-        texel_density: Texels per unit of length of the model. The resolution is then the smallest multiple of 4 that
-            has at least this density.
+        texel_density: Texels per unit of length of the model, at least, instead of a resolution, which is then the
+            smallest multiple of 4 that suffices.
     """
 
     max_energy: float = option(MAX_ENERGY, Number(is_positive=True))
@@ -30,3 +30,5 @@ class UnwrapOptions(SeamOptions, AtlasOptions, RunOptions):
             raise OptionError(
                 f"max_energy must be above 4, the energy of an isometry, got {self.max_energy:g}"
             )
+        if self.texel_density is not None and self.resolution != AtlasOptions.resolution:
+            raise OptionError("resolution and texel_density cannot be combined: leave out one of them")

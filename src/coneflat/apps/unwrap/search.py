@@ -71,12 +71,15 @@ class CutSearch:
         max_energy: largest symmetric Dirichlet energy.
         method: how the part is laid out.
         is_quick: whether the first candidate within the bound is taken.
+        is_coarse: whether the part is a coarse mesh already.
     """
 
-    def __init__(self, part: Part, max_energy: float, method: Method, is_quick: bool = False) -> None:
+    def __init__(
+        self, part: Part, max_energy: float, method: Method, is_quick: bool = False, is_coarse: bool = False
+    ) -> None:
         self._part, self._max_energy, self._method = part, max_energy, method
-        self._is_coarse = len(part.faces) > 2 * COARSE and not part.seams.is_forbidden.any()
-        self._is_quick = is_quick or (len(part.faces) > MANY_TRIANGLES and not self._is_coarse)
+        self._has_coarse = len(part.faces) > 2 * COARSE and not (is_coarse or part.seams.is_forbidden.any())
+        self._is_quick = is_quick or (len(part.faces) > MANY_TRIANGLES and not self._has_coarse)
         self._surface = Surface.of(part.mesh, part.lengths, part.is_exact)
         self._surface.is_reused = True
         self._costs = seam_costs(part.mesh, part.lengths, part.seams)
@@ -89,7 +92,7 @@ class CutSearch:
         Raises:
             CurvatureError, MetricError, SeamError: a candidate could not be laid out.
         """
-        if self._is_coarse:
+        if self._has_coarse:
             return self._from_coarse()
         found = self._by_distortion()
         near = [one for one in found if one.energy <= self._reach]
@@ -117,7 +120,7 @@ class CutSearch:
         if layout is not None:
             start = self._settled(replace(start, layout=layout, cost=self._cost(layout)))
         slack = self._max_energy - start.energy
-        if self._is_coarse and 0 <= slack <= 10 * TOLERANCE * (self._max_energy - ISOMETRIC):
+        if self._has_coarse and 0 <= slack <= 10 * TOLERANCE * (self._max_energy - ISOMETRIC):
             return start
         for moved in map(self._settled, self._moved(start)):
             if moved.energy <= self._max_energy and (
@@ -139,7 +142,7 @@ class CutSearch:
         coarse, kept = coarse_part(self._part, COARSE)
         bound, found = self._max_energy + COARSE_EXCESS * (self._max_energy - ISOMETRIC), list[Candidate]()
         for _ in range(COARSE_TRIES):
-            best = CutSearch(coarse, bound, self._method, self._is_quick).best()
+            best = CutSearch(coarse, bound, self._method, self._is_quick, is_coarse=True).best()
             spec = self._with_cones(kept[best.layout.cones])
             layout, _ = lay_out_once(self._surface, self._part, spec, self._method)
             one = self._candidate(layout, best.distortion)
@@ -230,7 +233,7 @@ class CutSearch:
         wanted, allowed = self._max_energy - start.energy, self._max_energy - ISOMETRIC
         # For each slack that was requested, the energy above the bound.
         slack, tried, known = wanted, [(0.0, -wanted)], [seams]
-        for _ in range(MAX_TRIES // 2 if self._is_coarse and wanted > 0 else MAX_TRIES):
+        for _ in range(MAX_TRIES // 2 if self._has_coarse and wanted > 0 else MAX_TRIES):
             moved = moved_tips(start.layout, seams, tips, moves_for(start.layout, tips, slack))
             if any(np.array_equal(moved[0], each) for each in known):
                 # The tips move by whole edges.

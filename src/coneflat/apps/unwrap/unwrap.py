@@ -31,8 +31,8 @@ MINOR_SHARE = 0.002
 SHARP, CREASES = np.radians(40), 0.3
 # Options that the flattening does not have.
 OWN = ("max_energy", "texel_density")
-# Fraction of a texture that charts cover, roughly; the largest resolution; and the number of packings to find it.
-COVERED, MAX_RESOLUTION, MAX_PACKINGS = 0.65, 2**16, 4
+# Fraction of a texture that charts cover, roughly, and the largest resolution.
+COVERED, MAX_RESOLUTION = 0.65, 2**16
 #: The `method` in the settings of a result.
 FREE = "free seams"
 
@@ -80,7 +80,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     areas = np.array([double_areas(part.lengths).sum() for part in parts])
     if o.texel_density is not None:
         side = np.sqrt(areas.sum() / 2 / COVERED / o.tiles) / 2.0**prepared.checked.exponent
-        shared = replace(shared, resolution=_resolution(o.texel_density, side))
+        shared = replace(shared, resolution=_resolution(o.texel_density, side, o.padding))
     with limit_threads(o.threads):
         copies = find_copies(parts)
         searches = {
@@ -104,13 +104,13 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     energies = [one.energy for one in found.values()]
     shared = replace(shared, method=FREE)
     result = evaluate(prepared, layouts, shared, watch)
-    for _ in range(MAX_PACKINGS):
-        if o.texel_density is None:
-            break
+    has_risen = False
+    while o.texel_density is not None:
         # The padding, and with it the scale, depends on the resolution.
-        resolution = _resolution(o.texel_density, 1 / result.uv_scale)
-        if resolution == shared.resolution:
+        resolution = _resolution(o.texel_density, 1 / result.uv_scale, o.padding)
+        if resolution == shared.resolution or (has_risen and resolution < shared.resolution):
             break
+        has_risen |= resolution > shared.resolution
         shared = replace(shared, resolution=resolution)
         result = evaluate(prepared, layouts, shared, watch)
     notes = (*result.notes, *_notes(energies, o.max_energy))
@@ -126,9 +126,10 @@ def along_sharp_edges(part: Part) -> Part:
     return replace(part, seams=replace(part.seams, creases=max(CREASES * share, part.seams.creases)))
 
 
-def _resolution(density: float, side: float) -> int:
+def _resolution(density: float, side: float, padding: float) -> int:
     """Return the resolution for a number of texels per unit of length, and the length of the side of a texture."""
-    resolution = 4 * int(np.ceil(min(density * side / 4, MAX_RESOLUTION)))
+    # Charts need some space next to the padding.
+    resolution = 4 * int(np.ceil(min(max(density * side / 4, 4 * padding), MAX_RESOLUTION)))
     if resolution > MAX_RESOLUTION:
         raise OptionError(
             f"texel_density is too large: it needs a texture of {density * side:.3g} texels per side, and "
