@@ -34,7 +34,7 @@ FIRST_DISTORTION, MAX_CANDIDATES = 0.25, 5
 # Number of triangles of a coarse mesh; number of coarse searches to meet the bound on the given mesh; and what its
 # energy has more, relative to what is allowed above that of an isometry.
 COARSE, COARSE_TRIES, COARSE_EXCESS = 4_000, 3, 0.15
-# Tips of larger meshes are moved only to meet the bound, as each try takes seconds.
+# Tips of larger meshes are moved on their coarse meshes only, as each try takes seconds.
 MANY_TRIANGLES = 60_000
 # Number of times that tips are moved to meet the bound, half as often on large meshes, and that a layout is settled to
 # avoid contacts.
@@ -115,7 +115,7 @@ class CutSearch:
             start: a candidate.
             layout: its layout, if that was cut further.
         """
-        if self._is_quick or (len(self._part.faces) > MANY_TRIANGLES and start.energy <= self._max_energy):
+        if self._is_quick or len(self._part.faces) > MANY_TRIANGLES:
             return start if layout is None else replace(start, layout=layout)
         if layout is not None:
             start = self._settled(replace(start, layout=layout, cost=self._cost(layout)))
