@@ -12,6 +12,7 @@ from command import command
 import coneflat
 from coneflat import errors, measure_uv, unwrap
 from coneflat.apps.unwrap.free import freed
+from coneflat.apps.unwrap.unwrap import along_sharp_edges
 from coneflat.base import Stopwatch
 from coneflat.flatten import Method, lay_out_part
 from coneflat.io import as_input
@@ -208,3 +209,17 @@ def test_a_small_texel_density_is_reached(density):
 def test_a_mesh_that_cannot_be_made_coarse_is_searched_itself(monkeypatch):
     monkeypatch.setattr("coneflat.apps.unwrap.search.COARSE", 2)
     assert unwrap(*shapes.torus(16, 8)).distortion.flipped == 0
+
+
+def test_seams_follow_sharp_edges_where_these_bend_the_surface():
+    """A cube cut open along its edges; a sphere has no sharp edges, so its seams cost their lengths."""
+    result = unwrap(*shapes.box(8, sides=(1.0, 1.0, 1.0)))
+    on_edge = (np.isclose(np.abs(result.vertices - result.vertices.mean(axis=0)), 0.5)).sum(axis=1) >= 2
+    ends = result.vertices[result.seams]
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    assert lengths[on_edge[result.seams].all(axis=1)].sum() > 0.8 * lengths.sum()
+    creases = [
+        along_sharp_edges(Source(as_input(*shape)).prepared(Options()).parts[0]).seams.creases
+        for shape in (shapes.box(), shapes.sphere(3, 0.0))
+    ]
+    assert creases == [pytest.approx(0.3), 0.0]

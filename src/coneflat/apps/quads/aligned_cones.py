@@ -23,17 +23,15 @@ from .cross_field import (
     sharp_ends,
     smoothest_cross_field,
 )
-from .map_model import MapModel, vertex_graph
+from .map_model import SAMPLES, MapModel, vertex_graph
 
 # Cost of an area distortion as large as allowed, of crosses that are off by 22.5 degrees on average, and of a rotation
 # along a handle that is off by 45 degrees; a cone costs 1 for each quarter turn, a missing one more than all others.
 COST_OF_AREAS, COST_OF_DIRECTIONS, COST_OF_HANDLES, COST_OF_MISSING = 15.0, 200.0, 60.0, 1e4
-# Number of places all over the mesh at which pairs of cones are tried.
-FAR_PLACES = 250
 # Radii within which cones move, relative to the distance between the centres of regions, and tried places in each.
 RADII, PLACES_NEAR = (1.0, 0.6, 0.35, 0.2), 10
-# Largest number of steps of a descent, and least decrease of the cost of a step.
-MAX_STEPS, MIN_GAIN = 300, 1e-3
+# Least decrease of the cost by a step of a descent, which thus ends.
+MIN_GAIN = 1e-3
 # How often the cost of areas is doubled to meet the bound, and the bound for a distortion of 1: the log of the ratio of
 # the 95% and 5% quantiles of the areas of quads.
 MAX_DOUBLINGS, SPREAD = 3, np.log(2.0) / 0.1
@@ -109,7 +107,7 @@ class _Search:
     def descend_all(self, costs: _Costs) -> None:
         """Decrease the cost by steps between places all over the mesh, then by steps nearby."""
         self.model.linearise(self.indices)
-        first = np.append(self.model.centres[:FAR_PLACES], len(self.indices) - 1)
+        first = np.append(self.model.centres[:SAMPLES], len(self.indices) - 1)
         first = np.union1d(first, np.flatnonzero(self.indices))
         self._descend(first, first, costs)
         for radius in RADII:
@@ -135,7 +133,7 @@ class _Search:
         is_same = np.array_equal(one, two)
         gram = first.scales.T @ second.scales
         squares = (first.scales**2).sum(axis=0)[:, None] + (second.scales**2).sum(axis=0) - 2 * gram
-        for _ in range(MAX_STEPS):
+        while True:
             scale, waves, loops = model.state(indices)
             now = _direction_cost(waves.sum()[None], loops.sum()[None], model, costs)[0]
             rise = np.where(indices < model.most, np.abs(indices + 1) - np.abs(indices), np.inf) * price

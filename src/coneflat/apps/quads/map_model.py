@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 
 from ... import TriangleMesh
 from ...base import ComplexArray, FloatArray, IntArray
+from ...cones import CONE_ANGLE_PER_TRIANGLE
 from ...geometry import (
     angle_defect,
     corner_angles,
@@ -23,14 +24,11 @@ from ...linalg import Factor, factorize
 from ...mesh import tie_key
 from .cross_field import edge_rotations, halfedge_angles
 
-RIGHT_ANGLE = np.pi / 2
 # Numbers of regions over which the log scale and the directions are summed, and largest number of vertices that can be
 # cones.
 REGIONS, SAMPLES, MAX_PLACES = 500, 250, 20_000
 # Number of right-hand sides that are solved at once.
 BLOCK = 64
-# Radians for each triangle at a cone, up to which straight sides can hold its angle.
-CONE_ANGLE_PER_TRIANGLE = 0.6 * np.pi
 
 
 class MapModel:
@@ -81,7 +79,7 @@ class MapModel:
         samples = order[np.concatenate([[True], np.diff(of_face[order]) > 0])]
         self._number = np.searchsorted(of_face[samples], of_face)
         self.places = _places(key, np.union1d(centres, required))
-        self.key, self.curvature = key[self.places], self._defect[self.places] / RIGHT_ANGLE
+        self.key, self.curvature = key[self.places], self._defect[self.places] / (np.pi / 2)
         number = np.empty(count, dtype=np.int64)
         number[self.places] = np.arange(len(self.places))
         self.centres = number[centres]
@@ -93,7 +91,7 @@ class MapModel:
         triangles = np.bincount(mesh.faces.ravel(), minlength=count)[self.places]
         border = mesh.is_boundary_vertex[self.places]
         straight = np.where(border, 2, 4)
-        widest = np.floor(CONE_ANGLE_PER_TRIANGLE * triangles / RIGHT_ANGLE).astype(np.int64)
+        widest = np.floor(CONE_ANGLE_PER_TRIANGLE * triangles / (np.pi / 2)).astype(np.int64)
         low = np.minimum(np.maximum(np.where(border, -1, least), straight - widest), 0)
         self.least = np.append(low, -(10**9))
         self.most = np.append(np.where(border, 1, np.where(triangles > 2, most, 0)), 10**9)
@@ -105,7 +103,7 @@ class MapModel:
     def linearise(self, indices: IntArray) -> None:
         """Linearise the rotations at the cones with given curvatures (p + 1,), in quarter turns."""
         curvature = -self._defect
-        curvature[self.places] += RIGHT_ANGLE * indices[:-1]
+        curvature[self.places] += np.pi / 2 * indices[:-1]
         self._log_scale = self._poisson.solve(curvature[:, None])[:, 0]
         turned = self._rotations.of_frames(self._log_scale) + self._rotations.mean_change @ self._log_scale
         crosses = self._wanted * np.exp(4j * turned)
@@ -200,7 +198,7 @@ class _Poisson:
         found = np.empty((rows.shape[0], len(places)))
         for start in range(0, rows.shape[0], BLOCK):
             block = slice(start, start + BLOCK)
-            found[block] = RIGHT_ANGLE * self.solve(rows[block].toarray().T)[places].T
+            found[block] = np.pi / 2 * self.solve(rows[block].toarray().T)[places].T
         return found
 
 

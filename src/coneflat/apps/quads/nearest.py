@@ -82,56 +82,47 @@ def _search(
     weights: FloatArray,
 ) -> None:
     """Find the nearest triangle of each point, depth first, the nearer child first."""
-    first_leaf = len(leaves) - 2
     stack, trial = np.empty(128, np.int64), np.empty(3)
-    last = order[0]
+
+    def square_to(f: int, q: int) -> float:
+        """Return the squared distance of point q from triangle f, more if it faces away, and fill in `trial`."""
+        square = nearest_in_triangle(points[q], corners[f, 0], corners[f, 1], corners[f, 2], trial)
+        along = 0.0
+        for k in range(3):
+            along += normals[f, k] * directions[q, k]
+        return square + opposite if along < 0 else square
+
+    def square_to_box(node: int, q: int) -> float:
+        total = 0.0
+        for k in range(3):
+            outside = max(boxes[node, 0, k] - points[q, k], points[q, k] - boxes[node, 1, k], 0.0)
+            total += outside * outside
+        return total
+
+    first_leaf, last = len(leaves) - 2, order[0]
     for q in range(len(points)):
         # The triangle of the point before gives a first bound.
-        best = _square_to(corners[last], normals[last], points[q], directions[q], opposite, trial)
+        best = square_to(last, q)
         found[q], weights[q] = last, trial
         stack[0], size = 0, 1
         while size > 0:
             size -= 1
             node = stack[size]
-            if _square_to_box(boxes[node], points[q]) > best:
+            if square_to_box(node, q) > best:
                 continue
             if node < first_leaf:
                 left, right = 2 * node + 1, 2 * node + 2
-                if _square_to_box(boxes[left], points[q]) < _square_to_box(boxes[right], points[q]):
+                if square_to_box(left, q) < square_to_box(right, q):
                     left, right = right, left
                 stack[size], stack[size + 1] = left, right
                 size += 2
                 continue
             for k in range(leaves[node - first_leaf], leaves[node - first_leaf + 1]):
                 f = order[k]
-                square = _square_to(corners[f], normals[f], points[q], directions[q], opposite, trial)
+                square = square_to(f, q)
                 if square <= best:
                     best, found[q], weights[q] = square, f, trial
         last = found[q]
-
-
-@compiled
-def _square_to(
-    corners: FloatArray,
-    normal: FloatArray,
-    point: FloatArray,
-    direction: FloatArray,
-    opposite: float,
-    weights: FloatArray,
-) -> float:
-    """Return the squared distance of a point from a triangle, more if it faces away, and fill in `weights`."""
-    square = nearest_in_triangle(point, corners[0], corners[1], corners[2], weights)
-    along = normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2]
-    return square + opposite if along < 0 else square
-
-
-@compiled
-def _square_to_box(box: FloatArray, point: FloatArray) -> float:
-    total = 0.0
-    for k in range(3):
-        outside = max(box[0, k] - point[k], point[k] - box[1, k], 0.0)
-        total += outside * outside
-    return total
 
 
 def surface_distances(vertices: FloatArray, faces: IntArray, queries: FloatArray) -> FloatArray:

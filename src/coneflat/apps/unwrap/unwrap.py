@@ -72,10 +72,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     with watch("check"):
         prepared = source.prepared(shared)
     method = Method(RelaxSpec("off", 0.0), o.charts == "atlas", None, Stopwatch(), Surface.of, find_metric)
-    parts = [
-        replace(each, seams=replace(each.seams, creases=max(CREASES, each.seams.creases)))
-        for each in prepared.parts
-    ]
+    parts = [along_sharp_edges(part) for part in prepared.parts]
     found = dict[int, Candidate]()
     areas = np.array([double_areas(part.lengths).sum() for part in parts])
     if o.texel_density is not None:
