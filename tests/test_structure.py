@@ -34,16 +34,15 @@ CEILINGS = {
     "apps.ahead": 37,
     "apps.batch": 398,
     "apps.blender": 885,
-    "apps.cli": 1525,
+    "apps.cli": 1626,
     "apps.measure_uv": 160,
     "apps.peers": 470,
-    "apps.quads": 3890,
+    "apps.quads": 3880,
     "apps.studio": 1741,
-    "apps.transfer": 318,
-    "apps.brains": 347,
-    "apps.cli.more": 83,
+    "apps.transfer": 323,
+    "apps.brains": 262,
     "apps.pyvista": 26,
-    "apps.unwrap": 1099,
+    "apps.unwrap": 1096,
     "apps.view": 1591,
     "atlas": 1492,
     "base": 328,
@@ -53,7 +52,7 @@ CEILINGS = {
     "flatten": 221,
     "flattener": 35,
     "geometry": 1560,
-    "io": 2795,
+    "io": 2881,
     "layout": 2218,
     "linalg": 453,
     "measure": 829,
@@ -68,12 +67,10 @@ CEILINGS = {
     "xatlas": 2,
 }
 #: Applications with a ceiling of their own, which the ceilings of everything else leave out.
-OWN_CEILING = {
-    "apps.blender", "apps.brains", "apps.cli.more", "apps.pyvista", "apps.quads", "apps.transfer", "apps.unwrap",
-}  # fmt: skip
+OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 143, 15_701, 203, 21_620
-CONSTANTS, KERNELS, NAMES, LEVELS = 259, 101, 30, 8
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_786, 232, 25_715
+CONSTANTS, KERNELS, NAMES, LEVELS = 295, 110, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
 

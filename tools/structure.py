@@ -50,8 +50,6 @@ HOLDS = {
     "xatlas": "the interface of xatlas",
     "__main__": "python -m coneflat",
 }
-#: Files whose lines count as those of another package, or as their own.
-COUNTED_AS = {"io.brains": "apps.brains", "apps.cli.more": "apps.cli.more"}
 
 
 @dataclass(frozen=True)
@@ -136,10 +134,10 @@ def package_of(name: str) -> str:
 
 
 def sizes(package: Path = PACKAGE) -> dict[str, Size]:
-    """Return the sizes of the packages; the formats of brains count as that application."""
+    """Return the sizes of the packages."""
     found: dict[str, Size] = {}
     for name, module in read_modules(package).items():
-        key = COUNTED_AS.get(name) or package_of(name)
+        key = package_of(name)
         found[key] = found.get(key, Size(0, 0, 0, 0)) + size_of(module.path)
     return found
 

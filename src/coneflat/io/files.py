@@ -87,7 +87,9 @@ def readable(path: Path, kind: str) -> Iterator[None]:
     except (ConeflatError, MemoryError):
         raise
     except Exception as error:
-        reason = f"{error} is missing" if isinstance(error, KeyError) else " ".join(str(error).split())[:200]
+        # Pillow adds the address of the stream.
+        text = " ".join(str(error).partition(" <_io.")[0].split())[:200]
+        reason = f"{error} is missing" if isinstance(error, KeyError) else text
         raise MeshFileError(f"{path} is not a readable {kind}: {reason or type(error).__name__}") from error
 
 

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import shapes
 from click.testing import CliRunner
 
 import coneflat
@@ -24,11 +23,6 @@ CONES = (3, 60, 200, 410, 500)
 def some_choices():
     chosen = Choices().placed(CONES).with_angle(60, math.radians(270)).locked(200, True)
     return chosen.with_option("stretch", 0.25).cut((1, 2, 9)).with_kept((7, 8))
-
-
-@pytest.fixture
-def mesh(tmp_path):
-    return shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(3))
 
 
 class TestChoices:

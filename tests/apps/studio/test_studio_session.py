@@ -26,19 +26,6 @@ from coneflat.apps.studio.worker import COMMAND, read_frame, write_frame
 from coneflat.errors import OptionError, ProjectError, StudioError
 
 
-@pytest.fixture
-def mesh(tmp_path):
-    return shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(3))
-
-
-@pytest.fixture
-def session(tmp_path, mesh):
-    opened = Session(tmp_path)
-    opened.open(tmp_path / "ball.obj")
-    yield opened
-    opened.close()
-
-
 def worker_process():
     """The id of the worker process."""
     (found,) = (each for each in psutil.Process().children() if COMMAND[-1] in each.cmdline())

@@ -8,7 +8,6 @@ import math
 
 import numpy as np
 import pytest
-import shapes
 from click.testing import CliRunner
 from studio_browsing import sample, studio, visit  # noqa: F401
 
@@ -20,7 +19,6 @@ from coneflat.apps.studio.messages import with_warnings
 from coneflat.apps.studio.outputs import curve_options
 from coneflat.apps.studio.paint import Region
 from coneflat.apps.studio.project import Project, file_hash, read_project
-from coneflat.apps.studio.session import Session
 from coneflat.apps.unwrap.options import MAX_ENERGY, UnwrapOptions
 from coneflat.base import cancel_with
 from coneflat.errors import OptionError, StudioError
@@ -35,19 +33,6 @@ def both_kinds():
     for name, value in {"max_energy": 4.05, "stretch": 0.25, "boundary": "disk", "padding": 4}.items():
         chosen = chosen.with_option(name, value)
     return chosen.painted("no_cone", Region.of_text("3")).painted("importance", Region.of_text("9"), 10)
-
-
-@pytest.fixture
-def mesh(tmp_path):
-    return shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(3))
-
-
-@pytest.fixture
-def session(tmp_path, mesh):
-    opened = Session(tmp_path)
-    opened.open(mesh)
-    yield opened
-    opened.close()
 
 
 class TestChoices:

@@ -9,26 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import shapes
 
 import coneflat
 from coneflat.apps.studio.choices import DECLARED, Choices
 from coneflat.apps.studio.messages import CONTROLS, misplaced_warning, page_message, vertices_in
 from coneflat.apps.studio.paint import Region
-from coneflat.apps.studio.session import Session
 from coneflat.base.defaults import MAX_CONE_ANGLE
 from coneflat.errors import StudioError
 
 PAGE = files("coneflat.apps.studio.page")
 SOURCES = Path(coneflat.__file__).parent
-
-
-@pytest.fixture
-def session(tmp_path):
-    opened = Session(tmp_path)
-    opened.open(shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(3)))
-    yield opened
-    opened.close()
 
 
 def settled(session):

@@ -81,7 +81,7 @@ def read_flat(path: Path, surface: Path) -> UVMesh:
         faces, vertices, planar = flat.triangles, np.arange(len(flat.vertices)), flat.vertices
     else:
         vertices, planar = _read_patch(path)
-    if (len(vertices) and vertices.max() >= count) or (
+    if (len(vertices) and not 0 <= vertices.min() <= vertices.max() < count) or (
         path.suffix.lower() == ".gii" and len(planar) != count
     ):
         raise OptionError(

@@ -184,10 +184,17 @@ def _check_combinations(context: click.Context, kind: str) -> None:
 
 
 @click.command(short_help="Flatten a sample model, and draw it.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), default="coneflat-demo", show_default=True)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    default=Path("coneflat-demo"),
+    show_default=True,
+    help="Folder for the files; created if it does not exist.",
+)
 @verbosity_options
 def demo(output: Path, verbosity: str | None) -> None:
-    """Flatten the sample model of coneflat, and write the textured mesh, its report and a picture to a folder."""
+    """Flatten the sample model of coneflat, and write the textured mesh, its report and a picture."""
     from ... import sample_path
     from ...io import make_folder
     from ..view import demo_figure, new_figure, save_figure

@@ -12,6 +12,7 @@ from .shared import QUIET, check_required, input_options, require_option, verbos
 
 if TYPE_CHECKING:
     from ...measure import Row
+    from ..brains import FlatMeasures
     from ..measure_uv import UVMeasures
 
 
@@ -68,13 +69,13 @@ def measure(
             click.echo(json.dumps(found, indent=2))
         elif not as_json:
             console.say(f"note: {note}" for note in measured.notes)
-            console.table([*([] if flat is None else flat.rows()), *rows_of_measures(measured)])
+            console.table(rows_of_measures(measured, flat))
             console.finish([] if report is None else [report])
     check_required(requirements, found)
 
 
-def rows_of_measures(measured: UVMeasures) -> list[Row]:
-    """Return the rows (name, value, meaning) of the table of measures of UVs."""
+def rows_of_measures(measured: UVMeasures, flat: FlatMeasures | None = None) -> list[Row]:
+    """Return the rows (name, value, meaning) of the table of measures of UVs, or of a flat map of a brain."""
     from ...measure import map_rows, number_text, packing_row
     from .run import FIRST_ROWS
 
@@ -83,7 +84,7 @@ def rows_of_measures(measured: UVMeasures) -> list[Row]:
     if counts["triangles_without_uv"]:
         missing = f"; {counts['triangles_without_uv']:,} without UVs"
     tiles = "" if counts["tiles"] == 1 else f" of {counts['tiles']:,} unit squares with charts"
-    return [
+    rows = [
         ("triangles", f"{counts['triangles']:,}", f"of {counts['polygons']:,} polygons as fans{missing}"),
         *(of_map.pop(name) for name in FIRST_ROWS if name in of_map),
         *(of_map.pop(name) for name in ("area distortion", "degenerate")),
@@ -96,3 +97,6 @@ def rows_of_measures(measured: UVMeasures) -> list[Row]:
             "largest angle error around a point inside a chart, radians",
         ),
     ]
+    # Flat maps are in the unit of the surface, not in the unit square.
+    is_texture = {"packing", "outside", "texel density"}
+    return rows if flat is None else [*flat.rows(), *(row for row in rows if row[0] not in is_texture)]

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from ...base import plural
 from ...options import FORMATS, ConeNumber, RunOptions, option, strength
 from .measure import rows_of_measures
 from .options import flag, keywords, option_flags, path_flag, pop_flags
@@ -82,21 +83,25 @@ def brain(context: click.Context, /, surface: Path, verbosity: str | None, **giv
         with console.stage("write"):
             for path in outputs:
                 (found if path.suffix.lower() in FLAT_FORMATS else found.result).save(path)
+        # The file for FreeSurfer leaves out the most triangles.
+        smallest = next((path for path in outputs if path.suffix.lower() == ".3d"), Path(".gii"))
         with console.stage("measure"):
-            measured = measure_flat(found.uv_mesh(outputs[0]))
+            measured = measure_flat(found.uv_mesh(smallest))
         if flags.report is not None:
             write_report(flags.report, {**measured.report(), "seconds": dict(console.seconds)})
-        console.say(f"note: {note}" for note in (*found.result.notes, *measured.uv.notes))
+        left_out = len(found.result.faces) - int(measured.uv.counts["triangles"])
+        along = [f"{plural(left_out, 'triangle')} along cuts left out of the flat map."] if left_out else []
+        console.say(f"note: {note}" for note in (*found.result.notes, *measured.uv.notes, *along))
         console.finish([*outputs, *([] if flags.report is None else [flags.report])])
-        shown = ("triangles", "charts", "QC distortion", "area distortion")
-        rows = [row for row in rows_of_measures(measured.uv) if row[0] in shown]
-        console.table([*measured.rows(), *rows])
+        console.table(rows_of_measures(measured.uv, measured))
 
 
 @click.command(short_help="Bake the textures of a model into other UVs.")
 @click.argument("old", type=_PATH)
 @click.argument("new", type=_PATH)
-@click.option("-o", "--output", type=_PATH, help="Model or picture.  [default: NEW's name with _baked]")
+@click.option(
+    "-o", "--output", type=_PATH, help="File to write: .glb or .png.  [default: NEW's name with _baked]"
+)
 @click.option("--resolution", type=int, default=2048, show_default=True, help="Texels along a side.")
 @click.option("--texture", type=_PATH, help="Image of the UVs of OLD, instead of its materials.")
 @verbosity_options
@@ -130,7 +135,14 @@ def transfer(
 
 
 @click.command(short_help="Write the Blender extension.")
-@click.option("-o", "--output", type=_PATH, default="coneflat_blender.zip", show_default=True)
+@click.option(
+    "-o",
+    "--output",
+    type=_PATH,
+    default="coneflat_blender.zip",
+    show_default=True,
+    help="File to write, .zip.",
+)
 def blender(output: Path) -> None:
     """Write the extension for Blender 4.2 or later as a zip.
 

@@ -24,17 +24,18 @@ from .cross_field import (
     smoothest_cross_field,
 )
 from .map_model import SAMPLES, MapModel, vertex_graph
+from .options import DISTORTION
 
-# Cost of an area distortion as large as allowed, of crosses that are off by 22.5 degrees on average, and of a rotation
-# along a handle that is off by 45 degrees; a cone costs 1 for each quarter turn, a missing one more than all others.
-COST_OF_AREAS, COST_OF_DIRECTIONS, COST_OF_HANDLES, COST_OF_MISSING = 15.0, 200.0, 60.0, 1e4
+# Cost of an area distortion as large as allowed, at first; a cone costs 1 for each quarter turn, and a missing one more
+# than all others.
+COST_OF_AREAS, COST_OF_MISSING = 15.0, 1e4
 # Radii within which cones move, relative to the distance between the centres of regions, and tried places in each.
 RADII, PLACES_NEAR = (1.0, 0.6, 0.35, 0.2), 10
 # Least decrease of the cost by a step of a descent, which thus ends.
 MIN_GAIN = 1e-3
 # How often the cost of areas is doubled to meet the bound, and the bound for a distortion of 1: the log of the ratio of
 # the 95% and 5% quantiles of the areas of quads.
-MAX_DOUBLINGS, SPREAD = 3, np.log(2.0) / 0.1
+MAX_DOUBLINGS, SPREAD = 3, np.log(2.0) / DISTORTION
 
 
 def aligned_cones(
@@ -68,11 +69,11 @@ def aligned_cones(
 
 
 class _Costs(NamedTuple):
-    """Costs of the squared area distortion, of directions and of handles."""
+    """Costs of the squared area distortion, of crosses off by 22.5 degrees, and of a handle's rotation off by 45."""
 
     areas: float
-    directions: float = COST_OF_DIRECTIONS
-    handles: float = COST_OF_HANDLES
+    directions: float = 200.0
+    handles: float = 60.0
 
 
 @dataclass(frozen=True, eq=False)

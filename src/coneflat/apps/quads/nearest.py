@@ -9,8 +9,6 @@ import numpy as np
 from ...base import FloatArray, IntArray, compiled
 from ...geometry import face_normals
 
-#: Triangles per leaf of the tree; fewer make the tree deeper, more make each leaf slower.
-LEAF = 4
 #: A triangle that faces away from the normal of a point counts as farther by this fraction of the model's diagonal,
 #: so that the two sides of a thin wall are not confused.
 OPPOSITE = 0.01
@@ -21,12 +19,13 @@ class TriangleTree:
 
     Args:
         vertices, faces: (n, 3), (m, 3) the surface.
+        leaf: triangles per leaf; fewer make the tree deeper, more make each leaf slower.
     """
 
-    def __init__(self, vertices: FloatArray, faces: IntArray) -> None:
+    def __init__(self, vertices: FloatArray, faces: IntArray, leaf: int = 4) -> None:
         corners = np.ascontiguousarray(vertices[faces])
         centres, count = corners.mean(axis=1), len(faces)
-        self._levels = max(int(np.ceil(np.log2(count / LEAF))), 0)
+        self._levels = max(int(np.ceil(np.log2(count / leaf))), 0)
         order = np.arange(count)
         for level in range(self._levels):
             start = self._starts(level, count)

@@ -99,7 +99,12 @@ class Painted:
             return self._attribute(f"TEXCOORD_{number}", 2)
         if self.mesh.uv is None or self.mesh.texture is None:
             raise MeshFileError(f"{self.mesh.path} must have UVs for its texture, got none")
-        return self.mesh.uv[self.mesh.texture[self.corners]] * [1, -1] + [0, 1]
+        points = self.mesh.texture[self.corners]
+        if (points < 0).any():
+            raise MeshFileError(
+                f"{self.mesh.path} must have UVs at all corners for its texture, but some have none"
+            )
+        return self.mesh.uv[points] * [1, -1] + [0, 1]
 
     def _attribute(self, name: str, columns: int) -> FloatArray:
         """Return (m, 3, columns) an attribute at the corners of a glTF scene, 1 where missing."""
