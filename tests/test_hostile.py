@@ -11,6 +11,7 @@ from trials.cases import cases, run_case
 from trials.grids import check_grid, check_quads
 from trials.outcome import Outcome
 from trials.promises import check
+from trials.textures import check_energy
 from trials.workers import MEMORY, run_all
 from trials.written import check_file
 
@@ -144,6 +145,18 @@ def test_a_fault_that_its_own_note_names_is_no_breach(ball):
         assert (cause in breaches_of(replace(turned, notes=notes), options, *mesh)) == is_breach
     other = replace(planted(result, "other cone"), notes=("The sum of curvatures is off at 1 cone.",))
     assert "cones: sum of curvatures" in breaches_of(other, options, *mesh)
+
+
+def test_an_energy_above_the_bound_is_found(ball):
+    layout = coneflat.unwrap(*ball[2])
+    for bound, uv, is_found in (
+        (4.1, layout.uv, False),
+        (4.1, layout.uv * [1.0, 0.7], True),
+        (4.01, layout.uv, True),
+    ):
+        outcome = Outcome("texture", 0)
+        check_energy(outcome, replace(layout, uv=uv), bound)
+        assert [cause for cause, _ in outcome.breaches] == ["energy above the bound"] * is_found
 
 
 @pytest.mark.parametrize("ending", [".obj", ".ply", ".glb", ".npz"])

@@ -192,7 +192,8 @@ class CutSearch:
         return found
 
     def _candidate(self, layout: Layout, distortion: float) -> Candidate:
-        layout, energy = freed(layout, tolerance=TOLERANCE)
+        # What the cones or the metric do not meet does not matter where seams are free.
+        layout, energy = freed(replace(layout, notes=()), tolerance=TOLERANCE)
         one = Candidate(layout, energy, self._cost(layout), distortion)
         return one if energy > self._reach else self._separated(one)
 
