@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..base.text import list_some, plural
 from ..geometry.overlap import Overlaps
 from ..geometry.planar import sides_between
 from ..mesh.connectivity import TriangleMesh
-from .distortion import angle_sum_errors, measure
+from .distortion import angle_sum_errors, measure, measure_map
 from .seam_data import Rotations, seam_rotations
 
 if TYPE_CHECKING:
@@ -78,15 +79,20 @@ def remeasured(
     old = result.distortion
     # Scaling by a power of two avoids underflow and overflow of squared lengths.
     exponent = -unit_exponent(changed.vertices[changed.faces])
-    distortion = measure(
-        TriangleMesh(np.ldexp(changed.vertices, exponent), changed.faces),
-        changed.corner_uv,
-        (old.curvature_error, old.curvature_error_max),
-        changed.cones,
-        changed.prescribed,
-        overlaps,
-        None if changed.lengths is None else np.ldexp(changed.lengths, exponent),
-    ).rescaled(exponent * float(np.log(2)))
+    points = np.ldexp(changed.vertices, exponent)
+    lengths = None if changed.lengths is None else np.ldexp(changed.lengths, exponent)
+    measured = partial(measure, curvature_error=(old.curvature_error, old.curvature_error_max), cones=changed.cones)
+    plane = result.settings.get("mirror_plane")
+    if plane is None:
+        mesh = TriangleMesh(points, changed.faces)
+        distortion = measured(mesh, changed.corner_uv, prescribed=changed.prescribed, overlaps=overlaps, lengths=lengths)
+    else:
+        # Two halves share their texels, so one of them is measured.
+        own = changed.vertices[changed.faces].mean(axis=1) @ plane[:3] > plane[3]
+        distortion = measured(TriangleMesh(points, changed.faces[own]), changed.corner_uv[own])
+        each = measure_map(TriangleMesh(points, changed.faces), changed.corner_uv)
+        distortion = replace(distortion, qc=each.qc, log_area_scale=each.log_area_scale)
+    distortion = distortion.rescaled(exponent * float(np.log(2)))
     changed = replace(changed, distortion=distortion, rotations=_rotations(result, changed))
     kept = tuple(note for note in result.notes if note not in old_notes)
     return replace(changed, notes=(*kept, *unmet_guarantees(changed, unit), *notes))
@@ -125,7 +131,7 @@ def _orientation(result: Flattening) -> Iterator[str]:
 
 def _overlaps(result: Flattening) -> Iterator[str]:
     measures = result.distortion
-    if result.settings.get("charts") == "atlas" and measures.overlapping_pairs:
+    if result.settings.get("charts") not in ("one", None) and measures.overlapping_pairs:
         pairs = plural(measures.overlapping_pairs, "pair")
         verb = "overlaps" if measures.overlapping_pairs == 1 else "overlap"
         yield f"{pairs} of triangles {verb} in the atlas, on {measures.overlap:.2g} of the covered area."
