@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -79,17 +78,21 @@ def remeasured(
     old = result.distortion
     # Scaling by a power of two avoids underflow and overflow of squared lengths.
     exponent = -unit_exponent(changed.vertices[changed.faces])
-    points = np.ldexp(changed.vertices, exponent)
-    lengths = None if changed.lengths is None else np.ldexp(changed.lengths, exponent)
-    measured = partial(measure, curvature_error=(old.curvature_error, old.curvature_error_max), cones=changed.cones)
+    # Two halves that share their texels do not overlap each other, so one of them is measured.
     plane = result.settings.get("mirror_plane")
-    if plane is None:
-        mesh = TriangleMesh(points, changed.faces)
-        distortion = measured(mesh, changed.corner_uv, prescribed=changed.prescribed, overlaps=overlaps, lengths=lengths)
-    else:
-        # Two halves share their texels, so one of them is measured.
-        own = changed.vertices[changed.faces].mean(axis=1) @ plane[:3] > plane[3]
-        distortion = measured(TriangleMesh(points, changed.faces[own]), changed.corner_uv[own])
+    middles = changed.vertices[changed.faces].mean(axis=1)
+    own = slice(None) if plane is None else middles @ plane[:3] > plane[3]
+    points = np.ldexp(changed.vertices, exponent)
+    distortion = measure(
+        TriangleMesh(points, changed.faces[own]),
+        changed.corner_uv[own],
+        (old.curvature_error, old.curvature_error_max),
+        changed.cones,
+        changed.prescribed,
+        overlaps if plane is None else None,
+        None if changed.lengths is None else np.ldexp(changed.lengths, exponent),
+    )
+    if plane is not None:
         each = measure_map(TriangleMesh(points, changed.faces), changed.corner_uv)
         distortion = replace(distortion, qc=each.qc, log_area_scale=each.log_area_scale)
     distortion = distortion.rescaled(exponent * float(np.log(2)))
@@ -130,11 +133,10 @@ def _orientation(result: Flattening) -> Iterator[str]:
 
 
 def _overlaps(result: Flattening) -> Iterator[str]:
-    measures = result.distortion
-    if result.settings.get("charts") not in ("one", None) and measures.overlapping_pairs:
-        pairs = plural(measures.overlapping_pairs, "pair")
-        verb = "overlaps" if measures.overlapping_pairs == 1 else "overlap"
-        yield f"{pairs} of triangles {verb} in the atlas, on {measures.overlap:.2g} of the covered area."
+    count, share = result.distortion.overlapping_pairs, result.distortion.overlap
+    if result.settings.get("charts") not in ("one", None) and count:
+        verb = "overlaps" if count == 1 else "overlap"
+        yield f"{plural(count, 'pair')} of triangles {verb} in the atlas, on {share:.2g} of the covered area."
 
 
 def _angle_sums(result: Flattening, unit: float) -> Iterator[str]:
@@ -226,11 +228,8 @@ def _seam_rotations(result: Flattening, unit: float) -> Iterator[str]:
     if rotations is None or not rotations.worst > EXACT_TOLERANCE:
         return
     mesh = TriangleMesh(result.vertices, result.faces)
-    shorter = (
-        np.abs(sides_between(result.corner_uv))
-        .ravel()[mesh.edge_halfedges[~mesh.is_boundary_edge]]
-        .min(axis=1)
-    )
+    sides = np.abs(sides_between(result.corner_uv)).ravel()
+    shorter = sides[mesh.edge_halfedges[~mesh.is_boundary_edge]].min(axis=1)
     off = seam_rotations(mesh, result.corner_uv, rotations.quantum)
     off = np.where(rotations.binds(off), off, 0.0)
     if (off * shorter > EXACT_TOLERANCE * shorter + MAX_ROUNDINGS * unit).any():

@@ -97,26 +97,34 @@ def both_halves(half: Flattening, mirror: Mirror, prepared: Prepared) -> Flatten
     image[number] = number[mirror.vertices]
     uv_faces = np.empty(faces.shape, dtype=np.int64)
     uv_faces[chosen] = half.uv_faces
-    uv_faces.ravel()[mirror.images] = uv_faces.ravel()[mirror.corners]
-    of_faces, of_vertices = dict[str, FloatArray](), dict[str, FloatArray]()
-    for name in ("qc", "log_area_scale"):
-        of_faces[name] = np.empty(len(faces))
-        of_faces[name][chosen] = of_faces[name][partner] = getattr(half.distortion, name)
-    for name in ("log_scale", "prescribed", "curvature_residual"):
-        values = getattr(half, name)
-        of_vertices[name] = np.where(np.isnan(values), values[image], values)
+    uv_faces.ravel()[mirror.images] = uv_faces.ravel()[mirror.corners] + len(half.uv)
+
+    def of_faces(values: FloatArray) -> FloatArray:
+        found = np.empty(len(faces))
+        found[chosen] = found[partner] = values
+        return found
+
+    def of_vertices(values: FloatArray) -> FloatArray:
+        return np.where(np.isnan(values), values[image], values)
+
+    measures = half.distortion
     cones, first = np.unique(np.concatenate([half.cones, image[half.cones]]), return_index=True)
     plane = [*mirror.plane[:3].tolist(), float(np.ldexp(mirror.plane[3], -checked.exponent))]
     return replace(
         half,
-        **of_vertices,
         faces=faces,
         face_origin=checked.face_origin,
+        uv=np.concatenate([half.uv, half.uv]),
         uv_faces=uv_faces,
         cones=cones,
         curvatures=np.tile(half.curvatures, 2)[first],
         seams=np.unique(np.sort(np.concatenate([half.seams, image[half.seams]]), axis=1), axis=0),
-        distortion=replace(half.distortion, **of_faces),
+        log_scale=of_vertices(half.log_scale),
+        prescribed=of_vertices(half.prescribed),
+        curvature_residual=of_vertices(half.curvature_residual),
+        distortion=replace(
+            measures, qc=of_faces(measures.qc), log_area_scale=of_faces(measures.log_area_scale)
+        ),
         notes=(*half.notes, "The two halves share their texels; all measures are those of one half."),
         settings={**half.settings, "mirror_plane": plane},
     )
@@ -144,12 +152,17 @@ def _mirror_at(plane: FloatArray, mesh: TriangleMesh) -> Mirror | tuple[int, int
     name = f"about the plane across ({', '.join(f'{x:.3g}' for x in plane[:3])})"
     if (image == len(positions)).any():
         count = int((image == len(positions)).sum())
-        return 0, count, f"{plural(count, 'vertex', 'vertices')} of {len(positions):,} without an image {name}"
+        return (
+            0,
+            count,
+            f"{plural(count, 'vertex', 'vertices')} of {len(positions):,} without an image {name}",
+        )
     # The corners of each face in order, and in the reverse order, from the smallest position.
     own, turned = place.ravel()[mesh.faces], image[place.ravel()[mesh.faces]]
     start = 3 * np.arange(len(own))[:, None]
     here, there = (
-        start + (rows.argmin(axis=1)[:, None] + sign * np.arange(3)) % 3 for rows, sign in ((own, 1), (turned, -1))
+        start + (rows.argmin(axis=1)[:, None] + sign * np.arange(3)) % 3
+        for rows, sign in ((own, 1), (turned, -1))
     )
     rows = np.concatenate([own.ravel()[here], turned.ravel()[there]])
     key, back = np.split(np.unique(rows, axis=0, return_inverse=True)[1].ravel(), 2)

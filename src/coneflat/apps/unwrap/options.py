@@ -8,15 +8,26 @@ from typing import TYPE_CHECKING, Any
 
 from ...base import short_repr
 from ...errors import OptionError
-from ...options import AtlasOptions, Choice, Edges, Kind, Number, RunOptions, SeamOptions, as_integer, declarations, option
+from ...options import (
+    AtlasOptions,
+    Choice,
+    Edges,
+    Kind,
+    Number,
+    RunOptions,
+    SeamOptions,
+    as_integer,
+    declarations,
+    option,
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 #: The symmetric Dirichlet energy of an isometry, and the default bound.
 ISOMETRIC, MAX_ENERGY = 4.0, 4.1
-#: The energy above that of an isometry, relative to the squared area distortion, of layouts with the least energy: 17 to
-#: 27 on seven models.
+#: The energy above that of an isometry, relative to the squared area distortion, of layouts with the least energy:
+#: 17 to 27 on seven models.
 ENERGY_PER_AREA = 20.0
 
 
@@ -64,9 +75,9 @@ class UnwrapOptions(TextureOptions, SeamOptions, AtlasOptions, RunOptions):
     """Texture.
 
     Attributes:
-        seams: Edges that must be cut, as pairs of vertices; input, for the seams of the UVs in the file; or none, for no
-            seams but those that open each component to a disk, whatever the energy. In Python, ("input", pairs) and
-            ("none", pairs) combine a word with edges.
+        seams: Edges that must be cut, as pairs of vertices; input, for the seams of the UVs in the file; or none, for
+            no seams but those that open each component to a disk, whatever the energy. In Python, ("input", pairs)
+            and ("none", pairs) combine a word with edges.
         charts: atlas: move seams and add cuts until no triangles overlap. one: a single chart per component, which may
             overlap itself. Or a number of charts: they are cut where they are narrow until there are as many.
     """

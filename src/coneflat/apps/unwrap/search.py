@@ -160,7 +160,9 @@ class CutSearch:
             seams = np.flatnonzero(without_loose_ends(mesh, is_cut))
             disk, none = open_along(mesh, seams).mesh, np.empty(0, dtype=np.int64)
             points = np.zeros((len(disk.vertices), 2))
-            layout = replace(layout, points=points, corners=disk.faces, disk=disk, cones=none, seams=mesh.edges[seams])
+            layout = replace(
+                layout, points=points, corners=disk.faces, disk=disk, cones=none, seams=mesh.edges[seams]
+            )
         layout, energy = self._freed(layout)
         return self._settled(self._separated(Candidate(layout, energy, self._cost(layout), ANY_DISTORTION)))
 
@@ -230,7 +232,9 @@ class CutSearch:
         layout, energy = freed(layout, free, tolerance)
         if self._by_area:
             areas, flat = double_areas(layout.lengths), signed_double_areas(layout.points[layout.corners])
-            energy = ISOMETRIC + ENERGY_PER_AREA * float(np.average(np.log(flat / areas) ** 2, weights=areas)) / 4
+            energy = (
+                ISOMETRIC + ENERGY_PER_AREA * float(np.average(np.log(flat / areas) ** 2, weights=areas)) / 4
+            )
         return layout, energy
 
     def _separated(self, one: Candidate) -> Candidate:

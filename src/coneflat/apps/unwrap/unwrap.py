@@ -168,5 +168,7 @@ def _notes(o: UnwrapOptions, energies: Sequence[float], charts: int) -> Iterator
             "allowed: refine the mesh, or allow more."
         )
     if isinstance(o.charts, int) and charts != o.charts:
-        why = "no further cut divides one" if charts < o.charts else "components, seams and overlaps need them"
+        why = (
+            "no further cut divides one" if charts < o.charts else "components, seams and overlaps need them"
+        )
         yield f"The texture has {plural(charts, 'chart')} instead of {o.charts:,}: {why}."
