@@ -158,8 +158,9 @@ def _angle_sums(result: Flattening, unit: float) -> Iterator[str]:
 
 def _equal_sides(result: Flattening, unit: float) -> Iterator[str]:
     settings = result.settings
-    marked = settings.get("seams") is not None or settings.get("sharp_angle") is not None
-    most = EXACT_TOLERANCE if _is_exact(result) else ROUGH_TOLERANCE if marked else np.inf
+    is_marked = any(settings.get(name) is not None for name in ("seams", "sharp_angle"))
+    is_tied = is_marked and settings.get("method") != "free seams"
+    most = EXACT_TOLERANCE if _is_exact(result) else ROUGH_TOLERANCE if is_tied else np.inf
     if not result.distortion.seam_mismatch_max > most:
         return
     mesh = TriangleMesh(result.vertices, result.faces)

@@ -36,6 +36,7 @@ class ChartNumber(Kind):
     """A word, or a number of charts; a text may be a number, too."""
 
     words: tuple[str, ...] = ("atlas", "one")
+    metavar: str = "atlas|one|NUMBER"
 
     def parse(self, name: str, value: Any) -> str | int:
         if isinstance(value, str) and value not in self.words and not value.isdecimal():

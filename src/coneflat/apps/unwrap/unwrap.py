@@ -78,7 +78,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         prepared, mirror = source.prepared(shared), None
         if o.stack == "mirrored":
             mirror, prepared = half_of(prepared, source, shared)
-    method = Method(RelaxSpec("off", 0.0), o.charts == "atlas", None, Stopwatch(), Surface.of, find_metric)
+    method = Method(RelaxSpec("off", 0.0), shared.charts == "atlas", None, Stopwatch(), Surface.of, find_metric)
     parts = [along_sharp_edges(part) for part in prepared.parts]
     found = dict[int, Candidate]()
     areas = np.array([double_areas(part.lengths).sum() for part in parts])
@@ -128,7 +128,8 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         result = evaluate(prepared, layouts, shared, watch)
     notes = (*result.notes, *_notes(o, energies, result.distortion.charts))
     own = {name: getattr(o, name) for name in OWN if name != "seams"}
-    own |= {} if o.marked is o.seams else {"seams": ["none", result.settings["seams"]]}
+    if o.marked is not o.seams:
+        own["seams"] = "none" if o.marked is None else ["none", result.settings["seams"]]
     result = replace(result, settings={**result.settings, **own}, notes=notes)
     return result if mirror is None else both_halves(result, mirror, prepared)
 
