@@ -217,7 +217,8 @@ class CutSearch:
                 # The energy above that of an isometry is about a multiple of the square of the distortion.
                 above = float(np.clip(one.energy - ISOMETRIC, allowed / 16, allowed * 16))
                 factor = np.sqrt(allowed / above)
-                distortion *= max(factor, 8 / 7) if factor > 1 else min(factor, 7 / 8)
+                step = 3 / 4 if same else 7 / 8
+                distortion *= max(factor, 8 / 7) if factor > 1 else min(factor, step)
         return found
 
     def _candidate(self, layout: Layout, distortion: float) -> Candidate:

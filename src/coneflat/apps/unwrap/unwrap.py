@@ -78,7 +78,9 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         prepared, mirror = source.prepared(shared), None
         if o.stack == "mirrored":
             mirror, prepared = half_of(prepared, source, shared)
-    method = Method(RelaxSpec("off", 0.0), shared.charts == "atlas", None, Stopwatch(), Surface.of, find_metric)
+    method = Method(
+        RelaxSpec("off", 0.0), shared.charts == "atlas", None, Stopwatch(), Surface.of, find_metric
+    )
     parts = [along_sharp_edges(part) for part in prepared.parts]
     found = dict[int, Candidate]()
     areas = np.array([double_areas(part.lengths).sum() for part in parts])
