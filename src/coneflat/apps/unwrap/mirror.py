@@ -44,17 +44,16 @@ def find_mirror(mesh: TriangleMesh) -> Mirror:
     """Return the symmetry of a mesh about the first plane, across an axis or a principal axis, that has one.
 
     Raises:
-        OptionError: there is none; the message is about the plane with the fewest exceptions.
+        OptionError: there is none; the message is about the plane with the smallest share of exceptions.
     """
-    failures = list[tuple[int, int, str]]()
+    failures = list[tuple[float, str]]()
     for plane in _planes(mesh.vertices):
         found = _mirror_at(plane, mesh)
         if isinstance(found, Mirror):
             return found
         failures.append(found)
-    raise OptionError(
-        f"stack mirrored needs a model that is mirrored vertex by vertex: {min(failures, key=lambda one: one[:2])[2]}"
-    )
+    why = min(failures, key=lambda one: one[0])[1]
+    raise OptionError(f"stack mirrored needs a model that is mirrored vertex by vertex: {why}")
 
 
 def half_of(prepared: Prepared, source: Source, options: Options) -> tuple[Mirror, Prepared]:
@@ -137,25 +136,24 @@ def _planes(points: FloatArray) -> Iterator[FloatArray]:
         (np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2], points.mean(axis=0)),
     ):
         for normal in normals:
-            own = normal * np.sign(normal[np.abs(normal).argmax()])
+            own = normal * np.sign(normal[np.abs(normal).argmax()]) + 0.0  # without -0
             yield np.append(own, centre @ own)
 
 
-def _mirror_at(plane: FloatArray, mesh: TriangleMesh) -> Mirror | tuple[int, int, str]:
-    """Return the symmetry about a plane, or what is in its way: the kind, the number of exceptions, and a text."""
+def _mirror_at(plane: FloatArray, mesh: TriangleMesh) -> Mirror | tuple[float, str]:
+    """Return the symmetry about a plane, or what is in its way: the share of exceptions, and a text."""
     extent = float(np.ptp(mesh.vertices, axis=0).max())
     positions, place = np.unique(mesh.vertices, axis=0, return_inverse=True)
     height = positions @ plane[:3] - plane[3]
     height[np.abs(height) <= SAME_PLACE * extent] = 0
     reflected = positions - 2 * (positions @ plane[:3] - plane[3])[:, None] * plane[:3]
     _, image = cKDTree(positions).query(reflected, distance_upper_bound=SAME_PLACE * extent)
-    name = f"about the plane across ({', '.join(f'{x:.3g}' for x in plane[:3])})"
+    name = f"the plane across ({', '.join(f'{x:.3g}' for x in plane[:3])})"
     if (image == len(positions)).any():
         count = int((image == len(positions)).sum())
         return (
-            0,
-            count,
-            f"{plural(count, 'vertex', 'vertices')} of {len(positions):,} without an image {name}",
+            count / len(positions),
+            f"{plural(count, 'vertex', 'vertices')} of {len(positions):,} without an image about {name}",
         )
     # The corners of each face in order, and in the reverse order, from the smallest position.
     own, turned = place.ravel()[mesh.faces], image[place.ravel()[mesh.faces]]
@@ -170,19 +168,20 @@ def _mirror_at(plane: FloatArray, mesh: TriangleMesh) -> Mirror | tuple[int, int
     partner = order[np.minimum(np.searchsorted(key[order], back), len(key) - 1)]
     # Faces at the same place have no image of their own.
     is_missing = (key[partner] != back) | (partner[partner] != np.arange(len(own)))
-    vertices = np.empty(len(mesh.vertices), dtype=np.int64)
-    vertices[mesh.faces.ravel()[there]] = mesh.faces.ravel()[here[partner]]
-    is_missing |= (vertices[mesh.faces.ravel()[there]] != mesh.faces.ravel()[here[partner]]).any(axis=1)
+    vertices = np.full(len(mesh.vertices), -1)
+    of_corners, known = mesh.faces.ravel(), np.flatnonzero(~is_missing)
+    vertices[of_corners[there[known]]] = of_corners[here[partner[known]]]
+    is_missing |= (vertices[of_corners[there]] != of_corners[here[partner]]).any(axis=1)
     if is_missing.any():
         count = int(is_missing.sum())
-        return 1, count, f"{plural(count, 'face')} of {len(own):,} without an image {name}"
+        return count / len(own), f"{plural(count, 'face')} of {len(own):,} without an image about {name}"
     low, high = height[own].min(axis=1), height[own].max(axis=1)
     is_half = (low >= 0) & (high > 0)
     crosses = is_half == is_half[partner]
     if crosses.any():
         count = int(crosses.sum())
         verb = "crosses or lies" if count == 1 else "cross or lie"
-        return 2, count, f"{plural(count, 'face')} of {len(own):,} {verb} in the mirror plane {name}"
+        return count / len(own), f"{plural(count, 'face')} of {len(own):,} {verb} in {name}"
     sides = is_half[np.maximum(mesh.edge_halfedges, 0) // 3]
     middle = np.flatnonzero((sides[:, 0] != sides[:, 1]) & ~mesh.is_boundary_edge)
     return Mirror(plane, vertices, is_half, there[is_half], here[partner[is_half]], middle)
