@@ -42,7 +42,7 @@ CEILINGS = {
     "apps.transfer": 323,
     "apps.brains": 262,
     "apps.pyvista": 26,
-    "apps.unwrap": 1096,
+    "apps.unwrap": 1368,
     "apps.view": 1591,
     "atlas": 1492,
     "base": 328,
@@ -55,21 +55,21 @@ CEILINGS = {
     "io": 2881,
     "layout": 2218,
     "linalg": 453,
-    "measure": 829,
+    "measure": 828,
     "mesh": 710,
     "metric": 999,
     "options": 522,
     "result": 96,
     "sample": 5,
     "seams": 177,
-    "source": 521,
+    "source": 520,
     "stages": 223,
     "xatlas": 2,
 }
 #: Applications with a ceiling of their own, which the ceilings of everything else leave out.
 OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_786, 232, 25_715
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_785, 232, 25_714
 CONSTANTS, KERNELS, NAMES, LEVELS = 295, 110, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
