@@ -55,7 +55,7 @@ CEILINGS = {
     "io": 2881,
     "layout": 2218,
     "linalg": 453,
-    "measure": 828,
+    "measure": 829,
     "mesh": 710,
     "metric": 999,
     "options": 522,
@@ -69,7 +69,7 @@ CEILINGS = {
 #: Applications with a ceiling of their own, which the ceilings of everything else leave out.
 OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_785, 232, 25_714
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_786, 232, 25_715
 CONSTANTS, KERNELS, NAMES, LEVELS = 295, 110, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
