@@ -42,7 +42,7 @@ CEILINGS = {
     "apps.transfer": 323,
     "apps.brains": 262,
     "apps.pyvista": 26,
-    "apps.unwrap": 1096,
+    "apps.unwrap": 1368,
     "apps.view": 1591,
     "atlas": 1492,
     "base": 328,
@@ -62,7 +62,7 @@ CEILINGS = {
     "result": 96,
     "sample": 5,
     "seams": 177,
-    "source": 521,
+    "source": 520,
     "stages": 223,
     "xatlas": 2,
 }

@@ -169,13 +169,10 @@ def _check_arrays(
     bad = [] if cones is None else [v for v in np.asarray(cones).tolist() if not 0 <= v < len(mesh.vertices)]
     if bad:
         raise OptionError(f"cones are not vertices of the mesh: {list_some(bad)}")
+    count = (len(mesh.vertices),)
     for name, found, wanted in (
         ("corner_uv", np.shape(corner_uv), (*np.shape(mesh.faces), 2)),
-        (
-            "prescribed",
-            (len(mesh.vertices),) if prescribed is None else np.shape(prescribed),
-            (len(mesh.vertices),),
-        ),
+        ("prescribed", count if prescribed is None else np.shape(prescribed), count),
     ):
         if found != wanted:
             raise ArrayShapeError(f"{name} must have the shape {wanted}, to match the mesh, got {found}")
@@ -219,6 +216,7 @@ def measure_map(
     log_scale = np.full(len(area), np.nan)
     log_scale[chosen] = scales
     mean_scale = _mean(scales, weights)
+    low, high = quantiles(scales, weights, 0.05, 0.95)
 
     joined = joined_edges(mesh, corner_uv)
     seams = np.flatnonzero(~joined & ~mesh.is_boundary_edge)
@@ -246,7 +244,7 @@ def measure_map(
         seam_mismatch=_mean(mismatches, seam_lengths) if len(seams) else 0.0,
         seam_mismatch_max=float(mismatches.max()) if len(seams) else 0.0,
         seam_motion_mismatch=_seam_motion_mismatch(mesh, corner_uv, seams, cones),
-        density_spread=_spread(scales, weights),
+        density_spread=float(np.exp(high - low)),
         overlap=float("nan"),
         overlapping_pairs=0,
         curvature_error=curvature_error[0],
@@ -309,11 +307,6 @@ def _seam_motion_mismatch(
 def _mean(values: FloatArray, weights: FloatArray) -> float:
     total = float(weights.sum())
     return float((values * weights).sum() / total) if total > 0 else float("nan")
-
-
-def _spread(log_scale: FloatArray, weights: FloatArray) -> float:
-    low, high = quantiles(log_scale, weights, 0.05, 0.95)
-    return float(np.exp(high - low))
 
 
 def quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:

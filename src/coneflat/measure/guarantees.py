@@ -13,7 +13,7 @@ from ..base.text import list_some, plural
 from ..geometry.overlap import Overlaps
 from ..geometry.planar import sides_between
 from ..mesh.connectivity import TriangleMesh
-from .distortion import angle_sum_errors, measure
+from .distortion import angle_sum_errors, measure, measure_map
 from .seam_data import Rotations, seam_rotations
 
 if TYPE_CHECKING:
@@ -78,15 +78,24 @@ def remeasured(
     old = result.distortion
     # Scaling by a power of two avoids underflow and overflow of squared lengths.
     exponent = -unit_exponent(changed.vertices[changed.faces])
+    # Two halves that share their texels do not overlap each other, so one of them is measured.
+    plane = result.settings.get("mirror_plane")
+    middles = changed.vertices[changed.faces].mean(axis=1)
+    own = slice(None) if plane is None else middles @ plane[:3] > plane[3]
+    points = np.ldexp(changed.vertices, exponent)
     distortion = measure(
-        TriangleMesh(np.ldexp(changed.vertices, exponent), changed.faces),
-        changed.corner_uv,
+        TriangleMesh(points, changed.faces[own]),
+        changed.corner_uv[own],
         (old.curvature_error, old.curvature_error_max),
         changed.cones,
         changed.prescribed,
-        overlaps,
+        overlaps if plane is None else None,
         None if changed.lengths is None else np.ldexp(changed.lengths, exponent),
-    ).rescaled(exponent * float(np.log(2)))
+    )
+    if plane is not None:
+        each = measure_map(TriangleMesh(points, changed.faces), changed.corner_uv)
+        distortion = replace(distortion, qc=each.qc, log_area_scale=each.log_area_scale)
+    distortion = distortion.rescaled(exponent * float(np.log(2)))
     changed = replace(changed, distortion=distortion, rotations=_rotations(result, changed))
     kept = tuple(note for note in result.notes if note not in old_notes)
     return replace(changed, notes=(*kept, *unmet_guarantees(changed, unit), *notes))
@@ -124,11 +133,10 @@ def _orientation(result: Flattening) -> Iterator[str]:
 
 
 def _overlaps(result: Flattening) -> Iterator[str]:
-    measures = result.distortion
-    if result.settings.get("charts") == "atlas" and measures.overlapping_pairs:
-        pairs = plural(measures.overlapping_pairs, "pair")
-        verb = "overlaps" if measures.overlapping_pairs == 1 else "overlap"
-        yield f"{pairs} of triangles {verb} in the atlas, on {measures.overlap:.2g} of the covered area."
+    count, share = result.distortion.overlapping_pairs, result.distortion.overlap
+    if result.settings.get("charts") not in ("one", None) and count:
+        verb = "overlaps" if count == 1 else "overlap"
+        yield f"{plural(count, 'pair')} of triangles {verb} in the atlas, on {share:.2g} of the covered area."
 
 
 def _angle_sums(result: Flattening, unit: float) -> Iterator[str]:
@@ -150,8 +158,9 @@ def _angle_sums(result: Flattening, unit: float) -> Iterator[str]:
 
 def _equal_sides(result: Flattening, unit: float) -> Iterator[str]:
     settings = result.settings
-    marked = settings.get("seams") is not None or settings.get("sharp_angle") is not None
-    most = EXACT_TOLERANCE if _is_exact(result) else ROUGH_TOLERANCE if marked else np.inf
+    is_marked = any(settings.get(name) is not None for name in ("seams", "sharp_angle"))
+    is_tied = is_marked and settings.get("method") != "free seams"
+    most = EXACT_TOLERANCE if _is_exact(result) else ROUGH_TOLERANCE if is_tied else np.inf
     if not result.distortion.seam_mismatch_max > most:
         return
     mesh = TriangleMesh(result.vertices, result.faces)
@@ -220,11 +229,8 @@ def _seam_rotations(result: Flattening, unit: float) -> Iterator[str]:
     if rotations is None or not rotations.worst > EXACT_TOLERANCE:
         return
     mesh = TriangleMesh(result.vertices, result.faces)
-    shorter = (
-        np.abs(sides_between(result.corner_uv))
-        .ravel()[mesh.edge_halfedges[~mesh.is_boundary_edge]]
-        .min(axis=1)
-    )
+    sides = np.abs(sides_between(result.corner_uv)).ravel()
+    shorter = sides[mesh.edge_halfedges[~mesh.is_boundary_edge]].min(axis=1)
     off = seam_rotations(mesh, result.corner_uv, rotations.quantum)
     off = np.where(rotations.binds(off), off, 0.0)
     if (off * shorter > EXACT_TOLERANCE * shorter + MAX_ROUNDINGS * unit).any():

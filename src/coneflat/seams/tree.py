@@ -69,7 +69,7 @@ def find_seams(
         is_cut |= _loops(mesh, costs, is_cut, is_end)
     else:
         is_end[np.argmax(key)] = True
-        is_cut = _without_loose_ends(mesh, _loops(mesh, costs, is_cut, is_end))
+        is_cut = without_loose_ends(mesh, _loops(mesh, costs, is_cut, is_end))
     seams = _lengthened(mesh, costs, is_cut & ~mesh.is_boundary_edge)
     _refuse(seams & is_forbidden, "needed to open the mesh, but forbidden as seams")
     return np.flatnonzero(seams)
@@ -157,7 +157,7 @@ def _paths_over(mesh: TriangleMesh, paths: Paths, edges: IntArray) -> BoolArray:
     return found
 
 
-def _without_loose_ends(mesh: TriangleMesh, is_cut: BoolArray) -> BoolArray:
+def without_loose_ends(mesh: TriangleMesh, is_cut: BoolArray) -> BoolArray:
     """Return (e,) the edges of a cut that are in loops or in paths between loops; dangling paths are removed."""
     kept = is_cut.copy()
     while True:

@@ -1,7 +1,7 @@
 """Preparation of the input: connected parts, each with the specification of its cones, metric and seams."""
 
 from .copies import Copy, copied, find_copies
-from .input_mesh import at_unit_size
-from .parts import Part, Source
+from .input_mesh import at_unit_size, result_numbering
+from .parts import Part, Prepared, Source
 
-__all__ = ["Copy", "Part", "Source", "at_unit_size", "copied", "find_copies"]
+__all__ = ["Copy", "Part", "Prepared", "Source", "at_unit_size", "copied", "find_copies", "result_numbering"]

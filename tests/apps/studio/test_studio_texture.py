@@ -47,6 +47,13 @@ class TestChoices:
         assert DECLARED["max_energy"].default == MAX_ENERGY
         assert Choices().with_option("max_energy", MAX_ENERGY) == Choices()
 
+    def test_a_texel_density_replaces_the_resolution(self):
+        chosen = Choices().with_texture(True).with_option("resolution", 2048).with_option("texel_density", 50)
+        assert chosen.keywords() == {"texel_density": 50.0}
+        assert chosen.with_texture(False).keywords() == {}
+        assert chosen.with_option("resolution", 512).keywords() == {"resolution": 512}
+        assert chosen.with_option("texel_density", None).keywords() == {}
+
     @pytest.mark.parametrize("value", [4, 3.9, -1, "much", math.nan])
     def test_a_bound_that_cannot_be_met_is_refused(self, value):
         with pytest.raises(OptionError, match="max_energy must be"):

@@ -20,7 +20,7 @@ from ..unwrap.options import UnwrapOptions
 _TEXTURE = ("seam_weights", "sharp_angle", "hide_seams", "resolution", "padding", "tiles", "up")
 #: The options of each command that the extension shows.
 SHOWN: dict[str, tuple[str, ...]] = {
-    "unwrap": ("max_energy", *_TEXTURE),
+    "unwrap": ("max_energy", "texel_density", *_TEXTURE),
     "flatten": ("distortion", "cone_count", "weights", "quantise", "boundary", "stretch", *_TEXTURE),
     "quads": (
         "quads", "size", "stretch", "boundary", "sharp_angle", "distortion", "cone_count", "weights", "smooth",

@@ -11,8 +11,8 @@ from typing import Any
 import click
 
 from ...base import plural, printable
-from ...options import FORMATS, Options, read_options
-from ..unwrap.options import UnwrapOptions
+from ...options import FORMATS, Options, declarations, read_options
+from ..unwrap.options import MAX_ENERGY, TextureOptions, UnwrapOptions
 from .options import (
     check_combinations,
     flag,
@@ -38,7 +38,6 @@ class BatchFlags:
         time_limit: Time limit per mesh in seconds.
         dask: Address of a Dask scheduler whose cluster is used, for example tcp://host:8786.
         redo: Also flatten meshes that are done.
-        max_energy: Unwrap for textures within this energy, for example 4.1, as `coneflat unwrap` does.
     """
 
     out: Path = path_flag(required=True)
@@ -48,7 +47,6 @@ class BatchFlags:
     time_limit: float = flag(3600.0, type=float)
     dask: str | None = flag(metavar="ADDRESS")
     redo: bool = flag(False, is_flag=True)
-    max_energy: float | None = flag(type=float)
 
 
 @click.command(cls=GroupedCommand, short_help="Flatten many meshes, on this machine or on a Dask cluster.")
@@ -56,6 +54,7 @@ class BatchFlags:
 @option_flags(BatchFlags)
 @paper_option
 @option_flags(Options, one_mesh=False)
+@option_flags(TextureOptions)
 @input_options
 @require_option
 @verbosity_options
@@ -70,6 +69,8 @@ def batch(
     **given: Any,
 ) -> None:
     """Flatten all meshes that match the patterns: files, folders, or names with *, ? and ** in quotes.
+
+    With an option for textures they are unwrapped, as by `coneflat unwrap`.
 
     A mesh that fails does not stop the others. A further run continues with the meshes that are not done.
 
@@ -88,8 +89,8 @@ def batch(
     flags = pop_flags(given, BatchFlags)
     if flags.jobs is not None and flags.dask is not None:
         raise click.UsageError("--jobs has no effect with --dask: leave out --jobs", context)
-    textures = {} if flags.max_energy is None else {"max_energy": flags.max_energy}
-    options = keywords(given) | textures
+    textures = {name: given[name] for name in declarations(TextureOptions) if given[name] is not None}
+    options = keywords(given) | ({"max_energy": MAX_ENERGY, **textures} if textures else {})
     _refuse_vertices(context, options)
     parse_requirements(required, REPORTED)
     # Options are checked before the work starts.

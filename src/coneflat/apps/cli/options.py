@@ -122,7 +122,7 @@ def _may_fit_any_mesh(declaration: Declaration) -> bool:
 def _flag(declaration: Declaration) -> Callable[[Command], Command]:
     """Return a decorator that adds one option; its value is None, or an empty tuple, if it is not given."""
     kind, name = declaration.kind, declaration.name
-    more, spelled, doc = dict[str, Any](), flag_name(name), declaration.doc
+    more, spelled, doc = {"metavar": getattr(kind, "metavar", None)}, flag_name(name), declaration.doc
     if declaration.default is True:
         spelled += f"/--no-{spelled[2:]}"
     match kind:

@@ -24,12 +24,14 @@ from .paint import Paint, Region
 #: Options that the studio sets directly; cones and seams are edited individually.
 PLAIN_OPTIONS = (
     "distortion", "cone_count", "boundary", "stretch", "charts", "seams", "sharp_angle", "hide_seams",
-    "resolution", "padding", "repair", "max_energy",
+    "resolution", "padding", "repair", "max_energy", "texel_density",
 )  # fmt: skip
 #: Declarations of all options, by name.
 DECLARED = declarations(UnwrapOptions) | declarations(Options)
 #: Options that determine the number of cones of a search; at most one of them is set.
 NUMBERS = ("distortion", "cone_count")
+#: Options that determine the size of the texture; at most one of them is set.
+SIZES = ("resolution", "texel_density")
 #: Shapes of the boundary; the four corners of a rectangle are picked by the user.
 BOUNDARIES = ("free", "lengths", "disk", "straight", "rectangle")
 #: Units of length of a file; "" if unknown. They affect only the lengths that are shown.
@@ -101,7 +103,7 @@ class Choices:
         options, declared = dict(self.options), DECLARED[name]
         if value != "rectangle":
             value = declared.kind.parse(name, value)
-        for other in NUMBERS if name in NUMBERS else (name,):
+        for other in NUMBERS if name in NUMBERS else SIZES if name in SIZES else (name,):
             options.pop(other, None)
         if value != declared.default or isinstance(declared.kind, Flag):
             options[name] = value
@@ -393,7 +395,7 @@ def command_line(mesh: str, project: str, choices: Choices) -> str:
         elif name == "required_cones":
             parts += [flag, ",".join(str(vertex) for vertex in value)]
         elif isinstance(value, dict):
-            parts += [flag, ",".join(_cone_text(vertex, curvature) for vertex, curvature in value.items())]
+            parts += [flag, ",".join(str(v) if k is None else f"{v}:{k!r}" for v, k in value.items())]
         else:
             parts += [flag, repr(value) if isinstance(value, float) else str(value)]
     return shlex.join(parts)
@@ -406,10 +408,6 @@ def python_lines(mesh: str, choices: Choices) -> str:
         return "# The drawn paths and the paint are too large to be shown here; they are in the project file."
     call = "\n".join([f"result = coneflat.{choices.command}(\n    {mesh!r},", *given, ")"])
     return f"import coneflat\n\n{call}"
-
-
-def _cone_text(vertex: int, curvature: float | None) -> str:
-    return str(vertex) if curvature is None else f"{vertex}:{curvature!r}"
 
 
 def _written(value: Any) -> str:

@@ -37,6 +37,7 @@ CONTROLS = {
     "charts": "Charts",
     "resolution": "Texels per side",
     "padding": "Texels between charts",
+    "texel_density": "Texels per unit of length",
     "max_energy": "Energy at most",
     "repair": "Repair the mesh",
 }

@@ -47,9 +47,35 @@ def cut_for_packing(layouts: Sequence[Layout], costs: Sequence[FloatArray], gap:
     if not area > 0:
         return list(layouts)
     borders = sum(float(one.border_costs[np.isfinite(one.border_costs)].sum()) for one in charts)
-    best = _search(charts, area, SHARE * borders, gap)
+    return _cut(layouts, charts, _search(charts, area, SHARE * borders, gap).pieces)
+
+
+def cut_into(layouts: Sequence[Layout], costs: Sequence[FloatArray], count: int) -> list[Layout]:
+    """Return layouts whose charts are cut until there are `count`, as far as possible.
+
+    The next cut is always the shortest one relative to the root of the area that it separates.
+
+    Args:
+        layouts, costs: as for `cut_for_packing`.
+        count: the number of all charts.
+    """
+    charts = _largest_charts(layouts, costs, 1 / (4 * count))
+    pieces, missing = list(charts), count - sum(int(one.chart.max()) + 1 for one in layouts)
+    while missing > 0:
+        check_cancelled()
+        cuts = [min(piece.cuts, key=lambda cut: cut.score) for piece in pieces if piece.cuts]
+        if not cuts:
+            break
+        best = min(cuts, key=lambda cut: cut.score)
+        pieces = [piece for piece in pieces if piece is not best.piece] + list(best.pieces)
+        missing -= len(best.pieces) - 1
+    return _cut(layouts, charts, pieces)
+
+
+def _cut(layouts: Sequence[Layout], charts: Sequence[_Piece], pieces: Sequence[_Piece]) -> list[Layout]:
+    """Return layouts in which pieces replace the charts that they are pieces of."""
     label = [one.chart.copy() for one in layouts]
-    for piece in best.pieces:
+    for piece in pieces:
         if piece not in charts:
             label[piece.layout][piece.faces] = label[piece.layout].max() + 1
     return [
@@ -239,15 +265,17 @@ class _State:
     value: float
 
 
-def _largest_charts(layouts: Sequence[Layout], costs: Sequence[FloatArray]) -> list[_Piece]:
-    """Return the largest charts of layouts."""
+def _largest_charts(
+    layouts: Sequence[Layout], costs: Sequence[FloatArray], min_piece: float = MIN_PIECE
+) -> list[_Piece]:
+    """Return the largest charts of layouts, of which pieces may have a minimum share of the area."""
     found = []
     for i, one in enumerate(layouts):
         sides = one.points[one.corners[:, 1:]] - one.points[one.corners[:, :1]]
         areas = np.bincount(one.chart, np.abs(np.linalg.det(sides)) / 2)
         found += [(float(areas[c]), i, int(c)) for c in np.argsort(-areas, kind="stable")[:MAX_CHARTS]]
     found.sort(key=lambda chart: -chart[0])
-    least = MIN_PIECE * sum(chart[0] for chart in found)
+    least = min_piece * sum(chart[0] for chart in found)
     charts = []
     for _, i, c in found[:MAX_CHARTS]:
         faces = np.flatnonzero(layouts[i].chart == c)

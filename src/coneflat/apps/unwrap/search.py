@@ -14,23 +14,23 @@ import numpy as np
 
 from ... import TriangleMesh
 from ...atlas import ChartLayout, separate_overlaps, with_charts
-from ...base import FloatArray, IntArray
+from ...base import BoolArray, FloatArray, IntArray
 from ...cones import close_search, find_cones
 from ...errors import CurvatureError, MetricError
 from ...flatten import Method, lay_out_once
-from ...geometry import find_overlaps, signed_double_areas
+from ...geometry import double_areas, find_overlaps, signed_double_areas
 from ...layout import lay_out
 from ...mesh import label_faces, open_along
-from ...seams import seam_costs
+from ...seams import seam_costs, without_loose_ends
 from ...source import Part
 from ...stages import ConeSpec, Cut, Layout, Surface, VertexCurvatures
 from .coarse import coarse_part
 from .free import freed, seam_edges
-from .options import ISOMETRIC
+from .options import ENERGY_PER_AREA, ISOMETRIC
 from .tips import RINGS, find_tips, moved_tips, moves_for
 
-# The area distortion of the first candidate, and the maximum number of candidates.
-FIRST_DISTORTION, MAX_CANDIDATES = 0.25, 5
+# The area distortion of the first candidate, one that the fewest cones reach, and the maximum number of candidates.
+FIRST_DISTORTION, ANY_DISTORTION, MAX_CANDIDATES = 0.25, 1e3, 5
 # Number of triangles of a coarse mesh; number of coarse searches to meet the bound on the given mesh; and what its
 # energy has more, relative to what is allowed above that of an isometry.
 COARSE, COARSE_TRIES, COARSE_EXCESS = 4_000, 3, 0.15
@@ -52,7 +52,7 @@ class Candidate:
 
     Attributes:
         layout: the layout, without overlaps if its energy is in reach of the bound.
-        energy: its mean symmetric Dirichlet energy.
+        energy: its mean symmetric Dirichlet energy, or the energy that belongs to its area distortion.
         cost: the cost of its seams.
         distortion: the area distortion for which its cones were searched.
     """
@@ -68,16 +68,24 @@ class CutSearch:
 
     Args:
         part: a connected part of the input.
-        max_energy: largest symmetric Dirichlet energy.
+        max_energy: largest symmetric Dirichlet energy; infinite for no seams but those that are necessary.
         method: how the part is laid out.
         is_quick: whether the first candidate within the bound is taken.
         is_coarse: whether the part is a coarse mesh already.
+        by_area: whether the bound is the energy that belongs to an area distortion, see `ENERGY_PER_AREA`.
     """
 
     def __init__(
-        self, part: Part, max_energy: float, method: Method, is_quick: bool = False, is_coarse: bool = False
+        self,
+        part: Part,
+        max_energy: float,
+        method: Method,
+        is_quick: bool = False,
+        is_coarse: bool = False,
+        by_area: bool = False,
     ) -> None:
         self._part, self._max_energy, self._method = part, max_energy, method
+        self._by_area = by_area
         self._has_coarse = len(part.faces) > 2 * COARSE and not (is_coarse or part.seams.is_forbidden.any())
         self._is_quick = is_quick or (len(part.faces) > MANY_TRIANGLES and not self._has_coarse)
         self._surface = Surface.of(part.mesh, part.lengths, part.is_exact)
@@ -92,6 +100,8 @@ class CutSearch:
         Raises:
             CurvatureError, MetricError, SeamError: a candidate could not be laid out.
         """
+        if not np.isfinite(self._max_energy):
+            return self._with_fewest_seams()
         if self._has_coarse:
             return self._from_coarse()
         found = self._by_distortion()
@@ -119,6 +129,8 @@ class CutSearch:
             return start if layout is None else replace(start, layout=layout)
         if layout is not None:
             start = self._settled(replace(start, layout=layout, cost=self._cost(layout)))
+        if not np.isfinite(self._max_energy):
+            return start
         slack = self._max_energy - start.energy
         if self._has_coarse and 0 <= slack <= 10 * TOLERANCE * (self._max_energy - ISOMETRIC):
             return start
@@ -137,12 +149,29 @@ class CutSearch:
         """The energy above which a candidate is given up."""
         return ISOMETRIC + 2 * (self._max_energy - ISOMETRIC)
 
+    def _with_fewest_seams(self) -> Candidate:
+        """Return a candidate cut between the fewest cones, and only along closed curves where there are handles."""
+        mesh, spec = self._part.mesh, replace(self._part.cones, distortion=ANY_DISTORTION)
+        layout, _ = lay_out_once(self._surface, self._part, spec, self._method)
+        close_search(self._surface)
+        if len(layout.cones) and mesh.euler_characteristic < 2 and not mesh.is_boundary_edge.any():
+            is_cut = np.zeros(len(mesh.edges), dtype=bool)
+            is_cut[seam_edges(layout)] = True
+            seams = np.flatnonzero(without_loose_ends(mesh, is_cut))
+            disk, none = open_along(mesh, seams).mesh, np.empty(0, dtype=np.int64)
+            points = np.zeros((len(disk.vertices), 2))
+            layout = replace(
+                layout, points=points, corners=disk.faces, disk=disk, cones=none, seams=mesh.edges[seams]
+            )
+        layout, energy = self._freed(layout)
+        return self._settled(self._separated(Candidate(layout, energy, self._cost(layout), ANY_DISTORTION)))
+
     def _from_coarse(self) -> Candidate:
         """Return a candidate with the cones that are best on a coarse mesh, for a bound that the mesh itself meets."""
         coarse, kept = coarse_part(self._part, COARSE)
         bound, found = self._max_energy + COARSE_EXCESS * (self._max_energy - ISOMETRIC), list[Candidate]()
         for _ in range(COARSE_TRIES):
-            best = CutSearch(coarse, bound, self._method, self._is_quick, is_coarse=True).best()
+            best = CutSearch(coarse, bound, self._method, self._is_quick, True, self._by_area).best()
             spec = self._with_cones(kept[best.layout.cones])
             layout, _ = lay_out_once(self._surface, self._part, spec, self._method)
             one = self._candidate(layout, best.distortion)
@@ -188,14 +217,27 @@ class CutSearch:
                 # The energy above that of an isometry is about a multiple of the square of the distortion.
                 above = float(np.clip(one.energy - ISOMETRIC, allowed / 16, allowed * 16))
                 factor = np.sqrt(allowed / above)
-                distortion *= max(factor, 8 / 7) if factor > 1 else min(factor, 7 / 8)
+                step = 3 / 4 if same else 7 / 8
+                distortion *= max(factor, 8 / 7) if factor > 1 else min(factor, step)
         return found
 
     def _candidate(self, layout: Layout, distortion: float) -> Candidate:
         # What the cones or the metric do not meet does not matter where seams are free.
-        layout, energy = freed(replace(layout, notes=()), tolerance=TOLERANCE)
+        layout, energy = self._freed(replace(layout, notes=()), tolerance=TOLERANCE)
         one = Candidate(layout, energy, self._cost(layout), distortion)
         return one if energy > self._reach else self._separated(one)
+
+    def _freed(
+        self, layout: Layout, free: BoolArray | None = None, tolerance: float = 1e-3
+    ) -> tuple[Layout, float]:
+        """Return a layout with the least energy, and its energy or the one that belongs to its area distortion."""
+        layout, energy = freed(layout, free, tolerance)
+        if self._by_area:
+            areas, flat = double_areas(layout.lengths), signed_double_areas(layout.points[layout.corners])
+            energy = (
+                ISOMETRIC + ENERGY_PER_AREA * float(np.average(np.log(flat / areas) ** 2, weights=areas)) / 4
+            )
+        return layout, energy
 
     def _separated(self, one: Candidate) -> Candidate:
         """Return a candidate whose overlaps are separated."""
@@ -208,7 +250,7 @@ class CutSearch:
         """Return a candidate with the least energy without overlaps: its separating cuts are free, too."""
         is_free = np.ones(len(one.layout.points), dtype=bool)
         for _ in range(MAX_TRIES):
-            layout, energy = freed(one.layout, is_free)
+            layout, energy = self._freed(one.layout, is_free)
             pairs = find_overlaps(side_by_side(layout).points[layout.corners]).pairs
             if not (len(pairs) and self._method.separates):
                 return replace(one, layout=layout, energy=energy)

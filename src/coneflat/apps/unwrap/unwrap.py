@@ -20,8 +20,9 @@ from ...metric import find_metric
 from ...options import Options, declarations, read_options, takes
 from ...source import Part, Source, find_copies
 from ...stages import RelaxSpec, Surface
-from .options import UnwrapOptions
-from .pack_cuts import cut_for_packing
+from .mirror import both_halves, half_of
+from .options import ENERGY_PER_AREA, ISOMETRIC, TextureOptions, UnwrapOptions
+from .pack_cuts import cut_for_packing, cut_into
 from .search import Candidate, CutSearch
 
 # For parts with less than this share of the area the first cut within the bound is taken.
@@ -29,8 +30,8 @@ MINOR_SHARE = 0.002
 # Dihedral angle of sharp edges in radians; and the preference for seams along them if only they bend the surface: twice
 # their length costs as much as that of other edges.
 SHARP, CREASES = np.radians(40), 0.3
-# Options that the flattening does not have.
-OWN = ("max_energy", "texel_density")
+# Options that the flattening does not have, or with other values.
+OWN = (*declarations(TextureOptions), "charts", "seams")
 # Fraction of a texture that charts cover, roughly, and the largest resolution.
 COVERED, MAX_RESOLUTION = 0.65, 2**16
 #: The `method` in the settings of a result.
@@ -67,11 +68,19 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         (True, 0, 0)
     """
     o = read_options(options, UnwrapOptions)
-    shared = Options(**{name: getattr(o, name) for name in declarations(UnwrapOptions) if name not in OWN})
+    shared = Options(
+        **{name: getattr(o, name) for name in declarations(UnwrapOptions) if name not in OWN},
+        seams=o.marked,
+        charts="one" if o.charts == "one" else "atlas",
+    )
     watch, source = Stopwatch(o.progress), Source(as_input(mesh, faces))
     with watch("check"):
-        prepared = source.prepared(shared)
-    method = Method(RelaxSpec("off", 0.0), o.charts == "atlas", None, Stopwatch(), Surface.of, find_metric)
+        prepared, mirror = source.prepared(shared), None
+        if o.stack == "mirrored":
+            mirror, prepared = half_of(prepared, source, shared)
+    method = Method(
+        RelaxSpec("off", 0.0), shared.charts == "atlas", None, Stopwatch(), Surface.of, find_metric
+    )
     parts = [along_sharp_edges(part) for part in prepared.parts]
     found = dict[int, Candidate]()
     areas = np.array([double_areas(part.lengths).sum() for part in parts])
@@ -79,21 +88,30 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         side = np.sqrt(areas.sum() / 2 / COVERED / o.tiles) / 2.0**prepared.checked.exponent
         shared = replace(shared, resolution=_resolution(o.texel_density, side, o.padding))
     with limit_threads(o.threads):
-        copies = find_copies(parts)
+        # Copies cannot have different numbers of charts.
+        copies = [None] * len(parts) if isinstance(o.charts, int) else find_copies(parts)
         searches = {
-            i: CutSearch(part, o.max_energy, method, areas[i] < MINOR_SHARE * areas.sum())
+            i: CutSearch(
+                part,
+                o.bound,
+                method,
+                is_quick=areas[i] < MINOR_SHARE * areas.sum(),
+                by_area=o.area is not None,
+            )
             for i, part in enumerate(parts)
             if copies[i] is None
         }
         for i, search in searches.items():
-            watch.share = 0.8 * len(parts[i].faces) / len(prepared.checked.mesh.faces)
+            watch.share = 0.8 * len(parts[i].faces) / sum(len(part.faces) for part in parts)
             with watch("search", 1.0):
                 found[i] = search.best()
             watch.end_component()
         layouts = [found[i].layout for i in searches]
         with watch("pack"):
-            if method.separates and o.up is None:
-                costs = [search.costs for search in searches.values()]
+            costs = [search.costs for search in searches.values()]
+            if isinstance(o.charts, int):
+                layouts = cut_into(layouts, costs, o.charts)
+            elif method.separates and o.up is None and np.isfinite(o.bound):
                 layouts = cut_for_packing(layouts, costs, o.padding / shared.resolution)
             for (i, search), layout in zip(searches.items(), layouts, strict=True):
                 found[i] = search.shortened(found[i], layout)
@@ -110,9 +128,12 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         has_risen |= resolution > shared.resolution
         shared = replace(shared, resolution=resolution)
         result = evaluate(prepared, layouts, shared, watch)
-    notes = (*result.notes, *_notes(energies, o.max_energy))
-    own = {name: getattr(o, name) for name in OWN}
-    return replace(result, settings={**result.settings, **own}, notes=notes)
+    notes = (*result.notes, *_notes(o, energies, result.distortion.charts))
+    own = {name: getattr(o, name) for name in OWN if name != "seams"}
+    if o.marked is not o.seams:
+        own["seams"] = "none" if o.marked is None else ["none", result.settings["seams"]]
+    result = replace(result, settings={**result.settings, **own}, notes=notes)
+    return result if mirror is None else both_halves(result, mirror, prepared)
 
 
 def along_sharp_edges(part: Part) -> Part:
@@ -135,11 +156,22 @@ def _resolution(density: float, side: float, padding: float) -> int:
     return resolution
 
 
-def _notes(energies: Sequence[float], bound: float) -> Iterator[str]:
-    """Yield a note if the energy of a component is above the bound."""
-    above = [energy for energy in energies if energy > bound]
-    if above:
+def _notes(o: UnwrapOptions, energies: Sequence[float], charts: int) -> Iterator[str]:
+    """Yield a note if the energy of a component is above the bound, or if there is another number of charts."""
+    above = [energy for energy in energies if energy > o.bound]
+    if above and o.area is None:
         yield (
-            f"The energy of {plural(len(above), 'component')} is up to {max(above):.6g}, above the {bound:.6g} "
+            f"The energy of {plural(len(above), 'component')} is up to {max(above):.6g}, above the {o.bound:.6g} "
             "allowed: refine the mesh, or allow more."
         )
+    elif above:
+        reached = np.sqrt((max(above) - ISOMETRIC) / ENERGY_PER_AREA)
+        yield (
+            f"The area distortion of {plural(len(above), 'component')} is up to {reached:.4g}, above the {o.area:.4g} "
+            "allowed: refine the mesh, or allow more."
+        )
+    if isinstance(o.charts, int) and charts != o.charts:
+        why = (
+            "no further cut divides one" if charts < o.charts else "components, seams and overlaps need them"
+        )
+        yield f"The texture has {plural(charts, 'chart')} instead of {o.charts:,}: {why}."

@@ -50,6 +50,7 @@ class Panel {
     this.part("boundary").addEventListener("change", (event) => event.target.value === "rectangle" && studio.setTool("corner"));
     this.part("purpose").addEventListener("change", (event) => act({do: "texture", value: event.target.value === "texture"}));
     this.part("max-energy").addEventListener("change", (event) => set("max_energy", Number(event.target.value)));
+    this.part("texel-density").addEventListener("change", (event) => set("texel_density", event.target.value === "" ? null : Number(event.target.value)));
     for (const name of ["resolution", "padding"]) this.part(name).addEventListener("change", (event) => set(name, Number(event.target.value)));
     this.part("own-seams").addEventListener("change", (event) => set("seams", event.target.checked ? "input" : null));
     this.part("follow").addEventListener("change", (event) => studio.setFollowing(event.target.checked));
@@ -132,6 +133,7 @@ class Panel {
     this.value("boundary", options.boundary);
     this.part("boundary").closest("label").hidden = this.part("tool-corner").hidden = forTexture || !this.studio.hasBoundary();
     this.value("resolution", options.resolution);
+    this.value("texel-density", options.texel_density ?? "");
     this.value("padding", options.padding);
     this.value("stretch", options.stretch);
     this.value("charts", options.charts);
