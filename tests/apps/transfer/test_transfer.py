@@ -216,8 +216,8 @@ def test_bad_input_is_named(folder, tmp_path):
         transfer(folder / "old.glb", tmp_path / "no_uv.obj")
     with pytest.raises(MeshFileError, match="must have UVs"):
         transfer(tmp_path / "no_uv.obj", folder / "new.glb", texture=tmp_path / "any.png")
-    with pytest.raises(OptionError, match="resolution must be an integer"):
-        transfer(folder / "old.glb", folder / "new.glb", resolution=0)
+    with pytest.raises(OptionError, match="resolution must be an integer from 1 to 16,384, got 1,000,000"):
+        transfer(folder / "old.glb", folder / "new.glb", resolution=1_000_000)
 
 
 def test_the_command_writes_a_model_and_notes(folder, tmp_path):
