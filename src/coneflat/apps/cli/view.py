@@ -59,8 +59,9 @@ def view(
 ) -> None:
     """Write a page that shows FILE and its layout side by side.
 
-    FILE is a mesh (.obj, .ply, .stl, .off, .gltf, .glb) or a result (.npz) of `coneflat flatten`, `coneflat unwrap` or
-    `coneflat quads`. A mesh without UVs is flattened first, with default options. The page is a single HTML file.
+    FILE is a mesh (.obj, .ply, .stl, .off, .gltf, .glb, .gii, lh.pial) or a result (.npz) of `coneflat flatten`,
+    `coneflat unwrap` or `coneflat quads`. A mesh without UVs is flattened first, with default options. The page is a
+    single HTML file.
 
     \b
     Examples:
