@@ -135,9 +135,8 @@ def read_label(text: str) -> IntArray:
                 values = np.where(values < 0, keys.setdefault("unknown", -1), values)
         else:
             values = read_vertex_values(path)
-            keys = {}
-            if ending == ".gii":
-                keys = {one.label: one.key for one in package.load(path).labeltable.labels}
+            labels = package.load(path).labeltable.labels if ending == ".gii" else ()
+            keys = {one.label: one.key for one in labels}
     if not name and ending != ".annot":
         return np.flatnonzero(values)
     if name not in keys:
