@@ -113,6 +113,7 @@ class Studio {
     this.repicking = false;
     this.pickSelected();
     this.showMeasures(model.head);
+    this.slivers = model.head.show === "plain" ? 0 : sliverCount(model);
     if (!isSame) this.final = null;
     if (!this.news.early && model.head.show !== "plain") this.final = {model, turns: this.turns};
     const {asked, news} = this;
@@ -129,6 +130,13 @@ class Studio {
     place.textContent = place.title = [place.textContent, ...more].join("  ·  ");
   }
 
+  /** Return a sentence on narrow charts beside drawn cuts, or nothing. */
+  sliverWarning() {
+    if (!this.slivers || !this.choices.cuts.length || this.news.stale || this.news.bare) return [];
+    const [charts, are] = this.slivers === 1 ? ["chart", "is"] : ["charts", "are"];
+    return [`${this.slivers} ${charts} beside drawn cuts ${are} less than two triangles wide: erase the cut, or draw it along the seam.`];
+  }
+
   /** Choose the axis of the model that points up in its view. */
   setUp(axis) {
     const {camera} = this.viewer.panes[0], {turn} = this.viewer.model.head;
@@ -142,9 +150,10 @@ class Studio {
   align(model) {
     const {camera} = this.viewer.panes[1], before = this.final;
     if (!before || model.head.show === "plain") return;
-    this.turns = nearestTurns(before.model, before.turns, model);
+    const pairs = chartPairs(sharedParts(before.model, before.turns, model));
+    this.turns = nearestTurns(pairs);
     camera.turn = camera.home = quarterTurns(this.turns);
-    keepChartNumbers(before.model, model);
+    keepChartNumbers(pairs, model);
     document.querySelector("#layout h2").textContent = this.turns ? `Layout, rotated by ${90 * this.turns}°` : "Layout";
   }
 
@@ -411,8 +420,17 @@ class Studio {
       this.edges = new EdgeGraph(this.surface());
       this.edges.follow(this.follows);
     }
-    this.edges.prefer(this.choices.cuts);
+    const {cuts} = this.choices, {model} = this.viewer;
+    if (this.preferred?.cuts !== cuts || this.preferred.model !== model) this.preferred = {cuts, model, seams: this.seamsShown()};
+    this.edges.prefer(this.preferred);
     return this.edges;
+  }
+
+  /** Return the seams of the layout that is shown, as paths of two vertices of the user. */
+  seamsShown() {
+    const {model} = this.viewer, count = this.hasLayout() ? model.seamCount : 0;
+    const ends = (i) => model.outlineCorners(2 * i).map((corner) => this.numberOf(model.vertexAt(corner)));
+    return Array.from({length: count}, (_, i) => ends(i)).filter((pair) => Math.min(...pair) >= 0);
   }
 
   /** Return the vertices of the full mesh for vertices of the page; without added ones if the page is simplified. */
