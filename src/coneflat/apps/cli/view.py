@@ -12,7 +12,6 @@ from ...options import SHOWS
 from .options import flag, option_flags, path_flag, pop_flags
 from .shared import (
     QUIET,
-    VERBOSE,
     again_option,
     color_option,
     input_options,
@@ -146,5 +145,4 @@ def studio(
         if verbosity != QUIET or no_open:
             click.echo(line)
 
-    log = click.echo if verbosity == VERBOSE else None
-    run_studio(file, port, opens=not no_open, say=say, log=log, color=color, most_triangles=most_triangles)
+    run_studio(file, port, opens=not no_open, say=say, color=color, most_triangles=most_triangles)

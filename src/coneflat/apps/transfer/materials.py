@@ -80,7 +80,7 @@ class Painted:
             numbers = [one.get("material", len(self.materials) - 1) for one, _ in self.primitives]
             self.material = np.repeat(numbers, [len(corners) // 3 for _, corners in self.primitives])
         self.used: list[int] = np.unique(self.material).tolist()
-        self.uv, self._image = cache(self._read_uv), cache(self._read_image)
+        self.uv, self.image = cache(self._read_uv), cache(self._read_image)
 
     @cached_property
     def colours(self) -> FloatArray | None:
@@ -102,7 +102,7 @@ class Painted:
             raise MeshFileError(f"{self.mesh.path} must have UVs at all corners for its texture")
         return uv[points[self.corners]] * [1, -1] + [0, 1]
 
-    def _uv_of(self, slot: Any) -> FloatArray:
+    def uv_of(self, slot: Any) -> FloatArray:
         """Return (m, 3, 2) the UVs that a property of a material refers to, without its transform."""
         return self.uv(0 if self.mesh.scene is None else self.mesh.scene.data.uv_set(slot))
 
@@ -111,7 +111,7 @@ class Painted:
         found = np.zeros((len(self.faces), 3, 2))
         for i in self.used:
             own, slot = self.material == i, self.value(NORMAL.name, i)
-            found[own] = self._uv_of(slot)[own] if slot else 0.0
+            found[own] = self.uv_of(slot)[own] if slot else 0.0
         return found
 
     def _attribute(self, name: str, columns: int) -> FloatArray:
@@ -174,10 +174,10 @@ class Painted:
 
     def _sampled(self, slot: Any, faces: IntArray, weights: FloatArray, is_colour: bool) -> FloatArray:
         """Return (q, 4) the linear values of the image that a property `slot` of a material refers to."""
-        shift, uv = slot.get("extensions", {}).get("KHR_texture_transform", {}), self._uv_of(slot)[faces]
+        shift, uv = slot.get("extensions", {}).get("KHR_texture_transform", {}), self.uv_of(slot)[faces]
         cos, sin = np.cos(shift.get("rotation", 0.0)), np.sin(shift.get("rotation", 0.0))
         uv = np.einsum("qi,qic->qc", weights, uv) * shift.get("scale", (1, 1)) @ [[cos, -sin], [sin, cos]]
-        image, wraps = self._image(slot.get("index"))
+        image, wraps = self.image(slot.get("index"))
         table = np.arange(256) / 255
         tables = [to_linear(table) if is_colour else table] * 3 + [table]
         return bilinear(image, uv + shift.get("offset", (0, 0)), np.stack(tables), wraps)

@@ -112,12 +112,22 @@ class Studio {
     if (!isSame) this.selected = selected === null ? null : (this.verticesOf([selected])[0] ?? null);
     this.repicking = false;
     this.pickSelected();
+    this.takeOwnPicture(model);
     this.showMeasures(model.head);
     this.slivers = model.head.show === "plain" ? 0 : sliverCount(model);
     if (!isSame) this.final = null;
     if (!this.news.early && model.head.show !== "plain") this.final = {model, turns: this.turns};
     const {asked, news} = this;
     requestAnimationFrame(() => requestAnimationFrame(() => this.noteTime(asked, news.early)));
+  }
+
+  /** Have the texture of the file as the picture, with the UVs of the file, until another is chosen. */
+  async takeOwnPicture({arrays, head}) {
+    if (!arrays.own_uv || arrays.picture === this.ownPicture) return;
+    this.ownPicture = arrays.picture;
+    const picture = await pictureOf(new Blob([arrays.picture], {type: head.picture}));
+    this.viewer.renderer.setPicture(picture, true);
+    this.viewer.redraw();
   }
 
   /** Add the charts, the packing, the overlap and the energy to the title; a preview does not have them. */
