@@ -276,24 +276,6 @@ def test_a_chart_that_splits_keeps_the_place_and_the_number_of_its_larger_part(v
     assert smaller > most
 
 
-def test_a_path_along_a_seam_joins_it_instead_of_making_a_sliver(visit):
-    visit.settle()
-    beside = visit.run(
-        "(() => { const chains = new Map(), graph = studio.graph(), on = new Set();"
-        "for (const [a, b] of studio.seamsShown()) { on.add(a).add(b);"
-        "for (const [c, d] of [[a, b], [b, a]]) chains.set(c, [...(chains.get(c) ?? []), d]); }"
-        "const path = [[...chains].find(([, ends]) => ends.length === 1)[0]];"
-        "for (let next = path[0]; next !== undefined && path.length < 25; ) {"
-        "next = chains.get(path.at(-1)).find((v) => !path.includes(v)); if (next !== undefined) path.push(next); }"
-        "const near = (number) => { const [v] = studio.verticesOf([number]);"
-        "return [...graph.ends.slice(graph.start[v], graph.start[v + 1])].find((w) => !on.has(studio.numberOf(w))); };"
-        "return [path, studio.pathBetween(near(path[2]), near(path.at(-3)))]; })()"
-    )
-    seam, path = beside
-    assert len(seam) > 15
-    assert len(set(path) & set(seam)) > 0.7 * len(path)
-
-
 def test_a_sliver_beside_a_drawn_cut_is_reported(visit):
     """Two rings around the ball, one triangle apart."""
     visit.settle()

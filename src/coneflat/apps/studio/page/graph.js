@@ -1,6 +1,5 @@
 // Shortest paths along the edges of a surface.
 
-const NEAR_SEAM = 0.4; // Factor of the cost of edges on seams that were computed, which may change with the next cut.
 // As in `seams/costs.py`: dihedral angles in radians at which sharpness begins and is complete, and the factor of the cost of sharp edges.
 const [SMOOTH, SHARP, CHEAPEST] = [Math.PI / 9, Math.PI / 3, 0.1];
 
@@ -24,7 +23,7 @@ class EdgeGraph {
     }
     Object.assign(this, {start, ends, faces});
     this.from = -1;
-    this.cheap = new Map(); // The factors of the costs of edges on drawn cuts and on seams, by their keys.
+    this.cut = new Set(); // The edges of drawn cuts, as keys.
     this.shares = null; // Sharpness of the edge of each entry, 0 to 1.
   }
 
@@ -34,17 +33,15 @@ class EdgeGraph {
     this.from = -1;
   }
 
-  /** Set the drawn cuts and the seams. Their edges cost little, so that new paths join them: strips beside them would be slivers. */
-  prefer(preferred) {
-    if (preferred === this.preferred) return;
-    this.preferred = preferred;
+  /** Set the drawn cuts. Their edges cost little, so that new paths join them: strips between two cuts would be slivers. */
+  prefer(cuts) {
+    if (cuts === this.cuts) return;
+    this.cuts = cuts;
     this.from = -1;
-    this.cheap.clear();
-    for (const [paths, factor] of [[preferred.seams, NEAR_SEAM], [preferred.cuts, CHEAPEST]]) {
-      for (const path of paths) {
-        const vertices = path.map((number) => this.surface.vertexOf(number));
-        for (let i = 1; i < vertices.length; i++) this.cheap.set(this.edgeKey(vertices[i - 1], vertices[i]), factor);
-      }
+    this.cut.clear();
+    for (const path of cuts) {
+      const vertices = path.map((number) => this.surface.vertexOf(number));
+      for (let i = 1; i < vertices.length; i++) this.cut.add(this.edgeKey(vertices[i - 1], vertices[i]));
     }
   }
 
@@ -55,8 +52,8 @@ class EdgeGraph {
   /** Return the cost of the edge of an entry of a vertex. */
   cost(vertex, k) {
     const length = this.length(vertex, this.ends[k]);
-    const factor = this.cheap.size ? (this.cheap.get(this.edgeKey(vertex, this.ends[k])) ?? 1) : 1;
-    return length * Math.min(factor, CHEAPEST ** (this.shares?.[k] ?? 0));
+    if (this.cut.size && this.cut.has(this.edgeKey(vertex, this.ends[k]))) return length * CHEAPEST;
+    return this.shares?.[k] ? length * CHEAPEST ** this.shares[k] : length;
   }
 
   length(one, two) {

@@ -430,17 +430,8 @@ class Studio {
       this.edges = new EdgeGraph(this.surface());
       this.edges.follow(this.follows);
     }
-    const {cuts} = this.choices, {model} = this.viewer;
-    if (this.preferred?.cuts !== cuts || this.preferred.model !== model) this.preferred = {cuts, model, seams: this.seamsShown()};
-    this.edges.prefer(this.preferred);
+    this.edges.prefer(this.choices.cuts);
     return this.edges;
-  }
-
-  /** Return the seams of the layout that is shown, as paths of two vertices of the user. */
-  seamsShown() {
-    const {model} = this.viewer, count = this.hasLayout() ? model.seamCount : 0;
-    const ends = (i) => model.outlineCorners(2 * i).map((corner) => this.numberOf(model.vertexAt(corner)));
-    return Array.from({length: count}, (_, i) => ends(i)).filter((pair) => Math.min(...pair) >= 0);
   }
 
   /** Return the vertices of the full mesh for vertices of the page; without added ones if the page is simplified. */
