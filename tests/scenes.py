@@ -120,7 +120,7 @@ def rich_scene():
                 "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}},
                 "extensions": {"KHR_materials_ior": {"ior": 1.4}},
             },
-            {"name": "lower", "doubleSided": True},
+            {"name": "lower", "doubleSided": True, "normalTexture": {"index": 0, "texCoord": 1}},
         ],
         "images": [{"bufferView": make.view(PNG), "mimeType": "image/png", "name": "skin"}],
         "samplers": [{"wrapS": 33071}],

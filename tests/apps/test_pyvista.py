@@ -66,3 +66,20 @@ def test_what_is_written_is_read_back(ball, tmp_path):
     again = pyvista.read(tmp_path / "ball.vtp")
     assert np.array_equal(again.active_texture_coordinates, mesh.active_texture_coordinates)
     assert len(coneflat.read_mesh(tmp_path / "ball.ply").triangles) == mesh.n_cells
+
+
+def test_data_of_points_and_cells_stay_where_they_are():
+    """Also on polygons, after vertices and lines, which have cells before them."""
+    box = pyvista.Cube(clean=True)
+    mesh = pyvista.PolyData(box.points, faces=box.faces, lines=[2, 0, 6], verts=[1, 3])
+    mesh.cell_data["middle"] = np.array([mesh.get_cell(i).center for i in range(mesh.n_cells)])
+    mesh.cell_data["name"] = [f"cell {i}" for i in range(mesh.n_cells)]
+    mesh.point_data["place"] = mesh.points
+    for result in (mesh.coneflat.flatten(), mesh.coneflat.unwrap()):
+        assert np.array_equal(result["place"], result.points)
+        corners = result.points[result.faces.reshape(-1, 4)[:, 1:]]
+        # Each triangle is in the square around the middle.
+        inside = np.abs(corners - np.asarray(result["middle"])[:, None]).max(axis=2)
+        assert inside.max() == pytest.approx(0.5)
+        assert [str(one) for one in result["name"][:2]] == ["cell 2", "cell 2"]
+        assert np.linalg.norm(np.asarray(result["middle"]), axis=1) == pytest.approx(0.5)

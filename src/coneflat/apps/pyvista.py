@@ -25,6 +25,8 @@ class ConeflatAccessor:
     def flatten(self, **options: Any) -> pyvista.PolyData:
         """Return the surface with texture coordinates, by `coneflat.flatten`; points are repeated at seams.
 
+        The data of its points and cells are kept; a polygon is several triangles.
+
         Raises:
             ConeflatError: as of `coneflat.flatten`.
         """
@@ -39,7 +41,7 @@ class ConeflatAccessor:
         return self._with_data(unwrap(self._mesh, **options))
 
     def quads(self, **options: Any) -> pyvista.PolyData:
-        """Return a quad mesh of the surface, by `coneflat.quads`.
+        """Return a quad mesh of the surface, by `coneflat.quads`, without its data: points and faces are others.
 
         Raises:
             ConeflatError: as of `coneflat.quads`.
@@ -48,13 +50,14 @@ class ConeflatAccessor:
         return pyvista.PolyData(found.vertices, np.insert(found.quads, 0, 4, axis=1).ravel())
 
     def _with_data(self, result: Flattening) -> pyvista.PolyData:
-        """Return a result as a surface, with the point data of the input, and its measures as field data."""
-        mesh = result.to_pyvista()
-        own = np.asarray(mesh.point_data["vertex"])
-        origin = own if result.vertex_origin is None else result.vertex_origin[own]
-        for name, values in self._mesh.point_data.items():
-            if name not in mesh.point_data:
-                mesh.point_data[name] = np.asarray(values)[origin]
-        for name in ("qc_mean", "area_std", "flipped", "overlap", "charts"):
-            mesh.field_data[name] = [getattr(result.distortion, name)]
-        return mesh
+        """Return a result as a surface with the data of the input's points and cells; its measures are field data."""
+        own, cut = self._mesh, result.to_pyvista()
+        vertex = np.asarray(result.vertex_origin)[cut.point_data["vertex"]]
+        # A polygon of k corners becomes k - 2 triangles; the cells of a surface begin with its points and lines.
+        sizes = np.diff(pyvista.convert_array(own.GetPolys().GetOffsetsArray()))
+        cell = own.n_verts + own.n_lines + np.repeat(np.arange(len(sizes)), sizes - 2)[result.face_origin]
+        for old, new, at in ((own.point_data, cut.point_data, vertex), (own.cell_data, cut.cell_data, cell)):
+            new.update({name: np.asarray(old[name])[at] for name in old if name not in new})
+        measures = ("qc_mean", "area_std", "flipped", "overlap", "charts")
+        cut.field_data.update({name: [getattr(result.distortion, name)] for name in measures})
+        return cut

@@ -48,21 +48,21 @@ def is_gifti(content: bytes) -> bool:
 
 
 def parse_freesurfer(path: Path, content: bytes) -> MeshFile:
-    """Return the mesh of a FreeSurfer surface: three bytes, two lines, two counts, positions and triangles.
+    """Return the mesh of a FreeSurfer surface: three bytes, one or two lines, two counts, positions and triangles.
 
     Raises:
         MeshFileError: it is not one, or is truncated.
     """
-    begin = content.find(b"\n\n") + 2
-    if not is_freesurfer(content) or begin < 2:
-        raise MeshFileError(f"{path} is not a FreeSurfer surface of triangles")
-    vertices, faces = (int(count) for count in np.frombuffer(content, ">i4", 2, begin))
-    need = begin + 8 + 12 * (vertices + faces)
-    if min(vertices, faces) < 0 or len(content) < need:
-        raise MeshFileError(f"{path} must have {need:,} bytes for its triangles, got {len(content):,}")
-    points = np.frombuffer(content, ">f4", 3 * vertices, begin + 8).reshape(-1, 3)
-    corners = np.frombuffer(content, ">i4", 3 * faces, begin + 8 + 12 * vertices)
-    return _triangles(path, points, corners)
+    # FreeSurfer skips a line and all white space after it; nibabel skips two lines, and the second may be a comment.
+    rest = content.partition(b"\n")[2].lstrip()
+    for body in (rest, rest.partition(b"\n")[2]) if is_freesurfer(content) else ():
+        vertices, faces = (int(count) for count in np.frombuffer(body[:8].ljust(8, b"\xff"), ">i4"))
+        if min(vertices, faces) >= 0 and len(body) >= 8 + 12 * (vertices + faces):
+            points = np.frombuffer(body, ">f4", 3 * vertices, 8).reshape(-1, 3)
+            return _triangles(path, points, np.frombuffer(body, ">i4", 3 * faces, 8 + 12 * vertices))
+    raise MeshFileError(
+        f"{path} is not a FreeSurfer surface of triangles, or is truncated at {len(content):,} bytes"
+    )
 
 
 def parse_gifti(path: Path, content: bytes) -> MeshFile:
@@ -135,9 +135,8 @@ def read_label(text: str) -> IntArray:
                 values = np.where(values < 0, keys.setdefault("unknown", -1), values)
         else:
             values = read_vertex_values(path)
-            keys = {}
-            if ending == ".gii":
-                keys = {one.label: one.key for one in package.load(path).labeltable.labels}
+            labels = package.load(path).labeltable.labels if ending == ".gii" else ()
+            keys = {one.label: one.key for one in labels}
     if not name and ending != ".annot":
         return np.flatnonzero(values)
     if name not in keys:

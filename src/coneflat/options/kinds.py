@@ -87,7 +87,7 @@ class Number(Kind):
             value = float(value)
         number = as_integer(name, value) if self.is_integer else as_number(name, value)
         if not self.least <= number <= self.most or (self.is_positive and not 0 < number < math.inf):
-            raise OptionError(f"{name} must be {self.text}, got {number:,.6g}")
+            raise OptionError(f"{name} must be {self.text}, got {number:,{'' if self.is_integer else '.6g'}}")
         return number
 
     @property

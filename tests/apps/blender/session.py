@@ -305,11 +305,46 @@ def failures():
     assert "Error: /missing/python does not run coneflat: No such file" in run("unwrap")
     preferences().python = ""
     os.environ["PATH"] = ""
-    assert "Error: coneflat is not installed, and online access is off" in run("unwrap")
+    named = "in the preferences of the extension, name a Python that has coneflat, or a folder of wheels"
+    assert f"Error: coneflat is not installed: {named}" in run("unwrap")
+    preferences().requirement = "coneflat"
+    assert f"Error: online access is off: allow it; or, {named}" in run("unwrap")
     preferences().wheels = os.environ["BLENDER_USER_RESOURCES"]
     lines = run("install")
     assert "Error: install coneflat: No matching distribution found for coneflat" in lines, lines
     assert not flags(cube.data).any()
+
+
+def all_or_none():
+    """A failure at the second of two objects, which each have a map of their own, leaves both as they were."""
+    items = [add("cube", "first"), add("cube", "second", location=(3, 0, 0))]
+    before = [uv_of(item.data).copy() for item in items]
+    select(*items)
+    settings().together = False
+    exchange, read = module("exchange"), module("exchange").read_maps
+
+    def unreadable(folder, parts):
+        if parts[0].name == "second":
+            (folder / exchange.RESULT).unlink()
+        return read(folder, parts)
+
+    def changed(folder, parts):
+        items[1].data.vertices.add(1)
+        return read(folder, parts)
+
+    for fails, message in (
+        (unreadable, "cannot be read"),
+        (changed, "second has changed while coneflat was running"),
+    ):
+        exchange.read_maps = fails
+        lines = run("unwrap")
+        assert message in lines, lines
+        for item, uv in zip(items, before, strict=True):
+            assert (uv_of(item.data) == uv).all()
+            assert not flags(item.data).any()
+    exchange.read_maps = read
+    assert "second: charts" in run("unwrap")
+    assert all(flags(item.data).any() for item in items)
 
 
 def disable():

@@ -25,7 +25,7 @@ from coneflat.apps.cli.main import cli
 SESSION = Path(__file__).with_name("session.py")
 SESSIONS = (
     "three_objects", "again", "selected_faces", "sharp_edges", "vertex_groups", "quads", "unapplied", "failures",
-    "escape", "disable", "edited_together",
+    "escape", "disable", "edited_together", "all_or_none",
 )  # fmt: skip
 
 
@@ -279,28 +279,32 @@ def test_the_environment_is_found(extension, tmp_path, monkeypatch):
     assert environment.find("", own).version == "99.1"
     assert environment.find(str(own), tmp_path).version == "99.1"
     monkeypatch.setenv("PATH", "")
-    with pytest.raises(failure, match="coneflat is not installed: choose Install"):
+    with pytest.raises(failure, match="coneflat is not installed: .* name a Python that has coneflat"):
         environment.find("", tmp_path)
 
 
 def test_an_environment_without_a_network(extension, tmp_path, monkeypatch):
     commands, failure = extension.environment.install_commands, extension.job.Failure
-    with pytest.raises(failure, match="online access is off"):
-        commands(tmp_path, "", "", False)
+    with pytest.raises(
+        failure, match="not installed: .* name a Python that has coneflat, or a folder of wheels"
+    ):
+        commands(tmp_path, "", "", True)
+    with pytest.raises(failure, match="online access is off: allow it"):
+        commands(tmp_path, "coneflat", "", False)
     with pytest.raises(failure, match="wheels, does not exist"):
         commands(tmp_path, "", str(tmp_path / "none"), True)
     for name in [name for name in os.environ if name.startswith("PIP_")]:
         monkeypatch.delenv(name)
     monkeypatch.setenv("PIP_CONFIG_FILE", os.devnull)
     monkeypatch.setenv("PIP_INDEX_URL", "http://127.0.0.1:9/simple")
-    make, install, _ = commands(tmp_path / "own", "", "", True)
-    assert install[1][-1] == f"coneflat>={coneflat.__version__}"
+    assert commands(tmp_path, "", str(tmp_path), True)[1][1][-1] == f"coneflat>={coneflat.__version__}"
+    make, install, _ = commands(tmp_path / "own", "coneflat", "", True)
     with extension.job.Job(*make) as job:
         wait(job)
         job.check()
     with extension.job.Job(*install) as job:
         wait(job)
-        with pytest.raises(failure, match="^install coneflat: there is no network; name a folder of wheels"):
+        with pytest.raises(failure, match="^install coneflat: there is no network; .* a folder of wheels$"):
             job.check()
     install = commands(tmp_path / "own", "coneflat", str(tmp_path), False)[1]
     with extension.job.Job(*install) as job:

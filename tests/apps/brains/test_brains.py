@@ -14,7 +14,8 @@ from shapes import grid, sphere
 import coneflat
 from coneflat.apps.brains import flatten_cortex, measure_flat, metric_distortion, read_flat
 from coneflat.errors import MeshFileError, OptionError, UnknownFormatError
-from coneflat.io import read_label, read_vertex_values
+from coneflat.io import INPUT_FORMATS, read_label, read_vertex_values
+from coneflat.io.brains import FREESURFER
 
 nibabel = pytest.importorskip("nibabel")
 
@@ -70,6 +71,26 @@ def test_surfaces_are_read_as_nibabel_reads_them(folder):
         mesh = coneflat.read_mesh(folder / name)
         assert np.array_equal(mesh.vertices, vertices)
         assert np.array_equal(mesh.triangles, faces)
+
+
+@pytest.mark.parametrize(
+    "head", ["made by hand\n", "\n", "made\n\n", "made\n\n\n \t\r\n", "made\na comment\n"]
+)
+def test_headers_are_read_as_freesurfer_and_nibabel_read_them(folder, tmp_path, head):
+    """FreeSurfer skips a line and all white space after it; nibabel skips two lines."""
+    vertices, faces = nibabel.freesurfer.read_geometry(folder / "lh.pial")
+    counts = np.array([len(vertices), len(faces)])
+    content = b"".join([counts.astype(">i4").tobytes(), vertices.astype(">f4"), faces.astype(">i4")])
+    (tmp_path / "lh.pial").write_bytes(b"\xff\xff\xfe" + head.encode() + content)
+    mesh = coneflat.read_mesh(tmp_path / "lh.pial")
+    assert np.array_equal(mesh.vertices, vertices)
+    assert np.array_equal(mesh.triangles, faces)
+    if head.count("\n") == 2:
+        assert np.array_equal(nibabel.freesurfer.read_geometry(tmp_path / "lh.pial")[1], faces)
+    for short in (content[:6], content[:-4]):
+        (tmp_path / "lh.pial").write_bytes(b"\xff\xff\xfe" + head.encode() + short)
+        with pytest.raises(MeshFileError, match=r"is truncated at [\d,]+ bytes"):
+            coneflat.read_mesh(tmp_path / "lh.pial")
 
 
 def test_values_and_labels_are_read_in_all_formats(folder):
@@ -221,11 +242,19 @@ def test_bad_input_is_named(folder, flat, tmp_path):
     with pytest.raises(MeshFileError, match="got a GIFTI file without positions"):
         coneflat.read_mesh(folder / "lh.sulc.gii")
     (tmp_path / "lh.pial").write_bytes((folder / "lh.pial").read_bytes()[:-5])
-    with pytest.raises(MeshFileError, match=r"must have .* bytes for its triangles"):
+    with pytest.raises(MeshFileError, match="or is truncated at"):
         coneflat.read_mesh(tmp_path / "lh.pial")
     (tmp_path / "lh.bad.3d").write_bytes(b"12345678")
     with pytest.raises(MeshFileError, match="must be a FreeSurfer patch"):
         read_flat(tmp_path / "lh.bad.3d", folder / "lh.pial")
+
+
+@pytest.mark.parametrize("name", ["flatten", "unwrap", "quads", "view"])
+def test_help_names_all_formats_that_are_read(name):
+    text = command(name, "--help").stdout
+    assert {ending for ending in INPUT_FORMATS if ending not in text} <= set(FREESURFER) - {".pial"}
+    if name == "view":
+        assert "lh.sulc" in text
 
 
 def test_the_commands_write_measure_and_draw(folder, tmp_path):
@@ -245,6 +274,8 @@ def test_the_commands_write_measure_and_draw(folder, tmp_path):
         cwd=tmp_path,
     )
     assert (done.returncode, "areal distortion" in done.stdout) == (0, True), done.stderr
+    done = command("measure", "lh.flat.gii", "--surface", folder / "lh.pial", "--weld", cwd=tmp_path)
+    assert (done.returncode, done.stderr.count("\n"), "--weld" in done.stderr) == (2, 1, True)
     pytest.importorskip("matplotlib")
     done = command(
         "figure", "lh.npz", "--color", folder / "lh.sulc", "-o", "a.png", "--dpi", 50, cwd=tmp_path

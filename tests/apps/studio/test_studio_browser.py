@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from itertools import pairwise
 
 import numpy as np
@@ -250,6 +251,69 @@ def test_a_small_change_keeps_the_layout_in_place(visit, studio):
             assert off < 0.2 * min(size), cone
             assert (np.array(now) == charts).mean() > 0.9
     assert turned  # Without the turn of the view, the places would be far apart.
+
+
+#: A layout like that shown, turned, whose largest chart is split in two and whose other charts have moved.
+SPLIT = """
+(() => { const before = coneflat.model, {uv, faces, chart} = before.arrays;
+const turned = uv.slice(), parts = chart.slice(), most = Math.max(...chart);
+for (let p = 0; p < uv.length; p += 2) [turned[p], turned[p + 1]] = [uv[p + 1], 1 - uv[p]];
+const middle = (i) => before.place(before.vertexAt(3 * i))[0];
+for (let i = 0; i < parts.length; i++) parts[i] = chart[i] === 0 && middle(i) > 0.3 ? most + 1 : chart[i];
+const swapped = parts.map((one) => most + 1 - one);
+const after = new before.constructor(before.head, {...before.arrays, uv: turned, chart: swapped});
+[after.uvCentre, after.uvUnit] = [before.uvCentre, before.uvUnit];
+studio.align(after);
+return [studio.turns, Array.from(after.arrays.chart.filter((_, i) => chart[i] === 0)), most]; })()
+"""
+
+
+def test_a_chart_that_splits_keeps_the_place_and_the_number_of_its_larger_part(visit):
+    visit.settle()
+    turns, numbers, most = visit.run(SPLIT)
+    (larger, _), (smaller, _) = Counter(numbers).most_common()
+    assert (turns, larger) == (1, 0)
+    assert smaller > most
+
+
+def test_a_sliver_beside_a_drawn_cut_is_reported(visit):
+    """Two rings around the ball, one triangle apart."""
+    visit.settle()
+    assert visit.run("studio.slivers") == 0
+    mesh = coneflat.read_mesh(coneflat.sample_path())
+    rings = _rings(mesh)
+    for ring in rings:
+        visit.run(f"studio.act({{do: 'cut', path: {ring}}})")
+        visit.settle()
+    assert visit.run("studio.slivers") >= 1
+    assert "less than two triangles wide" in visit.page.inner_text("#warnings")
+    for _ in rings:
+        visit.run("studio.act({do: 'undo'})")
+    visit.settle()
+    assert not visit.page.is_visible("#warnings")
+
+
+def _rings(mesh):
+    """Return two closed paths of vertices: the borders of a strip of triangles, on which a plane cuts the sample."""
+    checked = coneflat.check_mesh(mesh.vertices, mesh.triangles).mesh
+    height = checked.vertices[:, 1] - np.median(checked.vertices[:, 1])
+    is_upper = (height > 0)[checked.faces]
+    strip = checked.faces[is_upper.any(axis=1) & ~is_upper.all(axis=1)]
+    pairs = np.sort(strip[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    edges, counts = np.unique(pairs, axis=0, return_counts=True)
+    neighbours = {}
+    for one, two in edges[counts == 1].tolist():
+        neighbours.setdefault(one, []).append(two)
+        neighbours.setdefault(two, []).append(one)
+    loops = []
+    while neighbours:
+        start = next(iter(neighbours))
+        path = [start]
+        while ends := [v for v in neighbours.pop(path[-1], []) if v in neighbours]:
+            path.append(ends[0])
+        if len(path) > 10:
+            loops.append([*path, start])
+    return sorted(loops, key=len)[-2:]
 
 
 def test_a_path_joins_an_earlier_cut_instead_of_running_next_to_it(visit):

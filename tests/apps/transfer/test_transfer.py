@@ -182,6 +182,46 @@ def test_normal_maps_turn_with_the_uvs(tmp_path):
     assert (len(tree["images"]), len(tree["materials"])) == (2, 1)
 
 
+def test_normal_maps_and_tangents_of_other_uvs(tmp_path):
+    """The normal map has the second UVs, which are turned by a quarter; tangents of either file are not kept."""
+    make = SceneMaker()
+    stream = BytesIO()
+    Image.new("RGB", (4, 4), (255, 128, 128)).save(stream, format="PNG")
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    plain, turned = square[:, :2] * [1, -1] + [0, 1], square[:, [1, 0]]
+    attributes = {"POSITION": square, "TEXCOORD_0": plain, "TEXCOORD_1": turned, "TANGENT": np.ones((4, 4))}
+    primitive = {
+        "attributes": {name: make.accessor(values.copy()) for name, values in attributes.items()},
+        "indices": make.accessor([0, 1, 2, 0, 2, 3], 5125),
+        "material": 0,
+        "targets": [{"TANGENT": make.accessor(np.ones((4, 3))), "POSITION": make.accessor(np.zeros((4, 3)))}],
+    }
+    transform = {"extensions": {"KHR_texture_transform": {"texCoord": 1, "offset": [0.5, 0]}}}
+    make.tree |= {
+        "images": [{"bufferView": make.view(stream.getvalue()), "mimeType": "image/png"}],
+        "textures": [{"source": 0}],
+        "materials": [{"normalTexture": {"index": 0, **transform}}],
+        "nodes": [{"mesh": 0}],
+        "scenes": [{"nodes": [0]}],
+        "meshes": [{"primitives": [primitive]}],
+    }
+    (tmp_path / "old.glb").write_bytes(make.glb())
+    baked = transfer(tmp_path / "old.glb", tmp_path / "old.glb", resolution=8)
+    # The normal pointed along the first direction of the second UVs, which is the second of the first.
+    assert np.abs(baked.images["normalTexture"][..., :3].astype(int) - [128, 255, 128]).max() <= 1
+    assert any("Tangents" in note for note in baked.notes)
+    scene = coneflat.read_mesh(baked.save(tmp_path / "out.glb")).scene
+    (after,) = scene.data.tree["meshes"][0]["primitives"]
+    assert set(after["attributes"]) == {"POSITION", "TEXCOORD_0", "TEXCOORD_1"}
+    assert set(after["targets"][0]) == {"POSITION"}
+    assert np.array_equal(scene.data.values(after["attributes"]["TEXCOORD_1"], 2), turned)
+    make.tree["materials"][0]["normalTexture"]["texCoord"] = -1
+    make.tree["materials"][0]["normalTexture"]["extensions"] = {}
+    (tmp_path / "bad.glb").write_bytes(make.glb())
+    with pytest.raises(MeshFileError, match="'texCoord' is -1, not an integer from 0"):
+        transfer(tmp_path / "bad.glb", tmp_path / "old.glb", resolution=8)
+
+
 def test_the_sides_of_a_thin_wall_stay_apart():
     square = np.array(
         [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1e-4], [1, 0, 1e-4], [0, 1, 1e-4]], dtype=float
@@ -216,8 +256,8 @@ def test_bad_input_is_named(folder, tmp_path):
         transfer(folder / "old.glb", tmp_path / "no_uv.obj")
     with pytest.raises(MeshFileError, match="must have UVs"):
         transfer(tmp_path / "no_uv.obj", folder / "new.glb", texture=tmp_path / "any.png")
-    with pytest.raises(OptionError, match="resolution must be an integer"):
-        transfer(folder / "old.glb", folder / "new.glb", resolution=0)
+    with pytest.raises(OptionError, match="resolution must be an integer from 1 to 16,384, got 1,000,000"):
+        transfer(folder / "old.glb", folder / "new.glb", resolution=1_000_000)
 
 
 def test_the_command_writes_a_model_and_notes(folder, tmp_path):

@@ -64,7 +64,7 @@ class FileFlags:
 def flatten(context: click.Context, /, **given: Any) -> None:
     """Flatten MESH and write it with UV coordinates.
 
-    MESH is a file (.obj, .ply, .stl, .off, .gltf, .glb), or - for standard input.
+    MESH is a file (.obj, .ply, .stl, .off, .gltf, .glb, .gii, lh.pial), or - for standard input.
 
     \b
     Examples:
@@ -99,7 +99,7 @@ def flatten(context: click.Context, /, **given: Any) -> None:
 def unwrap(context: click.Context, /, **given: Any) -> None:
     """Write MESH with UV coordinates for a texture: nearly isometric, with the shortest seams.
 
-    MESH is a file (.obj, .ply, .stl, .off, .gltf, .glb), or - for standard input.
+    MESH is a file (.obj, .ply, .stl, .off, .gltf, .glb, .gii, lh.pial), or - for standard input.
 
     \b
     Examples:

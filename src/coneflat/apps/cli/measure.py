@@ -48,6 +48,8 @@ def measure(
     from ..measure_uv import MEASURED, measure_mapped
     from .run import Console, require_distinct, write_report
 
+    if surface is not None and weld:
+        raise click.UsageError("--weld would change the numbers that --surface and FILE share: leave it out")
     requirements = parse_requirements(required, MEASURED if surface is None else (*MEASURED, *FLAT_MEASURES))
     if report is not None:
         check_target(report)
@@ -55,14 +57,10 @@ def measure(
     with Console(verbosity) as console:
         with console.stage("read", 0.0):
             mapped = as_uv_mesh(file, weld=weld) if surface is None else read_flat(file, surface)
-        flat = None
         with console.stage("measure", 0.3):
-            if surface is None:
-                measured = measure_mapped(mapped, strict=not repair)
-            else:
-                flat = measure_flat(mapped, strict=not repair)
-                measured = flat.uv
-        found = measured.report() if flat is None else flat.report()
+            flat = None if surface is None else measure_flat(mapped, strict=not repair)
+            measured = measure_mapped(mapped, strict=not repair) if flat is None else flat.uv
+        found = (flat or measured).report()
         if report is not None:
             write_report(report, found)
         if as_json and verbosity != QUIET:

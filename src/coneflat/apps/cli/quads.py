@@ -51,7 +51,8 @@ def quads(
 ) -> None:
     """Convert MESH to a mesh of quads only, with few irregular vertices.
 
-    MESH is a file (.obj, .ply, .stl, .off, .gltf, .glb), or an integer grid (.npz) that --grid has written.
+    MESH is a file (.obj, .ply, .stl, .off, .gltf, .glb, .gii, lh.pial), or an integer grid (.npz) that --grid has
+    written.
 
     \b
     Examples:

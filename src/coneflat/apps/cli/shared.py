@@ -99,7 +99,8 @@ color_option = click.option(
     "--color",
     metavar="NAME|FILE",
     help="Your own values, shown as colours with a scale: the name of a vertex property of a .ply or of an array in a "
-    "result (.npz); or FILE.npy or FILE.npz:NAME, with one value per vertex or triangle.",
+    "result (.npz); or FILE.npy, FILE.npz:NAME, or values of a brain such as lh.sulc, with one value per vertex or "
+    "triangle.",
 )
 
 most_option = click.option(

@@ -12,7 +12,6 @@ from ...options import SHOWS
 from .options import flag, option_flags, path_flag, pop_flags
 from .shared import (
     QUIET,
-    VERBOSE,
     again_option,
     color_option,
     input_options,
@@ -59,8 +58,9 @@ def view(
 ) -> None:
     """Write a page that shows FILE and its layout side by side.
 
-    FILE is a mesh (.obj, .ply, .stl, .off, .gltf, .glb) or a result (.npz) of `coneflat flatten`, `coneflat unwrap` or
-    `coneflat quads`. A mesh without UVs is flattened first, with default options. The page is a single HTML file.
+    FILE is a mesh (.obj, .ply, .stl, .off, .gltf, .glb, .gii, lh.pial) or a result (.npz) of `coneflat flatten`,
+    `coneflat unwrap` or `coneflat quads`. A mesh without UVs is flattened first, with default options. The page is a
+    single HTML file.
 
     \b
     Examples:
@@ -145,5 +145,4 @@ def studio(
         if verbosity != QUIET or no_open:
             click.echo(line)
 
-    log = click.echo if verbosity == VERBOSE else None
-    run_studio(file, port, opens=not no_open, say=say, log=log, color=color, most_triangles=most_triangles)
+    run_studio(file, port, opens=not no_open, say=say, color=color, most_triangles=most_triangles)

@@ -10,24 +10,25 @@ import os
 import sys
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ... import ConeflatError, Flattener, Flattening, unwrap
-from ...base import cancel_with
+from ...base import FloatArray, cancel_with
 from ...errors import DegenerateFaceError, NonManifoldError, NonOrientableError
-from ...io import Joined, read_joined
+from ...io import Joined, Texture, read_joined
 from ...options import MAX_SHOWN_TRIANGLES
 from ..view import Model, PageText, Quantity, content_of, head_and_block, own_quantity, pack, shown_rows
 from .choices import Choices
 from .known import with_hashes
 from .messages import angle_warning, page_message, with_warnings
-from .outputs import bad_places, curve_data, quads_file, repaired, result_file, without_layout
+from .outputs import bad_places, curve_data, own_picture, quads_file, repaired, result_file, without_layout
 from .worker import Head, read_frame, write_frame
 
 #: The text that stands for unknown numbers, and the title of the preview.
@@ -90,6 +91,7 @@ class JobRunner:
         self._flattener: Flattener | None = None
         self._model: Model | None = None
         self._most: int | None = None
+        self._own: tuple[Texture, FloatArray] | None = None
         self._read: tuple[str, str] | None = None
 
     def flatten(
@@ -125,14 +127,20 @@ class JobRunner:
             result = flattener.flatten(on_preview=on_preview, progress=report_max, **words)
         result = with_warnings(replace(result, notes=source.all_notes(result.notes)), chosen)
         report("picture", 1.0)
-        head, body = self._coloured(job, result, name)
+        own, missing = None, {}
+        if job.get("color"):
+            try:
+                own = own_quantity(result, job["color"])
+            except ConeflatError as error:
+                missing = {"missing": page_message(str(error))}
+        head, body = self._picture(result, name, own=own)
         self.result = result
         warnings = angle_warning(chosen, result)
         if chosen.options.get("repair"):
             checked, wrong = repaired(source)
             head["head"]["bad"] = bad_places(checked)
             warnings += (f"The mesh was repaired: {wrong}. “Undo” reverts this.",) if wrong else ()
-        return {**head, "warnings": warnings}, body
+        return {**head, **missing, "warnings": warnings}, body
 
     def bare(self, job: Head) -> tuple[Head, bytes]:
         """Return the page data of the mesh of a failed job without a layout; nothing if no triangle can be drawn."""
@@ -143,18 +151,6 @@ class JobRunner:
                 data["head"] |= {"bad": bad_places(checked), "show": "plain"}
                 return data, block
         return {}, b""
-
-    def _coloured(self, job: Head, result: Flattening, name: str) -> tuple[Head, bytes]:
-        """Return the page data of a result, with the colours given by the user if these are available."""
-
-        own, missing = None, {}
-        if job.get("color"):
-            try:
-                own = own_quantity(result, job["color"])
-            except ConeflatError as error:
-                missing = {"missing": page_message(str(error))}
-        head, body = self._picture(result, name, own=own)
-        return {**head, **missing}, body
 
     def make(self, job: Head, report: Callable[[str, float], None]) -> tuple[Head, bytes]:
         """Return the output of another job: a file of the result, quads, or a curve."""
@@ -188,7 +184,11 @@ class JobRunner:
             self._model = Model.of(result)
         content = content_of(result, self._most or MAX_SHOWN_TRIANGLES, self._model, own)
         show = "checker" if own is None else "own"
-        head, block = head_and_block(result, content, None, name, "y", show, text)
+        picture, uv = self._own or (None, None)
+        head, block = head_and_block(result, content, picture, name, "y", show, text)
+        if uv is not None and result.face_corners is not None:
+            own_uv = uv[result.face_corners[content.face_numbers]].astype(np.float32)
+            head, block = with_arrays(head, block, {"own_uv": own_uv})
         # A simplified mesh is sent in full, too, for painting and drawing, up to 4 million triangles.
         if content.left_out and len(result.faces) <= 4_000_000:
             head, block = with_all_triangles(head, block, self._model, result)
@@ -205,6 +205,7 @@ class JobRunner:
             repaired.cache_clear()
             source = read_joined(Path(mesh))
             self._source, self._flattener, self._read = source, Flattener(source.mesh), (mesh, sha256)
+            self._own = None if source.mesh.scene is None else own_picture(source.mesh)
         return self._source, self._flattener
 
 
@@ -218,6 +219,11 @@ def with_all_triangles(head: Head, block: bytes, model: Model, result: Flattenin
     numbers = model.used if result.vertex_origin is None else result.vertex_origin[model.used]
     if not np.array_equal(numbers, np.arange(len(numbers))):
         arrays["whole_numbers"] = numbers.astype(np.int32)
+    return with_arrays(head, block, arrays)
+
+
+def with_arrays(head: Head, block: bytes, arrays: Mapping[str, NDArray[Any]]) -> tuple[Head, bytes]:
+    """Return page data with more arrays."""
     listed, more = pack(arrays)
     moved = [{**each, "offset": each["offset"] + len(block)} for each in listed]
     return {**head, "arrays": [*head["arrays"], *moved]}, block + more

@@ -96,7 +96,7 @@ class Studio:
             raise ArrayShapeError(f"vertices must have the shape (n, 3), got {vertices.shape}")
         if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
             raise ArrayShapeError(
-                f"faces must be integers of shape (m, 3), got shape {triangles.shape} and type {triangles.dtype}"
+                f"faces must be (m, 3) integers, got {triangles.dtype} of shape {triangles.shape}"
             )
         if folder is None:
             self._own_folder = tempfile.TemporaryDirectory(prefix="coneflat-")
@@ -180,9 +180,7 @@ def _proxied(through: str, port: int, token: str) -> str:
         OptionError: the address does not contain "{port}".
     """
     if "{port}" not in through:
-        raise OptionError(
-            f"through must be an address that contains {{port}}, such as /proxy/{{port}}/, got {short_repr(through)}"
-        )
+        raise OptionError(f"through must be an address that contains {{port}}, got {short_repr(through)}")
     return f"{through.replace('{port}', str(port)).rstrip('/')}/?token={token}"
 
 

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 from io import BytesIO
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ... import Flattening, TriangleMesh, check_mesh
-from ...base import MAX_CONES
+from ... import ConeflatError, Flattening, MeshFile, TriangleMesh, check_mesh
+from ...base import MAX_CONES, FloatArray
 from ...errors import MeshError, StudioError
-from ...io import Joined, as_input
+from ...io import Joined, Texture, as_input, encode_png
 from ...mesh import REPAIR_ADVICE, CheckedMesh, end_corners
+from ..transfer.materials import BASE, Painted
 from ..view import outline_halfedges
-
-if TYPE_CHECKING:
-    from .choices import Choices
+from .choices import DECLARED, Choices
 
 #: File formats of results: .json is the report, .svg and .png are pictures of the layout.
 EXPORTS = (".obj", ".ply", ".glb", ".npz", ".svg", ".png", ".json")
@@ -168,6 +168,25 @@ def bad_places(checked: CheckedMesh) -> list[list[int]]:
     split = np.setdiff1d(np.flatnonzero(np.bincount(origin) > 1), edges)
     # The page stays fast if only some of very many places are marked.
     return [*edges.tolist(), *split[:, None].tolist()][:2000]
+
+
+def own_picture(mesh: MeshFile) -> tuple[Texture, FloatArray] | None:
+    """Return the base colours of the material of most triangles of a glTF file, and its UVs; None if it has no image.
+
+    The UVs (3 m, 2) are those of the corners in the file, v upwards, and -1e6 at triangles of other materials, by
+    which the page knows them. The image is reduced to the default resolution of textures.
+    """
+    with suppress(ConeflatError, AttributeError, TypeError):  # Materials that are not valid are not shown.
+        painted = Painted(mesh.path, None)
+        slots = {i: slot for i in painted.used if (slot := painted.value(BASE.name, i))}
+        most = max(slots, key=np.bincount(painted.material).item, default=None)
+        if most is not None:
+            is_own, slot = painted.material == most, slots[most]
+            uv = np.where(is_own[:, None, None], painted.uv_of(slot) * [1, -1] + [0, 1], -1e6)
+            image, _ = painted.image(slot.get("index"))
+            step = -(-max(image.shape) // DECLARED["resolution"].default)
+            return encode_png(np.ascontiguousarray(image[::step, ::step])), uv.reshape(-1, 2)
+    return None
 
 
 def without_layout(checked: CheckedMesh) -> Flattening:

@@ -172,9 +172,7 @@ def file_within(name: str, folder: Path) -> Path:
         StudioError: the name is not valid, or the file is a link to another folder.
     """
     if not name:
-        raise StudioError(
-            "no file is given: expected the name of a mesh or a project in the folder of the session"
-        )
+        raise StudioError("no file is given: expected the name of a mesh or a project")
     if name != Path(name).name or name.startswith(".") or "\\" in name or "\0" in name:
         raise StudioError(f"{short_repr(name)} is not the name of a file in the folder of the session")
     path = folder / name

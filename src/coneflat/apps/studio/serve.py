@@ -13,7 +13,6 @@ from ..view import open_address
 
 if TYPE_CHECKING:
     from .server import StudioServer
-    from .session import Session
 
 HOST = "127.0.0.1"
 
@@ -23,7 +22,6 @@ def run_studio(
     port: int,
     opens: bool,
     say: Callable[[str], None],
-    log: Callable[[str], None] | None,
     color: str | None,
     most_triangles: int,
 ) -> None:
@@ -34,7 +32,6 @@ def run_studio(
         port: port of this machine; 0 for a free one.
         opens: whether to open the page in the browser.
         say: called with the address of the page.
-        log: called with a line on every layout and every error; None for none.
         color: name of values that are shown as colours.
         most_triangles: largest number of triangles shown.
 
@@ -56,8 +53,6 @@ def run_studio(
             if file is not None:
                 session.open(file)
             say(address)
-            if log is not None:
-                session.listen(ChangePrinter(session, log))
             if opens:
                 open_address(address)
             server_class(session, token, port).run(sockets=[listener])
@@ -83,25 +78,6 @@ def studio_server() -> type[StudioServer]:
 def page_address(port: int, token: str) -> str:
     """Return the address of the page."""
     return f"http://{HOST}:{port}/?token={token}"
-
-
-class ChangePrinter:
-    """Listener of a session that reports a line on each layout and each error."""
-
-    def __init__(self, session: Session, log: Callable[[str], None]) -> None:
-        self._session, self._log = session, log
-        self._printed: tuple[int, str] = (0, "")
-
-    def __call__(self) -> None:
-        """Report what has changed."""
-        state, shown = self._session.state(), self._session.picture()
-        trouble = "" if state["trouble"] is None else str(state["trouble"]["text"])
-        layout, before = self._printed
-        self._printed = (state["layout"], trouble)
-        if state["layout"] != layout and shown is not None and not (state["early"] or state["bare"]):
-            self._log(f"layout {state['layout']} in {state['seconds']:.2f} s: {shown[0]['title']}")
-        if trouble and trouble != before:
-            self._log(trouble)
 
 
 def open_listener(port: int) -> socket.socket:

@@ -80,7 +80,7 @@ class Painted:
             numbers = [one.get("material", len(self.materials) - 1) for one, _ in self.primitives]
             self.material = np.repeat(numbers, [len(corners) // 3 for _, corners in self.primitives])
         self.used: list[int] = np.unique(self.material).tolist()
-        self.uv, self._image = cache(self._read_uv), cache(self._read_image)
+        self.uv, self.image = cache(self._read_uv), cache(self._read_image)
 
     @cached_property
     def colours(self) -> FloatArray | None:
@@ -97,14 +97,22 @@ class Painted:
         """Return (m, 3, 2) a set of UVs, v downwards as in glTF."""
         if self.primitives:
             return self._attribute(f"TEXCOORD_{number}", 2)
-        if self.mesh.uv is None or self.mesh.texture is None:
-            raise MeshFileError(f"{self.mesh.path} must have UVs for its texture, got none")
-        points = self.mesh.texture[self.corners]
-        if (points < 0).any():
-            raise MeshFileError(
-                f"{self.mesh.path} must have UVs at all corners for its texture, but some have none"
-            )
-        return self.mesh.uv[points] * [1, -1] + [0, 1]
+        uv, points = self.mesh.uv, self.mesh.texture
+        if uv is None or points is None or (points[self.corners] < 0).any():
+            raise MeshFileError(f"{self.mesh.path} must have UVs at all corners for its texture")
+        return uv[points[self.corners]] * [1, -1] + [0, 1]
+
+    def uv_of(self, slot: Any) -> FloatArray:
+        """Return (m, 3, 2) the UVs that a property of a material refers to, without its transform."""
+        return self.uv(0 if self.mesh.scene is None else self.mesh.scene.data.uv_set(slot))
+
+    def normal_uv(self) -> FloatArray:
+        """Return (m, 3, 2) the UVs of normal maps, 0 for triangles without one."""
+        found = np.zeros((len(self.faces), 3, 2))
+        for i in self.used:
+            own, slot = self.material == i, self.value(NORMAL.name, i)
+            found[own] = self.uv_of(slot)[own] if slot else 0.0
+        return found
 
     def _attribute(self, name: str, columns: int) -> FloatArray:
         """Return (m, 3, columns) an attribute at the corners of a glTF scene, 1 where missing."""
@@ -146,8 +154,7 @@ class Painted:
         ]
         if not found and self.colours is None:
             raise OptionError(
-                f"{self.mesh.path} must have textures or vertex colours, got neither: give the image of its UVs "
-                "(--texture)"
+                f"{self.mesh.path} must have textures or vertex colours, got neither: give a texture"
             )
         return found if BASE in found else [BASE, *found]
 
@@ -167,11 +174,10 @@ class Painted:
 
     def _sampled(self, slot: Any, faces: IntArray, weights: FloatArray, is_colour: bool) -> FloatArray:
         """Return (q, 4) the linear values of the image that a property `slot` of a material refers to."""
-        shift = slot.get("extensions", {}).get("KHR_texture_transform", {})
-        uv = self.uv(shift.get("texCoord", slot.get("texCoord", 0)))[faces]
+        shift, uv = slot.get("extensions", {}).get("KHR_texture_transform", {}), self.uv_of(slot)[faces]
         cos, sin = np.cos(shift.get("rotation", 0.0)), np.sin(shift.get("rotation", 0.0))
         uv = np.einsum("qi,qic->qc", weights, uv) * shift.get("scale", (1, 1)) @ [[cos, -sin], [sin, cos]]
-        image, wraps = self._image(slot.get("index"))
+        image, wraps = self.image(slot.get("index"))
         table = np.arange(256) / 255
         tables = [to_linear(table) if is_colour else table] * 3 + [table]
         return bilinear(image, uv + shift.get("offset", (0, 0)), np.stack(tables), wraps)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import json
-import struct
 from collections.abc import Collection
+from copy import deepcopy
 from dataclasses import dataclass
 from io import BytesIO
 from os import PathLike
@@ -32,6 +31,9 @@ MAX_RESOLUTION = 16384
 #: Distance of the models, as a fraction of the diagonal, from which on a note reports it: above the error of 32 bits.
 FAR = 0.01
 ENDINGS = (".glb", ".png")
+#: Attributes and extensions of primitives that the material replaces: vertex colours are in the image; tangents may be
+#: those of other UVs, and viewers compute them; compressed copies contain both.
+REPLACED = ("COLOR_0", "TANGENT", "KHR_materials_variants", "KHR_draco_mesh_compression")
 #: Channels whose image belongs to the metallic-roughness model in a material.
 SURFACE = ("baseColorTexture", "metallicRoughnessTexture")
 
@@ -114,6 +116,9 @@ def transfer(
     images, farthest = _bake(painted, target.vertices[target.faces[known]], texels, owner)
     source = distance_transform_edt(owner < 0, return_distances=False, return_indices=True)
     notes = list(target.notes)
+    meshes = target.source.scene.data.tree["meshes"] if target.source and target.source.scene else []
+    if any("TANGENT" in one["attributes"] for mesh in meshes for one in mesh["primitives"]):
+        notes.append("Tangents are left out of a GLB: viewers compute those of the new UVs.")
     if twice:
         notes.append(f"UVs overlap: {twice:,} texels are in several triangles, and show one of them.")
     if farthest > FAR:
@@ -136,7 +141,10 @@ def _bake(
     images = {channel: np.zeros((side, side, 4), np.uint8) for channel in painted.channels()}
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     if NORMAL in images:
-        axes, old_axes = _tangents(corners, texels), _tangents(painted.vertices[painted.faces], painted.uv(0))
+        axes, old_axes = (
+            _tangents(corners, texels),
+            _tangents(painted.vertices[painted.faces], painted.normal_uv()),
+        )
     every = np.flatnonzero(owner.reshape(-1) >= 0)
     for begin in range(0, len(every), TEXELS_AT_ONCE):
         check_cancelled()
@@ -202,11 +210,9 @@ def _material(painted: Painted, names: Collection[str]) -> dict[str, Any]:
     used = [painted.materials[i] for i in painted.used]
     surface = used[0].get("pbrMetallicRoughness", {"metallicFactor": 0.0})
     kept = () if "metallicRoughnessTexture" in names else ("metallicFactor", "roughnessFactor")
-    item: dict[str, Any] = {
-        name: used[0][name] for name in ("alphaCutoff", "emissiveFactor") if name in used[0]
-    }
+    item: dict[str, Any] = {"doubleSided": any(each.get("doubleSided", False) for each in used)}
+    item |= {name: used[0][name] for name in ("alphaCutoff", "emissiveFactor") if name in used[0]}
     item |= {"emissiveFactor": [1.0] * 3} if "emissiveTexture" in names else {}
-    item["doubleSided"] = any(each.get("doubleSided", False) for each in used)
     modes = [each.get("alphaMode", "OPAQUE") for each in used]
     item["alphaMode"] = max(modes, key=("OPAQUE", "MASK", "BLEND").index)
     return item | {"pbrMetallicRoughness": {name: surface[name] for name in kept if name in surface}}
@@ -215,23 +221,21 @@ def _material(painted: Painted, names: Collection[str]) -> dict[str, Any]:
 def _with_material(baked: Baked) -> io.Glb:
     """Return the model as GLB, with one material instead of its own."""
     source = baked.uv_mesh.source
-    scene = None if source is None else source.scene
-    buffers = [] if scene is None else scene.data.tree["buffers"]
-    if baked.model.suffix.lower() == ".glb" and len(buffers) == 1 and "uri" not in buffers[0]:
-        content = io.read_bytes(baked.model)
-    else:
+    if source is None or source.scene is None:
         stream = BytesIO()
         io.write_stream(uv_flattening(baked.uv_mesh), stream, ".glb")
-        content = stream.getvalue()
-    (length,) = struct.unpack_from("<I", content, 12)
-    tree, binary = json.loads(content[20 : 20 + length]), content[28 + length :]
-    unused = {image.get("bufferView") for image in tree.pop("images", [])}
-    glb = io.Glb({name: tree[name] for name in tree if name not in ("materials", "textures", "samplers")})
-    for i, view in enumerate(tree["bufferViews"]):
-        start = view.get("byteOffset", 0)
-        # The content of old images is replaced by a few bytes, so that views keep their numbers.
-        kept = bytes(4) if i in unused else binary[start : start + view["byteLength"]]
-        view |= {"byteOffset": glb.append(kept), "byteLength": len(kept)}
+        source = io.read_mesh_from(stream.getvalue(), baked.model)
+    assert source.scene is not None
+    data, left_out = source.scene.data, ("images", "textures", "samplers", "materials")
+    glb = io.Glb({name: deepcopy(item) for name, item in data.tree.items() if name not in left_out})
+    for mesh in glb.tree["meshes"]:
+        for primitive in mesh["primitives"]:
+            primitive["material"] = 0
+            targets, extensions = primitive.get("targets", []), primitive.get("extensions", {})
+            for name in REPLACED:
+                for item in (primitive["attributes"], extensions, *targets):
+                    item.pop(name, None)
+    glb.copy_arrays(data)
     item = baked.material | {"pbrMetallicRoughness": dict(baked.material["pbrMetallicRoughness"])}
     for name, image in baked.images.items():
         texture = io.encode_png(image)
@@ -239,9 +243,4 @@ def _with_material(baked: Baked) -> io.Glb:
         place = item["pbrMetallicRoughness"] if name in SURFACE else item
         place[name] = {"index": glb.add("textures", {"source": number})}
     glb.add("materials", item)
-    for mesh in tree["meshes"]:
-        for primitive in mesh["primitives"]:
-            primitive["material"] = 0
-            primitive["attributes"].pop("COLOR_0", None)  # it is in the image
-            primitive.get("extensions", {}).pop("KHR_materials_variants", None)
     return glb

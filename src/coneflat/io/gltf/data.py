@@ -193,6 +193,11 @@ class GltfData:
             self.fail(f"{name!r} is {str(value)[:20]}, not an integer from 0")
         return value
 
+    def uv_set(self, slot: Item) -> int:
+        """Return the number of the UVs that a property of a material, such as "normalTexture", refers to."""
+        extensions = self.entry(slot, "extensions", dict)
+        return self.count(slot | self.entry(extensions, "KHR_texture_transform", dict), "texCoord", 0)
+
     def resolve(self, uri: str) -> Path:
         """Return the path of a URI that is relative to this file."""
         return self.path.parent / unquote(uri)

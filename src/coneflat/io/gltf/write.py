@@ -11,6 +11,7 @@ import json
 import os
 import struct
 from collections import defaultdict, deque
+from copy import deepcopy
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 from urllib.parse import quote, unquote
@@ -105,6 +106,31 @@ class Glb:
         plain = MATERIAL["pbrMetallicRoughness"]
         return self.add("materials", MATERIAL | {"pbrMetallicRoughness": plain | shown})
 
+    def copy_arrays(self, data: GltfData) -> None:
+        """Copy the arrays of a scene that the tree refers to into the buffer, and release the indices of all others."""
+        tree = self.tree
+        maybe = set(numbers_in_extensions(tree))
+        accessors, views = maybe.union(accessors_of_arrays(tree)), maybe.union(views_of_images(tree))
+        for i, accessor in enumerate(tree.get("accessors", [])):
+            if i in accessors:
+                views |= {one["bufferView"] for one in view_owners(accessor)}
+            else:
+                # The placeholder is the smallest possible accessor.
+                self.release("accessors", i, {"componentType": 5121, "count": 1, "type": "SCALAR"})
+        for i, view in enumerate(tree.get("bufferViews", [])):
+            if i in views:
+                view["byteOffset"] = self.append(data.view(i).tobytes())
+                view["buffer"] = 0
+                for name in COMPRESSED:
+                    view.get("extensions", {}).pop(name, None)
+            else:
+                self.release("bufferViews", i, {"buffer": 0, "byteLength": 1})
+        used = set(keys_of(tree))
+        for name in ("extensionsUsed", "extensionsRequired"):
+            left = [one for one in tree.pop(name, []) if one not in (DRACO, *COMPRESSED) or one in used]
+            if left:
+                tree[name] = left
+
     def write(self, stream: IO[bytes]) -> None:
         """Write the file.
 
@@ -193,8 +219,9 @@ def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: 
     """Return a glTF scene with the UVs of a result.
 
     In each primitive, TEXCOORD_0 is new, and every vertex is repeated for each of its UVs; all other attributes and
-    morph targets are copied bit for bit. A mesh that several nodes show is copied for each node. Image files are
-    embedded in the buffer. All other data is unchanged.
+    morph targets are copied bit for bit, but for tangents of the old UVs, which are those of the normal map. A mesh
+    that several nodes show is copied for each node. Image files are embedded in the buffer. All other data is
+    unchanged.
 
     Args:
         result: the result for a mesh that was read from the scene, with its `face_corners`.
@@ -203,15 +230,15 @@ def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: 
         texture: texture of the flattened parts, instead of the file's materials.
     """
     assert result.face_corners is not None
-    data, glb = scene.data, Glb(_copied(scene.data.tree))
+    data, glb = scene.data, Glb(deepcopy(scene.data.tree))
     targets = _own_primitives(glb.tree, scene)
-    old = [_copied(target) for target in targets]
+    old = [deepcopy(target) for target in targets]
     for target in targets:
         target["attributes"] = {}
         for name in ("indices", "targets", "mode"):
             target.pop(name, None)
         target.get("extensions", {}).pop(DRACO, None)
-    _keep_referenced(glb, data)
+    glb.copy_arrays(data)
     _embed_images(glb, data, folder)
     # Readers such as trimesh return the UVs of primitives that have a material only.
     if texture is not None:
@@ -229,7 +256,6 @@ def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: 
         if texture is not None or "material" not in target:
             target["material"] = material
     _drop_empty(glb, targets)
-    _remove_extensions(glb.tree)
     return glb
 
 
@@ -239,7 +265,8 @@ def scene_losses(result: Flattening) -> tuple[str, ...]:
     if source is None or source.scene is None or result.face_corners is None:
         return ()
     notes = []
-    tree, parts = source.scene.data.tree, source.scene.parts
+    data, parts = source.scene.data, source.scene.parts
+    tree = data.tree
     dropped = sum(len(part.corners) for part in parts) // 3 - len(result.faces)
     if dropped:
         notes.append(f"Triangles that the repair dropped are not in the file: {dropped:,}.")
@@ -249,14 +276,11 @@ def scene_losses(result: Flattening) -> tuple[str, ...]:
         notes.append(
             f"Meshes of several nodes were copied, to have UVs for each node: {plural(copies, 'copy', 'copies')}."
         )
-    materials = tree.get("materials", [])
-    painted = {
-        i
-        for part in parts
-        if isinstance(i := tree["meshes"][part.mesh]["primitives"][part.primitive].get("material"), int)
-        and i < len(materials)
-        and any(name.endswith("Texture") for name in keys_of(materials[i]))
-    }
+    primitives = [tree["meshes"][part.mesh]["primitives"][part.primitive] for part in parts]
+    if any("TANGENT" in one["attributes"] and "TANGENT" in _replaced(data, one) for one in primitives):
+        notes.append("Tangents of the old UVs are not in the file: viewers compute them from the new ones.")
+    used = {one["material"] for one in primitives if "material" in one}
+    painted = [i for i in used if any(name.endswith("Texture") for name in keys_of(tree["materials"][i]))]
     if painted:
         notes.append(
             f"The textures of {plural(len(painted), 'material')} are kept, but were made for the old UVs; `coneflat "
@@ -273,7 +297,7 @@ def _own_primitives(tree: Item, scene: GltfScene) -> list[Item]:
         owner = first_node.setdefault(part.mesh, part.node)
         if owner != part.node and nodes[part.node]["mesh"] == part.mesh:
             nodes[part.node]["mesh"] = len(meshes)
-            meshes.append(_copied(scene.data.tree["meshes"][part.mesh]))
+            meshes.append(deepcopy(scene.data.tree["meshes"][part.mesh]))
     return [meshes[nodes[part.node]["mesh"]]["primitives"][part.primitive] for part in scene.parts]
 
 
@@ -285,36 +309,16 @@ def _faces_of_parts(parts: tuple[ScenePart, ...], face_corners: IntArray) -> lis
     return np.split(order, np.searchsorted(owner[order], np.arange(1, len(parts))))
 
 
-def _keep_referenced(glb: Glb, data: GltfData) -> None:
-    """Copy arrays that are still referred to into the new buffer, and release the indices of all others."""
-    tree = glb.tree
-    maybe = set(numbers_in_extensions(tree))
-    accessors, views = maybe.union(accessors_of_arrays(tree)), maybe.union(views_of_images(tree))
-    for i, accessor in enumerate(tree.get("accessors", [])):
-        if i in accessors:
-            views |= {one["bufferView"] for one in view_owners(accessor)}
-        else:
-            # The placeholder is the smallest possible accessor.
-            glb.release("accessors", i, {"componentType": 5121, "count": 1, "type": "SCALAR"})
-    for i, view in enumerate(tree.get("bufferViews", [])):
-        if i in views:
-            view["byteOffset"] = glb.append(data.view(i).tobytes())
-            view["buffer"] = 0
-            for name in COMPRESSED:
-                view.get("extensions", {}).pop(name, None)
-        else:
-            glb.release("bufferViews", i, {"buffer": 0, "byteLength": 1})
-
-
 def _fill(
     glb: Glb, data: GltfData, target: Item, before: Item, vertices: IntArray, points: IntArray, uv: FloatArray
 ) -> None:
     """Write the triangles of a primitive, with its vertex and the point in the plane of every corner."""
     pairs, number = np.unique(vertices * len(uv) + points, return_inverse=True)
     own, point = np.divmod(pairs, len(uv))
+    replaced = _replaced(data, before)
 
     def gathered(arrays: dict[str, int]) -> dict[str, int]:
-        kept = ((name, index) for name, index in arrays.items() if name != UV)
+        kept = ((name, index) for name, index in arrays.items() if name not in replaced)
         return {name: _gathered(glb, data, index, own, name == "POSITION") for name, index in kept}
 
     target["attributes"] = gathered(before["attributes"])
@@ -327,6 +331,12 @@ def _fill(
         target["targets"] = [gathered(one) for one in before["targets"]]
     if before.get("mode", Mode.TRIANGLES) != Mode.TRIANGLES:
         target["mode"] = Mode.TRIANGLES.value
+
+
+def _replaced(data: GltfData, primitive: Item) -> tuple[str, ...]:
+    """Return the attributes that new UVs replace: also tangents, unless their normal map has other UVs."""
+    material = data.item("materials", primitive["material"]) if "material" in primitive else {}
+    return (UV,) if data.uv_set(data.entry(material, "normalTexture", dict)) else (UV, "TANGENT")
 
 
 def _gathered(glb: Glb, data: GltfData, index: int, own: IntArray, has_bounds: bool) -> int:
@@ -374,17 +384,3 @@ def _drop_empty(glb: Glb, targets: list[Item]) -> None:
             zero = {"componentType": 5126, "count": 1, "type": "VEC3"} | bounds(np.zeros((1, 3)))
             left = [{"attributes": {"POSITION": glb.add("accessors", zero)}, "mode": 0}]
         mesh["primitives"] = left
-
-
-def _remove_extensions(tree: Item) -> None:
-    """Remove compression extensions that are no longer used from the lists of extensions."""
-    used = set(keys_of(tree))
-    for name in ("extensionsUsed", "extensionsRequired"):
-        left = [one for one in tree.pop(name, []) if one not in (DRACO, *COMPRESSED) or one in used]
-        if left:
-            tree[name] = left
-
-
-def _copied(item: Any) -> Any:
-    """Return a deep copy of a JSON tree."""
-    return json.loads(json.dumps(item))

@@ -15,13 +15,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from .job import WHEELS, Failure, popen_options
+from .job import HINT, Failure, popen_options
 
 #: The version of the extension, and the options of the commands.
 KNOWN = json.loads(Path(__file__).with_name("options.json").read_text(encoding="utf-8"))
 #: Seconds to wait for a program that only prints its version.
 _PATIENCE = 60.0
-_HINT = "choose Install in the preferences of the extension"
 #: Prints whether a Python can make environments that coneflat supports.
 _CAN_MAKE = "import sys, venv, ensurepip; print(sys.version_info >= (3, 10))"
 
@@ -60,7 +59,7 @@ def find(named: str, own: Path) -> Environment:
     if named:
         path = Path(named).expanduser()
         return _checked((str(python_in(path) if path.is_dir() else path), "-m", "coneflat"))
-    reason = f"coneflat is not installed: {_HINT}"
+    reason = f"coneflat is not installed: {HINT}"
     module = ("-m", "coneflat")
     own_python = str(python_in(own))
     programs = ((own_python, module), ("coneflat", ()), ("python3", module), ("python", module))
@@ -87,7 +86,7 @@ def _checked(command: Sequence[str]) -> Environment:
         raise Failure(f"{command[0]} does not run coneflat: {last}")
     if _numbers(match[1]) < _numbers(KNOWN["version"]):
         needed = KNOWN["version"]
-        raise Failure(f"coneflat {match[1]} of {command[0]} is older than the extension, {needed}: {_HINT}")
+        raise Failure(f"coneflat {match[1]} of {command[0]} is older than the extension, {needed}: {HINT}")
     return Environment(tuple(command), match[1])
 
 
@@ -106,24 +105,24 @@ def _output(command: Sequence[str]) -> tuple[int, str]:
     return done.returncode, done.stdout
 
 
-def install_commands(
-    own: Path, requirement: str, wheels: str, is_online: bool
-) -> list[tuple[str, list[str]]]:
+def install_commands(own: Path, requirement: str, wheels: str, online: bool) -> list[tuple[str, list[str]]]:
     """Return the commands that make the extension's environment, each with a name for messages.
 
     Args:
         own: the folder of the environment; what it contains is removed.
-        requirement: what pip installs.
-        wheels: a folder of wheels, to install without a network; "" for the package index.
-        is_online: whether Blender allows access to the network.
+        requirement: what pip installs; "" for coneflat, which is not in the package index, from the folder of wheels.
+        wheels: a folder of wheels, to install without a network; "" for none.
+        online: whether Blender allows access to the network.
 
     Raises:
         Failure: neither is possible, or no Python can make environments.
     """
     if wheels and not Path(wheels).is_dir():
         raise Failure(f"{wheels}, the folder of wheels, does not exist")
-    if not wheels and not is_online:
-        raise Failure(f"coneflat is not installed, and online access is off: allow it, or {WHEELS}")
+    if not wheels and not requirement.strip():
+        raise Failure(f"coneflat is not installed: {HINT}")
+    if not wheels and not online:
+        raise Failure(f"online access is off: allow it; or, {HINT}")
     source = ["--no-index", "--find-links", wheels] if wheels else ["--retries", "1"]
     quiet = ["--disable-pip-version-check", "--no-input", "--progress-bar", "off"]
     python = str(python_in(own))
@@ -142,6 +141,4 @@ def _base_python() -> str:
     for program in (own, *map(shutil.which, ("python3.12", "python3.11", "python3.10", "python3", "python"))):
         if program and _output([program, "-c", _CAN_MAKE])[1].strip().endswith("True"):
             return program
-    raise Failure(
-        "no Python 3.10 or later with venv was found: name one that has coneflat in the preferences"
-    )
+    raise Failure(f"no Python 3.10 or later with venv was found: {HINT}")

@@ -158,10 +158,8 @@ def read_maps(folder: Path, parts: Sequence[Part]) -> tuple[list[Map], dict[str,
     )
     maps = []
     for i, start in enumerate(starts[:-1]):
-        own_seams, own_cones = (
-            seams[of_vertex[seams[:, 0]] == i] - start,
-            cones[of_vertex[cones] == i] - start,
-        )
+        own_seams = seams[of_vertex[seams[:, 0]] == i] - start
+        own_cones = cones[of_vertex[cones] == i] - start
         maps.append(Map(uv[of_corner == i], own_seams, own_cones, int((of_polygon[torn] == i).sum())))
     return maps, json.loads(str(found["report"]))
 

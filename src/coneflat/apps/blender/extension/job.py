@@ -17,7 +17,7 @@ from typing import Any
 #: A line of progress of a command: seconds, percent and stage.
 _PROGRESS = re.compile(r"\s*[\d.]+ s +(\d+)%\s+(\S.*)")
 _ERROR = re.compile(r"(?:coneflat: )?error: (.+)", re.IGNORECASE)
-WHEELS = "name a folder of wheels in the preferences of the extension"
+HINT = "in the preferences of the extension, name a Python that has coneflat, or a folder of wheels"
 #: Seconds to wait for the end of a process that was killed.
 _PATIENCE = 5.0
 
@@ -114,7 +114,7 @@ class Job:
             return
         self._reader.join(_PATIENCE)
         if any("connection broken" in line for line in self._lines):
-            raise Failure(f"{self.name}: there is no network; {WHEELS}")
+            raise Failure(f"{self.name}: there is no network; {HINT}")
         errors = [match[1] for line in self._lines if (match := _ERROR.match(line))]
         if errors:
             raise Failure(f"{self.name}: {errors[-1]}")

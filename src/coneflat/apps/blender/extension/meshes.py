@@ -166,6 +166,18 @@ def left_as_is(item: Any, applied: bool) -> list[str]:
     return [f"{item.name}: {'; '.join(words)}"] if words else []
 
 
+def item_of(source: Source, is_same: bool = True) -> Any:
+    """Return the object that a part is of; `is_same`: its mesh must have the same numbers of elements.
+
+    Raises:
+        Failure: the object has been removed or its mesh changed.
+    """
+    item = bpy.data.objects.get(source.name)
+    if item is None or (is_same and counts(item.data) != source.counts):
+        raise Failure(f"{source.name} has changed while coneflat was running")
+    return item
+
+
 def check_uv_map(item: Any, name: str) -> None:
     """Raise Failure if a UV map of this name, or any if it is "", can neither be found nor added."""
     layers = item.data.uv_layers
@@ -186,14 +198,9 @@ def write_map(source: Source, found: Map, name: str, *, mark: bool, select: str)
     Raises:
         Failure: the object has been removed or its mesh changed.
     """
-    item = bpy.data.objects.get(source.name)
-    if item is None or counts(item.data) != source.counts:
-        raise Failure(f"{source.name} has changed while coneflat was running")
-    mesh = item.data
+    mesh = item_of(source).data
     layer = mesh.uv_layers.get(name) if name else mesh.uv_layers.active
     layer = layer or mesh.uv_layers.new(name=name or "UVMap", do_init=False)
-    if layer is None:
-        raise Failure(f"{source.name}: a UV map cannot be added")
     mesh.uv_layers.active = layer
     uv = values(layer.data, "uv", np.float64, 2)
     has_uv = np.isfinite(found.uv).all(axis=1)
@@ -246,9 +253,7 @@ def add_quads(source: Source, found: dict[str, NDArray[Any]], select: bool) -> A
     Raises:
         Failure: the object has been removed.
     """
-    item = bpy.data.objects.get(source.name)
-    if item is None:
-        raise Failure(f"{source.name} has been removed while coneflat was running")
+    item = item_of(source, is_same=False)
     mesh = bpy.data.meshes.new(f"{item.data.name}_quads")
     added = bpy.data.objects.new(f"{item.name}_quads", mesh)
     added.matrix_world = item.matrix_world.copy()

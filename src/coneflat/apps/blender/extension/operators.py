@@ -213,10 +213,11 @@ class Command(Runner):
                 arguments = [*command, self.command, *files, *self.arguments(context)]
                 yield stack.enter_context(Job(self.title, arguments, folder))
                 done.append((folder, chosen))
-            # Nothing changes before all processes have ended well.
+            # Nothing changes before all processes have ended well, and all results are read and can be written.
             with meshes.object_mode(context, returns=self.command != "quads"):
-                for folder, chosen in done:
-                    self.write(context, folder, chosen)
+                found = [self.load(context, folder, chosen) for folder, chosen in done]
+                for (_, chosen), result in zip(done, found, strict=True):
+                    self.write(context, chosen, result)
 
     def arguments(self, context: Any) -> list[str]:
         """Return the options of the command that the settings change."""
@@ -255,10 +256,20 @@ class Command(Runner):
             raise Failure("no faces are selected" if in_edit else "the selected objects have no faces")
         return found
 
-    def write(self, context: Any, folder: Path, sources: Sequence[meshes.Source]) -> None:
+    def load(self, context: Any, folder: Path, sources: Sequence[meshes.Source]) -> Any:
+        """Return the result of a command.
+
+        Raises:
+            Failure: it cannot be read, or not be written to the objects.
+        """
+        for source in sources:
+            meshes.check_uv_map(meshes.item_of(source), context.scene.coneflat.uv_map)
+        return exchange.read_maps(folder, [source.part for source in sources])
+
+    def write(self, context: Any, sources: Sequence[meshes.Source], result: Any) -> None:
         """Write UVs, and report measures and notes."""
         settings = context.scene.coneflat
-        maps, measures = exchange.read_maps(folder, [source.part for source in sources])
+        maps, measures = result
         for source, found in zip(sources, maps, strict=True):
             meshes.write_map(source, found, settings.uv_map, mark=settings.mark, select=settings.select)
             if found.torn:
@@ -298,18 +309,21 @@ class CONEFLAT_OT_quads(Command, bpy.types.Operator):
     bl_idname, bl_label, bl_options = "coneflat.quads", "Quads", {"UNDO"}
     command, title = "quads", "Quads"
 
-    def write(self, context: Any, folder: Path, sources: Sequence[meshes.Source]) -> None:
-        """Add an object for each mesh, and select it instead."""
-        for source in sources:
-            found, notes = exchange.read_quads(folder)
-            added = meshes.add_quads(source, found, context.scene.coneflat.select == "CONES")
-            old = bpy.data.objects[source.name]
-            old.select_set(False)
-            added.select_set(True)
-            context.view_layer.objects.active = added
-            self._say(notes)
-            quads, irregular = len(found["quads"]), len(found["irregular"])
-            self._say([f"{added.name}: {quads:,} quads, {irregular} irregular vertices"])
+    def load(self, context: Any, folder: Path, sources: Sequence[meshes.Source]) -> Any:
+        """Return the quads of a mesh, and notes."""
+        meshes.item_of(sources[0], is_same=False)
+        return exchange.read_quads(folder)
+
+    def write(self, context: Any, sources: Sequence[meshes.Source], result: Any) -> None:
+        """Add an object beside that of the mesh, and select it instead."""
+        (source,), (found, notes) = sources, result
+        added = meshes.add_quads(source, found, context.scene.coneflat.select == "CONES")
+        bpy.data.objects[source.name].select_set(False)
+        added.select_set(True)
+        context.view_layer.objects.active = added
+        self._say(notes)
+        quads, irregular = len(found["quads"]), len(found["irregular"])
+        self._say([f"{added.name}: {quads:,} quads, {irregular} irregular vertices"])
 
 
 class CONEFLAT_OT_install(Runner, bpy.types.Operator):

@@ -71,11 +71,11 @@ _POINTERS = {command: PointerProperty(type=group) for command, group in GROUPS.i
 Settings = _group("settings", {**_OWN, **_POINTERS})
 
 
-_PYTHON = (
-    "Python or environment that has coneflat. Empty: the extension's own environment, or one on the PATH"
+_PYTHON = "Python or environment that has coneflat. Empty: the extension's own, or one on the PATH"
+_WHEELS = (
+    "Folder of wheels of coneflat and what it needs, from which Install makes the extension's own environment"
 )
-_WHEELS = "Install from the wheels in this folder, without a network. Empty: from the package index"
-_PACKAGE = "What pip installs, for example coneflat[fast]. Empty: coneflat, this version or later"
+_PACKAGE = "What pip installs, for example a wheel. Empty: coneflat, this version or later, from the folder of wheels"
 
 
 class Preferences(bpy.types.AddonPreferences):

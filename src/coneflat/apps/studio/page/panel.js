@@ -182,7 +182,7 @@ class Panel {
 
   /** Show the warnings on the choices. */
   showWarnings() {
-    const warnings = this.studio.news?.warnings ?? [], key = JSON.stringify(warnings);
+    const warnings = [...(this.studio.news?.warnings ?? []), ...this.studio.sliverWarning()], key = JSON.stringify(warnings);
     if (key === this.warningsShown) return;
     this.warningsShown = key;
     this.part("warnings").hidden = !warnings.length;

@@ -33,3 +33,20 @@ function showSizes(studio) {
     ]),
   );
 }
+
+const NARROW = 2, LONG = 40; // Width in triangles, and squared outline over area, of slivers; a square has 16.
+
+/** Return the number of charts that are slivers: long, and less than two triangles wide. */
+function sliverCount(model) {
+  const {faces, uv, chart, outline} = model.arrays, charts = new Map();
+  const sizes = (face) => charts.get(chart[face]) ?? charts.set(chart[face], {area: 0, length: 0, sides: 0, count: 0}).get(chart[face]);
+  const length = (p, q) => Math.hypot(uv[2 * q] - uv[2 * p], uv[2 * q + 1] - uv[2 * p + 1]);
+  for (let i = 0; i < chart.length; i++) {
+    const [p, q, r] = [faces[3 * i], faces[3 * i + 1], faces[3 * i + 2]], own = sizes(i);
+    own.area += Math.abs((uv[2 * q] - uv[2 * p]) * (uv[2 * r + 1] - uv[2 * p + 1]) - (uv[2 * q + 1] - uv[2 * p + 1]) * (uv[2 * r] - uv[2 * p])) / 2;
+    own.sides += length(p, q) + length(q, r) + length(r, p);
+    own.count += 3;
+  }
+  for (let i = 0; i < outline.length; i++) sizes(Math.floor(outline[i] / 3)).length += length(...model.outlineCorners(i).map((corner) => faces[corner]));
+  return [...charts.values()].filter((one) => (2 * one.area) / one.length < (NARROW * one.sides) / one.count && one.length ** 2 > LONG * one.area).length;
+}

@@ -112,11 +112,22 @@ class Studio {
     if (!isSame) this.selected = selected === null ? null : (this.verticesOf([selected])[0] ?? null);
     this.repicking = false;
     this.pickSelected();
+    this.takeOwnPicture(model);
     this.showMeasures(model.head);
+    this.slivers = model.head.show === "plain" ? 0 : sliverCount(model);
     if (!isSame) this.final = null;
     if (!this.news.early && model.head.show !== "plain") this.final = {model, turns: this.turns};
     const {asked, news} = this;
     requestAnimationFrame(() => requestAnimationFrame(() => this.noteTime(asked, news.early)));
+  }
+
+  /** Have the texture of the file as the picture, with the UVs of the file, until another is chosen. */
+  async takeOwnPicture({arrays, head}) {
+    if (!arrays.own_uv || arrays.picture === this.ownPicture) return;
+    this.ownPicture = arrays.picture;
+    const picture = await pictureOf(new Blob([arrays.picture], {type: head.picture}));
+    this.viewer.renderer.setPicture(picture, true);
+    this.viewer.redraw();
   }
 
   /** Add the charts, the packing, the overlap and the energy to the title; a preview does not have them. */
@@ -127,6 +138,13 @@ class Studio {
     if (this.forTexture) more.unshift(`energy ${values.get("energy")}`);
     const place = document.getElementById("title");
     place.textContent = place.title = [place.textContent, ...more].join("  ·  ");
+  }
+
+  /** Return a sentence on narrow charts beside drawn cuts, or nothing. */
+  sliverWarning() {
+    if (!this.slivers || !this.choices.cuts.length || this.news.stale || this.news.bare) return [];
+    const [charts, are] = this.slivers === 1 ? ["chart", "is"] : ["charts", "are"];
+    return [`${this.slivers} ${charts} beside drawn cuts ${are} less than two triangles wide: erase the cut, or draw it along the seam.`];
   }
 
   /** Choose the axis of the model that points up in its view. */
@@ -142,9 +160,10 @@ class Studio {
   align(model) {
     const {camera} = this.viewer.panes[1], before = this.final;
     if (!before || model.head.show === "plain") return;
-    this.turns = nearestTurns(before.model, before.turns, model);
+    const pairs = chartPairs(sharedParts(before.model, before.turns, model));
+    this.turns = nearestTurns(pairs);
     camera.turn = camera.home = quarterTurns(this.turns);
-    keepChartNumbers(before.model, model);
+    keepChartNumbers(pairs, model);
     document.querySelector("#layout h2").textContent = this.turns ? `Layout, rotated by ${90 * this.turns}°` : "Layout";
   }
 

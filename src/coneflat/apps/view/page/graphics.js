@@ -160,14 +160,14 @@ function tableTexture(gl, colours, smooth) {
   return texture;
 }
 
-/** Return a texture of an image, row 0 at the top, with mipmaps. */
-function pictureTexture(gl, source) {
+/** Return a texture of an image, row 0 at the top, with mipmaps; repeats: outside the unit square, too. */
+function pictureTexture(gl, source, repeats) {
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, texture);
   gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, source);
   gl.generateMipmap(gl.TEXTURE_2D);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
-  for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, gl.CLAMP_TO_EDGE);
+  for (const name of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, name, repeats ? gl.REPEAT : gl.CLAMP_TO_EDGE);
   const sharper = gl.getExtension("EXT_texture_filter_anisotropic");
   if (sharper) gl.texParameterf(gl.TEXTURE_2D, sharper.TEXTURE_MAX_ANISOTROPY_EXT, 8);
   return texture;

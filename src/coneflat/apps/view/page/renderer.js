@@ -53,7 +53,7 @@ class Renderer {
     };
     for (const programs of [this.programs, this.pickPrograms]) Object.values(programs).forEach((one) => one.finish());
     this.picture = null;
-    if (this.look.picture) this.setPicture(this.look.picture);
+    if (this.look.picture) this.setPicture(this.look.picture, this.look.asInFile);
     this.shown = null;
     this.targets = new Map();
     this.samples = Math.min(SAMPLES, gl.getParameter(gl.MAX_SAMPLES) ?? 0);
@@ -67,8 +67,15 @@ class Renderer {
       {array: cornerNormals(model, places), size: 4, type: gl.INT_2_10_10_10_REV, normalised: true},
       {array: new Float32Array(3 * model.triangleCount), size: 1},
     ]);
+    this.putOwnUVs();
     if (this.look.marks?.length !== 12 * model.triangleCount) this.look.marks = null;
     this.setMarks(this.look.marks);
+  }
+
+  /** Set the UVs of the file, if any. */
+  putOwnUVs() {
+    const array = this.model.arrays.own_uv;
+    if (array) this.surface.put(5, {array, size: 2});
   }
 
   /** Set the paint on the surface: four bytes for each corner, of which three are the strengths of the layers; null for none. */
@@ -89,8 +96,10 @@ class Renderer {
     this.shown = null;
     this.targets.forEach((target) => (target.key = null));
     [...this.lines, ...this.dots].forEach((shape) => shape.discard());
-    if (isSame) this.surface.refill(1, cornerUVs(model));
-    else {
+    if (isSame) {
+      this.surface.refill(1, cornerUVs(model));
+      this.putOwnUVs();
+    } else {
       this.surface.discard();
       this.prepareSurface();
     }
@@ -102,11 +111,12 @@ class Renderer {
     return new Shape(this.gl, attributes.map((rows) => ({array: forQuads(rows, 3), size: 3})));
   }
 
-  /** source: an ImageBitmap or a canvas. */
-  setPicture(source) {
+  /** source: an ImageBitmap or a canvas; asInFile: it is that of the UVs of the file, not of the layout. */
+  setPicture(source, asInFile = false) {
     this.look.picture = source;
+    this.look.asInFile = asInFile;
     if (this.picture) this.gl.deleteTexture(this.picture);
-    this.picture = pictureTexture(this.gl, source);
+    this.picture = pictureTexture(this.gl, source, asInFile);
   }
 
   /** colours: {ground, pane, paint, undefined, seam, halo}, each three numbers. */
@@ -172,6 +182,7 @@ class Renderer {
       plane: [...this.model.uvCentre, this.model.uvUnit],
       board: show === "checker" || show === "charts",
       pictured: show === "picture" && this.picture !== null,
+      asInFile: show === "picture" && Boolean(this.look.asInFile),
       tinted: Boolean(scale) || show === "charts",
       table: 0,
       picture: 1,
@@ -185,7 +196,7 @@ class Renderer {
       marked: this.look.marks ? (state.get("marked") ?? 1) : 0,
       hatch: pixel,
     });
-    if (pane.inPlane && this.look.behind && show === "picture" && this.picture) this.drawBehind();
+    if (pane.inPlane && this.look.behind && show === "picture" && this.picture && !this.look.asInFile) this.drawBehind();
     this.surface.draw();
     gl.enable(gl.BLEND);
     gl.depthMask(false); // Overlays do not hide anything.

@@ -32,7 +32,8 @@ layout(location = 1) in vec2 uv;
 layout(location = 2) in vec4 normal;
 layout(location = 3) in float value;
 layout(location = 4) in vec4 marks;
-uniform bool inPlane;
+layout(location = 5) in vec2 own;  // UVs of the file.
+uniform bool inPlane, asInFile;
 uniform vec3 plane;  // The centre of the layout, and its unit.
 ${VIEW_UNIFORMS}
 #ifdef PICK
@@ -52,7 +53,7 @@ void main() {
   int k = gl_VertexID % 3;
   corner = vec3(k == 0, k == 1, k == 2);
   facing = turn * normal.xyz;
-  at = uv;
+  at = asInFile ? own : uv;
   tone = value;
   mark = marks.rgb;
 #endif
@@ -111,7 +112,7 @@ vec3 withMarks(vec3 base) {
 void main() {
   vec3 base = paint;
   if (tinted) base = tone < 0.0 ? undefinedPaint : texture(table, vec2(tone, 0.5)).rgb;
-  if (pictured) {
+  if (pictured && at.x > -1e5) {
     vec4 texel = texture(picture, vec2(at.x, 1.0 - at.y));
     base = mix(base, texel.rgb, texel.a);
   }
