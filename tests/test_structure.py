@@ -53,10 +53,10 @@ CEILINGS = {
     "flattener": 35,
     "geometry": 1473,
     "io": 2881,
-    "layout": 2039,
+    "layout": 2032,
     "linalg": 453,
     "measure": 829,
-    "mesh": 680,
+    "mesh": 666,
     "metric": 999,
     "options": 522,
     "result": 96,
@@ -69,8 +69,8 @@ CEILINGS = {
 #: Applications with a ceiling of their own, which the ceilings of everything else leave out.
 OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_426, 232, 25_297
-CONSTANTS, KERNELS, NAMES, LEVELS = 295, 89, 30, 8
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_405, 232, 25_276
+CONSTANTS, KERNELS, NAMES, LEVELS = 295, 88, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
 

@@ -10,7 +10,7 @@ from ..base.jit import compiled
 from ..errors import ArrayShapeError
 from ..geometry.planar import as_pairs
 from ..geometry.straight import FlatTriangles
-from ..mesh.connectivity import NEXT, PREVIOUS
+from ..mesh.connectivity import NEXT, PREVIOUS, end_corners
 
 # Number of iterations that distribute the gaps; each costs as much as half a breadth-first search.
 SWEEPS = 10
@@ -73,7 +73,7 @@ def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
     pinned = np.zeros(count, dtype=np.bool_)
     while (seeds := on_cut[~reached[on_cut // 3]]).size:
         border, frames = _border(flat, cut, int(seeds[0]))
-        tails = corner[_next(border)]
+        tails = corner[end_corners(border)[0]]
         points[tails] = closed_chain(frames * flat.sides[border])
         placed[tails] = pinned[tails] = True
         along, first = np.unique(border // 3, return_index=True)
@@ -88,10 +88,6 @@ def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
         spread(*arrays, 1, reached, frame, placed, points)
     _close_gaps(flat.sides, corner, frame, points, pinned)
     return as_pairs(points)
-
-
-def _next(halfedges: IntArray) -> IntArray:
-    return halfedges - halfedges % 3 + (halfedges + 1) % 3
 
 
 def _border(flat: FlatTriangles, cut: BoolArray, start: int) -> tuple[IntArray, ComplexArray]:

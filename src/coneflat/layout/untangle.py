@@ -114,7 +114,7 @@ class _Untangling:
 
     def improve(self, rings: int, stay: BoolArray) -> None:
         """Untangle bad triangles by moving the vertices in a number of rings around them, except those in `stay`."""
-        movable = _neighbourhood(self.faces, np.flatnonzero(self.is_bad), rings, len(stay)) & ~stay
+        movable = around(self.faces, self.is_bad, rings - 1) & ~stay
         if movable.any():
             patches = Patches(self.flat, self.faces, self.sides, movable, self.rest)
             self._accept(patches, patches.solve())
@@ -175,11 +175,11 @@ def winding_vertices(
     return np.flatnonzero(~is_bad & winds)
 
 
-def _neighbourhood(faces: IntArray, seeds: IntArray, rings: int, count: int) -> BoolArray:
-    """Return (n,) True for the vertices of the seed triangles and of `rings - 1` rings of triangles around them."""
-    inside = np.zeros(count, dtype=bool)
+def around(faces: IntArray, seeds: BoolArray, rings: int) -> BoolArray:
+    """Return (n,) True for the vertices of seed triangles (m,) and of `rings` rings of triangles around them."""
+    inside = np.zeros(int(faces.max()) + 1, dtype=bool)
     inside[faces[seeds]] = True
-    for _ in range(rings - 1):
+    for _ in range(rings):
         inside[faces[has_any(inside, faces)]] = True
     return inside
 

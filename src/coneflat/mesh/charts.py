@@ -7,7 +7,6 @@ from typing import TypeVar
 import numpy as np
 
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from ..base.jit import compiled
 from .connectivity import TriangleMesh, end_corners, label_components
 
 # Largest UV distance, relative to the UV edge length, at which the two sides of an edge count as joined.
@@ -39,10 +38,9 @@ def point_seams(mesh: TriangleMesh, corners: IntArray, among: IntArray | None = 
         corners: (m, 3) the point at each corner.
         among: edges to choose from; None: all.
     """
-    corners = np.ascontiguousarray(corners)
-    if among is not None:
-        return among[find_split(mesh.edge_halfedges[among], corners)]
-    return np.flatnonzero(find_split(mesh.edge_halfedges, corners))
+    inner = np.flatnonzero(~mesh.is_boundary_edge) if among is None else among[~mesh.is_boundary_edge[among]]
+    here, there = both_sides(mesh, inner, corners)
+    return inner[(here[:, 0] != there[:, 0]) | (here[:, 1] != there[:, 1])]
 
 
 def point_vertices(faces: IntArray, corners: IntArray, count: int) -> IntArray:
@@ -72,23 +70,3 @@ def joined_edges(mesh: TriangleMesh, corner_uv: FloatArray) -> BoolArray:
 def label_charts(mesh: TriangleMesh, joined: BoolArray) -> tuple[int, IntArray]:
     """Return the number of charts, and (m,) the chart of each triangle; `joined` (e,) is True for edges in charts."""
     return label_components(len(mesh.faces), *mesh.edge_faces[joined].T)
-
-
-@compiled
-def find_split(edge_halfedges: IntArray, corners: IntArray) -> BoolArray:
-    """Return (e,) whether the two sides of each edge have different points at their ends; False on the boundary.
-
-    Args:
-        edge_halfedges: (e, 2) the half-edges of each edge, of opposite directions; -1 on the boundary.
-        corners: (m, 3) the point at each corner.
-    """
-    split = np.zeros(len(edge_halfedges), np.bool_)
-    for e in range(len(edge_halfedges)):
-        h, t = edge_halfedges[e]
-        if t >= 0:
-            f, g = h // 3, t // 3
-            split[e] = (
-                corners[f, (h + 1) % 3] != corners[g, (t + 2) % 3]
-                or corners[f, (h + 2) % 3] != corners[g, (t + 1) % 3]
-            )
-    return split
