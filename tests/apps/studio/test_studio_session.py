@@ -77,7 +77,7 @@ class TestSession:
 
     @pytest.mark.parametrize(
         ("ending", "begins"),
-        [(".obj", b"v "), (".ply", b"ply"), (".glb", b"glTF"), (".npz", b"PK"), (".svg", b"<?xml")],
+        [(".obj", b"v "), (".ply", b"ply"), (".glb", b"glTF"), (".npz", b"PK"), (".svg", b"<svg")],
     )
     def test_it_saves(self, session, ending, begins):
         assert session.export(ending).startswith(begins)

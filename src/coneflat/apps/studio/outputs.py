@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ... import Flattening, check_mesh
+from ... import Flattening, TriangleMesh, check_mesh
 from ...base import MAX_CONES
 from ...errors import MeshError, StudioError
 from ...io import Joined, as_input
-from ...mesh import REPAIR_ADVICE, CheckedMesh
+from ...mesh import REPAIR_ADVICE, CheckedMesh, end_corners
+from ..view import outline_halfedges
 
 if TYPE_CHECKING:
     from .choices import Choices
@@ -44,8 +45,10 @@ def result_file(result: Flattening | None, ending: str) -> bytes:
         raise StudioError("there is nothing to save: the last change could not be flattened")
     if ending == ".json":
         return (json.dumps(result.report(), indent=2) + "\n").encode("utf-8")
+    if ending == ".svg":
+        return layout_svg(result).encode("utf-8")
     stream = BytesIO()
-    if ending in (".svg", ".png"):
+    if ending == ".png":
         from ..view import make_figure, write_figure
 
         write_figure(make_figure(result, "layout"), stream, ending)
@@ -104,6 +107,37 @@ def curve_options(choices: Choices) -> dict[str, Any]:
     """Return the keyword arguments on which the curve depends."""
     words = choices.with_search().keywords()
     return {name: words[name] for name in CURVE_OPTIONS if name in words}
+
+
+def layout_svg(result: Flattening) -> str:
+    """Return an SVG drawing of the unit square, v upwards: seams in black, the boundary in grey, cones as dots."""
+    outline, seams = outline_halfedges(TriangleMesh(result.vertices, result.faces), result.uv_faces)
+    begin, end = (result.uv_faces.reshape(-1)[corners] for corners in end_corners(outline))
+    places = np.round(np.column_stack([result.uv[:, 0], 1 - result.uv[:, 1]]) * 1000, 3)
+
+    def path(chosen: slice, name: str) -> str:
+        lines = (
+            f"M{a[0]:g} {a[1]:g}L{b[0]:g} {b[1]:g}"
+            for a, b in zip(places[begin[chosen]].tolist(), places[end[chosen]].tolist(), strict=True)
+        )
+        return f'<path class="{name}" d="{"".join(lines)}"/>'
+
+    is_cone = np.isin(result.faces.reshape(-1), result.cones)
+    dots = (
+        f'<circle cx="{x:g}" cy="{y:g}" r="3"/>'
+        for x, y in places[np.unique(result.uv_faces.reshape(-1)[is_cone])].tolist()
+    )
+    return "\n".join(
+        (
+            '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1000 1000" width="1000" height="1000">',
+            "<style>path{fill:none;stroke-width:1.5;stroke-linecap:round}.seam{stroke:#000}.boundary{stroke:#777}"
+            "circle{fill:#d62121}</style>",
+            path(slice(2 * seams), "seam"),
+            path(slice(2 * seams, None), "boundary"),
+            *dots,
+            "</svg>\n",
+        )
+    )
 
 
 @lru_cache(maxsize=1)
