@@ -15,14 +15,22 @@ import subprocess
 import sys
 import time
 from functools import partial
+from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 from common import best_time, cases, model, peak_memory, shapes
 from scipy.sparse import csc_matrix
 
-from coneflat import Flattening, flatten
+from coneflat import Flattening, TriangleMesh, flatten
 from coneflat.apps.peers.packages import PEERS, installed_peers
-from coneflat.geometry import cotangent_laplacian, cotangents, edge_lengths
+from coneflat.geometry import (
+    cotangent_laplacian,
+    cotangents,
+    double_areas,
+    edge_lengths,
+    signed_double_areas,
+)
 from coneflat.linalg import factorize
 
 STAGES = ("check", "cones", "metric", "cut", "layout", "measure")
@@ -84,7 +92,28 @@ def measured(name: str, rounds: int, runs: int, largest_of_peers: int) -> dict:
 
 def peers(best: Flattening) -> dict[str, float]:
     """Return the seconds of the installed other packages for the same mesh."""
-    return {name: best_time(partial(PEERS[name].run, best), 1) for name in installed_peers()}
+    runs = {name: PEERS[name].run for name in installed_peers()}
+    if find_spec("igl") is not None:
+        runs["libigl LSCM"] = libigl_lscm
+    return {name: best_time(partial(run, best), 1) for name, run in runs.items()}
+
+
+def libigl_lscm(base: Flattening) -> np.ndarray:
+    """Return the LSCM of each chart with two distant points pinned; charts keep their areas and are placed in a row."""
+    import igl
+
+    points = np.empty((len(base.uv), 3))
+    points[base.uv_faces] = base.vertices[base.faces]
+    corner_uv, right = np.empty((len(base.faces), 3, 2)), 0.0
+    for chart, _, faces in TriangleMesh(points, base.uv_faces).split_components():
+        pins = np.array([0, int(np.argmax(((chart.vertices - chart.vertices[0]) ** 2).sum(axis=1)))])
+        found: Any = igl.lscm(chart.vertices, chart.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))
+        uv = np.asarray(found[0] if isinstance(found, tuple) else found, dtype=np.float64)[chart.faces]
+        space = double_areas(edge_lengths(chart.vertices, chart.faces)).sum()
+        uv *= np.sqrt(space / np.abs(signed_double_areas(uv)).sum())
+        corner_uv[faces] = uv + np.array([right - uv[..., 0].min(), 0.0])
+        right += float(np.ptp(uv[..., 0]))
+    return corner_uv
 
 
 def line(row: dict) -> str:

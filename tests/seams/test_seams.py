@@ -52,20 +52,19 @@ def with_cones(shape, count, seed=0):
     return mesh, np.random.default_rng(seed).choice(inside, count, replace=False)
 
 
-def assert_opened(mesh, seams, cones, required=NONE, pieces=1):
+def assert_opened(mesh, seams, cones):
     disk = cut_open(mesh, seams)
-    assert disk.mesh.components[0] == disk.mesh.boundary_loops[0] == disk.mesh.euler_characteristic == pieces
+    assert disk.mesh.components[0] == disk.mesh.boundary_loops[0] == disk.mesh.euler_characteristic == 1
     assert not mesh.is_boundary_edge[seams].any()
-    assert np.isin(required, seams).all()
     assert (np.diff(disk.origin) >= 0).all()
     np.testing.assert_array_equal(disk.origin[disk.mesh.faces], mesh.faces)
     on_border = np.zeros(len(mesh.vertices), dtype=bool)
     on_border[disk.origin[disk.mesh.is_boundary_vertex]] = True
     assert on_border[cones].all()
-    # Nothing dangles: a seam ends at cones, boundaries and what had to be cut.
+    # Nothing dangles: a seam ends at cones and boundaries.
     ends, degree = np.unique(mesh.edges[seams], return_counts=True)
     loose = ends[(degree == 1) & ~mesh.is_boundary_vertex[ends]]
-    assert set(loose.tolist()) <= {*cones.tolist(), *mesh.edges[required].ravel().tolist()}
+    assert set(loose.tolist()) <= set(cones.tolist())
 
 
 @pytest.mark.parametrize("name", SURFACES)
@@ -116,48 +115,6 @@ def test_diagonals_are_avoided():
     assert (diagonal | around)[seams].sum() == 1
 
 
-class TestRequired:
-    def test_seams_between_parts_that_must_be_cut(self):
-        mesh, cones = with_cones(SURFACES["genus 2"], 3)
-        required = np.random.default_rng(1).choice(len(mesh.edges), 12, replace=False)
-        seams = find_seams(mesh, cones, lengths_of(mesh), required=required)
-        assert_opened(mesh, seams, cones, required)
-
-    def test_a_loop_around_a_handle_leaves_one_piece(self):
-        mesh, cones = with_cones(shapes.torus(40, 20), 2)
-        ring = np.flatnonzero((mesh.edges < 20).all(axis=1))
-        ring = ring[np.isin(np.diff(mesh.edges[ring], axis=1)[:, 0], (1, 19))]
-        assert len(ring) == 20
-        seams = find_seams(mesh, cones, lengths_of(mesh), required=ring)
-        assert_opened(mesh, seams, cones, ring)
-
-    def test_curves_that_part_the_surface_leave_pieces_that_are_disks_each(self):
-        mesh, cones = with_cones(shapes.genus(3), 6)
-        middle = mesh.vertices[mesh.faces].mean(axis=1)
-        # Three slices; the planes go through the arms between the holes.
-        slab = np.digitize(middle[:, 1], [2.5, 4.5])
-        beside = slab[mesh.edge_faces]
-        required = np.flatnonzero(beside[:, 0] != beside[:, 1])
-        glued = beside[:, 0] == beside[:, 1]
-        pieces, _ = label_components(len(mesh.faces), *mesh.edge_faces[glued].T)
-        assert pieces > 2
-        seams = find_seams(mesh, cones, lengths_of(mesh), required=required)
-        assert_opened(mesh, seams, cones, required, pieces)
-
-    def test_single_edges_and_those_of_the_boundary(self):
-        mesh = TriangleMesh(*shapes.sphere(2))
-        seams = find_seams(mesh, NONE, lengths_of(mesh), required=np.array([7]))
-        assert 7 in seams
-        assert len(seams) == 2
-        assert cut_open(mesh, seams).mesh.components[0] == 1
-        mesh, cones = with_cones(shapes.hill(), 2)
-        boundary = np.flatnonzero(mesh.is_boundary_edge)
-        np.testing.assert_array_equal(
-            find_seams(mesh, cones, lengths_of(mesh), required=boundary),
-            find_seams(mesh, cones, lengths_of(mesh)),
-        )
-
-
 class TestForbidden:
     @pytest.mark.parametrize("name", ["sphere", "annulus", "genus 1"])
     def test_seams_are_found_just_if_there_are_any(self, name):
@@ -192,8 +149,6 @@ class TestForbidden:
         message = f"1 edge of {len(mesh.edges)} is needed to open the mesh, but forbidden as seams"
         with pytest.raises(errors.SeamError, match=message):
             find_seams(mesh, cones, lengths_of(mesh), forbidden=around)
-        with pytest.raises(errors.SeamError, match="2 edges of 480 are both required and forbidden as seams"):
-            find_seams(mesh, cones, lengths_of(mesh), required=around[:2], forbidden=around)
 
 
 def test_graph_prefers_the_cheaper_of_parallel_edges_and_ignores_loops():

@@ -11,11 +11,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import BoolArray, FloatArray, IntArray
-from ..base.jit import compiled
+from ..base.arrays import BoolArray, FloatArray, IntArray, has_any
 from ..base.progress import check_cancelled
 from ..geometry.overlap import find_overlaps
-from ..geometry.planar import bounds, fill_bounds, signed_double_areas
+from ..geometry.planar import bounds, signed_double_areas
 from ..mesh.connectivity import TriangleMesh
 from .charts import ChartLayout, Seams, same_points
 
@@ -58,9 +57,7 @@ class _Gluing:
         self.faces = _members(layout.chart, np.arange(len(layout.chart)))
         if before is None:
             self.corners, self.chart = layout.corners.copy(), layout.chart.copy()
-            self.low, self.high = np.empty((2, len(self.corners), 2))
-            every = np.arange(len(self.corners))
-            fill_bounds(_pairs(self.places), self.corners, every, self.low, self.high)
+            self.low, self.high = bounds(self._corners(np.arange(len(self.corners))))
         else:
             self.corners, self.chart = before.corners, before.chart
             self.low, self.high = before.low, before.high
@@ -123,13 +120,14 @@ class _Gluing:
             return False
         is_joined = np.zeros(len(before), dtype=bool)
         is_joined[pairs] = True
-        changed = np.concatenate([with_points(self.corners, self.faces[kept], is_joined), self.faces[moved]])
+        own = self.faces[kept]
+        changed = np.concatenate([own[has_any(is_joined, self.corners[own])], self.faces[moved]])
         self.corners[changed] = joined[self.corners[changed]]
         seams.here, seams.there = joined[seams.here], joined[seams.there]
         seams.charts[seams.charts == moved] = self.chart[self.faces[moved]] = kept
         self.faces[kept] = np.concatenate([self.faces[kept], self.faces[moved]])
         self.faces[moved] = self.faces[moved][:0]
-        fill_bounds(_pairs(self.places), self.corners, changed, self.low, self.high)
+        self.low[changed], self.high[changed] = bounds(self._corners(changed))
         return True
 
     def _corners(self, faces: IntArray) -> FloatArray:
@@ -142,11 +140,11 @@ class _Gluing:
             return False
         low, high = bounds(corners)
         others = self.faces[kept]
-        others = others[touches(self.low, self.high, others, low.min(axis=0), high.max(axis=0))]
+        others = others[_touch(self.low[others], self.high[others], low.min(axis=0), high.max(axis=0))]
         if not len(others):
             return True
         least, most = self.low[others].min(axis=0), self.high[others].max(axis=0)
-        near = touches(low, high, np.arange(len(low)), least, most)
+        near = _touch(low, high, least, most)
         together = np.concatenate([corners[near], self._corners(others)])
         return not len(find_overlaps(together, limit=1).pairs)
 
@@ -161,29 +159,7 @@ def _pairs(places: NDArray[np.complex128]) -> FloatArray:
     return np.ascontiguousarray(places).view(np.float64).reshape(*places.shape, 2)
 
 
-@compiled
-def with_points(corners: IntArray, chosen: IntArray, is_wanted: BoolArray) -> IntArray:
-    """Return the chosen triangles that have a wanted point; corners are (m, 3), is_wanted is (u,)."""
-    found, count = np.empty(len(chosen), np.int64), 0
-    for f in chosen:
-        if is_wanted[corners[f, 0]] or is_wanted[corners[f, 1]] or is_wanted[corners[f, 2]]:
-            found[count] = f
-            count += 1
-    return found[:count]
-
-
-@compiled
-def touches(
-    low: FloatArray, high: FloatArray, chosen: IntArray, least: FloatArray, most: FloatArray
-) -> BoolArray:
-    """Return flags for the chosen boxes, from `low` to `high` (m, 2), that touch the box from `least` to `most`."""
-    found = np.empty(len(chosen), np.bool_)
-    for i in range(len(chosen)):
-        f = chosen[i]
-        found[i] = (
-            high[f, 0] >= least[0]
-            and low[f, 0] <= most[0]
-            and high[f, 1] >= least[1]
-            and low[f, 1] <= most[1]
-        )
-    return found
+def _touch(low: FloatArray, high: FloatArray, least: FloatArray, most: FloatArray) -> BoolArray:
+    """Return (k,) True for boxes from `low` to `high` (k, 2) that touch the box from `least` to `most` (2,)."""
+    does_touch = (high >= least) & (low <= most)
+    return does_touch[:, 0] & does_touch[:, 1]

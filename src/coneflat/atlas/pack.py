@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats
+from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..base.defaults import PADDING, RESOLUTION
 from ..base.text import short_repr
-from ..errors import ArrayShapeError, NonFiniteError, OptionError
+from ..errors import OptionError
 from ..geometry.planar import signed_double_areas
 from .charts import Charts, Outlines, read_charts
 from .orient import (
@@ -39,8 +39,7 @@ class Packed:
     Attributes:
         corner_uv: (m, 3, 2) position of every triangle corner, in [0, 1]^2; tile i of several is
             [i % 10, i % 10 + 1] x [i // 10, i // 10 + 1], which is UDIM 1001 + i.
-        scale: UV units per unit of length on the surface, the same for all charts; if no areas were given, per unit of
-            length of the input charts.
+        scale: UV units per unit of length of the input charts, the same for all charts.
         efficiency: area of the charts divided by the area of the tiles. Area that a chart covers twice counts twice.
         tile_of_chart: (k,) tile index of each chart, from 0.
         angle_of_chart: (k,) angle by which each chart was rotated, radians.
@@ -56,11 +55,9 @@ class Packed:
 def pack_charts(
     corner_uv: ArrayLike,
     chart_of_triangle: ArrayLike | None = None,
-    areas: ArrayLike | None = None,
     *,
     resolution: int = RESOLUTION,
     padding: float = PADDING,
-    margin: float | None = None,
     rotate: str | int = "any",
     tiles: int = 1,
 ) -> Packed:
@@ -72,11 +69,8 @@ def pack_charts(
     Args:
         corner_uv: (m, 3, 2) positions of the triangle corners, each chart anywhere in the plane.
         chart_of_triangle: (m,) chart index of each triangle, from 0; None for one chart.
-        areas: (m,) areas of the triangles on the surface, used to scale all charts to the same ratio of UV area to
-            surface area; None to keep the relative scales of the charts.
         resolution: texels along a side of the texture.
-        padding: minimum number of texels between charts.
-        margin: minimum number of texels between charts and the border of the texture; None for the same as `padding`.
+        padding: minimum number of texels between charts, and between charts and the border of the texture.
         rotate: "any" rotates charts to fill the texture best; charts with a straight border are aligned with the
             axes, see `orient_charts`. "quarter" aligns each chart, its long side along u or v. "none" does not rotate
             charts. An integer rotates each chart by a multiple of that fraction of a full turn, for example 4 by
@@ -97,34 +91,24 @@ def pack_charts(
         where its top is lowest. Orders and angles are changed at random, with a fixed seed, and improvements are kept.
     """
     charts = read_charts(corner_uv, chart_of_triangle)
-    margin = padding if margin is None else margin
-    return pack_known(charts, areas, resolution, padding, margin, rotate, tiles)
+    return pack_known(charts, resolution, padding, rotate, tiles)
 
 
-def pack_known(
-    charts: Charts,
-    areas: ArrayLike | None,
-    resolution: int,
-    padding: float,
-    margin: float,
-    rotate: str | int,
-    tiles: int,
-) -> Packed:
+def pack_known(charts: Charts, resolution: int, padding: float, rotate: str | int, tiles: int) -> Packed:
     """Pack validated charts; see `pack_charts`."""
-    _check(resolution, padding, margin, rotate, tiles)
-    density = np.ones(charts.count) if areas is None else _densities(charts, areas)
+    _check(resolution, padding, rotate, tiles)
     outlines = charts.outlines()
     is_single = charts.count == 1
     as_given = rotate == "none" or isinstance(rotate, int) or (is_single and rotate == "any")
     directions = [np.empty(0)] * charts.count if rotate == "none" else border_directions(outlines)
     straight = np.zeros(charts.count) if as_given else straight_angles(charts, outlines, directions)
-    frame = density * np.exp(1j * straight)
+    frame = np.exp(1j * straight)
     outlines = outlines.times(frame)
-    inner = 1.0 - 2.0 * margin / resolution
+    inner = 1.0 - 2.0 * padding / resolution
     if is_single:
         packing = _pack_single(outlines, directions[0], rotate)
     else:
-        area = float(np.abs(charts.sums(charts.areas) * density**2).sum())
+        area = float(np.abs(charts.sums(charts.areas)).sum())
         finest = QUARTER_TURNS * min(max(MAX_PLACEMENTS // (QUARTER_TURNS * charts.count), 1), 6)
         choices = {"any": finest, "quarter": QUARTER_TURNS, "none": 1}
         turns = rotate if isinstance(rotate, int) else choices[rotate]
@@ -135,7 +119,7 @@ def pack_known(
 
     scale = inner / (packing.side or 1.0)
     factors = scale * frame * np.exp(1j * packing.angle)
-    border = (1 + 1j) * margin / resolution
+    border = (1 + 1j) * padding / resolution
     uv = charts.moved(factors, packing.shift * scale + border)
     np.clip(uv, 0.0, 1.0, out=uv)
     corner = np.stack([packing.tile % TILES_IN_A_ROW, packing.tile // TILES_IN_A_ROW], axis=1)
@@ -149,31 +133,6 @@ def pack_known(
     )
 
 
-def _densities(charts: Charts, areas: ArrayLike) -> FloatArray:
-    """Return (k,) the factor that scales each chart to its area on the surface.
-
-    Degenerate charts, and charts without area on the surface, get the mean factor of the others.
-    """
-    surface = as_floats("areas", areas)
-    if surface.shape != charts.chart.shape:
-        raise ArrayShapeError(
-            f"areas must have shape {charts.chart.shape}, one for each triangle, got {surface.shape}"
-        )
-    if not np.isfinite(surface).all() or (surface < 0).any():
-        raise NonFiniteError(
-            f"{np.count_nonzero(~(np.isfinite(surface) & (surface >= 0))):,} areas are negative or not finite"
-        )
-    on_surface, in_plane = charts.sums(surface), charts.sums(charts.areas)
-    scalable = charts.has_area & (on_surface > 0)
-    if not scalable.any():
-        return np.ones(charts.count)
-    together = on_surface[scalable].sum() / in_plane[scalable].sum()
-    densities: FloatArray = np.sqrt(
-        np.divide(on_surface, in_plane, out=np.full(charts.count, together), where=scalable)
-    )
-    return densities
-
-
 def _pack_single(outlines: Outlines, directions: FloatArray, rotate: str | int) -> Packing:
     """Return the packing of a single chart, centred in its smallest enclosing square, with the least rotation."""
     angle = square_angle(outlines.points(0), directions) if rotate == "any" else 0.0
@@ -185,14 +144,13 @@ def _pack_single(outlines: Outlines, directions: FloatArray, rotate: str | int) 
     return Packing(side, np.array([angle]), np.array([shift]), np.zeros(1, dtype=np.int64))
 
 
-def _check(resolution: int, padding: float, margin: float, rotate: str | int, tiles: int) -> None:
+def _check(resolution: int, padding: float, rotate: str | int, tiles: int) -> None:
     for name, count in (("resolution", resolution), ("tiles", tiles)):
         if not isinstance(count, (int, np.integer)) or isinstance(count, bool) or count < 1:
             raise OptionError(f"{name} must be a positive integer, got {short_repr(count)}")
-    for name, texels in (("padding", padding), ("margin", margin)):
-        is_number = isinstance(texels, (int, float, np.number)) and not isinstance(texels, bool)
-        if not is_number or not 0 <= texels < np.inf:
-            raise OptionError(f"{name} must be a number of texels, 0 or more, got {short_repr(texels)}")
+    is_number = isinstance(padding, (int, float, np.number)) and not isinstance(padding, bool)
+    if not is_number or not 0 <= padding < np.inf:
+        raise OptionError(f"padding must be a number of texels, 0 or more, got {short_repr(padding)}")
     if isinstance(rotate, int) and not isinstance(rotate, bool):
         if not 1 <= rotate <= MAX_TURNS:
             raise OptionError(f"rotate must be from 1 to {MAX_TURNS} turns, got {rotate}")
@@ -200,8 +158,8 @@ def _check(resolution: int, padding: float, margin: float, rotate: str | int, ti
         raise OptionError(
             f"unknown rotate {short_repr(rotate)}: choose from {', '.join(ROTATIONS)}, or a number of turns"
         )
-    if 2 * margin >= resolution:
-        raise OptionError(f"margins of {margin:g} texels leave no space in a texture of {resolution} texels")
+    if 2 * padding >= resolution:
+        raise OptionError(f"{padding:g} texels of padding leave no space in a texture of {resolution} texels")
 
 
 def arrange_charts(
@@ -242,7 +200,7 @@ def arrange_charts(
         rotate = turns if up is None else "none"
     elif up is not None:
         flat = orient_charts(flat, chart, corners=space, up=up)
-    return pack_known(read(flat), None, resolution, padding, padding, rotate, tiles)
+    return pack_known(read(flat), resolution, padding, rotate, tiles)
 
 
 def turns_of_quantum(quantum: float) -> int:

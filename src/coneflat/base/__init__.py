@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from .defaults import DISTORTION, MAX_CONE_ANGLE, MAX_CONES, MIN_CONE_ANGLE
 from .progress import Progress, Stopwatch, cancel_with, check_cancelled
-from .text import list_some, plural, printable, short_repr
+from .text import exit_text, list_some, plural, printable, short_repr
 from .threads import THREADS, limit_threads
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = [
     "BoolArray", "ComplexArray", "DISTORTION", "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE",
     "MIN_CONE_ANGLE", "Progress", "Stopwatch", "THREADS", "cancel_with", "check_cancelled", "compiled",
-    "dots", "limit_threads", "list_some", "plural", "printable", "short_repr", "unit_exponent",
+    "dots", "exit_text", "limit_threads", "list_some", "plural", "printable", "short_repr", "unit_exponent",
 ]  # fmt: skip
 
 

@@ -73,16 +73,3 @@ def find_root(parent: IntArray, node: int) -> int:
     while parent[node] != node:
         node = parent[node]
     return node
-
-
-@compiled
-def number_sets(parent: IntArray) -> int:
-    """Replace the parent of each node by the number of its tree, in place; return the number of trees."""
-    number = 0
-    for v in range(len(parent)):  # a parent has a smaller index than its children
-        if parent[v] == v:
-            parent[v] = number
-            number += 1
-        else:
-            parent[v] = parent[parent[v]]
-    return number

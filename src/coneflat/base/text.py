@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import signal
 from collections.abc import Iterable
 from itertools import islice
 
@@ -49,3 +50,10 @@ def error_text(residual: float, unit: str = " rad") -> str:
     if not math.isfinite(residual):
         return "off by more than double precision can represent"
     return f"off by {residual:.2g}{unit}"
+
+
+def exit_text(code: int) -> str:
+    """Return a text that says how a process with this exit code ended."""
+    if -code in set(signal.Signals):
+        return f"was ended by {signal.Signals(-code).name}, possibly because memory ran out"
+    return f"ended with code {code}"

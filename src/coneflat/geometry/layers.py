@@ -13,6 +13,7 @@ import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from ..base.jit import compiled
+from ..mesh.connectivity import end_corners
 
 # Number of cells along a side of the grid, divided by the square root of the number of triangles, and its maximum.
 CELLS_PER_ROOT, MAX_CELLS = 1.5, 2048
@@ -29,7 +30,12 @@ def open_sides(edge_halfedges: IntArray, corners: FloatArray, group: IntArray) -
         group: (m,) group of each triangle. Only sides of the same group cancel; all sides of negative groups are open.
     """
     is_open = np.ones(3 * len(corners), dtype=bool)
-    close_sides(edge_halfedges, np.ascontiguousarray(corners), group, is_open)
+    h, t = edge_halfedges[edge_halfedges[:, 1] >= 0].T
+    places = np.ascontiguousarray(corners).view(np.complex128).ravel()
+    (start, end), (other_start, other_end) = end_corners(h), end_corners(t)
+    is_closed = (group[h // 3] == group[t // 3]) & (group[h // 3] >= 0)
+    is_closed &= (places[start] == places[other_end]) & (places[end] == places[other_start])
+    is_open[h[is_closed]] = is_open[t[is_closed]] = False
     return is_open
 
 
@@ -49,7 +55,7 @@ def may_overlap(corners: FloatArray, signs: IntArray, is_open: BoolArray) -> Int
     ends = np.stack([corners[face, (corner + 1) % 3], corners[face, (corner + 2) % 3]], axis=1)
     ends = np.where((signs[face] < 0)[:, None, None], ends[:, ::-1], ends)
     flat = np.ascontiguousarray(corners).reshape(-1, 6)
-    low, high = find_extent(flat)
+    low, high = (pick(pick(corners, axis=0), axis=0) for pick in (np.min, np.max))
     count = min(int(CELLS_PER_ROOT * math.sqrt(len(corners))), MAX_CELLS)
     extent = float((high - low).max())
     # The extent is half a cell less than the grid, so that the points of largest coordinates are in the last cells.
@@ -69,36 +75,6 @@ class Grid(NamedTuple):
     x: float
     y: float
     scale: float
-
-
-@compiled
-def close_sides(edge_halfedges: IntArray, corners: FloatArray, group: IntArray, is_open: BoolArray) -> None:
-    """Write False to `is_open` for half-edges that cancel with their twin; see `open_sides`."""
-    for e in range(len(edge_halfedges)):
-        h, t = edge_halfedges[e]
-        if t < 0:
-            continue
-        f, g = h // 3, t // 3
-        start, end, other_start, other_end = (h + 1) % 3, (h + 2) % 3, (t + 1) % 3, (t + 2) % 3
-        if (
-            group[f] == group[g] >= 0
-            and corners[f, start, 0] == corners[g, other_end, 0]
-            and corners[f, start, 1] == corners[g, other_end, 1]
-            and corners[f, end, 0] == corners[g, other_start, 0]
-            and corners[f, end, 1] == corners[g, other_start, 1]
-        ):
-            is_open[h] = is_open[t] = False
-
-
-@compiled
-def find_extent(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return (2,) the smallest and (2,) the largest coordinates of triangles (m, 6)."""
-    low, high = corners[0, :2].copy(), corners[0, :2].copy()
-    for t in range(len(corners)):
-        for i in range(6):
-            low[i % 2] = min(low[i % 2], corners[t, i])
-            high[i % 2] = max(high[i % 2], corners[t, i])
-    return low, high
 
 
 @compiled

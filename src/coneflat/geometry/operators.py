@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csc_matrix
+from scipy.sparse import csc_matrix, diags
 
-from ..base.arrays import BoolArray, FloatArray, Int32Array, IntArray, as_faces, as_floats, unit_exponent
-from ..base.jit import compiled
+from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats, unit_exponent
 from ..errors import ArrayShapeError, OptionError
+from ..mesh.connectivity import NEXT, PREVIOUS
 from .triangles import double_areas
 
 # Smallest weight, relative to the largest; smaller weights are raised to it. With zero weights, the norm would be
@@ -104,72 +104,10 @@ def cotangent_laplacian(faces: IntArray, cots: FloatArray, vertex_count: int) ->
     triangles, given = as_faces(faces, vertex_count), as_floats("cots", cots)
     if given.shape != triangles.shape:
         raise ArrayShapeError(f"cots must have the shape {triangles.shape} of the faces, got {given.shape}")
-    starts = np.zeros(vertex_count + 1, dtype=np.int32)
-    rows = np.empty(6 * len(triangles) + vertex_count, dtype=np.int32)
-    values = np.empty(len(rows))
-    count = fill_laplacian(triangles, np.ascontiguousarray(given), starts, rows, values)
+    one, two = triangles[:, NEXT].ravel(), triangles[:, PREVIOUS].ravel()
     shape = vertex_count, vertex_count
-    return csc_matrix((values[:count].copy(), rows[:count].copy(), starts), shape=shape)
-
-
-@compiled
-def fill_laplacian(
-    faces: IntArray, cots: FloatArray, starts: Int32Array, rows: Int32Array, values: FloatArray
-) -> int:
-    """Write the Laplacian in CSC form with sorted rows and without zero entries; return the number of entries.
-
-    starts: (n + 1,) zeros on entry. rows, values: buffers for n + 6m entries.
-    """
-    n = len(starts) - 1
-    leaving, entering = np.zeros(n), np.zeros(n)
-    for f in range(len(faces)):
-        for c in range(3):
-            i, j, w = faces[f, (c + 1) % 3], faces[f, (c + 2) % 3], cots[f, c] / 2
-            starts[i + 1] += 1
-            starts[j + 1] += 1
-            leaving[i] += w
-            entering[j] += w
-    for v in range(n):
-        starts[v + 1] += starts[v] + 1
-    # Each column has its diagonal entry first, then two entries for each side at its vertex.
-    place = starts[:-1].copy()
-    for v in range(n):
-        rows[place[v]], values[place[v]] = v, leaving[v] + entering[v]
-        place[v] += 1
-    for f in range(len(faces)):
-        for c in range(3):
-            i, j, w = faces[f, (c + 1) % 3], faces[f, (c + 2) % 3], cots[f, c] / 2
-            rows[place[i]], values[place[i]] = j, -w
-            # Advanced before the next entry, since an edge of an intrinsic triangulation may be a loop (i == j).
-            place[i] += 1
-            rows[place[j]], values[place[j]] = i, -w
-            place[j] += 1
-    # The matrix is symmetric; its transpose, computed column by column, has sorted rows.
-    of_column, of_value = rows.copy(), values.copy()
-    place[:] = starts[:-1]
-    for v in range(n):
-        for at in range(starts[v], starts[v + 1]):
-            row = of_column[at]
-            rows[place[row]], values[place[row]] = v, of_value[at]
-            place[row] += 1
-    return sum_repeated(starts, rows, values)
-
-
-@compiled
-def sum_repeated(starts: Int32Array, rows: Int32Array, values: FloatArray) -> int:
-    """Sum consecutive entries of the same row and remove zeros, in place; return the number of entries left."""
-    kept, begin = 0, 0
-    for v in range(len(starts) - 1):
-        at, end = begin, starts[v + 1]
-        starts[v] = kept
-        while at < end:
-            row, value = rows[at], 0.0
-            while at < end and rows[at] == row:
-                value += values[at]
-                at += 1
-            if value != 0.0:
-                rows[kept], values[kept] = row, value
-                kept += 1
-        begin = end
-    starts[-1] = kept
-    return kept
+    half = csc_matrix((given.ravel() / 2, (one, two)), shape=shape)
+    weights = half + half.T
+    laplacian = csc_matrix(diags(np.asarray(weights.sum(axis=0))[0]) - weights)
+    laplacian.eliminate_zeros()
+    return laplacian

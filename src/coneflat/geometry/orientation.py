@@ -76,4 +76,9 @@ def counterclockwise(corners: FloatArray) -> tuple[FloatArray, IntArray]:
     """Return (m, 3, 2) the triangles, with clockwise ones reversed, and (m,) their orientations 1, -1 or 0."""
     signs = np.empty(len(corners), dtype=np.int64)
     fill_orientations(corners.reshape(-1, 6), np.empty(12), signs)
-    return np.where((signs < 0)[:, None, None], corners[:, ::-1], corners), signs
+    clockwise = np.flatnonzero(signs < 0)
+    if not len(clockwise):
+        return corners, signs
+    oriented = corners.copy()
+    oriented[clockwise] = corners[clockwise][:, ::-1]
+    return oriented, signs

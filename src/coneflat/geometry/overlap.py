@@ -15,7 +15,7 @@ from ..errors import ArrayShapeError, OptionError
 from .coverage import overlap_areas
 from .fans import are_disjoint, find_fans
 from .layers import may_overlap, open_sides
-from .orientation import fill_orientations, orientation
+from .orientation import counterclockwise, orientation
 
 # Relative to the largest coordinate: smaller coordinates count as 0, so that products do not underflow.
 MIN_COORDINATE = 2.0**-420
@@ -77,7 +77,7 @@ def find_overlaps(
     if limit is not None and not (isinstance(limit, Integral) and limit >= 1):
         raise OptionError(f"the limit must be an integer, 1 or more, got {limit!r}")
     corners, exponent = _at_unit_size(_corners(points, triangles))
-    oriented, signs = _counterclockwise(corners)
+    oriented, signs = counterclockwise(corners)
     return _overlaps(oriented, exponent, np.flatnonzero(signs), limit)
 
 
@@ -91,7 +91,7 @@ def overlaps_of_mesh(edge_halfedges: IntArray, corners: FloatArray) -> Overlaps:
         corners: (m, 3, 2) corners of the triangles in the plane.
     """
     corners, exponent = _at_unit_size(_corners(corners, None))
-    oriented, signs = _counterclockwise(corners)
+    oriented, signs = counterclockwise(corners)
     # The sides of triangles that are not counterclockwise do not cancel with those of their neighbours.
     is_open = open_sides(edge_halfedges, corners, signs - 1)
     return _overlaps(oriented, exponent, may_overlap(corners, signs, is_open), None)
@@ -131,21 +131,9 @@ def _at_unit_size(corners: FloatArray) -> tuple[FloatArray, int]:
         corners, factor = np.ldexp(corners, -exponent), 1.0
     else:
         factor = 2.0**-exponent
-    scaled = np.empty(corners.shape)
-    scale_numbers(np.ascontiguousarray(corners).reshape(-1), factor, MIN_COORDINATE, scaled.reshape(-1))
+    scaled = np.ascontiguousarray(corners * factor)
+    scaled[np.abs(scaled) < MIN_COORDINATE] = 0.0
     return scaled, exponent
-
-
-def _counterclockwise(corners: FloatArray) -> tuple[FloatArray, IntArray]:
-    """Return (m, 3, 2) the triangles, with clockwise ones reversed, and (m,) their orientations 1, -1 or 0."""
-    signs = np.empty(len(corners), dtype=np.int64)
-    fill_orientations(corners.reshape(-1, 6), np.empty(12), signs)
-    clockwise = np.flatnonzero(signs < 0)
-    if not len(clockwise):
-        return corners, signs
-    oriented = corners.copy()
-    oriented[clockwise] = corners[clockwise][:, ::-1]
-    return oriented, signs
 
 
 def _find_pairs(corners: FloatArray, chosen: IntArray, limit: int | None) -> tuple[IntArray, bool]:
@@ -265,14 +253,6 @@ def box_tree(boxes: FloatArray) -> FloatArray:
         leaves //= 2
         np.minimum(below[::2], below[1::2], out=tree[leaves - 1 : 2 * leaves - 1])
     return tree
-
-
-@compiled
-def scale_numbers(numbers: FloatArray, factor: float, tiny: float, scaled: FloatArray) -> None:
-    """Write numbers times a factor to `scaled`; magnitudes below `tiny` become 0."""
-    for i in range(len(numbers)):
-        number = numbers[i] * factor
-        scaled[i] = number if abs(number) >= tiny else 0.0
 
 
 @compiled

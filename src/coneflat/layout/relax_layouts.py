@@ -18,6 +18,7 @@ from ..geometry.straight import place_triangles
 from ..mesh.connectivity import TriangleMesh, label_components
 from ..stages import Layout, RelaxSpec
 from .relax import StretchEnergy, relax
+from .untangle import around
 
 # Triangles with more quasi-conformal distortion than this are relaxed, with this number of rings around them. Measured:
 # with a twentieth of the vertices of a fine mesh and three quarters of a coarse one free, the mean comes within 0.0025
@@ -77,7 +78,7 @@ def _relaxed(group: LayoutGroup, spec: RelaxSpec, report: Callable[[str], None])
     before = group.ratios(points)
     is_free = group.is_free
     if not spec.relaxes_all:
-        is_free = is_free & _around(mesh, before > RELAXED_QC) & ~mesh.is_boundary_vertex
+        is_free = is_free & around(mesh.faces, before > RELAXED_QC, RELAXED_RINGS) & ~mesh.is_boundary_vertex
 
     def relaxed_by(start: FloatArray, sharpness: float, is_free: BoolArray) -> FloatArray:
         if not is_free.any():
@@ -296,12 +297,3 @@ def fill_ratios(
         has_area = (rest[0].conjugate() * rest[1]).imag != 0.0
         if has_area and one > two:
             ratios[f] = (one + two) / (one - two)
-
-
-def _around(mesh: TriangleMesh, is_bent: BoolArray) -> BoolArray:
-    """Return (n,) True for the vertices of given triangles and of `RELAXED_RINGS` rings around them."""
-    inside = np.zeros(len(mesh.vertices), dtype=bool)
-    inside[mesh.faces[is_bent]] = True
-    for _ in range(RELAXED_RINGS):
-        inside[mesh.faces[has_any(inside, mesh.faces)]] = True
-    return inside

@@ -10,6 +10,7 @@ from ..base.jit import compiled
 from ..errors import ArrayShapeError
 from ..geometry.planar import as_pairs
 from ..geometry.straight import FlatTriangles
+from ..mesh.connectivity import NEXT, PREVIOUS, end_corners
 
 # Number of iterations that distribute the gaps; each costs as much as half a breadth-first search.
 SWEEPS = 10
@@ -59,7 +60,9 @@ def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
             f"got {faces.shape}"
         )
     corner = faces.ravel()
-    cut = find_cut(flat.twin, corner)
+    start, end = faces[:, NEXT].ravel(), faces[:, PREVIOUS].ravel()
+    # On the boundary, or where the points differ from those of the twin.
+    cut = (flat.twin < 0) | (start != end[flat.twin]) | (end != start[flat.twin])
     m, count = len(faces), int(corner.max()) + 1
     frame, points = np.ones(m, dtype=np.complex128), np.zeros(count, dtype=np.complex128)
     placed, reached = np.zeros(count, dtype=np.bool_), np.zeros(m, dtype=np.bool_)
@@ -70,7 +73,7 @@ def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
     pinned = np.zeros(count, dtype=np.bool_)
     while (seeds := on_cut[~reached[on_cut // 3]]).size:
         border, frames = _border(flat, cut, int(seeds[0]))
-        tails = corner[_next(border)]
+        tails = corner[end_corners(border)[0]]
         points[tails] = closed_chain(frames * flat.sides[border])
         placed[tails] = pinned[tails] = True
         along, first = np.unique(border // 3, return_index=True)
@@ -83,12 +86,8 @@ def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
         reached[seed] = placed[corner[3 * seed]] = pinned[corner[3 * seed]] = True
         queue[0] = seed
         spread(*arrays, 1, reached, frame, placed, points)
-    _close_gaps(flat.sides, corner, frame, points, pinned, *weigh_sides(corner, flat.sides, NO_LENGTH, count))
+    _close_gaps(flat.sides, corner, frame, points, pinned)
     return as_pairs(points)
-
-
-def _next(halfedges: IntArray) -> IntArray:
-    return halfedges - halfedges % 3 + (halfedges + 1) % 3
 
 
 def _border(flat: FlatTriangles, cut: BoolArray, start: int) -> tuple[IntArray, ComplexArray]:
@@ -119,8 +118,6 @@ def _close_gaps(
     frame: ComplexArray,
     points: ComplexArray,
     pinned: BoolArray,
-    weight: FloatArray,
-    diagonal: FloatArray,
 ) -> None:
     """Move the points that are not pinned, in place, to distribute the gaps in the layout.
 
@@ -128,6 +125,11 @@ def _close_gaps(
     jumps along lines where fronts have met; k iterations distribute a jump over about k triangles. SciPy's version
     would divide by zero if no gap is left, as on small charts.
     """
+    squares = sides.real**2 + sides.imag**2
+    weight = 1 / np.maximum(squares, NO_LENGTH**2 * squares.max())
+    one, two, three = weight.reshape(-1, 3).T
+    around = np.stack([two + three, three + one, one + two], axis=1)
+    diagonal = np.bincount(corner, around.ravel(), len(points))
     damping = np.divide(1.0, diagonal, out=np.zeros(len(points)), where=~pinned & (diagonal > 0))
     residual, pull = np.empty_like(points), np.empty_like(points)
     gap_forces(corner, sides, weight, frame, points, residual)
@@ -138,72 +140,12 @@ def _close_gaps(
         if product == 0:
             break
         apply_stiffness(corner, weight, direction, pull)
-        product = take_step(product, damping, pull, direction, shift, residual)
+        length = product / float(np.vdot(direction, pull).real)
+        shift += length * direction
+        residual -= length * pull
+        before, product = product, float(np.vdot(residual, damping * residual).real)
+        direction = damping * residual + (product / before) * direction
     points += shift
-
-
-@compiled
-def weigh_sides(
-    corner: IntArray, sides: ComplexArray, no_length: float, count: int
-) -> tuple[FloatArray, FloatArray]:
-    """Return (3m,) the inverse squared length of each side, and (count,) the sum of these at each point.
-
-    no_length: minimum length of a side, as a fraction of the longest side.
-    """
-    longest, weight, diagonal = 0.0, np.empty(len(sides)), np.zeros(count)
-    for h in range(len(sides)):
-        weight[h] = sides[h].real ** 2 + sides[h].imag ** 2
-        longest = max(longest, weight[h])
-    for base in range(0, len(sides), 3):
-        for x in range(3):
-            weight[base + x] = 1.0 / max(weight[base + x], no_length**2 * longest)
-            diagonal[corner[base + (x + 1) % 3]] += weight[base + x]
-            diagonal[corner[base + (x + 2) % 3]] += weight[base + x]
-    return weight, diagonal
-
-
-@compiled
-def take_step(
-    product: float,
-    damping: FloatArray,
-    pull: ComplexArray,
-    direction: ComplexArray,
-    shift: ComplexArray,
-    residual: ComplexArray,
-) -> float:
-    """Take a step of conjugate gradients, in place; return the product of the residual and the damped residual."""
-    slope = 0.0
-    for v in range(len(pull)):
-        slope += direction[v].real * pull[v].real + direction[v].imag * pull[v].imag
-    length, after = product / slope, 0.0
-    for v in range(len(pull)):
-        d, p = direction[v], pull[v]
-        shift[v] += complex(length * d.real, length * d.imag)
-        residual[v] -= complex(length * p.real, length * p.imag)
-        after += damping[v] * (residual[v].real ** 2 + residual[v].imag ** 2)
-    share = after / product
-    for v in range(len(pull)):
-        d, r = direction[v], residual[v]
-        direction[v] = complex(
-            damping[v] * r.real + share * d.real,
-            damping[v] * r.imag + share * d.imag,
-        )
-    return after
-
-
-@compiled
-def find_cut(twin: IntArray, corner: IntArray) -> BoolArray:
-    """Return (3m,) True for half-edges on the boundary, and for those whose points differ from those of their twins."""
-    cut = np.ones(len(twin), np.bool_)
-    for base in range(0, len(twin), 3):
-        for x in range(3):
-            t = twin[base + x]
-            if t > base + x:  # and so for its twin
-                start, end = base + (x + 1) % 3, base + (x + 2) % 3
-                other_start, other_end = t - t % 3 + (t + 1) % 3, t - t % 3 + (t + 2) % 3
-                cut[base + x] = corner[start] != corner[other_end] or corner[end] != corner[other_start]
-                cut[t] = cut[base + x]
-    return cut
 
 
 @compiled

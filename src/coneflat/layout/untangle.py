@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
-from ..base.jit import compiled
 from ..geometry.planar import heights, signed_angles
 from ..geometry.straight import FlatTriangles
 from .patches import DEGENERATE_HEIGHT, Patches
@@ -73,7 +72,7 @@ def untangle(
         V. Garanzha et al., "Foldover-free maps in 50 lines of code", 2021: an energy that grows without
         bound as the area of a triangle goes to zero, with a regularisation that makes it finite for inverted ones.
     """
-    if not any_degenerate(flat.sides, DEGENERATE_HEIGHT):
+    if not find_degenerate(flat.sides).any():
         return Untangled(flat, np.empty(0, dtype=np.int64), 0.0, np.empty(0, dtype=np.int64))
     state = _Untangling(flat, faces, angles, on_boundary, _thickened(rest))
     for stay in stays:
@@ -111,12 +110,11 @@ class _Untangling:
         self.flat, self.faces, self.angles, self.on_boundary = flat, faces, angles, on_boundary
         self.sides, self.is_copied = flat.sides.reshape(-1, 3), False
         self.moves = np.zeros(len(angles))
-        self.is_bad = np.empty(len(faces), dtype=bool)
-        find_degenerate(flat.sides, DEGENERATE_HEIGHT, self.is_bad)
+        self.is_bad = find_degenerate(flat.sides)
 
     def improve(self, rings: int, stay: BoolArray) -> None:
         """Untangle bad triangles by moving the vertices in a number of rings around them, except those in `stay`."""
-        movable = _neighbourhood(self.faces, np.flatnonzero(self.is_bad), rings, len(stay)) & ~stay
+        movable = around(self.faces, self.is_bad, rings - 1) & ~stay
         if movable.any():
             patches = Patches(self.flat, self.faces, self.sides, movable, self.rest)
             self._accept(patches, patches.solve())
@@ -177,11 +175,11 @@ def winding_vertices(
     return np.flatnonzero(~is_bad & winds)
 
 
-def _neighbourhood(faces: IntArray, seeds: IntArray, rings: int, count: int) -> BoolArray:
-    """Return (n,) True for the vertices of the seed triangles and of `rings - 1` rings of triangles around them."""
-    inside = np.zeros(count, dtype=bool)
+def around(faces: IntArray, seeds: BoolArray, rings: int) -> BoolArray:
+    """Return (n,) True for the vertices of seed triangles (m,) and of `rings` rings of triangles around them."""
+    inside = np.zeros(int(faces.max()) + 1, dtype=bool)
     inside[faces[seeds]] = True
-    for _ in range(rings - 1):
+    for _ in range(rings):
         inside[faces[has_any(inside, faces)]] = True
     return inside
 
@@ -200,27 +198,6 @@ def _thickened(rest: ComplexArray) -> ComplexArray:
     return wanted
 
 
-@compiled
-def is_degenerate(sides: ComplexArray, base: int, least: float) -> bool:
-    """Return True if the triangle of a given first side is flipped or has at most a given height over longest side."""
-    doubled = sides[base].real * sides[base + 1].imag - sides[base].imag * sides[base + 1].real
-    longest = 0.0
-    for h in range(base, base + 3):
-        longest = max(longest, sides[h].real ** 2 + sides[h].imag ** 2)
-    return not doubled > least * longest
-
-
-@compiled
-def any_degenerate(sides: ComplexArray, least: float) -> bool:
-    """Return True if any triangle with sides (3m,) is flipped or has at most a given height over longest side."""
-    f = 0
-    while f < len(sides) // 3 and not is_degenerate(sides, 3 * f, least):
-        f += 1
-    return f < len(sides) // 3
-
-
-@compiled
-def find_degenerate(sides: ComplexArray, least: float, found: BoolArray) -> None:
-    """Fill in (m,) True for each triangle that is flipped or has at most a given height over longest side."""
-    for f in range(len(found)):
-        found[f] = is_degenerate(sides, 3 * f, least)
+def find_degenerate(sides: ComplexArray) -> BoolArray:
+    """Return (m,) True for triangles with sides (3m,) that are flipped or have almost no height over a side."""
+    return ~(heights(sides.reshape(-1, 3)) > DEGENERATE_HEIGHT)

@@ -20,7 +20,7 @@ from .relax import StretchEnergy, relax
 from .relax.relax import rest_sides
 from .relax_layouts import LayoutGroup
 from .unfold import unfold
-from .untangle import MAX_RINGS, any_degenerate, untangle
+from .untangle import MAX_RINGS, find_degenerate, untangle
 
 
 def untangle_seams(
@@ -50,7 +50,7 @@ def untangle_seams(
         a layout of a flat metric.
     """
     flat = _in_the_plane(layout.points, layout.corners)
-    if quantum is not None or not any_degenerate(flat.sides, DEGENERATE_HEIGHT):
+    if quantum is not None or not find_degenerate(flat.sides).any():
         return layout
     disk = TriangleMesh(np.zeros((len(layout.points), 3)), layout.corners)
     vertex = np.empty(len(layout.points), dtype=np.int64)
@@ -77,7 +77,7 @@ def untangle_seams(
     caveat = "the sides of seams near them are unequal"
     if len(untangled.left) and not fixed.any() and disk.boundary_loops[0] == 1:
         embedded = embedded_disk(disk, float(np.abs(signed_double_areas(points[disk.faces])).sum()))
-        if not any_degenerate(_in_the_plane(embedded, disk.faces).sides, DEGENERATE_HEIGHT):
+        if not find_degenerate(_in_the_plane(embedded, disk.faces).sides).any():
             points, is_free, caveat = embedded, ~fixed, "no seam or cone is exact"
     if not is_free.any():
         return layout

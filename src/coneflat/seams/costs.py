@@ -33,7 +33,6 @@ def edge_costs(
     hiding: float = 0.0,
     visibility: FloatArray | None = None,
     vertex_weights: ArrayLike | None = None,
-    edge_weights: ArrayLike | None = None,
 ) -> FloatArray:
     """Return (e,) the costs of edges for `find_seams`: lengths times weights.
 
@@ -45,7 +44,6 @@ def edge_costs(
         hiding: preference for hidden edges, 0 to 10: at 1, an almost invisible edge costs a tenth, at 2 a hundredth.
         visibility: (n,) visible fraction of each vertex, 0 to 1; by default the result of `visible_share`.
         vertex_weights: (n,) weights, not negative; an edge gets the mean of its two ends.
-        edge_weights: (e,) weights, not negative.
 
     Raises:
         OptionError: `hiding` is out of range, or weights are negative, not finite, all 0 or of the wrong shape.
@@ -60,9 +58,7 @@ def edge_costs(
         share = visible_share(mesh.vertices, mesh.faces) if visibility is None else visibility
         costs *= CHEAPEST ** (hiding * _hidden(mesh, share, angles))
     if vertex_weights is not None:
-        costs *= _checked(vertex_weights, len(mesh.vertices), "vertex")[mesh.edges].mean(axis=1)
-    if edge_weights is not None:
-        costs *= _checked(edge_weights, len(mesh.edges), "edge")
+        costs *= _checked(vertex_weights, len(mesh.vertices))[mesh.edges].mean(axis=1)
     return costs
 
 
@@ -108,14 +104,14 @@ def _orientation_sign(mesh: TriangleMesh) -> float:
     return float(np.where(volume < 0, -1.0, 1.0))
 
 
-def _checked(weights: ArrayLike, count: int, noun: str) -> FloatArray:
-    """Return validated weights, one for each vertex or edge, raised to a positive minimum."""
+def _checked(weights: ArrayLike, count: int) -> FloatArray:
+    """Return validated weights, one for each vertex, raised to a positive minimum."""
     values = np.asarray(weights, dtype=np.float64)
     if values.shape != (count,):
-        raise OptionError(f"{noun} weights of seams must be {count:,} numbers, got shape {values.shape}")
+        raise OptionError(f"vertex weights of seams must be {count:,} numbers, got shape {values.shape}")
     if not (np.isfinite(values).all() and values.min() >= 0 and values.max() > 0):
         raise OptionError(
-            f"{noun} weights of seams must be finite, not negative and not all 0, got {values.min():g} to "
+            f"vertex weights of seams must be finite, not negative and not all 0, got {values.min():g} to "
             f"{values.max():g}"
         )
     values = at_safe_scale(values)

@@ -30,37 +30,30 @@ def find_seams(
     edge_costs: FloatArray,
     is_avoided: BoolArray | None = None,
     *,
-    required: IntArray = NO_EDGES,
     forbidden: IntArray = NO_EDGES,
 ) -> IntArray:
     """Return (k,) the edges to cut so that a connected mesh becomes a disk with all cones on its border.
-
-    If required edges form closed curves that cut the mesh into pieces, every piece becomes a disk.
 
     Args:
         mesh: the mesh.
         cones: (s,) vertices that the seams must reach.
         edge_costs: (e,) positive costs, for example the edge lengths, or the result of `edge_costs`.
         is_avoided: (e,) True for edges that are cut only if necessary, such as diagonals of polygons.
-        required: edges that are always cut; boundary edges among them have no effect.
         forbidden: edges that must not be cut.
 
     Raises:
-        SeamError: every set of seams needs forbidden edges; or edges are both required and forbidden.
+        SeamError: every set of seams needs forbidden edges.
         OptionError: costs are not positive numbers.
     """
-    is_required, is_forbidden = np.zeros((2, len(mesh.edges)), dtype=bool)
-    is_required[required] = True
-    is_required &= ~mesh.is_boundary_edge
+    is_forbidden = np.zeros(len(mesh.edges), dtype=bool)
     is_forbidden[forbidden] = True
-    _refuse(is_required & is_forbidden, "both required and forbidden as seams")
     key = mesh_tie_key(mesh)
     costs = _checked(edge_costs, len(mesh.edges)) * (1 + TIE_BREAK * key[mesh.edges].sum(axis=1))
     for is_costly in (is_avoided, is_forbidden):
         if is_costly is not None and is_costly.any():
             costs = np.where(is_costly, costs + costs.sum(), costs)
 
-    is_cut = mesh.is_boundary_edge | is_required
+    is_cut = mesh.is_boundary_edge.copy()
     is_end = np.zeros(len(mesh.vertices), dtype=bool)
     is_end[mesh.edges[is_cut]] = is_end[cones] = True
     if is_end.any():
@@ -71,7 +64,12 @@ def find_seams(
         is_end[np.argmax(key)] = True
         is_cut = without_loose_ends(mesh, _loops(mesh, costs, is_cut, is_end))
     seams = _lengthened(mesh, costs, is_cut & ~mesh.is_boundary_edge)
-    _refuse(seams & is_forbidden, "needed to open the mesh, but forbidden as seams")
+    count = int((seams & is_forbidden).sum())
+    if count:
+        verb = "is" if count == 1 else "are"
+        raise SeamError(
+            f"{plural(count, 'edge')} of {len(seams):,} {verb} needed to open the mesh, but forbidden as seams"
+        )
     return np.flatnonzero(seams)
 
 
@@ -97,12 +95,6 @@ def _checked(costs: FloatArray, count: int) -> FloatArray:
     if np.shape(costs) != (count,) or not (np.isfinite(costs).all() and (costs > 0).all()):
         raise OptionError(f"costs of edges must be {count:,} positive numbers")
     return at_safe_scale(np.asarray(costs, dtype=np.float64))
-
-
-def _refuse(edges: BoolArray, what: str) -> None:
-    count = int(edges.sum())
-    if count:
-        raise SeamError(f"{plural(count, 'edge')} of {len(edges):,} {'is' if count == 1 else 'are'} {what}")
 
 
 def _tree(mesh: TriangleMesh, costs: FloatArray, is_cut: BoolArray, is_end: BoolArray) -> BoolArray:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import subprocess
 import sys
 import threading
@@ -19,6 +18,7 @@ from contextlib import suppress
 from queue import SimpleQueue
 from typing import Any
 
+from ...base import exit_text
 from ...errors import OptionError
 from ...io import remove_unfinished
 from .jobs import Job
@@ -77,16 +77,6 @@ def failed(job: Job, error: str, seconds: float | None = None) -> dict[str, Any]
     }
 
 
-def _exit_text(code: int) -> str:
-    """Return a text that says how a process with this exit code ended."""
-    if code >= 0:
-        return f"ended with code {code}"
-    try:
-        return f"was ended by {signal.Signals(-code).name}"
-    except ValueError:
-        return f"was ended by signal {-code}"
-
-
 class Child:
     """A worker process that is started for its first job, and again after it was ended or has died."""
 
@@ -119,7 +109,7 @@ class Child:
         if limit is not None and seconds >= limit:
             why = f"it took longer than {limit:g} s"
         else:
-            why = f"its process {_exit_text(process.returncode)}, possibly because memory ran out"
+            why = f"its process {exit_text(process.returncode)}"
         return failed(job, why, round(seconds, 3))
 
     def end(self) -> None:

@@ -26,7 +26,7 @@ class CompareFlags:
         methods: Methods to compare, separated by commas.  [default: all]
         eye: Direction from which pictures show the model: front, back, left, right, top, bottom, two of these, or
             X,Y,Z.
-        no_peers: Leave out `unwrap` and other packages (libigl, xatlas, uvunwrap).
+        no_peers: Leave out `unwrap` and other packages (xatlas, uvunwrap).
         paper: Use the cones of the published method (greedy, epsilon 1).
     """
 

@@ -7,14 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
 
-from ... import Flattening, TriangleMesh, unwrap
+from ... import Flattening, unwrap
 from ...base import FloatArray
 from ...errors import MetricError
-from ...geometry import double_areas, edge_lengths, signed_double_areas
 from ...io import as_uv_mesh
 from ..view import uv_flattening
 
@@ -63,24 +61,6 @@ def unwrap_charts(base: Flattening) -> FloatArray:
     return unwrap(base.vertices, base.faces).corner_uv
 
 
-def libigl_lscm(base: Flattening) -> FloatArray:
-    """Return the LSCM of each chart with two distant points pinned; charts keep their areas and are placed in a row."""
-    import igl
-
-    points = np.empty((len(base.uv), 3))
-    points[base.uv_faces] = base.vertices[base.faces]
-    corner_uv, right = np.empty((len(base.faces), 3, 2)), 0.0
-    for chart, _, faces in TriangleMesh(points, base.uv_faces).split_components():
-        pins = np.array([0, int(np.argmax(((chart.vertices - chart.vertices[0]) ** 2).sum(axis=1)))])
-        found: Any = igl.lscm(chart.vertices, chart.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))
-        uv = np.asarray(found[0] if isinstance(found, tuple) else found, dtype=np.float64)[chart.faces]
-        space = double_areas(edge_lengths(chart.vertices, chart.faces)).sum()
-        uv *= np.sqrt(space / np.abs(signed_double_areas(uv)).sum())
-        corner_uv[faces] = uv + np.array([right - uv[..., 0].min(), 0.0])
-        right += float(np.ptp(uv[..., 0]))
-    return corner_uv
-
-
 def xatlas_charts(base: Flattening) -> FloatArray:
     """Return the UVs of xatlas, run at an area of 10,000 so that its absolute tolerances do not matter."""
     import xatlas
@@ -103,7 +83,6 @@ def uvunwrap_charts(base: Flattening) -> FloatArray:
 #: Peers by name.
 PEERS = {
     "unwrap": Peer("coneflat", unwrap_charts, "short seams with free sides, for textures"),
-    "libigl LSCM": Peer("igl", libigl_lscm, "our cut; prescribes no cones"),
     "xatlas": Peer("xatlas", xatlas_charts, "charts of its own"),
     "uvunwrap": Peer("uvunwrap", uvunwrap_charts, "charts of its own"),
 }

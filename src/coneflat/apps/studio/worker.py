@@ -6,7 +6,6 @@ Messages in both directions are JSON followed by bytes.
 from __future__ import annotations
 
 import json
-import signal
 import struct
 import subprocess
 import sys
@@ -15,6 +14,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import IO, Any
 
+from ...base import exit_text
 from ...errors import StudioError
 
 _SIZES = struct.Struct("<QQ")
@@ -82,15 +82,7 @@ class Worker:
                     self._on_message(*frame)
         code = process.wait()
         if self._process is process:  # It was not ended by `end`.
-            self._on_exit(_exit_text(code))
-
-
-def _exit_text(code: int) -> str:
-    """Return a text that says how a process with this exit code ended."""
-    if code < 0:
-        with suppress(ValueError):
-            return f"was ended by {signal.Signals(-code).name}, possibly because memory ran out"
-    return f"ended with code {code}"
+            self._on_exit(exit_text(code))
 
 
 def write_frame(stream: IO[bytes], head: Head, body: bytes = b"") -> None:

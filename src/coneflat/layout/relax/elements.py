@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from ...base.arrays import BoolArray, ComplexArray, FloatArray, Int32Array, IntArray, has_any
+from ...base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
 from ...base.jit import compiled
 from ...geometry.planar import map_factors
-from ...mesh.connectivity import label_components
+from ...mesh.connectivity import label_components, sort_by_counting
 from .energies import Energy
 from .motions import Motions
 
@@ -121,16 +121,24 @@ class Elements:
 
     def _find_pattern(self) -> None:
         k, sizes = self.count, np.diff(self._start)
-        squares = np.concatenate([[0], np.cumsum(sizes**2)])
-        rows, columns = np.empty((2, squares[-1]), dtype=np.int32)
-        fill_pairs(self._start, self._unknown, squares, rows, columns)
-        self._slots = np.empty(len(rows), dtype=np.int64)
-        indptr, indices = np.zeros(k + 1, dtype=np.int32), np.empty(len(rows), dtype=np.int32)
-        count = number_pairs(rows, columns, indptr, indices, self._slots)
+        # The ordered pairs of the unknowns of each element, row by row.
+        lengths = sizes.repeat(sizes)
+        run = np.cumsum(lengths) - lengths - self._start[:-1].repeat(sizes)
+        rows = self._unknown.repeat(lengths)
+        columns = self._unknown[np.arange(len(rows)) - run.repeat(lengths)]
+        self._squares = np.concatenate([[0], np.cumsum(sizes**2)])
+        # The offset, which has the index k, is not solved for.
+        inside = np.flatnonzero((rows < k) & (columns < k))
+        order = inside[sort_by_counting(rows[inside], k)]
+        order = order[sort_by_counting(columns[order], k)]
+        rows, columns = rows[order], columns[order]
+        is_first = np.append(True, (np.diff(rows) != 0) | (np.diff(columns) != 0))[: len(order)]
+        self._slots = np.full(self._squares[-1], -1)
+        self._slots[order] = np.cumsum(is_first) - 1
+        starts = np.searchsorted(columns[is_first], np.arange(k + 1))
         # One matrix for all steps, so that its pattern is analysed once.
-        self._matrix = csc_matrix((np.zeros(count), indices[:count].copy(), indptr), shape=(k, k))
+        self._matrix = csc_matrix((np.zeros(starts[-1]), rows[is_first], starts), shape=(k, k))
         self._indices, self._indptr = self._matrix.indices, self._matrix.indptr
-        self._squares = squares
         self._diagonal = np.flatnonzero(self._indices == np.arange(k).repeat(np.diff(self._indptr)))
         self.parts, self.unknown_part = label_components(
             k, self._indices.astype(np.int64), np.arange(k).repeat(np.diff(self._indptr))
@@ -152,9 +160,9 @@ class Elements:
         return Maps(sums[0], sums[1])
 
     def energies(self, energy: Energy, maps: Maps) -> FloatArray:
-        """Return (f,) the energy of each triangle; infinite where it is flipped."""
+        """Return (f,) the energy of each triangle; infinite where it is flipped, unless the energy is regularised."""
         one, two = maps.singular_values()
-        is_positive = two > 0
+        is_positive = (two > 0) | energy.is_regularised
         values = np.full(len(one), np.inf)
         values[is_positive] = energy.values(one[is_positive], two[is_positive]) * self.weight[is_positive]
         return values
@@ -181,12 +189,8 @@ class Elements:
         first = found.one_one + 2 * found.one_two + found.two_two
         last = found.one_one - 2 * found.one_two + found.two_two
         cross = found.one_one - found.two_two
-        unit_a = maps.a / one  # |a| > |b|
-        is_round = two <= 1e-9 * one
-        unit_b = np.where(is_round, 1.0, maps.b / np.where(is_round, 1.0, two))
-        # By symmetry psi_B vanishes for B = 0, so the limit of the quotient is the second derivative.
-        turn_b = np.where(is_round, last, by_b / np.where(is_round, 1.0, two))
-        turn_a = by_a / one
+        unit_a, turn_a = _polar(maps.a, one, two, by_a, first)
+        unit_b, turn_b = _polar(maps.b, two, one, by_b, last)
         middle, half = (first + last) / 2, (first - last) / 2
         radius = np.hypot(half, cross)
         high, low = np.maximum(middle + radius, 0.0), np.maximum(middle - radius, 0.0)
@@ -227,64 +231,17 @@ class Elements:
         return gradient[: self.count], offset * pull[: self.count], self._matrix
 
 
-@compiled
-def fill_pairs(
-    start: IntArray, unknown: IntArray, squares: IntArray, rows: IntArray, columns: IntArray
-) -> None:
-    """Fill in the ordered pairs of the unknowns of each element."""
-    for f in range(len(start) - 1):
-        at = squares[f]
-        for i in range(start[f], start[f + 1]):
-            for j in range(start[f], start[f + 1]):
-                rows[at] = unknown[i]
-                columns[at] = unknown[j]
-                at += 1
+def _polar(
+    values: ComplexArray, size: FloatArray, other: FloatArray, slope: FloatArray, bend: FloatArray
+) -> tuple[ComplexArray, FloatArray]:
+    """Return (f,) the directions of complex numbers of a given size, and the derivatives by it divided by it.
 
-
-@compiled
-def number_pairs(
-    rows: Int32Array, columns: Int32Array, indptr: Int32Array, indices: Int32Array, slots: IntArray
-) -> int:
-    """Number the distinct pairs by column and row, as entries of a sparse matrix; return the number of entries.
-
-    Args:
-        rows, columns: (p,) the pairs; those with an index of k or more are left out.
-        indptr: (k + 1,) zeros on entry; filled with the start of each column.
-        indices: (p,) filled with the rows of the entries.
-        slots: (p,) filled with the entry of each pair, -1 if it is left out.
+    By symmetry the derivative `slope` vanishes with the size, so the limit of the quotient is the second derivative
+    `bend`. Sizes that are tiny in comparison with `other` count as 0.
     """
-    k = len(indptr) - 1
-    begin = np.zeros(k + 1, np.int64)
-    for p in range(len(rows)):
-        if rows[p] < k and columns[p] < k:
-            begin[rows[p] + 1] += 1
-            indptr[columns[p] + 1] += 1
-    for i in range(k):
-        begin[i + 1] += begin[i]
-        indptr[i + 1] += indptr[i]
-    # Sort by row, and then by column with a stable sort.
-    by_row, by_column = np.empty(begin[k], np.int64), np.empty(begin[k], np.int64)
-    for p in range(len(rows)):
-        slots[p] = -1
-        if rows[p] < k and columns[p] < k:
-            by_row[begin[rows[p]]] = p
-            begin[rows[p]] += 1
-    begin[:] = indptr
-    for p in by_row:
-        by_column[begin[columns[p]]] = p
-        begin[columns[p]] += 1
-    count = 0
-    for column in range(k):
-        first, start = count, indptr[column] if column == 0 else begin[column - 1]
-        for at in range(start, begin[column]):
-            p = by_column[at]
-            if count == first or indices[count - 1] != rows[p]:
-                indices[count] = rows[p]
-                count += 1
-            slots[p] = count - 1
-        indptr[column] = first
-    indptr[k] = count
-    return count
+    is_zero = size <= 1e-9 * other
+    divisor = np.where(is_zero, 1.0, size)
+    return np.where(is_zero, 1.0, values / divisor), np.where(is_zero, bend, slope / divisor)
 
 
 @compiled

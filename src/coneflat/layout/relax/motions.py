@@ -31,15 +31,15 @@ class Motions:
         unknown, coefficient: the unknown of each entry, and the shift of the point per unit of it. Unknown k is not
             solved for: with the value 1 it moves the points to where the constraints hold.
         has_offset: whether constraints do not hold at the current points.
-        builder: the builder of these motions.
+        builder: the builder of these motions, if seams have to be closed.
     """
 
     count: int
     start: IntArray
     unknown: IntArray
     coefficient: ComplexArray
-    has_offset: bool
-    builder: _Builder
+    has_offset: bool = False
+    builder: _Builder | None = None
 
     def closed(self, points: ComplexArray) -> ComplexArray:
         """Return (u,) moved points with the rounding gaps between the sides of seams closed.
@@ -47,9 +47,10 @@ class Motions:
         If a layout shrinks by a factor of a thousand, the relative size of rounding errors grows by the same factor.
         Layouts with quarter turns are returned unchanged.
         """
-        if self.builder.constraints.quarter_turns or not len(self.builder.chains.edges):
+        builder = self.builder
+        if builder is None or builder.constraints.quarter_turns or not len(builder.chains.edges):
             return points
-        motions = self.builder.at(points).motions()
+        motions = builder.at(points).motions()
         step = np.zeros(motions.count + 1)
         step[-1] = CLOSING_UNIT
         return points + motions.shifts(step)
