@@ -18,6 +18,7 @@ from ... import TriangleMesh
 from ...base import ComplexArray, FloatArray, IntArray
 from ...errors import CurvatureError
 from .cross_field import (
+    SHARP_ANGLE,
     field_indices,
     preferred_directions,
     sharp_ends,
@@ -39,7 +40,12 @@ MAX_DOUBLINGS, SPREAD = 3, np.log(2.0) / DISTORTION
 
 
 def aligned_cones(
-    mesh: TriangleMesh, distortion: float, least: int = -2, most: int = 1, price: float = 1.0
+    mesh: TriangleMesh,
+    distortion: float,
+    least: int = -2,
+    most: int = 1,
+    price: float = 1.0,
+    sharp_angle: float = SHARP_ANGLE,
 ) -> dict[int, int]:
     """Return cones of a connected mesh, and corners of its boundary, with their curvature in quarter turns.
 
@@ -48,14 +54,15 @@ def aligned_cones(
         distortion: area distortion that should not be exceeded: the standard deviation of the log scale.
         least, most: bounds of the curvature of cones.
         price: cost of a cone, 1 by default.
+        sharp_angle: dihedral angle of edges that grid lines should follow, radians.
 
     Raises:
         CurvatureError: the mesh has too few vertices for the cones that it needs.
     """
-    directions = preferred_directions(mesh)
+    directions = preferred_directions(mesh, sharp_angle)
     start = field_indices(mesh, smoothest_cross_field(mesh, directions))
     model = MapModel(mesh, directions.both, np.flatnonzero(start), least, most)
-    search = _Search(mesh, model, start, price)
+    search = _Search(mesh, model, start, price, sharp_angle)
     areas = COST_OF_AREAS
     for _ in range(MAX_DOUBLINGS + 1):
         search.descend_all(_Costs(areas / distortion**2))
@@ -94,11 +101,11 @@ class _Block:
 class _Search:
     """The descent; `indices` (p + 1,) are the curvatures at the places, the last one those without a place yet."""
 
-    def __init__(self, mesh: TriangleMesh, model: MapModel, start: IntArray, price: float) -> None:
+    def __init__(self, mesh: TriangleMesh, model: MapModel, start: IntArray, price: float, sharp_angle: float) -> None:
         self.model, self.graph, self.key = model, vertex_graph(mesh), model.key
         inside = np.clip(start[model.places], model.least[:-1], model.most[:-1])
         # Cones at corners of the surface, where sharp edges meet, stay there.
-        edges_at = np.bincount(sharp_ends(mesh).ravel(), minlength=len(mesh.vertices))[model.places]
+        edges_at = np.bincount(sharp_ends(mesh, sharp_angle).ravel(), minlength=len(mesh.vertices))[model.places]
         is_corner = (inside != 0) & (edges_at > 2) & (np.abs(model.curvature - inside) < 0.25)
         fixed = np.flatnonzero(is_corner)
         model.least[fixed] = model.most[fixed] = inside[fixed]
