@@ -28,12 +28,12 @@ from ...layout import StretchEnergy
 from ...measure import unmet_guarantees
 from ...mesh import CheckedMesh
 from ...options import ANGLE_OR_NONE, WordOrVertices, read_options
-from . import lines
 from .aligned_cones import aligned_cones
 from .cross_field import SHARP_ANGLE, sharp_ends
 from .features import split_chords, split_small_components
 from .integer_map import IntegerGrid
 from .layout import GRID_TOLERANCE, GridLayout, aligned
+from .lines import grid_with_lines, with_sides
 from .options import DISTORTION, QUADS, QuadOptions
 from .round_layout import grid_of, split_between_nodes, with_note
 
@@ -222,7 +222,7 @@ class _Search:
         price = max(1.0, QUADS_PER_CONE / quads)
         with self.stages("cones"), limit_threads(options.threads):
             for part, vertices, _ in mesh.split_components():
-                found = aligned_cones(part, options.distortion, *bounds, price, self._angle)
+                found = aligned_cones(part, options.distortion, *bounds, price, self.sharp_angle)
                 cones |= {int(vertices[v]): k * np.pi / 2 for v, k in found.items()}
         given = {name: one for name, one in self.options.items() if name not in OPTIONS}
         given |= {**_defaults({"cones": cones}), "cones": cones}
@@ -308,37 +308,29 @@ class _Search:
         self.stages.done = 1.0
         with self.stages("grid"), limit_threads(result.settings.get("threads", THREADS)):
             layout = aligned(result, self.quads, self.size, self._angle)
-            notes: tuple[str, ...] = ()
+            sided, note = with_sides(layout) if is_straight else layout, ""
             if sharp_lines or self.sharp_angle is not None:
-                found, notes = self._with_sharp_lines(layout)
-                if found:
-                    return found
-            found = self._with_sides(layout, is_straight, all_sides)
-            return replace(found, notes=(*found.notes, *notes))
+                found, note = self._with_lines(sided)
+                if found is not None:
+                    return with_note(found, note)
+            return with_note(self._with_sides(layout, sided, all_sides), note)
 
     @property
     def _angle(self) -> float:
-        """The dihedral angle of sharp edges."""
+        """The dihedral angle above which edges are sharp."""
         return SHARP_ANGLE if self.sharp_angle is None else self.sharp_angle
 
-    def _with_sides(self, layout: GridLayout, is_straight: bool, all_sides: bool) -> IntegerGrid:
-        if not is_straight or np.isin(layout.ends[0][layout.border], layout.sides.points).all():
-            return grid_of(layout, self.energy)
-        with suppress(ConvergenceError, GridError, OptionError):
-            return grid_of(with_sides(layout), self.energy)
-        why = "straight sides of different loops are not parallel up to quarter turns, so not all on grid lines"
-        if all_sides:
-            raise GridError(why)
-        return with_note(grid_of(layout, self.energy), f"{why.capitalize()}.")
-
-    def _with_sharp_lines(self, layout: GridLayout) -> tuple[IntegerGrid | None, tuple[str, ...]]:
-        """Return a grid with sharp edges on grid lines, or None; and a note on required ones that are not."""
+    def _with_lines(self, layout: GridLayout) -> tuple[IntegerGrid | None, str]:
+        """Return a grid with sharp edges on grid lines, or None, and a note on required ones that are not, or ""."""
         layout, _ = split_between_nodes(layout)
-        required = self.sharp_angle is not None
-        edges = lines.sharp_edges(layout, self._angle, required)
-        with np.errstate(all="ignore"):
-            found, kept = lines.grid_with_lines(layout, edges, self.energy, required)
-        if not required:
-            return found, ()
-        notes = lines.notes(layout.mesh, edges, kept)
-        return (found and replace(found, notes=(*found.notes, *notes))), notes
+        return grid_with_lines(layout, self._angle, self.sharp_angle is not None, self.energy)
+
+    def _with_sides(self, layout: GridLayout, sided: GridLayout, all_sides: bool) -> IntegerGrid:
+        """Return a grid with the sides of a layout on grid lines, or without some if these are not required."""
+        try:
+            return grid_of(sided, self.energy)
+        except GridError:
+            if all_sides or len(sided.sides.points) == len(layout.sides.points):
+                raise
+        why = "Straight sides of different loops are not parallel up to quarter turns, so not all on grid lines."
+        return with_note(grid_of(layout, self.energy), why)

@@ -79,8 +79,8 @@ def grid_about(rounding: Rounding, energy: StretchEnergy, most: int = 4) -> Inte
 
 
 def with_note(found: IntegerGrid, note: str) -> IntegerGrid:
-    """Return a grid with one more note."""
-    return replace(found, notes=(*found.notes, note))
+    """Return a grid with one more note, unless this is empty."""
+    return replace(found, notes=(*found.notes, note)) if note else found
 
 
 def _squares(grid: IntegerGrid) -> float:
@@ -176,9 +176,7 @@ def _snapped(found: Relaxed, transitions: Transitions, values: IntArray) -> Comp
     return transitions.places(as_complex(rounded), values.astype(np.float64))
 
 
-def _make_grid(
-    layout: GridLayout, points: ComplexArray, found: Relaxed, tries: int
-) -> IntegerGrid:
+def _make_grid(layout: GridLayout, points: ComplexArray, found: Relaxed, tries: int) -> IntegerGrid:
     mesh, corner_grid = layout.mesh, as_pairs(points)[layout.corners]
     quarters = quarters_around(mesh, sides_between(corner_grid))
     cones, corners = layout.cones, layout.sides.corners

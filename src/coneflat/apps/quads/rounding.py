@@ -39,7 +39,7 @@ class Stiffness:
         self._factor = factorize(ridged)
 
     def displacement(self, given: FloatArray) -> FloatArray:
-        """Return the displacements (2u, k) of least energy; `given` (2u, k) are those of fixed coordinates and copies."""
+        """Return the displacements (2u, k) of least energy for given ones (2u, k) of fixed coordinates and copies."""
         right = -(self._turned.T @ (self._energy @ given))
         return given + self._turned @ self._factor.solve(np.ascontiguousarray(right))
 
@@ -53,7 +53,6 @@ class Stiffness:
             gram[:, block] = pulls.T @ self.displacement(self._shifts @ basis[:, block].astype(np.float64))
         # Changes without energy need a positive value too, so that the energy is a metric.
         return (gram + gram.T) / 2 + 1e-10 * max(float(np.trace(gram)), 1.0) * np.eye(count)
-
 
     def pulls(self, basis: IntArray) -> csr_matrix:
         """Return (2u, d) the matrix whose products with displacements are derivatives of the energy by coordinates."""
