@@ -27,7 +27,7 @@ from ...io import as_input
 from ...layout import StretchEnergy
 from ...measure import unmet_guarantees
 from ...mesh import CheckedMesh
-from ...options import ANGLE_OR_NONE, WordOrVertices, read_options
+from ...options import WordOrVertices, read_options
 from .aligned_cones import aligned_cones
 from .cross_field import SHARP_ANGLE, sharp_ends
 from .features import split_chords, split_small_components
@@ -121,7 +121,10 @@ def integer_grid(
         raise OptionError(f"{name} must be a positive number, not {wanted!r}")
     progress = options.pop("progress", None)
     stages = Stopwatch(progress)
-    energy, angle = StretchEnergy(stretch), ANGLE_OR_NONE.parse("sharp_angle", sharp_angle)
+    energy, angle = (
+        StretchEnergy(stretch),
+        read_options({"sharp_angle": sharp_angle}).sharp_angle,
+    )
     search = _Search(mesh, faces, quads or QUADS, size, energy, options, progress, stages, angle)
     if isinstance(mesh, Flattening):
         if faces is not None or options or sharp_angle is not None:

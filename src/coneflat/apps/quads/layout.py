@@ -112,9 +112,9 @@ class GridLayout:
         times = float(np.sqrt(factor))
         return replace(self, points=times * self.points, size=self.size / times)
 
-    def chains(self, quarter_turns: bool = False) -> SeamChains:
+    def chains(self) -> SeamChains:
         """Return the seams as chains between vertices that must lie on grid points; see `find_chains`."""
-        return find_chains(self.mesh, self.corners, self.points, self.nodes, quarter_turns=quarter_turns)
+        return find_chains(self.mesh, self.corners, self.points, self.nodes)
 
 
 def aligned(

@@ -246,12 +246,13 @@ def find_rounding(layout: GridLayout) -> Rounding:
     solutions = integer_solutions(transitions.equations, zeros)
     assert solutions is not None
     basis = solutions.basis
-    start = np.linalg.lstsq(basis.astype(np.float64), transitions.values, rcond=None)[0]
+    fitted = np.linalg.lstsq(basis.astype(np.float64), transitions.values, rcond=None)[0]
+    start = np.array(fitted, dtype=np.float64)
     stiffness = Stiffness(layout, transitions)
     metric = stiffness.gram(basis)
     # The least energy, to which sides that are not straight in the layout contribute.
     shift = stiffness.displacement(_given(layout.points, transitions, basis @ start))
-    start = start - np.linalg.solve(metric, (stiffness.pulls(basis).T @ shift)[:, 0])
+    start -= np.linalg.solve(metric, (stiffness.pulls(basis).T @ shift)[:, 0])
     pairs = _near_pairs(layout, transitions, basis, start)
     return Rounding(basis, start, metric, pairs, stiffness, layout, transitions)
 

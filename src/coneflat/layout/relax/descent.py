@@ -19,8 +19,6 @@ from .motions import Motions
 RELATIVE_ROUNDING = 1e-12
 # The constraints cannot be reached if a step covers less than this fraction of the distance to them.
 MIN_PROGRESS = 1e-3
-# Maximum fraction of the distance per step if seams and sides have to rotate: with longer steps, sides fold over.
-TURNING_STRIDE = 0.1
 # If less than this fraction of the unknowns is in parts that have not converged, only these parts are continued. And
 # factor by which more unknowns than there are count for the choice of the solver, since matrices of one pattern are
 # factorized repeatedly: with 6,000 unknowns this halves the time.
@@ -53,7 +51,6 @@ def descend(
     tolerance: float,
     steps: int,
     progress: Callable[[int, float], bool | None] | None = None,
-    stride: float = 1.0,
 ) -> Descent:
     """Return points of lower energy, found by Newton's method.
 
@@ -70,7 +67,6 @@ def descend(
             the lower bound.
         steps: maximum number of steps.
         progress: called with the number of steps and the energy; a return value of True ends the iteration.
-        stride: maximum fraction of the distance to the constraints per step.
 
     Raises:
         MetricError: the Hessian is singular in double precision.
@@ -113,8 +109,7 @@ def descend(
         change = elements.change(step)
         length = np.full(parts, np.inf)
         np.minimum.at(length, part, maps.largest_steps(change))
-        longest = min(1.0, stride / remaining) if remaining else 1.0
-        length = np.minimum(longest, MAX_STEP_SHARE * length)
+        length = np.minimum(1.0, MAX_STEP_SHARE * length)
         taken += 1
         for _ in range(HALVINGS):
             trial = maps.plus(length[part], change)
