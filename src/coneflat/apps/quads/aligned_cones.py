@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import dijkstra
 from ... import TriangleMesh
 from ...base import ComplexArray, FloatArray, IntArray
 from ...errors import CurvatureError
+from ..unwrap.coarse import coarse_mesh
 from .cross_field import (
     SHARP_ANGLE,
     field_indices,
@@ -32,6 +33,8 @@ from .options import DISTORTION
 COST_OF_AREAS, COST_OF_DIRECTIONS, TIMES_REQUIRED, COST_OF_MISSING = 15.0, 200.0, 5.0, 1e4
 # Radii within which cones move, relative to the distance between the centres of regions, and tried places in each.
 RADII, PLACES_NEAR = (1.0, 0.6, 0.35, 0.2), 10
+# Number of triangles of a coarse mesh, on which the cones of larger meshes are searched.
+COARSE = 25_000
 # Least decrease of the cost by a step of a descent, which thus ends.
 MIN_GAIN = 1e-3
 # How often the cost of areas is doubled to meet the bound, and the bound for a distortion of 1: the log of the ratio of
@@ -60,10 +63,13 @@ def aligned_cones(
     Raises:
         CurvatureError: the mesh has too few vertices for the cones that it needs.
     """
-    angle = SHARP_ANGLE if sharp_angle is None else sharp_angle
+    angle, kept = SHARP_ANGLE if sharp_angle is None else sharp_angle, np.arange(len(mesh.vertices))
+    degrees = np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
+    if len(mesh.faces) > 2 * COARSE:
+        mesh, kept, _ = coarse_mesh(mesh, COARSE)
     directions = preferred_directions(mesh, angle)
     start = field_indices(mesh, smoothest_cross_field(mesh, directions))
-    model = MapModel(mesh, directions.both, np.flatnonzero(start), least, most)
+    model = MapModel(mesh, directions.both, np.flatnonzero(start), least, most, degrees[kept])
     search = _Search(mesh, model, start, price, angle)
     along = COST_OF_DIRECTIONS * (1.0 if sharp_angle is None else TIMES_REQUIRED)
     areas = COST_OF_AREAS
@@ -75,7 +81,7 @@ def aligned_cones(
     if search.indices[-1]:
         raise CurvatureError(f"{len(mesh.vertices):,} vertices are too few for the cones")
     found = np.flatnonzero(search.indices[:-1])
-    return dict(zip(model.places[found].tolist(), search.indices[found].tolist(), strict=True))
+    return dict(zip(kept[model.places[found]].tolist(), search.indices[found].tolist(), strict=True))
 
 
 class _Costs(NamedTuple):

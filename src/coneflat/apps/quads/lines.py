@@ -57,7 +57,7 @@ def grid_with_lines(
         if not len(lined.edges):
             break
         rounding = find_rounding(lined.layout)
-        costs, is_folded = lined.costs(layout, rounding.displaced(rounding.smooth))
+        costs, is_folded = lined.costs(layout, rounding.displaced([rounding.smooth])[0])
         is_bad = costs >= 0.5 * costs.max()
         if not is_required and costs.max() > MAX_COST * np.sqrt(layout.area):
             is_bad = costs > MAX_COST * np.sqrt(layout.area)

@@ -18,6 +18,8 @@ from .transitions import Transitions
 
 # Relative deviation from the requested number of squares above which a note is added.
 NOTED_SHARE = 0.1
+# Largest fraction of the distance to lines per step of relaxing.
+LINE_STRIDE = 0.1
 
 
 def grid_of(layout: GridLayout, energy: StretchEnergy) -> IntegerGrid:
@@ -114,7 +116,7 @@ def _displaced(layout: GridLayout, rounding: Rounding, values: IntArray) -> Comp
 
     If this makes a triangle too small, return the smooth layout itself, from which relaxing may still succeed.
     """
-    moved = rounding.displaced(values)
+    (moved,) = rounding.displaced([values])
     before, after = (replace(layout, points=points).double_areas() for points in (layout.points, moved))
     return moved if (after > 0.01 * before).all() else layout.points
 
@@ -147,6 +149,7 @@ def _relaxed(
         lines=lines,
         tied=chains.halfedges[one_of, 1],
         translations=values[:count].reshape(-1, 2),
+        stride=LINE_STRIDE if lines and smooth is layout.points else 1.0,
     )
     # A thousand times the energy of an isometry occurs if cones merge. Of 60 cases of benchmarks/grids.py the slowest
     # takes 1.7 times as long without this limit.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
@@ -179,14 +180,21 @@ class Rounding:
                 if (angle, at_once) == SEPARATIONS[-1]:
                     raise
         values = [np.asarray(self.basis @ each) for each in found]
-        areas = [self._flipped_area(each) for each in values]
+        areas = [
+            -float(np.minimum(replace(self.layout, points=points).double_areas(), 0.0).sum())
+            for points in self.displaced(values)
+        ]
         return [values[i] for i in np.argsort(areas, kind="stable")]
 
-    def displaced(self, values: FloatArray | IntArray) -> ComplexArray:
-        """Return (u,) the points with given values (v,) of the variables, moved by the displacement of least energy."""
-        points = self.layout.points
-        shift = self.stiffness.displacement(_given(points, self.transitions, values))
-        return self.transitions.places(points + as_complex(shift.reshape(-1, 2)), values)
+    def displaced(self, values: Sequence[FloatArray | IntArray]) -> list[ComplexArray]:
+        """Return (u,) the points moved by the displacement of least energy to each of some values (v,)."""
+        points, places = self.layout.points, self.transitions.places
+        given = [as_pairs(places(points, each) - points).ravel() for each in values]
+        shifts = self.stiffness.displacement(np.stack(given, axis=1)).T
+        return [
+            places(points + as_complex(shift.reshape(-1, 2)), each)
+            for shift, each in zip(shifts, values, strict=True)
+        ]
 
     def _separated(self, lattice: Lattice, angle: float, at_once: int | None) -> list[IntArray]:
         """Return near vectors of a lattice that separate all cones, and rotate near pairs by less than `angle`."""
@@ -208,11 +216,6 @@ class Rounding:
             [lattice.nearest(self.start, 64), lattice.nearest(self.start, 1, QUICK_VISITS)]
         )
         return [each for each in found if not len(self.pairs.collapsed(each, angle))][:16]
-
-    def _flipped_area(self, values: IntArray) -> float:
-        """Return twice the area of triangles that the displacement of least energy to given values (v,) flips."""
-        doubled = replace(self.layout, points=self.displaced(values)).double_areas()
-        return -float(np.minimum(doubled, 0.0).sum())
 
     def _separate(self, pair: int, lattice: Lattice) -> Lattice | None:
         """Return the part of a lattice where two cones keep their distance along an axis, at least a unit.
@@ -251,15 +254,11 @@ def find_rounding(layout: GridLayout) -> Rounding:
     stiffness = Stiffness(layout, transitions)
     metric = stiffness.gram(basis)
     # The least energy, to which sides that are not straight in the layout contribute.
-    shift = stiffness.displacement(_given(layout.points, transitions, basis @ start))
+    given = as_pairs(transitions.places(layout.points, basis @ start) - layout.points).reshape(-1, 1)
+    shift = stiffness.displacement(given)
     start -= np.linalg.solve(metric, (stiffness.pulls(basis).T @ shift)[:, 0])
     pairs = _near_pairs(layout, transitions, basis, start)
     return Rounding(basis, start, metric, pairs, stiffness, layout, transitions)
-
-
-def _given(points: ComplexArray, transitions: Transitions, values: FloatArray | IntArray) -> FloatArray:
-    """Return (2u, 1) the displacements of fixed coordinates and copies for values (v,) of the variables."""
-    return as_pairs(transitions.places(points, values) - points).reshape(-1, 1)
 
 
 def _near_pairs(

@@ -45,6 +45,7 @@ class PointConstraints:
         tied: (q,) half-edges of seams with prescribed translations.
         translations: (q, 2) the final translation of each tied half-edge: a point in the frame of its own triangle is
             the corresponding point in the frame of the opposite triangle, rotated by the seam's rotation, plus this.
+        stride: largest fraction of the distance to the constraints per step; where lines turn, long steps fold them.
     """
 
     pinned: ArrayLike = ()
@@ -53,6 +54,7 @@ class PointConstraints:
     held_seams: ArrayLike = ()
     tied: ArrayLike = ()
     translations: ArrayLike = ()
+    stride: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)

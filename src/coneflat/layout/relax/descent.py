@@ -51,6 +51,7 @@ def descend(
     tolerance: float,
     steps: int,
     progress: Callable[[int, float], bool | None] | None = None,
+    stride: float = 1.0,
 ) -> Descent:
     """Return points of lower energy, found by Newton's method.
 
@@ -67,6 +68,7 @@ def descend(
             the lower bound.
         steps: maximum number of steps.
         progress: called with the number of steps and the energy; a return value of True ends the iteration.
+        stride: maximum fraction of the distance to the constraints per step.
 
     Raises:
         MetricError: the Hessian is singular in double precision.
@@ -109,7 +111,8 @@ def descend(
         change = elements.change(step)
         length = np.full(parts, np.inf)
         np.minimum.at(length, part, maps.largest_steps(change))
-        length = np.minimum(1.0, MAX_STEP_SHARE * length)
+        longest = min(1.0, stride / remaining) if remaining else 1.0
+        length = np.minimum(longest, MAX_STEP_SHARE * length)
         taken += 1
         for _ in range(HALVINGS):
             trial = maps.plus(length[part], change)

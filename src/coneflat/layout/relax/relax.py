@@ -138,7 +138,8 @@ def relax(
     elements = Elements(motions, corner, rest, unit, share)
     if not elements.count and not motions.has_offset:
         return Relaxed(places, 0.0, 0.0, 0, is_free)
-    found = descend(z, motions, elements, energy, tolerance, steps, progress)
+    stride = 1.0 if constraints is None else constraints.stride
+    found = descend(z, motions, elements, energy, tolerance, steps, progress, stride)
     if found.remaining:
         raise ConvergenceError(
             f"constraints cannot be met without flipping triangles: {1 - found.remaining:.1%} of the way to them "
