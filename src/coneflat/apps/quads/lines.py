@@ -8,6 +8,7 @@ is a grid.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import count
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -33,8 +34,6 @@ SHORTEST = 4.0
 MAX_COST = 5e-4
 # The energy of a triangle that is flipped or nearly so.
 FOLDED_ENERGY = 10.0
-# Largest number of times that chains are left out.
-MAX_TRIES = 60
 
 
 def grid_with_lines(
@@ -52,13 +51,14 @@ def grid_with_lines(
     sharp = sharp_edges(mesh, angle) if is_required else edge_indices(mesh, sharp_ends(mesh, angle))
     near = sharp if is_required else sharp[np.abs(off[sharp]) < MAX_TURN]
     edges, found = _long_chains(layout, near), None
-    for attempt in range(MAX_TRIES):
+    for attempt in count():
         lined = _with_lines(layout, edges, off)
         if not len(lined.edges):
             break
         rounding = find_rounding(lined.layout)
         costs, is_folded = lined.costs(layout, rounding.displaced([rounding.smooth])[0])
-        is_bad = costs >= 0.5 * costs.max()
+        # Each failure lowers the bound, so that the attempts end soon.
+        is_bad = costs >= 0.5 ** (1 + attempt / 4) * costs.max()
         if not is_required and costs.max() > MAX_COST * np.sqrt(layout.area):
             is_bad = costs > MAX_COST * np.sqrt(layout.area)
         elif not is_folded or (is_required and attempt == 0):
@@ -110,7 +110,7 @@ class _Lined:
             before: the layout that is not cut.
             moved: (u,) where the points move.
         """
-        mesh, count = before.mesh, int(self.chain.max()) + 1
+        mesh, chains = before.mesh, int(self.chain.max()) + 1
         one, two = map_factors((places := before.points[before.corners])[:, PREVIOUS] - places[:, NEXT])
         after = moved[self.layout.corners]
         after = after - after[:, :1]
@@ -128,8 +128,8 @@ class _Lined:
         nearest = dijkstra(graph.maximum(graph.T), indices=on, min_only=True, return_predecessors=True)[2]
         near = np.flatnonzero(nearest[mesh.faces[:, 0]] >= 0)
         chain = at[nearest[mesh.faces[near, 0]]]
-        along = np.bincount(self.chain, lengths_along(mesh, self.edges), count) / before.size
-        costs: FloatArray = np.bincount(chain, energy[near], count) / along
+        along = np.bincount(self.chain, lengths_along(mesh, self.edges), chains) / before.size
+        costs: FloatArray = np.bincount(chain, energy[near], chains) / along
         return costs, bool(is_folded.any())
 
 

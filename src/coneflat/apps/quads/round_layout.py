@@ -105,10 +105,23 @@ def _grid_near(rounding: Rounding, energy: StretchEnergy) -> tuple[IntegerGrid |
             tries, why = tries + 1, str(error)
             continue
         points = _snapped(found, transitions, values)
+        if _folds_sides(layout, transitions, points):
+            tries, why = tries + 1, "sides of triangles on grid lines change their direction"
+            continue
         if (replace(layout, points=points).double_areas() > 0).all():
             return _make_grid(layout, points, found, tries), ""
         tries, why = tries + 1, "rounding flipped a very small triangle"
     return None, why
+
+
+def _folds_sides(layout: GridLayout, transitions: Transitions, points: ComplexArray) -> bool:
+    """Return whether an edge on a side turns by more than a right angle if points move, which flips no triangle."""
+    on = np.zeros(len(points), dtype=bool)
+    on[layout.sides.points] = True
+    sides = np.concatenate([layout.border, transitions.chains.halfedges.ravel()])
+    starts, ends = (each[sides] for each in layout.ends)
+    turned = (points[ends] - points[starts]) * np.conj(layout.points[ends] - layout.points[starts])
+    return bool((turned.real <= 0)[on[starts] & on[ends]].any())
 
 
 def _displaced(layout: GridLayout, rounding: Rounding, values: IntArray) -> ComplexArray:

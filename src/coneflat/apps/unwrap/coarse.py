@@ -23,13 +23,12 @@ def coarse_part(part: Part, count: int) -> tuple[Part, IntArray]:
     """Return a part with about `count` triangles, and (k,) the vertices of the given part that it keeps."""
     coarse, kept, faces = coarse_mesh(part.mesh, count)
     own = edge_lengths(coarse.vertices, coarse.faces)
-    lengths, _ = mollify(own)
     seams, none = part.seams, np.zeros(len(coarse.edges), dtype=bool)
     return Part(
         coarse,
         part.vertices[kept],
         faces,
-        lengths,
+        mollify(own)[0],
         double_areas(own),
         replace(
             part.cones,
@@ -58,8 +57,7 @@ def coarse_mesh(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntArray,
     points, key = mesh.vertices - mesh.vertices.mean(axis=0), tie_key(mesh.vertices)
     collapse_edges(points, faces, _quadrics(mesh, points), mesh.is_boundary_vertex, key, count)
     kept, corners = np.unique(faces[faces[:, 0] >= 0], return_inverse=True)
-    coarse = TriangleMesh(mesh.vertices[kept], corners.reshape(-1, 3))
-    return coarse, kept, np.flatnonzero(faces[:, 0] >= 0)
+    return TriangleMesh(mesh.vertices[kept], corners.reshape(-1, 3)), kept, np.flatnonzero(faces[:, 0] >= 0)
 
 
 def _quadrics(mesh: TriangleMesh, points: FloatArray) -> FloatArray:
