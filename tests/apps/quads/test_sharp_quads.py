@@ -11,9 +11,9 @@ from test_integer_grid import check_laws
 
 from coneflat import errors, integer_grid, quads
 from coneflat.apps.quads.extract import extract_quads
-from coneflat.apps.quads.features import edge_indices, sharp_edges, split_for_features
+from coneflat.apps.quads.features import edge_indices, sharp_edges
 from coneflat.apps.quads.quality import measure_quads
-from coneflat.layout.relax.elimination import orthogonal_solutions, sparse_solutions
+from coneflat.layout.relax.elimination import orthogonal_solutions
 from coneflat.mesh.connectivity import TriangleMesh
 
 SHARP = np.deg2rad(40)
@@ -69,7 +69,7 @@ def vertices_that_turn(mesh, edges):
 @pytest.mark.parametrize("name", SHAPES)
 def test_laws(name, count):
     grid = integer_grid(*SHAPES[name], quads=count, sharp_angle=SHARP)
-    assert grid.notes == ()
+    assert not any("sharp edge" in note for note in grid.notes)
     check_laws(grid)
     check_features(grid)
     mesh = TriangleMesh(grid.vertices, grid.faces)
@@ -95,20 +95,29 @@ def test_cube_is_of_squares(count):
     ]
 
 
-def test_irregular_vertices_by_patch():
-    """A disk without corners has quarter turns for four cones of three quads; six corners leave -2 (Gauss-Bonnet)."""
-    round_one = quads(*SHAPES["cylinder"], quads=1000, sharp_angle=SHARP)
-    assert (4 - round_one.valences[round_one.irregular]).sum() == 8
-    height = round_one.vertices[:, 2]
-    for level in (height.min(), height.max()):
-        on_cap = round_one.irregular[np.abs(height[round_one.irregular] - level) < 1e-9]
-        assert (4 - round_one.valences[on_cap]).sum() == 4
-    six = quads(*SHAPES["hexagon"], quads=1000, sharp_angle=SHARP)
-    place = six.vertices[six.irregular]
-    cap = np.abs(place[:, 2] - place[:, 2].min()) < 1e-9
-    at_corner = np.abs(np.hypot(place[:, 0], place[:, 1]) - 1) < 1e-6
-    assert (4 - six.valences[six.irregular[cap & at_corner]]).sum() == 6
-    assert (4 - six.valences[six.irregular[cap & ~at_corner]]).sum() == -2
+@pytest.mark.parametrize("name", ["cylinder", "hexagon"])
+def test_quads_follow_round_edges(name):
+    """All sharp edges are on edges of quads, and irregular vertices add up to 8 quarter turns (Gauss-Bonnet)."""
+    found = quads(*SHAPES[name], quads=1000, sharp_angle=SHARP)
+    assert (4 - found.valences[found.irregular]).sum() == 8
+    vertices, faces = SHAPES[name]
+    for level in (vertices[:, 2].min(), vertices[:, 2].max()):
+        # Each quad is on a cap or beside it, so those on the cap cover it.
+        areas = [
+            double_areas_of(points, corners[(np.abs(points[:, 2] - level) < 1e-9)[corners].all(axis=1)])
+            for points, corners in (
+                (vertices, faces),
+                (found.vertices, found.quads[:, :3]),
+                (found.vertices, found.quads[:, [0, 2, 3]]),
+            )
+        ]
+        assert areas[1] + areas[2] == pytest.approx(areas[0], rel=0.01)
+
+
+def double_areas_of(vertices, faces):
+    """Return twice the area of triangles."""
+    a, b, c = vertices[faces].transpose(1, 0, 2)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
 
 
 def test_surface_without_sharp_edges():
@@ -124,26 +133,23 @@ def test_impossible_angles(angle):
         integer_grid(*SHAPES["cube"], quads=100, sharp_angle=angle)
 
 
-@pytest.mark.parametrize("solutions", [sparse_solutions, orthogonal_solutions])
 @pytest.mark.parametrize("seed", range(5))
-def test_elimination_spans_all_solutions(seed, solutions):
+def test_elimination_spans_all_solutions(seed):
     rng = np.random.default_rng(seed)
     rows = rng.integers(-1, 2, (12, 30)) * (rng.random((12, 30)) < 0.2)
     rows = np.concatenate([rows, rows[:3] - rows[3:6]]).astype(float)
     right = rows @ rng.normal(size=30)
-    found, left = solutions(csr_matrix(rows), right)
+    found, left = orthogonal_solutions(csr_matrix(rows), right)
     basis = found.toarray()
     assert np.abs(left).max(initial=0.0) < 1e-9
     assert rows @ basis[:, -1] == pytest.approx(right, abs=1e-9)
     assert np.abs(rows @ basis[:, :-1]).max() < 1e-9
     assert np.linalg.matrix_rank(basis[:, :-1]) == 30 - np.linalg.matrix_rank(rows) == basis.shape[1] - 1
     right[-1] += 1
-    missed = solutions(csr_matrix(rows), right)[1]
-    if solutions is sparse_solutions:
-        assert np.abs(missed).max() == pytest.approx(1)
-    else:  # turned: as long as what least squares leave
-        nearest = rows @ np.linalg.lstsq(rows, right)[0]
-        assert np.linalg.norm(missed) == pytest.approx(np.linalg.norm(right - nearest))
+    missed = orthogonal_solutions(csr_matrix(rows), right)[1]
+    # As long as what least squares leave.
+    nearest = rows @ np.linalg.lstsq(rows, right)[0]
+    assert np.linalg.norm(missed) == pytest.approx(np.linalg.norm(right - nearest))
 
 
 @pytest.mark.parametrize("count", [10, 300])
@@ -155,8 +161,8 @@ def test_two_triangles_back_to_back(count):
     assert abs(len(mesh.quads) - count) < 0.1 * count + 5
 
 
-def test_a_patch_has_at_most_as_many_cones_as_squares():
-    """Each triangle of a pyramid is a patch of two squares, in which more cones would not find grid points."""
+def test_sharp_edges_without_room_are_left_out_with_a_note():
+    """Between the edges of a pyramid of 40 quads there is less than a square."""
     angle = np.pi / 6 * np.arange(12)
     around = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     sides = [[i, (i + 1) % 12, 12] for i in range(12)]
@@ -164,13 +170,6 @@ def test_a_patch_has_at_most_as_many_cones_as_squares():
     grid = integer_grid(
         np.vstack([around, [[0, 0, 6.8], [0, 0, -0.4]]]), sides + base, quads=40, sharp_angle=0.3
     )
+    check_laws(grid)
     check_features(grid)
-    assert not any("not on grid lines" in note for note in grid.notes)
-
-
-def test_needles_are_not_split_without_bound():
-    vertices = np.array([[0.0, 0.0, 0.0], [12.0, -0.2, 0.0], [28.0, -0.4, 0.0]])
-    fine, _, _ = split_for_features(
-        vertices, np.array([[0, 1, 2], [2, 1, 0]]), np.array([[0, 1], [1, 2]]), 0.04
-    )
-    assert len(fine.faces) < 100_000
+    assert any("% of their length, not on grid lines: " in note for note in grid.notes)

@@ -17,7 +17,9 @@ from scipy.sparse.csgraph import dijkstra
 from ... import TriangleMesh
 from ...base import ComplexArray, FloatArray, IntArray
 from ...errors import CurvatureError
+from ..unwrap.coarse import coarse_mesh
 from .cross_field import (
+    SHARP_ANGLE,
     field_indices,
     preferred_directions,
     sharp_ends,
@@ -26,11 +28,13 @@ from .cross_field import (
 from .map_model import SAMPLES, MapModel, vertex_graph
 from .options import DISTORTION
 
-# Cost of an area distortion as large as allowed, at first; a cone costs 1 for each quarter turn, and a missing one more
-# than all others.
-COST_OF_AREAS, COST_OF_MISSING = 15.0, 1e4
+# Cost of an area distortion as large as allowed, at first, and of crosses off by 22.5 degrees, which is larger where
+# sharp edges are required on grid lines; a cone costs 1 for each quarter turn, and a missing one more than all others.
+COST_OF_AREAS, COST_OF_DIRECTIONS, TIMES_REQUIRED, COST_OF_MISSING = 15.0, 200.0, 5.0, 1e4
 # Radii within which cones move, relative to the distance between the centres of regions, and tried places in each.
 RADII, PLACES_NEAR = (1.0, 0.6, 0.35, 0.2), 10
+# Number of triangles of a coarse mesh, on which the cones of larger meshes are searched.
+COARSE = 25_000
 # Least decrease of the cost by a step of a descent, which thus ends.
 MIN_GAIN = 1e-3
 # How often the cost of areas is doubled to meet the bound, and the bound for a distortion of 1: the log of the ratio of
@@ -39,7 +43,12 @@ MAX_DOUBLINGS, SPREAD = 3, np.log(2.0) / DISTORTION
 
 
 def aligned_cones(
-    mesh: TriangleMesh, distortion: float, least: int = -2, most: int = 1, price: float = 1.0
+    mesh: TriangleMesh,
+    distortion: float,
+    least: int = -2,
+    most: int = 1,
+    price: float = 1.0,
+    sharp_angle: float | None = None,
 ) -> dict[int, int]:
     """Return cones of a connected mesh, and corners of its boundary, with their curvature in quarter turns.
 
@@ -48,31 +57,38 @@ def aligned_cones(
         distortion: area distortion that should not be exceeded: the standard deviation of the log scale.
         least, most: bounds of the curvature of cones.
         price: cost of a cone, 1 by default.
+        sharp_angle: dihedral angle of edges that grid lines must follow, radians; None: that from which on they prefer
+            to, and other directions count as much.
 
     Raises:
         CurvatureError: the mesh has too few vertices for the cones that it needs.
     """
-    directions = preferred_directions(mesh)
+    angle, kept = SHARP_ANGLE if sharp_angle is None else sharp_angle, np.arange(len(mesh.vertices))
+    degrees = np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
+    if len(mesh.faces) > 2 * COARSE:
+        mesh, kept, _ = coarse_mesh(mesh, COARSE)
+    directions = preferred_directions(mesh, angle)
     start = field_indices(mesh, smoothest_cross_field(mesh, directions))
-    model = MapModel(mesh, directions.both, np.flatnonzero(start), least, most)
-    search = _Search(mesh, model, start, price)
+    model = MapModel(mesh, directions.both, np.flatnonzero(start), least, most, degrees[kept])
+    search = _Search(mesh, model, start, price, angle)
+    along = COST_OF_DIRECTIONS * (1.0 if sharp_angle is None else TIMES_REQUIRED)
     areas = COST_OF_AREAS
     for _ in range(MAX_DOUBLINGS + 1):
-        search.descend_all(_Costs(areas / distortion**2))
+        search.descend_all(_Costs(areas / distortion**2, along))
         if model.spread <= SPREAD * distortion:
             break
         areas *= 2
     if search.indices[-1]:
         raise CurvatureError(f"{len(mesh.vertices):,} vertices are too few for the cones")
     found = np.flatnonzero(search.indices[:-1])
-    return dict(zip(model.places[found].tolist(), search.indices[found].tolist(), strict=True))
+    return dict(zip(kept[model.places[found]].tolist(), search.indices[found].tolist(), strict=True))
 
 
 class _Costs(NamedTuple):
     """Costs of the squared area distortion, of crosses off by 22.5 degrees, and of a handle's rotation off by 45."""
 
     areas: float
-    directions: float = 200.0
+    directions: float
     handles: float = 60.0
 
 
@@ -94,11 +110,15 @@ class _Block:
 class _Search:
     """The descent; `indices` (p + 1,) are the curvatures at the places, the last one those without a place yet."""
 
-    def __init__(self, mesh: TriangleMesh, model: MapModel, start: IntArray, price: float) -> None:
+    def __init__(
+        self, mesh: TriangleMesh, model: MapModel, start: IntArray, price: float, sharp_angle: float
+    ) -> None:
         self.model, self.graph, self.key = model, vertex_graph(mesh), model.key
         inside = np.clip(start[model.places], model.least[:-1], model.most[:-1])
         # Cones at corners of the surface, where sharp edges meet, stay there.
-        edges_at = np.bincount(sharp_ends(mesh).ravel(), minlength=len(mesh.vertices))[model.places]
+        edges_at = np.bincount(sharp_ends(mesh, sharp_angle).ravel(), minlength=len(mesh.vertices))[
+            model.places
+        ]
         is_corner = (inside != 0) & (edges_at > 2) & (np.abs(model.curvature - inside) < 0.25)
         fixed = np.flatnonzero(is_corner)
         model.least[fixed] = model.most[fixed] = inside[fixed]

@@ -56,12 +56,12 @@ def halfedge_angles(angles: FloatArray) -> FloatArray:
     return np.stack([zero, np.pi - angles[:, 2], np.pi + angles[:, 1]], axis=1).ravel()
 
 
-def preferred_directions(mesh: TriangleMesh) -> Directions:
-    """Return the preferred crosses of a mesh."""
+def preferred_directions(mesh: TriangleMesh, angle: float = SHARP_ANGLE) -> Directions:
+    """Return the preferred crosses of a mesh, at edges sharper than an angle and along curvature."""
     lengths = edge_lengths(mesh.vertices, mesh.faces)
     areas = np.maximum(double_areas(lengths) / 2, np.finfo(float).tiny)
     scale = float(np.sqrt(areas.sum()))
-    sides = mesh.edge_halfedges[sharp_or_boundary(mesh, SHARP_LENGTH * scale)].ravel()
+    sides = mesh.edge_halfedges[sharp_or_boundary(mesh, SHARP_LENGTH * scale, angle)].ravel()
     sides = sides[sides >= 0]
     crosses = lengths.ravel()[sides] * np.exp(4j * halfedge_angles(corner_angles(lengths))[sides])
     count = len(mesh.faces)
@@ -78,9 +78,9 @@ def preferred_directions(mesh: TriangleMesh) -> Directions:
     return Directions(sharp, np.asarray(curved, dtype=np.complex128))
 
 
-def sharp_or_boundary(mesh: TriangleMesh, shortest: float) -> IntArray:
+def sharp_or_boundary(mesh: TriangleMesh, shortest: float, angle: float = SHARP_ANGLE) -> IntArray:
     """Return the edges that are on the boundary or sharp; connected sharp edges shorter than `shortest` are noise."""
-    sharp = np.flatnonzero(np.abs(dihedral_angles(mesh)) > SHARP_ANGLE)
+    sharp = np.flatnonzero(np.abs(dihedral_angles(mesh)) > angle)
     ends = mesh.edges[sharp]
     _, label = label_components(len(mesh.vertices), ends[:, 0], ends[:, 1])
     lengths = np.linalg.norm(np.diff(mesh.vertices[ends], axis=1)[:, 0], axis=1)
@@ -88,10 +88,10 @@ def sharp_or_boundary(mesh: TriangleMesh, shortest: float) -> IntArray:
     return np.union1d(sharp[total[label[ends[:, 0]]] > shortest], np.flatnonzero(mesh.is_boundary_edge))
 
 
-def sharp_ends(mesh: TriangleMesh) -> IntArray:
-    """Return (k, 2) the vertices of the sharp edges of a mesh, without the boundary."""
+def sharp_ends(mesh: TriangleMesh, angle: float = SHARP_ANGLE) -> IntArray:
+    """Return (k, 2) the vertices of the edges of a mesh sharper than an angle, without the boundary."""
     scale = float(np.sqrt(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum() / 2))
-    edges = sharp_or_boundary(mesh, SHARP_LENGTH * scale)
+    edges = sharp_or_boundary(mesh, SHARP_LENGTH * scale, angle)
     return mesh.edges[edges[~mesh.is_boundary_edge[edges]]]
 
 

@@ -1,15 +1,13 @@
-"""Sharp edges of a surface, the patches between them, and mesh refinement for them."""
+"""Sharp edges of a surface, their chains, and mesh refinement for them."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray
-from ...geometry import corner_angles, dihedral_angles, face_normals
-from ...mesh import CutMesh, label_components, label_faces, open_along, tie_key
+from ...geometry import dihedral_angles
+from ...mesh import label_components, label_faces, tie_key
 
 
 def sharp_edges(mesh: TriangleMesh, angle: float) -> IntArray:
@@ -42,38 +40,6 @@ def without_stubs(mesh: TriangleMesh, edges: IntArray, least: float) -> IntArray
         kept = kept[~is_stub[chain]]
 
 
-def patches_of(mesh: TriangleMesh, edges: IntArray) -> tuple[int, IntArray]:
-    """Return the number of patches into which edges divide a mesh, and (m,) the patch of each triangle."""
-    glued = ~mesh.is_boundary_edge
-    glued[edges] = False
-    pairs = mesh.edge_faces[glued]
-    return label_components(len(mesh.faces), pairs[:, 0], pairs[:, 1])
-
-
-def dangling(mesh: TriangleMesh, edges: IntArray) -> IntArray:
-    """Return the indices of the edges (k,) that have the same patch on both sides."""
-    _, patch = patches_of(mesh, edges)
-    one, two = patch[mesh.edge_faces[edges]].T
-    return np.flatnonzero(one == two)
-
-
-def border_of(mesh: TriangleMesh, edges: IntArray, number: int) -> IntArray:
-    """Return the indices of the edges (k,) on the longest chain between a patch and another patch.
-
-    If there is no such chain, return the edges inside the patch; the result may be empty.
-    """
-    _, patch = patches_of(mesh, edges)
-    one, two = patch[mesh.edge_faces[edges]].T
-    adjacent = (one == number) | (two == number)
-    border = np.flatnonzero(adjacent & (one != two))
-    if not len(border):
-        return np.flatnonzero(adjacent)
-    chain, _ = feature_chains(mesh, edges)
-    lengths = lengths_along(mesh, edges)
-    longest = int(np.argmax(np.bincount(chain[border], lengths[border])))
-    return border[chain[border] == longest]
-
-
 def feature_chains(mesh: TriangleMesh, edges: IntArray) -> tuple[IntArray, IntArray]:
     """Return (k,) the chain of each edge, and (k, 2) the number of edges that meet at its ends.
 
@@ -88,100 +54,6 @@ def feature_chains(mesh: TriangleMesh, edges: IntArray) -> tuple[IntArray, IntAr
     return chain, degree[ends]
 
 
-@dataclass(frozen=True, eq=False)
-class Opened:
-    """A mesh cut open along its features.
-
-    Attributes:
-        mesh: the mesh.
-        edges: (k,) the features, inner edges.
-        cut: the mesh cut open along them, with the original vertex of each of its vertices.
-        quarters: (c,) the target angle at each boundary vertex of the open mesh in quarter turns: at least one, two
-            where it is straight; 0 inside.
-    """
-
-    mesh: TriangleMesh
-    edges: IntArray
-    cut: CutMesh
-    quarters: IntArray
-
-    @property
-    def nodes(self) -> IntArray:
-        """Vertices on features or the boundary that must lie on grid points: where these meet, end or turn."""
-        border = np.flatnonzero(self.quarters > 0)
-        turns = np.zeros(len(self.mesh.vertices), dtype=bool)
-        turns[self.cut.origin[border[self.quarters[border] != 2]]] = True
-        copies = np.bincount(self.cut.origin[border], minlength=len(turns))
-        inside = ~self.mesh.is_boundary_vertex
-        turns |= np.where(inside, (copies != 2) & (copies > 0), copies > 1)
-        return np.flatnonzero(turns)
-
-    @property
-    def irregular(self) -> IntArray:
-        """The inner nodes with an angle sum other than four quarter turns."""
-        total = np.bincount(self.cut.origin, self.quarters, len(self.mesh.vertices)).astype(np.int64)
-        return np.flatnonzero((total > 0) & (total != 4) & ~self.mesh.is_boundary_vertex)
-
-    @property
-    def is_feature(self) -> BoolArray:
-        """(e,) whether each edge of the mesh is a feature."""
-        mask = np.zeros(len(self.mesh.edges), dtype=bool)
-        mask[self.edges] = True
-        return mask
-
-
-def opened(mesh: TriangleMesh, edges: IntArray, lengths: FloatArray) -> Opened:
-    """Return a mesh cut open along edges (k,), with angles rounded to quarter turns; `lengths` has shape (m, 3)."""
-    cut = open_along(mesh, edges)
-    angles = corner_angles(lengths)
-    sums = np.bincount(cut.mesh.faces.ravel(), angles.ravel(), len(cut.origin)) / (np.pi / 2)
-    rounded = np.maximum(np.rint(sums), 1).astype(np.int64)
-    # Corners of an octagon, with 1.5 quarter turns, count as straight independently of rounding errors.
-    rounded[(rounded == 1) & (sums > 1.45)] = 2
-    return Opened(mesh, edges, cut, np.where(cut.mesh.is_boundary_vertex, rounded, 0))
-
-
-def split_for_features(
-    vertices: FloatArray, faces: IntArray, features: IntArray, longest: float
-) -> tuple[TriangleMesh, IntArray, IntArray]:
-    """Return a finer mesh of the same surface, (f,) its feature edges, and (f,) the given feature that contains each.
-
-    Edges are split until none is longer than `longest`, or than a quarter of the square root of the area of its patch,
-    unless that takes far too many triangles.
-    Edges that join two vertices on features or the boundary, without being such edges, are split too, because straight
-    sides could degenerate their triangles. The longest edge of a triangle is always split first, so that angles do not
-    become arbitrarily small.
-
-    Args:
-        vertices, faces: (n, 3), (m, 3) the mesh; its vertices remain the first ones.
-        features: (k, 2) pairs of vertices.
-        longest: largest edge length.
-
-    References:
-        M.-C. Rivara, "Algorithms for refining triangular grids suitable for adaptive and multigrid techniques", 1984.
-    """
-    mesh = TriangleMesh(*_without_pillows(vertices, faces))
-    edges, origin = edge_indices(mesh, features), np.arange(len(features))
-    for _ in range(30):  # each round halves edges
-        marked = _too_long(mesh, edges, longest)
-        # Needles become far more triangles than their area suggests, as they stay similar until the short sides are
-        # short enough. A patch of two triangles needs about 100.
-        if not marked.any() or len(mesh.faces) > 2**15 + 64 * len(faces):
-            break
-        mesh, edges, origin = _split(mesh, edges, origin, _with_longest_sides(mesh, marked))
-    return _split(mesh, edges, origin, _chords(mesh, edges))
-
-
-def split_faces(
-    mesh: TriangleMesh, edges: IntArray, origin: IntArray, faces: IntArray
-) -> tuple[TriangleMesh, IntArray, IntArray]:
-    """Return a mesh with all sides of some faces split, its features (k,), and (k,) the origin of each."""
-    marked = np.zeros(len(mesh.edges), dtype=bool)
-    marked[mesh.halfedge_edges.reshape(-1, 3)[faces]] = True
-    mesh, edges, origin = _split(mesh, edges, origin, _with_longest_sides(mesh, marked))
-    return _split(mesh, edges, origin, _chords(mesh, edges))
-
-
 def split_chords(mesh: TriangleMesh, ends: IntArray | None = None) -> tuple[TriangleMesh, int]:
     """Return a mesh without inner edges between two boundary vertices, by splitting them, and their number.
 
@@ -190,7 +62,7 @@ def split_chords(mesh: TriangleMesh, ends: IntArray | None = None) -> tuple[Tria
     """
     mesh, none = TriangleMesh(*_without_pillows(mesh.vertices, mesh.faces)), np.empty(0, dtype=np.int64)
     chords = _chords(mesh, none if ends is None else edge_indices(mesh, ends))
-    return _split(mesh, none, none, chords)[0], int(chords.sum())
+    return _split(mesh, chords), int(chords.sum())
 
 
 def split_small_components(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
@@ -198,7 +70,7 @@ def split_small_components(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
 
     On a sphere, a grid has at least eight cones.
     """
-    mesh, none = TriangleMesh(*_without_pillows(mesh.vertices, mesh.faces)), np.empty(0, dtype=np.int64)
+    mesh = TriangleMesh(*_without_pillows(mesh.vertices, mesh.faces))
     small = 0
     while True:
         count, label = label_faces(mesh.faces, len(mesh.vertices))
@@ -206,7 +78,7 @@ def split_small_components(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
         small = small or int(is_small.sum())
         if not is_small.any():
             return mesh, small
-        mesh, _, _ = _split(mesh, none, none, is_small[label[mesh.edge_faces[:, 0]]])
+        mesh = _split(mesh, is_small[label[mesh.edge_faces[:, 0]]])
 
 
 def edge_indices(mesh: TriangleMesh, pairs: IntArray) -> IntArray:
@@ -232,16 +104,6 @@ def _without_pillows(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray,
     return points, np.concatenate([faces[~paired], *fans])
 
 
-def _too_long(mesh: TriangleMesh, edges: IntArray, longest: float) -> BoolArray:
-    """Return (e,) whether each edge is longer than its patches allow."""
-    count, patch = patches_of(mesh, edges)
-    areas = np.linalg.norm(face_normals(mesh.vertices, mesh.faces), axis=1) / 2
-    allowed = np.minimum(longest, np.sqrt(np.bincount(patch, areas, count)) / 4)[patch]
-    lengths = lengths_along(mesh, np.arange(len(mesh.edges)))
-    one, two = mesh.edge_faces.T
-    return lengths > np.minimum(allowed[one], np.where(two < 0, np.inf, allowed[two]))
-
-
 def _chords(mesh: TriangleMesh, edges: IntArray) -> BoolArray:
     """Return (e,) whether each edge joins two vertices on features or the boundary without being such an edge."""
     is_fixed = mesh.is_boundary_edge.copy()
@@ -249,18 +111,6 @@ def _chords(mesh: TriangleMesh, edges: IntArray) -> BoolArray:
     on = np.zeros(len(mesh.vertices), dtype=bool)
     on[mesh.edges[is_fixed]] = True
     return on[mesh.edges].all(axis=1) & ~is_fixed
-
-
-def _with_longest_sides(mesh: TriangleMesh, marked: BoolArray) -> BoolArray:
-    """Return (e,) marks extended by the longest side of every triangle that has a marked side."""
-    marked, longest = marked.copy(), _longest_sides(mesh, np.ones(len(marked), dtype=bool))
-    sides = mesh.halfedge_edges.reshape(-1, 3)
-    while True:
-        more = longest[marked[sides].any(axis=1)]
-        more = more[~marked[more]]
-        if not len(more):
-            return marked
-        marked[more] = True
 
 
 def _longest_sides(mesh: TriangleMesh, among: BoolArray) -> IntArray:
@@ -278,10 +128,8 @@ def _longest_sides(mesh: TriangleMesh, among: BoolArray) -> IntArray:
     return sides[np.arange(len(sides)), np.argmax(rank[sides], axis=1)]
 
 
-def _split(
-    mesh: TriangleMesh, edges: IntArray, origin: IntArray, marked: BoolArray
-) -> tuple[TriangleMesh, IntArray, IntArray]:
-    """Return a mesh with marked edges split at their midpoints, its features (k,), and (k,) the origin of each."""
+def _split(mesh: TriangleMesh, marked: BoolArray) -> TriangleMesh:
+    """Return a mesh with marked edges (e,) split at their midpoints."""
     n = len(mesh.vertices)
     middle = np.full(len(marked), -1)
     middle[marked] = n + np.arange(int(marked.sum()))
@@ -290,12 +138,7 @@ def _split(
     first = np.argmax(sides == _longest_sides(mesh, marked)[:, None], axis=1)
     origin_face, corners = split_pieces(marked[sides], first)
     six = np.concatenate([mesh.faces, middle[sides]], axis=1)[origin_face]
-    finer = TriangleMesh(points, np.take_along_axis(six, corners, axis=1))
-    pairs, at = mesh.edges[edges], middle[edges]
-    is_cut = at >= 0
-    halves = [np.stack([pairs[is_cut, end], at[is_cut]], axis=1) for end in range(2)]
-    features = edge_indices(finer, np.concatenate([pairs[~is_cut], *halves]))
-    return finer, features, np.concatenate([origin[~is_cut], origin[is_cut], origin[is_cut]])
+    return TriangleMesh(points, np.take_along_axis(six, corners, axis=1))
 
 
 def split_pieces(is_split: BoolArray, first: IntArray) -> tuple[IntArray, IntArray]:

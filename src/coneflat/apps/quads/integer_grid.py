@@ -29,14 +29,13 @@ from ...measure import unmet_guarantees
 from ...mesh import CheckedMesh
 from ...options import WordOrVertices, read_options
 from .aligned_cones import aligned_cones
-from .cross_field import sharp_ends
+from .cross_field import SHARP_ANGLE, sharp_ends
 from .features import split_chords, split_small_components
 from .integer_map import IntegerGrid
 from .layout import GRID_TOLERANCE, GridLayout, aligned
+from .lines import grid_with_lines, with_sides
 from .options import DISTORTION, QUADS, QuadOptions
-from .patch_layout import straightened, with_sharp_lines
-from .round_layout import grid_about, grid_near, grid_of, split_between_nodes, with_note
-from .sharp import sharp_layouts
+from .round_layout import grid_of, split_between_nodes, with_note
 
 # Options of the flattening for a grid: three, five or six quads at a cone, and rotations by quarter turns.
 OPTIONS = {
@@ -52,8 +51,6 @@ OPTIONS = {
 QUADS_PER_CONE = 2_000
 # Largest fraction of the edges that are split because they join two vertices on sharp edges.
 MAX_CHORDS = 0.05
-# Largest mean quasi-conformal distortion of a grid with sharp edges on grid lines.
-MAX_SHARP_QC = 1.11
 # Options that only the search for the fewest cones takes into account.
 SPARSE_OPTIONS = ("cone_count", "required_cones", "forbidden_cones", "weights", "positive_only", "max_cones")
 
@@ -124,13 +121,17 @@ def integer_grid(
         raise OptionError(f"{name} must be a positive number, not {wanted!r}")
     progress = options.pop("progress", None)
     stages = Stopwatch(progress)
-    search = _Search(mesh, faces, quads or QUADS, size, StretchEnergy(stretch), options, progress, stages)
+    energy, angle = (
+        StretchEnergy(stretch),
+        read_options({"sharp_angle": sharp_angle}).sharp_angle,
+    )
+    search = _Search(mesh, faces, quads or QUADS, size, energy, options, progress, stages, angle)
     if isinstance(mesh, Flattening):
         if faces is not None or options or sharp_angle is not None:
             raise OptionError("a flattening already has faces and options: no others can be given")
         found = search.of_result(mesh)
     else:
-        found = search.with_more_cones(sharp_angle, options.pop("boundary", "auto"))
+        found = search.with_more_cones(options.pop("boundary", "auto"))
     return replace(found, seconds=stages.seconds)
 
 
@@ -168,23 +169,24 @@ class _Search:
     options: dict[str, Any]
     progress: Progress | None
     stages: Stopwatch
+    sharp_angle: float | None = None
 
-    def with_more_cones(self, sharp_angle: float | str | None, boundary: Any) -> IntegerGrid:
-        """Return a grid for the options `sharp_angle` and `boundary`, with less distortion if there is none as given.
+    def with_more_cones(self, boundary: Any) -> IntegerGrid:
+        """Return a grid for the option `boundary`, with less distortion if there is none as given.
 
         Where few cones leave rotations around handles far from quarter turns, more cones help.
         """
         given = self.options
         is_searched = isinstance(given.get("cones", "auto"), str) and not given.get("cone_count")
         try:
-            return self.with_lines(sharp_angle, boundary)
+            return self.with_boundary(boundary)
         except (ConvergenceError, GridError):
             if not is_searched:
                 raise
         less = 0.7 * given.get("distortion", DISTORTION)
         search = replace(self, options={**given, "distortion": less})
         note = f"With a distortion above {less:.3g}, no grid was found."
-        return with_note(search.with_lines(sharp_angle, boundary), note)
+        return with_note(search.with_boundary(boundary), note)
 
     def with_boundary(self, boundary: Any) -> IntegerGrid:
         """Return a grid for the option `boundary` of `integer_grid`."""
@@ -210,7 +212,7 @@ class _Search:
         for split, note, noun in (FEW_VERTICES, CHORDS):
             mesh, count = split(mesh)
             notes += [note.format(plural(count, noun))] if count else []
-        finer, count = split_chords(mesh, sharp_ends(mesh))
+        finer, count = split_chords(mesh, sharp_ends(mesh, self._angle))
         # On coarse meshes these are most edges, and their triangles would get thin.
         mesh = finer if count < MAX_CHORDS * len(mesh.edges) else mesh
         bounds = (
@@ -223,7 +225,7 @@ class _Search:
         price = max(1.0, QUADS_PER_CONE / quads)
         with self.stages("cones"), limit_threads(options.threads):
             for part, vertices, _ in mesh.split_components():
-                found = aligned_cones(part, options.distortion, *bounds, price)
+                found = aligned_cones(part, options.distortion, *bounds, price, self.sharp_angle)
                 cones |= {int(vertices[v]): k * np.pi / 2 for v, k in found.items()}
         given = {name: one for name, one in self.options.items() if name not in OPTIONS}
         given |= {**_defaults({"cones": cones}), "cones": cones}
@@ -246,16 +248,6 @@ class _Search:
         except (CurvatureError, MetricError) as error:
             why = f"The boundary cuts squares, because no grid with the boundary on grid lines was found: {error}."
         return with_note(self._of_flattening("free"), why)
-
-    def with_lines(self, sharp_angle: float | str | None, boundary: Any) -> IntegerGrid:
-        """Return a grid with the boundary and as many sharp edges as possible on grid lines."""
-        if sharp_angle is None:
-            return self.with_boundary(boundary)
-        boundary = "free" if boundary == "auto" else boundary
-        with self.stages("grid"):
-            found, why = self._along_axes({**self.options, "sharp_angle": sharp_angle, "boundary": boundary})
-        none = f"No sharp edge is on a grid line: {why}."
-        return found or with_note(self._of_flattening(boundary), none)
 
     def _checked(self) -> CheckedMesh:
         given, repair = as_input(self.mesh, self.faces), bool(self.options.get("repair", False))
@@ -318,37 +310,30 @@ class _Search:
         is_straight = result.settings.get("boundary") == "straight"
         self.stages.done = 1.0
         with self.stages("grid"), limit_threads(result.settings.get("threads", THREADS)):
-            layout = aligned(result, self.quads, self.size)
-            if sharp_lines and (found := self._with_sharp_lines(layout)):
-                return found
-            if not is_straight or np.isin(layout.ends[0][layout.border], layout.sides.points).all():
-                return grid_of(layout, self.energy)
-            with suppress(ConvergenceError, GridError, OptionError):
-                # Relaxing rotates the sides, which is not conformal.
-                return grid_of(straightened(layout), self.energy)
-            why = "straight sides of different loops are not parallel up to quarter turns, so not all on grid lines"
-            if all_sides:
-                raise GridError(why)
-            return with_note(grid_of(layout, self.energy), f"{why.capitalize()}.")
+            layout = aligned(result, self.quads, self.size, self._angle)
+            sided, note = with_sides(layout) if is_straight else layout, ""
+            if sharp_lines or self.sharp_angle is not None:
+                found, note = self._with_lines(sided)
+                if found is not None:
+                    return with_note(found, note)
+            return with_note(self._with_sides(layout, sided, all_sides), note)
 
-    def _with_sharp_lines(self, layout: GridLayout) -> IntegerGrid | None:
-        """Return a grid with sharp edges on grid lines, or None if there are none or it is much distorted."""
+    @property
+    def _angle(self) -> float:
+        """The dihedral angle above which edges are sharp."""
+        return SHARP_ANGLE if self.sharp_angle is None else self.sharp_angle
+
+    def _with_lines(self, layout: GridLayout) -> tuple[IntegerGrid | None, str]:
+        """Return a grid with sharp edges on grid lines, or None, and a note on required ones that are not, or ""."""
         layout, _ = split_between_nodes(layout)
-        with suppress(GridError, MetricError, OptionError, SeamError), np.errstate(all="ignore"):
-            straight, edges = with_sharp_lines(layout, self.energy)
-            found = grid_about(straight, self.energy) if len(edges) else None
-            if found is not None and found.qc_mean < MAX_SHARP_QC:
-                return replace(found, features=layout.mesh.edges[edges])
-        return None
+        return grid_with_lines(layout, self._angle, self.sharp_angle is not None, self.energy)
 
-    def _along_axes(self, options: dict[str, Any]) -> tuple[IntegerGrid | None, str]:
-        """Return a grid with the boundary and as many sharp edges as possible on grid lines; or None and the reason."""
-        why = "none is long enough for quads of this size"
-        for layout, features, notes in sharp_layouts(
-            self.mesh, self.faces, self.quads, self.size, options, OPTIONS, self.progress
-        ):
-            with limit_threads(options.get("threads", THREADS)):
-                grid, why = grid_near(layout, self.energy)
-            if grid is not None:
-                return replace(grid, features=features, notes=(*grid.notes, *notes)), ""
-        return None, why
+    def _with_sides(self, layout: GridLayout, sided: GridLayout, all_sides: bool) -> IntegerGrid:
+        """Return a grid with the sides of a layout on grid lines, or without some if these are not required."""
+        try:
+            return grid_of(sided, self.energy)
+        except GridError:
+            if all_sides or len(sided.sides.points) == len(layout.sides.points):
+                raise
+        why = "Straight sides of different loops are not parallel up to quarter turns, so not all on grid lines."
+        return with_note(grid_of(layout, self.energy), why)

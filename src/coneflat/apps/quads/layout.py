@@ -22,7 +22,7 @@ from ...geometry import (
 )  # fmt: skip
 from ...layout import SeamChains, find_chains, rest_sides
 from ...mesh import NEXT, PREVIOUS, label_components, label_faces, point_vertices
-from .cross_field import halfedge_angles, preferred_directions
+from .cross_field import SHARP_ANGLE, halfedge_angles, preferred_directions
 from .features import split_pieces
 
 # Tolerance, in radians or squares, for sides to be straight or parallel up to quarter turns, and for points to
@@ -112,12 +112,14 @@ class GridLayout:
         times = float(np.sqrt(factor))
         return replace(self, points=times * self.points, size=self.size / times)
 
-    def chains(self, quarter_turns: bool = False) -> SeamChains:
+    def chains(self) -> SeamChains:
         """Return the seams as chains between vertices that must lie on grid points; see `find_chains`."""
-        return find_chains(self.mesh, self.corners, self.points, self.nodes, quarter_turns=quarter_turns)
+        return find_chains(self.mesh, self.corners, self.points, self.nodes)
 
 
-def aligned(result: Flattening, quads: float | None, size: float | None) -> GridLayout:
+def aligned(
+    result: Flattening, quads: float | None, size: float | None, sharp_angle: float = SHARP_ANGLE
+) -> GridLayout:
     """Return the layout of a flattening, rotated so that the grid is aligned with creases and boundaries.
 
     Charts are joined at some seams, and a cone of each component is at the origin.
@@ -126,6 +128,7 @@ def aligned(result: Flattening, quads: float | None, size: float | None) -> Grid
         result: a flattening with quantised cones.
         quads: number of unit squares that the layout covers.
         size: edge length of a square in model units; replaces `quads`.
+        sharp_angle: dihedral angle of edges that are creases, radians.
 
     Raises:
         GridError: triangles are flipped.
@@ -150,7 +153,7 @@ def aligned(result: Flattening, quads: float | None, size: float | None) -> Grid
     apart = GridLayout(mesh, lengths, result.uv_faces, points, cones, Sides(), size)
     layout, component = joined_charts(apart)
     is_straight, angles = _side_angles(layout, component)
-    angles = np.where(is_straight, angles, _preferred_angles(layout, component))
+    angles = np.where(is_straight, angles, _preferred_angles(layout, component, sharp_angle))
     layout = replace(layout, points=layout.points * np.exp(-1j * angles)[component])
     return at_origin(replace(layout, sides=find_sides(layout, is_straight[component])), component)
 
@@ -191,10 +194,10 @@ def at_origin(layout: GridLayout, component: IntArray) -> GridLayout:
     return replace(layout, points=layout.points - origins[component])
 
 
-def _preferred_angles(layout: GridLayout, component: IntArray) -> FloatArray:
+def _preferred_angles(layout: GridLayout, component: IntArray, sharp_angle: float) -> FloatArray:
     """Return (c,) the rotation of each component up to quarter turns at which it follows preferred directions best."""
     mesh, (starts, ends) = layout.mesh, layout.ends
-    wanted = preferred_directions(mesh).both
+    wanted = preferred_directions(mesh, sharp_angle).both
     # A triangle rotates as its half-edges do on average.
     before = layout.lengths.ravel() * np.exp(1j * halfedge_angles(corner_angles(layout.lengths)))
     turned = ((layout.points[ends] - layout.points[starts]) * before.conj()).reshape(-1, 3).sum(axis=1)

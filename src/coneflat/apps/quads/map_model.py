@@ -52,7 +52,13 @@ class MapModel:
     """
 
     def __init__(
-        self, mesh: TriangleMesh, wanted: ComplexArray, required: IntArray, least: int, most: int
+        self,
+        mesh: TriangleMesh,
+        wanted: ComplexArray,
+        required: IntArray,
+        least: int,
+        most: int,
+        triangles: IntArray | None = None,
     ) -> None:
         """Set up the model.
 
@@ -61,6 +67,7 @@ class MapModel:
             wanted: (m,) preferred crosses of triangles, weighted.
             required: vertices that must be places.
             least, most: bounds of the curvature of cones, in quarter turns.
+            triangles: (n,) the number of triangles at each vertex if it is another one in the mesh that gets the cones.
         """
         lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces))
         angles, count = corner_angles(lengths), len(mesh.vertices)
@@ -88,7 +95,9 @@ class MapModel:
         to_samples = self._rotations.to_frames(samples) + self._rotations.mean_change[samples]
         self.scales = self._functional(self._means)
         self.turns, self.loops = 4 * self._functional(to_samples), 4 * self._functional(self._along)
-        triangles = np.bincount(mesh.faces.ravel(), minlength=count)[self.places]
+        if triangles is None:
+            triangles = np.bincount(mesh.faces.ravel(), minlength=count)
+        triangles = triangles[self.places]
         border = mesh.is_boundary_vertex[self.places]
         straight = np.where(border, 2, 4)
         widest = np.floor(CONE_ANGLE_PER_TRIANGLE * triangles / (np.pi / 2)).astype(np.int64)

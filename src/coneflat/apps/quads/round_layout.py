@@ -14,10 +14,12 @@ from ...layout import Lines, PointConstraints, Relaxed, StretchEnergy, relax, re
 from .integer_map import IntegerGrid, find_motions
 from .layout import GridLayout, between_nodes, quarters_around, split_edges
 from .rounding import Rounding, find_rounding
-from .transitions import Transitions, find_transitions
+from .transitions import Transitions
 
 # Relative deviation from the requested number of squares above which a note is added.
 NOTED_SHARE = 0.1
+# Largest fraction of the distance to lines per step of relaxing.
+LINE_STRIDE = 0.1
 
 
 def grid_of(layout: GridLayout, energy: StretchEnergy) -> IntegerGrid:
@@ -30,7 +32,7 @@ def grid_of(layout: GridLayout, energy: StretchEnergy) -> IntegerGrid:
         GridError: no grid was found.
     """
     layout, split = split_between_nodes(layout)
-    found = grid_about(layout, energy)
+    found = grid_about(find_rounding(layout), energy)
     if split:
         found = with_note(
             found,
@@ -45,11 +47,15 @@ def split_between_nodes(layout: GridLayout) -> tuple[GridLayout, int]:
     return (split_edges(layout, is_split) if is_split.any() else layout), int(is_split.sum())
 
 
-def grid_about(layout: GridLayout, energy: StretchEnergy) -> IntegerGrid:
-    """Return the grid of a smooth layout in which no edge between cones needs to be split; see `grid_of`."""
-    wanted, found, why, most = layout.area, None, "", 4
+def grid_about(rounding: Rounding, energy: StretchEnergy, most: int = 4) -> IntegerGrid:
+    """Return the grid of a smooth layout in which no edge between cones needs to be split; see `grid_of`.
+
+    `most` is how often the number of squares is doubled.
+    """
+    layout = rounding.layout
+    wanted, found, why = layout.area, None, ""
     for finer in (2.0**k for k in range(most + 1)):
-        found, why = grid_near(layout.scaled(finer), energy)
+        found, why = _grid_near(rounding.scaled(finer), energy)
         if found is not None:
             break
     if found is None:
@@ -62,7 +68,7 @@ def grid_about(layout: GridLayout, energy: StretchEnergy) -> IntegerGrid:
             break
         # Later corrections are halved, because the number of squares changes by entire rows.
         factor *= (wanted / last) if factor == 1.0 else math.sqrt(wanted / last)
-        other, _ = grid_near(layout.scaled(factor), energy)
+        other, _ = _grid_near(rounding.scaled(factor), energy)
         if other is None:
             break
         last = _squares(other)
@@ -75,49 +81,57 @@ def grid_about(layout: GridLayout, energy: StretchEnergy) -> IntegerGrid:
 
 
 def with_note(found: IntegerGrid, note: str) -> IntegerGrid:
-    """Return a grid with one more note."""
-    return replace(found, notes=(*found.notes, note))
+    """Return a grid with one more note, unless this is empty."""
+    return replace(found, notes=(*found.notes, note)) if note else found
 
 
 def _squares(grid: IntegerGrid) -> float:
     return float(signed_double_areas(grid.corner_grid).sum()) / 2
 
 
-def grid_near(layout: GridLayout, energy: StretchEnergy) -> tuple[IntegerGrid | None, str]:
+def _grid_near(rounding: Rounding, energy: StretchEnergy) -> tuple[IntegerGrid | None, str]:
     """Return a grid for one of the nearest lattice points, or None and the reason why the last one failed."""
-    transitions = find_transitions(layout)
+    layout, transitions = rounding.layout, rounding.transitions
     try:
-        rounding = find_rounding(layout, transitions)
         candidates = rounding.candidates()
     except GridError as error:
         return None, str(error)
-    smooth = transitions.places(layout.points, rounding.smooth)
     tries, why = 0, "all lattice points nearby merge cones"
     for values in candidates[:3]:
-        start = _displaced(layout, smooth, rounding, transitions, values)
+        start = _displaced(layout, rounding, values)
         try:
             found = _relaxed(layout, start, transitions, values, energy)
         except (ConvergenceError, OptionError) as error:
             tries, why = tries + 1, str(error)
             continue
         points = _snapped(found, transitions, values)
+        if _folds_sides(layout, transitions, points):
+            tries, why = tries + 1, "sides of triangles on grid lines change their direction"
+            continue
         if (replace(layout, points=points).double_areas() > 0).all():
-            return _make_grid(layout, smooth, points, found, tries), ""
+            return _make_grid(layout, points, found, tries), ""
         tries, why = tries + 1, "rounding flipped a very small triangle"
     return None, why
 
 
-def _displaced(
-    layout: GridLayout, smooth: ComplexArray, rounding: Rounding, transitions: Transitions, values: IntArray
-) -> ComplexArray:
+def _folds_sides(layout: GridLayout, transitions: Transitions, points: ComplexArray) -> bool:
+    """Return whether an edge on a side turns by more than a right angle if points move, which flips no triangle."""
+    on = np.zeros(len(points), dtype=bool)
+    on[layout.sides.points] = True
+    sides = np.concatenate([layout.border, transitions.chains.halfedges.ravel()])
+    starts, ends = (each[sides] for each in layout.ends)
+    turned = (points[ends] - points[starts]) * np.conj(layout.points[ends] - layout.points[starts])
+    return bool((turned.real <= 0)[on[starts] & on[ends]].any())
+
+
+def _displaced(layout: GridLayout, rounding: Rounding, values: IntArray) -> ComplexArray:
     """Return the layout with seams and cones at their rounded values, moved by the displacement of least energy.
 
     If this makes a triangle too small, return the smooth layout itself, from which relaxing may still succeed.
     """
-    shift = rounding.stiffness.displacement((values - rounding.smooth)[:, None])[:, 0]
-    moved = transitions.places(smooth + shift[0::2] + 1j * shift[1::2], values.astype(np.float64))
-    before, after = (replace(layout, points=points).double_areas() for points in (smooth, moved))
-    return moved if (after > 0.01 * before).all() else smooth
+    (moved,) = rounding.displaced([values])
+    before, after = (replace(layout, points=points).double_areas() for points in (layout.points, moved))
+    return moved if (after > 0.01 * before).all() else layout.points
 
 
 def _relaxed(
@@ -148,6 +162,7 @@ def _relaxed(
         lines=lines,
         tied=chains.halfedges[one_of, 1],
         translations=values[:count].reshape(-1, 2),
+        stride=LINE_STRIDE if lines and smooth is layout.points else 1.0,
     )
     # A thousand times the energy of an isometry occurs if cones merge. Of 60 cases of benchmarks/grids.py the slowest
     # takes 1.7 times as long without this limit.
@@ -177,9 +192,7 @@ def _snapped(found: Relaxed, transitions: Transitions, values: IntArray) -> Comp
     return transitions.places(as_complex(rounded), values.astype(np.float64))
 
 
-def _make_grid(
-    layout: GridLayout, smooth: ComplexArray, points: ComplexArray, found: Relaxed, tries: int
-) -> IntegerGrid:
+def _make_grid(layout: GridLayout, points: ComplexArray, found: Relaxed, tries: int) -> IntegerGrid:
     mesh, corner_grid = layout.mesh, as_pairs(points)[layout.corners]
     quarters = quarters_around(mesh, sides_between(corner_grid))
     cones, corners = layout.cones, layout.sides.corners
@@ -195,19 +208,19 @@ def _make_grid(
         cones,
         quarters[cones],
     )
-    moves, energies = _moves(layout, smooth, points), (found.energy_before, found.energy)
-    qc = _distortion(layout, smooth)[0], *_distortion(layout, points)
+    moves, energies = _moves(layout, points), (found.energy_before, found.energy)
+    qc = _distortion(layout, layout.points)[0], *_distortion(layout, points)
     # In the order of the attributes.
     notes = (note,) if tries else ()
     return IntegerGrid(*arrays, layout.size, *moves, *energies, *qc, notes, corners, quarters[corners])
 
 
-def _moves(layout: GridLayout, smooth: ComplexArray, points: ComplexArray) -> tuple[float, float]:
+def _moves(layout: GridLayout, points: ComplexArray) -> tuple[float, float]:
     """Return the root mean square and the largest displacement of cones in grid units, relative to their mean."""
     at = np.isin(layout.mesh.faces, layout.nodes)
     if not at.any():
         return 0.0, 0.0
-    move = (points - smooth)[np.unique(layout.corners[at])]
+    move = (points - layout.points)[np.unique(layout.corners[at])]
     size = np.abs(move - move.mean())
     return float(np.sqrt((size**2).mean())), float(size.max())
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -12,11 +13,11 @@ from scipy.sparse.csgraph import dijkstra
 
 from ...base import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import GridError
-from ...geometry import cotangents
+from ...geometry import as_complex, as_pairs, cotangents
 from ...linalg import factorize
 from .lattice import Lattice, integer_solutions
 from .layout import GridLayout
-from .transitions import TURNS, UNITS, Transitions
+from .transitions import TURNS, UNITS, Transitions, find_transitions
 
 
 class Stiffness:
@@ -38,9 +39,8 @@ class Stiffness:
         ridged.sort_indices()
         self._factor = factorize(ridged)
 
-    def displacement(self, values: FloatArray) -> FloatArray:
-        """Return the displacements (2u, k) of least energy for changes (v, k) of the variables."""
-        given = self._shifts @ values
+    def displacement(self, given: FloatArray) -> FloatArray:
+        """Return the displacements (2u, k) of least energy for given ones (2u, k) of fixed coordinates and copies."""
         right = -(self._turned.T @ (self._energy @ given))
         return given + self._turned @ self._factor.solve(np.ascontiguousarray(right))
 
@@ -48,13 +48,17 @@ class Stiffness:
         """Return (d, d) the Gram matrix of the columns of a basis (v, d) in the energy."""
         count = basis.shape[1]
         gram = np.zeros((count, count))
-        # Few points are on seams, so the sparse matrix is small.
-        pulls = self._energy @ (self._shifts @ csr_matrix(basis))
+        pulls = self.pulls(basis)
         for start in range(0, count, 16):
             block = slice(start, start + 16)
-            gram[:, block] = pulls.T @ self.displacement(basis[:, block].astype(np.float64))
+            gram[:, block] = pulls.T @ self.displacement(self._shifts @ basis[:, block].astype(np.float64))
         # Changes without energy need a positive value too, so that the energy is a metric.
         return (gram + gram.T) / 2 + 1e-10 * max(float(np.trace(gram)), 1.0) * np.eye(count)
+
+    def pulls(self, basis: IntArray) -> csr_matrix:
+        """Return (2u, d) the matrix whose products with displacements are derivatives of the energy by coordinates."""
+        # Few points are on seams, so the sparse matrix is small.
+        return self._energy @ (self._shifts @ csr_matrix(basis))
 
 
 def _laplacian(layout: GridLayout) -> csr_matrix:
@@ -134,6 +138,7 @@ class Rounding:
         pairs: pairs of cones that must not merge.
         stiffness: the energy that gives the metric.
         layout: the smooth layout.
+        transitions: its seams and sides.
     """
 
     basis: IntArray
@@ -142,11 +147,18 @@ class Rounding:
     pairs: ConePairs
     stiffness: Stiffness
     layout: GridLayout
+    transitions: Transitions
 
     @property
     def smooth(self) -> FloatArray:
         """(v,) the variables of the smooth layout, projected to the solutions of the equations."""
         return self.basis @ self.start
+
+    def scaled(self, factor: float) -> Rounding:
+        """Return the rounding of the layout with the number of squares multiplied by a factor."""
+        layout, start = self.layout.scaled(factor), np.sqrt(factor) * self.start
+        pairs = _near_pairs(layout, self.transitions, self.basis, start)
+        return replace(self, start=start, pairs=pairs, layout=layout)
 
     def candidates(self) -> list[IntArray]:
         """Return integer values (v,) of the variables near the smooth ones that merge no two cones.
@@ -168,8 +180,21 @@ class Rounding:
                 if (angle, at_once) == SEPARATIONS[-1]:
                     raise
         values = [np.asarray(self.basis @ each) for each in found]
-        areas = self._flipped_areas(np.stack(values, axis=1) - self.smooth[:, None])
+        areas = [
+            -float(np.minimum(replace(self.layout, points=points).double_areas(), 0.0).sum())
+            for points in self.displaced(values)
+        ]
         return [values[i] for i in np.argsort(areas, kind="stable")]
+
+    def displaced(self, values: Sequence[FloatArray | IntArray]) -> list[ComplexArray]:
+        """Return (u,) the points moved by the displacement of least energy to each of some values (v,)."""
+        points, places = self.layout.points, self.transitions.places
+        given = [as_pairs(places(points, each) - points).ravel() for each in values]
+        shifts = self.stiffness.displacement(np.stack(given, axis=1)).T
+        return [
+            places(points + as_complex(shift.reshape(-1, 2)), each)
+            for shift, each in zip(shifts, values, strict=True)
+        ]
 
     def _separated(self, lattice: Lattice, angle: float, at_once: int | None) -> list[IntArray]:
         """Return near vectors of a lattice that separate all cones, and rotate near pairs by less than `angle`."""
@@ -192,14 +217,6 @@ class Rounding:
         )
         return [each for each in found if not len(self.pairs.collapsed(each, angle))][:16]
 
-    def _flipped_areas(self, changes: FloatArray) -> FloatArray:
-        """Return (k,) twice the area of triangles that the displacements of least energy flip, for changes (v, k)."""
-        shifts = self.stiffness.displacement(changes)
-        moved = self.layout.points[:, None] + shifts[0::2] + 1j * shifts[1::2]
-        a, b, c = (moved[self.layout.corners[:, i]] for i in range(3))
-        doubled = (np.conj(b - a) * (c - a)).imag
-        return -np.minimum(doubled, 0.0).sum(axis=0)
-
     def _separate(self, pair: int, lattice: Lattice) -> Lattice | None:
         """Return the part of a lattice where two cones keep their distance along an axis, at least a unit.
 
@@ -220,17 +237,28 @@ class Rounding:
         return None
 
 
-def find_rounding(layout: GridLayout, transitions: Transitions) -> Rounding:
-    """Return the lattice to which the translations and cones of a layout must be rounded."""
+def find_rounding(layout: GridLayout) -> Rounding:
+    """Return the lattice to which the translations and cones of a layout must be rounded.
+
+    Raises:
+        SeamError: the sides of a seam are not congruent.
+        GridError: the sides of a seam are not related by quarter turns, or the equations between them overflow.
+    """
+    transitions = find_transitions(layout)
     zeros = np.zeros(len(transitions.equations), dtype=np.int64)
     solutions = integer_solutions(transitions.equations, zeros)
     assert solutions is not None
     basis = solutions.basis
     fitted = np.linalg.lstsq(basis.astype(np.float64), transitions.values, rcond=None)[0]
-    start = np.asarray(fitted, dtype=np.float64)
+    start = np.array(fitted, dtype=np.float64)
     stiffness = Stiffness(layout, transitions)
+    metric = stiffness.gram(basis)
+    # The least energy, to which sides that are not straight in the layout contribute.
+    given = as_pairs(transitions.places(layout.points, basis @ start) - layout.points).reshape(-1, 1)
+    shift = stiffness.displacement(given)
+    start -= np.linalg.solve(metric, (stiffness.pulls(basis).T @ shift)[:, 0])
     pairs = _near_pairs(layout, transitions, basis, start)
-    return Rounding(basis, start, stiffness.gram(basis), pairs, stiffness, layout)
+    return Rounding(basis, start, metric, pairs, stiffness, layout, transitions)
 
 
 def _near_pairs(

@@ -51,7 +51,7 @@ class Transitions:
     equations: IntArray
     values: FloatArray
 
-    def places(self, points: ComplexArray, values: FloatArray) -> ComplexArray:
+    def places(self, points: ComplexArray, values: FloatArray | IntArray) -> ComplexArray:
         """Return (u,) the points for given values of the variables; copies follow from their base points."""
         shift = self.shifts @ values
         loose = np.where(self.fixed[:, 0], 0, points.real) + 1j * np.where(self.fixed[:, 1], 0, points.imag)

@@ -20,27 +20,15 @@ MAX_ROTATION, MIN_SHAPE, LENGTH_WEIGHT = 0.2, 0.1, 0.1
 
 
 def coarse_part(part: Part, count: int) -> tuple[Part, IntArray]:
-    """Return a part with about `count` triangles, and (k,) the vertices of the given part that it keeps.
-
-    The topology is that of the given part.
-
-    References:
-        M. Garland, P. Heckbert, "Surface simplification using quadric error metrics", 1997.
-    """
-    mesh = part.mesh
-    faces = mesh.faces.copy()
-    points, key = mesh.vertices - mesh.vertices.mean(axis=0), tie_key(mesh.vertices)
-    collapse_edges(points, faces, _quadrics(mesh, points), mesh.is_boundary_vertex, key, count)
-    kept, corners = np.unique(faces[faces[:, 0] >= 0], return_inverse=True)
-    coarse = TriangleMesh(mesh.vertices[kept], corners.reshape(-1, 3))
+    """Return a part with about `count` triangles, and (k,) the vertices of the given part that it keeps."""
+    coarse, kept, faces = coarse_mesh(part.mesh, count)
     own = edge_lengths(coarse.vertices, coarse.faces)
-    lengths, _ = mollify(own)
     seams, none = part.seams, np.zeros(len(coarse.edges), dtype=bool)
     return Part(
         coarse,
         part.vertices[kept],
-        np.flatnonzero(faces[:, 0] >= 0),
-        lengths,
+        faces,
+        mollify(own)[0],
         double_areas(own),
         replace(
             part.cones,
@@ -57,6 +45,19 @@ def coarse_part(part: Part, count: int) -> tuple[Part, IntArray]:
             is_forbidden=none,
         ),
     ), kept
+
+
+def coarse_mesh(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntArray, IntArray]:
+    """Return a mesh of the same topology with about `count` triangles, and its vertices (k,) and triangles here.
+
+    References:
+        M. Garland, P. Heckbert, "Surface simplification using quadric error metrics", 1997.
+    """
+    faces = mesh.faces.copy()
+    points, key = mesh.vertices - mesh.vertices.mean(axis=0), tie_key(mesh.vertices)
+    collapse_edges(points, faces, _quadrics(mesh, points), mesh.is_boundary_vertex, key, count)
+    kept, corners = np.unique(faces[faces[:, 0] >= 0], return_inverse=True)
+    return TriangleMesh(mesh.vertices[kept], corners.reshape(-1, 3)), kept, np.flatnonzero(faces[:, 0] >= 0)
 
 
 def _quadrics(mesh: TriangleMesh, points: FloatArray) -> FloatArray:

@@ -45,9 +45,7 @@ class PointConstraints:
         tied: (q,) half-edges of seams with prescribed translations.
         translations: (q, 2) the final translation of each tied half-edge: a point in the frame of its own triangle is
             the corresponding point in the frame of the opposite triangle, rotated by the seam's rotation, plus this.
-        quarter_turns: True moves the two sides of every seam to copies of each other, rotated by the nearest multiple
-            of a quarter turn; otherwise they must already be rigid copies, and keep their rotations.
-        nodes: vertices at which chains of seam edges always end.
+        stride: largest fraction of the distance to the constraints per step; where lines turn, long steps fold them.
     """
 
     pinned: ArrayLike = ()
@@ -56,8 +54,7 @@ class PointConstraints:
     held_seams: ArrayLike = ()
     tied: ArrayLike = ()
     translations: ArrayLike = ()
-    quarter_turns: bool = False
-    nodes: ArrayLike = ()
+    stride: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +70,6 @@ class CheckedConstraints:
     held_seams: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     tied: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     translations: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
-    quarter_turns: bool = False
-    nodes: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
 
 def check_constraints(constraints: PointConstraints, points: FloatArray) -> CheckedConstraints:
@@ -98,7 +93,6 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
         raise OptionError(
             f"{plural(len(tied), 'half-edge')} tied, but {plural(len(translations), 'translation')} given for them"
         )
-    nodes = np.asarray(constraints.nodes, dtype=np.int64).ravel()
     on_line, line, directions, offsets = _checked_lines(constraints.lines, points)
     return CheckedConstraints(
         pinned,
@@ -110,8 +104,6 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
         held,
         tied,
         translations,
-        constraints.quarter_turns,
-        nodes,
     )
 
 

@@ -19,8 +19,6 @@ from .motions import Motions
 RELATIVE_ROUNDING = 1e-12
 # The constraints cannot be reached if a step covers less than this fraction of the distance to them.
 MIN_PROGRESS = 1e-3
-# Maximum fraction of the distance per step if seams and sides have to rotate: with longer steps, sides fold over.
-TURNING_STRIDE = 0.1
 # If less than this fraction of the unknowns is in parts that have not converged, only these parts are continued. And
 # factor by which more unknowns than there are count for the choice of the solver, since matrices of one pattern are
 # factorized repeatedly: with 6,000 unknowns this halves the time.

@@ -15,57 +15,8 @@ from ...mesh.connectivity import label_components
 RELATIVE_ROUNDING = 1e-10
 # Coefficients of an orthogonal basis below this value are set to zero; the sides of seams differ by the dropped part.
 ZERO_COEFFICIENT = 1e-15
-# Minimum size of a pivot, as a fraction of the largest coefficient of the equation.
-MIN_PIVOT_SHARE = 0.5
 # Block size of LAPACK, in columns.
 PANEL_COLUMNS = 32
-
-
-def sparse_solutions(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, FloatArray]:
-    """Return the solutions of linear equations as a sparse basis, and the residuals of dependent equations.
-
-    Equations with the fewest variables are solved first, each for the variable that is in the fewest other equations
-    (H. M. Markowitz, "The elimination form of the inverse and its application to linear programming", 1957), so that
-    each variable depends on few others; with an orthogonal basis it would depend on all.
-
-    Args:
-        rows: (r, v) coefficients; equations may be linearly dependent.
-        right: (r,) right-hand sides.
-
-    Returns:
-        (v, k + 1) a basis of the k-dimensional space of homogeneous solutions, with a particular solution in the last
-        column; and (d,) the residuals of the dependent equations, 0 if the equations are consistent.
-    """
-    work = np.concatenate([rows.toarray(), right[:, None]], axis=1)
-    count = rows.shape[1]
-    is_open = np.ones(len(work), dtype=bool)
-    solved: list[tuple[int, int]] = []
-    while True:
-        filled = np.abs(work[:, :count]) > RELATIVE_ROUNDING
-        sizes = np.where(is_open, filled.sum(axis=1), count + 1)
-        sizes[is_open & (sizes == 0)] = count + 1
-        row = int(np.argmin(sizes))
-        if sizes[row] > count:
-            break
-        size = np.abs(work[row, :count])
-        columns = np.flatnonzero(size >= MIN_PIVOT_SHARE * size.max())
-        column = int(columns[np.argmin(filled[:, columns].sum(axis=0))])
-        work[row] /= work[row, column]
-        others = np.flatnonzero(filled[:, column])
-        others = others[others != row]
-        work[others] -= work[others, column, None] * work[row]
-        work[others, column] = 0.0
-        is_open[row] = False
-        solved.append((row, column))
-    pivots = np.array([column for _, column in solved], dtype=np.int64)
-    at = np.array([row for row, _ in solved], dtype=np.int64)
-    free = np.setdiff1d(np.arange(count), pivots)
-    basis = np.zeros((count, len(free) + 1))
-    basis[free, np.arange(len(free))] = 1.0
-    basis[pivots, :-1] = -work[np.ix_(at, free)]
-    basis[pivots, -1] = work[at, count]
-    basis[np.abs(basis) < RELATIVE_ROUNDING * max(1.0, float(np.abs(basis).max(initial=0.0)))] = 0.0
-    return csr_matrix(basis), work[is_open, count]
 
 
 def orthogonal_solutions(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, FloatArray]:

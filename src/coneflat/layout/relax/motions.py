@@ -14,7 +14,7 @@ from ...geometry.planar import as_complex
 from ...mesh.charts import point_vertices
 from ...mesh.connectivity import TriangleMesh
 from .constraints import CheckedConstraints
-from .elimination import RELATIVE_ROUNDING, orthogonal_solutions, sparse_solutions
+from .elimination import RELATIVE_ROUNDING, orthogonal_solutions
 from .seam_chains import SeamChains, constrained_chains
 
 # Unit of the rounding gaps between the sides of seams. In this unit they are large enough not to be treated as zero.
@@ -45,10 +45,9 @@ class Motions:
         """Return (u,) moved points with the rounding gaps between the sides of seams closed.
 
         If a layout shrinks by a factor of a thousand, the relative size of rounding errors grows by the same factor.
-        Layouts with quarter turns are returned unchanged.
         """
         builder = self.builder
-        if builder is None or builder.constraints.quarter_turns or not len(builder.chains.edges):
+        if builder is None or not len(builder.chains.edges):
             return points
         motions = builder.at(points).motions()
         step = np.zeros(motions.count + 1)
@@ -181,7 +180,7 @@ class _Builder:
 
     def _gaps(self, left: IntArray, right: IntArray, chain: IntArray) -> ComplexArray:
         """Return the shifts of right points that close the gaps to the mapped left points; zero for rigid seams."""
-        if not (self.constraints.quarter_turns or self.is_closing):
+        if not self.is_closing:
             return np.zeros(len(left), dtype=np.complex128)
         turned: ComplexArray = self.chains.rotation[chain] * self.points[left]
         gaps: ComplexArray = turned + self.translation[chain] - self.points[right]
@@ -321,9 +320,8 @@ class _Builder:
         rows, right = self._equations()
         if not len(right):
             return eye(self.size, self.size + 1, format="csr")
-        is_integer = self.constraints.quarter_turns
-        basis, left = (sparse_solutions if is_integer else orthogonal_solutions)(rows, right)
-        if is_integer or not self.is_closing:  # rounding gaps between fixed points may be inconsistent
+        basis, left = orthogonal_solutions(rows, right)
+        if not self.is_closing:  # rounding gaps between fixed points may be inconsistent
             _require_solved(float(np.abs(left).max(initial=0.0)), right)
         return basis
 

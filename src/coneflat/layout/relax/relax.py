@@ -26,7 +26,7 @@ from ...geometry.planar import as_complex, as_pairs, signed_double_areas
 from ...geometry.straight import place_triangles
 from ...mesh.connectivity import TriangleMesh
 from .constraints import PointConstraints, check_constraints
-from .descent import TURNING_STRIDE, descend
+from .descent import descend
 from .elements import Elements
 from .energies import Energy, StretchEnergy
 from .motions import find_motions
@@ -138,7 +138,7 @@ def relax(
     elements = Elements(motions, corner, rest, unit, share)
     if not elements.count and not motions.has_offset:
         return Relaxed(places, 0.0, 0.0, 0, is_free)
-    stride = TURNING_STRIDE if checked.quarter_turns else 1.0
+    stride = 1.0 if constraints is None else constraints.stride
     found = descend(z, motions, elements, energy, tolerance, steps, progress, stride)
     if found.remaining:
         raise ConvergenceError(

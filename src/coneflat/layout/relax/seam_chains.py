@@ -17,7 +17,6 @@ from .constraints import CheckedConstraints
 ROTATION_TOLERANCE = 1e-5
 # Largest difference of the two lengths of a seam edge, relative to its length.
 RIGID_TOLERANCE = 1e-4
-QUARTER_TURNS = np.array([1, 1j, -1, -1j])
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +48,6 @@ def find_chains(
     corners: IntArray,
     points: ComplexArray,
     nodes: IntArray,
-    *,
-    quarter_turns: bool = False,
 ) -> SeamChains:
     """Return the chains of the edges whose sides have different points.
 
@@ -59,7 +56,6 @@ def find_chains(
         corners: (m, 3) the point at each triangle corner.
         points: (u,) positions in the plane as complex numbers.
         nodes: additional vertices at which chains end.
-        quarter_turns: True rounds rotations to quarter turns and does not require that sides are rigid copies.
 
     Raises:
         SeamError: the sides of a seam are not rigid copies of each other.
@@ -69,12 +65,9 @@ def find_chains(
     vertices = np.stack(mesh.ends_of(h), axis=1)
     sides = np.stack(both_sides(mesh, edges, corners))
     one, two = (points[side[:, 1]] - points[side[:, 0]] for side in sides)
-    if not quarter_turns:
-        _check_rigid(edges, vertices, one, two)
+    _check_rigid(edges, vertices, one, two)
     turns = two * np.conj(one)
     turns /= np.abs(turns)
-    if quarter_turns:
-        turns = _nearest_quarter(turns)
     is_node = np.bincount(vertices.ravel(), minlength=len(mesh.vertices)) != 2
     is_node |= mesh.is_boundary_vertex
     is_node[nodes] = True
@@ -92,10 +85,7 @@ def find_chains(
         chain,
         np.where(swapped, two * np.conj(one), 0).conj() + np.where(swapped, 0, two * np.conj(one)),
     )
-    rotation = total / np.abs(total)
-    if quarter_turns:
-        rotation = _nearest_quarter(rotation)
-    return SeamChains(edges, vertices, left, right, halfedges, chain, rotation, is_node)
+    return SeamChains(edges, vertices, left, right, halfedges, chain, total / np.abs(total), is_node)
 
 
 def constrained_chains(
@@ -106,17 +96,14 @@ def constrained_chains(
     A point on a single line needs no node if it is a left point within a seam.
     """
     if not len(c.on_line):
-        nodes = np.concatenate([vertex[c.pinned], c.nodes])
-        return find_chains(mesh, corners, points, nodes, quarter_turns=c.quarter_turns)
+        return find_chains(mesh, corners, points, vertex[c.pinned])
     on, times = np.unique(c.on_line, return_counts=True)
-    nodes = np.concatenate([vertex[c.pinned], vertex[on[times > 1]], c.nodes])
-    chains = find_chains(mesh, corners, points, nodes, quarter_turns=c.quarter_turns)
+    nodes = np.concatenate([vertex[c.pinned], vertex[on[times > 1]]])
+    chains = find_chains(mesh, corners, points, nodes)
     inside = ~chains.is_node[chains.vertices]
     if not np.isin(on, chains.right[inside]).any():
         return chains
-    return find_chains(
-        mesh, corners, points, np.concatenate([nodes, vertex[on]]), quarter_turns=c.quarter_turns
-    )
+    return find_chains(mesh, corners, points, np.concatenate([nodes, vertex[on]]))
 
 
 def _strands(vertices: IntArray, sides: IntArray, is_node: BoolArray) -> tuple[IntArray, IntArray]:
@@ -132,11 +119,6 @@ def _strands(vertices: IntArray, sides: IntArray, is_node: BoolArray) -> tuple[I
     meet = np.flatnonzero(point[1:] == point[:-1])
     _, label = label_components(2 * count, side[meet], side[meet + 1])
     return label[:count], label[count:]
-
-
-def _nearest_quarter(turns: ComplexArray) -> ComplexArray:
-    """Return for each number the nearest of 1, i, -1 and -i."""
-    return QUARTER_TURNS[np.rint(np.angle(turns) / (np.pi / 2)).astype(np.int64) % 4]
 
 
 def _rotating(vertices: IntArray, sides: IntArray, turns: ComplexArray, is_node: BoolArray) -> IntArray:

@@ -1,0 +1,206 @@
+"""Sharp edges and straight sides of the boundary on grid lines.
+
+Chains of sharp edges become sides, as those of the boundary are: the grid has an integer for the common coordinate of
+each, and relaxing moves their points there. Chains that deform the grid most for their length are left out until there
+is a grid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import count
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from ...base import BoolArray, ComplexArray, FloatArray, IntArray, plural
+from ...errors import GridError
+from ...geometry import map_factors, signed_angles
+from ...layout import StretchEnergy
+from ...mesh import NEXT, PREVIOUS, open_along
+from .cross_field import sharp_ends
+from .features import edge_indices, lengths_along, sharp_edges, without_stubs
+from .integer_map import IntegerGrid
+from .layout import GridLayout, Sides, at_origin, find_sides, joined_charts
+from .round_layout import grid_about
+from .rounding import find_rounding
+
+# Preferred edges are put on a line if their direction differs from an axis by less, radians.
+MAX_TURN = np.deg2rad(20.0)
+# Squares: shorter chains of sharp edges are not put on lines.
+SHORTEST = 4.0
+# Largest cost of a preferred chain: the energy of the triangles near it, over its length and the root of the area.
+MAX_COST = 5e-4
+# The energy of a triangle that is flipped or nearly so.
+FOLDED_ENERGY = 10.0
+
+
+def grid_with_lines(
+    layout: GridLayout, angle: float, is_required: bool, energy: StretchEnergy
+) -> tuple[IntegerGrid | None, str]:
+    """Return a grid with sharp edges on grid lines, or None if none are, and a note on those that are not, or "".
+
+    Args:
+        layout: a layout in which no edge joins two vertices on grid points.
+        angle: dihedral angle above which edges are sharp, radians.
+        is_required: put as many edges as possible on lines; else only those that deform the grid little.
+        energy: what the grid minimises.
+    """
+    mesh, off, why = layout.mesh, _deviations(layout), "too short for quads of this size"
+    sharp = sharp_edges(mesh, angle) if is_required else edge_indices(mesh, sharp_ends(mesh, angle))
+    near = sharp if is_required else sharp[np.abs(off[sharp]) < MAX_TURN]
+    edges, found = _long_chains(layout, near), None
+    for attempt in count():
+        lined = _with_lines(layout, edges, off)
+        if not len(lined.edges):
+            break
+        rounding = find_rounding(lined.layout)
+        costs, is_folded = lined.costs(layout, rounding.displaced([rounding.smooth])[0])
+        # Each failure lowers the bound, so that the attempts end soon.
+        is_bad = costs >= 0.5 ** (1 + attempt / 4) * costs.max()
+        if not is_required and costs.max() > MAX_COST * np.sqrt(layout.area):
+            is_bad = costs > MAX_COST * np.sqrt(layout.area)
+        elif not is_folded or (is_required and attempt == 0):
+            try:
+                found = grid_about(rounding, energy, 0)
+                break
+            except GridError as error:
+                why = str(error)
+        edges = _long_chains(layout, lined.edges[~is_bad[lined.chain]])
+    if found is not None:
+        found = replace(found, features=mesh.edges[lined.edges])
+    left = np.setdiff1d(sharp, lined.edges) if found else sharp
+    if not is_required or not len(left):
+        return found, "There are no sharp edges." if is_required and not len(sharp) else ""
+    share = 100 * lengths_along(mesh, left).sum() / lengths_along(mesh, sharp).sum()
+    return found, (
+        f"{plural(len(left), 'sharp edge')} of {len(sharp):,}, {share:.1f} % of their length, not on grid lines: {why}."
+    )
+
+
+def with_sides(layout: GridLayout) -> GridLayout:
+    """Return a layout with all sides of its boundary on lines, along the nearest axes."""
+    return replace(layout, sides=find_sides(layout, np.ones(len(layout.points), dtype=bool)))
+
+
+def _deviations(layout: GridLayout) -> FloatArray:
+    """Return (e,) the angle of each edge from the nearest axis."""
+    one, (starts, ends) = layout.mesh.edge_halfedges[:, 0], layout.ends
+    off: FloatArray = np.angle((layout.points[ends[one]] - layout.points[starts[one]]) ** 4) / 4
+    return off
+
+
+def _long_chains(layout: GridLayout, edges: IntArray) -> IntArray:
+    return edges[without_stubs(layout.mesh, edges, SHORTEST * layout.size)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Lined:
+    """A layout cut along edges, which are sides: (k,) these edges of its mesh, and (k,) the chain of each."""
+
+    layout: GridLayout
+    edges: IntArray
+    chain: IntArray
+
+    def costs(self, before: GridLayout, moved: ComplexArray) -> tuple[FloatArray, bool]:
+        """Return (c,) the energy of triangles near each chain over its length, and whether any triangle is flipped.
+
+        Args:
+            before: the layout that is not cut.
+            moved: (u,) where the points move.
+        """
+        mesh, chains = before.mesh, int(self.chain.max()) + 1
+        one, two = map_factors((places := before.points[before.corners])[:, PREVIOUS] - places[:, NEXT])
+        after = moved[self.layout.corners]
+        after = after - after[:, :1]
+        a, b = (np.abs((factor * after).sum(axis=1)) ** 2 for factor in (one, two))
+        # The mean of the quasi-conformal distortion and its inverse, minus 1.
+        is_folded = b >= 0.95 * a
+        excess = np.where(is_folded, FOLDED_ENERGY, 2 * b / np.where(is_folded, 1.0, a - b))
+        energy = before.double_areas() / 2 * np.minimum(excess, FOLDED_ENERGY)
+        at = np.zeros(len(mesh.vertices), dtype=np.int64)
+        at[mesh.edges[self.edges]] = self.chain[:, None]
+        starts, ends = before.ends
+        lengths = np.abs(before.points[ends] - before.points[starts])
+        graph = csr_matrix((lengths, (mesh.tails, mesh.heads)), shape=(len(at),) * 2)
+        on = np.unique(mesh.edges[self.edges])
+        nearest = dijkstra(graph.maximum(graph.T), indices=on, min_only=True, return_predecessors=True)[2]
+        near = np.flatnonzero(nearest[mesh.faces[:, 0]] >= 0)
+        chain = at[nearest[mesh.faces[near, 0]]]
+        along = np.bincount(self.chain, lengths_along(mesh, self.edges), chains) / before.size
+        costs: FloatArray = np.bincount(chain, energy[near], chains) / along
+        return costs, bool(is_folded.any())
+
+
+def _with_lines(layout: GridLayout, edges: IntArray, off: FloatArray) -> _Lined:
+    """Return a layout cut along edges, which become sides.
+
+    Of two edges that leave a vertex in the same direction, the one farther from it is left out.
+
+    Args:
+        layout: the layout.
+        edges: (k,) inner edges of its mesh.
+        off: (e,) the angle of each edge from its axis.
+    """
+    mesh, (starts, ends) = layout.mesh, layout.ends
+    places = layout.points[layout.corners]
+    angles = signed_angles(places[:, PREVIOUS] - places[:, NEXT]).ravel()
+    while True:
+        cut = open_along(mesh, edges)
+        border = cut.mesh.edge_halfedges[cut.mesh.is_boundary_edge, 0]
+        edge, tails, heads = mesh.halfedge_edges[border], cut.mesh.tails[border], cut.mesh.heads[border]
+        # The angle between two axes, at each copy of a vertex, is a multiple of a quarter turn.
+        turned = np.bincount(cut.mesh.faces.ravel(), angles, len(cut.origin))
+        turned += np.bincount(tails, off[edge], len(turned)) - np.bincount(heads, off[edge], len(turned))
+        quarters = np.rint(turned / (np.pi / 2)).astype(np.int64)
+        is_same = cut.mesh.is_boundary_vertex & (quarters <= 0)
+        same = np.intersect1d(edge[is_same[tails] | is_same[heads]], edges)
+        if not len(same):
+            break
+        worst = same[np.abs(off[same]) >= np.abs(off[same]).max() - 1e-9]
+        edges = _long_chains(layout, np.setdiff1d(edges, worst))
+    on, turns, on_side = np.zeros((3, len(mesh.vertices)), dtype=bool)
+    on[mesh.edges[edges]] = True
+    turns[cut.origin[cut.mesh.is_boundary_vertex & (quarters != 2)]] = True
+    on_side[layout.vertex[layout.sides.points]] = True
+    copies = np.bincount(cut.origin, minlength=len(on))
+    turns |= copies != np.where(mesh.is_boundary_vertex, 1, 2)
+    nodes = np.setdiff1d(np.flatnonzero(on & turns & (on_side | ~mesh.is_boundary_vertex)), layout.cones)
+    is_line = np.zeros(len(mesh.edges), dtype=bool)
+    is_line[edges] = True
+    inner = ~mesh.is_boundary_edge
+    there, back = mesh.edge_halfedges[inner].T
+    is_seam = is_line.copy()
+    is_seam[inner] |= (starts[there] != ends[back]) | (ends[there] != starts[back])
+    opened = open_along(mesh, np.flatnonzero(is_seam))
+    old = np.empty(len(opened.origin), dtype=np.int64)
+    old[opened.mesh.faces.ravel()] = layout.corners.ravel()
+    sides = Sides(np.union1d(nodes, layout.sides.corners))
+    parts, component = joined_charts(
+        replace(layout, corners=opened.mesh.faces, points=layout.points[old], sides=sides)
+    )
+    sides, chain = _sides(parts, edges, off, np.isin(old, layout.sides.points))
+    return _Lined(at_origin(replace(parts, sides=sides), component), edges, chain)
+
+
+def _sides(
+    layout: GridLayout, edges: IntArray, off: FloatArray, is_straight: BoolArray
+) -> tuple[Sides, IntArray]:
+    """Return the sides of the boundary and the left sides of chains of edges (k,), and (k,) the chain of each edge."""
+    points, chains = layout.points, layout.chains()
+    border, order = find_sides(layout, is_straight), np.argsort(chains.edges)
+    which = order[np.searchsorted(chains.edges[order], edges)]
+    left = chains.left[which]
+    numbers, chain = np.unique(chains.chain[which], return_inverse=True)
+    along = (points[left[:, 1]] - points[left[:, 0]]) * np.exp(-1j * off[edges])
+    # The doubled angle makes opposite directions equal.
+    double = np.bincount(chain, (along**2).real, len(numbers))
+    both = np.unique(np.stack([left.ravel(), chain.repeat(2)], axis=1), axis=0)
+    sides = Sides(
+        layout.sides.corners,
+        np.concatenate([border.points, both[:, 0]]),
+        np.concatenate([border.side, both[:, 1] + len(border.axis)]),
+        np.concatenate([border.axis, np.where(double >= 0, 1, 0)]),
+    )
+    return sides, chain
