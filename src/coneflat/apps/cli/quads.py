@@ -14,6 +14,7 @@ from ...options import ConeBounds, ConeNumber, declarations, read_options
 from ..quads.options import QuadOptions
 from .options import is_given, keywords, option_flags, path_flag, pop_flags, refuse
 from .shared import GroupedCommand, input_options, verbosity_options
+from .values import read_weights
 
 if TYPE_CHECKING:
     from ... import IntegerGrid
@@ -110,8 +111,9 @@ def quads(
 
 def _check_combinations(context: click.Context, mesh: Path) -> None:
     """Raise an error if an option would have no effect."""
-    if is_given(context, "quads") and is_given(context, "size"):
-        raise click.UsageError("--quads (--faces) and --size exclude each other: leave out one", context)
+    size = context.params["size"]
+    if is_given(context, "quads") and size is not None and isinstance(read_weights(size), float):
+        raise click.UsageError("--quads (--faces) and a length as --size exclude each other", context)
     searched = [*declarations(ConeBounds), *declarations(ConeNumber), "max_cones"]
     given = context.params["cones"] not in ((), ("auto",))
     refuse(

@@ -39,7 +39,12 @@ MAX_DOUBLINGS, SPREAD = 3, np.log(2.0) / DISTORTION
 
 
 def aligned_cones(
-    mesh: TriangleMesh, distortion: float, least: int = -2, most: int = 1, price: float = 1.0
+    mesh: TriangleMesh,
+    distortion: float,
+    least: int = -2,
+    most: int = 1,
+    price: float = 1.0,
+    log_scale: FloatArray | None = None,
 ) -> dict[int, int]:
     """Return cones of a connected mesh, and corners of its boundary, with their curvature in quarter turns.
 
@@ -48,13 +53,15 @@ def aligned_cones(
         distortion: area distortion that should not be exceeded: the standard deviation of the log scale.
         least, most: bounds of the curvature of cones.
         price: cost of a cone, 1 by default.
+        log_scale: (n,) the log scale from which the distortion deviates, up to a constant; None for equal sizes.
 
     Raises:
         CurvatureError: the mesh has too few vertices for the cones that it needs.
     """
     directions = preferred_directions(mesh)
     start = field_indices(mesh, smoothest_cross_field(mesh, directions))
-    model = MapModel(mesh, directions.both, np.flatnonzero(start), least, most)
+    wanted = np.zeros(len(mesh.vertices)) if log_scale is None else log_scale
+    model = MapModel(mesh, directions.both, np.flatnonzero(start), least, most, wanted)
     search = _Search(mesh, model, start, price)
     areas = COST_OF_AREAS
     for _ in range(MAX_DOUBLINGS + 1):

@@ -37,6 +37,7 @@ from .options import DISTORTION, QUADS, QuadOptions
 from .patch_layout import straightened, with_sharp_lines
 from .round_layout import grid_about, grid_near, grid_of, split_between_nodes, with_note
 from .sharp import sharp_layouts
+from .sizes import extended, note_on_sizes, scaled_components, wanted_scales
 
 # Options of the flattening for a grid: three, five or six quads at a cone, and rotations by quarter turns.
 OPTIONS = {
@@ -76,7 +77,7 @@ def integer_grid(
     faces: ArrayLike | None = None,
     *,
     quads: int | None = None,
-    size: float | None = None,
+    size: ArrayLike | None = None,
     stretch: float = 0.0,
     sharp_angle: float | str | None = None,
     **options: Any,
@@ -86,7 +87,9 @@ def integer_grid(
     Args:
         mesh, faces: as for `coneflat.flatten`; or a `Flattening` with cones quantised to quarter turns.
         quads: approximate number of unit squares that cover the surface; None: 10,000, unless `size` is given.
-        size: edge length of a square in model units; replaces `quads`.
+        size: edge length of a square in model units, which replaces `quads`; or relative sizes of squares, (n,) numbers,
+            the name of a vertex property of the file, or "curvature", for squares up to four times smaller where
+            the surface is more curved.
         stretch: trade-off between angles (0) and areas (1); see `StretchEnergy`.
         sharp_angle: radians; edges with a larger dihedral angle, and the boundary, are put on grid lines; None for
             none.
@@ -117,16 +120,18 @@ def integer_grid(
         >>> grid.corners, grid.corner_quarters
         (array([0, 1, 2, 3]), array([1, 1, 1, 1]))
     """
-    wanted, name = (size, "size") if size is not None else (QUADS if quads is None else quads, "quads")
-    if quads is not None and size is not None:
+    length, sizes = (size, None) if isinstance(size, Real) else (None, size)
+    wanted, name = (length, "size") if length is not None else (QUADS if quads is None else quads, "quads")
+    if quads is not None and length is not None:
         raise OptionError("quads and size must not be given together")
     if not (isinstance(wanted, Real) and 0 < wanted < np.inf):
         raise OptionError(f"{name} must be a positive number, not {wanted!r}")
     progress = options.pop("progress", None)
     stages = Stopwatch(progress)
-    search = _Search(mesh, faces, quads or QUADS, size, StretchEnergy(stretch), options, progress, stages)
+    energy, count = StretchEnergy(stretch), quads or QUADS
+    search = _Search(mesh, faces, count, length, energy, options, progress, stages, sizes)
     if isinstance(mesh, Flattening):
-        if faces is not None or options or sharp_angle is not None:
+        if any(one is not None for one in (faces, sizes, sharp_angle)) or options:
             raise OptionError("a flattening already has faces and options: no others can be given")
         found = search.of_result(mesh)
     else:
@@ -168,6 +173,7 @@ class _Search:
     options: dict[str, Any]
     progress: Progress | None
     stages: Stopwatch
+    sizes: Any
 
     def with_more_cones(self, sharp_angle: float | str | None, boundary: Any) -> IntegerGrid:
         """Return a grid for the options `sharp_angle` and `boundary`, with less distortion if there is none as given.
@@ -218,12 +224,15 @@ class _Search:
             int(np.floor((2 * np.pi - options.min_cone_angle) / (np.pi / 2) + GRID_TOLERANCE)),
         )
         cones: dict[int, float] = {}
+        asked = None if self.sizes is None else wanted_scales(self.mesh, self.faces, checked, self.sizes)
+        scales = None if asked is None else extended(asked, mesh)
         area = float(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum()) / 2
         quads = area / np.ldexp(self.size, checked.exponent) ** 2 if self.size else self.quads
         price = max(1.0, QUADS_PER_CONE / quads)
         with self.stages("cones"), limit_threads(options.threads):
             for part, vertices, _ in mesh.split_components():
-                found = aligned_cones(part, options.distortion, *bounds, price)
+                wanted = None if scales is None else scales[vertices]
+                found = aligned_cones(part, options.distortion, *bounds, price, wanted)
                 cones |= {int(vertices[v]): k * np.pi / 2 for v, k in found.items()}
         given = {name: one for name, one in self.options.items() if name not in OPTIONS}
         given |= {**_defaults({"cones": cones}), "cones": cones}
@@ -232,7 +241,10 @@ class _Search:
         with self.stages("flatten"):
             vertices = np.ldexp(mesh.vertices, -checked.exponent)
             result = flatten(vertices, mesh.faces, **given, progress=self.progress)
-        return self._with_notes(replace(result, notes=(*notes, *result.notes)), True, True)
+        if scales is not None:
+            result = replace(result, uv=scaled_components(result, mesh, scales))
+        grid = self._with_notes(replace(result, notes=(*notes, *result.notes)), True, True)
+        return grid if asked is None else with_note(grid, note_on_sizes(grid, asked))
 
     def _with_fewest_cones(self, boundary: Any) -> IntegerGrid:
         """Return a grid with the fewest cones for the option `boundary` of `integer_grid`."""

@@ -75,6 +75,11 @@ class IntegerGrid:
     features: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     seconds: dict[str, float] = field(default_factory=dict)
 
+    @property
+    def squares(self) -> float:
+        """The area of the grid in squares."""
+        return float(signed_double_areas(self.corner_grid).sum()) / 2
+
     def report(self) -> dict[str, float | None]:
         """Return the numeric attributes by name, ready for JSON; unknown values are None."""
         numbers = {name: value for name, value in vars(self).items() if isinstance(value, float)}
