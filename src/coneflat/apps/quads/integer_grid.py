@@ -87,9 +87,9 @@ def integer_grid(
     Args:
         mesh, faces: as for `coneflat.flatten`; or a `Flattening` with cones quantised to quarter turns.
         quads: approximate number of unit squares that cover the surface; None: 10,000, unless `size` is given.
-        size: edge length of a square in model units, which replaces `quads`; or relative sizes of squares, (n,) numbers,
-            the name of a vertex property of the file, or "curvature", for squares up to four times smaller where
-            the surface is more curved.
+        size: edge length of a square in model units, which replaces `quads`; or relative sizes of squares: (n,)
+            numbers, the name of a vertex property of the file, or "curvature", for squares up to four times smaller
+            where the surface is more curved.
         stretch: trade-off between angles (0) and areas (1); see `StretchEnergy`.
         sharp_angle: radians; edges with a larger dihedral angle, and the boundary, are put on grid lines; None for
             none.
