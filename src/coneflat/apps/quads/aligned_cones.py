@@ -28,7 +28,7 @@ from .options import DISTORTION
 
 # Cost of an area distortion as large as allowed, at first; a cone costs 1 for each quarter turn, and a missing one more
 # than all others.
-COST_OF_AREAS, COST_OF_MISSING = 15.0, 1e4
+COST_OF_AREAS, COST_OF_MISSING = 15.0, 1e9
 # Radii within which cones move, relative to the distance between the centres of regions, and tried places in each.
 RADII, PLACES_NEAR = (1.0, 0.6, 0.35, 0.2), 10
 # Least decrease of the cost by a step of a descent, which thus ends.
@@ -60,8 +60,7 @@ def aligned_cones(
     """
     directions = preferred_directions(mesh)
     start = field_indices(mesh, smoothest_cross_field(mesh, directions))
-    wanted = np.zeros(len(mesh.vertices)) if log_scale is None else log_scale
-    model = MapModel(mesh, directions.both, np.flatnonzero(start), least, most, wanted)
+    model = MapModel(mesh, directions.both, np.flatnonzero(start), least, most, log_scale)
     search = _Search(mesh, model, start, price)
     areas = COST_OF_AREAS
     for _ in range(MAX_DOUBLINGS + 1):

@@ -193,6 +193,12 @@ def split_chords(mesh: TriangleMesh, ends: IntArray | None = None) -> tuple[Tria
     return _split(mesh, none, none, chords)[0], int(chords.sum())
 
 
+def split_all(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
+    """Return a mesh with all edges split at their midpoints, and their number."""
+    mesh, none = TriangleMesh(*_without_pillows(mesh.vertices, mesh.faces)), np.empty(0, dtype=np.int64)
+    return _split(mesh, none, none, np.ones(len(mesh.edges), dtype=bool))[0], len(mesh.edges)
+
+
 def split_small_components(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     """Return a mesh with at least 60 triangles in each component, by splitting edges, and how many were smaller.
 

@@ -30,8 +30,8 @@ from ...mesh import CheckedMesh
 from ...options import WordOrVertices, read_options
 from .aligned_cones import aligned_cones
 from .cross_field import sharp_ends
-from .features import split_chords, split_small_components
-from .integer_map import IntegerGrid
+from .features import split_all, split_chords, split_small_components
+from .integer_map import IntegerGrid, joined_grids
 from .layout import GRID_TOLERANCE, GridLayout, aligned
 from .options import DISTORTION, QUADS, QuadOptions
 from .patch_layout import straightened, with_sharp_lines
@@ -53,6 +53,8 @@ OPTIONS = {
 QUADS_PER_CONE = 2_000
 # Largest fraction of the edges that are split because they join two vertices on sharp edges.
 MAX_CHORDS = 0.05
+# Largest number of triangles that are refined where there is no grid; meshes of more have places enough for cones.
+MAX_REFINED = 10_000
 # Largest mean quasi-conformal distortion of a grid with sharp edges on grid lines.
 MAX_SHARP_QC = 1.11
 # Options that only the search for the fewest cones takes into account.
@@ -65,6 +67,7 @@ FEW_VERTICES = (
     "Split the triangles of {} with too few vertices for cones of a grid.",
     "component",
 )
+EVERY = (split_all, "Split all {}, because no grid was found without.", "edge")
 CHORDS = (
     split_chords,
     "Split {} between boundary vertices, whose triangles straight sides degenerate.",
@@ -196,11 +199,53 @@ class _Search:
         """Return a grid for the option `boundary` of `integer_grid`."""
         if not self._may_align(boundary):
             return self._with_fewest_cones(boundary)
-        try:
-            return self._of_aligned_cones()
-        except (ConvergenceError, CurvatureError, GridError, MetricError, SeamError) as error:
-            note = f"Quads follow no sharp edges or curvature, because no grid with such cones was found: {error}."
+        what = "sharp edges or curvature" if self.sizes is None else "sharp edges, curvature or wanted sizes"
+        for is_finer in (False, True):
+            try:
+                return self._of_aligned_cones(is_finer)
+            except (ConvergenceError, CurvatureError, GridError, MetricError, SeamError) as error:
+                note = f"Quads follow no {what}, because no grid with such cones was found: {error}."
+            if self._has_several_parts() or len(self._checked().mesh.faces) > MAX_REFINED:
+                break
+        if self._has_several_parts():
+            return self._of_components(boundary)
         return with_note(self._with_fewest_cones(boundary), note)
+
+    def _has_several_parts(self) -> bool:
+        """Return whether each component can have a search of its own: no option refers to vertices."""
+        plain = all(one is None or isinstance(one, (str, float, int)) for one in self.options.values())
+        return plain and self._checked().mesh.components[0] > 1
+
+    def _of_components(self, boundary: Any) -> IntegerGrid:
+        """Return the grid of the components, each with a search of its own, so that none spoils those of the others.
+
+        Raises:
+            GridError: no component has a grid.
+        """
+        checked, found, why = self._checked(), list[IntegerGrid](), list[str]()
+        mesh, grow = checked.mesh, np.exp2(-checked.exponent)
+        scales = np.zeros(len(mesh.vertices))
+        if self.sizes is not None:
+            scales = wanted_scales(self.mesh, self.faces, checked, self.sizes)
+        areas, of_face = (
+            double_areas(edge_lengths(mesh.vertices, mesh.faces)),
+            scales[mesh.faces].mean(axis=1),
+        )
+        size = self.size or grow * float(np.sqrt(areas.sum() / 2 / self.quads))
+        for part, vertices, faces in mesh.split_components():
+            own = np.average(of_face[faces], weights=areas[faces])
+            ratio = float(np.exp(np.average(of_face, weights=areas) - own))
+            sizes = None if self.sizes is None else np.exp(-scales[vertices])
+            search = replace(
+                self, mesh=grow * part.vertices, faces=part.faces, size=size * ratio, sizes=sizes
+            )
+            try:
+                found.append(search.with_boundary(boundary))
+            except (ConvergenceError, CurvatureError, GridError, MetricError, SeamError) as error:
+                why.append(f"Left out a component of {plural(len(part.faces), 'triangle')}: {error}.")
+        if not found:
+            raise GridError(f"no grid was found for any of {mesh.components[0]} components: {why[0]}")
+        return joined_grids(found, (*checked.notes, *why))
 
     def _may_align(self, boundary: Any) -> bool:
         """Return whether the options leave open which cones a grid has."""
@@ -209,11 +254,14 @@ class _Search:
             return False
         return boundary in ("auto", "straight") or not self._checked().mesh.is_boundary_edge.any()
 
-    def _of_aligned_cones(self) -> IntegerGrid:
-        """Return a grid whose cones are chosen for even sizes and for the directions of the surface."""
+    def _of_aligned_cones(self, is_finer: bool) -> IntegerGrid:
+        """Return a grid whose cones are chosen for even sizes and for the directions of the surface.
+
+        is_finer: split all edges, for more places for cones and smaller triangles between them.
+        """
         checked, options = self._checked(), read_options(self.options, QuadOptions)
         mesh, notes = checked.mesh, list(checked.notes)
-        for split, note, noun in (FEW_VERTICES, CHORDS):
+        for split, note, noun in (*[EVERY] * is_finer, FEW_VERTICES, CHORDS):
             mesh, count = split(mesh)
             notes += [note.format(plural(count, noun))] if count else []
         finer, count = split_chords(mesh, sharp_ends(mesh))

@@ -58,7 +58,7 @@ class MapModel:
         required: IntArray,
         least: int,
         most: int,
-        log_scale: FloatArray,
+        log_scale: FloatArray | None = None,
     ) -> None:
         """Set up the model.
 
@@ -67,7 +67,7 @@ class MapModel:
             wanted: (m,) preferred crosses of triangles, weighted.
             required: vertices that must be places.
             least, most: bounds of the curvature of cones, in quarter turns.
-            log_scale: (n,) the wanted log scale, up to a constant.
+            log_scale: (n,) the wanted log scale, up to a constant; None for 0.
         """
         lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces))
         angles, count = corner_angles(lengths), len(mesh.vertices)
@@ -77,7 +77,7 @@ class MapModel:
         self._wanted, self.weight = wanted, max(float(np.abs(wanted).sum()), np.finfo(float).tiny)
         self._defect = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
         self._poisson = _Poisson(cotangent_laplacian(mesh.faces, cotangents(lengths), count), share)
-        self._wanted_scale = log_scale - share @ log_scale
+        self._wanted_scale = 0.0 if log_scale is None else log_scale - share @ log_scale
         self._rotations = _Rotations(mesh, angles)
         self._means = _region_means(region, share)
         # A triangle belongs to the first region of its corners. The sample is its triangle of largest weight.
