@@ -26,8 +26,8 @@ class QuadFlags:
     """Output.
 
     Attributes:
-        output: File for the quads: .obj, .ply, .glb or .npz.  [default: MESH's name with _quads, as .obj; none if
-            --grid or --view is given]
+        output: File for the quads: .obj, .ply, .glb or .npz; by meshio .vtk, .vtu, .inp or .msh.  [default: MESH's name
+            with _quads, as .obj; none if --grid or --view is given]
         grid: File for the integer grid that the quads are extracted from: .obj, with texture coordinates in units of
             grid squares, or .npz.
         view: Page (.html) that shows the quads, their irregular vertices, and the rectangles that they form.

@@ -115,10 +115,11 @@ class QuadMesh:
         return self.surface.euler_characteristic - unused
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Write the mesh as .obj, .ply, .glb or .npz, atomically, and return the path; see `write_quads`.
+        """Write the mesh as .obj, .ply, .glb, .npz, .vtk, .vtu, .inp or .msh, and return the path; see `write_quads`.
 
         Raises:
             UnknownFormatError: the extension is another one.
+            OptionError: meshio, which writes the last four, is not installed.
             MeshFileError: the file cannot be written.
         """
         from .files import write_quads
