@@ -113,7 +113,9 @@ def _check_combinations(context: click.Context, mesh: Path) -> None:
     """Raise an error if an option would have no effect."""
     size = context.params["size"]
     if is_given(context, "quads") and size is not None and isinstance(read_weights(size), float):
-        raise click.UsageError("--quads (--faces) and a length as --size exclude each other", context)
+        raise click.UsageError(
+            "--quads (--faces) and a length as --size exclude each other: leave out one", context
+        )
     searched = [*declarations(ConeBounds), *declarations(ConeNumber), "max_cones"]
     given = context.params["cones"] not in ((), ("auto",))
     refuse(

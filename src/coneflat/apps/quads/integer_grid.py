@@ -199,16 +199,16 @@ class _Search:
         """Return a grid for the option `boundary` of `integer_grid`."""
         if not self._may_align(boundary):
             return self._with_fewest_cones(boundary)
+        if self._has_several_parts():
+            return self._of_components(boundary)
         what = "sharp edges or curvature" if self.sizes is None else "sharp edges, curvature or wanted sizes"
         for is_finer in (False, True):
             try:
                 return self._of_aligned_cones(is_finer)
             except (ConvergenceError, CurvatureError, GridError, MetricError, SeamError) as error:
                 note = f"Quads follow no {what}, because no grid with such cones was found: {error}."
-            if self._has_several_parts() or len(self._checked().mesh.faces) > MAX_REFINED:
+            if len(self._checked().mesh.faces) > MAX_REFINED:
                 break
-        if self._has_several_parts():
-            return self._of_components(boundary)
         return with_note(self._with_fewest_cones(boundary), note)
 
     def _has_several_parts(self) -> bool:
@@ -217,7 +217,10 @@ class _Search:
         return plain and self._checked().mesh.components[0] > 1
 
     def _of_components(self, boundary: Any) -> IntegerGrid:
-        """Return the grid of the components, each with a search of its own, so that none spoils those of the others.
+        """Return the grid of the components, each with a search of its own.
+
+        One that needs a finer grid, or that has none, thus does not change those of the others. On human.obj, five
+        components, 3,000 quads become 3,099 in half the time; 12,040 if all are rounded together.
 
         Raises:
             GridError: no component has a grid.
@@ -227,20 +230,21 @@ class _Search:
         scales = np.zeros(len(mesh.vertices))
         if self.sizes is not None:
             scales = wanted_scales(self.mesh, self.faces, checked, self.sizes)
-        areas, of_face = (
-            double_areas(edge_lengths(mesh.vertices, mesh.faces)),
-            scales[mesh.faces].mean(axis=1),
-        )
+        areas = double_areas(edge_lengths(mesh.vertices, mesh.faces))
+        of_face = scales[mesh.faces].mean(axis=1)
         size = self.size or grow * float(np.sqrt(areas.sum() / 2 / self.quads))
         for part, vertices, faces in mesh.split_components():
-            own = np.average(of_face[faces], weights=areas[faces])
-            ratio = float(np.exp(np.average(of_face, weights=areas) - own))
-            sizes = None if self.sizes is None else np.exp(-scales[vertices])
+            # The mean of the log scale on the component, relative to that on the whole mesh.
+            mean = np.average(of_face[faces], weights=areas[faces]) - np.average(of_face, weights=areas)
             search = replace(
-                self, mesh=grow * part.vertices, faces=part.faces, size=size * ratio, sizes=sizes
+                self,
+                mesh=grow * part.vertices,
+                faces=part.faces,
+                size=size * float(np.exp(-mean)),
+                sizes=None if self.sizes is None else np.exp(-scales[vertices]),
             )
             try:
-                found.append(search.with_boundary(boundary))
+                found.append(search.with_more_cones(None, boundary))
             except (ConvergenceError, CurvatureError, GridError, MetricError, SeamError) as error:
                 why.append(f"Left out a component of {plural(len(part.faces), 'triangle')}: {error}.")
         if not found:
@@ -309,6 +313,11 @@ class _Search:
 
     def with_lines(self, sharp_angle: float | str | None, boundary: Any) -> IntegerGrid:
         """Return a grid with the boundary and as many sharp edges as possible on grid lines."""
+        if self.sizes is not None and not (sharp_angle is None and self._may_align(boundary)):
+            raise OptionError(
+                "relative sizes need cones and a boundary that are found automatically: leave out size, or the "
+                "other options"
+            )
         if sharp_angle is None:
             return self.with_boundary(boundary)
         boundary = "free" if boundary == "auto" else boundary
