@@ -38,6 +38,10 @@ class Sizes(Number):
     def parse(self, name: str, value: Any) -> Any:
         return super().parse(name, value) if isinstance(value, Real) else value
 
+    @property
+    def text(self) -> str:
+        return f"{super().text}, `curvature`, numbers or the name of a vertex property"
+
 
 SIZE = Sizes(is_positive=True, optional=True)
 
@@ -50,9 +54,8 @@ class QuadOptions(ConeNumber, ConeBounds, RunOptions):
 
     Attributes:
         quads: Approximate number of quads; 10,000 unless size is given.
-        size: Length of the edges of quads in model units, which replaces quads. Or relative sizes of quads: a number
-            for each vertex, the name of a vertex property, or curvature, for quads up to four times smaller where
-            the surface is more curved.
+        size: Length of the edges of quads in model units, which replaces quads. Or relative sizes at the vertices;
+            curvature makes quads smaller where the surface is more curved.
         stretch: Trade-off between equal angles (0) and also equal sizes (1) of quads.
         smooth: Rounds of smoothing on the surface; 0 for none.
         sharp_angle: Put edges with a larger dihedral angle, and the boundary, on grid lines, so that edges of quads
