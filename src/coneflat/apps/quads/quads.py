@@ -97,6 +97,7 @@ def quads(
         found,
         notes=(*grid.notes, *coarse[:1], *found.notes, *_notes(found)),
         seconds={**grid.seconds, **stages.seconds},
+        grid=grid,
     )
 
 
