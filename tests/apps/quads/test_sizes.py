@@ -138,3 +138,17 @@ def test_sizes_hold_between_components(two_balls):
     sides, places = edges_and_places(coneflat.quads(*two_balls, quads=1000, size=sizes))
     is_small = places[:, 0] < 3
     assert sides[~is_small].mean() == pytest.approx(2 * sides[is_small].mean(), rel=0.1)
+
+
+def test_a_coarse_mesh_without_a_grid_is_refined():
+    """The rotations along the handles of these 800 triangles do not become quarter turns."""
+    simplify = pytest.importorskip("fast_simplification").simplify
+    path = shapes.SHARED / "3holes.off"
+    if not path.exists():
+        pytest.skip("the shared meshes are not here")
+    model = coneflat.read_mesh(path)
+    vertices, faces = simplify(model.vertices.astype(np.float32), model.triangles, target_count=800)
+    grid = coneflat.integer_grid(vertices.astype(float), faces, quads=1000)
+    assert any(note.startswith("Split all 1,200 edges") for note in grid.notes)
+    assert not any("follow no sharp edges" in note for note in grid.notes)
+    assert coneflat.quads(grid).euler_characteristic == -4

@@ -88,13 +88,12 @@ def quads(
         with console.stage("read", 0.0):
             joined = None if mesh.suffix.lower() == ".npz" else read_joined(mesh, weld)
             source: Any = read_grid(mesh) if joined is None else joined.mesh
-        options = {} if joined is None else joined.map_options(options)
+        options = {**({} if joined is None else joined.map_options(options)), "progress": console.part()}
         found = measures = None
         if output is None and view is None:
-            done = source if joined is None else integer_grid(source, progress=console.part(), **options)
-            grid_map = done
+            done = grid_map = source if joined is None else integer_grid(source, **options)
         else:
-            done = found = find_quads(source, progress=console.part(), **options, **rounds)
+            done = found = find_quads(source, **options, **rounds)
             grid_map = found.grid
             with console.stage("measure"):
                 measures = measure_quads(found)
