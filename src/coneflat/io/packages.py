@@ -102,7 +102,7 @@ def _from_polygons(points: ArrayLike, polygons: list[list[int]]) -> InputMesh:
 
 def to_trimesh(result: Flattening) -> Any:
     """Return a `trimesh.Trimesh`; see `Flattening.to_trimesh`."""
-    trimesh = _imported("trimesh", "trimesh")
+    trimesh = imported("trimesh", "trimesh")
     split = split_at_seams(result)
     return trimesh.Trimesh(
         split.vertices,
@@ -116,7 +116,7 @@ def to_trimesh(result: Flattening) -> Any:
 
 def to_pyvista(result: Flattening) -> Any:
     """Return a `pyvista.PolyData`; see `Flattening.to_pyvista`."""
-    pyvista = _imported("pyvista", "PyVista")
+    pyvista = imported("pyvista", "PyVista")
     split = split_at_seams(result)
     # Each triangle is preceded by its number of corners.
     padded = np.insert(split.faces, 0, 3, axis=1)
@@ -130,7 +130,7 @@ def to_pyvista(result: Flattening) -> Any:
 
 def to_meshio(result: Flattening) -> Any:
     """Return a `meshio.Mesh`; see `Flattening.to_meshio`."""
-    meshio = _imported("meshio", "meshio")
+    meshio = imported("meshio", "meshio")
     split = split_at_seams(result)
     return meshio.Mesh(
         split.vertices,
@@ -141,7 +141,12 @@ def to_meshio(result: Flattening) -> Any:
     )
 
 
-def _imported(module: str, name: str) -> Any:
+def imported(module: str, name: str) -> Any:
+    """Return a module that not every installation has.
+
+    Raises:
+        OptionError: it is not installed.
+    """
     try:
         return import_module(module)
     except ImportError as error:

@@ -111,10 +111,8 @@ def locate_constraints(checked: CheckedMesh, options: Options, given: InputMesh)
         _locate(checked, "corner", options.corners),
         required,
         is_allowed,
-        None if options.weights is None else _weights("weights", options.weights, given)[names],
-        None
-        if options.seam_weights is None
-        else _weights("seam weights", options.seam_weights, given)[names],
+        vertex_numbers("weights", options.weights, given, names),
+        vertex_numbers("seam weights", options.seam_weights, given, names),
     )
 
 
@@ -151,11 +149,23 @@ def _weights_of_some(noun: str, weights: Mapping[Any, Any], count: int) -> Float
     return values
 
 
-def _weights(noun: str, weights: object, given: InputMesh) -> FloatArray:
-    """Return (n,) the importance of each vertex of the input."""
+def vertex_numbers(noun: str, weights: object, given: InputMesh, names: IntArray) -> FloatArray | None:
+    """Return (n,) nonnegative numbers for the vertices `names` of the input, such as their importance; None for None.
+
+    Args:
+        noun: what the numbers are, for messages.
+        weights: one number for each vertex of the input, a map for some, or the name of a vertex property.
+        given: the input.
+        names: (n,) vertices.
+
+    Raises:
+        OptionError: they are not such numbers.
+    """
+    if weights is None:
+        return None
     count = len(np.asarray(given.vertices))
     if isinstance(weights, str):
-        weights = _property(weights, given)
+        weights = _property(noun, weights, given)
     if isinstance(weights, Mapping):
         weights = _weights_of_some(noun, weights, count)
     try:
@@ -174,16 +184,15 @@ def _weights(noun: str, weights: object, given: InputMesh) -> FloatArray:
         raise OptionError(
             f"{noun} must be nonnegative and not all 0; they are {values.min():g} to {values.max():g}"
         )
-    return values
+    return values[names]
 
 
-def _property(name: str, given: InputMesh) -> FloatArray:
+def _property(noun: str, name: str, given: InputMesh) -> FloatArray:
     """Return (n,) a vertex property of the input's file; "color" stands for the saturation of the vertex colour."""
     known = {} if given.source is None else given.source.properties
     if name == "color" and all(colour in known for colour in COLOURS):
-        painted = np.ptp(np.stack([known[colour] for colour in COLOURS]), axis=0)
-        return 1.0 + PAINTED * painted
+        return 1.0 + PAINTED * np.ptp(np.stack([known[colour] for colour in COLOURS]), axis=0)
     if name not in known:
         has = "it has " + ", ".join(known) if known else "it has none"
-        raise OptionError(f"the mesh has no vertex property {name!r} for weights; {has}")
+        raise OptionError(f"the mesh has no vertex property {name!r} for {noun}; {has}")
     return known[name]

@@ -169,3 +169,19 @@ def test_quads_are_flattened_again(tmp_path):
     again = coneflat.read_mesh(result.save(tmp_path / "flat.obj"))
     assert (np.diff(again.offsets) == 4).all()
     assert len(again.offsets) == len(coneflat.read_mesh(path).offsets)
+
+
+def test_the_command_tries_a_finer_grid_as_the_function_does(tmp_path):
+    """Around each hole of a surface with three handles there are too few squares."""
+    vertices, faces = shapes.genus(3)
+    path = tmp_path / "holes.obj"
+    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
+    path.write_text("\n".join([*rows, *(f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist())]))
+    words = ("--quads", 10, "--cones", "sparse", "--distortion", 0.2)
+    done = run(path, *words, "-o", tmp_path / "quads.npz", "--grid", tmp_path / "grid.npz")
+    assert done.exit_code == 0, done.output
+    assert "More quads than wanted" in done.output
+    mesh = coneflat.quads(coneflat.read_mesh(path), quads=10, cones="sparse", distortion=0.2)
+    np.testing.assert_array_equal(QuadMesh.load(tmp_path / "quads.npz").quads, mesh.quads)
+    # The grid that is written is that of the quads.
+    assert IntegerGrid.load(tmp_path / "grid.npz").size == mesh.grid.size

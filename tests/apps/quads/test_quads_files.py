@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import fields
 
 import numpy as np
@@ -10,7 +11,8 @@ from grid_maps import L_SHAPE, on_squares, polycube
 
 from coneflat import QuadMesh, read_mesh
 from coneflat.apps.quads.extract import extract_quads
-from coneflat.errors import MeshFileError
+from coneflat.apps.quads.quad_mesh import least_jacobians
+from coneflat.errors import MeshFileError, OptionError
 from coneflat.io.gltf.data import GltfData
 
 
@@ -101,3 +103,25 @@ class TestNpz:
         with pytest.raises(MeshFileError, match=message) as caught:
             QuadMesh.load(tmp_path / "bad.npz")
         assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("ending", [".vtk", ".vtu", ".inp", ".msh"])
+class TestMeshio:
+    def test_reads_the_same_quads(self, cube, tmp_path, ending):
+        meshio = pytest.importorskip("meshio")
+        found = meshio.read(cube.save(tmp_path / f"quads{ending}"))
+        np.testing.assert_array_equal(found.points, cube.vertices)
+        (block,) = found.cells
+        assert block.type == "quad"
+        np.testing.assert_array_equal(block.data, cube.quads)
+        if ending != ".inp":
+            np.testing.assert_array_equal(found.point_data["valence"], cube.valences)
+            np.testing.assert_allclose(
+                found.cell_data["jacobian"][0], least_jacobians(cube.vertices, cube.quads)
+            )
+
+    def test_is_an_extra(self, cube, tmp_path, monkeypatch, ending):
+        monkeypatch.setitem(sys.modules, "meshio", None)
+        with pytest.raises(OptionError, match="need meshio: pip install meshio"):
+            cube.save(tmp_path / f"quads{ending}")
+        assert not list(tmp_path.iterdir())

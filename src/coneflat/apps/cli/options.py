@@ -15,6 +15,7 @@ from ... import PAPER
 from ... import options as declared
 from ...errors import OptionError
 from ...options import ConeOptions, Declaration, Kind, MetricOptions, Number, Options, declarations, option
+from ..quads.options import Sizes
 from . import values
 from .shared import BRIEF, RARE, RARE_TITLE, Grouped, repair_keywords
 
@@ -139,6 +140,8 @@ def _flag(declaration: Declaration) -> Callable[[Command], Command]:
             more = {"type": _angle, "metavar": "ANGLE"}
         case Number(is_strength=True):
             more = {"type": _strength, "is_flag": False, "flag_value": 1.0, "metavar": "STRENGTH"}
+        case Sizes():
+            more = {"metavar": "LENGTH|curvature|NAME|FILE"}
         case Number():
             more = {"type": int if kind.is_integer else float}
         case declared.Direction():
@@ -213,7 +216,7 @@ def _value(declaration: Declaration, value: Any) -> Any:
             return words[0] if words else values.read_vertex_map(flag, kind.noun, value)
         case declared.Edges():
             return _edges(flag, kind, value)
-        case declared.Weights():
+        case declared.Weights() | Sizes():
             return values.read_weights(value)
     return value
 

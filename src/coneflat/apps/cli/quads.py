@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,6 @@ from .shared import GroupedCommand, input_options, verbosity_options
 
 if TYPE_CHECKING:
     from ... import IntegerGrid
-    from .run import Console
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,8 +24,8 @@ class QuadFlags:
     """Output.
 
     Attributes:
-        output: File for the quads: .obj, .ply, .glb or .npz.  [default: MESH's name with _quads, as .obj; none if
-            --grid or --view is given]
+        output: File for the quads: .obj, .ply, .glb or .npz; by meshio .vtk, .vtu, .inp or .msh.  [default: MESH's name
+            with _quads, as .obj; none if --grid or --view is given]
         grid: File for the integer grid that the quads are extracted from: .obj, with texture coordinates in units of
             grid squares, or .npz.
         view: Page (.html) that shows the quads, their irregular vertices, and the rectangles that they form.
@@ -62,10 +61,10 @@ def quads(
       coneflat quads bunny.obj --grid bunny_grid.obj
       coneflat quads hand.obj -o hand.npz --view hand.html
     """
-    from ... import measure_quads
+    from ... import integer_grid, measure_quads
     from ... import quads as find_quads
-    from ...io import check_target
-    from ..quads.files import check_grid_output, check_quads_output
+    from ...io import check_target, read_joined
+    from ..quads.files import check_grid_output, check_quads_output, read_grid
     from ..quads.page import page_of_quads
     from ..view import check_page, write_page
     from .run import Console, require_distinct, write_report
@@ -73,6 +72,8 @@ def quads(
     _check_combinations(context, mesh)
     flags, options = pop_flags(given, QuadFlags), keywords(given, QuadOptions)
     read_options(options, QuadOptions)
+    if "quads" in options and isinstance(options.get("size"), float):
+        raise click.UsageError("--quads (--faces) and a length as --size exclude each other: leave out one")
     output, grid, view = flags.output, flags.grid, flags.view
     if output is None and grid is None and view is None:
         output = Path(f"{mesh.stem}_quads.obj")
@@ -85,13 +86,19 @@ def quads(
     require_distinct({"input": mesh, **files})
     rounds = {"smooth": options.pop("smooth")} if "smooth" in options else {}
     with Console(verbosity) as console:
-        grid_map = _read_grid(mesh, console, options, weld)
+        with console.stage("read", 0.0):
+            joined = None if mesh.suffix.lower() == ".npz" else read_joined(mesh, weld)
+            source: Any = read_grid(mesh) if joined is None else joined.mesh
+        options = {**({} if joined is None else joined.map_options(options)), "progress": console.part()}
         found = measures = None
-        if output is not None or view is not None:
-            found = find_quads(grid_map, progress=console.part(), **rounds)
-            console.seconds.update(found.seconds)
+        if output is None and view is None:
+            done = grid_map = source if joined is None else integer_grid(source, **options)
+        else:
+            done = found = find_quads(source, **options, **rounds)
+            grid_map = found.grid
             with console.stage("measure"):
                 measures = measure_quads(found)
+        console.seconds.update(done.seconds)
         with console.stage("write"):
             if grid is not None:
                 grid_map.save(grid)
@@ -99,7 +106,7 @@ def quads(
                 found.save(output)
             if found is not None and view is not None:
                 write_page(page_of_quads(found, name=mesh.name), view)
-        notes = list((grid_map if found is None else found).notes)
+        notes = list(done.notes if joined is None else joined.all_notes(done.notes))
         if flags.report is not None:
             measured = {} if measures is None else measures.report()
             rest = {"grid": grid_map.report(), "seconds": dict(console.seconds), "notes": notes}
@@ -111,10 +118,8 @@ def quads(
 
 def _check_combinations(context: click.Context, mesh: Path) -> None:
     """Raise an error if an option would have no effect."""
-    if is_given(context, "quads") and is_given(context, "size"):
-        raise click.UsageError("--quads (--faces) and --size exclude each other: leave out one", context)
     searched = [*declarations(ConeBounds), *declarations(ConeNumber), "max_cones"]
-    given = context.params["cones"] not in ((), ("auto",))
+    given = context.params["cones"] not in ((), ("auto",), ("sparse",))
     refuse(
         context,
         [
@@ -128,21 +133,6 @@ def _check_combinations(context: click.Context, mesh: Path) -> None:
         allowed = ("mesh", "output", "grid", "view", "smooth", "report", "verbosity")
         if parameter.name not in allowed and parameter.name is not None and is_given(context, parameter.name):
             raise click.UsageError(f"{mesh} is a grid: leave out {parameter.opts[0]}", context)
-
-
-def _read_grid(mesh: Path, console: Console, options: dict[str, Any], weld: bool | None) -> IntegerGrid:
-    """Return the integer grid of a mesh file, or the one in a .npz file."""
-    from ... import integer_grid
-    from ...io import read_joined
-    from ..quads.files import read_grid
-
-    with console.stage("read", 0.0):
-        if mesh.suffix.lower() == ".npz":
-            return read_grid(mesh)
-        joined = read_joined(mesh, weld)
-    found = integer_grid(joined.mesh, progress=console.part(), **joined.map_options(options))
-    console.seconds.update(found.seconds)
-    return replace(found, notes=joined.all_notes(found.notes))
 
 
 def _grid_rows(grid: IntegerGrid) -> Iterator[tuple[str, str, str]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -122,8 +123,8 @@ def _holds_pairs(path: Path) -> bool:
     return all(len(words) == 2 for words in lines if words != [""])
 
 
-def read_weights(text: str) -> str | FloatArray:
-    """Return the numbers in a file; or the text itself, which is then the name of a property.
+def read_weights(text: str) -> str | float | FloatArray:
+    """Return the numbers in a file; or a number; or the text itself, which is then the name of a property.
 
     Raises:
         MeshFileError: the file cannot be read.
@@ -132,6 +133,8 @@ def read_weights(text: str) -> str | FloatArray:
 
     path = Path(text)
     if not is_file(text):
+        with suppress(ValueError):
+            return float(text)
         if path.suffix:
             raise MeshFileError(f"cannot read weights from {path}: there is no such file")
         return text

@@ -30,7 +30,7 @@ from .options import DISTORTION
 
 # Cost of an area distortion as large as allowed, at first, and of crosses off by 22.5 degrees, which is larger where
 # sharp edges are required on grid lines; a cone costs 1 for each quarter turn, and a missing one more than all others.
-COST_OF_AREAS, COST_OF_DIRECTIONS, TIMES_REQUIRED, COST_OF_MISSING = 15.0, 200.0, 5.0, 1e4
+COST_OF_AREAS, COST_OF_DIRECTIONS, TIMES_REQUIRED, COST_OF_MISSING = 15.0, 200.0, 5.0, 1e9
 # Radii within which cones move, relative to the distance between the centres of regions, and tried places in each.
 RADII, PLACES_NEAR = (1.0, 0.6, 0.35, 0.2), 10
 # Number of triangles of a coarse mesh, on which the cones of larger meshes are searched.
@@ -49,6 +49,7 @@ def aligned_cones(
     most: int = 1,
     price: float = 1.0,
     sharp_angle: float | None = None,
+    log_scale: FloatArray | None = None,
 ) -> dict[int, int]:
     """Return cones of a connected mesh, and corners of its boundary, with their curvature in quarter turns.
 
@@ -59,6 +60,7 @@ def aligned_cones(
         price: cost of a cone, 1 by default.
         sharp_angle: dihedral angle of edges that grid lines must follow, radians; None: that from which on they prefer
             to, and other directions count as much.
+        log_scale: (n,) the log scale from which the distortion deviates, up to a constant; None for equal sizes.
 
     Raises:
         CurvatureError: the mesh has too few vertices for the cones that it needs.
@@ -69,7 +71,8 @@ def aligned_cones(
         mesh, kept, _ = coarse_mesh(mesh, COARSE)
     directions = preferred_directions(mesh, angle)
     start = field_indices(mesh, smoothest_cross_field(mesh, directions))
-    model = MapModel(mesh, directions.both, np.flatnonzero(start), least, most, degrees[kept])
+    scale = None if log_scale is None else log_scale[kept]
+    model = MapModel(mesh, directions.both, np.flatnonzero(start), least, most, degrees[kept], scale)
     search = _Search(mesh, model, start, price, angle)
     along = COST_OF_DIRECTIONS * (1.0 if sharp_angle is None else TIMES_REQUIRED)
     areas = COST_OF_AREAS

@@ -67,7 +67,7 @@ def preferred_directions(mesh: TriangleMesh, angle: float = SHARP_ANGLE) -> Dire
     count = len(mesh.faces)
     sharp = np.zeros(count, dtype=np.complex128)
     np.add.at(sharp, sides // 3, crosses / scale)
-    tensors = _curvature_tensors(mesh, areas, CURVATURE_SCALE * scale)
+    tensors = curvature_tensors(mesh, areas, CURVATURE_SCALE * scale)
     # The direction of a tensor is that of an angle up to half turns.
     double = (tensors[:, 0, 0] - tensors[:, 1, 1]) + 2j * tensors[:, 0, 1]
     trace, size = tensors[:, 0, 0] + tensors[:, 1, 1], np.abs(double)
@@ -95,7 +95,7 @@ def sharp_ends(mesh: TriangleMesh, angle: float = SHARP_ANGLE) -> IntArray:
     return mesh.edges[edges[~mesh.is_boundary_edge[edges]]]
 
 
-def _curvature_tensors(mesh: TriangleMesh, areas: FloatArray, radius: float) -> FloatArray:
+def curvature_tensors(mesh: TriangleMesh, areas: FloatArray, radius: float) -> FloatArray:
     """Return (m, 2, 2) the curvature tensors of triangles in their frames, averaged over a radius.
 
     References:

@@ -65,6 +65,12 @@ def split_chords(mesh: TriangleMesh, ends: IntArray | None = None) -> tuple[Tria
     return _split(mesh, chords), int(chords.sum())
 
 
+def split_all(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
+    """Return a mesh with all edges split at their midpoints, and their number."""
+    mesh = TriangleMesh(*_without_pillows(mesh.vertices, mesh.faces))
+    return _split(mesh, np.ones(len(mesh.edges), dtype=bool)), len(mesh.edges)
+
+
 def split_small_components(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     """Return a mesh with at least 60 triangles in each component, by splitting edges, and how many were smaller.
 

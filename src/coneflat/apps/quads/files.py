@@ -10,6 +10,7 @@ from dataclasses import fields
 from functools import partial
 from os import PathLike
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import IO, Any, TypeAlias
 
 import numpy as np
@@ -28,6 +29,7 @@ from ...io import (
     atomic_write,
     bounds,
     checked_target,
+    imported,
     known_ending,
     lines_of,
     number,
@@ -38,14 +40,14 @@ from ...io import (
     write_parts,
 )
 from .integer_map import IntegerGrid, find_motions, grid_of_corners
-from .quad_mesh import QuadMesh
+from .quad_mesh import QuadMesh, least_jacobians
 
 Check: TypeAlias = Callable[["str | PathLike[str]"], Path]
 
+#: Names of the formats that meshio writes, by their extensions.
+_MESHIO = {".vtk": "vtk", ".vtu": "vtu", ".inp": "abaqus", ".msh": "gmsh"}
 #: Extensions of the files that `write_quads` writes.
-QUAD_FORMATS = (".obj", ".ply", ".glb", ".npz")
-#: Checks in advance whether `write_quads` can write a path; returns it as a `Path`, or raises the same errors.
-check_quads_output: Check = partial(checked_target, endings=QUAD_FORMATS, what="quads are written as")
+QUAD_FORMATS = (".obj", ".ply", ".glb", ".npz", *_MESHIO)
 #: Arrays from which a quad mesh is restored.
 _NAMES = ("vertices", "quads", "faces", "barycentric", "surface_vertices", "surface_faces", "report")
 #: Extensions of the files that `write_grid` writes and `read_grid` reads.
@@ -67,12 +69,22 @@ _HEAD = (
 )
 
 
+def check_quads_output(path: str | PathLike[str]) -> Path:
+    """Return a path that `write_quads` can write, or raise the same errors in advance."""
+    found = checked_target(path, endings=QUAD_FORMATS, what="quads are written as")
+    if found.suffix.lower() in _MESHIO:
+        imported("meshio", "meshio")
+    return found
+
+
 def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:
     """Write a quad mesh atomically and return the path.
 
     An .obj has as many digits as are needed to read the same numbers; a .ply is binary with double coordinates. A .glb,
     which has no quads, has two triangles for each and their edges as lines; see `_write_glb`. An .npz has all arrays of
-    the `QuadMesh`, from which `read_quads` restores it, and the irregular vertices with their valences.
+    the `QuadMesh`, from which `read_quads` restores it, and the irregular vertices with their valences. VTK (.vtk,
+    .vtu), Abaqus (.inp) and Gmsh (.msh) are written by meshio; all but Abaqus have the valences of vertices, and the
+    least scaled Jacobians of quads.
 
     Args:
         path: the file.
@@ -80,6 +92,7 @@ def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:
 
     Raises:
         UnknownFormatError: the extension is not one of `QUAD_FORMATS`.
+        OptionError: meshio is needed and not installed.
         MeshFileError: the file cannot be written.
     """
     path = check_quads_output(path)
@@ -98,8 +111,26 @@ def write_quads_stream(mesh: QuadMesh, stream: IO[bytes], ending: str) -> None:
         write_parts(stream, "quads by coneflat", [f"double {axis}" for axis in "xyz"], places, mesh.quads)
     elif ending == ".glb":
         _write_glb(mesh, stream)
+    elif ending in _MESHIO:
+        _write_by_meshio(mesh, stream, ending)
     else:
         _write_quads_npz(mesh, stream)
+
+
+def _write_by_meshio(mesh: QuadMesh, stream: IO[bytes], ending: str) -> None:
+    meshio = imported("meshio", "meshio")
+    least = least_jacobians(mesh.vertices, mesh.quads)
+    is_bare = ending == ".inp"
+    found = meshio.Mesh(
+        mesh.vertices,
+        [("quad", mesh.quads)],
+        point_data={} if is_bare else {"valence": mesh.valences},
+        cell_data={} if is_bare else {"jacobian": [least]},
+    )
+    with TemporaryDirectory() as folder:  # not all writers of meshio take streams
+        path = Path(folder) / f"quads{ending}"
+        meshio.write(path, found, _MESHIO[ending])
+        stream.write(path.read_bytes())
 
 
 def _write_quads_npz(mesh: QuadMesh, stream: IO[bytes]) -> None:

@@ -30,12 +30,13 @@ from ...mesh import CheckedMesh
 from ...options import WordOrVertices, read_options
 from .aligned_cones import aligned_cones
 from .cross_field import SHARP_ANGLE, sharp_ends
-from .features import split_chords, split_small_components
-from .integer_map import IntegerGrid
+from .features import split_all, split_chords, split_small_components
+from .integer_map import IntegerGrid, joined_grids
 from .layout import GRID_TOLERANCE, GridLayout, aligned
 from .lines import grid_with_lines, with_sides
 from .options import DISTORTION, QUADS, QuadOptions
 from .round_layout import grid_of, split_between_nodes, with_note
+from .sizes import extended, note_on_sizes, scaled_components, wanted_scales
 
 # Options of the flattening for a grid: three, five or six quads at a cone, and rotations by quarter turns.
 OPTIONS = {
@@ -51,6 +52,8 @@ OPTIONS = {
 QUADS_PER_CONE = 2_000
 # Largest fraction of the edges that are split because they join two vertices on sharp edges.
 MAX_CHORDS = 0.05
+# Largest number of triangles that are refined where there is no grid; meshes of more have places enough for cones.
+MAX_REFINED = 10_000
 # Options that only the search for the fewest cones takes into account.
 SPARSE_OPTIONS = ("cone_count", "required_cones", "forbidden_cones", "weights", "positive_only", "max_cones")
 
@@ -61,6 +64,7 @@ FEW_VERTICES = (
     "Split the triangles of {} with too few vertices for cones of a grid.",
     "component",
 )
+EVERY = (split_all, "Split all {}, because no grid was found without.", "edge")
 CHORDS = (
     split_chords,
     "Split {} between boundary vertices, whose triangles straight sides degenerate.",
@@ -73,7 +77,7 @@ def integer_grid(
     faces: ArrayLike | None = None,
     *,
     quads: int | None = None,
-    size: float | None = None,
+    size: ArrayLike | None = None,
     stretch: float = 0.0,
     sharp_angle: float | str | None = None,
     **options: Any,
@@ -83,7 +87,9 @@ def integer_grid(
     Args:
         mesh, faces: as for `coneflat.flatten`; or a `Flattening` with cones quantised to quarter turns.
         quads: approximate number of unit squares that cover the surface; None: 10,000, unless `size` is given.
-        size: edge length of a square in model units; replaces `quads`.
+        size: edge length of a square in model units, which replaces `quads`; or relative sizes of squares: (n,)
+            numbers, the name of a vertex property of the file, or "curvature", for squares up to four times smaller
+            where the surface is more curved.
         stretch: trade-off between angles (0) and areas (1); see `StretchEnergy`.
         sharp_angle: radians; edges with a larger dihedral angle, and the boundary, are put on grid lines; None for
             none.
@@ -114,20 +120,18 @@ def integer_grid(
         >>> grid.corners, grid.corner_quarters
         (array([0, 1, 2, 3]), array([1, 1, 1, 1]))
     """
-    wanted, name = (size, "size") if size is not None else (QUADS if quads is None else quads, "quads")
-    if quads is not None and size is not None:
+    length, sizes = (size, None) if isinstance(size, Real) else (None, size)
+    wanted, name = (length, "size") if length is not None else (QUADS if quads is None else quads, "quads")
+    if quads is not None and length is not None:
         raise OptionError("quads and size must not be given together")
     if not (isinstance(wanted, Real) and 0 < wanted < np.inf):
         raise OptionError(f"{name} must be a positive number, not {wanted!r}")
     progress = options.pop("progress", None)
     stages = Stopwatch(progress)
-    energy, angle = (
-        StretchEnergy(stretch),
-        read_options({"sharp_angle": sharp_angle}).sharp_angle,
-    )
-    search = _Search(mesh, faces, quads or QUADS, size, energy, options, progress, stages, angle)
+    energy, angle = StretchEnergy(stretch), read_options({"sharp_angle": sharp_angle}).sharp_angle
+    search = _Search(mesh, faces, quads or QUADS, length, energy, options, progress, stages, sizes, angle)
     if isinstance(mesh, Flattening):
-        if faces is not None or options or sharp_angle is not None:
+        if any(one is not None for one in (faces, sizes, sharp_angle)) or options:
             raise OptionError("a flattening already has faces and options: no others can be given")
         found = search.of_result(mesh)
     else:
@@ -169,6 +173,7 @@ class _Search:
     options: dict[str, Any]
     progress: Progress | None
     stages: Stopwatch
+    sizes: Any = None
     sharp_angle: float | None = None
 
     def with_more_cones(self, boundary: Any) -> IntegerGrid:
@@ -191,12 +196,63 @@ class _Search:
     def with_boundary(self, boundary: Any) -> IntegerGrid:
         """Return a grid for the option `boundary` of `integer_grid`."""
         if not self._may_align(boundary):
+            if self.sizes is not None:
+                raise OptionError(
+                    "relative sizes need cones and a boundary that are found automatically: leave out size, or the "
+                    "other options"
+                )
             return self._with_fewest_cones(boundary)
-        try:
-            return self._of_aligned_cones()
-        except (ConvergenceError, CurvatureError, GridError, MetricError, SeamError) as error:
-            note = f"Quads follow no sharp edges or curvature, because no grid with such cones was found: {error}."
+        if self._has_several_parts():
+            return self._of_components(boundary)
+        what = "sharp edges or curvature" if self.sizes is None else "sharp edges, curvature or wanted sizes"
+        for is_finer in (False, True):
+            try:
+                return self._of_aligned_cones(is_finer)
+            except (ConvergenceError, CurvatureError, GridError, MetricError, SeamError) as error:
+                note = f"Quads follow no {what}, because no grid with such cones was found: {error}."
+            if len(self._checked().mesh.faces) > MAX_REFINED:
+                break
         return with_note(self._with_fewest_cones(boundary), note)
+
+    def _has_several_parts(self) -> bool:
+        """Return whether each component can have a search of its own: no option refers to vertices."""
+        plain = all(one is None or isinstance(one, (str, float, int)) for one in self.options.values())
+        return plain and self._checked().mesh.components[0] > 1
+
+    def _of_components(self, boundary: Any) -> IntegerGrid:
+        """Return the grid of the components, each with a search of its own.
+
+        One that needs a finer grid, or that has none, thus does not change those of the others. On human.obj, five
+        components, 3,000 quads become 3,099 in half the time; 12,040 if all are rounded together.
+
+        Raises:
+            GridError: no component has a grid.
+        """
+        checked, found, why = self._checked(), list[IntegerGrid](), list[str]()
+        mesh, grow = checked.mesh, np.exp2(-checked.exponent)
+        scales = np.zeros(len(mesh.vertices))
+        if self.sizes is not None:
+            scales = wanted_scales(self.mesh, self.faces, checked, self.sizes)
+        areas = double_areas(edge_lengths(mesh.vertices, mesh.faces))
+        of_face = scales[mesh.faces].mean(axis=1)
+        size = self.size or grow * float(np.sqrt(areas.sum() / 2 / self.quads))
+        for part, vertices, faces in mesh.split_components():
+            # The mean of the log scale on the component, relative to that on the whole mesh.
+            mean = np.average(of_face[faces], weights=areas[faces]) - np.average(of_face, weights=areas)
+            search = replace(
+                self,
+                mesh=grow * part.vertices,
+                faces=part.faces,
+                size=size * float(np.exp(-mean)),
+                sizes=None if self.sizes is None else np.exp(-scales[vertices]),
+            )
+            try:
+                found.append(search.with_more_cones(boundary))
+            except (ConvergenceError, CurvatureError, GridError, MetricError, SeamError) as error:
+                why.append(f"Left out a component of {plural(len(part.faces), 'triangle')}: {error}.")
+        if not found:
+            raise GridError(f"no grid was found for any of {mesh.components[0]} components: {why[0]}")
+        return joined_grids(found, (*checked.notes, *why))
 
     def _may_align(self, boundary: Any) -> bool:
         """Return whether the options leave open which cones a grid has."""
@@ -205,11 +261,14 @@ class _Search:
             return False
         return boundary in ("auto", "straight") or not self._checked().mesh.is_boundary_edge.any()
 
-    def _of_aligned_cones(self) -> IntegerGrid:
-        """Return a grid whose cones are chosen for even sizes and for the directions of the surface."""
+    def _of_aligned_cones(self, is_finer: bool) -> IntegerGrid:
+        """Return a grid whose cones are chosen for even sizes and for the directions of the surface.
+
+        is_finer: split all edges, for more places for cones and smaller triangles between them.
+        """
         checked, options = self._checked(), read_options(self.options, QuadOptions)
         mesh, notes = checked.mesh, list(checked.notes)
-        for split, note, noun in (FEW_VERTICES, CHORDS):
+        for split, note, noun in (*[EVERY] * is_finer, FEW_VERTICES, CHORDS):
             mesh, count = split(mesh)
             notes += [note.format(plural(count, noun))] if count else []
         finer, count = split_chords(mesh, sharp_ends(mesh, self._angle))
@@ -220,12 +279,15 @@ class _Search:
             int(np.floor((2 * np.pi - options.min_cone_angle) / (np.pi / 2) + GRID_TOLERANCE)),
         )
         cones: dict[int, float] = {}
+        asked = None if self.sizes is None else wanted_scales(self.mesh, self.faces, checked, self.sizes)
+        scales = None if asked is None else extended(asked, mesh)
         area = float(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum()) / 2
         quads = area / np.ldexp(self.size, checked.exponent) ** 2 if self.size else self.quads
         price = max(1.0, QUADS_PER_CONE / quads)
         with self.stages("cones"), limit_threads(options.threads):
             for part, vertices, _ in mesh.split_components():
-                found = aligned_cones(part, options.distortion, *bounds, price, self.sharp_angle)
+                wanted = None if scales is None else scales[vertices]
+                found = aligned_cones(part, options.distortion, *bounds, price, self.sharp_angle, wanted)
                 cones |= {int(vertices[v]): k * np.pi / 2 for v, k in found.items()}
         given = {name: one for name, one in self.options.items() if name not in OPTIONS}
         given |= {**_defaults({"cones": cones}), "cones": cones}
@@ -234,7 +296,10 @@ class _Search:
         with self.stages("flatten"):
             vertices = np.ldexp(mesh.vertices, -checked.exponent)
             result = flatten(vertices, mesh.faces, **given, progress=self.progress)
-        return self._with_notes(replace(result, notes=(*notes, *result.notes)), True, True)
+        if scales is not None:
+            result = replace(result, uv=scaled_components(result, mesh, scales))
+        grid = self._with_notes(replace(result, notes=(*notes, *result.notes)), True, True)
+        return grid if asked is None else with_note(grid, note_on_sizes(grid, asked))
 
     def _with_fewest_cones(self, boundary: Any) -> IntegerGrid:
         """Return a grid with the fewest cones for the option `boundary` of `integer_grid`."""

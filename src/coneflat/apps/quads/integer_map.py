@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -74,6 +76,11 @@ class IntegerGrid:
     corner_quarters: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     features: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def squares(self) -> float:
+        """The area of the grid in squares."""
+        return float(signed_double_areas(self.corner_grid).sum()) / 2
 
     def report(self) -> dict[str, float | None]:
         """Return the numeric attributes by name, ready for JSON; unknown values are None."""
@@ -183,6 +190,25 @@ def grid_of_corners(
         corner_quarters=quarters[corners],
         **{"size": float(np.sqrt(area / flat.sum())), **known},  # type: ignore[arg-type]
     )
+
+
+def joined_grids(grids: Sequence[IntegerGrid], notes: Sequence[str]) -> IntegerGrid:
+    """Return one grid of several surfaces, with means of their measures, and the notes of all after given ones."""
+    first = np.cumsum([0, *(len(grid.vertices) for grid in grids)])
+    squares = [grid.squares for grid in grids]
+    values: dict[str, Any] = {}
+    for each in fields(IntegerGrid):
+        own = [getattr(grid, each.name) for grid in grids]
+        if each.name in ("faces", "cones", "corners", "features"):
+            values[each.name] = np.concatenate([one + start for one, start in zip(own, first, strict=False)])
+        elif str(each.type).endswith("Array"):
+            values[each.name] = np.concatenate(own)
+        elif each.type == "float":
+            values[each.name] = float(np.average(own, weights=squares))
+    values["move_max"] = max(grid.move_max for grid in grids)
+    values["least_area"] = min(grid.least_area for grid in grids)
+    values["notes"] = tuple(dict.fromkeys([*notes, *(note for grid in grids for note in grid.notes)]))
+    return IntegerGrid(**values)
 
 
 def _between_sides(mesh: TriangleMesh, corner_grid: FloatArray) -> BoolArray:

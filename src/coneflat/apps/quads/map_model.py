@@ -59,6 +59,7 @@ class MapModel:
         least: int,
         most: int,
         triangles: IntArray | None = None,
+        log_scale: FloatArray | None = None,
     ) -> None:
         """Set up the model.
 
@@ -68,6 +69,7 @@ class MapModel:
             required: vertices that must be places.
             least, most: bounds of the curvature of cones, in quarter turns.
             triangles: (n,) the number of triangles at each vertex if it is another one in the mesh that gets the cones.
+            log_scale: (n,) the wanted log scale, up to a constant; None for 0.
         """
         lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces))
         angles, count = corner_angles(lengths), len(mesh.vertices)
@@ -77,6 +79,7 @@ class MapModel:
         self._wanted, self.weight = wanted, max(float(np.abs(wanted).sum()), np.finfo(float).tiny)
         self._defect = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
         self._poisson = _Poisson(cotangent_laplacian(mesh.faces, cotangents(lengths), count), share)
+        self._wanted_scale = 0.0 if log_scale is None else log_scale - share @ log_scale
         self._rotations = _Rotations(mesh, angles)
         self._means = _region_means(region, share)
         # A triangle belongs to the first region of its corners. The sample is its triangle of largest weight.
@@ -120,19 +123,23 @@ class MapModel:
         self._base = np.bincount(self._number, crosses.real, count) + 1j * np.bincount(
             self._number, crosses.imag, count
         )
-        self._base_scale = self._means @ self._log_scale
+        self._excess = self._log_scale - self._wanted_scale
+        self._base_scale = self._means @ self._excess
         self._base_loops = np.exp(4j * self._rotations.around_loops(self._log_scale))
 
     @property
     def spread(self) -> float:
-        """The log of the ratio of the 95% and 5% quantiles of the areas of quads, for the cones of `linearise`."""
-        order = np.argsort(self._log_scale)
+        """The log of the ratio of the 95% and 5% quantiles of the areas of quads, for the cones of `linearise`.
+
+        Areas are relative to the wanted ones.
+        """
+        order = np.argsort(self._excess)
         number = np.cumsum(self._poisson.share[order] * np.exp(2 * self._log_scale[order]))
-        low, high = np.interp([0.05, 0.95], number / number[-1], self._log_scale[order])
+        low, high = np.interp([0.05, 0.95], number / number[-1], self._excess[order])
         return float(2 * (high - low))
 
     def state(self, indices: IntArray) -> tuple[FloatArray, ComplexArray, ComplexArray]:
-        """Return the log scale of regions (r,), the crosses of samples (s,), and the rotations of loops (l,)."""
+        """Return how far log scales of regions (r,) are off, crosses of samples (s,), and rotations of loops (l,)."""
         step = indices - self._at
         used = np.flatnonzero(step)
         turned, looped = (each[:, used] @ step[used] for each in (self.turns, self.loops))

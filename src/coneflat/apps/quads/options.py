@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Real
+from typing import TYPE_CHECKING, Any
 
 from ...options import (
     ANGLE,
@@ -20,10 +22,28 @@ from ...options import (
     strength,
 )
 
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
 #: Defaults: the number of quads, and the rounds of smoothing; further rounds change little.
 QUADS, ROUNDS = 10_000, 10
 #: Default bound of the area distortion: the areas of 90% of the quads differ by a factor of two.
 DISTORTION = 0.1
+
+
+@dataclass(frozen=True)
+class Sizes(Number):
+    """A length; or relative sizes at the vertices, which are checked with the mesh."""
+
+    def parse(self, name: str, value: Any) -> Any:
+        return super().parse(name, value) if isinstance(value, Real) else value
+
+    @property
+    def text(self) -> str:
+        return f"{super().text}, `curvature`, numbers or the name of a vertex property"
+
+
+SIZE = Sizes(is_positive=True, optional=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +54,8 @@ class QuadOptions(ConeNumber, ConeBounds, RunOptions):
 
     Attributes:
         quads: Approximate number of quads; 10,000 unless size is given.
-        size: Length of the edges of quads in model units; replaces quads.
+        size: Length of the edges of quads in model units, which replaces quads. Or relative sizes at the vertices;
+            curvature makes quads smaller where the surface is more curved.
         stretch: Trade-off between equal angles (0) and also equal sizes (1) of quads.
         smooth: Rounds of smoothing on the surface; 0 for none.
         sharp_angle: Put edges with a larger dihedral angle, and the boundary, on grid lines, so that edges of quads
@@ -55,7 +76,7 @@ class QuadOptions(ConeNumber, ConeBounds, RunOptions):
 
     distortion: float = option(DISTORTION, Number(is_positive=True))
     quads: int | None = option(None, COUNT)
-    size: float | None = option(None, Number(is_positive=True, optional=True))
+    size: ArrayLike | None = option(None, SIZE)
     stretch: float = option(0.0, strength(1))
     smooth: int = option(ROUNDS, COUNT)
     sharp_angle: float | None = option(None, ANGLE_OR_NONE)

@@ -17,6 +17,7 @@ from ...mesh import sort_pairs
 
 if TYPE_CHECKING:
     from ..view import Look, Row
+    from .integer_map import IntegerGrid
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +35,7 @@ class QuadMesh:
         surface: the triangle mesh.
         notes: notes on the computation and on problems, one sentence each.
         seconds: wall time of each stage; not stored in files.
+        grid: the integer grid that the quads are extracted from; not stored in files.
 
     Examples:
         >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
@@ -53,6 +55,7 @@ class QuadMesh:
     surface: TriangleMesh
     notes: tuple[str, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
+    grid: IntegerGrid | None = None
 
     @cached_property
     def _edges(self) -> tuple[IntArray, IntArray]:
@@ -115,10 +118,11 @@ class QuadMesh:
         return self.surface.euler_characteristic - unused
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Write the mesh as .obj, .ply, .glb or .npz, atomically, and return the path; see `write_quads`.
+        """Write the mesh as .obj, .ply, .glb, .npz, .vtk, .vtu, .inp or .msh, and return the path; see `write_quads`.
 
         Raises:
             UnknownFormatError: the extension is another one.
+            OptionError: meshio, which writes the last four, is not installed.
             MeshFileError: the file cannot be written.
         """
         from .files import write_quads

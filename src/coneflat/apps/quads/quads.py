@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from numbers import Real
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -27,7 +28,7 @@ def quads(
     faces: ArrayLike | None = None,
     *,
     quads: int | None = None,
-    size: float | None = None,
+    size: ArrayLike | None = None,
     stretch: float = 0.0,
     sharp_angle: float | str | None = None,
     smooth: int = ROUNDS,
@@ -39,7 +40,8 @@ def quads(
         mesh, faces: as for `coneflat.flatten`; or an `IntegerGrid`, which accepts the options `smooth` and `progress`
             only.
         quads: approximate number of quads; None: 10,000, unless `size` is given.
-        size: length of the edges of quads in model units; replaces `quads`.
+        size: length of the edges of quads in model units, which replaces `quads`; or relative sizes of quads, see
+            `integer_grid`.
         stretch: trade-off between equal angles (0) and also equal areas (1); see `integer_grid`.
         sharp_angle: radians; edges of quads follow edges with a larger dihedral angle; None for none.
         smooth: rounds of smoothing on the surface, see `smooth_quads`; 0 for none.
@@ -65,6 +67,8 @@ def quads(
         raise OptionError("a grid already has faces, size and options: no others can be given")
     search = partial(integer_grid, mesh, faces, stretch=stretch, sharp_angle=sharp_angle, **options)
     grid, coarse = mesh if is_given else search(quads=quads, size=size), list[str]()
+    if not isinstance(size, Real):
+        search = partial(search, size=size)
     # Where the surface is as thin as a square, quads have a vertex twice. Then 1.6 times as many quads are tried, at
     # most twice. If that does not help, these quads are left out.
     is_fixed = sharp_angle is not None or bool(options.keys() & {"cones", "distortion"})
@@ -83,7 +87,7 @@ def quads(
             if retries == FINER_TRIES + 1:
                 # The fewest cones need the least room.
                 search, finer = partial(search, cones="sparse", distortion=2 * DISTORTION), 1.0
-            grid = search(size=grid.size / finer**0.5)
+            grid = search(quads=finer * grid.squares)
     found = with_borders(found) if found.left_out else found
     with stages("smooth"):
         found = smooth_quads(found, smooth, grid.features)
@@ -93,6 +97,7 @@ def quads(
         found,
         notes=(*grid.notes, *coarse[:1], *found.notes, *_notes(found)),
         seconds={**grid.seconds, **stages.seconds},
+        grid=grid,
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base import ComplexArray, IntArray, plural
 from ...errors import ConvergenceError, GridError, OptionError
-from ...geometry import as_complex, as_pairs, double_areas, map_factors, sides_between, signed_double_areas
+from ...geometry import as_complex, as_pairs, double_areas, map_factors, sides_between
 from ...layout import Lines, PointConstraints, Relaxed, StretchEnergy, relax, rest_sides
 from .integer_map import IntegerGrid, find_motions
 from .layout import GridLayout, between_nodes, quarters_around, split_edges
@@ -62,19 +62,19 @@ def grid_about(rounding: Rounding, energy: StretchEnergy, most: int = 4) -> Inte
         raise GridError(
             f"no grid of about {wanted:,.0f} quads, or of up to {2**most} times as many, was found: {why}"
         )
-    factor, last = 1.0, _squares(found)
+    factor, last = 1.0, found.squares
     for _ in range(4):
-        if finer > 1 or abs(_squares(found) - wanted) <= NOTED_SHARE * wanted:
+        if finer > 1 or abs(found.squares - wanted) <= NOTED_SHARE * wanted:
             break
         # Later corrections are halved, because the number of squares changes by entire rows.
         factor *= (wanted / last) if factor == 1.0 else math.sqrt(wanted / last)
         other, _ = _grid_near(rounding.scaled(factor), energy)
         if other is None:
             break
-        last = _squares(other)
-        if abs(np.log(last / wanted)) < abs(np.log(_squares(found) / wanted)):
+        last = other.squares
+        if abs(np.log(last / wanted)) < abs(np.log(found.squares / wanted)):
             found = replace(other, size=layout.size)
-    squares = _squares(found)
+    squares = found.squares
     if abs(squares - wanted) > NOTED_SHARE * wanted:
         found = with_note(found, f"The grid has an area of {squares:,.0f} squares, not {wanted:,.0f}.")
     return found
@@ -83,10 +83,6 @@ def grid_about(rounding: Rounding, energy: StretchEnergy, most: int = 4) -> Inte
 def with_note(found: IntegerGrid, note: str) -> IntegerGrid:
     """Return a grid with one more note, unless this is empty."""
     return replace(found, notes=(*found.notes, note)) if note else found
-
-
-def _squares(grid: IntegerGrid) -> float:
-    return float(signed_double_areas(grid.corner_grid).sum()) / 2
 
 
 def _grid_near(rounding: Rounding, energy: StretchEnergy) -> tuple[IntegerGrid | None, str]:

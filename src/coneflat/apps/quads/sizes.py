@@ -1,0 +1,129 @@
+"""Wanted sizes of quads: one for each vertex, or smaller ones where the surface is more curved."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csc_matrix, csr_matrix, diags
+
+from ... import Flattening, TriangleMesh
+from ...base import FloatArray
+from ...errors import OptionError
+from ...geometry import (
+    cotangent_laplacian,
+    cotangents,
+    double_areas,
+    edge_lengths,
+    mollify,
+    signed_double_areas,
+)
+from ...io import as_input
+from ...linalg import factorize
+from ...mesh import CheckedMesh
+from ...source import vertex_numbers
+from .cross_field import CURVATURE_SCALE, curvature_tensors
+from .integer_map import IntegerGrid
+from .map_model import vertex_graph
+
+# Largest ratio of two sizes that curvature asks for.
+CURVATURE_RATIO = 4.0
+
+
+def wanted_scales(mesh: Any, faces: Any, checked: CheckedMesh, sizes: Any) -> FloatArray:
+    """Return (n,) the wanted log scale of a flattening at the vertices of a checked mesh: minus the log of the sizes.
+
+    Args:
+        mesh, faces: the input.
+        checked: the same, checked.
+        sizes: relative sizes of quads, one for each vertex of the input or the name of a vertex property; or
+            "curvature".
+
+    Raises:
+        OptionError: the sizes are not positive numbers.
+    """
+    if isinstance(sizes, str) and sizes == "curvature":
+        return _scales_of_curvature(checked.mesh)
+    found = vertex_numbers("sizes", sizes, as_input(mesh, faces), checked.vertex_origin)
+    if found is None or not found.min() > 0:
+        raise OptionError("sizes must be positive; there are some of 0")
+    return -np.log(found)
+
+
+def _scales_of_curvature(mesh: TriangleMesh) -> FloatArray:
+    """Return (n,) log scales at which quads of the same size deviate equally from the surface.
+
+    An edge of length h deviates by h^2 / 8 times the curvature, so that sizes are inverse to its root. The curvature is
+    the root of the sum of the squared principal curvatures, averaged over the same radius as their directions. Values
+    are bounded around their median, and smoothed over twice this radius.
+    """
+    lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces))
+    areas, count = double_areas(lengths) / 2, len(mesh.vertices)
+    radius = CURVATURE_SCALE * float(np.sqrt(areas.sum()))
+    tensors = curvature_tensors(mesh, areas, radius)
+    squared = np.maximum((tensors**2).sum(axis=(1, 2)), np.finfo(float).tiny)
+    corners = mesh.faces.ravel()
+    share = np.bincount(corners, areas.repeat(3) / 3, count)
+    mean = np.bincount(corners, (areas * np.log(squared) / 8).repeat(3) / 3, count) / share
+    order = np.argsort(mean)
+    middle = mean[order][np.searchsorted(np.cumsum(share[order]), share.sum() / 2)]
+    bound = np.log(CURVATURE_RATIO) / 2
+    smoothed = csc_matrix(
+        diags(share) + 4 * radius**2 * cotangent_laplacian(mesh.faces, cotangents(lengths), count)
+    )
+    smoothed.sort_indices()
+    return factorize(smoothed).solve((share * np.clip(mean - middle, -bound, bound))[:, None])[:, 0]
+
+
+def extended(values: FloatArray, mesh: TriangleMesh) -> FloatArray:
+    """Return (n,) values at all vertices: given ones at the first vertices, then means of the neighbours that have one.
+
+    Refinement of a mesh appends vertices.
+    """
+    found = np.zeros(len(mesh.vertices))
+    found[: len(values)] = values
+    known = np.arange(len(found)) < len(values)
+    near = csr_matrix((vertex_graph(mesh) > 0).astype(np.float64))
+    while not known.all():
+        count = near @ known.astype(np.float64)
+        reached = ~known & (count > 0)
+        found[reached] = (near @ (found * known))[reached] / count[reached]
+        known |= reached
+    return found
+
+
+def scaled_components(result: Flattening, mesh: TriangleMesh, wanted: FloatArray) -> FloatArray:
+    """Return the points of a layout with each component scaled so that its mean log scale is the wanted one.
+
+    wanted: (n,) log scale at the vertices of the mesh that was flattened.
+    """
+    count, label = mesh.components
+    own = label[mesh.faces[:, 0]]
+    areas = double_areas(edge_lengths(mesh.vertices, mesh.faces))
+    flat, real = (np.bincount(own, each, count) for each in (signed_double_areas(result.corner_uv), areas))
+    mean = np.bincount(own, areas * wanted[mesh.faces].mean(axis=1), count) / real
+    factor = np.exp(mean) * np.sqrt(real / flat)
+    of_point = np.zeros(len(result.uv), dtype=np.int64)
+    of_point[result.uv_faces] = own[:, None]
+    return result.uv * factor[of_point][:, None]
+
+
+def note_on_sizes(grid: IntegerGrid, wanted: FloatArray) -> str:
+    """Return a note on how well the sizes of the squares of a grid are the wanted ones, up to a common factor.
+
+    wanted: (k,) the log scale at the first vertices of the grid.
+    """
+    mesh = TriangleMesh(grid.vertices, grid.faces)
+    number = signed_double_areas(grid.corner_grid)
+    area = double_areas(edge_lengths(grid.vertices, grid.faces))
+    reached = np.log(np.maximum(area, np.finfo(float).tiny) / number) / 2
+    asked = -extended(wanted, mesh)[mesh.faces].mean(axis=1)
+    off, weight = reached - asked, number / number.sum()
+    covariance = np.cov(np.stack([asked, reached]), aweights=weight)
+    spread = np.sqrt(covariance[0, 0] * covariance[1, 1])
+    order = np.argsort(off)
+    low, high = np.interp([0.05, 0.95], np.cumsum(weight[order]), off[order])
+    return (
+        f"Sizes of quads have a correlation of {covariance[0, 1] / spread if spread else 1.0:.2f} with the wanted "
+        f"ones; the ratio of both varies by a factor of {np.exp(high - low):.2f} over 90 % of the quads."
+    )
