@@ -37,8 +37,8 @@ CEILINGS = {
     "apps.cli": 1623,
     "apps.measure_uv": 160,
     "apps.peers": 453,
-    "apps.quads": 3644,
-    "apps.studio": 1736,
+    "apps.quads": 3840,
+    "apps.studio": 1734,
     "apps.transfer": 323,
     "apps.brains": 262,
     "apps.pyvista": 26,
@@ -53,7 +53,7 @@ CEILINGS = {
     "flattener": 35,
     "geometry": 1473,
     "io": 2881,
-    "layout": 2032,
+    "layout": 1978,
     "linalg": 453,
     "measure": 829,
     "mesh": 666,
@@ -69,8 +69,8 @@ CEILINGS = {
 #: Applications with a ceiling of their own, which the ceilings of everything else leave out.
 OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_732, 231, 25_425
-CONSTANTS, KERNELS, NAMES, LEVELS = 295, 110, 30, 8
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_351, 232, 25_206
+CONSTANTS, KERNELS, NAMES, LEVELS = 295, 88, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
 

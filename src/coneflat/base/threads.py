@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from functools import cache
@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
 Result = TypeVar("Result")
 
-# Number of triangles below which starting a thread takes longer than it saves.
-SMALL = 1_000
 # Number of triangles above which memory limits the computation.
 MEMORY_BOUND_TRIANGLES = 3_000_000
 # Default number of threads. It is the same on every machine, because the last digits of results depend on it.
@@ -28,20 +26,15 @@ _threads: ContextVar[int] = ContextVar("coneflat_threads", default=THREADS)
 def concurrently(call: Callable[[], Result], triangles: int) -> Iterator[Future[Result]]:
     """Run a function on another thread during the block, and yield its future.
 
-    If the mesh is small, if it is huge, because both together would need too much memory, or if only one thread may be
-    used, the function finishes before the block starts. The function and the block must not share data that either
-    modifies. Compiled loops, factorizations and most of NumPy release the interpreter lock.
+    If the mesh is huge, because both together would need too much memory, or if only one thread may be used, the
+    function finishes before the block starts. The function and the block must not share data that either modifies.
+    Compiled loops, factorizations and most of NumPy release the interpreter lock.
     """
-    if not SMALL <= triangles <= MEMORY_BOUND_TRIANGLES or threads() == 1:
-        future = Future[Result]()
-        try:
-            future.set_result(call())
-        except Exception as error:
-            future.set_exception(error)
-        yield future
-        return
     with ThreadPoolExecutor(1, thread_name_prefix="coneflat") as executor:
-        yield executor.submit(copy_context().run, call)
+        future = executor.submit(copy_context().run, call)
+        if triangles > MEMORY_BOUND_TRIANGLES or threads() == 1:
+            wait([future])
+        yield future
 
 
 def threads() -> int:

@@ -87,7 +87,7 @@ def test_sizes_that_are_none(ball, size, message):
         coneflat.quads(*ball, quads=100, size=size)
 
 
-@pytest.mark.parametrize("more", [{"cone_count": 8}, {"sharp_angle": 0.5}, {"cones": "sparse"}])
+@pytest.mark.parametrize("more", [{"cone_count": 8}, {"cones": "sparse"}])
 def test_sizes_need_cones_that_may_be_chosen(ball, more):
     with pytest.raises(OptionError, match="relative sizes need"):
         coneflat.quads(*ball, quads=100, size="curvature", **more)

@@ -15,12 +15,12 @@ from ...base import FloatArray, IntArray, dots, list_some, plural
 from ...errors import GridError
 from ...geometry import signed_double_areas
 from ...mesh import NEXT, PREVIOUS, label_components
+from .cross_field import SHARP_ANGLE
 from .exact_grid import ExactGrid, exact_grid
 from .features import lengths_along
 from .grid_points import LOST, GridPoints, Ports, find_points, find_ports, join_ports
 from .integer_map import IntegerGrid
 from .quad_mesh import CoarseGridError, QuadMesh, degenerate_quads
-from .smooth import SHARP_ANGLE
 
 # Largest number of squares; at about a kilobyte of peak memory for each, many machines have enough.
 MAX_SQUARES = 20_000_000

@@ -28,7 +28,7 @@ from ...layout import StretchEnergy
 from ...measure import unmet_guarantees
 from ...mesh import CheckedMesh
 from ...options import WordOrVertices, read_options
-from .aligned_cones import aligned_cones
+from .aligned_cones import COARSE, aligned_cones
 from .cross_field import SHARP_ANGLE, sharp_ends
 from .features import split_all, split_chords, split_small_components
 from .integer_map import IntegerGrid, joined_grids
@@ -52,8 +52,6 @@ OPTIONS = {
 QUADS_PER_CONE = 2_000
 # Largest fraction of the edges that are split because they join two vertices on sharp edges.
 MAX_CHORDS = 0.05
-# Largest number of triangles that are refined where there is no grid; meshes of more have places enough for cones.
-MAX_REFINED = 10_000
 # Options that only the search for the fewest cones takes into account.
 SPARSE_OPTIONS = ("cone_count", "required_cones", "forbidden_cones", "weights", "positive_only", "max_cones")
 
@@ -210,7 +208,8 @@ class _Search:
                 return self._of_aligned_cones(is_finer)
             except (ConvergenceError, CurvatureError, GridError, MetricError, SeamError) as error:
                 note = f"Quads follow no {what}, because no grid with such cones was found: {error}."
-            if len(self._checked().mesh.faces) > MAX_REFINED:
+            # Meshes of more triangles have places enough for cones.
+            if 2 * len(self._checked().mesh.faces) > COARSE:
                 break
         return with_note(self._with_fewest_cones(boundary), note)
 

@@ -26,9 +26,6 @@ from .cross_field import CURVATURE_SCALE, curvature_tensors
 from .integer_map import IntegerGrid
 from .map_model import vertex_graph
 
-# Largest ratio of two sizes that curvature asks for.
-CURVATURE_RATIO = 4.0
-
 
 def wanted_scales(mesh: Any, faces: Any, checked: CheckedMesh, sizes: Any) -> FloatArray:
     """Return (n,) the wanted log scale of a flattening at the vertices of a checked mesh: minus the log of the sizes.
@@ -50,12 +47,12 @@ def wanted_scales(mesh: Any, faces: Any, checked: CheckedMesh, sizes: Any) -> Fl
     return -np.log(found)
 
 
-def _scales_of_curvature(mesh: TriangleMesh) -> FloatArray:
+def _scales_of_curvature(mesh: TriangleMesh, ratio: float = 4.0) -> FloatArray:
     """Return (n,) log scales at which quads of the same size deviate equally from the surface.
 
     An edge of length h deviates by h^2 / 8 times the curvature, so that sizes are inverse to its root. The curvature is
     the root of the sum of the squared principal curvatures, averaged over the same radius as their directions. Values
-    are bounded around their median, and smoothed over twice this radius.
+    are bounded around their median, such that sizes differ by `ratio` at most, and smoothed over twice this radius.
     """
     lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces))
     areas, count = double_areas(lengths) / 2, len(mesh.vertices)
@@ -67,7 +64,7 @@ def _scales_of_curvature(mesh: TriangleMesh) -> FloatArray:
     mean = np.bincount(corners, (areas * np.log(squared) / 8).repeat(3) / 3, count) / share
     order = np.argsort(mean)
     middle = mean[order][np.searchsorted(np.cumsum(share[order]), share.sum() / 2)]
-    bound = np.log(CURVATURE_RATIO) / 2
+    bound = np.log(ratio) / 2
     smoothed = csc_matrix(
         diags(share) + 4 * radius**2 * cotangent_laplacian(mesh.faces, cotangents(lengths), count)
     )

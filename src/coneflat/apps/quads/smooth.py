@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...base import BoolArray, FloatArray, IntArray, dots
 from ...errors import OptionError
+from .cross_field import SHARP_ANGLE
 from .features import edge_indices, sharp_edges
 from .nearest import Stars, slide_near
 from .options import ROUNDS
@@ -17,8 +18,6 @@ from .quad_mesh import QuadMesh, least_jacobians
 
 # Least scaled Jacobian: no quad falls below it, and quads that are below it do not get worse.
 MIN_JACOBIAN = 0.5
-# Radians: edges of the surface with a larger dihedral angle are sharp, and quad vertices on them do not move.
-SHARP_ANGLE = np.deg2rad(40.0)
 
 
 def smooth_quads(quads: QuadMesh, rounds: int = ROUNDS, features: ArrayLike = ()) -> QuadMesh:
