@@ -13,7 +13,15 @@ from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags
 
 from ... import TriangleMesh
 from ...base import ComplexArray, FloatArray, IntArray
-from ...geometry import angle_defect, corner_angles, dihedral_angles, double_areas, edge_lengths, face_normals
+from ...geometry import (
+    angle_defect,
+    corner_angles,
+    dihedral_angles,
+    double_areas,
+    edge_lengths,
+    face_normals,
+    mollify,
+)
 from ...linalg import HermitianFactor, factorize
 from ...mesh import label_components
 
@@ -139,8 +147,8 @@ def smoothest_cross_field(mesh: TriangleMesh, directions: Directions) -> Complex
     References:
         F. Knoeppel, K. Crane, U. Pinkall, P. Schroeder, "Globally optimal direction fields", 2013.
     """
-    lengths = edge_lengths(mesh.vertices, mesh.faces)
-    areas = np.maximum(double_areas(lengths) / 2, np.finfo(float).tiny)
+    lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces))
+    areas = double_areas(lengths) / 2
     energy = _dual_laplacian(mesh, areas, edge_rotations(mesh, halfedge_angles(corner_angles(lengths))))
     sharp = SHARP_WEIGHT * directions.sharp * np.sqrt(areas.sum() / areas)
     wanted = sharp + directions.curved
