@@ -37,7 +37,7 @@ CEILINGS = {
     "apps.cli": 1623,
     "apps.measure_uv": 160,
     "apps.peers": 453,
-    "apps.quads": 3846,
+    "apps.quads": 3848,
     "apps.studio": 1734,
     "apps.transfer": 323,
     "apps.brains": 262,
@@ -69,7 +69,7 @@ CEILINGS = {
 #: Applications with a ceiling of their own, which the ceilings of everything else leave out.
 OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_351, 232, 25_212
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_351, 232, 25_214
 CONSTANTS, KERNELS, NAMES, LEVELS = 295, 88, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -134,7 +134,7 @@ def _walk(
         if not len(around):
             break
         steps = mesh.vertices[others] - mesh.vertices[here]
-        sizes = np.sqrt((steps**2).sum(axis=1))
+        sizes = np.maximum(np.sqrt((steps**2).sum(axis=1)), np.finfo(float).tiny)
         best = 0
         if ahead is not None:
             straight = steps @ ahead / sizes
@@ -149,7 +149,7 @@ def _walk(
 
 
 def _unit(vector: FloatArray) -> FloatArray:
-    return vector / np.sqrt(vector @ vector)
+    return vector / max(np.sqrt(vector @ vector), np.finfo(float).tiny)
 
 
 def _steps(mesh: TriangleMesh, path: IntArray, size: float) -> int:
