@@ -149,7 +149,7 @@ def _walk(
 
 
 def _unit(vector: FloatArray) -> FloatArray:
-    return vector / max(np.sqrt(vector @ vector), np.finfo(float).tiny)
+    return vector / max(float(np.linalg.norm(vector)), np.finfo(float).tiny)
 
 
 def _steps(mesh: TriangleMesh, path: IntArray, size: float) -> int:
