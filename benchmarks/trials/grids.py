@@ -150,7 +150,7 @@ def check_grid(outcome: Outcome, grid: Any, options: dict[str, Any]) -> None:
     least = (
         options.get("min_cone_angle", 1.5 * np.pi if "boundary" not in options else 0) / (np.pi / 2) - 1e-6
     )
-    # The angles of vertices on sharp edges are sums of those of patches.
+    # The angles of vertices on sharp edges are sums of those between the edges.
     if (
         len(grid.quarters)
         and "sharp_angle" not in options

@@ -170,7 +170,7 @@ def test_an_area_distortion_that_no_cut_reaches_gives_a_note():
         ({"area": 0.0}, "area must be a number above 0, got 0"),
         ({"charts": 0}, "charts must be 1 or more, got 0"),
         ({"charts": 2.5}, "charts must be an integer, got 2.5"),
-        ({"charts": "many"}, "unknown charts 'many': choose from atlas, one, or give a number"),
+        ({"charts": "many"}, "charts must be atlas, one or an integer, 1 or more, got 'many'"),
         ({"seams": "all"}, "unknown seams 'all': choose from input, none"),
         ({"stack": "copied"}, "unknown stack 'copied': choose from none, mirrored"),
     ],

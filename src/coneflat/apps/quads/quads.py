@@ -71,7 +71,8 @@ def quads(
         search = partial(search, size=size)
     # Where the surface is as thin as a square, quads have a vertex twice. Then 1.6 times as many quads are tried, at
     # most twice. If that does not help, these quads are left out.
-    is_fixed = sharp_angle is not None or bool(options.keys() & {"cones", "distortion"})
+    is_relative = not (size is None or isinstance(size, Real))
+    is_fixed = is_relative or sharp_angle is not None or bool(options.keys() & {"cones", "distortion"})
     most = 0 if is_given else FINER_TRIES + (not is_fixed)
     for retries in range(most, -1, -1):
         stages.done = 1.0

@@ -59,9 +59,8 @@ def grid_about(rounding: Rounding, energy: StretchEnergy, most: int = 4) -> Inte
         if found is not None:
             break
     if found is None:
-        raise GridError(
-            f"no grid of about {wanted:,.0f} quads, or of up to {2**most} times as many, was found: {why}"
-        )
+        more = f", or of up to {2**most} times as many," if most else ""
+        raise GridError(f"no grid of about {wanted:,.0f} quads{more} was found: {why}")
     factor, last = 1.0, found.squares
     for _ in range(4):
         if finer > 1 or abs(found.squares - wanted) <= NOTED_SHARE * wanted:

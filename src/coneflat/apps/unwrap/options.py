@@ -41,7 +41,7 @@ class ChartNumber(Kind):
     def parse(self, name: str, value: Any) -> str | int:
         if isinstance(value, str) and value not in self.words and not value.isdecimal():
             words = ", ".join(self.words)
-            raise OptionError(f"unknown {name} {short_repr(value)}: choose from {words}, or give a number")
+            raise OptionError(f"{name} must be {words} or an integer, 1 or more, got {short_repr(value)}")
         if isinstance(value, str) and value in self.words:
             return value
         number = as_integer(name, int(value) if isinstance(value, str) else value)
