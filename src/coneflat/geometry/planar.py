@@ -34,9 +34,8 @@ def signed_double_areas(corners: FloatArray) -> FloatArray:
 
 def bounds(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return (m, 2) the smallest and (m, 2) the largest coordinates of triangles with corners (m, 3, 2)."""
-    one, two, three = (
-        corners[:, k] for k in range(3)
-    )  # NumPy is slow at extrema along an axis of length three
+    # NumPy is slow at extrema along an axis of length three.
+    one, two, three = (corners[:, k] for k in range(3))
     return np.minimum(np.minimum(one, two), three), np.maximum(np.maximum(one, two), three)
 
 

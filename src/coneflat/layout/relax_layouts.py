@@ -18,7 +18,7 @@ from ..geometry.straight import place_triangles
 from ..mesh.connectivity import TriangleMesh, label_components
 from ..stages import Layout, RelaxSpec
 from .relax import StretchEnergy, relax
-from .untangle import around
+from .untangle import nearby
 
 # Triangles with more quasi-conformal distortion than this are relaxed, with this number of rings around them. Measured:
 # with a twentieth of the vertices of a fine mesh and three quarters of a coarse one free, the mean comes within 0.0025
@@ -78,7 +78,7 @@ def _relaxed(group: LayoutGroup, spec: RelaxSpec, report: Callable[[str], None])
     before = group.ratios(points)
     is_free = group.is_free
     if not spec.relaxes_all:
-        is_free = is_free & around(mesh.faces, before > RELAXED_QC, RELAXED_RINGS) & ~mesh.is_boundary_vertex
+        is_free = is_free & nearby(mesh.faces, before > RELAXED_QC, RELAXED_RINGS) & ~mesh.is_boundary_vertex
 
     def relaxed_by(start: FloatArray, sharpness: float, is_free: BoolArray) -> FloatArray:
         if not is_free.any():

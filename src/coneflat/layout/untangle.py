@@ -114,7 +114,7 @@ class _Untangling:
 
     def improve(self, rings: int, stay: BoolArray) -> None:
         """Untangle bad triangles by moving the vertices in a number of rings around them, except those in `stay`."""
-        movable = around(self.faces, self.is_bad, rings - 1) & ~stay
+        movable = nearby(self.faces, self.is_bad, rings - 1) & ~stay
         if movable.any():
             patches = Patches(self.flat, self.faces, self.sides, movable, self.rest)
             self._accept(patches, patches.solve())
@@ -175,7 +175,7 @@ def winding_vertices(
     return np.flatnonzero(~is_bad & winds)
 
 
-def around(faces: IntArray, seeds: BoolArray, rings: int) -> BoolArray:
+def nearby(faces: IntArray, seeds: BoolArray, rings: int) -> BoolArray:
     """Return (n,) True for the vertices of seed triangles (m,) and of `rings` rings of triangles around them."""
     inside = np.zeros(int(faces.max()) + 1, dtype=bool)
     inside[faces[seeds]] = True

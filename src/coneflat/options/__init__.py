@@ -1,6 +1,6 @@
 """Declaration, parsing and validation of all options."""
 
-from .combined import Options
+from .combined import SEARCH_OPTIONS, Options
 from .declared import (
     CONES,
     FORMATS,
@@ -45,5 +45,5 @@ __all__ = [
     "CurveOptions", "Declaration", "Direction", "Edges", "FORMATS", "FindOptions", "Flag", "Kind",
     "MAX_SHOWN_TRIANGLES", "MetricOptions", "Number", "Options", "PAPER", "RunOptions", "SHOWS", "SeamOptions",
     "Vertices", "VerticesOrEdges", "Weights", "WordOrVertices", "as_number", "as_integer", "declarations", "option",
-    "read_options", "settings", "strength", "takes",
+    "SEARCH_OPTIONS", "read_options", "settings", "strength", "takes",
 ]  # fmt: skip

@@ -11,6 +11,7 @@ import shapes
 from coneflat import errors, flatten, integer_grid
 from coneflat.apps.quads.layout import aligned, between_nodes, split_edges
 from coneflat.apps.quads.transitions import find_transitions
+from coneflat.geometry import edge_lengths
 from coneflat.mesh.connectivity import TriangleMesh
 
 TURNS = np.array([1, 1j, -1, -1j])
@@ -225,3 +226,11 @@ def test_charts_stay_joined_where_edges_between_them_are_split(shared, distortio
     split = split_edges(layout, is_split)
     transitions = find_transitions(split)
     np.testing.assert_allclose(transitions.equations @ transitions.values, 0, atol=1e-9)
+
+
+def test_given_side_lengths_are_those_of_the_grid():
+    vertices, faces = shapes.sphere(2)
+    plain = integer_grid(vertices, faces, quads=60, cones="sparse")
+    given = integer_grid(vertices, faces, quads=60, lengths=edge_lengths(vertices, faces))
+    assert np.array_equal(given.faces, plain.faces)
+    assert given.corner_grid == pytest.approx(plain.corner_grid, abs=1e-9)

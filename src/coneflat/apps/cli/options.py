@@ -217,7 +217,7 @@ def _value(declaration: Declaration, value: Any) -> Any:
         case declared.Edges():
             return _edges(flag, kind, value)
         case declared.Weights() | Sizes():
-            return values.read_weights(value)
+            return values.read_numbers("sizes" if isinstance(kind, Sizes) else "weights", value)
     return value
 
 

@@ -123,8 +123,10 @@ def _holds_pairs(path: Path) -> bool:
     return all(len(words) == 2 for words in lines if words != [""])
 
 
-def read_weights(text: str) -> str | float | FloatArray:
+def read_numbers(noun: str, text: str) -> str | float | FloatArray:
     """Return the numbers in a file; or a number; or the text itself, which is then the name of a property.
+
+    noun: what the numbers are, for messages.
 
     Raises:
         MeshFileError: the file cannot be read.
@@ -136,14 +138,14 @@ def read_weights(text: str) -> str | float | FloatArray:
         with suppress(ValueError):
             return float(text)
         if path.suffix:
-            raise MeshFileError(f"cannot read weights from {path}: there is no such file")
+            raise MeshFileError(f"cannot read {noun} from {path}: there is no such file")
         return text
     try:
         values = np.load(path, allow_pickle=False) if path.suffix == ".npy" else np.loadtxt(path, ndmin=1)
         return np.asarray(values, dtype=np.float64)
     except (OSError, ValueError, TypeError, EOFError) as error:
-        reason = " ".join(str(error).split())
-        raise MeshFileError(f"cannot read weights from {path}: {reason}") from error
+        reason = "not a text file" if isinstance(error, UnicodeDecodeError) else " ".join(str(error).split())
+        raise MeshFileError(f"cannot read {noun} from {path}: {reason}") from error
 
 
 def parse_angle(text: str) -> float:

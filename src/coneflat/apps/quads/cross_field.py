@@ -24,6 +24,7 @@ from ...geometry import (
 )
 from ...linalg import HermitianFactor, factorize
 from ...mesh import label_components
+from .features import lengths_along, sharp_edges
 
 # Edges are sharp if their dihedral angle is larger, radians, and if the connected ones are together longer than this
 # fraction of the square root of the area. Shorter ones are noise.
@@ -88,11 +89,10 @@ def preferred_directions(mesh: TriangleMesh, angle: float = SHARP_ANGLE) -> Dire
 
 def sharp_or_boundary(mesh: TriangleMesh, shortest: float, angle: float = SHARP_ANGLE) -> IntArray:
     """Return the edges that are on the boundary or sharp; connected sharp edges shorter than `shortest` are noise."""
-    sharp = np.flatnonzero(np.abs(dihedral_angles(mesh)) > angle)
+    sharp = sharp_edges(mesh, angle)
     ends = mesh.edges[sharp]
     _, label = label_components(len(mesh.vertices), ends[:, 0], ends[:, 1])
-    lengths = np.linalg.norm(np.diff(mesh.vertices[ends], axis=1)[:, 0], axis=1)
-    total = np.bincount(label[ends[:, 0]], lengths, len(mesh.vertices))
+    total = np.bincount(label[ends[:, 0]], lengths_along(mesh, sharp), len(mesh.vertices))
     return np.union1d(sharp[total[label[ends[:, 0]]] > shortest], np.flatnonzero(mesh.is_boundary_edge))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from numbers import Real
 from typing import Any, TypeAlias
 
@@ -27,7 +28,7 @@ from ...io import as_input
 from ...layout import StretchEnergy
 from ...measure import unmet_guarantees
 from ...mesh import CheckedMesh
-from ...options import WordOrVertices, read_options
+from ...options import SEARCH_OPTIONS, WordOrVertices, read_options
 from .aligned_cones import COARSE, aligned_cones
 from .cross_field import SHARP_ANGLE, sharp_ends
 from .features import split_all, split_chords, split_small_components
@@ -36,7 +37,7 @@ from .layout import GRID_TOLERANCE, GridLayout, aligned
 from .lines import grid_with_lines, with_sides
 from .options import DISTORTION, QUADS, QuadOptions
 from .round_layout import grid_of, split_between_nodes, with_note
-from .sizes import extended, note_on_sizes, scaled_components, wanted_scales
+from .sizes import extended, note_on_sizes, wanted_scales
 
 # Options of the flattening for a grid: three, five or six quads at a cone, and rotations by quarter turns.
 OPTIONS = {
@@ -53,7 +54,7 @@ QUADS_PER_CONE = 2_000
 # Largest fraction of the edges that are split because they join two vertices on sharp edges.
 MAX_CHORDS = 0.05
 # Options that only the search for the fewest cones takes into account.
-SPARSE_OPTIONS = ("cone_count", "required_cones", "forbidden_cones", "weights", "positive_only", "max_cones")
+SPARSE_OPTIONS = (*SEARCH_OPTIONS, "max_cones", "lengths")
 
 Split: TypeAlias = Callable[[TriangleMesh], tuple[TriangleMesh, int]]
 # How a mesh is split where flattening it fails, a note, and the noun for the number of splits.
@@ -200,7 +201,7 @@ class _Search:
                     "other options"
                 )
             return self._with_fewest_cones(boundary)
-        if self._has_several_parts():
+        if self._checked.mesh.components[0] > 1:
             return self._of_components(boundary)
         what = "sharp edges or curvature" if self.sizes is None else "sharp edges, curvature or wanted sizes"
         for is_finer in (False, True):
@@ -209,14 +210,9 @@ class _Search:
             except (ConvergenceError, CurvatureError, GridError, MetricError, SeamError) as error:
                 note = f"Quads follow no {what}, because no grid with such cones was found: {error}."
             # Meshes of more triangles have places enough for cones.
-            if 2 * len(self._checked().mesh.faces) > COARSE:
+            if 2 * len(self._checked.mesh.faces) > COARSE:
                 break
         return with_note(self._with_fewest_cones(boundary), note)
-
-    def _has_several_parts(self) -> bool:
-        """Return whether each component can have a search of its own: no option refers to vertices."""
-        plain = all(one is None or isinstance(one, (str, float, int)) for one in self.options.values())
-        return plain and self._checked().mesh.components[0] > 1
 
     def _of_components(self, boundary: Any) -> IntegerGrid:
         """Return the grid of the components, each with a search of its own.
@@ -227,7 +223,7 @@ class _Search:
         Raises:
             GridError: no component has a grid.
         """
-        checked, found, why = self._checked(), list[IntegerGrid](), list[str]()
+        checked, found, why = self._checked, list[IntegerGrid](), list[str]()
         mesh, grow = checked.mesh, np.exp2(-checked.exponent)
         scales = np.zeros(len(mesh.vertices))
         if self.sizes is not None:
@@ -258,14 +254,14 @@ class _Search:
         cones = self.options.get("cones", "auto")
         if not (isinstance(cones, str) and cones == "auto") or any(n in self.options for n in SPARSE_OPTIONS):
             return False
-        return boundary in ("auto", "straight") or not self._checked().mesh.is_boundary_edge.any()
+        return boundary in ("auto", "straight") or not self._checked.mesh.is_boundary_edge.any()
 
     def _of_aligned_cones(self, is_finer: bool) -> IntegerGrid:
-        """Return a grid whose cones are chosen for even sizes and for the directions of the surface.
+        """Return a grid of a connected mesh whose cones are chosen for even sizes and its directions.
 
         is_finer: split all edges, for more places for cones and smaller triangles between them.
         """
-        checked, options = self._checked(), read_options(self.options, QuadOptions)
+        checked, options = self._checked, read_options(self.options, QuadOptions)
         mesh, notes = checked.mesh, list(checked.notes)
         for split, note, noun in (*[EVERY] * is_finer, FEW_VERTICES, CHORDS):
             mesh, count = split(mesh)
@@ -277,17 +273,14 @@ class _Search:
             int(np.ceil((2 * np.pi - (options.max_cone_angle or np.inf)) / (np.pi / 2) - GRID_TOLERANCE)),
             int(np.floor((2 * np.pi - options.min_cone_angle) / (np.pi / 2) + GRID_TOLERANCE)),
         )
-        cones: dict[int, float] = {}
         asked = None if self.sizes is None else wanted_scales(self.mesh, self.faces, checked, self.sizes)
         scales = None if asked is None else extended(asked, mesh)
         area = float(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum()) / 2
         quads = area / np.ldexp(self.size, checked.exponent) ** 2 if self.size else self.quads
         price = max(1.0, QUADS_PER_CONE / quads)
         with self.stages("cones"), limit_threads(options.threads):
-            for part, vertices, _ in mesh.split_components():
-                wanted = None if scales is None else scales[vertices]
-                found = aligned_cones(part, options.distortion, *bounds, price, self.sharp_angle, wanted)
-                cones |= {int(vertices[v]): k * np.pi / 2 for v, k in found.items()}
+            found = aligned_cones(mesh, options.distortion, *bounds, price, self.sharp_angle, scales)
+        cones = {vertex: quarters * np.pi / 2 for vertex, quarters in found.items()}
         given = {name: one for name, one in self.options.items() if name not in OPTIONS}
         given |= {**_defaults({"cones": cones}), "cones": cones}
         if mesh.is_boundary_edge.any():
@@ -295,8 +288,6 @@ class _Search:
         with self.stages("flatten"):
             vertices = np.ldexp(mesh.vertices, -checked.exponent)
             result = flatten(vertices, mesh.faces, **given, progress=self.progress)
-        if scales is not None:
-            result = replace(result, uv=scaled_components(result, mesh, scales))
         grid = self._with_notes(replace(result, notes=(*notes, *result.notes)), True, True)
         return grid if asked is None else with_note(grid, note_on_sizes(grid, asked))
 
@@ -305,7 +296,7 @@ class _Search:
         if boundary != "auto":
             return self._of_flattening(boundary)
         may_be_straight = isinstance(self.options.get("cones", "auto"), str)
-        if not (may_be_straight and self._checked().mesh.is_boundary_edge.any()):
+        if not (may_be_straight and self._checked.mesh.is_boundary_edge.any()):
             return self._of_flattening("free")
         try:
             return self._of_flattening("straight", all_sides=True)
@@ -313,6 +304,7 @@ class _Search:
             why = f"The boundary cuts squares, because no grid with the boundary on grid lines was found: {error}."
         return with_note(self._of_flattening("free"), why)
 
+    @cached_property
     def _checked(self) -> CheckedMesh:
         given, repair = as_input(self.mesh, self.faces), bool(self.options.get("repair", False))
         checked = check_mesh(given.vertices, given.faces, repair=repair)
@@ -325,7 +317,7 @@ class _Search:
         # Arrays and vertices in options would not fit another mesh.
         if not all(one is None or isinstance(one, (str, float, int)) for one in self.options.values()):
             return None
-        checked, (split, note, noun) = self._checked(), how
+        checked, (split, note, noun) = self._checked, how
         mesh, count = split(checked.mesh)
         with suppress(ConeflatError):
             if count:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags
 
-from ... import Flattening, TriangleMesh
+from ... import TriangleMesh
 from ...base import FloatArray
 from ...errors import OptionError
 from ...geometry import (
@@ -87,22 +87,6 @@ def extended(values: FloatArray, mesh: TriangleMesh) -> FloatArray:
         found[reached] = (near @ (found * known))[reached] / count[reached]
         known |= reached
     return found
-
-
-def scaled_components(result: Flattening, mesh: TriangleMesh, wanted: FloatArray) -> FloatArray:
-    """Return the points of a layout with each component scaled so that its mean log scale is the wanted one.
-
-    wanted: (n,) log scale at the vertices of the mesh that was flattened.
-    """
-    count, label = mesh.components
-    own = label[mesh.faces[:, 0]]
-    areas = double_areas(edge_lengths(mesh.vertices, mesh.faces))
-    flat, real = (np.bincount(own, each, count) for each in (signed_double_areas(result.corner_uv), areas))
-    mean = np.bincount(own, areas * wanted[mesh.faces].mean(axis=1), count) / real
-    factor = np.exp(mean) * np.sqrt(real / flat)
-    of_point = np.zeros(len(result.uv), dtype=np.int64)
-    of_point[result.uv_faces] = own[:, None]
-    return result.uv * factor[of_point][:, None]
 
 
 def note_on_sizes(grid: IntegerGrid, wanted: FloatArray) -> str:

@@ -94,16 +94,17 @@ class UnwrapOptions(TextureOptions, SeamOptions, AtlasOptions, RunOptions):
                 f"max_energy must be above 4, the energy of an isometry, got {self.max_energy:g}"
             )
         for one, other, are_both in (
-            ("resolution", "texel_density", self._is_set("texel_density") and self._is_set("resolution")),
-            ("area", "max_energy", self._is_set("area") and self._is_set("max_energy")),
-            ("seams none", "max_energy", not math.isfinite(self.bound) and self._is_set("max_energy")),
-            ("seams none", "area", not math.isfinite(self.bound) and self._is_set("area")),
-            ("stack mirrored", "lengths", self._is_set("stack") and self.lengths is not None),
+            ("resolution", "texel_density", self._differs("texel_density") and self._differs("resolution")),
+            ("area", "max_energy", self._differs("area") and self._differs("max_energy")),
+            ("seams none", "max_energy", not math.isfinite(self.bound) and self._differs("max_energy")),
+            ("seams none", "area", not math.isfinite(self.bound) and self._differs("area")),
+            ("stack mirrored", "lengths", self._differs("stack") and self.lengths is not None),
         ):
             if are_both:
                 raise OptionError(f"{one} and {other} cannot be combined: leave out one of them")
 
-    def _is_set(self, name: str) -> bool:
+    def _differs(self, name: str) -> bool:
+        """Return whether an option is not its default."""
         return bool(getattr(self, name) != declarations(UnwrapOptions)[name].default)
 
     @property
