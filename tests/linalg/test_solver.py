@@ -24,6 +24,7 @@ def kind(request, monkeypatch):
     name = "coneflat.linalg.factors"
     monkeypatch.setattr(f"{name}.has_pardiso", lambda: request.param is PardisoFactor)
     monkeypatch.setattr(f"{name}.MIN_PARDISO_UNKNOWNS", 1)
+    monkeypatch.setattr(f"{name}.MIN_CHOLMOD_UNKNOWNS", 0)
     if request.param is SuperLUFactor:
         monkeypatch.setattr(f"{name}.CholespyFactor", SuperLUFactor)
     return request.param
@@ -101,6 +102,7 @@ def test_solutions_are_the_same_every_time(kind, matrix):
 def test_large_systems_are_solved_by_pardiso_where_it_is_installed(matrix, monkeypatch):
     right = np.ones(matrix.shape[0])
     expected = np.linalg.solve(matrix.toarray(), right)
+    monkeypatch.setattr("coneflat.linalg.factors.MIN_CHOLMOD_UNKNOWNS", 0)
     for is_installed, large in ((True, PardisoFactor), (False, CholespyFactor)):
         monkeypatch.setattr("coneflat.linalg.factors.has_pardiso", lambda: is_installed)  # noqa: B023
         for total_size, kind in ((0, CholespyFactor), (MIN_PARDISO_UNKNOWNS, large)):
@@ -109,11 +111,20 @@ def test_large_systems_are_solved_by_pardiso_where_it_is_installed(matrix, monke
             assert factor.solve(right) == pytest.approx(expected, abs=1e-9)
 
 
-def test_small_scattered_parts_are_solved_by_superlu(matrix):
+def test_small_systems_are_solved_by_superlu_without_messages(matrix, capfd):
+    """CHOLMOD prints on standard output if a matrix is indefinite."""
     right = np.ones(matrix.shape[0])
-    factor = factorize(matrix, is_scattered=True)
-    assert type(factor) is SuperLUFactor
-    assert factor.solve(right) == pytest.approx(np.linalg.solve(matrix.toarray(), right), abs=1e-9)
+    indefinite = csc_matrix(matrix - diags(np.full(matrix.shape[0], 0.5)))
+    for each in (matrix, indefinite):
+        factor = factorize(each)
+        assert type(factor) is SuperLUFactor
+        assert factor.solve(right) == pytest.approx(np.linalg.solve(each.toarray(), right), abs=1e-6)
+    assert capfd.readouterr().out == ""
+
+
+def test_scattered_parts_are_solved_by_superlu(matrix, monkeypatch):
+    monkeypatch.setattr("coneflat.linalg.factors.MIN_CHOLMOD_UNKNOWNS", 0)
+    assert type(factorize(matrix, is_scattered=True)) is SuperLUFactor
 
 
 def test_no_unknowns():

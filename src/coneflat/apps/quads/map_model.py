@@ -134,7 +134,8 @@ class MapModel:
         Areas are relative to the wanted ones.
         """
         order = np.argsort(self._excess)
-        number = np.cumsum(self._poisson.share[order] * np.exp(2 * self._log_scale[order]))
+        scale = self._log_scale[order] - self._log_scale.max()
+        number = np.cumsum(self._poisson.share[order] * np.exp(2 * scale))
         low, high = np.interp([0.05, 0.95], number / number[-1], self._excess[order])
         return float(2 * (high - low))
 

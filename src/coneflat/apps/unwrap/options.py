@@ -37,16 +37,18 @@ class ChartNumber(Kind):
 
     words: tuple[str, ...] = ("atlas", "one")
     metavar: str = "atlas|one|NUMBER"
+    most: int = 10_000
 
     def parse(self, name: str, value: Any) -> str | int:
-        if isinstance(value, str) and value not in self.words and not value.isdecimal():
-            words = ", ".join(self.words)
-            raise OptionError(f"{name} must be {words} or an integer, 1 or more, got {short_repr(value)}")
         if isinstance(value, str) and value in self.words:
             return value
-        number = as_integer(name, int(value) if isinstance(value, str) else value)
-        if number < 1:
-            raise OptionError(f"{name} must be 1 or more, got {number}")
+        is_number = value.isdecimal() and len(value) < 19 if isinstance(value, str) else True
+        number = as_integer(name, int(value) if isinstance(value, str) else value) if is_number else 0
+        if not 1 <= number <= self.most:
+            expected = ", ".join(self.words)
+            raise OptionError(
+                f"{name} must be {expected} or an integer from 1 to {self.most:,}, got {short_repr(value)}"
+            )
         return number
 
 

@@ -142,8 +142,8 @@ def relax(
     found = descend(z, motions, elements, energy, tolerance, steps, progress, stride)
     if found.remaining:
         raise ConvergenceError(
-            f"constraints cannot be met without flipping triangles: {1 - found.remaining:.1%} of the way to them "
-            f"after {plural(found.steps, 'step')}"
+            f"constraints cannot be met without flipping triangles: {found.remaining:.1%} of the way to them "
+            f"is left after {plural(found.steps, 'step')}"
         )
     total = float(elements.weight.sum())
     moved = as_pairs(motions.closed(found.points))
