@@ -68,7 +68,8 @@ def halfedge_angles(angles: FloatArray) -> FloatArray:
 def preferred_directions(mesh: TriangleMesh, angle: float = SHARP_ANGLE) -> Directions:
     """Return the preferred crosses of a mesh, at edges sharper than an angle and along curvature."""
     lengths = edge_lengths(mesh.vertices, mesh.faces)
-    areas = np.maximum(double_areas(lengths) / 2, np.finfo(float).tiny)
+    areas = double_areas(lengths) / 2
+    areas = np.maximum(areas, 1e-12 * areas.sum())  # Weights of edges are inverse to areas.
     scale = float(np.sqrt(areas.sum()))
     sides = mesh.edge_halfedges[sharp_or_boundary(mesh, SHARP_LENGTH * scale, angle)].ravel()
     sides = sides[sides >= 0]

@@ -194,12 +194,11 @@ class CutSearch:
             # Cones that their triangles cannot hold are no problem for free seams.
             layout, _ = lay_out_once(self._surface, self._part, spec, self._method)
             same = [i for i, each in enumerate(found) if np.array_equal(each.layout.cones, layout.cones)]
-            one = (
-                replace(found.pop(same[0]), distortion=distortion)
-                if same
-                else self._candidate(layout, distortion)
-            )
+            known = found.pop(same[0]) if same else self._candidate(layout, distortion)
+            one = replace(known, distortion=distortion)
             found.append(one)
+            if known.energy > self._max_energy and distortion < known.distortion / 2:
+                break  # The search finds no more cones.
             within = [each for each in found if each.energy <= self._max_energy]
             beyond = [each for each in found if each.energy > self._max_energy]
             low = max(within, key=lambda each: each.distortion, default=None)
