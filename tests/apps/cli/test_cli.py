@@ -166,6 +166,24 @@ def test_interrupts_in_compiled_functions_are_interrupts(monkeypatch, capsys):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has other signals")
+def test_a_command_that_hangs_after_a_signal_is_ended():
+    code = """if True:
+        import signal, time, coneflat.apps.cli.main as command
+        def hang(**_):
+            try:
+                signal.raise_signal(signal.SIGTERM)
+            finally:
+                time.sleep(60)
+        command.cli.main, command.PATIENCE = hang, 0.2
+        command.main()"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=30, check=False
+    )
+    assert done.returncode == 128 + signal.SIGTERM
+    assert done.stderr.startswith("coneflat: error: interrupted")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has other signals")
 @pytest.mark.parametrize("error", [KeyboardInterrupt, SystemError, ValueError])
 def test_a_signal_gives_its_exit_code_whatever_error_arrives(monkeypatch, capsys, error):
     def interrupted(**_):
@@ -175,6 +193,7 @@ def test_a_signal_gives_its_exit_code_whatever_error_arrives(monkeypatch, capsys
 
     before = signal.signal(signal.SIGTERM, signal.SIG_DFL)
     monkeypatch.setattr("coneflat.apps.cli.main.cli.main", interrupted)
+    monkeypatch.setattr("coneflat.apps.cli.main.PATIENCE", threading.TIMEOUT_MAX)  # This process goes on.
     with pytest.raises(SystemExit) as ended:
         main()
     signal.signal(signal.SIGTERM, before)

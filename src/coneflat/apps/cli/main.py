@@ -6,6 +6,7 @@ import gc
 import os
 import signal
 import sys
+import threading
 from types import FrameType
 from typing import NoReturn
 
@@ -22,6 +23,9 @@ from .peers import compare
 from .quads import quads
 from .shared import ExitCode
 from .view import studio, view
+
+# Seconds after a signal in which a command must end by itself.
+PATIENCE = 5.0
 
 
 class Interrupted(KeyboardInterrupt):
@@ -48,6 +52,10 @@ def main() -> NoReturn:
 
     def interrupt(number: int, _: FrameType | None) -> NoReturn:
         received.append(number)
+        # An exception inside of a call of `threading` can leave a lock for which another thread waits without end.
+        watchdog = threading.Timer(PATIENCE, lambda: os._exit(_fail_interrupted(received)))
+        watchdog.daemon = True
+        watchdog.start()
         raise Interrupted
 
     for number in {1, 2, 15} & signal.valid_signals():  # SIGHUP, which Windows has not, SIGINT, SIGTERM

@@ -25,7 +25,7 @@ from ...seams import seam_costs, without_loose_ends
 from ...source import Part
 from ...stages import ConeSpec, Cut, Layout, Surface, VertexCurvatures
 from .coarse import coarse_part
-from .free import freed, seam_edges
+from .free import freed, recut, seam_edges
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .tips import RINGS, find_tips, moved_tips, moves_for
 
@@ -39,6 +39,8 @@ MANY_TRIANGLES = 60_000
 # Number of times that tips are moved to meet the bound, half as often on large meshes, and that a layout is settled to
 # avoid contacts.
 MAX_TRIES = 4
+# Tips are not moved further if the energy changes by less than this fraction of its distance to the bound.
+MIN_RESPONSE = 0.2
 # Cost of seams that lowers the energy to that of an isometry, relative to the square root of the area.
 COST_PER_ENERGY = 0.6
 # Tolerance of the energies of candidates, see `relax`. Those above the bound by less than twice as much may be within
@@ -276,12 +278,17 @@ class CutSearch:
         # For each slack that was requested, the energy above the bound.
         slack, tried, known = wanted, [(0.0, -wanted)], [seams]
         for _ in range(MAX_TRIES // 2 if self._has_coarse and wanted > 0 else MAX_TRIES):
-            moved = moved_tips(start.layout, seams, tips, moves_for(start.layout, tips, slack))
+            moves = moves_for(start.layout, tips, slack)
+            if self._has_coarse and wanted < 0:
+                # The decrease per length was made equal at all tips on the coarse mesh. Seams that only get longer need
+                # no other metric to start from.
+                moves = np.minimum(moves, 0.0)
+            moved = moved_tips(start.layout, seams, tips, moves)
             if any(np.array_equal(moved[0], each) for each in known):
                 # The tips move by whole edges.
                 slack += np.sign(slack) * allowed / 4
                 continue
-            layout = self._with_tips(*moved)
+            layout = self._with_tips(start.layout, *moved)
             if layout is None:
                 break
             known.append(moved[0])
@@ -299,15 +306,24 @@ class CutSearch:
                 part = float(np.clip(low[1] / (low[1] - high[1]), 0.2, 0.8))
                 slack = low[0] + part * (high[0] - low[0])
             else:
-                change = excess + wanted
-                slack *= float(np.clip(wanted / change, 1.25, 3)) if change * wanted > 0 else 3.0
+                (slack_before, excess_before), (slack, excess) = tried[-2:]
+                change = excess - excess_before
+                if wanted > 0 and len(tried) > 2 and abs(change) < MIN_RESPONSE * abs(excess):
+                    break
+                wished = slack - excess * (slack - slack_before) / change if change else np.inf
+                slack *= float(np.clip(wished / slack, 1.25, 3)) if wished * slack > 0 else 3.0
         return sorted(found, key=lambda one: one.cost)
 
-    def _with_tips(self, seams: IntArray, cones: IntArray) -> Layout | None:
-        """Return the layout with given cones that is cut along given edges; None if there is none."""
+    def _with_tips(self, start: Layout, seams: IntArray, cones: IntArray) -> Layout | None:
+        """Return the layout with given cones that is cut along given edges; None if there is none.
+
+        start: a layout; if it is cut along some of these edges, and no others, the layout is the same.
+        """
         mesh = self._part.mesh
-        spec = self._with_cones(cones[np.isin(cones, mesh.edges[seams])])
-        cut = open_along(mesh, seams)
+        cones = cones[np.isin(cones, mesh.edges[seams])]
+        if np.isin(seam_edges(start), seams).all():
+            return replace(recut(start, seams), cones=cones)
+        spec, cut = self._with_cones(cones), open_along(mesh, seams)
         try:
             solution = find_cones(self._surface, spec, self._method.watch)
             metric = self._method.find_metric(self._surface, solution, self._part.metric)

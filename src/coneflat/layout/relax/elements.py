@@ -104,11 +104,9 @@ class Elements:
 
     def of_parts(self, chosen: BoolArray) -> tuple[Elements, IntArray]:
         """Return the elements of chosen parts (parts,), renumbered, and (k',) the indices here of their unknowns."""
-        some = chosen[self.part]
-        unknowns = np.flatnonzero(chosen[self.unknown_part])
-        number = np.zeros(self.count + 1, dtype=np.int64)
-        number[unknowns] = np.arange(len(unknowns))
-        number[-1] = len(unknowns)
+        some, is_kept = chosen[self.part], chosen[self.unknown_part]
+        unknowns, renamed = np.flatnonzero(is_kept), np.cumsum(chosen) - 1
+        number = np.append(np.cumsum(is_kept) - 1, len(unknowns))
         found, sizes = copy(self), np.diff(self._start)
         entries = some.repeat(sizes)
         found.faces, found.weight, found.count = self.faces[some], self.weight[some], len(unknowns)
@@ -116,7 +114,15 @@ class Elements:
         found._start = np.concatenate([[0], np.cumsum(sizes[some])])
         found._unknown = number[self._unknown[entries]]
         found._alpha, found._beta = self._alpha[entries], self._beta[entries]
-        found._find_pattern()
+        found.parts, found.part = int(chosen.sum()), renamed[self.part[some]]
+        found.unknown_part = renamed[self.unknown_part[unknowns]]
+        # Columns of the matrix have entries of their own part only.
+        lengths = np.diff(self._indptr)
+        inside = is_kept.repeat(lengths)
+        slots = self._slots[some.repeat(sizes**2)]
+        found._squares = np.concatenate([[0], np.cumsum(sizes[some] ** 2)])
+        found._slots = np.where(slots >= 0, (np.cumsum(inside) - 1)[slots], -1)
+        found._set_matrix(number[self._indices[inside]], np.append(0, np.cumsum(lengths[is_kept])))
         return found, unknowns
 
     def _find_pattern(self) -> None:
@@ -136,15 +142,19 @@ class Elements:
         self._slots = np.full(self._squares[-1], -1)
         self._slots[order] = np.cumsum(is_first) - 1
         starts = np.searchsorted(columns[is_first], np.arange(k + 1))
-        # One matrix for all steps, so that its pattern is analysed once.
-        self._matrix = csc_matrix((np.zeros(starts[-1]), rows[is_first], starts), shape=(k, k))
-        self._indices, self._indptr = self._matrix.indices, self._matrix.indptr
-        self._diagonal = np.flatnonzero(self._indices == np.arange(k).repeat(np.diff(self._indptr)))
+        self._set_matrix(rows[is_first], starts)
         self.parts, self.unknown_part = label_components(
             k, self._indices.astype(np.int64), np.arange(k).repeat(np.diff(self._indptr))
         )
         first = self._unknown[self._start[:-1]]
         self.part = np.append(self.unknown_part, 0)[first]  # any part for the offset: all share a step
+
+    def _set_matrix(self, rows: IntArray, starts: IntArray) -> None:
+        # One matrix for all steps, so that its pattern is analysed once.
+        k = self.count
+        self._matrix = csc_matrix((np.zeros(len(rows)), rows, starts), shape=(k, k))
+        self._indices, self._indptr = self._matrix.indices, self._matrix.indptr
+        self._diagonal = np.flatnonzero(self._indices == np.arange(k).repeat(np.diff(self._indptr)))
 
     def maps(self, points: ComplexArray) -> Maps:
         """Return the maps at given positions (u,) of all points."""
