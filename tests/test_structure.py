@@ -34,10 +34,10 @@ CEILINGS = {
     "apps.ahead": 37,
     "apps.batch": 391,
     "apps.blender": 884,
-    "apps.cli": 1623,
+    "apps.cli": 1622,
     "apps.measure_uv": 160,
     "apps.peers": 453,
-    "apps.quads": 3832,
+    "apps.quads": 3828,
     "apps.studio": 1734,
     "apps.transfer": 323,
     "apps.brains": 262,
@@ -53,7 +53,7 @@ CEILINGS = {
     "flattener": 35,
     "geometry": 1471,
     "io": 2881,
-    "layout": 1978,
+    "layout": 1962,
     "linalg": 453,
     "measure": 829,
     "mesh": 666,
@@ -69,7 +69,7 @@ CEILINGS = {
 #: Applications with a ceiling of their own, which the ceilings of everything else leave out.
 OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_349, 232, 25_196
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_333, 232, 25_175
 CONSTANTS, KERNELS, NAMES, LEVELS = 295, 88, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

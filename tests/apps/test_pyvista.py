@@ -53,15 +53,6 @@ def test_options_reach_the_functions(ball):
         ball.coneflat.flatten(cone_count=-1)
 
 
-def test_numbers_are_named_by_point_data(ball):
-    ball = ball.copy()
-    ball["cost"] = 1.0 + 9 * (ball["height"] > 0)
-    named, given = (ball.coneflat.flatten(weights=each) for each in ("cost", ball["cost"]))
-    assert np.array_equal(named.active_texture_coordinates, given.active_texture_coordinates)
-    with pytest.raises(coneflat.ConeflatError, match="no vertex property 'height2'"):
-        ball.coneflat.quads(quads=100, size="height2")
-
-
 def test_quads_are_four_sided(ball):
     mesh = ball.coneflat.quads(quads=100)
     assert set(mesh.faces[::5]) == {4}

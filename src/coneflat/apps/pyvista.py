@@ -14,8 +14,6 @@ from .. import Flattening, flatten, quads, unwrap
 class ConeflatAccessor:
     """Flattening of a PyVista surface; options are those of the functions of the same names.
 
-    Numbers for the vertices, as `weights`, may be named by the point data that has them.
-
     Examples:
         >>> sphere = pyvista.Sphere().coneflat.flatten()  # doctest: +SKIP
         >>> sphere.plot(texture=pyvista.examples.load_globe_texture())  # doctest: +SKIP
@@ -32,7 +30,7 @@ class ConeflatAccessor:
         Raises:
             ConeflatError: as of `coneflat.flatten`.
         """
-        return self._with_data(flatten(self._mesh, **self._with_numbers(options)))
+        return self._with_data(flatten(self._mesh, **options))
 
     def unwrap(self, **options: Any) -> pyvista.PolyData:
         """Return the surface with texture coordinates, by `coneflat.unwrap`; points are repeated at seams.
@@ -40,7 +38,7 @@ class ConeflatAccessor:
         Raises:
             ConeflatError: as of `coneflat.unwrap`.
         """
-        return self._with_data(unwrap(self._mesh, **self._with_numbers(options)))
+        return self._with_data(unwrap(self._mesh, **options))
 
     def quads(self, **options: Any) -> pyvista.PolyData:
         """Return a quad mesh of the surface, by `coneflat.quads`, without its data: points and faces are others.
@@ -48,16 +46,8 @@ class ConeflatAccessor:
         Raises:
             ConeflatError: as of `coneflat.quads`.
         """
-        found = quads(self._mesh, **self._with_numbers(options))
+        found = quads(self._mesh, **options)
         return pyvista.PolyData(found.vertices, np.insert(found.quads, 0, 4, axis=1).ravel())
-
-    def _with_numbers(self, options: dict[str, Any]) -> dict[str, Any]:
-        known = self._mesh.point_data
-        named = {name: options.get(name) for name in ("weights", "size")}
-        return {
-            **options,
-            **{name: np.asarray(known[own]) for name, own in named.items() if isinstance(own, str) and own in known},
-        }
 
     def _with_data(self, result: Flattening) -> pyvista.PolyData:
         """Return a result as a surface with the data of the input's points and cells; its measures are field data."""

@@ -53,10 +53,8 @@ class Stopwatch:
                 f"progress must be a function of a text and a fraction, got {type(progress).__name__}"
             )
         self.seconds: dict[str, float] = {}
-        self.done = 0.0
-        self.share = 0.0
+        self.done = self.share = self._within = 0.0
         self._name = ""
-        self._within = 0.0
         self._progress = progress
 
     @contextmanager

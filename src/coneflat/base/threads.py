@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from functools import cache
@@ -26,15 +26,18 @@ _threads: ContextVar[int] = ContextVar("coneflat_threads", default=THREADS)
 def concurrently(call: Callable[[], Result], triangles: int) -> Iterator[Future[Result]]:
     """Run a function on another thread during the block, and yield its future.
 
-    If the mesh is huge, because both together would need too much memory, or if only one thread may be used, the
-    function finishes before the block starts. The function and the block must not share data that either modifies.
+    If the mesh is small, or huge, because both together would need too much memory, or if only one thread may be used,
+    the function finishes before the block starts. The function and the block must not share data that either modifies.
     Compiled loops, factorizations and most of NumPy release the interpreter lock.
     """
     with ThreadPoolExecutor(1, thread_name_prefix="coneflat") as executor:
-        future = executor.submit(copy_context().run, call)
-        if triangles > MEMORY_BOUND_TRIANGLES or threads() == 1:
-            wait([future])
-        yield future
+        # For fewer triangles, the start of a thread takes longer than it saves.
+        if threads() > 1 and 2_000 <= triangles <= MEMORY_BOUND_TRIANGLES:
+            yield executor.submit(copy_context().run, call)
+        else:
+            done: Future[Result] = Future()
+            done.set_result(call())
+            yield done
 
 
 def threads() -> int:

@@ -113,11 +113,7 @@ def closed_chain(steps: ComplexArray) -> ComplexArray:
 
 
 def _close_gaps(
-    sides: ComplexArray,
-    corner: IntArray,
-    frame: ComplexArray,
-    points: ComplexArray,
-    pinned: BoolArray,
+    sides: ComplexArray, corner: IntArray, frame: ComplexArray, points: ComplexArray, pinned: BoolArray
 ) -> None:
     """Move the points that are not pinned, in place, to distribute the gaps in the layout.
 
@@ -150,12 +146,7 @@ def _close_gaps(
 
 @compiled
 def walk_border(
-    twin: IntArray,
-    cut: BoolArray,
-    turns: ComplexArray,
-    start: int,
-    border: IntArray,
-    frames: ComplexArray,
+    twin: IntArray, cut: BoolArray, turns: ComplexArray, start: int, border: IntArray, frames: ComplexArray
 ) -> int:
     """Fill in the half-edges of a border loop, in order, and the frames of their triangles; return its length n.
 

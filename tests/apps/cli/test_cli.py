@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import threading
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -174,7 +175,7 @@ def test_a_command_that_hangs_after_a_signal_is_ended():
                 signal.raise_signal(signal.SIGTERM)
             finally:
                 time.sleep(60)
-        command.cli.main, command.PATIENCE = hang, 0.2
+        command.cli.main = hang
         command.main()"""
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=30, check=False
@@ -193,7 +194,7 @@ def test_a_signal_gives_its_exit_code_whatever_error_arrives(monkeypatch, capsys
 
     before = signal.signal(signal.SIGTERM, signal.SIG_DFL)
     monkeypatch.setattr("coneflat.apps.cli.main.cli.main", interrupted)
-    monkeypatch.setattr("coneflat.apps.cli.main.PATIENCE", threading.TIMEOUT_MAX)  # This process goes on.
+    monkeypatch.setattr("coneflat.apps.cli.main.threading.Timer", Mock())  # This process goes on.
     with pytest.raises(SystemExit) as ended:
         main()
     signal.signal(signal.SIGTERM, before)

@@ -24,9 +24,6 @@ from .quads import quads
 from .shared import ExitCode
 from .view import studio, view
 
-# Seconds after a signal in which a command must end by itself.
-PATIENCE = 5.0
-
 
 class Interrupted(KeyboardInterrupt):
     """A signal; after a plain KeyboardInterrupt inside `exec`, Python ends with the code of SIGINT in any case."""
@@ -53,7 +50,7 @@ def main() -> NoReturn:
     def interrupt(number: int, _: FrameType | None) -> NoReturn:
         received.append(number)
         # An exception inside of a call of `threading` can leave a lock for which another thread waits without end.
-        watchdog = threading.Timer(PATIENCE, lambda: os._exit(_fail_interrupted(received)))
+        watchdog = threading.Timer(5.0, lambda: os._exit(_fail_interrupted(received)))
         watchdog.daemon = True
         watchdog.start()
         raise Interrupted
@@ -116,14 +113,15 @@ def _open_streams() -> None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
     is_replaced = sys.stdout is not sys.__stdout__  # By a test.
     if not is_replaced and not (os.name == "nt" and sys.stdout.isatty()):
-        own = os.dup(1)
+        sys.stdout = open(  # noqa: SIM115
+            os.dup(1), "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors
+        )
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        sys.stdout = open(own, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)  # noqa: SIM115
 
 
 def _fail_interrupted(received: list[int]) -> int:
-    number = (received or [signal.SIGINT])[0]
-    return _fail("interrupted; no incomplete file was left", ExitCode.SIGNALLED + number)
+    code = ExitCode.SIGNALLED + (received or [signal.SIGINT])[0]
+    return _fail("interrupted; no incomplete file was left", code)
 
 
 def _fail(message: str, code: int) -> int:

@@ -172,14 +172,8 @@ def _bar() -> Progress:
     from rich.console import Console as RichConsole
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    return Progress(
-        SpinnerColumn(),
-        TextColumn("{task.description:28}"),
-        BarColumn(),
-        TimeElapsedColumn(),
-        console=RichConsole(stderr=True),
-        transient=True,
-    )
+    columns = SpinnerColumn(), TextColumn("{task.description:28}"), BarColumn(), TimeElapsedColumn()
+    return Progress(*columns, console=RichConsole(stderr=True), transient=True)
 
 
 def _lines_of_table(rows: Sequence[tuple[str, str, str]]) -> Iterator[str]:

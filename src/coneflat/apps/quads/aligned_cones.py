@@ -18,13 +18,7 @@ from ... import TriangleMesh
 from ...base import ComplexArray, FloatArray, IntArray
 from ...errors import CurvatureError
 from ..unwrap.coarse import coarse_mesh
-from .cross_field import (
-    SHARP_ANGLE,
-    field_indices,
-    preferred_directions,
-    sharp_ends,
-    smoothest_cross_field,
-)
+from .cross_field import SHARP_ANGLE, field_indices, preferred_directions, sharp_ends, smoothest_cross_field
 from .map_model import SAMPLES, MapModel, vertex_graph
 from .options import DISTORTION
 

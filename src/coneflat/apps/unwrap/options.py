@@ -40,10 +40,11 @@ class ChartNumber(Kind):
     most: int = 10_000
 
     def parse(self, name: str, value: Any) -> str | int:
-        if isinstance(value, str) and value in self.words:
-            return value
-        is_number = value.isdecimal() and len(value) < 19 if isinstance(value, str) else True
-        number = as_integer(name, int(value) if isinstance(value, str) else value) if is_number else 0
+        text = value if isinstance(value, str) else ""
+        if text in self.words:
+            return text
+        given = int(text) if text.isdecimal() and len(text) < 19 else 0
+        number = given if text else as_integer(name, value)
         if not 1 <= number <= self.most:
             expected = ", ".join(self.words)
             raise OptionError(

@@ -39,8 +39,6 @@ MANY_TRIANGLES = 60_000
 # Number of times that tips are moved to meet the bound, half as often on large meshes, and that a layout is settled to
 # avoid contacts.
 MAX_TRIES = 4
-# Tips are not moved further if the energy changes by less than this fraction of its distance to the bound.
-MIN_RESPONSE = 0.2
 # Cost of seams that lowers the energy to that of an isometry, relative to the square root of the area.
 COST_PER_ENERGY = 0.6
 # Tolerance of the energies of candidates, see `relax`. Those above the bound by less than twice as much may be within
@@ -189,7 +187,9 @@ class CutSearch:
 
     def _by_distortion(self) -> list[Candidate]:
         """Return candidates with energies around the bound."""
-        found, distortion = list[Candidate](), FIRST_DISTORTION
+        found = list[Candidate]()
+        # The first candidate of a quick search should be within the bound.
+        distortion = FIRST_DISTORTION * (0.7 if self._is_quick else 1.0)
         allowed = self._max_energy - ISOMETRIC
         for tried in range(2 * MAX_CANDIDATES):
             spec = replace(self._part.cones, distortion=distortion)
@@ -199,8 +199,9 @@ class CutSearch:
             known = found.pop(same[0]) if same else self._candidate(layout, distortion)
             one = replace(known, distortion=distortion)
             found.append(one)
-            if known.energy > self._max_energy and distortion < known.distortion / 2:
-                break  # The search finds no more cones.
+            is_within = known.energy <= self._max_energy
+            if distortion > 2 * known.distortion if is_within else distortion < known.distortion / 2:
+                break  # The search finds no fewer or no more cones.
             within = [each for each in found if each.energy <= self._max_energy]
             beyond = [each for each in found if each.energy > self._max_energy]
             low = max(within, key=lambda each: each.distortion, default=None)
@@ -278,11 +279,10 @@ class CutSearch:
         # For each slack that was requested, the energy above the bound.
         slack, tried, known = wanted, [(0.0, -wanted)], [seams]
         for _ in range(MAX_TRIES // 2 if self._has_coarse and wanted > 0 else MAX_TRIES):
-            moves = moves_for(start.layout, tips, slack)
-            if self._has_coarse and wanted < 0:
-                # The decrease per length was made equal at all tips on the coarse mesh. Seams that only get longer need
-                # no other metric to start from.
-                moves = np.minimum(moves, 0.0)
+            # The decrease per length was made equal at all tips on the coarse mesh. Seams that only get longer need no
+            # other metric to start from.
+            most = 0.0 if self._has_coarse and wanted < 0 else np.inf
+            moves = np.minimum(moves_for(start.layout, tips, slack), most)
             moved = moved_tips(start.layout, seams, tips, moves)
             if any(np.array_equal(moved[0], each) for each in known):
                 # The tips move by whole edges.
@@ -308,8 +308,8 @@ class CutSearch:
             else:
                 (slack_before, excess_before), (slack, excess) = tried[-2:]
                 change = excess - excess_before
-                if wanted > 0 and len(tried) > 2 and abs(change) < MIN_RESPONSE * abs(excess):
-                    break
+                if wanted > 0 and len(tried) > 2 and abs(change) < abs(excess) / 5:
+                    break  # The energy hardly depends on the tips.
                 wished = slack - excess * (slack - slack_before) / change if change else np.inf
                 slack *= float(np.clip(wished / slack, 1.25, 3)) if wished * slack > 0 else 3.0
         return sorted(found, key=lambda one: one.cost)
@@ -363,15 +363,8 @@ def separate_charts(layout: Layout, costs: FloatArray, part: Part) -> Layout:
         sides = disk.edge_halfedges[:, 0]
         edges = layout.mesh.halfedge_edges[3 * faces[sides // 3] + sides % 3]
         avoided, forbidden = part.seams.is_avoided[edges], part.seams.is_forbidden[edges]
-        alone = replace(
-            layout,
-            notes=notes,
-            mesh=disk,
-            points=points,
-            corners=disk.faces,
-            chart=np.zeros(len(faces), dtype=np.int64),
-            disk=None,
-        )
+        none, shape = np.zeros(len(faces), dtype=np.int64), disk.faces
+        alone = replace(layout, notes=notes, mesh=disk, points=points, corners=shape, chart=none, disk=None)
         spec = replace(part.seams, is_avoided=avoided, is_forbidden=forbidden)
         separated = separate_overlaps(alone, costs[edges], spec)
         notes, pieces = separated.notes, separated.chart

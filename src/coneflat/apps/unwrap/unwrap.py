@@ -84,6 +84,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     parts = [along_sharp_edges(part) for part in prepared.parts]
     found = dict[int, Candidate]()
     areas = np.array([double_areas(part.lengths).sum() for part in parts])
+    is_minor = areas < MINOR_SHARE * areas.sum()
     if o.texel_density is not None:
         side = np.sqrt(areas.sum() / 2 / COVERED / o.tiles) / 2.0**prepared.checked.exponent
         shared = replace(shared, resolution=_resolution(o.texel_density, side, o.padding))
@@ -91,13 +92,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         # Copies cannot have different numbers of charts.
         copies = [None] * len(parts) if isinstance(o.charts, int) else find_copies(parts)
         searches = {
-            i: CutSearch(
-                part,
-                o.bound,
-                method,
-                is_quick=areas[i] < MINOR_SHARE * areas.sum(),
-                by_area=o.area is not None,
-            )
+            i: CutSearch(part, o.bound, method, is_minor[i], by_area=o.area is not None)
             for i, part in enumerate(parts)
             if copies[i] is None
         }

@@ -94,17 +94,7 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
             f"{plural(len(tied), 'half-edge')} tied, but {plural(len(translations), 'translation')} given for them"
         )
     on_line, line, directions, offsets = _checked_lines(constraints.lines, points)
-    return CheckedConstraints(
-        pinned,
-        places,
-        on_line,
-        line,
-        directions,
-        offsets,
-        held,
-        tied,
-        translations,
-    )
+    return CheckedConstraints(pinned, places, on_line, line, directions, offsets, held, tied, translations)
 
 
 def _checked_lines(

@@ -203,12 +203,7 @@ class _Builder:
         order = np.argsort(point, kind="stable")
         start = np.searchsorted(point[order], np.arange(len(self.points) + 1))
         return Motions(
-            self.count,
-            start,
-            unknown[order],
-            coefficient[order],
-            bool(np.any(coefficient[last] != 0)),
-            self,
+            self.count, start, unknown[order], coefficient[order], bool(np.any(coefficient[last] != 0)), self
         )
 
     def _add(self, points: IntArray, variables: IntArray, factors: ComplexArray, is_complex: bool) -> None:
