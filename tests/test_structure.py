@@ -34,7 +34,7 @@ CEILINGS = {
     "apps.ahead": 37,
     "apps.batch": 391,
     "apps.blender": 884,
-    "apps.cli": 1622,
+    "apps.cli": 1623,
     "apps.measure_uv": 160,
     "apps.peers": 453,
     "apps.quads": 3828,
@@ -69,7 +69,7 @@ CEILINGS = {
 #: Applications with a ceiling of their own, which the ceilings of everything else leave out.
 OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_333, 232, 25_175
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_333, 232, 25_176
 CONSTANTS, KERNELS, NAMES, LEVELS = 295, 88, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -181,7 +181,7 @@ def test_a_command_that_hangs_after_a_signal_is_ended():
         [sys.executable, "-c", code], capture_output=True, text=True, timeout=30, check=False
     )
     assert done.returncode == 128 + signal.SIGTERM
-    assert done.stderr.startswith("coneflat: error: interrupted")
+    assert done.stderr == "coneflat: error: interrupted, and ended by force\n"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has other signals")
@@ -194,7 +194,7 @@ def test_a_signal_gives_its_exit_code_whatever_error_arrives(monkeypatch, capsys
 
     before = signal.signal(signal.SIGTERM, signal.SIG_DFL)
     monkeypatch.setattr("coneflat.apps.cli.main.cli.main", interrupted)
-    monkeypatch.setattr("coneflat.apps.cli.main.threading.Timer", Mock())  # This process goes on.
+    monkeypatch.setattr("coneflat.apps.cli.main.start_new_thread", Mock())  # This process goes on.
     with pytest.raises(SystemExit) as ended:
         main()
     signal.signal(signal.SIGTERM, before)

@@ -6,7 +6,8 @@ import gc
 import os
 import signal
 import sys
-import threading
+import time
+from _thread import start_new_thread
 from types import FrameType
 from typing import NoReturn
 
@@ -47,12 +48,16 @@ def main() -> NoReturn:
     # The number of a signal does not always arrive with the error that it causes inside a compiled function.
     received = list[int]()
 
+    def give_up() -> NoReturn:
+        time.sleep(10)
+        os.write(2, b"coneflat: error: interrupted, and ended by force\n")
+        os._exit(ExitCode.SIGNALLED + received[0])
+
     def interrupt(number: int, _: FrameType | None) -> NoReturn:
         received.append(number)
         # An exception inside of a call of `threading` can leave a lock for which another thread waits without end.
-        watchdog = threading.Timer(5.0, lambda: os._exit(_fail_interrupted(received)))
-        watchdog.daemon = True
-        watchdog.start()
+        # `threading` itself would need its locks to start one.
+        start_new_thread(give_up, ())
         raise Interrupted
 
     for number in {1, 2, 15} & signal.valid_signals():  # SIGHUP, which Windows has not, SIGINT, SIGTERM
@@ -120,8 +125,8 @@ def _open_streams() -> None:
 
 
 def _fail_interrupted(received: list[int]) -> int:
-    code = ExitCode.SIGNALLED + (received or [signal.SIGINT])[0]
-    return _fail("interrupted; no incomplete file was left", code)
+    # Without a signal that was received, it was SIGINT.
+    return _fail("interrupted; no incomplete file was left", ExitCode.SIGNALLED + (received or [2])[0])
 
 
 def _fail(message: str, code: int) -> int:
