@@ -118,10 +118,9 @@ def _open_streams() -> None:
             setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
     is_replaced = sys.stdout is not sys.__stdout__  # By a test.
     if not is_replaced and not (os.name == "nt" and sys.stdout.isatty()):
-        sys.stdout = open(  # noqa: SIM115
-            os.dup(1), "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors
-        )
+        own = os.dup(1)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        sys.stdout = open(own, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)  # noqa: SIM115
 
 
 def _fail_interrupted(received: list[int]) -> int:
