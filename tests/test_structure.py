@@ -45,7 +45,7 @@ CEILINGS = {
     "apps.unwrap": 1368,
     "apps.view": 1591,
     "atlas": 1439,
-    "base": 323,
+    "base": 321,
     "cone_curve": 108,
     "cones": 2098,
     "evaluate": 194,
@@ -69,7 +69,7 @@ CEILINGS = {
 #: Applications with a ceiling of their own, which the ceilings of everything else leave out.
 OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_333, 232, 25_176
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_331, 232, 25_174
 CONSTANTS, KERNELS, NAMES, LEVELS = 295, 88, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -18,8 +18,8 @@ def test_results_and_errors_come_when_asked_for(triangles):
         working.result()
 
 
-@pytest.mark.parametrize(("triangles", "count"), [(1, 1), (MEMORY_BOUND_TRIANGLES + 1, 2)])
-def test_on_one_thread_and_on_huge_meshes_the_inside_begins_afterwards(triangles, count):
+@pytest.mark.parametrize(("triangles", "count"), [(10_000, 1), (100, 2), (MEMORY_BOUND_TRIANGLES + 1, 2)])
+def test_on_one_thread_and_on_small_or_huge_meshes_the_inside_begins_afterwards(triangles, count):
     begun = threading.Event()
     with limit_threads(count), concurrently(begun.is_set, triangles) as working:
         begun.set()
@@ -29,7 +29,7 @@ def test_on_one_thread_and_on_huge_meshes_the_inside_begins_afterwards(triangles
 
 def test_otherwise_both_run_at_the_same_time():
     begun = threading.Event()
-    with concurrently(begun.wait, 1) as working:
+    with concurrently(begun.wait, 10_000) as working:
         assert not working.done()
         begun.set()
     assert working.result()

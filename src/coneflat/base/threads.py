@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from functools import cache
@@ -31,13 +31,11 @@ def concurrently(call: Callable[[], Result], triangles: int) -> Iterator[Future[
     Compiled loops, factorizations and most of NumPy release the interpreter lock.
     """
     with ThreadPoolExecutor(1, thread_name_prefix="coneflat") as executor:
-        # For fewer triangles, the start of a thread takes longer than it saves.
-        if threads() > 1 and 2_000 <= triangles <= MEMORY_BOUND_TRIANGLES:
-            yield executor.submit(copy_context().run, call)
-        else:
-            done: Future[Result] = Future()
-            done.set_result(call())
-            yield done
+        future = executor.submit(copy_context().run, call)
+        # On small meshes both mostly wait for the interpreter lock.
+        if threads() == 1 or not 2_000 <= triangles <= MEMORY_BOUND_TRIANGLES:
+            wait([future])
+        yield future
 
 
 def threads() -> int:
