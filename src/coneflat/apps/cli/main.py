@@ -55,8 +55,8 @@ def main() -> NoReturn:
 
     def interrupt(number: int, _: FrameType | None) -> NoReturn:
         received.append(number)
-        # An exception inside of a call of `threading` can leave a lock for which another thread waits without end.
-        # `threading` itself would need its locks to start one.
+        # An exception inside of a call of `threading` or llvmlite can leave a lock for which another thread waits
+        # without end. `threading` would need its locks to start this thread.
         start_new_thread(give_up, ())
         raise Interrupted
 
