@@ -354,7 +354,7 @@ def separate_charts(layout: Layout, costs: FloatArray, part: Part) -> Layout:
         separated = separate_overlaps(layout, costs, part.seams)
         return replace(separated, chart=label_faces(separated.corners, len(separated.points))[1])
     pairs = find_overlaps(side_by_side(layout).points[layout.corners]).pairs
-    label, notes = layout.chart.copy(), layout.notes
+    label = layout.chart.copy()
     for chart in np.unique(layout.chart[pairs[:, 0]]).tolist():
         faces = np.flatnonzero(layout.chart == chart)
         used, corners = np.unique(layout.corners[faces], return_inverse=True)
@@ -363,11 +363,11 @@ def separate_charts(layout: Layout, costs: FloatArray, part: Part) -> Layout:
         sides = disk.edge_halfedges[:, 0]
         edges = layout.mesh.halfedge_edges[3 * faces[sides // 3] + sides % 3]
         avoided, forbidden = part.seams.is_avoided[edges], part.seams.is_forbidden[edges]
-        none, shape = np.zeros(len(faces), dtype=np.int64), disk.faces
-        alone = replace(layout, notes=notes, mesh=disk, points=points, corners=shape, chart=none, disk=None)
+        one_chart = np.zeros(len(faces), dtype=np.int64)
+        alone = replace(layout, mesh=disk, points=points, corners=disk.faces, chart=one_chart, disk=None)
         spec = replace(part.seams, is_avoided=avoided, is_forbidden=forbidden)
         separated = separate_overlaps(alone, costs[edges], spec)
-        notes, pieces = separated.notes, separated.chart
+        layout, pieces = replace(layout, notes=separated.notes), separated.chart
         label[faces] = np.where(pieces > 0, label.max() + pieces, chart)
     return with_charts(
         layout, ChartLayout(layout.points, layout.corners, layout.chart).split(label).renumbered()
