@@ -144,7 +144,10 @@ def _reads_otherwise(reader: Callable[[Path], Read], source: Any, ending: str) -
     Statements that a format does not know are copied verbatim. Where a lenient reader takes one for a face, in the
     input as in the output, its triangles cannot be compared.
     """
-    if source is None or source.path.suffix.lower() != ending or not source.path.is_file():
+    family = {".gltf": ".glb"}  # materials are copied from one to the other
+    if source is None or not source.path.is_file():
+        return False
+    if family.get(source.path.suffix.lower(), source.path.suffix.lower()) != ending:
         return False
     try:
         # Of trimesh without the UVs, which the input need not have.

@@ -304,3 +304,10 @@ def test_bad_options(options, said):
     corners, chart = a_few()
     with pytest.raises(OptionError, match=said):
         pack_charts(corners, chart, **options)
+
+
+def test_a_gap_that_leaves_no_space_is_refused_soon():
+    square = np.array([[[0.0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]])
+    corners = np.concatenate([square + 2 * i for i in range(13)])
+    with pytest.raises(OptionError, match="leaves no space"):
+        pack_charts(corners, np.arange(13).repeat(2), resolution=1, padding=0.2)

@@ -246,7 +246,7 @@ def pack(
 
     while (best := fill(start, width, width)).height > width:
         width += width // 12 + 1
-        if tiles * width**2 > 4 * MAX_CELLS:
+        if width > 4 * columns or tiles * width**2 > 4 * MAX_CELLS:
             raise OptionError(
                 f"a gap of {100 * gap:.3g} % of the texture's width between {len(order):,} charts leaves no space for "
                 "them: use less padding, a higher resolution or more tiles"

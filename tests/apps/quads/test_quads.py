@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 import shapes
@@ -27,7 +29,7 @@ from coneflat.apps.quads.extract import extract_quads
 from coneflat.apps.quads.nearest import surface_distances
 from coneflat.apps.quads.quad_mesh import degenerate_quads, least_jacobians
 from coneflat.apps.quads.quality import measure_quads
-from coneflat.errors import GridError
+from coneflat.errors import DegenerateFaceError, GridError
 
 
 def oriented_sides(quads):
@@ -244,3 +246,15 @@ def edges_of(quads):
     """Edges by their vertices."""
     pairs = np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=-1), axis=-1)
     return np.unique(pairs.reshape(-1, 2), axis=0, return_inverse=True)[1].reshape(quads.shape)
+
+
+@pytest.mark.parametrize("factor", [1e-100, 1e100])
+def test_coordinates_out_of_range_are_refused_and_named(factor):
+    square = factor * np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    with pytest.raises(GridError, match=re.escape(f"largest coordinate is {factor:g}")):
+        coneflat.quads(square, [[0, 1, 2], [0, 2, 3]], quads=16)
+
+
+def test_triangles_on_a_point_are_refused_without_a_warning():
+    with pytest.raises(DegenerateFaceError, match="no area"):
+        coneflat.quads(np.zeros((3, 3)), [[0, 1, 2], [0, 2, 1]], quads=900)

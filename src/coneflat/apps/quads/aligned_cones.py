@@ -198,5 +198,4 @@ class _Search:
 def _direction_cost(waves: ComplexArray, loops: ComplexArray, model: MapModel, costs: _Costs) -> FloatArray:
     """Return the cost of directions for sums of crosses over the samples, and of phases over the loops."""
     off = 1 - np.abs(waves) / model.weight
-    total: FloatArray = costs.directions * off + costs.handles * (len(model.loops) - loops.real) / 2
-    return total
+    return np.asarray(costs.directions * off + costs.handles * (len(model.loops) - loops.real) / 2)

@@ -67,15 +67,14 @@ def halfedge_angles(angles: FloatArray) -> FloatArray:
 
 def preferred_directions(mesh: TriangleMesh, angle: float = SHARP_ANGLE) -> Directions:
     """Return the preferred crosses of a mesh, at edges sharper than an angle and along curvature."""
-    lengths = edge_lengths(mesh.vertices, mesh.faces)
+    lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces))
     areas = double_areas(lengths) / 2
     areas = np.maximum(areas, 1e-12 * areas.sum())  # Weights of edges are inverse to areas.
     scale = float(np.sqrt(areas.sum()))
     sides = mesh.edge_halfedges[sharp_or_boundary(mesh, SHARP_LENGTH * scale, angle)].ravel()
     sides = sides[sides >= 0]
     crosses = lengths.ravel()[sides] * np.exp(4j * halfedge_angles(corner_angles(lengths))[sides])
-    count = len(mesh.faces)
-    sharp = np.zeros(count, dtype=np.complex128)
+    sharp = np.zeros(len(mesh.faces), dtype=np.complex128)
     np.add.at(sharp, sides // 3, crosses / scale)
     tensors = curvature_tensors(mesh, areas, CURVATURE_SCALE * scale)
     # The direction of a tensor is that of an angle up to half turns.
@@ -116,9 +115,8 @@ def curvature_tensors(mesh: TriangleMesh, areas: FloatArray, radius: float) -> F
     products = (weights[:, None, None] * along[:, :, None] * along[:, None, :]).reshape(-1, 9)
     one, two = mesh.edge_faces[~mesh.is_boundary_edge].T
     inner = products[~mesh.is_boundary_edge]
-    count = len(mesh.faces)
     both = np.concatenate([one, two])
-    sums = [np.bincount(both, np.tile(column, 2), count) for column in inner.T]
+    sums = [np.bincount(both, np.tile(column, 2), len(mesh.faces)) for column in inner.T]
     stiffness = _dual_laplacian(mesh, areas, np.zeros(len(one)))
     system = csc_matrix(diags(areas) + radius**2 * stiffness.real)
     system.sort_indices()
@@ -127,8 +125,7 @@ def curvature_tensors(mesh: TriangleMesh, areas: FloatArray, radius: float) -> F
     normal = face_normals(mesh.vertices, mesh.faces)
     axes = np.stack([x, np.cross(normal, x)], axis=1)
     axes /= np.maximum(np.linalg.norm(axes, axis=2, keepdims=True), np.finfo(float).tiny)
-    tensors: FloatArray = np.einsum("fai,fij,fbj->fab", axes, mean, axes)
-    return tensors
+    return np.asarray(np.einsum("fai,fij,fbj->fab", axes, mean, axes))
 
 
 def _dual_laplacian(mesh: TriangleMesh, areas: FloatArray, rotations: FloatArray) -> csr_matrix:

@@ -87,8 +87,7 @@ def with_sides(layout: GridLayout) -> GridLayout:
 def _deviations(layout: GridLayout) -> FloatArray:
     """Return (e,) the angle of each edge from the nearest axis."""
     one, (starts, ends) = layout.mesh.edge_halfedges[:, 0], layout.ends
-    off: FloatArray = np.angle((layout.points[ends[one]] - layout.points[starts[one]]) ** 4) / 4
-    return off
+    return np.asarray(np.angle((layout.points[ends[one]] - layout.points[starts[one]]) ** 4) / 4)
 
 
 def _long_chains(layout: GridLayout, edges: IntArray) -> IntArray:

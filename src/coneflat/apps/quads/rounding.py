@@ -416,5 +416,4 @@ def _distances_to_sides(vectors: list[PathVector], transitions: Transitions) -> 
 
 def _known_axes(transitions: Transitions, point: int) -> BoolArray:
     """Return (2,) whether the variables determine each coordinate of a point."""
-    fixed: BoolArray = transitions.fixed[transitions.base[point]]
-    return np.roll(fixed, int(transitions.turn[point]) % 2)
+    return np.roll(transitions.fixed[transitions.base[point]], int(transitions.turn[point]) % 2)
