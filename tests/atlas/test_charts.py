@@ -73,7 +73,7 @@ class TestSeparate:
         one, other = np.zeros((2, len(disk.faces)), dtype=bool)
         first, second = rng.choice(len(disk.faces), 2, replace=False)
         if seed % 2:  # on the border
-            first = disk.edge_faces[disk.halfedge_edges[disk.boundary_walk()][0], 0]
+            first = disk.edge_faces[disk.halfedge_edges[disk.boundary_walks()[0]][0], 0]
         if first == second:
             second = (first + 1) % len(disk.faces)
         one[first] = other[second] = True

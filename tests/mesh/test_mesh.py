@@ -63,7 +63,7 @@ def test_orientation_of_shapes_is_consistent():
 
 def test_the_walk_around_a_boundary_passes_every_side_once_and_goes_on_where_it_came():
     mesh = TriangleMesh(*shapes.hill(7, 5))
-    walk = mesh.boundary_walk()
+    (walk,) = mesh.boundary_walks()
     np.testing.assert_array_equal(mesh.heads[walk], np.roll(mesh.tails[walk], -1))
     np.testing.assert_array_equal(np.sort(mesh.halfedge_edges[walk]), np.flatnonzero(mesh.is_boundary_edge))
     # With the mesh to the left: the walk is that of its triangles.

@@ -138,7 +138,7 @@ class LayoutGroup:
         self._vertices = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
         self._faces = np.cumsum([0, *(len(mesh.faces) for mesh in meshes)])
         self._points = np.cumsum([0, *(len(one.points) for one in layouts)])
-        self.mesh = meshes[0] if len(meshes) == 1 else _joined(meshes, self._vertices)
+        self.mesh = meshes[0] if len(meshes) == 1 else joined(meshes, self._vertices)
         self.points = np.concatenate([one.points for one in layouts])
         self.corners = np.concatenate(
             [one.corners + start for one, start in zip(layouts, self._points, strict=False)]
@@ -263,7 +263,7 @@ class LayoutGroup:
         return found
 
 
-def _joined(meshes: Sequence[TriangleMesh], starts: IntArray) -> TriangleMesh:
+def joined(meshes: Sequence[TriangleMesh], starts: IntArray) -> TriangleMesh:
     """Return the union of meshes; the vertex indices of each are shifted by its start."""
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
     return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))

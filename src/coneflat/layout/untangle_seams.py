@@ -119,7 +119,7 @@ def _in_the_plane(points: FloatArray, corners: IntArray) -> FlatTriangles:
 
 def embedded_disk(disk: TriangleMesh, double_area: float) -> FloatArray:
     """Return (c, 2) points of a disk by Tutte's embedding: the border on a circle, inner points at neighbour means."""
-    border = disk.tails[disk.boundary_walk()]
+    border = disk.tails[disk.boundary_walks()[0]]
     turn = 2 * np.pi * np.arange(len(border)) / len(border)
     points = np.zeros((len(disk.vertices), 2))
     points[border] = np.stack([np.cos(turn), np.sin(turn)], axis=1)

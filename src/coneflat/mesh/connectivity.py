@@ -174,17 +174,17 @@ class TriangleMesh:
         local[on_boundary] = labels
         return count, local
 
-    def boundary_walk(self) -> IntArray:
-        """Return (b,) the half-edges of the boundary in order, the mesh on the left; there must be one loop."""
-        sides = self.edge_halfedges[self.is_boundary_edge, 0]
-        leaving = np.empty(len(self.vertices), dtype=np.int64)
-        tails, heads = self.ends_of(sides)
-        leaving[tails] = np.arange(len(sides))
-        after = leaving[heads].tolist()
-        order = [0]
-        while (following := after[order[-1]]) != 0:
-            order.append(following)
-        return sides[order]
+    def boundary_walks(self) -> list[IntArray]:
+        """Return for each boundary loop (b,) its half-edges in order, the mesh on the left."""
+        sides, walks = self.edge_halfedges[self.is_boundary_edge, 0], list[IntArray]()
+        leaving = {tail: (head, side) for tail, head, side in zip(*self.ends_of(sides), sides, strict=True)}
+        while leaving:
+            here, walk = next(iter(leaving)), list[int]()
+            while here in leaving:
+                here, side = leaving.pop(here)
+                walk.append(side)
+            walks.append(np.array(walk))
+        return walks
 
     @cached_property
     def components(self) -> tuple[int, IntArray]:

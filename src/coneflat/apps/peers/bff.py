@@ -45,7 +45,7 @@ def boundary_first(mesh: TriangleMesh, lengths: FloatArray, solution: ConeSoluti
         and 1.029, 0.054. Without seams the results are similar: a face 1.02676 and 1.02675.
         """
         disk = cut.mesh
-        border = disk.boundary_walk()
+        border = disk.boundary_walks()[0]
         inside = HarmonicExtension(disk, lengths)
         log_scale = np.empty(len(disk.vertices))
         log_scale[disk.faces] = solution.log_scale[mesh.faces]

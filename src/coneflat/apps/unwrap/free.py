@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import BoolArray, ComplexArray, FloatArray, IntArray
+from ...base import BoolArray, FloatArray, IntArray
 from ...geometry import (
     as_complex,
     as_pairs,
@@ -21,7 +22,7 @@ from ...geometry import (
 from ...layout import StretchEnergy, relax
 from ...linalg import factorize
 from ...mesh import label_faces, open_along
-from ...stages import Layout
+from ...stages import Layout, SolveStatistics
 from .options import ISOMETRIC
 
 
@@ -39,40 +40,80 @@ def freed(layout: Layout, free: BoolArray | None = None, tolerance: float = 1e-3
     disk = layout.disk or TriangleMesh(np.zeros((len(layout.points), 3)), layout.corners)
     points = layout.points
     if not (signed_double_areas(points[layout.corners]) > 0).all():
-        points = as_pairs(_tutte_embedding(disk))
+        points = tutte_embedding(disk, np.zeros(len(layout.corners), dtype=np.int64), areas)
     energy, sides = StretchEnergy(1.0), layout.lengths
     found = relax(disk, points, layout.corners, energy, lengths=sides, free=free, tolerance=tolerance)
     if free is not None and not free.all():
         free_layout = replace(layout, points=found.points)
-        return free_layout, float(triangle_energies(free_layout).sum())
+        return free_layout, float(triangle_energies(sides, found.points[layout.corners]).sum() / areas.sum())
     # The relaxation keeps the lengths relative to the area at its start.
     start = np.abs(signed_double_areas(points[layout.corners])).sum() / 2
     points = found.points * np.sqrt(areas.sum() / start)
-    flat = np.abs(signed_double_areas(points[layout.corners])) / 2
-    curvature = layout_curvature(mesh, points[layout.corners])
-    found_layout = replace(
-        layout,
+    return replace(
+        layout, points=points, **_measured(mesh, areas, points[layout.corners])
+    ), ISOMETRIC * found.energy
+
+
+def laid_out(
+    mesh: TriangleMesh, lengths: FloatArray, places: FloatArray, seams: IntArray, cones: IntArray
+) -> Layout:
+    """Return the layout that consists of triangles in the plane.
+
+    Args:
+        mesh, lengths: the mesh, and (m, 3) its side lengths.
+        places: (m, 3, 2) the corners of its triangles in the plane, in one chart.
+        seams: (k,) the edges across which they do not fit.
+        cones: (s,) vertices at which seams may end.
+    """
+    disk = open_along(mesh, seams).mesh
+    points = np.empty((len(disk.vertices), 2))
+    points[disk.faces] = places
+    return Layout(
+        mesh=mesh,
+        lengths=lengths,
         points=points,
-        log_scale=vertex_log_scale(mesh, areas, flat),
-        target=curvature,
-        curvature=curvature,
-        is_open=np.ones(len(mesh.vertices), dtype=bool),
-        is_fixed=np.zeros(len(mesh.vertices), dtype=bool),
+        corners=disk.faces,
+        chart=np.zeros(len(disk.faces), dtype=np.int64),
+        cones=cones,
+        seams=mesh.edges[seams],
+        statistics=SolveStatistics(),
+        disk=disk,
+        **_measured(mesh, double_areas(lengths) / 2, places),
     )
-    return found_layout, ISOMETRIC * found.energy
 
 
-def _tutte_embedding(disk: TriangleMesh) -> ComplexArray:
-    """Return (n,) the vertices of a disk in the plane: the boundary on a circle, others at the mean of neighbours."""
-    count, loop = len(disk.vertices), disk.heads[disk.boundary_walk()]
+def _measured(mesh: TriangleMesh, areas: FloatArray, places: FloatArray) -> dict[str, Any]:
+    """Return what a layout with free seams says of the vertices, for (m,) areas and (m, 3, 2) corners of triangles."""
+    count, curvature = len(mesh.vertices), layout_curvature(mesh, places)
+    return {
+        "log_scale": vertex_log_scale(mesh, areas, np.abs(signed_double_areas(places)) / 2),
+        "target": curvature,
+        "curvature": curvature,
+        "is_open": np.ones(count, dtype=bool),
+        "is_fixed": np.zeros(count, dtype=bool),
+    }
+
+
+def tutte_embedding(disks: TriangleMesh, of_face: IntArray, areas: FloatArray) -> FloatArray:
+    """Return (n, 2) disks in the plane: boundaries on circles, other vertices at the mean of their neighbours.
+
+    Args:
+        disks: the disks as one mesh.
+        of_face: (m,) the disk of each triangle.
+        areas: (m,) areas of the triangles; each disk has the area of its triangles.
+    """
+    count, of = len(disks.vertices), np.zeros(len(disks.vertices), dtype=np.int64)
+    of[disks.faces] = of_face[:, None]
     points = np.zeros(count, dtype=np.complex128)
-    points[loop] = np.exp(2j * np.pi * np.arange(len(loop)) / len(loop))
-    inner = np.flatnonzero(~disk.is_boundary_vertex)
+    for walk in disks.boundary_walks():
+        points[disks.heads[walk]] = np.exp(2j * np.pi * np.arange(len(walk)) / len(walk))
+    inner = np.flatnonzero(~disks.is_boundary_vertex)
     if len(inner):
-        laplacian = cotangent_laplacian(disk.faces, np.ones(disk.faces.shape), count)[inner]
-        right = as_pairs(-(laplacian @ points))
-        points[inner] = as_complex(factorize(laplacian[:, inner]).solve(right))
-    return points
+        laplacian = cotangent_laplacian(disks.faces, np.ones(disks.faces.shape), count)[inner]
+        points[inner] = as_complex(factorize(laplacian[:, inner]).solve(as_pairs(-(laplacian @ points))))
+    flat = np.bincount(of_face, signed_double_areas(as_pairs(points)[disks.faces]) / 2)
+    scale = np.sqrt(np.bincount(of_face, areas) / np.maximum(flat, np.finfo(float).tiny))
+    return as_pairs(scale[of] * points)
 
 
 def recut(layout: Layout, seams: IntArray) -> Layout:
@@ -97,11 +138,13 @@ def seam_edges(layout: Layout) -> IntArray:
     return np.flatnonzero(np.isin(keys, np.sort(layout.seams, axis=1) @ [count, 1]))
 
 
-def triangle_energies(layout: Layout) -> FloatArray:
-    """Return (m,) the symmetric Dirichlet energy of each triangle, multiplied by its share of the area."""
-    places = layout.points[layout.corners]
+def triangle_energies(lengths: FloatArray, places: FloatArray) -> FloatArray:
+    """Return (m,) the symmetric Dirichlet energy of each triangle, multiplied by its area.
+
+    lengths, places: (m, 3) its side lengths and (m, 3, 2) its corners in the plane.
+    """
     sides = places[:, [2, 0, 1]] - places[:, [1, 2, 0]]
-    areas = double_areas(layout.lengths) / 2
-    squares = (cotangents(layout.lengths) * (sides**2).sum(axis=2)).sum(axis=1) / (2 * areas)
+    areas = double_areas(lengths) / 2
+    squares = (cotangents(lengths) * (sides**2).sum(axis=2)).sum(axis=1) / (2 * areas)
     ratio = signed_double_areas(places) / (2 * areas)
-    return squares * (1 + ratio**-2) * areas / areas.sum()
+    return np.asarray(squares * (1 + ratio**-2) * areas)

@@ -30,7 +30,7 @@ MIN_PIECE, MAX_CHARTS = 0.02, 32
 # Points of a border between which cuts are searched. Cuts whose ends are closer than MIN_SEPARATION of it are alike.
 SAMPLES, MIN_SEPARATION = 96, 0.06
 # Cuts tried per set of charts, sets continued per step, and steps without a gain after which the search ends.
-TRIED, CONTINUED, PATIENCE = 16, 3, 2
+TRIED, CONTINUED, PATIENCE = 16, 2, 2
 QUICK = Effort(columns=128, tries=12)
 
 
@@ -174,7 +174,7 @@ class _Piece:
     @cached_property
     def _rim(self) -> IntArray:
         """The vertices of the border in order; the first is farthest from their mean."""
-        rim = self.disk.tails[self.disk.boundary_walk()]
+        rim = self.disk.tails[self.disk.boundary_walks()[0]]
         return np.roll(rim, -int(np.abs(self._places[rim] - self._places[rim].mean()).argmax()))
 
     @cached_property

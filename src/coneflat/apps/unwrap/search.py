@@ -9,6 +9,7 @@ coarse mesh, and only the cones found there are taken over.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -25,7 +26,7 @@ from ...seams import seam_costs, without_loose_ends
 from ...source import Part
 from ...stages import ConeSpec, Cut, Layout, Surface, VertexCurvatures
 from .coarse import coarse_part
-from .free import freed, recut, seam_edges
+from .free import freed, recut, seam_edges, triangle_energies
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .tips import RINGS, find_tips, moved_tips, moves_for
 
@@ -70,29 +71,38 @@ class CutSearch:
         part: a connected part of the input.
         max_energy: largest symmetric Dirichlet energy; infinite for no seams but those that are necessary.
         method: how the part is laid out.
-        is_quick: whether the first candidate within the bound is taken.
         is_coarse: whether the part is a coarse mesh already.
         by_area: whether the bound is the energy that belongs to an area distortion, see `ENERGY_PER_AREA`.
     """
 
     def __init__(
-        self,
-        part: Part,
-        max_energy: float,
-        method: Method,
-        is_quick: bool = False,
-        is_coarse: bool = False,
-        by_area: bool = False,
+        self, part: Part, max_energy: float, method: Method, is_coarse: bool = False, by_area: bool = False
     ) -> None:
-        self._part, self._max_energy, self._method = part, max_energy, method
-        self._by_area = by_area
+        self.part, self.max_energy, self._method, self._by_area = part, max_energy, method, by_area
         self._has_coarse = len(part.faces) > 2 * COARSE and not (is_coarse or part.seams.is_forbidden.any())
-        self._is_quick = is_quick or (len(part.faces) > MANY_TRIANGLES and not self._has_coarse)
-        self._surface = Surface.of(part.mesh, part.lengths, part.is_exact)
-        self._surface.is_reused = True
-        self._costs = seam_costs(part.mesh, part.lengths, part.seams)
-        #: (e,) the costs of cutting the edges, infinite for edges to avoid.
-        self.costs = np.where(part.seams.is_avoided | part.seams.is_forbidden, np.inf, self._costs)
+
+    @cached_property
+    def _surface(self) -> Surface:
+        surface = Surface.of(self.part.mesh, self.part.lengths, self.part.is_exact)
+        surface.is_reused = True
+        return surface
+
+    @property
+    def may_join(self) -> bool:
+        """Whether the part may be cut together with others, see `MinorParts`."""
+        is_bounded, forbidden = np.isfinite(self.max_energy), self.part.seams.is_forbidden
+        return bool(is_bounded and len(self.part.faces) <= 2 * COARSE and not forbidden.any())
+
+    @cached_property
+    def seam_costs(self) -> FloatArray:
+        """(e,) the costs of cutting the edges."""
+        return seam_costs(self.part.mesh, self.part.lengths, self.part.seams)
+
+    @property
+    def costs(self) -> FloatArray:
+        """(e,) the costs of cutting the edges, infinite for edges to avoid."""
+        seams = self.part.seams
+        return np.where(seams.is_avoided | seams.is_forbidden, np.inf, self.seam_costs)
 
     def best(self) -> Candidate:
         """Return the candidate within the bound whose seams cost least, or else the one with the least energy.
@@ -100,23 +110,23 @@ class CutSearch:
         Raises:
             CurvatureError, MetricError, SeamError: a candidate could not be laid out.
         """
-        if not np.isfinite(self._max_energy):
+        if not np.isfinite(self.max_energy):
             return self._with_fewest_seams()
         if self._has_coarse:
             return self._from_coarse()
         found = self._by_distortion()
         near = [one for one in found if one.energy <= self._reach]
-        for one in [] if self._is_quick else sorted(near, key=self._expected_cost)[:2]:
-            found.append(self._settled(one))
-            if found[-1].energy > self._max_energy:
+        for one in sorted(near, key=self._expected_cost)[:2]:
+            found.append(self.settled(one))
+            if found[-1].energy > self.max_energy:
                 found.append(self.shortened(found[-1]))
-            if found[-1].energy <= self._max_energy:
+            if found[-1].energy <= self.max_energy:
                 break
         close_search(self._surface)
-        within = [one for one in found if one.energy <= self._max_energy]
+        within = [one for one in found if one.energy <= self.max_energy]
         if within:
             return min(within, key=self._expected_cost)
-        return self._separated(min(found, key=lambda one: one.energy))
+        return self.separated(min(found, key=lambda one: one.energy))
 
     def shortened(self, start: Candidate, layout: Layout | None = None) -> Candidate:
         """Return a candidate with the tips of its seams moved to where its energy is about the largest allowed.
@@ -125,34 +135,34 @@ class CutSearch:
             start: a candidate.
             layout: its layout, if that was cut further.
         """
-        if self._is_quick or len(self._part.faces) > MANY_TRIANGLES:
+        if len(self.part.faces) > MANY_TRIANGLES:
             return start if layout is None else replace(start, layout=layout)
         if layout is not None:
-            start = self._settled(replace(start, layout=layout, cost=self._cost(layout)))
-        if not np.isfinite(self._max_energy):
+            start = self.settled(replace(start, layout=layout, cost=self.cost_of(layout)))
+        if not np.isfinite(self.max_energy):
             return start
-        slack = self._max_energy - start.energy
-        if self._has_coarse and 0 <= slack <= 10 * TOLERANCE * (self._max_energy - ISOMETRIC):
+        slack = self.max_energy - start.energy
+        if self._has_coarse and 0 <= slack <= 10 * TOLERANCE * (self.max_energy - ISOMETRIC):
             return start
-        for moved in map(self._settled, self._moved(start)):
-            if moved.energy <= self._max_energy and (
-                moved.cost < start.cost or start.energy > self._max_energy
+        for moved in map(self.settled, self._moved(start)):
+            if moved.energy <= self.max_energy and (
+                moved.cost < start.cost or start.energy > self.max_energy
             ):
                 return moved
         return start
 
-    def _cost(self, layout: Layout) -> float:
-        return float(self._costs[seam_edges(layout)].sum())
+    def cost_of(self, layout: Layout) -> float:
+        return float(self.seam_costs[seam_edges(layout)].sum())
 
     @property
     def _reach(self) -> float:
         """The energy above which a candidate is given up."""
-        return ISOMETRIC + 2 * (self._max_energy - ISOMETRIC)
+        return ISOMETRIC + 2 * (self.max_energy - ISOMETRIC)
 
     def _with_fewest_seams(self) -> Candidate:
         """Return a candidate cut between the fewest cones, and only along closed curves where there are handles."""
-        mesh, spec = self._part.mesh, replace(self._part.cones, distortion=ANY_DISTORTION)
-        layout, _ = lay_out_once(self._surface, self._part, spec, self._method)
+        mesh, spec = self.part.mesh, replace(self.part.cones, distortion=ANY_DISTORTION)
+        layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
         close_search(self._surface)
         if len(layout.cones) and mesh.euler_characteristic < 2 and not mesh.is_boundary_edge.any():
             is_cut = np.zeros(len(mesh.edges), dtype=bool)
@@ -164,21 +174,21 @@ class CutSearch:
                 layout, points=points, corners=disk.faces, disk=disk, cones=none, seams=mesh.edges[seams]
             )
         layout, energy = self._freed(layout)
-        return self._settled(self._separated(Candidate(layout, energy, self._cost(layout), ANY_DISTORTION)))
+        return self.settled(self.separated(Candidate(layout, energy, self.cost_of(layout), ANY_DISTORTION)))
 
     def _from_coarse(self) -> Candidate:
         """Return a candidate with the cones that are best on a coarse mesh, for a bound that the mesh itself meets."""
-        coarse, kept = coarse_part(self._part, COARSE)
-        bound, found = self._max_energy + COARSE_EXCESS * (self._max_energy - ISOMETRIC), list[Candidate]()
+        coarse, kept = coarse_part(self.part, COARSE)
+        bound, found = self.max_energy + COARSE_EXCESS * (self.max_energy - ISOMETRIC), list[Candidate]()
         for _ in range(COARSE_TRIES):
-            best = CutSearch(coarse, bound, self._method, self._is_quick, True, self._by_area).best()
+            best = CutSearch(coarse, bound, self._method, True, self._by_area).best()
             spec = self._with_cones(kept[best.layout.cones])
-            layout, _ = lay_out_once(self._surface, self._part, spec, self._method)
+            layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
             one = self._candidate(layout, best.distortion)
-            if one.energy > self._max_energy:
-                one = self.shortened(self._settled(one))
+            if one.energy > self.max_energy:
+                one = self.shortened(self.settled(one))
             found.append(one)
-            excess = one.energy - self._max_energy
+            excess = one.energy - self.max_energy
             if excess <= 0:
                 break
             bound = max(bound - excess, (bound + ISOMETRIC) / 2)
@@ -187,47 +197,36 @@ class CutSearch:
 
     def _by_distortion(self) -> list[Candidate]:
         """Return candidates with energies around the bound."""
-        found = list[Candidate]()
-        # The first candidate of a quick search should be within the bound.
-        distortion = FIRST_DISTORTION * (0.7 if self._is_quick else 1.0)
-        allowed = self._max_energy - ISOMETRIC
+        found, distortion, allowed = list[Candidate](), FIRST_DISTORTION, self.max_energy - ISOMETRIC
         for tried in range(2 * MAX_CANDIDATES):
-            spec = replace(self._part.cones, distortion=distortion)
+            spec = replace(self.part.cones, distortion=distortion)
             # Cones that their triangles cannot hold are no problem for free seams.
-            layout, _ = lay_out_once(self._surface, self._part, spec, self._method)
-            same = [i for i, each in enumerate(found) if np.array_equal(each.layout.cones, layout.cones)]
-            known = found.pop(same[0]) if same else self._candidate(layout, distortion)
-            one = replace(known, distortion=distortion)
-            found.append(one)
-            is_within = known.energy <= self._max_energy
-            if distortion > 2 * known.distortion if is_within else distortion < known.distortion / 2:
-                break  # The search finds no fewer or no more cones.
-            within = [each for each in found if each.energy <= self._max_energy]
-            beyond = [each for each in found if each.energy > self._max_energy]
+            layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
+            if not any(np.array_equal(each.layout.cones, layout.cones) for each in found):
+                found.append(self._candidate(layout, distortion))
+            elif min(each.energy for each in found) <= self.max_energy:
+                break
+            within = [each for each in found if each.energy <= self.max_energy]
+            beyond = [each for each in found if each.energy > self.max_energy]
             low = max(within, key=lambda each: each.distortion, default=None)
             high = min(beyond, key=lambda each: each.distortion, default=None)
-            if low and (
-                self._is_quick
-                or tried >= MAX_CANDIDATES - 1
-                or not len(low.layout.seams)
-                or (high and len(low.layout.cones) <= len(high.layout.cones) + 1)
-            ):
+            if low and (tried >= MAX_CANDIDATES - 1 or not len(low.layout.seams)):
                 break
             if low and high:
+                if len(low.layout.cones) <= len(high.layout.cones) + 1:
+                    break
                 distortion = float(np.sqrt(low.distortion * high.distortion))
             else:
                 # The energy above that of an isometry is about a multiple of the square of the distortion.
-                above = float(np.clip(one.energy - ISOMETRIC, allowed / 16, allowed * 16))
-                factor = np.sqrt(allowed / above)
-                step = 3 / 4 if same else 7 / 8
-                distortion *= max(factor, 8 / 7) if factor > 1 else min(factor, step)
+                above = float(np.clip(found[-1].energy - ISOMETRIC, allowed / 16, allowed * 16))
+                distortion *= np.sqrt(allowed / above) * (8 / 7 if low else 7 / 8)
         return found
 
     def _candidate(self, layout: Layout, distortion: float) -> Candidate:
         # What the cones or the metric do not meet does not matter where seams are free.
         layout, energy = self._freed(replace(layout, notes=()), tolerance=TOLERANCE)
-        one = Candidate(layout, energy, self._cost(layout), distortion)
-        return one if energy > self._reach else self._separated(one)
+        one = Candidate(layout, energy, self.cost_of(layout), distortion)
+        return one if energy > self._reach else self.separated(one)
 
     def _freed(
         self, layout: Layout, free: BoolArray | None = None, tolerance: float = 1e-3
@@ -235,20 +234,25 @@ class CutSearch:
         """Return a layout with the least energy, and its energy or the one that belongs to its area distortion."""
         layout, energy = freed(layout, free, tolerance)
         if self._by_area:
-            areas, flat = double_areas(layout.lengths), signed_double_areas(layout.points[layout.corners])
-            energy = (
-                ISOMETRIC + ENERGY_PER_AREA * float(np.average(np.log(flat / areas) ** 2, weights=areas)) / 4
-            )
+            energies = self.energies_of(layout.lengths, layout.points[layout.corners])
+            energy = float(energies.sum() / layout.area)
         return layout, energy
 
-    def _separated(self, one: Candidate) -> Candidate:
+    def energies_of(self, lengths: FloatArray, places: FloatArray) -> FloatArray:
+        """Return (m,) the energies of triangles, multiplied by their areas, see `triangle_energies`."""
+        if not self._by_area:
+            return triangle_energies(lengths, places)
+        areas, flat = double_areas(lengths), signed_double_areas(places)
+        return (ISOMETRIC + ENERGY_PER_AREA * np.log(flat / areas) ** 2 / 4) * areas / 2
+
+    def separated(self, one: Candidate) -> Candidate:
         """Return a candidate whose overlaps are separated."""
         if not self._method.separates:
             return one
-        layout = separate_charts(one.layout, self._costs, self._part)
-        return replace(one, layout=layout, cost=self._cost(layout))
+        layout = separate_charts(one.layout, self.seam_costs, self.part)
+        return replace(one, layout=layout, cost=self.cost_of(layout))
 
-    def _settled(self, one: Candidate) -> Candidate:
+    def settled(self, one: Candidate) -> Candidate:
         """Return a candidate with the least energy without overlaps: its separating cuts are free, too."""
         is_free = np.ones(len(one.layout.points), dtype=bool)
         for _ in range(MAX_TRIES):
@@ -266,8 +270,8 @@ class CutSearch:
 
     def _expected_cost(self, one: Candidate) -> float:
         """Return the cost of the seams at which the energy would be the largest allowed, roughly."""
-        size, allowed = float(np.sqrt(one.layout.area)), self._max_energy - ISOMETRIC
-        return one.cost + (one.energy - self._max_energy) / allowed * COST_PER_ENERGY * size
+        size, allowed = float(np.sqrt(one.layout.area)), self.max_energy - ISOMETRIC
+        return one.cost + (one.energy - self.max_energy) / allowed * COST_PER_ENERGY * size
 
     def _moved(self, start: Candidate) -> list[Candidate]:
         """Return candidates with the tips of the seams moved, so that the energy is about the largest allowed."""
@@ -275,7 +279,7 @@ class CutSearch:
         tips = find_tips(start.layout, seams, self.costs)
         if not (tips.rates > 0).any():
             return found
-        wanted, allowed = self._max_energy - start.energy, self._max_energy - ISOMETRIC
+        wanted, allowed = self.max_energy - start.energy, self.max_energy - ISOMETRIC
         # For each slack that was requested, the energy above the bound.
         slack, tried, known = wanted, [(0.0, -wanted)], [seams]
         for _ in range(MAX_TRIES // 2 if self._has_coarse and wanted > 0 else MAX_TRIES):
@@ -293,12 +297,12 @@ class CutSearch:
                 break
             known.append(moved[0])
             one = self._candidate(layout, start.distortion)
-            excess = one.energy - self._max_energy
+            excess = one.energy - self.max_energy
             tried.append((slack, excess))
             if excess <= 2 * TOLERANCE * allowed:
                 found.append(one)
             # A start beyond the bound only has to get within it: the tips move again after the cuts for packing.
-            if excess <= 0 and (excess >= -2 * TOLERANCE * allowed or start.energy > self._max_energy):
+            if excess <= 0 and (excess >= -2 * TOLERANCE * allowed or start.energy > self.max_energy):
                 break
             low = max((pair for pair in tried if pair[1] <= 0), default=None)
             high = min((pair for pair in tried if pair[1] > 0), default=None)
@@ -319,14 +323,14 @@ class CutSearch:
 
         start: a layout; if it is cut along some of these edges, and no others, the layout is the same.
         """
-        mesh = self._part.mesh
+        mesh = self.part.mesh
         cones = cones[np.isin(cones, mesh.edges[seams])]
         if np.isin(seam_edges(start), seams).all():
             return replace(recut(start, seams), cones=cones)
         spec, cut = self._with_cones(cones), open_along(mesh, seams)
         try:
             solution = find_cones(self._surface, spec, self._method.watch)
-            metric = self._method.find_metric(self._surface, solution, self._part.metric)
+            metric = self._method.find_metric(self._surface, solution, self.part.metric)
             layout = lay_out(metric, Cut(cut.mesh, seams))
         except (CurvatureError, MetricError):
             return None
@@ -337,7 +341,7 @@ class CutSearch:
     def _with_cones(self, cones: IntArray) -> ConeSpec:
         """Return the specification of given cones, whose curvatures are found."""
         given = VertexCurvatures(cones, np.full(len(cones), np.nan))
-        return replace(self._part.cones, strategy="given", given=given)
+        return replace(self.part.cones, strategy="given", given=given)
 
 
 def side_by_side(layout: Layout) -> Layout:

@@ -179,6 +179,7 @@ def _gains(layout: Layout, seams: IntArray, paths: list[IntArray]) -> FloatArray
     is_near = np.zeros(len(longer.points), dtype=bool)
     is_near[longer.corners] = near[mesh.faces] >= 0
     moved, _ = freed(longer, is_near)
-    change = triangle_energies(layout) - triangle_energies(moved)
+    before, after = (triangle_energies(one.lengths, one.points[one.corners]) for one in (layout, moved))
+    change = (before - after) / layout.area
     nearest = near[mesh.faces].max(axis=1)
     return np.bincount(nearest[nearest >= 0], change[nearest >= 0], len(paths)).astype(np.float64)

@@ -20,13 +20,14 @@ from ...metric import find_metric
 from ...options import Options, declarations, read_options, takes
 from ...source import Part, Source, find_copies
 from ...stages import RelaxSpec, Surface
+from .minor import MinorParts
 from .mirror import both_halves, half_of
 from .options import ENERGY_PER_AREA, ISOMETRIC, TextureOptions, UnwrapOptions
 from .pack_cuts import cut_for_packing, cut_into
-from .search import Candidate, CutSearch
+from .search import MANY_TRIANGLES, Candidate, CutSearch
 
-# For parts with less than this share of the area the first cut within the bound is taken.
-MINOR_SHARE = 0.002
+# Parts with less than this share of the area are cut together.
+MINOR_SHARE = 0.01
 # Dihedral angle of sharp edges in radians; and the preference for seams along them if only they bend the surface: twice
 # their length costs as much as that of other edges.
 SHARP, CREASES = np.radians(40), 0.3
@@ -91,15 +92,20 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     with limit_threads(o.threads):
         # Copies cannot have different numbers of charts.
         copies = [None] * len(parts) if isinstance(o.charts, int) else find_copies(parts)
-        searches = {
-            i: CutSearch(part, o.bound, method, is_minor[i], by_area=o.area is not None)
-            for i, part in enumerate(parts)
-            if copies[i] is None
-        }
-        for i, search in searches.items():
-            watch.share = 0.8 * len(parts[i].faces) / sum(len(part.faces) for part in parts)
+        by_area, size = o.area is not None, sum(len(part.faces) for part in parts)
+        originals = [i for i, copy in enumerate(copies) if copy is None]
+        searches = {i: CutSearch(parts[i], o.bound, method, by_area=by_area) for i in originals}
+        for group in _groups([i for i, search in searches.items() if is_minor[i] and search.may_join], parts):
+            watch.share = 0.8 * sum(len(parts[i].faces) for i in group) / size
             with watch("search", 1.0):
-                found[i] = search.best()
+                together = MinorParts([searches[i] for i in group]).candidates()
+                found.update((i, one) for i, one in zip(group, together, strict=True) if one is not None)
+            watch.end_component()
+        joined = set(found)
+        for i in [i for i in searches if i not in joined]:
+            watch.share = 0.8 * len(parts[i].faces) / size
+            with watch("search", 1.0):
+                found[i] = searches[i].best()
             watch.end_component()
         layouts = [found[i].layout for i in searches]
         with watch("pack"):
@@ -109,7 +115,8 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
             elif method.separates and o.up is None and np.isfinite(o.bound):
                 layouts = cut_for_packing(layouts, costs, o.padding / shared.resolution)
             for (i, search), layout in zip(searches.items(), layouts, strict=True):
-                found[i] = search.shortened(found[i], layout)
+                is_done = i in joined
+                found[i] = replace(found[i], layout=layout) if is_done else search.shortened(found[i], layout)
     layouts = with_copies({i: one.layout for i, one in found.items()}, parts, copies)
     energies = [one.energy for one in found.values()]
     shared = replace(shared, method=FREE)
@@ -129,6 +136,14 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         own["seams"] = "none" if o.marked is None else ["none", result.settings["seams"]]
     result = replace(result, settings={**result.settings, **own}, notes=notes)
     return result if mirror is None else both_halves(result, mirror, prepared)
+
+
+def _groups(chosen: Sequence[int], parts: Sequence[Part]) -> Iterator[list[int]]:
+    """Yield groups of at least two parts with not many triangles."""
+    total = np.cumsum([len(parts[i].faces) for i in chosen]) // MANY_TRIANGLES
+    for group in np.split(np.array(chosen), np.flatnonzero(np.diff(total)) + 1):
+        if len(group) > 1:
+            yield group.tolist()
 
 
 def along_sharp_edges(part: Part) -> Part:

@@ -1,0 +1,131 @@
+"""Cuts of many small components, searched for all of them at once: as one mesh that is not connected."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ... import TriangleMesh
+from ...base import BoolArray, FloatArray, IntArray, check_cancelled
+from ...geometry import double_areas, find_overlaps, signed_double_areas
+from ...layout import StretchEnergy, joined, relax
+from ...linalg import factorize
+from ...mesh import open_along, tie_key
+from ...seams import find_seams
+from ...stages import Surface
+from .free import laid_out, tutte_embedding
+from .options import ISOMETRIC
+from .search import FIRST_DISTORTION, TOLERANCE, Candidate, CutSearch
+
+# Number of times that cones are added; and, as in the search for the cones of one part, the number of corners of a
+# polyhedron that all become cones, and the least curvature of a corner.
+MAX_ROUNDS, MAX_CORNERS, LEAST_CURVATURE = 12, 24, 1e-6
+# Relative change of values that breaks ties, see `seams.tree`.
+TIE_BREAK = 1e-7
+
+
+class MinorParts:
+    """The search for the cuts of several parts.
+
+    The next cone of a part is where its log scale is the largest, if it is zero at the cones so far, as in Section 3.2
+    of the paper. A polyhedron with few corners has them all. Cones are added until the energy is within the bound.
+
+    Args:
+        searches: the searches of the parts.
+    """
+
+    def __init__(self, searches: Sequence[CutSearch]) -> None:
+        self._searches, parts = searches, [search.part for search in searches]
+        self._of_face = np.arange(len(parts)).repeat([len(part.faces) for part in parts])
+        self._of = np.arange(len(parts)).repeat([len(part.vertices) for part in parts])
+        self._first = np.cumsum([0, *(len(part.vertices) for part in parts)])
+        self._first_edge = np.cumsum([0, *(len(part.mesh.edges) for part in parts)])
+        self._mesh = joined([part.mesh for part in parts], self._first)
+        self._lengths = np.concatenate([part.lengths for part in parts])
+        self._areas = double_areas(self._lengths) / 2
+        self._costs = np.concatenate([search.seam_costs for search in searches])
+        self._is_avoided = np.concatenate([part.seams.is_avoided for part in parts])
+        self._is_allowed = np.concatenate([part.cones.is_allowed for part in parts])
+        self._is_allowed &= ~self._mesh.is_boundary_vertex
+        self._tie_break = 1 + TIE_BREAK * tie_key(self._mesh.vertices)
+        self._surface = Surface.of(self._mesh, self._lengths)
+
+    def candidates(self) -> list[Candidate | None]:
+        """Return a candidate for each part; None for parts with an energy above the bound."""
+        bound, count = self._searches[0].max_energy, len(self._searches)
+        spread, energies = np.full(count, FIRST_DISTORTION), np.full(count, np.inf)
+        cones, places = self._first_cones(), np.zeros((len(self._of_face), 3, 2))
+        for _ in range(MAX_ROUNDS):
+            is_open = energies > bound
+            if not is_open.any():
+                break
+            check_cancelled()
+            cones, spread = self._with_more_cones(cones, is_open, spread)
+            seams = find_seams(self._mesh, np.flatnonzero(cones), self._costs, self._is_avoided)
+            disk = open_along(self._mesh, seams).mesh
+            energies = self._lay_out(disk, places, is_open)
+            # The energy above that of an isometry is about a multiple of the square of the distortion.
+            above = np.maximum(energies, bound) - ISOMETRIC
+            spread *= np.sqrt(np.clip((bound - ISOMETRIC) / above, 0.5, 0.98))
+        width = 2 * np.abs(places).max() * self._of_face
+        pairs = find_overlaps(places + np.stack([width, 0 * width], axis=1)[:, None]).pairs
+        overlapping = set(self._of_face[pairs[:, 0]].tolist())
+        vertices = np.flatnonzero(cones)
+        own_places = np.split(places, np.flatnonzero(np.diff(self._of_face)) + 1)
+        own_seams = np.split(seams, np.searchsorted(seams, self._first_edge[1:-1]))
+        own_cones = np.split(vertices, np.searchsorted(vertices, self._first[1:-1]))
+        found = list[Candidate | None]()
+        for i, search in enumerate(self._searches):
+            cut = own_seams[i] - self._first_edge[i], own_cones[i] - self._first[i]
+            layout = laid_out(search.part.mesh, search.part.lengths, own_places[i], *cut)
+            one = Candidate(layout, float(energies[i]), search.cost_of(layout), FIRST_DISTORTION)
+            one = search.settled(search.separated(one)) if i in overlapping else one
+            found.append(one if one.energy <= bound else None)
+        return found
+
+    def _lay_out(self, disk: TriangleMesh, places: FloatArray, is_open: BoolArray) -> FloatArray:
+        """Lay out open parts by changing the corners (m, 3, 2) in the plane, and return the energy of each part."""
+        of, is_moved = self._of_face, is_open[self._of_face]
+        points = tutte_embedding(disk, of, self._areas)
+        points[disk.faces[~is_moved]] = places[~is_moved]
+        free = np.zeros(len(points), dtype=bool)
+        free[disk.faces[is_moved]] = True
+        energy = StretchEnergy(1.0)
+        found = relax(disk, points, disk.faces, energy, lengths=self._lengths, free=free, tolerance=TOLERANCE)
+        places[:] = found.points[disk.faces]
+        energies = self._searches[0].energies_of(self._lengths, places)
+        energies[~(signed_double_areas(places) > 0)] = np.inf
+        return np.asarray(np.bincount(of, energies) / np.bincount(of, self._areas))
+
+    def _first_cones(self) -> BoolArray:
+        """Return (n,) the corners of polyhedra with few of them, and one vertex of other closed parts."""
+        curvature, of, is_boundary = self._surface.curvature, self._of, self._mesh.is_boundary_vertex
+        cones = (np.abs(curvature) > LEAST_CURVATURE) & self._is_allowed
+        cones &= (np.bincount(of, cones) <= MAX_CORNERS)[of]
+        is_closed = np.bincount(of, cones | is_boundary, len(self._searches)) == 0
+        cones[self._largest(curvature - curvature.min() + 1, is_closed)] = True
+        return cones
+
+    def _with_more_cones(
+        self, cones: BoolArray, is_open: BoolArray, allowed: FloatArray
+    ) -> tuple[BoolArray, FloatArray]:
+        """Return cones for which the area distortion of each open part is at most a value, and the distortion."""
+        of, curvature = self._of, self._surface.curvature
+        cones, share = cones.copy(), self._surface.areas / np.bincount(of, self._surface.areas)[of]
+        while True:
+            is_zero = cones | self._mesh.is_boundary_vertex
+            inner, phi = np.flatnonzero(~is_zero & is_open[of]), np.zeros(len(of))
+            phi[inner] = factorize(self._surface.laplacian[inner][:, inner]).solve(-curvature[inner])
+            mean = np.bincount(of, share * phi)
+            reached = np.sqrt(np.bincount(of, share * (phi - mean[of]) ** 2))
+            chosen = self._largest(np.where(is_zero, 0.0, np.abs(phi)), is_open & (reached > allowed))
+            if not len(chosen):
+                return cones, reached
+            cones[chosen] = True
+
+    def _largest(self, values: FloatArray, is_chosen: BoolArray) -> IntArray:
+        """Return the allowed vertex with the largest value in each chosen part, if one is positive."""
+        values = np.where(self._is_allowed, values, 0.0) * self._tie_break
+        largest = np.lexsort((values, self._of))[self._first[1:] - 1]
+        return np.asarray(largest[is_chosen & (values[largest] > 0)])

@@ -1,0 +1,96 @@
+"""Cuts of many small components: the same promises as for large ones, in less time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+
+from coneflat import unwrap
+from coneflat.apps.unwrap import unwrap as unwrap_module
+from coneflat.apps.unwrap.free import triangle_energies
+from coneflat.apps.unwrap.search import CutSearch
+from coneflat.geometry import double_areas, edge_lengths
+from coneflat.mesh import label_faces
+
+KINDS = {
+    "icosphere": shapes.sphere(2),
+    "box": shapes.box(),
+    "tetrahedron": shapes.tetrahedron(),
+    "torus": shapes.torus(),
+    "two handles": shapes.genus(2),
+    "hill": shapes.hill(),
+    "annulus": shapes.annulus(),
+    "cylinder": shapes.cylinder(),
+    "triangle": (np.eye(3), np.array([[0, 1, 2]])),
+}
+
+
+def crumbs(kinds, count: int, seed: int = 0):
+    """Return many components of different proportions, none a copy of another."""
+    random = np.random.default_rng(seed)
+    parts = []
+    for i in range(count):
+        vertices, faces = kinds[i % len(kinds)]
+        stretched = np.asarray(vertices, dtype=float) * random.uniform(0.3, 1, 3)
+        parts.append((stretched + random.uniform(-100, 100, 3), faces))
+    return shapes.join(*parts)
+
+
+@pytest.fixture
+def every_part_is_minor(monkeypatch):
+    monkeypatch.setattr(unwrap_module, "MINOR_SHARE", 1.0)
+    monkeypatch.setattr(CutSearch, "best", lambda self: pytest.fail("a part is searched alone"))
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_promises_hold_for_every_kind_of_component(name, every_part_is_minor):
+    vertices, faces = crumbs([KINDS[name]], 12)
+    result = unwrap(vertices, faces)
+    d = result.distortion
+    assert (d.flipped, d.degenerate, d.overlapping_pairs, result.notes) == (0, 0, 0, ())
+    component = label_faces(result.faces, len(result.vertices))[1]
+    for i in range(12):
+        own = component == i
+        energy = triangle_energies(
+            edge_lengths(vertices, faces[own]), result.corner_uv[own] / result.uv_scale
+        )
+        area = double_areas(edge_lengths(vertices, faces[own])).sum() / 2
+        assert energy.sum() < 4.1 * (1 + 1e-3) * area  # at the scale that all components share
+    if name == "box":
+        assert d.energy == pytest.approx(4)
+
+
+def test_seams_are_as_short_as_when_components_are_cut_alone(monkeypatch):
+    vertices, faces = crumbs([KINDS["icosphere"], KINDS["hill"]], 12)
+
+    def length():
+        ends = vertices[unwrap(vertices, faces).seams]
+        return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum()
+
+    alone = length()
+    monkeypatch.setattr(unwrap_module, "MINOR_SHARE", 1.0)
+    assert length() < 1.15 * alone
+
+
+def test_the_numbering_of_components_changes_nothing(every_part_is_minor):
+    vertices, faces = crumbs(list(KINDS.values()), 18)
+    component = label_faces(faces, len(vertices))[1]
+    order = np.random.default_rng(3).permutation(component.max() + 1)
+    shuffled = np.concatenate([np.flatnonzero(component == i) for i in order])
+    one, other = unwrap(vertices, faces), unwrap(vertices, faces[shuffled])
+    assert len(one.seams) == len(other.seams)
+    assert one.distortion.energy == pytest.approx(other.distortion.energy, rel=1e-6)
+    assert set(map(tuple, np.sort(one.seams))) == set(map(tuple, np.sort(other.seams)))
+
+
+def test_a_component_that_would_overlap_itself_is_separated(every_part_is_minor):
+    # A long spiral strip, of which the relaxed layout overlaps itself in one chart.
+    turns = np.linspace(0, 6 * np.pi, 300)
+    inner = np.column_stack([np.cos(turns), np.sin(turns), 0.02 * turns])
+    rows = np.concatenate([inner, 1.5 * inner * [1, 1, 2 / 3]])
+    a = np.arange(299)
+    strip = np.concatenate([np.column_stack([a, a + 300, a + 1]), np.column_stack([a + 1, a + 300, a + 301])])
+    result = unwrap(*crumbs([(rows, strip)], 4))
+    assert (result.distortion.flipped, result.distortion.overlapping_pairs) == (0, 0)
+    assert result.distortion.charts > 4
