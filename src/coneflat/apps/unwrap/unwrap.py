@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import Flattening
-from ...base import Stopwatch, limit_threads, plural
+from ...base import FloatArray, Stopwatch, limit_threads, plural
 from ...errors import OptionError
 from ...evaluate import evaluate
-from ...flatten import Method, with_copies
+from ...flatten import SMALL_TRIANGLES, Method, with_copies
 from ...geometry import dihedral_angles, double_areas
 from ...io import as_input
 from ...metric import find_metric
@@ -26,7 +26,7 @@ from .options import ENERGY_PER_AREA, ISOMETRIC, TextureOptions, UnwrapOptions
 from .pack_cuts import cut_for_packing, cut_into
 from .search import MANY_TRIANGLES, Candidate, CutSearch
 
-# Parts with less than this share of the area are cut together.
+# Parts with less than this share of the area, or few triangles, are cut together.
 MINOR_SHARE = 0.01
 # Dihedral angle of sharp edges in radians; and the preference for seams along them if only they bend the surface: twice
 # their length costs as much as that of other edges.
@@ -84,26 +84,25 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     )
     parts = [along_sharp_edges(part) for part in prepared.parts]
     found = dict[int, Candidate]()
-    areas = np.array([double_areas(part.lengths).sum() for part in parts])
-    is_minor = areas < MINOR_SHARE * areas.sum()
+    areas, sizes = np.array([(double_areas(part.lengths).sum(), len(part.faces)) for part in parts]).T
+    is_minor = (areas < MINOR_SHARE * areas.sum()) | (sizes <= SMALL_TRIANGLES)
     if o.texel_density is not None:
         side = np.sqrt(areas.sum() / 2 / COVERED / o.tiles) / 2.0**prepared.checked.exponent
         shared = replace(shared, resolution=_resolution(o.texel_density, side, o.padding))
     with limit_threads(o.threads):
         # Copies cannot have different numbers of charts.
         copies = [None] * len(parts) if isinstance(o.charts, int) else find_copies(parts)
-        by_area, size = o.area is not None, sum(len(part.faces) for part in parts)
         originals = [i for i, copy in enumerate(copies) if copy is None]
-        searches = {i: CutSearch(parts[i], o.bound, method, by_area=by_area) for i in originals}
-        for group in _groups([i for i, search in searches.items() if is_minor[i] and search.may_join], parts):
-            watch.share = 0.8 * sum(len(parts[i].faces) for i in group) / size
+        searches = {i: CutSearch(parts[i], o.bound, method, by_area=o.area is not None) for i in originals}
+        for group in _groups([i for i, search in searches.items() if is_minor[i] and search.may_join], sizes):
+            watch.share = float(0.8 * sizes[group].sum() / sizes.sum())
             with watch("search", 1.0):
                 together = MinorParts([searches[i] for i in group]).candidates()
                 found.update((i, one) for i, one in zip(group, together, strict=True) if one is not None)
             watch.end_component()
         joined = set(found)
         for i in [i for i in searches if i not in joined]:
-            watch.share = 0.8 * len(parts[i].faces) / size
+            watch.share = float(0.8 * sizes[i] / sizes.sum())
             with watch("search", 1.0):
                 found[i] = searches[i].best()
             watch.end_component()
@@ -138,10 +137,11 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     return result if mirror is None else both_halves(result, mirror, prepared)
 
 
-def _groups(chosen: Sequence[int], parts: Sequence[Part]) -> Iterator[list[int]]:
+def _groups(chosen: Sequence[int], sizes: FloatArray) -> Iterator[list[int]]:
     """Yield groups of at least two parts with not many triangles."""
-    total = np.cumsum([len(parts[i].faces) for i in chosen]) // MANY_TRIANGLES
-    for group in np.split(np.array(chosen), np.flatnonzero(np.diff(total)) + 1):
+    parts = np.array(chosen, dtype=np.int64)
+    total = np.cumsum(sizes[parts]) // MANY_TRIANGLES
+    for group in np.split(parts, np.flatnonzero(np.diff(total)) + 1):
         if len(group) > 1:
             yield group.tolist()
 
