@@ -89,8 +89,7 @@ class MinorParts:
         of, is_moved = self._of_face, is_open[self._of_face]
         points = tutte_embedding(disk, of, self._areas)
         points[disk.faces[~is_moved]] = places[~is_moved]
-        free = np.zeros(len(points), dtype=bool)
-        free[disk.faces[is_moved]] = True
+        free = np.isin(np.arange(len(points)), disk.faces[is_moved])
         energy = StretchEnergy(1.0)
         found = relax(disk, points, disk.faces, energy, lengths=self._lengths, free=free, tolerance=TOLERANCE)
         places[:] = found.points[disk.faces]

@@ -202,10 +202,11 @@ class CutSearch:
             spec = replace(self.part.cones, distortion=distortion)
             # Cones that their triangles cannot hold are no problem for free seams.
             layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
-            if not any(np.array_equal(each.layout.cones, layout.cones) for each in found):
-                found.append(self._candidate(layout, distortion))
-            elif min(each.energy for each in found) <= self.max_energy:
-                break
+            same = [i for i, each in enumerate(found) if np.array_equal(each.layout.cones, layout.cones)]
+            known = found.pop(same[0]) if same else self._candidate(layout, distortion)
+            found.append(replace(known, distortion=distortion))
+            if same and (known.energy <= self.max_energy or distortion < known.distortion / 2):
+                break  # The search finds no others.
             within = [each for each in found if each.energy <= self.max_energy]
             beyond = [each for each in found if each.energy > self.max_energy]
             low = max(within, key=lambda each: each.distortion, default=None)
