@@ -42,7 +42,7 @@ CEILINGS = {
     "apps.transfer": 323,
     "apps.brains": 262,
     "apps.pyvista": 26,
-    "apps.unwrap": 1500,
+    "apps.unwrap": 1504,
     "apps.view": 1591,
     "atlas": 1439,
     "base": 321,

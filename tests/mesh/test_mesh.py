@@ -61,6 +61,16 @@ def test_orientation_of_shapes_is_consistent():
         assert check_mesh(*shape).notes == ()
 
 
+def test_the_walks_around_several_boundaries_pass_every_side_once():
+    mesh = TriangleMesh(*shapes.join(shapes.annulus(), shapes.hill(7, 5)))
+    walks = mesh.boundary_walks()
+    assert len(walks) == 3
+    for walk in walks:
+        np.testing.assert_array_equal(mesh.heads[walk], np.roll(mesh.tails[walk], -1))
+    sides = np.sort(mesh.halfedge_edges[np.concatenate(walks)])
+    np.testing.assert_array_equal(sides, np.flatnonzero(mesh.is_boundary_edge))
+
+
 def test_the_walk_around_a_boundary_passes_every_side_once_and_goes_on_where_it_came():
     mesh = TriangleMesh(*shapes.hill(7, 5))
     (walk,) = mesh.boundary_walks()

@@ -175,16 +175,16 @@ class TriangleMesh:
         return count, local
 
     def boundary_walks(self) -> list[IntArray]:
-        """Return for each boundary loop (b,) its half-edges in order, the mesh on the left."""
-        sides, walks = self.edge_halfedges[self.is_boundary_edge, 0], list[IntArray]()
-        leaving = {tail: (head, side) for tail, head, side in zip(*self.ends_of(sides), sides, strict=True)}
-        while leaving:
-            here, walk = next(iter(leaving)), list[int]()
+        """Return for each boundary loop (b,) its half-edges in order, the mesh on the left; loops share no vertex."""
+        sides, walks = self.edge_halfedges[self.is_boundary_edge, 0], list[list[int]]()
+        ends = np.stack([*self.ends_of(sides), sides], axis=1).tolist()
+        leaving = {tail: (head, side) for tail, head, side in ends}
+        for here in list(leaving):
+            walks.append([])
             while here in leaving:
                 here, side = leaving.pop(here)
-                walk.append(side)
-            walks.append(np.array(walk))
-        return walks
+                walks[-1].append(side)
+        return [np.array(walk) for walk in walks if walk]
 
     @cached_property
     def components(self) -> tuple[int, IntArray]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 import shapes
@@ -71,6 +73,26 @@ def test_seams_are_as_short_as_when_components_are_cut_alone(monkeypatch):
     alone = length()
     monkeypatch.setattr(unwrap_module, "MINOR_SHARE", 1.0)
     assert length() < 1.15 * alone
+
+
+def test_sizes_that_differ_by_a_million_change_nothing(every_part_is_minor):
+    one, other = (crumbs([KINDS["icosphere"]], 2, seed) for seed in (0, 1))
+    seams = len(unwrap(*shapes.join(one, other), charts="one").seams)
+    assert len(unwrap(*shapes.join(one, (1e-6 * other[0], other[1])), charts="one").seams) == seams
+
+
+def test_a_needle_whose_tips_are_neighbours_gives_no_warning(every_part_is_minor):
+    vertices = np.array([[0.0, 0, 0], [5, 0, 0], [2.5, 0.1, 0], [2.5, 0, 0.1]])
+    needle = vertices, np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        result = unwrap(*shapes.join(needle, KINDS["hill"]))
+    assert (result.distortion.flipped, result.distortion.overlapping_pairs) == (0, 0)
+
+
+def test_a_large_bound_needs_fewer_cones(every_part_is_minor):
+    parts = crumbs([KINDS["icosphere"]], 3)
+    assert len(unwrap(*parts, max_energy=50).cones) < len(unwrap(*parts).cones)
 
 
 def test_the_numbering_of_components_changes_nothing(every_part_is_minor):

@@ -15,7 +15,7 @@ from ...mesh import open_along, tie_key
 from ...seams import find_seams
 from ...stages import Surface
 from .free import laid_out, tutte_embedding
-from .options import ISOMETRIC
+from .options import ENERGY_PER_AREA, ISOMETRIC
 from .search import FIRST_DISTORTION, TOLERANCE, Candidate, CutSearch
 
 # Number of times that cones are added; and, as in the search for the cones of one part, the number of corners of a
@@ -54,13 +54,13 @@ class MinorParts:
     def candidates(self) -> list[Candidate | None]:
         """Return a candidate for each part; None for parts with an energy above the bound."""
         bound, count = self._searches[0].max_energy, len(self._searches)
-        spread, energies = np.full(count, FIRST_DISTORTION), np.full(count, np.inf)
+        first = max(FIRST_DISTORTION, ((bound - ISOMETRIC) / ENERGY_PER_AREA) ** 0.5)
+        spread, energies = np.full(count, first), np.full(count, np.inf)
         cones, places = self._first_cones(), np.zeros((len(self._of_face), 3, 2))
         for _ in range(MAX_ROUNDS):
             is_open = energies > bound
             if not is_open.any():
                 break
-            check_cancelled()
             cones, spread = self._with_more_cones(cones, is_open, spread)
             seams = find_seams(self._mesh, np.flatnonzero(cones), self._costs, self._is_avoided)
             disk = open_along(self._mesh, seams).mesh
@@ -93,7 +93,8 @@ class MinorParts:
         energy = StretchEnergy(1.0)
         found = relax(disk, points, disk.faces, energy, lengths=self._lengths, free=free, tolerance=TOLERANCE)
         places[:] = found.points[disk.faces]
-        energies = self._searches[0].energies_of(self._lengths, places)
+        with np.errstate(all="ignore"):  # flipped triangles
+            energies = self._searches[0].energies_of(self._lengths, places)
         energies[~(signed_double_areas(places) > 0)] = np.inf
         return np.asarray(np.bincount(of, energies) / np.bincount(of, self._areas))
 
@@ -111,14 +112,17 @@ class MinorParts:
     ) -> tuple[BoolArray, FloatArray]:
         """Return cones for which the area distortion of each open part is at most a value, and the distortion."""
         of, curvature = self._of, self._surface.curvature
+        left, reached = is_open.copy(), np.zeros(len(is_open))
         cones, share = cones.copy(), self._surface.areas / np.bincount(of, self._surface.areas)[of]
         while True:
+            check_cancelled()
             is_zero = cones | self._mesh.is_boundary_vertex
-            inner, phi = np.flatnonzero(~is_zero & is_open[of]), np.zeros(len(of))
+            inner, phi = np.flatnonzero(~is_zero & left[of]), np.zeros(len(of))
             phi[inner] = factorize(self._surface.laplacian[inner][:, inner]).solve(-curvature[inner])
             mean = np.bincount(of, share * phi)
-            reached = np.sqrt(np.bincount(of, share * (phi - mean[of]) ** 2))
-            chosen = self._largest(np.where(is_zero, 0.0, np.abs(phi)), is_open & (reached > allowed))
+            reached[left] = np.sqrt(np.bincount(of, share * (phi - mean[of]) ** 2))[left]
+            left &= reached > allowed
+            chosen = self._largest(np.where(is_zero, 0.0, np.abs(phi)), left)
             if not len(chosen):
                 return cones, reached
             cones[chosen] = True

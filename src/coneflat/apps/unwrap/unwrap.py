@@ -13,7 +13,7 @@ from ... import Flattening
 from ...base import FloatArray, Stopwatch, limit_threads, plural
 from ...errors import OptionError
 from ...evaluate import evaluate
-from ...flatten import SMALL_TRIANGLES, Method, with_copies
+from ...flatten import Method, with_copies
 from ...geometry import dihedral_angles, double_areas
 from ...io import as_input
 from ...metric import find_metric
@@ -26,7 +26,7 @@ from .options import ENERGY_PER_AREA, ISOMETRIC, TextureOptions, UnwrapOptions
 from .pack_cuts import cut_for_packing, cut_into
 from .search import MANY_TRIANGLES, Candidate, CutSearch
 
-# Parts with less than this share of the area, or few triangles, are cut together.
+# Parts with less than this share of the area are cut together.
 MINOR_SHARE = 0.01
 # Dihedral angle of sharp edges in radians; and the preference for seams along them if only they bend the surface: twice
 # their length costs as much as that of other edges.
@@ -85,7 +85,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     parts = [along_sharp_edges(part) for part in prepared.parts]
     found = dict[int, Candidate]()
     areas, sizes = np.array([(double_areas(part.lengths).sum(), len(part.faces)) for part in parts]).T
-    is_minor = (areas < MINOR_SHARE * areas.sum()) | (sizes <= SMALL_TRIANGLES)
+    is_minor = areas < MINOR_SHARE * areas.sum()
     if o.texel_density is not None:
         side = np.sqrt(areas.sum() / 2 / COVERED / o.tiles) / 2.0**prepared.checked.exponent
         shared = replace(shared, resolution=_resolution(o.texel_density, side, o.padding))
