@@ -37,12 +37,12 @@ CEILINGS = {
     "apps.cli": 1623,
     "apps.measure_uv": 160,
     "apps.peers": 453,
-    "apps.quads": 3828,
+    "apps.quads": 3825,
     "apps.studio": 1734,
     "apps.transfer": 323,
     "apps.brains": 262,
     "apps.pyvista": 26,
-    "apps.unwrap": 1504,
+    "apps.unwrap": 1485,
     "apps.view": 1591,
     "atlas": 1439,
     "base": 321,
@@ -53,7 +53,7 @@ CEILINGS = {
     "flattener": 35,
     "geometry": 1471,
     "io": 2881,
-    "layout": 1949,
+    "layout": 1951,
     "linalg": 453,
     "measure": 829,
     "mesh": 666,
@@ -69,7 +69,7 @@ CEILINGS = {
 #: Applications with a ceiling of their own, which the ceilings of everything else leave out.
 OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_318, 232, 25_161
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_320, 232, 25_160
 CONSTANTS, KERNELS, NAMES, LEVELS = 295, 88, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -195,3 +195,19 @@ def test_sets_grow_by_what_is_nearest(least):
         own = np.flatnonzero(paths.source == seed)
         nearest = own[np.argsort(paths.distance[own])][: max(1, int(least))]
         assert set(np.flatnonzero(grown(paths, chosen, np.ones(graph.nodes), least))) == set(nearest)
+
+
+def test_the_seams_of_several_components_are_those_of_each():
+    # Of the closed one, two adjacent cones: one edge alone would not open it.
+    one, other = TriangleMesh(*shapes.sphere(1)), TriangleMesh(*shapes.hill(7, 5))
+    both = TriangleMesh(*shapes.join((one.vertices, one.faces), (other.vertices, other.faces)))
+    cones = one.edges[0]
+    found = both.edges[find_seams(both, cones, lengths_along_edges(both))]
+    alone = one.edges[find_seams(one, cones, lengths_along_edges(one))]
+    np.testing.assert_array_equal(np.sort(found), np.sort(alone))
+    assert len(found) == 2
+
+
+def lengths_along_edges(mesh):
+    ends = mesh.vertices[mesh.edges]
+    return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_matrix, csc_matrix, diags
 
 from ..base.arrays import FloatArray, IntArray
 from ..base.text import plural
 from ..geometry.intrinsic import halfedge_twins
+from ..geometry.operators import cotangent_laplacian
 from ..geometry.planar import heights, sides_between, signed_double_areas
 from ..geometry.straight import FlatTriangles
-from ..linalg.factors import SuperLUFactor
+from ..linalg.factors import factorize
 from ..mesh.connectivity import TriangleMesh
 from ..stages import Layout
 from .patches import DEGENERATE_HEIGHT
@@ -76,7 +76,8 @@ def untangle_seams(
     is_free[untangled.moved] = True
     caveat = "the sides of seams near them are unequal"
     if len(untangled.left) and not fixed.any() and disk.boundary_loops[0] == 1:
-        embedded = embedded_disk(disk, float(np.abs(signed_double_areas(points[disk.faces])).sum()))
+        areas = np.abs(signed_double_areas(points[disk.faces])) / 2
+        embedded = embedded_disks(disk, np.zeros(len(areas), dtype=np.int64), areas)
         if not find_degenerate(_in_the_plane(embedded, disk.faces).sides).any():
             points, is_free, caveat = embedded, ~fixed, "no seam or cone is exact"
     if not is_free.any():
@@ -117,17 +118,24 @@ def _in_the_plane(points: FloatArray, corners: IntArray) -> FlatTriangles:
     return FlatTriangles(sides, np.ones_like(sides), np.full(len(sides), -1))
 
 
-def embedded_disk(disk: TriangleMesh, double_area: float) -> FloatArray:
-    """Return (c, 2) points of a disk by Tutte's embedding: the border on a circle, inner points at neighbour means."""
-    border = disk.tails[disk.boundary_walks()[0]]
-    turn = 2 * np.pi * np.arange(len(border)) / len(border)
-    points = np.zeros((len(disk.vertices), 2))
-    points[border] = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    one, two = disk.edges.T
-    joins = coo_matrix((np.ones(len(one)), (one, two)), shape=(len(points), len(points)))
-    laplacian = csc_matrix(diags(np.bincount(disk.edges.ravel()).astype(float)) - joins - joins.T)
-    inside = np.flatnonzero(~disk.is_boundary_vertex)
+def embedded_disks(disks: TriangleMesh, of_face: IntArray, areas: FloatArray) -> FloatArray:
+    """Return (c, 2) points of disks by Tutte's embedding: borders on circles, inner points at neighbour means.
+
+    Args:
+        disks: one or several disks as one mesh.
+        of_face: (m,) the disk of each triangle.
+        areas: (m,) areas of the triangles; each disk gets the area of its triangles.
+    """
+    count, of = len(disks.vertices), np.zeros(len(disks.vertices), dtype=np.int64)
+    of[disks.faces] = of_face[:, None]
+    points = np.zeros((count, 2))
+    for walk in disks.boundary_walks():
+        turn = 2 * np.pi * np.arange(len(walk)) / len(walk)
+        points[disks.tails[walk]] = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    inside = np.flatnonzero(~disks.is_boundary_vertex)
     if len(inside):
-        rows = laplacian[inside]
-        points[inside] = SuperLUFactor(csc_matrix(rows[:, inside])).solve(-(rows[:, border] @ points[border]))
-    return points * np.sqrt(double_area / np.abs(signed_double_areas(points[disk.faces])).sum())
+        rows = cotangent_laplacian(disks.faces, np.ones(disks.faces.shape), count)[inside]
+        points[inside] = factorize(rows[:, inside]).solve(-(rows @ points))
+    flat = np.bincount(of_face, np.abs(signed_double_areas(points[disks.faces])) / 2)
+    scale = np.sqrt(np.bincount(of_face, areas) / np.maximum(flat, np.finfo(float).tiny))
+    return np.asarray(scale[of, None] * points)

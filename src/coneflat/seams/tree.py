@@ -32,10 +32,10 @@ def find_seams(
     *,
     forbidden: IntArray = NO_EDGES,
 ) -> IntArray:
-    """Return (k,) the edges to cut so that a connected mesh becomes a disk with all cones on its border.
+    """Return (k,) the edges to cut so that a mesh becomes a disk with all cones on its border.
 
     Args:
-        mesh: the mesh.
+        mesh: the mesh; it may have several components if each of them has a cone or a boundary.
         cones: (s,) vertices that the seams must reach.
         edge_costs: (e,) positive costs, for example the edge lengths, or the result of `edge_costs`.
         is_avoided: (e,) True for edges that are cut only if necessary, such as diagonals of polygons.
@@ -162,10 +162,10 @@ def without_loose_ends(mesh: TriangleMesh, is_cut: BoolArray) -> BoolArray:
 
 
 def _lengthened(mesh: TriangleMesh, costs: FloatArray, seams: BoolArray) -> BoolArray:
-    """Return seams of at least two edges on a closed mesh: a cut along one edge duplicates no vertex."""
-    if seams.sum() != 1 or mesh.is_boundary_edge.any():
-        return seams
-    is_adjacent = np.isin(mesh.edges, mesh.edges[seams]).sum(axis=1) == 1
-    longer = seams.copy()
-    longer[np.argmin(np.where(is_adjacent, costs, np.inf))] = True
+    """Return seams that are longer by an edge where they consist of one: such a cut duplicates no vertex."""
+    longer, is_border = seams.copy(), seams | mesh.is_boundary_edge
+    degree = np.bincount(mesh.edges[is_border].ravel(), minlength=len(mesh.vertices))
+    for edge in np.flatnonzero(seams & (degree[mesh.edges] == 1).all(axis=1)):
+        is_adjacent = np.isin(mesh.edges, mesh.edges[edge]).sum(axis=1) == 1
+        longer[np.argmin(np.where(is_adjacent, costs, np.inf))] = True
     return longer

@@ -134,12 +134,12 @@ def aligned(
         GridError: triangles are flipped.
         SeamError: the sides of a seam are not congruent.
     """
-    mesh, largest = TriangleMesh(result.vertices, result.faces), float(np.abs(result.vertices).max())
+    mesh = TriangleMesh(result.vertices, result.faces)
+    largest = float(np.abs(result.vertices).max())
     if not 1e-60 < largest < 1e60:
         raise GridError(f"the largest coordinate is {largest:.3g}, out of range for quads: scale the mesh")
-    lengths = mollify(edge_lengths(mesh.vertices, mesh.faces) if result.lengths is None else result.lengths)[
-        0
-    ]
+    own = edge_lengths(mesh.vertices, mesh.faces) if result.lengths is None else result.lengths
+    lengths, _ = mollify(own)
     flat, sides = signed_double_areas(result.corner_uv), np.abs(sides_between(result.corner_uv))
     has_area = flat > GRID_TOLERANCE**2 * sides.max(axis=1) ** 2
     if not has_area.all():
@@ -226,10 +226,7 @@ def _directions(
     weights: FloatArray, vectors: ComplexArray, component: IntArray, label: IntArray
 ) -> FloatArray:
     """Return (c,) the mean direction of weighted vectors up to quarter turns; `label` is the component of each."""
-    fourth, count = (
-        weights * (vectors / np.maximum(np.abs(vectors), np.finfo(float).tiny)) ** 4,
-        int(component.max(initial=-1)) + 1,
-    )
+    fourth, count = weights * (vectors / np.abs(vectors)) ** 4, int(component.max(initial=-1)) + 1
     return np.angle(np.bincount(label, fourth.real, count) + 1j * np.bincount(label, fourth.imag, count)) / 4
 
 

@@ -10,17 +10,13 @@ import numpy as np
 from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray
 from ...geometry import (
-    as_complex,
-    as_pairs,
-    cotangent_laplacian,
     cotangents,
     double_areas,
     layout_curvature,
     signed_double_areas,
     vertex_log_scale,
 )
-from ...layout import StretchEnergy, relax
-from ...linalg import factorize
+from ...layout import StretchEnergy, embedded_disks, relax
 from ...mesh import label_faces, open_along
 from ...stages import Layout, SolveStatistics
 from .options import ISOMETRIC
@@ -40,7 +36,7 @@ def freed(layout: Layout, free: BoolArray | None = None, tolerance: float = 1e-3
     disk = layout.disk or TriangleMesh(np.zeros((len(layout.points), 3)), layout.corners)
     points = layout.points
     if not (signed_double_areas(points[layout.corners]) > 0).all():
-        points = tutte_embedding(disk, np.zeros(len(layout.corners), dtype=np.int64), areas)
+        points = embedded_disks(disk, np.zeros(len(layout.corners), dtype=np.int64), areas)
     energy, sides = StretchEnergy(1.0), layout.lengths
     found = relax(disk, points, layout.corners, energy, lengths=sides, free=free, tolerance=tolerance)
     if free is not None and not free.all():
@@ -49,9 +45,8 @@ def freed(layout: Layout, free: BoolArray | None = None, tolerance: float = 1e-3
     # The relaxation keeps the lengths relative to the area at its start.
     start = np.abs(signed_double_areas(points[layout.corners])).sum() / 2
     points = found.points * np.sqrt(areas.sum() / start)
-    return replace(
-        layout, points=points, **_measured(mesh, areas, points[layout.corners])
-    ), ISOMETRIC * found.energy
+    at_vertices = _measured(mesh, areas, points[layout.corners])
+    return replace(layout, points=points, **at_vertices), ISOMETRIC * found.energy
 
 
 def laid_out(
@@ -92,28 +87,6 @@ def _measured(mesh: TriangleMesh, areas: FloatArray, places: FloatArray) -> dict
         "is_open": np.ones(count, dtype=bool),
         "is_fixed": np.zeros(count, dtype=bool),
     }
-
-
-def tutte_embedding(disks: TriangleMesh, of_face: IntArray, areas: FloatArray) -> FloatArray:
-    """Return (n, 2) disks in the plane: boundaries on circles, other vertices at the mean of their neighbours.
-
-    Args:
-        disks: the disks as one mesh.
-        of_face: (m,) the disk of each triangle.
-        areas: (m,) areas of the triangles; each disk has the area of its triangles.
-    """
-    count, of = len(disks.vertices), np.zeros(len(disks.vertices), dtype=np.int64)
-    of[disks.faces] = of_face[:, None]
-    points = np.zeros(count, dtype=np.complex128)
-    for walk in disks.boundary_walks():
-        points[disks.heads[walk]] = np.exp(2j * np.pi * np.arange(len(walk)) / len(walk))
-    inner = np.flatnonzero(~disks.is_boundary_vertex)
-    if len(inner):
-        laplacian = cotangent_laplacian(disks.faces, np.ones(disks.faces.shape), count)[inner]
-        points[inner] = as_complex(factorize(laplacian[:, inner]).solve(as_pairs(-(laplacian @ points))))
-    flat = np.bincount(of_face, signed_double_areas(as_pairs(points)[disks.faces]) / 2)
-    scale = np.sqrt(np.bincount(of_face, areas) / np.maximum(flat, np.finfo(float).tiny))
-    return as_pairs(scale[of] * points)
 
 
 def recut(layout: Layout, seams: IntArray) -> Layout:

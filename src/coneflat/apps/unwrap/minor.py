@@ -9,20 +9,18 @@ import numpy as np
 from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray, check_cancelled
 from ...geometry import double_areas, find_overlaps, signed_double_areas
-from ...layout import StretchEnergy, joined, relax
+from ...layout import StretchEnergy, embedded_disks, joined, relax
 from ...linalg import factorize
 from ...mesh import open_along, tie_key
-from ...seams import find_seams
+from ...seams import TIE_BREAK, find_seams
 from ...stages import Surface
-from .free import laid_out, tutte_embedding
+from .free import laid_out
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .search import FIRST_DISTORTION, TOLERANCE, Candidate, CutSearch
 
 # Number of times that cones are added; and, as in the search for the cones of one part, the number of corners of a
 # polyhedron that all become cones, and the least curvature of a corner.
 MAX_ROUNDS, MAX_CORNERS, LEAST_CURVATURE = 12, 24, 1e-6
-# Relative change of values that breaks ties, see `seams.tree`.
-TIE_BREAK = 1e-7
 
 
 class MinorParts:
@@ -55,19 +53,19 @@ class MinorParts:
         """Return a candidate for each part; None for parts with an energy above the bound."""
         bound, count = self._searches[0].max_energy, len(self._searches)
         first = max(FIRST_DISTORTION, ((bound - ISOMETRIC) / ENERGY_PER_AREA) ** 0.5)
-        spread, energies = np.full(count, first), np.full(count, np.inf)
+        distortion, energies = np.full(count, first), np.full(count, np.inf)
         cones, places = self._first_cones(), np.zeros((len(self._of_face), 3, 2))
         for _ in range(MAX_ROUNDS):
             is_open = energies > bound
             if not is_open.any():
                 break
-            cones, spread = self._with_more_cones(cones, is_open, spread)
+            cones, distortion = self._with_more_cones(cones, is_open, distortion)
             seams = find_seams(self._mesh, np.flatnonzero(cones), self._costs, self._is_avoided)
             disk = open_along(self._mesh, seams).mesh
             energies = self._lay_out(disk, places, is_open)
             # The energy above that of an isometry is about a multiple of the square of the distortion.
             above = np.maximum(energies, bound) - ISOMETRIC
-            spread *= np.sqrt(np.clip((bound - ISOMETRIC) / above, 0.5, 0.98))
+            distortion *= np.sqrt(np.clip((bound - ISOMETRIC) / above, 0.5, 0.98))
         width = 2 * np.abs(places).max() * self._of_face
         pairs = find_overlaps(places + np.stack([width, 0 * width], axis=1)[:, None]).pairs
         overlapping = set(self._of_face[pairs[:, 0]].tolist())
@@ -79,7 +77,7 @@ class MinorParts:
         for i, search in enumerate(self._searches):
             cut = own_seams[i] - self._first_edge[i], own_cones[i] - self._first[i]
             layout = laid_out(search.part.mesh, search.part.lengths, own_places[i], *cut)
-            one = Candidate(layout, float(energies[i]), search.cost_of(layout), FIRST_DISTORTION)
+            one = Candidate(layout, float(energies[i]), search.cost_of(layout), float(distortion[i]))
             one = search.settled(search.separated(one)) if i in overlapping else one
             found.append(one if one.energy <= bound else None)
         return found
@@ -87,7 +85,7 @@ class MinorParts:
     def _lay_out(self, disk: TriangleMesh, places: FloatArray, is_open: BoolArray) -> FloatArray:
         """Lay out open parts by changing the corners (m, 3, 2) in the plane, and return the energy of each part."""
         of, is_moved = self._of_face, is_open[self._of_face]
-        points = tutte_embedding(disk, of, self._areas)
+        points = embedded_disks(disk, of, self._areas)
         points[disk.faces[~is_moved]] = places[~is_moved]
         free = np.isin(np.arange(len(points)), disk.faces[is_moved])
         energy = StretchEnergy(1.0)

@@ -114,8 +114,9 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
             elif method.separates and o.up is None and np.isfinite(o.bound):
                 layouts = cut_for_packing(layouts, costs, o.padding / shared.resolution)
             for (i, search), layout in zip(searches.items(), layouts, strict=True):
-                is_done = i in joined
-                found[i] = replace(found[i], layout=layout) if is_done else search.shortened(found[i], layout)
+                # Joined parts would each need a relaxation of their own.
+                one = found[i]
+                found[i] = replace(one, layout=layout) if i in joined else search.shortened(one, layout)
     layouts = with_copies({i: one.layout for i, one in found.items()}, parts, copies)
     energies = [one.energy for one in found.values()]
     shared = replace(shared, method=FREE)
