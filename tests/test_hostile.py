@@ -46,6 +46,11 @@ def test_hostile_cases_break_no_promise():
     assert sum(one.status in ("ok", "noted") for one in outcomes) > SLICE / 2
 
 
+def test_charts_that_touch_themselves_do_not_overlap_in_single_precision(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run_case("texture", 1_600_249).breaches == []
+
+
 def test_a_case_is_the_same_whenever_it_is_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     one, two = (run_case("mesh", 2) for _ in range(2))

@@ -10,7 +10,7 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
-from ..atlas.touch import round_safely
+from ..atlas import round_safely
 from ..base.arrays import FloatArray, IntArray
 from ..base.text import plural, short_repr
 from ..errors import MeshFileError, OptionError, UnknownFormatError

@@ -117,9 +117,8 @@ class CutSearch:
         found = self._by_distortion()
         near = [one for one in found if one.energy <= self._reach]
         for one in sorted(near, key=self._expected_cost)[:2]:
-            found.append(self.settled(one))
-            if found[-1].energy > self.max_energy:
-                found.append(self.shortened(found[-1]))
+            if one.energy > self.max_energy:
+                found.append(self.shortened(one))
             if found[-1].energy <= self.max_energy:
                 break
         close_search(self._surface)
@@ -138,17 +137,18 @@ class CutSearch:
         if len(self.part.faces) > MANY_TRIANGLES:
             return start if layout is None else replace(start, layout=layout)
         if layout is not None:
-            start = self.settled(replace(start, layout=layout, cost=self.cost_of(layout)))
+            start = replace(start, layout=layout, cost=self.cost_of(layout))
+        if layout is not None or self.max_energy < start.energy <= self._near:
+            start = self.settled(start)
         if not np.isfinite(self.max_energy):
             return start
         slack = self.max_energy - start.energy
         if self._has_coarse and 0 <= slack <= 10 * TOLERANCE * (self.max_energy - ISOMETRIC):
             return start
-        for moved in map(self.settled, self._moved(start)):
-            if moved.energy <= self.max_energy and (
-                moved.cost < start.cost or start.energy > self.max_energy
-            ):
-                return moved
+        for moved in self._moved(start):
+            one = self.settled(moved) if moved.energy > self.max_energy else moved
+            if one.energy <= self.max_energy and (one.cost < start.cost or start.energy > self.max_energy):
+                return one
         return start
 
     def cost_of(self, layout: Layout) -> float:
@@ -158,6 +158,11 @@ class CutSearch:
     def _reach(self) -> float:
         """The energy above which a candidate is given up."""
         return ISOMETRIC + 2 * (self.max_energy - ISOMETRIC)
+
+    @property
+    def _near(self) -> float:
+        """The energy up to which a candidate may be within the bound once it is settled."""
+        return self.max_energy + 2 * TOLERANCE * (self.max_energy - ISOMETRIC)
 
     def _with_fewest_seams(self) -> Candidate:
         """Return a candidate cut between the fewest cones, and only along closed curves where there are handles."""
@@ -186,7 +191,7 @@ class CutSearch:
             layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
             one = self._candidate(layout, best.distortion)
             if one.energy > self.max_energy:
-                one = self.shortened(self.settled(one))
+                one = self.shortened(one)
             found.append(one)
             excess = one.energy - self.max_energy
             if excess <= 0:

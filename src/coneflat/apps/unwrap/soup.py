@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...atlas import pack_charts
+from ...atlas import pack_charts, round_safely
 from ...base import FloatArray, IntArray
 from ...errors import ConeflatError
 from ...geometry import as_pairs, edge_lengths
@@ -68,7 +68,9 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
         return UnwrappedSoup(corner_uv, chart, packed.efficiency, packed.scale, tuple(notes))
     assert result.face_origin is not None
     known = chosen[result.face_origin]
-    corner_uv[known] = result.corner_uv
+    # Where charts touch themselves, rounding to single precision may make overlaps.
+    uv, _ = round_safely(result.uv, result.uv_faces, lambda uv: uv.astype(np.float32).astype(np.float64))
+    corner_uv[known] = uv[result.uv_faces]
     chart[known] = label_faces(result.uv_faces, len(result.uv))[1]
     return UnwrappedSoup(
         corner_uv, chart, result.packing_efficiency, result.uv_scale, (*notes, *result.notes)

@@ -23,6 +23,8 @@ MIN_PROGRESS = 1e-3
 # factor by which more unknowns than there are count for the choice of the solver, since matrices of one pattern are
 # factorized repeatedly: with 6,000 unknowns this halves the time.
 MIN_ACTIVE_SHARE, REPEATED = 0.6, 6
+# Number of times that a step is lengthened: where negative eigenvalues of the Hessian are cut off, steps are too short.
+LENGTHENINGS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,10 +111,10 @@ def descend(
             if not active.any():
                 break
         change = elements.change(step)
-        length = np.full(parts, np.inf)
-        np.minimum.at(length, part, maps.largest_steps(change))
+        farthest = np.full(parts, np.inf)
+        np.minimum.at(farthest, part, MAX_STEP_SHARE * maps.largest_steps(change))
         longest = min(1.0, stride / remaining) if remaining else 1.0
-        length = np.minimum(longest, MAX_STEP_SHARE * length)
+        length = np.minimum(longest, farthest)
         taken += 1
         for _ in range(HALVINGS):
             trial = maps.plus(length[part], change)
@@ -125,6 +127,13 @@ def descend(
             length[~good] /= 2
         length[~good] = 0.0
         active &= length > 0
+        for _ in range(0 if remaining else LENGTHENINGS):
+            longer = np.minimum(1.5 * length, farthest)
+            beyond = sums(elements.energies(energy, maps.plus(longer[part], change)))
+            better = beyond < there
+            if not better.any():
+                break
+            length[better], there[better] = longer[better], beyond[better]
         total[unknowns] += length[unknown_part] * step[:-1]
         total[-1] += length[0] * step[-1] if remaining else 0.0
         places = points + motions.shifts(total)
