@@ -4,10 +4,9 @@ from .boundary import straight_boundary
 from .exact import ExactMetric, exact_metric
 from .find import find_metric, loop_rotations
 from .linear import linear_flat_metric, scaled_lengths
-from .solve import ExactChoices, exact_flat_metric
+from .solve import exact_flat_metric
 
 __all__ = [
-    "ExactChoices",
     "ExactMetric",
     "exact_flat_metric",
     "exact_metric",
