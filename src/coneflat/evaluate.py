@@ -203,15 +203,15 @@ def _pack(
     """Return the packed charts of all components."""
     points, own, chart, component = _all_charts(layouts)
     corners = triangles.sorted(own)
+    heights = None if options.up is None else (positions @ options.up)[triangles.faces]
     packed = arrange_charts(
         rows_of(points, corners),
         triangles.sorted(chart),
         component,
-        None if options.up is None else rows_of(positions, triangles.faces),
+        heights,
         resolution=options.resolution,
         padding=options.padding,
         tiles=options.tiles,
-        up=options.up,
         quantum=options.quantise,
         edge_halfedges=mesh.edge_halfedges,
     )
