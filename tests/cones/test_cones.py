@@ -108,7 +108,7 @@ def fitted(shape, cones, curvatures, **bounds):
     areas = vertex_areas(shape[1], edge_lengths(*shape), len(curvature))
     areas /= areas.sum()
     bounds = {"min_cone_angle": 0.1, "max_cone_angle": None, **bounds}
-    linear = LinearModel.of(laplacian, curvature, areas, is_boundary, None)
+    linear = LinearModel.of(laplacian, curvature, areas, is_boundary, np.zeros(len(areas)))
     solution = fitted_cones(linear, chi, np.array(cones), np.array(curvatures), **bounds)
 
     def energy(curvatures):

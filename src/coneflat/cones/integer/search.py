@@ -85,7 +85,7 @@ def moved_cones(
         bound: the allowed E.
     """
     operator = search.operator
-    places = search.unknowns_of(quantised.solution.cones)
+    places = operator.unknowns_of(quantised.solution.cones)
     curvatures = quantised.quantum * quantised.indices.astype(np.float64)
     before, penalty = (places, off), 1.0
     for _ in range(MAX_MOVES):
