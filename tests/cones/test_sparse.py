@@ -225,11 +225,11 @@ def test_changing_bounds_one_by_one_starts_from_the_bounds_found_at_once(monkeyp
     rng = np.random.default_rng(3)
     root = rng.normal(size=(80, 82))
     bounds = np.full(80, -0.1), np.full(80, 0.1)
-    program = fit_curvatures._Program(root @ root.T, 3 * rng.normal(size=80), *bounds, 0.5)
-    best, _ = program.change_one_by_one(np.zeros(80))
+    program = root @ root.T, 3 * rng.normal(size=80), *bounds, 0.5
+    best, _ = fit_curvatures.change_one_by_one(*program, np.zeros(80))
     calls, once = [], fit_curvatures.best_free
     monkeypatch.setattr(fit_curvatures, "best_free", lambda *given: calls.append(0) or once(*given))
-    again, _ = program.change_one_by_one(best)
+    again, _ = fit_curvatures.change_one_by_one(*program, best)
     np.testing.assert_allclose(again, best, atol=1e-9)
     assert np.count_nonzero(np.abs(best) == 0.1) > 20
     assert len(calls) < 5

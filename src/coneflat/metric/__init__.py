@@ -1,6 +1,5 @@
 """Flat metrics: the linear metric of the paper and the exact discrete conformal metric."""
 
-from .boundary import straight_boundary
 from .exact import ExactMetric, exact_metric
 from .find import find_metric, loop_rotations
 from .linear import linear_flat_metric, scaled_lengths
@@ -14,5 +13,4 @@ __all__ = [
     "linear_flat_metric",
     "loop_rotations",
     "scaled_lengths",
-    "straight_boundary",
 ]
