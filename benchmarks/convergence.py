@@ -32,7 +32,8 @@ from coneflat.geometry import (
     edge_lengths,
 )
 from coneflat.mesh.connectivity import TriangleMesh
-from coneflat.metric import ExactChoices, exact_flat_metric
+from coneflat.metric import exact_flat_metric
+from coneflat.stages import MetricSpec, VertexCurvatures
 
 # Vertices of the icosahedron that the sphere is split from, and curvatures that sum to 4 pi.
 CONES = np.array([0, 2, 3, 5, 7, 8, 10])
@@ -53,10 +54,17 @@ def flat_lengths(mesh: TriangleMesh) -> list[np.ndarray]:
         CONES,
         CURVATURES,
     )
-    metrics = (
-        circle_patterns(mesh, lengths, solution),
-        exact_flat_metric(mesh, lengths, solution, ExactChoices(scale_at_cones=False)),
+    spec = MetricSpec(
+        method="exact",
+        boundary="free",
+        corners=VertexCurvatures(np.empty(0, dtype=np.int64), np.empty(0)),
+        keeps_length=mesh.is_boundary_vertex,
+        keeps_area=True,
+        scale_at_cones=False,
+        quantum=None,
+        names=np.arange(len(mesh.vertices)),
     )
+    metrics = circle_patterns(mesh, lengths, solution), exact_flat_metric(mesh, lengths, solution, spec)
     found = []
     for metric in metrics:
         assert metric.triangles is not None

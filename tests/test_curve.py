@@ -81,7 +81,7 @@ class TestWhole:
 
     def test_of_one_component_it_is_the_same(self):
         mesh = shapes.sphere(2)
-        whole, one = whole_curve(*mesh, Options(), 6), coneflat.cone_curve(*mesh, most=6)
+        whole, one = whole_curve(mesh, Options(), 6), coneflat.cone_curve(*mesh, most=6)
         assert whole.parts == 1
         np.testing.assert_array_equal(whole.counts, one.counts)
         np.testing.assert_allclose(whole.distortions, one.distortions, rtol=1e-12)
@@ -91,7 +91,7 @@ class TestWhole:
         """A ball beside a hill, which needs no cones: at each number those of both count, by area."""
         ball, hill = shapes.sphere(3), shapes.hill(10, 8)
         vertices, faces = shapes.join((3 * ball[0] * [1, 1, 1.4], ball[1]), (hill[0] + 20, hill[1]))
-        whole = whole_curve(vertices, faces, Options(), 9)
+        whole = whole_curve((vertices, faces), Options(), 9)
         assert whole.parts == 2
         assert (np.diff(whole.distortions) < 0).all()
         alone = [coneflat.cone_curve(*each, most=9) for each in ((3 * ball[0] * [1, 1, 1.4], ball[1]), hill)]
@@ -111,6 +111,6 @@ class TestWhole:
         rim = mesh.edges[~low[mesh.edges].any(axis=1)]
         below = np.isin(np.arange(len(vertices)), faces[low[faces].any(axis=1)]) & ~low
         seams = rim[below[rim].all(axis=1)]
-        whole = whole_curve(vertices, faces, Options(seams=seams), 6)
+        whole = whole_curve((vertices, faces), Options(seams=seams), 6)
         assert whole.parts == 2
         assert whole.counts[0] == 0

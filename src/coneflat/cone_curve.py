@@ -178,11 +178,11 @@ def cone_curve(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Con
         return _curve(_largest(mesh, faces, chosen, stages), parsed.most, stages)[0]
 
 
-def whole_curve(mesh: Any, faces: ArrayLike | None, options: Options, most: int) -> WholeCurve:
+def whole_curve(mesh: Any, options: Options, most: int) -> WholeCurve:
     """Search for the best set of cones of each size, on all parts of a mesh.
 
     Args:
-        mesh, faces: as for `coneflat.flatten`.
+        mesh: as for `coneflat.flatten`.
         options: parsed options of `coneflat.flatten`; `cone_count` is ignored.
         most: largest number of cones in each part.
 
@@ -195,7 +195,7 @@ def whole_curve(mesh: Any, faces: ArrayLike | None, options: Options, most: int)
     stages = Stopwatch(options.progress)
     with limit_threads(options.threads):
         with stages("check"):
-            parts = Source(as_input(mesh, faces)).prepared(options).parts
+            parts = Source(as_input(mesh)).prepared(options).parts
         total, curves = sum(len(part.faces) for part in parts), []
         for part in parts:
             stages.share = len(part.faces) / total

@@ -60,18 +60,14 @@ class _Triangles:
     """The triangles of the result, in the order of the input's faces.
 
     Attributes:
-        order: (m,) index of each triangle in the concatenation of all components; None for the identity.
+        order: (m,) index of each triangle in the concatenation of all components.
         faces: (m, 3) vertices of the result.
         face_origin: (m,) the input face of each.
     """
 
-    order: IntArray | None
+    order: IntArray
     faces: IntArray
     face_origin: IntArray
-
-    def sorted(self, values: IntArray) -> IntArray:
-        """Return values (m,) or (m, 3) of the concatenated components, reordered to the result's triangles."""
-        return values if self.order is None else rows_of(values, self.order)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,21 +87,6 @@ class _Packed:
     own: IntArray
     scale: float
     efficiency: float
-
-
-@dataclass(frozen=True, eq=False)
-class _Curvature:
-    """Curvature at the vertices of the result, radians.
-
-    Attributes:
-        target: (r,) target curvature of the metric.
-        prescribed: (r,) prescribed curvature in the plane; NaN where it is free.
-        residual: (r,) target minus the curvature of the metric.
-    """
-
-    target: FloatArray
-    prescribed: FloatArray
-    residual: FloatArray
 
 
 def evaluate(
@@ -133,10 +114,14 @@ def evaluate(
     source, face_corners = prepared.given.source, prepared.given.face_corners
     if face_corners is not None and source is not None:
         face_corners = reorder_corners(checked, face_corners)
-    curvature = _curvature(prepared, layouts, numbering)
+    target = numbering.spread([one.target for one in layouts])
+    residual = target - numbering.spread([one.curvature for one in layouts])
+    prescribed = numbering.spread([one.prescribed for one in layouts])
+    # A vertex on a marked seam has several copies in the plane.
+    prescribed[numbering.of_checked[prepared.seams]] = np.nan
     cones = numbering.renumber([one.cones for one in layouts])
     with watch("measure"):
-        layout, distortion = _measure(prepared, mesh, layout, curvature, cones, options, overlaps)
+        layout, distortion = _measure(prepared, mesh, layout, residual, prescribed, cones, options, overlaps)
         rotations = _rotations(layouts, layout.uv[layout.own], options)
     result = Flattening(
         vertices=numbering.positions,
@@ -146,10 +131,10 @@ def evaluate(
         uv_scale=float(np.ldexp(layout.scale, checked.exponent)),
         packing_efficiency=layout.efficiency,
         cones=cones,
-        curvatures=curvature.target[cones],
+        curvatures=target[cones],
         log_scale=numbering.spread([one.log_scale for one in layouts]),
-        prescribed=curvature.prescribed,
-        curvature_residual=curvature.residual,
+        prescribed=prescribed,
+        curvature_residual=residual,
         seams=np.concatenate(
             [numbering.of_checked[prepared.seams], numbering.renumber([one.seams for one in layouts])]
         ),
@@ -186,11 +171,8 @@ def _sort_triangles(prepared: Prepared, numbering: _Numbering) -> _Triangles:
     """Return the triangles of all components in the order of the input's faces."""
     origin = np.concatenate([part.faces for part in prepared.parts])
     faces = numbering.renumber([part.mesh.faces for part in prepared.parts])
-    order = None
-    if not (origin[1:] >= origin[:-1]).all():
-        order = np.argsort(origin, kind="stable")
-        faces, origin = rows_of(faces, order), origin[order]
-    return _Triangles(order, faces, prepared.checked.face_origin[origin])
+    order = np.argsort(origin, kind="stable")
+    return _Triangles(order, rows_of(faces, order), prepared.checked.face_origin[origin[order]])
 
 
 def _pack(
@@ -202,16 +184,16 @@ def _pack(
 ) -> _Packed:
     """Return the packed charts of all components."""
     points, own, chart, component = _all_charts(layouts)
-    corners = triangles.sorted(own)
+    corners = rows_of(own, triangles.order)
+    heights = None if options.up is None else (positions @ options.up)[triangles.faces]
     packed = arrange_charts(
         rows_of(points, corners),
-        triangles.sorted(chart),
+        chart[triangles.order],
         component,
-        None if options.up is None else rows_of(positions, triangles.faces),
+        heights,
         resolution=options.resolution,
         padding=options.padding,
         tiles=options.tiles,
-        up=options.up,
         quantum=options.quantise,
         edge_halfedges=mesh.edge_halfedges,
     )
@@ -221,32 +203,23 @@ def _pack(
     return _Packed(uv, corners, own, packed.scale, packed.efficiency)
 
 
-def _curvature(prepared: Prepared, layouts: Sequence[Layout], numbering: _Numbering) -> _Curvature:
-    """Return the target, the prescribed and the residual curvature at the vertices of the result."""
-    target = numbering.spread([one.target for one in layouts])
-    prescribed = numbering.spread([one.prescribed for one in layouts])
-    # A vertex on a marked seam has several copies in the plane.
-    prescribed[numbering.of_checked[prepared.seams]] = np.nan
-    return _Curvature(target, prescribed, target - numbering.spread([one.curvature for one in layouts]))
-
-
 def _measure(
     prepared: Prepared,
     mesh: TriangleMesh,
     layout: _Packed,
-    curvature: _Curvature,
+    residual: FloatArray,
+    prescribed: FloatArray,
     cones: IntArray,
     options: Options,
     overlaps: Overlaps | None,
 ) -> tuple[_Packed, Distortion]:
     """Return the layout and its measures; in an atlas, triangles that overlap by rounding alone are separated."""
-    residual = curvature.residual
     measured = partial(
         measure,
         mesh,
         curvature_error=curvature_errors(residual[np.isfinite(residual)]),
         cones=cones,
-        prescribed=curvature.prescribed,
+        prescribed=prescribed,
         lengths=prepared.own_lengths,
     )
     distortion = measured(rows_of(layout.uv, layout.corners), overlaps=overlaps)
@@ -266,7 +239,7 @@ def _rotations(layouts: Sequence[Layout], corner_uv: FloatArray, options: Option
         return None
     flat = np.split(corner_uv, np.cumsum([len(one.corners) for one in layouts])[:-1])
     return Rotations.of_all(
-        measure_rotations(one.mesh, own, options.quantise) for one, own in zip(layouts, flat, strict=True)
+        [measure_rotations(one.mesh, own, options.quantise) for one, own in zip(layouts, flat, strict=True)]
     )
 
 

@@ -246,11 +246,11 @@ class Surface:
 
 @dataclass(frozen=True, eq=False)
 class LaplacianInverse:
-    """A factorized Laplacian; solutions are unique up to a constant if no vertex is fixed at zero.
+    """The inverse of a Laplacian, or an approximation to it; unique up to a constant if no solution is fixed at zero.
 
     Attributes:
         solve: returns (n,) the solution for a source (n,).
-        laplacian: (n, n), of all vertices.
+        laplacian: (n, n), with sorted indices; its rows at fixed vertices are not used.
         is_zero: (n,) vertices where solutions are zero.
         break_even: number of solves that take as long as another factorization.
     """

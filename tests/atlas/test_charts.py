@@ -11,7 +11,7 @@ from coneflat.atlas.charts import ChartLayout, Seams
 from coneflat.atlas.glue import glue_charts
 from coneflat.atlas.injective import injective_charts
 from coneflat.atlas.sheet import Sheet
-from coneflat.atlas.split import _label_ordered, _layers, largest_layers, split_overlaps
+from coneflat.atlas.split import _label_ordered, _layers, as_disk, largest_layers, split_overlaps
 from coneflat.geometry.overlap import find_overlaps
 from coneflat.mesh.charts import label_charts
 from coneflat.mesh.connectivity import TriangleMesh
@@ -192,8 +192,9 @@ class TestSplit:
         # Cheapest at the start of the strip.
         costs = (lengths_of(mesh) * (1 + mesh.edges[:, 0]))[mesh.halfedge_edges]
         pairs = find_overlaps(points, faces).pairs
-        small = np.bincount(split_overlaps(points, faces, costs, areas, pairs)).min()
-        large = np.bincount(split_overlaps(points, faces, costs, areas, pairs, 0.2 * len(faces))).min()
+        given = as_disk(points, faces), costs, areas, pairs
+        small = np.bincount(split_overlaps(*given)).min()
+        large = np.bincount(split_overlaps(*given, 0.2 * len(faces))).min()
         assert small < 0.2 * len(faces) <= large
 
     @pytest.mark.parametrize("seed", range(2))
@@ -217,7 +218,7 @@ class TestSplit:
         """Many cuts, after which pieces touch themselves in points."""
         disk, points, pairs = crumpled(24, seed)
         costs = lengths_of(disk)[disk.halfedge_edges]
-        chart = split_overlaps(points, disk.faces, costs, np.ones(len(disk.faces)), pairs)
+        chart = split_overlaps(as_disk(points, disk.faces), costs, np.ones(len(disk.faces)), pairs)
         assert chart.max() > 10
         across = chart[disk.edge_faces]
         count, _ = label_charts(disk, ~disk.is_boundary_edge & (across[:, 0] == across[:, 1]))
@@ -227,7 +228,7 @@ class TestSplit:
     def test_too_many_charts_are_given_up(self):
         points, faces = spiral(3.5, 300)
         mesh = TriangleMesh(np.column_stack([points, np.zeros(len(points))]), faces)
-        given = points, faces, lengths_of(mesh)[mesh.halfedge_edges], np.ones(len(faces))
+        given = as_disk(points, faces), lengths_of(mesh)[mesh.halfedge_edges], np.ones(len(faces))
         pairs = find_overlaps(points, faces).pairs
         count = split_overlaps(*given, pairs).max() + 1
         assert split_overlaps(*given, pairs, most=2) is None

@@ -7,11 +7,17 @@ import pytest
 from outlines import as_complex, letter_l, star
 from shapes import hill, rotation
 
-from coneflat.atlas import orient_charts
+from coneflat import TriangleMesh
+from coneflat.atlas import arrange_charts, pack_charts
 from coneflat.atlas.orient import square_angle, straight_angle
-from coneflat.errors import OptionError
 
 NONE = np.empty(0)  # directions of a border that is not straight
+
+
+def _straight(corner_uv):
+    """One chart at its own scale, turned by quarter turns from where its border lies along the axes."""
+    packed = pack_charts(corner_uv, rotate="quarter", padding=0)
+    return packed.corner_uv / packed.scale
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.3, 2.0])
@@ -42,26 +48,21 @@ def test_upright_charts_show_up_as_v(quarters):
     turn = np.exp(1j * (quarters * np.pi / 2 + 0.2))
     uv = (vertices[:, 0] + 3j * vertices[:, 1]) * turn
     corner_uv = np.stack([uv.real, uv.imag], axis=1)[faces]
-    laid = orient_charts(corner_uv, corners=wall[faces], up=space[:, 2])
-    assert np.abs(as_complex(laid) - as_complex(corner_uv) / turn).max() < 0.05
-    lying = orient_charts(corner_uv)
+    mesh, chart = TriangleMesh(wall, faces), np.zeros(len(faces), dtype=np.int64)
+    options = {"resolution": 512, "padding": 0, "tiles": 1, "edge_halfedges": mesh.edge_halfedges}
+    heights = wall[faces] @ space[:, 2]
+    packed = arrange_charts(corner_uv, chart, np.zeros(1, dtype=np.int64), heights, **options)
+    laid = packed.corner_uv / packed.scale
+    shift = as_complex(laid) - as_complex(corner_uv) / turn
+    assert np.ptp(shift.real) < 0.1
+    assert np.ptp(shift.imag) < 0.1
+    lying = _straight(corner_uv)
     assert np.ptp(lying[..., 0]) > 2.5
     assert np.ptp(laid[..., 1]) > 2.5
 
 
 def test_without_an_up_direction_the_heavier_half_is_below():
     for turn in (1, -1):
-        laid = orient_charts(turn * letter_l(1.0))[..., 1]
+        laid = _straight(turn * letter_l(1.0))[..., 1]
         weights = np.ones(6) / 6
         assert weights @ laid.mean(axis=1) < (laid.min() + laid.max()) / 2
-
-
-def test_bad_up():
-    corners = letter_l(1.0)
-    chart = np.zeros(len(corners), dtype=int)
-    with pytest.raises(OptionError, match="not all 0"):
-        orient_charts(corners, chart, corners=np.zeros((*corners.shape[:2], 3)), up=(0, 0, 0))
-    with pytest.raises(OptionError, match="needs the corners"):
-        orient_charts(corners, chart, up=(0, 0, 1))
-    with pytest.raises(OptionError, match="shape"):
-        orient_charts(corners, chart, corners=np.zeros((2, 3, 3)), up=(0, 0, 1))

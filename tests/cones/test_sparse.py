@@ -19,14 +19,13 @@ from coneflat.geometry import (
     edge_lengths,
 )
 from coneflat.geometry.operators import area_distortion
-from coneflat.mesh.ties import tie_key
 
 HANDLE = shapes.genus(3)
 SHAPES = {"sphere": shapes.sphere(3), "genus 3": HANDLE, "annulus": shapes.annulus()}
 
 
 def surface(vertices, faces):
-    """Return what the search takes, and what it takes by name."""
+    """Return Laplacian, curvature, areas, boundary and Euler characteristic."""
     mesh = check_mesh(vertices, faces).mesh
     lengths = edge_lengths(mesh.vertices, mesh.faces)
     curvature = angle_defect(mesh.faces, corner_angles(lengths), mesh.is_boundary_vertex)
@@ -35,19 +34,19 @@ def surface(vertices, faces):
     return laplacian, curvature, areas, mesh.is_boundary_vertex, mesh.euler_characteristic
 
 
-def sparse_cones(*given, distortion=0.2, count=None, **options):
-    search = ConeSearch(*given, **options)
+def search_on(vertices, faces, **options):
+    return ConeSearch.from_mesh(check_mesh(vertices, faces).mesh, **options)
+
+
+def sparse(vertices, faces, distortion=0.2, count=None, **options):
+    search = search_on(vertices, faces, **options)
     return search.fewest(distortion) if count is None else search.best_of(count)
-
-
-def sparse(vertices, faces, **options):
-    return sparse_cones(*surface(vertices, faces), tie_key=tie_key(vertices), **options)
 
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_reported_distortion_is_that_of_the_log_scale(name):
     laplacian, curvature, areas, is_boundary, chi = surface(*SHAPES[name])
-    found = sparse_cones(laplacian, curvature, areas, is_boundary, chi, distortion=0.1)
+    found = sparse(*SHAPES[name], distortion=0.1)
     solution = found.solution
     assert found.distortion <= 0.1
     assert found.distortion == pytest.approx(area_distortion(solution.log_scale, areas), rel=1e-9)
@@ -78,7 +77,7 @@ def test_positive_only():
 def test_bounds_that_leave_nothing_to_gain_end_the_search():
     """On a torus curvatures sum to 0: without negative ones there are none."""
     vertices, faces = shapes.genus(1)
-    search = ConeSearch(*surface(vertices, faces), positive_only=True)
+    search = search_on(vertices, faces, positive_only=True)
     found = search.fewest(0.01)
     assert found.distortion > 0.01
     assert max(search.coarse.best.sizes) < 30
@@ -90,10 +89,10 @@ def test_no_cone_can_be_left_out(name):
     """Also where the coarse model is far off, as on long thin triangles."""
     vertices, faces = SHAPES["sphere" if name == "stretched" else name]
     vertices = vertices * ([30, 1, 1] if name == "stretched" else 1)
-    search = ConeSearch(*surface(vertices, faces), tie_key=tie_key(vertices))
+    search = search_on(vertices, faces)
     found = search.fewest(0.1)
     assert found.distortion <= 0.1
-    members = search.exact.insert(search.unknowns_of(found.solution.cones))
+    members = search.exact.insert(search.operator.unknowns_of(found.solution.cones))
     for place in range(len(members)):
         assert search.exact.energy(np.delete(members, place)) > 0.01
 
@@ -127,39 +126,38 @@ def test_a_sphere_needs_enough_cones():
 
 
 def test_more_cones_are_no_worse():
-    given = surface(*shapes.sphere(3))
-    energies = [sparse_cones(*given, count=count).distortion for count in range(3, 9)]
+    energies = [sparse(*shapes.sphere(3), count=count).distortion for count in range(3, 9)]
     assert (np.diff(energies) < 0).all()
 
 
 def test_required_cones_are_kept_and_forbidden_ones_avoided():
     vertices, faces = shapes.hill(30, 30)
-    search = surface(vertices, faces)
-    free = sparse_cones(*search, distortion=0.05)
+    hill = vertices, faces
+    free = sparse(*hill, distortion=0.05)
     x = vertices[:, 0]
     forbidden = x > 0.4
-    found = sparse_cones(*search, distortion=0.05, allowed=~forbidden)
+    found = sparse(*hill, distortion=0.05, allowed=~forbidden)
     assert not forbidden[found.solution.cones].any()
-    inner = np.flatnonzero(~search[3])
+    inner = np.flatnonzero(~check_mesh(*hill).mesh.is_boundary_vertex)
     required = [int(inner[7]), int(inner[300])]
-    found = sparse_cones(*search, distortion=0.05, required=required)
+    found = sparse(*hill, distortion=0.05, required=required)
     assert found.solution.cones[:2].tolist() == required
     allowed = np.zeros(len(x), dtype=bool)
     allowed[free.solution.cones] = True
-    found = sparse_cones(*search, distortion=0.05, allowed=allowed)
+    found = sparse(*hill, distortion=0.05, allowed=allowed)
     assert set(found.solution.cones) <= set(free.solution.cones)
     assert found.distortion == pytest.approx(free.distortion, rel=0.05)
 
 
 def test_weights_shift_distortion_away():
     vertices, faces = shapes.sphere(3)
-    given = surface(vertices, faces)
+    areas = surface(vertices, faces)[2]
     face = vertices[:, 2] > 0.5
-    plain = sparse_cones(*given, count=5)
-    careful = sparse_cones(*given, count=5, weights=np.where(face, 50.0, 1.0))
+    plain = sparse(vertices, faces, count=5)
+    careful = sparse(vertices, faces, count=5, weights=np.where(face, 50.0, 1.0))
 
     def inside(found):
-        return area_distortion(found.solution.log_scale[face], given[2][face])
+        return area_distortion(found.solution.log_scale[face], areas[face])
 
     assert inside(careful) < 0.7 * inside(plain)
 
@@ -227,11 +225,11 @@ def test_changing_bounds_one_by_one_starts_from_the_bounds_found_at_once(monkeyp
     rng = np.random.default_rng(3)
     root = rng.normal(size=(80, 82))
     bounds = np.full(80, -0.1), np.full(80, 0.1)
-    program = fit_curvatures._Program(root @ root.T, 3 * rng.normal(size=80), *bounds, 0.5)
-    best, _ = program.change_one_by_one(np.zeros(80))
+    program = root @ root.T, 3 * rng.normal(size=80), *bounds, 0.5
+    best, _ = fit_curvatures.change_one_by_one(*program, np.zeros(80))
     calls, once = [], fit_curvatures.best_free
     monkeypatch.setattr(fit_curvatures, "best_free", lambda *given: calls.append(0) or once(*given))
-    again, _ = program.change_one_by_one(best)
+    again, _ = fit_curvatures.change_one_by_one(*program, best)
     np.testing.assert_allclose(again, best, atol=1e-9)
     assert np.count_nonzero(np.abs(best) == 0.1) > 20
     assert len(calls) < 5

@@ -2,13 +2,13 @@
 
 from .charts import ChartLayout, Outlines
 from .injective import separate_overlaps, with_charts
-from .orient import orient_charts, square_angle, straight_angle
+from .orient import square_angle, straight_angle
 from .pack import Packed, arrange_charts, pack_charts
 from .place import Effort, pack
 from .split import as_disk
 from .touch import round_safely, separate_touching
 
 __all__ = [
-    "ChartLayout", "Effort", "Outlines", "Packed", "arrange_charts", "as_disk", "orient_charts", "pack", "pack_charts",
+    "ChartLayout", "Effort", "Outlines", "Packed", "arrange_charts", "as_disk", "pack", "pack_charts",
     "round_safely", "separate_overlaps", "separate_touching", "square_angle", "straight_angle", "with_charts",
 ]  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +12,7 @@ from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..geometry.coverage import cancel_sides
 from ..geometry.layers import open_sides
+from ..geometry.planar import bounds
 from ..mesh.charts import both_sides, point_seams
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh, label_components
 
@@ -49,32 +50,33 @@ class Charts:
     @cached_property
     def has_area(self) -> NDArray[np.bool_]:
         """Return (k,) flags, False for charts that are degenerate to lines or points."""
-        extent = np.zeros((2, self.count))
-        for part, of in zip(extent, (self.corners.real, self.corners.imag), strict=True):
-            low, high = np.full(self.count, np.inf), np.full(self.count, -np.inf)
-            one, two, three = of.T
-            np.minimum.at(low, self.chart, np.minimum(np.minimum(one, two), three))
-            np.maximum.at(high, self.chart, np.maximum(np.maximum(one, two), three))
-            part[:] = high - low
-        return np.abs(self.sums(self.areas)) > NO_AREA * extent.max(axis=0) ** 2
+        low, high = bounds(self.places)
+        least, most = np.full((self.count, 2), np.inf), np.full((self.count, 2), -np.inf)
+        np.minimum.at(least, self.chart, low)
+        np.maximum.at(most, self.chart, high)
+        return np.abs(self.sums(self.areas)) > NO_AREA * (most - least).max(axis=1) ** 2
+
+    @property
+    def places(self) -> FloatArray:
+        """Return (m, 3, 2) the corner positions as coordinates."""
+        return np.ascontiguousarray(self.corners).view(np.float64).reshape(-1, 3, 2)
 
     def outlines(self) -> Outlines:
         """Return the outline of each chart."""
         is_open = None
         if self.edge_halfedges is not None:
-            places = np.ascontiguousarray(self.corners).view(np.float64).reshape(-1, 3, 2)
             group = np.where(self.areas < 0, -1, self.chart)
-            is_open = open_sides(self.edge_halfedges, places, group).reshape(-1, 3)[:, PREVIOUS]
+            is_open = open_sides(self.edge_halfedges, self.places, group).reshape(-1, 3)[:, PREVIOUS]
         return find_outlines(self.corners, self.areas < 0, self.chart, self.count, is_open)
 
-    def moved(
-        self, factors: NDArray[np.complex128], shifts: NDArray[np.complex128] | None = None
-    ) -> FloatArray:
+    def rotated(self, angles: FloatArray) -> Charts:
+        """Return the charts rotated about the origin, each by its angle in (k,), radians."""
+        return replace(self, corners=self.corners * np.exp(1j * angles)[self.chart][:, None])
+
+    def moved(self, factors: NDArray[np.complex128], shifts: NDArray[np.complex128]) -> FloatArray:
         """Return (m, 3, 2) the corners, multiplied by the complex factor (k,) of their chart, plus its shift (k,)."""
-        moved = self.corners * factors[self.chart][:, None]
-        if shifts is not None:
-            moved += shifts[self.chart][:, None]
-        return moved.view(np.float64).reshape(-1, 3, 2)
+        moved = self.corners * factors[self.chart][:, None] + shifts[self.chart][:, None]
+        return replace(self, corners=moved).places
 
 
 def read_charts(corner_uv: ArrayLike, chart_of_triangle: ArrayLike | None) -> Charts:

@@ -9,12 +9,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, has_any
 from ..base.progress import check_cancelled
 from ..geometry.overlap import find_overlaps
-from ..geometry.planar import bounds, signed_double_areas
+from ..geometry.planar import as_pairs, bounds, signed_double_areas
 from ..mesh.connectivity import TriangleMesh
 from .charts import ChartLayout, Seams, same_points
 
@@ -65,7 +64,7 @@ class _Gluing:
     @property
     def layout(self) -> ChartLayout:
         """The current layout."""
-        return ChartLayout(_pairs(self.places), self.corners, self.chart, self.seams.edges)
+        return ChartLayout(as_pairs(self.places), self.corners, self.chart, self.seams.edges)
 
     def glue_longest(self, lengths: FloatArray, rejected: set[tuple[int, ...]]) -> bool:
         """Glue charts along stretches of seam where they fit, the longest first; return True if any were glued.
@@ -131,7 +130,7 @@ class _Gluing:
         return True
 
     def _corners(self, faces: IntArray) -> FloatArray:
-        return _pairs(self.places[self.corners[faces]])
+        return as_pairs(self.places[self.corners[faces]])
 
     def _fits(self, kept: int, moved: int) -> bool:
         """Return True if the moved chart's triangles are positively oriented and do not overlap the other chart."""
@@ -152,11 +151,6 @@ class _Gluing:
 def _members(label: IntArray, numbers: IntArray) -> list[IntArray]:
     """Return a list with, for each label, the numbers that have it."""
     return np.split(numbers[np.argsort(label, kind="stable")], np.cumsum(np.bincount(label))[:-1])
-
-
-def _pairs(places: NDArray[np.complex128]) -> FloatArray:
-    """Return complex numbers as pairs of real and imaginary part, along an additional last axis."""
-    return np.ascontiguousarray(places).view(np.float64).reshape(*places.shape, 2)
 
 
 def _touch(low: FloatArray, high: FloatArray, least: FloatArray, most: FloatArray) -> BoolArray:

@@ -59,9 +59,7 @@ def injective_charts(
     for share in MIN_CHART_AREAS:
         least = share * float(np.abs(areas).sum())
         most = MAX_SMALL_CHARTS if share < MIN_CHART_AREAS[-1] else np.inf
-        chart = split_overlaps(
-            points, corners, lengths[mesh.halfedge_edges], np.abs(areas), pairs, least, most, disk
-        )
+        chart = split_overlaps(disk, lengths[mesh.halfedge_edges], np.abs(areas), pairs, least, most)
         if chart is None:
             continue
         layout = glue_charts(mesh, whole.split(chart), lengths).renumbered()

@@ -5,12 +5,10 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from ..base.jit import compiled
-from ..errors import OptionError
-from .charts import Charts, Outlines, read_charts
+from .charts import Charts, Outlines
 
 HALF_PI = np.pi / 2
 # A run is straight if its distance from the line between its ends is below this fraction of its length. This includes
@@ -26,39 +24,6 @@ MIN_STRAIGHT_SHARE = 0.4
 # Lengths, areas and fractions of a turn with a smaller relative difference, and angles with a smaller difference in
 # radians, are equal up to rounding.
 RELATIVE_TOLERANCE = 1e-6
-
-
-def orient_charts(
-    corner_uv: ArrayLike,
-    chart_of_triangle: ArrayLike | None = None,
-    *,
-    corners: ArrayLike | None = None,
-    up: ArrayLike | None = None,
-) -> FloatArray:
-    """Return (m, 3, 2) charts aligned with the axes, each rotated about the origin without other changes.
-
-    Where much of a chart's border is straight, as for boxes, most of it becomes parallel to the axes; otherwise the
-    rectangle of least area around the chart does. Without an up direction its long side is along u and the half of
-    the chart with more area is below. With an up direction, the chart is rotated by the multiple of a quarter turn
-    for which the surface rises the most along v.
-
-    Args:
-        corner_uv: (m, 3, 2) positions of the triangle corners in the plane, of any number of meshes.
-        chart_of_triangle: (m,) chart index of each triangle, from 0; None for one chart.
-        corners: (m, 3, 3) the triangle corners in space; needed for an up direction.
-        up: (3,) the direction in space that should map to v.
-
-    Raises:
-        ArrayShapeError, NonFiniteError: the shape of an array is wrong, or its values are not finite.
-        OptionError: a chart is mirrored, or `up` is not a direction, or is given without `corners`.
-    """
-    charts = read_charts(corner_uv, chart_of_triangle)
-    outlines = charts.outlines()
-    angles = straight_angles(charts, outlines, border_directions(outlines))
-    if up is not None:
-        rise = mean_rise(charts, corners, up) * np.exp(1j * angles)
-        angles += HALF_PI * np.round((HALF_PI - np.angle(rise)) / HALF_PI)
-    return charts.moved(np.exp(1j * angles))
 
 
 def border_directions(outlines: Outlines) -> list[FloatArray]:
@@ -78,7 +43,7 @@ def straight_angles(charts: Charts, outlines: Outlines, directions: list[FloatAr
     turned = outlines.times(np.exp(1j * angles)).sides.imag.ravel()
     start = 2 * outlines.start[:-1]
     middle = (np.minimum.reduceat(turned, start) + np.maximum.reduceat(turned, start)) / 2
-    height = (charts.corners * np.exp(1j * angles)[charts.chart][:, None]).imag.mean(axis=1)
+    height = charts.rotated(angles).corners.imag.mean(axis=1)
     top_heavy = charts.sums(charts.areas * (height - middle[charts.chart])) > 0
     return angles + np.where(top_heavy, np.pi, 0.0)
 
@@ -151,22 +116,13 @@ def _extents(hull: ComplexArray, angles: FloatArray) -> tuple[FloatArray, FloatA
     return width, height
 
 
-def mean_rise(charts: Charts, corners: ArrayLike | None, up: ArrayLike) -> ComplexArray:
-    """Return (k,) for each chart the integral of the height gradient over the plane, as complex numbers.
+def mean_rise(charts: Charts, heights: FloatArray) -> ComplexArray:
+    """Return (k,) for each chart the integral of the gradient of heights (m, 3) over the plane, as complex numbers.
 
     The gradient is constant on a triangle; multiplied by the area it is a sum over the sides without a division.
     """
-    direction = np.asarray(up, dtype=np.float64)
-    if direction.shape != (3,) or not np.isfinite(direction).all() or not direction.any():
-        raise OptionError(f"up must be a direction, three numbers that are not all 0, got {up!r}")
-    if corners is None:
-        raise OptionError("an up direction needs the corners of the triangles in space")
-    positions = np.asarray(corners, dtype=np.float64)
-    if positions.shape != (*charts.corners.shape, 3):
-        raise OptionError(f"corners must have shape {(*charts.corners.shape, 3)}, got {positions.shape}")
-    height = positions @ (direction / np.abs(direction).max())
     opposite = charts.corners[:, [2, 0, 1]] - charts.corners[:, [1, 2, 0]]
-    rise = 0.5j * (height * opposite).sum(axis=1)
+    rise = 0.5j * (heights * opposite).sum(axis=1)
     return charts.sums(rise.real) + 1j * charts.sums(rise.imag)
 
 

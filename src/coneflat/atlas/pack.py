@@ -11,7 +11,6 @@ from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..base.defaults import PADDING, RESOLUTION
 from ..base.text import short_repr
 from ..errors import OptionError
-from ..geometry.planar import signed_double_areas
 from .charts import Charts, Outlines, read_charts
 from .orient import (
     HALF_PI,
@@ -19,7 +18,6 @@ from .orient import (
     along_axes,
     border_directions,
     mean_rise,
-    orient_charts,
     square_angle,
     straight_angles,
 )  # fmt: skip
@@ -72,7 +70,7 @@ def pack_charts(
         resolution: texels along a side of the texture.
         padding: minimum number of texels between charts, and between charts and the border of the texture.
         rotate: "any" rotates charts to fill the texture best; charts with a straight border are aligned with the
-            axes, see `orient_charts`. "quarter" aligns each chart, its long side along u or v. "none" does not rotate
+            axes. "quarter" aligns each chart, its long side along u or v. "none" does not rotate
             charts. An integer rotates each chart by a multiple of that fraction of a full turn, for example 4 by
             quarter turns; charts with a straight border only so that the border is as parallel to the axes as
             possible. A single chart is rotated by "any" by at most an eighth of a turn, and by an integer not at all.
@@ -91,12 +89,12 @@ def pack_charts(
         where its top is lowest. Orders and angles are changed at random, with a fixed seed, and improvements are kept.
     """
     charts = read_charts(corner_uv, chart_of_triangle)
+    _check(resolution, padding, rotate, tiles)
     return pack_known(charts, resolution, padding, rotate, tiles)
 
 
 def pack_known(charts: Charts, resolution: int, padding: float, rotate: str | int, tiles: int) -> Packed:
     """Pack validated charts; see `pack_charts`."""
-    _check(resolution, padding, rotate, tiles)
     outlines = charts.outlines()
     is_single = charts.count == 1
     as_given = rotate == "none" or isinstance(rotate, int) or (is_single and rotate == "any")
@@ -166,12 +164,11 @@ def arrange_charts(
     corner_uv: FloatArray,
     chart: IntArray,
     component: IntArray,
-    space: FloatArray | None,
+    heights: FloatArray | None,
     *,
     resolution: int,
     padding: float,
     tiles: int,
-    up: tuple[float, float, float] | None = None,
     quantum: float | None = None,
     edge_halfedges: IntArray,
 ) -> Packed:
@@ -181,26 +178,22 @@ def arrange_charts(
         corner_uv: (m, 3, 2) positions of the triangle corners; those of a component are in one frame.
         chart: (m,) the chart of each triangle, from 0.
         component: (k,) the connected component of each chart.
-        space: (m, 3, 3) the triangles' corners on the model; needed only for an up direction.
+        heights: (m, 3) coordinates of the triangles' corners on the model along the direction that should map to v;
+            None to fill the texture best.
         resolution, padding, tiles: see `pack_charts`.
-        up: direction in space that should map to v; None to fill the texture best.
         quantum: angle in radians; charts of a component are rotated relative to each other only by its multiples, so
             that the rotations between the sides of seams stay such multiples. None for any angle.
         edge_halfedges: (e, 2) the half-edges of each edge of the triangles' mesh, see `TriangleMesh`.
     """
-
-    def read(corner_uv: FloatArray) -> Charts:
-        return replace(read_charts(corner_uv, chart), edge_halfedges=edge_halfedges)
-
-    flat = _unmirrored(corner_uv, chart)
-    rotate: str | int = "any" if up is None else "none"
-    if quantum is not None and len(component) > 1:
-        turns = turns_of_quantum(quantum)
-        flat = _rotated_together(read(flat), component, turns, space, up)
-        rotate = turns if up is None else "none"
-    elif up is not None:
-        flat = orient_charts(flat, chart, corners=space, up=up)
-    return pack_known(read(flat), resolution, padding, rotate, tiles)
+    corners = np.ascontiguousarray(corner_uv).view(np.complex128)[..., 0]
+    charts = _unmirrored(Charts(corners, chart, len(component), edge_halfedges))
+    rotate: str | int = "any"
+    if quantum is not None and charts.count > 1:
+        rotate = turns_of_quantum(quantum)
+        charts = _rotated_together(charts, component, rotate, heights)
+    elif heights is not None:
+        charts = _rotated_together(charts, np.arange(charts.count), QUARTER_TURNS, heights)
+    return pack_known(charts, resolution, padding, rotate if heights is None else "none", tiles)
 
 
 def turns_of_quantum(quantum: float) -> int:
@@ -211,18 +204,12 @@ def turns_of_quantum(quantum: float) -> int:
     return max(turns for turns in range(1, MAX_TURNS + 1) if round(parts) % turns == 0)
 
 
-def _rotated_together(
-    charts: Charts,
-    component: IntArray,
-    turns: int,
-    space: FloatArray | None,
-    up: tuple[float, float, float] | None,
-) -> FloatArray:
-    """Return (m, 3, 2) the charts, with one of each component axis-aligned and the others rotated by the same angle.
+def _rotated_together(charts: Charts, component: IntArray, turns: int, heights: FloatArray | None) -> Charts:
+    """Return the charts with one of each component axis-aligned and the others rotated by the same angle.
 
-    The aligned chart is the largest of those with a straight border, or of all. With an up direction each chart is
-    then rotated by the number of equal turns that brings its up direction closest to v; charts with a straight
-    border stay aligned with the axes.
+    The aligned chart is the largest of those with a straight border, or of all. With heights each chart is then rotated
+    by the number of equal turns that brings its up direction closest to v; charts with a straight border stay aligned
+    with the axes.
     """
     outlines = charts.outlines()
     directions = border_directions(outlines)
@@ -231,14 +218,14 @@ def _rotated_together(
     order = np.lexsort((-areas, is_free, component))
     _, first = np.unique(component[order], return_index=True)
     largest = order[first][np.unique(component, return_inverse=True)[1]]
-    if up is not None:
-        rise = mean_rise(charts, space, up)
-        angles += _best_turn(rise * np.exp(1j * angles), np.ones((charts.count, QUARTER_TURNS), dtype=bool))
-        angles = angles[largest]
-        choices = np.tile(2 * np.pi / turns * np.arange(turns), (charts.count, 1))
-        angles = angles + _best_turn(rise * np.exp(1j * angles), along_axes(directions, angles, choices))
-        return charts.moved(np.exp(1j * angles))
-    return charts.moved(np.exp(1j * angles[largest]))
+    if heights is None:
+        return charts.rotated(angles[largest])
+    rise = mean_rise(charts, heights)
+    angles += _best_turn(rise * np.exp(1j * angles), np.ones((charts.count, QUARTER_TURNS), dtype=bool))
+    angles = angles[largest]
+    choices = np.tile(2 * np.pi / turns * np.arange(turns), (charts.count, 1))
+    angles = angles + _best_turn(rise * np.exp(1j * angles), along_axes(directions, angles, choices))
+    return charts.rotated(angles)
 
 
 def _best_turn(rise: NDArray[np.complex128], allowed: BoolArray) -> FloatArray:
@@ -248,9 +235,10 @@ def _best_turn(rise: NDArray[np.complex128], allowed: BoolArray) -> FloatArray:
     return turns[height.argmax(axis=1)]
 
 
-def _unmirrored(flat: FloatArray, chart: IntArray) -> FloatArray:
-    """Return (m, 3, 2) the charts; a chart with negative total area is mirrored."""
-    is_mirrored = np.bincount(chart, weights=signed_double_areas(flat)) < 0
+def _unmirrored(charts: Charts) -> Charts:
+    """Return the charts; those with negative total area are mirrored."""
+    is_mirrored = charts.sums(charts.areas) < 0
     if not is_mirrored.any():
-        return flat
-    return np.where(is_mirrored[chart][:, None, None], flat * [1.0, -1.0], flat)
+        return charts
+    corners = np.where(is_mirrored[charts.chart][:, None], charts.corners.conj(), charts.corners)
+    return replace(charts, corners=corners)

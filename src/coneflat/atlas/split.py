@@ -18,14 +18,12 @@ from .sheet import Sheet
 
 
 def split_overlaps(
-    points: FloatArray,
-    corners: IntArray,
+    disk: TriangleMesh,
     costs: FloatArray,
     areas: FloatArray,
     pairs: IntArray,
     least: float = 0.0,
     most: float = np.inf,
-    whole: TriangleMesh | None = None,
 ) -> IntArray | None:
     """Return (m,) the chart of each triangle, from 0, such that no chart has both triangles of a pair.
 
@@ -33,22 +31,18 @@ def split_overlaps(
     in each piece.
 
     Args:
-        points: (u, 2) positions in the plane.
-        corners: (m, 3) indices of points; the triangles form a connected disk.
+        disk: the triangles in the plane, see `as_disk`.
         costs: (3m,) positive cost of cutting the side opposite each corner.
         areas: (m,) areas of the triangles, by which overlaps are compared.
-        pairs: (k, 2) triangles to separate, in lexicographic order.
+        pairs: (k, 2) triangles to separate, one pair or more, in lexicographic order.
         least: minimum area that a chart should have.
         most: number of charts at which splitting stops.
-        whole: the result of `as_disk` for all triangles, if it is known.
 
     Returns:
         The charts, or None if `most` charts are not enough.
     """
-    chart, count = np.zeros(len(corners), dtype=np.int64), 1
-    if not len(pairs):
-        return chart
-    sheets = [_Sheet.of(as_disk(points, corners) if whole is None else whole, costs, areas)]
+    chart, count = np.zeros(len(areas), dtype=np.int64), 1
+    sheets = [_Sheet(disk, costs, areas, np.arange(len(areas)), 0)]
     # Pieces of sheets, with the pairs in each.
     waiting = [(sheets[0], 0, pairs)]
     while waiting and count < most:
@@ -95,11 +89,6 @@ class _Sheet(Sheet):
     ) -> None:
         super().__init__(disk, costs)
         self.areas, self.faces, self.chart = areas, faces, [chart]
-
-    @classmethod
-    def of(cls, disk: TriangleMesh, costs: FloatArray, areas: FloatArray) -> _Sheet:
-        """Return a sheet of all triangles."""
-        return cls(disk, costs, areas, np.arange(len(areas)), 0)
 
     def opened(self, own: int, pairs: IntArray) -> tuple[_Sheet, int, IntArray]:
         """Return a pinched piece as a sheet cut open at its pinch points, its piece index, and its pairs."""
@@ -172,8 +161,6 @@ def _steps(pairs: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
 
     Pair i has number 2i in its given order and 2i + 1 in the other order.
     """
-    if not len(pairs):
-        return np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
     # The triangles of pairs are renumbered, as most triangles are in no pair.
     chosen, index = np.unique(pairs, return_inverse=True)
     pairs, count = index.reshape(-1, 2), len(chosen)

@@ -10,7 +10,6 @@ from .find import (
 )
 from .given import cones_at, cones_with_curvature
 from .greedy import greedy_cones
-from .integer.search import quantise_cones
 from .solution import GroundedLaplacian
 from .sparse import SparseCones
 from .sparse.limits import MAX_SEARCHED
@@ -19,5 +18,5 @@ from .sparse.search import ConeSearch
 __all__ = [
     "ConeSearch", "GroundedLaplacian", "CONE_ANGLE_PER_TRIANGLE", "MAX_SEARCHED", "SparseCones", "close_search",
     "cones_at", "cones_with_curvature", "find_cones", "greedy_cones", "coneless_solution", "open_search",
-    "quantise_cones", "uses_sparse_search",
+    "uses_sparse_search",
 ]  # fmt: skip

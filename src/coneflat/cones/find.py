@@ -159,20 +159,15 @@ def open_search(surface: Surface, spec: ConeSpec, watch: Stopwatch) -> ConeSearc
     if len(max_angles) >= FINE_VERTICES:
         max_angles = np.minimum(max_angles, MAX_CORNER / surface.widest)
     search = ConeSearch(
-        surface.laplacian,
-        surface.curvature,
-        surface.areas,
-        spec.absorbs_curvature,
+        linear_model(surface, spec),
         mesh.euler_characteristic,
         # A boundary corner of angle a has the curvature pi - a; inner cones use the same bound of curvature.
         min_cone_angle=spec.min_angle + (np.pi if spec.searches_corners else 0.0),
         max_cone_angle=spec.max_angle,
         positive_only=spec.positive_only,
-        weights=spec.weights,
         required=spec.required,
         allowed=spec.is_allowed,
         max_angles=max_angles.astype(np.float64),
-        linear=linear_model(surface, spec),
     )
     search.progress = watch.report
     if len(mesh.faces) <= MEMORY_BOUND_TRIANGLES:  # else it would use too much memory

@@ -49,7 +49,7 @@ def cones_at(
         if euler_characteristic != 0:
             raise CurvatureError(
                 f"a closed surface of Euler characteristic {euler_characteristic} has a total curvature of "
-                f"{2 * euler_characteristic} pi and needs cones to carry it, but none is given"
+                f"{2 * euler_characteristic} pi and needs cones to carry it, but has none"
             )
         grounded[0] = True
     phi = GroundedLaplacian(laplacian, grounded).solve(-curvature)
@@ -145,9 +145,7 @@ def fitted_cones(
     if not is_free.any():
         return linear.solution_of(cones, checked_sum(curvatures, euler))
     limits = Limits.of_angles(None, min_cone_angle, max_cone_angle, positive_only=False)
-    unknown = np.full(len(linear.curvature), -1, dtype=np.int64)
-    unknown[operator.vertices] = np.arange(len(operator.vertices))
-    responses = operator.responses(unknown[cones])
+    responses = operator.responses(operator.unknowns_of(cones))
     gram = _covariances(responses, responses, operator.areas)
     slope = _covariances(responses, linear.log_scale[None], operator.areas)[:, 0]
     prescribed = curvatures[~is_free]

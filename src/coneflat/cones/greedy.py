@@ -10,9 +10,10 @@ from scipy.linalg import solve_triangular
 from scipy.sparse import csc_matrix
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
-from ..errors import CurvatureError, OptionError
+from ..errors import OptionError
 from ..mesh.ties import argmax_tied
 from ..stages import ConeSolution
+from .given import cones_at
 from .solution import GroundedLaplacian, target_from_log_scale
 
 # Range of the log scale at which the search of the paper ends.
@@ -54,6 +55,9 @@ def greedy_cones(
         raise OptionError(f"epsilon must be positive, got {epsilon:g}")
     if max_cones is not None and max_cones < 0:
         raise OptionError(f"the maximum number of cones cannot be negative ({max_cones})")
+    if max_cones == 0:
+        none = np.empty(0, dtype=np.int64)
+        return cones_at(laplacian, curvature, is_boundary, euler_characteristic, none)
     search = _Search(laplacian, curvature, is_boundary, euler_characteristic, max_cones, tie_key)
     while True:
         if progress is not None:
@@ -94,7 +98,6 @@ class _Search:
             pin = argmax_tied(sign * curvature, self.tie_key)
             grounded[pin] = True
             if not self.floating:
-                self._require_cone(euler_characteristic)
                 self._mark(pin)
         self.grounded = GroundedLaplacian(laplacian, grounded)
         self.phi = self.grounded.solve(-curvature)
@@ -102,13 +105,6 @@ class _Search:
         self.columns = np.empty((len(curvature), 16), order="F")
         self.anchors: list[int] = []
         self.reference: tuple[int, FloatArray] | None = None
-
-    def _require_cone(self, euler_characteristic: int) -> None:
-        if self.limit == 0:
-            raise CurvatureError(
-                f"a closed surface of Euler characteristic {euler_characteristic} has a total curvature of "
-                f"{2 * euler_characteristic} pi and needs cones to carry it, but at most 0 are allowed"
-            )
 
     def _mark(self, vertex: int) -> None:
         self.cones.append(vertex)

@@ -55,21 +55,20 @@ def target_from_log_scale(
     return np.where(is_singular, curvature + laplacian @ log_scale, 0.0)
 
 
-def check_feasible(cones: IntArray, curvatures: FloatArray, names: IntArray | None, advice: str) -> None:
+def check_feasible(cones: IntArray, curvatures: FloatArray, names: IntArray, advice: str) -> None:
     """Raise CurvatureError if a cone has a curvature of 2 pi or more, which is impossible in any metric.
 
     Args:
         cones, curvatures: (s,) vertices and radians.
-        names: (n,) vertex numbers of the input, for the message; None if they are those of the mesh.
+        names: (n,) vertex numbers of the input, for the message.
         advice: the end of the message: what the user can do.
     """
     bad = np.flatnonzero(curvatures >= math.tau * (1 - 1e-12))
     if len(bad):
         worst = bad[np.argmax(curvatures[bad])]
-        name = cones[worst] if names is None else names[cones[worst]]
         raise CurvatureError(
             f"{plural(len(bad), 'cone')} with a curvature of 2 pi or more, which no metric has: "
-            f"vertex {name} has {curvatures[worst] / np.pi:.4f} pi; {advice}"
+            f"vertex {names[cones[worst]]} has {curvatures[worst] / np.pi:.4f} pi; {advice}"
         )
 
 

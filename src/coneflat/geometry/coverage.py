@@ -51,10 +51,8 @@ def overlap_areas(corners: FloatArray, pairs: IntArray) -> tuple[float, float]:
 def approximate_overlap_areas(corners: FloatArray) -> tuple[float, float]:
     """Return approximate areas inside at least two triangles and inside at least one, by counting pixels.
 
-    corners: (m, 3, 2) corners of the triangles, of any orientation.
-
     Args:
-        corners: (m, 3, 2) corners of triangles in the plane.
+        corners: (m, 3, 2) corners of the triangles, of any orientation.
     """
     low = corners.min(axis=(0, 1))
     size = corners.max(axis=(0, 1)) - low

@@ -7,7 +7,6 @@ between the same points cancel. In a grid cell that none of the remaining sides 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -62,19 +61,11 @@ def may_overlap(corners: FloatArray, signs: IntArray, is_open: BoolArray) -> Int
     scale = (count - 0.5) / extent if extent > 0 else 0.0
     if not 0 < scale < np.inf or np.abs(np.diff(ends[..., 1])).sum() * scale > MAX_ROWS_PER_SIDE * len(every):
         return every
-    grid = Grid(float(low[0]), float(low[1]), scale)
+    grid = float(low[0]), float(low[1]), scale
     marks, steps = np.zeros((2, count + 1, count + 1), dtype=np.int32)
     trace_sides(ends.reshape(-1, 4), *grid, marks, steps)
     sum_cells(marks, steps)
     return np.flatnonzero(find_suspected(flat, signs, *grid, marks))
-
-
-class Grid(NamedTuple):
-    """A grid of square cells: its corner (x, y), and the number of cells per unit of length."""
-
-    x: float
-    y: float
-    scale: float
 
 
 @compiled
@@ -85,6 +76,7 @@ def trace_sides(
 
     The column of a crossing may be wrong by rounding; both columns are then in the box of the side, which is marked.
 
+    x, y, scale: the corner of the grid of square cells, and the number of cells per unit of length.
     marks, steps: (c + 1, c + 1) zeros on entry; differences between consecutive cells on return, see `sum_cells`.
     """
     for i in range(len(sides)):

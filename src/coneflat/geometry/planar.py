@@ -20,8 +20,8 @@ def as_complex(places: FloatArray) -> ComplexArray:
 
 
 def as_pairs(points: ComplexArray) -> FloatArray:
-    """Return (k, 2) coordinates of (k,) complex points x + i y."""
-    return np.stack([points.real, points.imag], axis=1)
+    """Return (..., 2) coordinates of complex points x + i y of any shape."""
+    return np.stack([points.real, points.imag], axis=-1)
 
 
 def signed_double_areas(corners: FloatArray) -> FloatArray:
@@ -104,8 +104,6 @@ def layout_curvature(mesh: TriangleMesh, corners: FloatArray, at: BoolArray | No
 
 def vertex_log_scale(mesh: TriangleMesh, before: FloatArray, after: FloatArray) -> FloatArray:
     """Return (n,) half the log of the ratio of the areas around each vertex, from triangle areas `before` and `after`.
-
-    before, after: (m,) areas of the triangles.
 
     Args:
         mesh: triangle mesh with n vertices and m faces.

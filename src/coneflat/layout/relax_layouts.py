@@ -9,15 +9,15 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, rows_of
-from ..base.jit import compiled
 from ..errors import LengthError, MetricError, SeamError
 from ..geometry import double_areas
 from ..geometry.operators import MIN_WEIGHT, area_distortion, at_unit_scale, vertex_areas, weighted_areas
-from ..geometry.planar import layout_curvature, signed_double_areas, vertex_log_scale
-from ..geometry.straight import place_triangles
+from ..geometry.planar import as_complex, layout_curvature, map_factors, signed_double_areas, vertex_log_scale
 from ..mesh.connectivity import TriangleMesh, label_components
 from ..stages import Layout, RelaxSpec
 from .relax import StretchEnergy, relax
+from .relax.elements import Maps
+from .relax.relax import rest_sides
 from .untangle import nearby
 
 # Triangles with more quasi-conformal distortion than this are relaxed, with this number of rings around them. Measured:
@@ -184,7 +184,12 @@ class LayoutGroup:
         """
         ratios = np.full(len(self.mesh.faces), np.inf)
         every = np.arange(len(ratios)) if chosen is None else chosen
-        fill_ratios(np.ascontiguousarray(self.lengths), points, self.corners, every, ratios)
+        a_of, b_of = map_factors(rest_sides(self.lengths[every]))
+        places = as_complex(points)[self.corners[every]]
+        places -= places[:, :1]
+        larger, smaller = Maps((a_of * places).sum(axis=1), (b_of * places).sum(axis=1)).singular_values()
+        is_positive = smaller > 0  # False for triangles without area on the surface
+        ratios[every[is_positive]] = larger[is_positive] / smaller[is_positive]
         return ratios
 
     def means(self, ratios: FloatArray) -> FloatArray:
@@ -267,33 +272,3 @@ def joined(meshes: Sequence[TriangleMesh], starts: IntArray) -> TriangleMesh:
     """Return the union of meshes; the vertex indices of each are shifted by its start."""
     faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
     return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
-
-
-@compiled
-def fill_ratios(
-    lengths: FloatArray, points: FloatArray, corners: IntArray, chosen: IntArray, ratios: FloatArray
-) -> None:
-    """Fill in the ratio of singular values of the maps of chosen triangles; infinite for flipped ones.
-
-    Args:
-        lengths: (m, 3) side lengths of the triangles on the surface.
-        points: (u, 2) positions in the plane.
-        corners: (m, 3) indices of points.
-        chosen: indices of triangles.
-        ratios: (m,) filled at the chosen triangles.
-    """
-    rest = np.empty(3, np.complex128)
-    for f in chosen:
-        ratios[f] = np.inf
-        place_triangles(lengths[f], rest)
-        x, y = points[corners[f, 0]]
-        a, b = 0j, 0j
-        for i in range(1, 3):
-            place = complex(points[corners[f, i], 0] - x, points[corners[f, i], 1] - y)
-            # Both are scaled by the area of the triangle at rest, which cancels in the ratio.
-            a += rest[i].conjugate() * place
-            b += rest[i] * place
-        one, two = abs(a), abs(b)
-        has_area = (rest[0].conjugate() * rest[1]).imag != 0.0
-        if has_area and one > two:
-            ratios[f] = (one + two) / (one - two)

@@ -72,7 +72,7 @@ def untangle(
         V. Garanzha et al., "Foldover-free maps in 50 lines of code", 2021: an energy that grows without
         bound as the area of a triangle goes to zero, with a regularisation that makes it finite for inverted ones.
     """
-    if not find_degenerate(flat.sides).any():
+    if not find_degenerate(flat.sides.reshape(-1, 3)).any():
         return Untangled(flat, np.empty(0, dtype=np.int64), 0.0, np.empty(0, dtype=np.int64))
     state = _Untangling(flat, faces, angles, on_boundary, _thickened(rest))
     for stay in stays:
@@ -80,9 +80,8 @@ def untangle(
         while rings <= max_rings:
             state.improve(rings, stay)
             rings *= 2
-    changed = state.sides.ravel() if state.moves.any() else flat.sides
     return Untangled(
-        replace(flat, sides=changed),
+        replace(flat, sides=state.sides.ravel()),
         np.flatnonzero(state.moves),
         float(state.moves.max(initial=0.0)),
         np.flatnonzero(state.is_bad),
@@ -108,9 +107,9 @@ class _Untangling:
     ) -> None:
         self.rest = rest
         self.flat, self.faces, self.angles, self.on_boundary = flat, faces, angles, on_boundary
-        self.sides, self.is_copied = flat.sides.reshape(-1, 3), False
+        self.sides = flat.sides.reshape(-1, 3).copy()
         self.moves = np.zeros(len(angles))
-        self.is_bad = find_degenerate(flat.sides)
+        self.is_bad = find_degenerate(self.sides)
 
     def improve(self, rings: int, stay: BoolArray) -> None:
         """Untangle bad triangles by moving the vertices in a number of rings around them, except those in `stay`."""
@@ -122,17 +121,14 @@ class _Untangling:
     def _accept(self, patches: Patches, shifts: ComplexArray) -> None:
         """Accept the patches whose triangles are now positively oriented and wind around every vertex once."""
         result = patches.moved(shifts)
-        is_positive = heights(result) > DEGENERATE_HEIGHT
         failed = np.zeros(patches.count, dtype=bool)
-        failed[patches.face_patch[~is_positive]] = True
+        failed[patches.face_patch[find_degenerate(result)]] = True
         trial = np.where(failed[patches.face_patch, None], patches.sides, result)
         winding = self._winding(patches, trial)
         winds = np.zeros(len(self.angles), dtype=bool)
         winds[winding] = True
         failed[patches.face_patch[winds[self.faces[patches.faces]].any(axis=1)]] = True
         good = ~failed[patches.face_patch]
-        if not self.is_copied:
-            self.sides, self.is_copied = self.sides.copy(), True
         self.sides[patches.faces[good]] = result[good]
         self.is_bad[patches.faces[good]] = False
         self.moves[patches.vertices] += np.where(failed[patches.patch], 0.0, np.abs(shifts))
@@ -168,7 +164,7 @@ def winding_vertices(
         is_free: (n,) True for boundary vertices at which any angle of less than a full turn is allowed.
     """
     is_bad = np.zeros(len(angles), dtype=bool)
-    is_bad[faces[~(heights(sides) > DEGENERATE_HEIGHT)]] = True
+    is_bad[faces[find_degenerate(sides)]] = True
     sums = np.bincount(faces.ravel(), signed_angles(sides).ravel(), len(angles))
     winds = np.abs(sums - angles) > WINDING_ERROR
     winds[is_free] = sums[is_free] >= np.maximum(2 * np.pi, angles[is_free] + WINDING_ERROR)
@@ -199,5 +195,5 @@ def _thickened(rest: ComplexArray) -> ComplexArray:
 
 
 def find_degenerate(sides: ComplexArray) -> BoolArray:
-    """Return (m,) True for triangles with sides (3m,) that are flipped or have almost no height over a side."""
-    return ~(heights(sides.reshape(-1, 3)) > DEGENERATE_HEIGHT)
+    """Return (m,) True for triangles with sides (m, 3) that are flipped or have almost no height over a side."""
+    return ~(heights(sides) > DEGENERATE_HEIGHT)

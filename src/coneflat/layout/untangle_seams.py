@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..base.arrays import FloatArray, IntArray
 from ..base.text import plural
 from ..geometry.intrinsic import halfedge_twins
 from ..geometry.operators import cotangent_laplacian
-from ..geometry.planar import heights, sides_between, signed_double_areas
+from ..geometry.planar import sides_between, signed_double_areas
 from ..geometry.straight import FlatTriangles
 from ..linalg.factors import factorize
 from ..mesh.connectivity import TriangleMesh
 from ..stages import Layout
-from .patches import DEGENERATE_HEIGHT
 from .relax import StretchEnergy, relax
 from .relax.relax import rest_sides
 from .relax_layouts import LayoutGroup
@@ -49,8 +46,9 @@ def untangle_seams(
         a convex curve no triangle is inverted. A layout relaxed from this embedding is much worse than one relaxed from
         a layout of a flat metric.
     """
-    flat = _in_the_plane(layout.points, layout.corners)
-    if quantum is not None or not find_degenerate(flat.sides).any():
+    sides = sides_between(layout.points[layout.corners])
+    was_bad = find_degenerate(sides)
+    if quantum is not None or not was_bad.any():
         return layout
     disk = TriangleMesh(np.zeros((len(layout.points), 3)), layout.corners)
     vertex = np.empty(len(layout.points), dtype=np.int64)
@@ -62,9 +60,8 @@ def untangle_seams(
     is_near[border[fixed[border].any(axis=1)]] = True
     # The angles on the border of the chart are free.
     angles = np.where(disk.is_boundary_vertex, np.nan, 2 * np.pi)
-    flat = replace(flat, twin=halfedge_twins(disk))
     untangled = untangle(
-        flat,
+        FlatTriangles(sides.ravel(), np.ones(sides.size, dtype=np.complex128), halfedge_twins(disk)),
         disk.faces,
         angles,
         disk.is_boundary_vertex,
@@ -78,7 +75,7 @@ def untangle_seams(
     if len(untangled.left) and not fixed.any() and disk.boundary_loops[0] == 1:
         areas = np.abs(signed_double_areas(points[disk.faces])) / 2
         embedded = embedded_disks(disk, np.zeros(len(areas), dtype=np.int64), areas)
-        if not find_degenerate(_in_the_plane(embedded, disk.faces).sides).any():
+        if not find_degenerate(sides_between(embedded[disk.faces])).any():
             points, is_free, caveat = embedded, ~fixed, "no seam or cone is exact"
     if not is_free.any():
         return layout
@@ -95,27 +92,14 @@ def untangle_seams(
     was_free = np.zeros(len(layout.mesh.vertices), dtype=bool)
     was_free[vertex[is_free]] = True
     found = group.updated(points, was_free)[0]
-    before, after = (
-        heights(sides_between(each[disk.faces])) > DEGENERATE_HEIGHT for each in (layout.points, points)
-    )
-    flipped = np.flatnonzero(after & ~before)
+    flipped = np.flatnonzero(was_bad & ~find_degenerate(sides_between(points[disk.faces])))
     if not len(flipped):
         return layout
     name = names[layout.mesh.faces[flipped[0], 0]]
-    return replace(
-        found,
-        notes=(
-            *found.notes,
-            f"{plural(len(flipped), 'triangle')} had no room between seams with equal sides, as at vertex "
-            f"{name}: they are positively oriented, but {caveat}.",
-        ),
+    return found.with_notes(
+        f"{plural(len(flipped), 'triangle')} had no room between seams with equal sides, as at vertex "
+        f"{name}: they are positively oriented, but {caveat}."
     )
-
-
-def _in_the_plane(points: FloatArray, corners: IntArray) -> FlatTriangles:
-    """Return triangles of the plane in a common frame, without adjacency."""
-    sides = sides_between(points[corners]).ravel()
-    return FlatTriangles(sides, np.ones_like(sides), np.full(len(sides), -1))
 
 
 def embedded_disks(disks: TriangleMesh, of_face: IntArray, areas: FloatArray) -> FloatArray:

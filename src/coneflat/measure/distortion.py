@@ -216,7 +216,7 @@ def measure_map(
     log_scale = np.full(len(area), np.nan)
     log_scale[chosen] = scales
     mean_scale = _mean(scales, weights)
-    low, high = quantiles(scales, weights, 0.05, 0.95)
+    low, high = (quantile(scales, weights, fraction) for fraction in (0.05, 0.95))
 
     joined = joined_edges(mesh, corner_uv)
     seams = np.flatnonzero(~joined & ~mesh.is_boundary_edge)
@@ -311,16 +311,11 @@ def _mean(values: FloatArray, weights: FloatArray) -> float:
 
 def quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:
     """Return the weighted quantile of values for a fraction from 0 to 1; NaN for empty arrays."""
-    return quantiles(values, weights, fraction)[0]
-
-
-def quantiles(values: FloatArray, weights: FloatArray, *fractions: float) -> list[float]:
-    """Return the weighted quantiles of values for fractions from 0 to 1; NaN for empty arrays."""
     if not len(values):
-        return [float("nan")] * len(fractions)
+        return float("nan")
     order = np.argsort(values)
     cumulated = np.cumsum(weights[order])
-    return [float(values[order[np.searchsorted(cumulated, part * cumulated[-1])]]) for part in fractions]
+    return float(values[order[np.searchsorted(cumulated, fraction * cumulated[-1])]])
 
 
 def _place_separately(lengths: FloatArray) -> tuple[FloatArray, IntArray]:

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.arrays import ComplexArray, FloatArray, IntArray, unit_exponent
-from ..geometry import double_areas, edge_lengths
+from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, unit_exponent
+from ..geometry import double_areas, edge_lengths, sides_between
+from ..geometry.handles import difference_from_multiple, handle_loops
 from ..mesh.charts import label_charts, point_seams
 from ..mesh.connectivity import TriangleMesh, end_corners
 from .distortion import angle_sum_errors
 
 if TYPE_CHECKING:
     from ..result import Flattening
-
-
-from collections.abc import Iterable
-
-from ..base.arrays import BoolArray
-from ..geometry.handles import difference_from_multiple, handle_loops
-from ..geometry.planar import sides_between
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,13 +176,10 @@ class Rotations:
     handles: tuple[float, ...]
 
     @classmethod
-    def of_all(cls, parts: Iterable[Rotations | None]) -> Rotations | None:
-        """Return the combined deviations of components; None if there are none."""
-        known = [part for part in parts if part is not None]
-        if not known:
-            return None
-        handles = tuple(angle for part in known for angle in part.handles)
-        return cls(known[0].quantum, max(part.worst for part in known), handles)
+    def of_all(cls, parts: Sequence[Rotations]) -> Rotations:
+        """Return the combined deviations of components."""
+        handles = tuple(angle for part in parts for angle in part.handles)
+        return cls(parts[0].quantum, max(part.worst for part in parts), handles)
 
     def binds(self, off: FloatArray) -> BoolArray:
         """Return which edges with the given deviations are constrained; marked seams and joined components are not."""

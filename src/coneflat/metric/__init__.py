@@ -1,13 +1,11 @@
 """Flat metrics: the linear metric of the paper and the exact discrete conformal metric."""
 
-from .boundary import straight_boundary
 from .exact import ExactMetric, exact_metric
 from .find import find_metric, loop_rotations
 from .linear import linear_flat_metric, scaled_lengths
-from .solve import ExactChoices, exact_flat_metric
+from .solve import exact_flat_metric
 
 __all__ = [
-    "ExactChoices",
     "ExactMetric",
     "exact_flat_metric",
     "exact_metric",
@@ -15,5 +13,4 @@ __all__ = [
     "linear_flat_metric",
     "loop_rotations",
     "scaled_lengths",
-    "straight_boundary",
 ]

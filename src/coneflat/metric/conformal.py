@@ -15,7 +15,8 @@ from ..geometry.delaunay import make_delaunay
 from ..geometry.intrinsic import IntrinsicTriangulation
 from ..linalg import Factor, factorize
 from ..linalg.newton import HALVINGS, Limits, Point, minimise
-from .hessian import GroundedInverse, HessianPattern, Inverse, conjugate_gradients, corrected
+from ..stages import LaplacianInverse
+from .hessian import HessianPattern, conjugate_gradients, corrected
 
 # Residual, radians, at which the solve stops: the rounding error of a sum of a few angles.
 GOAL_RESIDUAL = 1e-13
@@ -78,12 +79,12 @@ class ConformalProblem:
     target: FloatArray
     fixed: BoolArray
     pinned: BoolArray
-    preconditioner: Inverse | None = None
+    preconditioner: LaplacianInverse | None = None
     records: list[IntArray] = field(default_factory=list)
     last: State | None = None
     _pattern: HessianPattern | None = None
     _factor: Factor | None = None
-    _known: tuple[Inverse, FloatArray, Inverse] | None = None
+    _known: tuple[LaplacianInverse, FloatArray, LaplacianInverse] | None = None
 
     @cached_property
     def is_bounded(self) -> bool:
@@ -167,11 +168,17 @@ class ConformalProblem:
                 return np.where(self.fixed, 0.0, step), False
         grounded = self.fixed | self.pinned
         hessian = self._pattern.matrix(state.cots, grounded)
-        self._factor = factorize(hessian, self._factor)
-        self.preconditioner = GroundedInverse(self._factor, hessian, grounded)
-        return self.preconditioner.solve(state.residual), True
+        factor = self._factor = factorize(hessian, self._factor)
 
-    def _corrected(self, inverse: Inverse, hessian: csc_matrix, log_scale: FloatArray) -> Inverse:
+        def solve(right: FloatArray) -> FloatArray:
+            return np.where(grounded, 0.0, factor.solve(np.where(grounded, 0.0, right)))
+
+        self.preconditioner = LaplacianInverse(solve, hessian, grounded, factor.break_even)
+        return solve(state.residual), True
+
+    def _corrected(
+        self, inverse: LaplacianInverse, hessian: csc_matrix, log_scale: FloatArray
+    ) -> LaplacianInverse:
         """Return an inverse corrected for the Hessian; reused while the Hessian has hardly changed."""
         known = self._known
         if known is None or known[0] is not inverse or np.ptp(log_scale - known[1]) > MAX_REUSE_CHANGE:

@@ -14,8 +14,8 @@ from ..geometry.intrinsic import IntrinsicTriangulation, check_lengths, double, 
 from ..geometry.straight import FlatTriangles, straight_triangles
 from ..geometry.triangles import double_areas
 from ..mesh.connectivity import TriangleMesh
+from ..stages import LaplacianInverse
 from .conformal import ConformalProblem, State, find_scale
-from .hessian import Inverse
 
 # Largest error of the Gauss-Bonnet sum of prescribed curvatures, radians; typed decimals are more accurate.
 SUM_TOLERANCE = 1e-8
@@ -73,7 +73,7 @@ def exact_metric(
     fixed: ArrayLike | None = None,
     fixed_log_scale: ArrayLike = 0.0,
     start: ArrayLike | None = None,
-    preconditioner: Inverse | None = None,
+    preconditioner: LaplacianInverse | None = None,
     tolerance: float = 1e-10,
     delaunay: bool = True,
     flipped: tuple[IntrinsicTriangulation, IntArray] | None = None,

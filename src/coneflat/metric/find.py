@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.sparse import csc_matrix
@@ -28,9 +29,9 @@ from ..geometry.triangles import slacks
 from ..linalg import factorize
 from ..mesh.connectivity import TriangleMesh
 from ..stages import ConeSolution, FlatMetric, MetricSpec, Surface
-from .boundary import prescribed_boundary, straight_boundary
+from .boundary import BoundaryCurvature, prescribed_boundary, straight_boundary
 from .linear import linear_flat_metric
-from .solve import ExactChoices, exact_flat_metric
+from .solve import exact_flat_metric
 
 # Largest number of steps, and largest error in radians at the end; about six steps are needed for well-placed cones.
 MAX_STEPS, TOLERANCE = 60, 1e-11
@@ -62,20 +63,21 @@ def find_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> F
     mesh, lengths, quantum = surface.mesh, surface.lengths, spec.quantum
     if spec.method == "linear":
         return linear_flat_metric(mesh, lengths, solution)
-    choices = _exact_choices(surface, solution, spec)
+    boundary = _boundary(surface, solution, spec)
     if quantum is not None:
-        if not choices.is_fixed(mesh).any():
+        solve = partial(exact_flat_metric, mesh, spec=spec, boundary=boundary)
+        if boundary is None and not spec.keeps_length.any():
             holonomy = loop_holonomy(mesh, holes=True)
             try:
                 if len(holonomy.loops) > 2 * mesh.genus():
-                    return corrected_flat_metric(lengths, solution, choices, holonomy, quantum)
+                    return corrected_flat_metric(lengths, solution, solve, holonomy, quantum)
             except ConvergenceError:
                 # Triangles cannot be sheared enough; correcting the handles alone may succeed.
                 pass
         if mesh.genus():
-            return corrected_flat_metric(lengths, solution, choices, loop_holonomy(mesh), quantum)
+            return corrected_flat_metric(lengths, solution, solve, loop_holonomy(mesh), quantum)
     delaunay = surface.delaunay if surface.is_reused else surface.known_delaunay
-    return exact_flat_metric(mesh, lengths, solution, choices, delaunay)
+    return exact_flat_metric(mesh, lengths, solution, spec, boundary, delaunay)
 
 
 def loop_rotations(surface: Surface, spec: MetricSpec) -> Callable[[ConeSolution], FloatArray] | None:
@@ -91,34 +93,26 @@ def loop_rotations(surface: Surface, spec: MetricSpec) -> Callable[[ConeSolution
         return None
     holonomy, plain = loop_holonomy(surface.mesh), spec.plain()
 
-    def rotations(solution: ConeSolution) -> FloatArray:
-        triangles = find_metric(surface, solution, plain).triangles
-        assert triangles is not None
-        return holonomy.of_flat(triangles)
-
-    return rotations
+    return lambda solution: holonomy.of_flat(_triangles(find_metric(surface, solution, plain)))
 
 
-def _exact_choices(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> ExactChoices:
-    mesh, boundary = surface.mesh, None
+def _boundary(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> BoundaryCurvature | None:
+    """Return the prescribed curvature of the boundary, or None."""
     if spec.boundary == "straight":
-        boundary = straight_boundary(mesh, solution.target)
-    elif spec.boundary in ("disk", "polygon"):
+        return straight_boundary(surface.mesh, solution.target)
+    if spec.boundary in ("disk", "polygon"):
         total = float(solution.curvatures.sum())
         corners = spec.corners.vertices, spec.corners.curvatures
-        boundary = prescribed_boundary(mesh, surface.lengths, total, *corners, spec.names)
-    return ExactChoices(
-        scale_at_cones=spec.scale_at_cones,
-        boundary=boundary,
-        rigid=spec.keeps_length,
-        keep_area=spec.keeps_area,
-        accepts_failure=spec.accepts_failure,
-        names=spec.names,
-    )
+        return prescribed_boundary(surface.mesh, surface.lengths, total, *corners, spec.names)
+    return None
 
 
 def corrected_flat_metric(
-    lengths: FloatArray, solution: ConeSolution, choices: ExactChoices, holonomy: Holonomy, quantum: float
+    lengths: FloatArray,
+    solution: ConeSolution,
+    solve: Callable[[FloatArray, ConeSolution], FlatMetric],
+    holonomy: Holonomy,
+    quantum: float,
 ) -> FlatMetric:
     """Return a flat metric with the cones of a solution whose holonomy along loops is a multiple of a quantum.
 
@@ -127,7 +121,8 @@ def corrected_flat_metric(
 
     Args:
         lengths: (m, 3) side lengths.
-        solution, choices: as for `exact_flat_metric`.
+        solution: cones, target curvatures and the linear log scale.
+        solve: returns the exact metric of other side lengths for cones.
         holonomy: of loops along the handles, and around the holes if the boundary is free.
         quantum: radians.
 
@@ -136,10 +131,10 @@ def corrected_flat_metric(
     """
     mesh = holonomy.mesh
     given = lengths
-    metric, triangles = _solve_metric(mesh, lengths, solution, choices)
+    metric = solve(lengths, solution)
+    triangles = _triangles(metric)
     off = difference_from_multiple(holonomy.of_flat(triangles), quantum)
     first = float(np.abs(off).max())
-    fixed = choices.is_open(mesh)
     changes = None
     for _ in range(MAX_STEPS):
         if np.abs(off).max() <= TOLERANCE:
@@ -151,7 +146,9 @@ def corrected_flat_metric(
             return replace(metric, notes=(*metric.notes, note))
         if changes is None:
             sides = np.abs(triangles.sides).reshape(-1, 3)
-            changes = least_changes(holonomy, sides, shear_norm(mesh, lengths, solution.cones), fixed)
+            changes = least_changes(
+                holonomy, sides, shear_norm(mesh, lengths, solution.cones), metric.is_open
+            )
             inverse = np.eye(len(off))
         step = -inverse @ off
         fraction = min(1.0, MAX_CHANGE / np.abs(changes @ step).max())
@@ -163,7 +160,8 @@ def corrected_flat_metric(
             break
         lengths = sheared
         solution = replace(solution, log_scale=metric.log_scale - np.log(metric.scale))
-        metric, triangles = _solve_metric(mesh, lengths, solution, choices)
+        metric = solve(lengths, solution)
+        triangles = _triangles(metric)
         before, off = off, difference_from_multiple(holonomy.of_flat(triangles), quantum)
         if fraction < 1:
             changes = None
@@ -176,12 +174,10 @@ def corrected_flat_metric(
     )
 
 
-def _solve_metric(
-    mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, choices: ExactChoices
-) -> tuple[FlatMetric, FlatTriangles]:
-    metric = exact_flat_metric(mesh, lengths, solution, choices)
+def _triangles(metric: FlatMetric) -> FlatTriangles:
+    """Return the triangles of an exact metric."""
     assert metric.triangles is not None
-    return metric, metric.triangles
+    return metric.triangles
 
 
 def _sheared(mesh: TriangleMesh, lengths: FloatArray, change: FloatArray) -> FloatArray:

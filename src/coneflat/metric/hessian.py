@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import csc_matrix
@@ -14,8 +13,9 @@ from ..base.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from ..base.jit import compiled
 from ..errors import MetricError
 from ..geometry.intrinsic import IntrinsicTriangulation
-from ..linalg import Factor, factorize
+from ..linalg import factorize
 from ..mesh.connectivity import sort_keys
+from ..stages import LaplacianInverse
 
 # Relative change of a row, in terms of its diagonal, above which the preconditioner is corrected for it, and largest
 # fraction of such rows. They are around cones and in coarse triangles. Conjugate gradients then need a quarter to a
@@ -219,90 +219,18 @@ def changed_share(
     return share
 
 
-class Inverse(Protocol):
-    """Interface of the inverse of a Laplacian, or of an approximation to it; see `coneflat.linalg.Factor`."""
-
-    @property
-    def break_even(self) -> int:
-        """Number of solves that take as long as a factorization."""
-        ...
-
-    @property
-    def laplacian(self) -> csc_matrix:
-        """The matrix (n, n), with sorted indices; which of its rows are fixed does not matter."""
-        ...
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Return (n,) the solution for a right-hand side (n,)."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class GroundedInverse:
-    """A factorized Laplacian with rows and columns of the identity where the solution is fixed at 0."""
-
-    factor: Factor
-    laplacian: csc_matrix
-    fixed: BoolArray
-
-    @property
-    def break_even(self) -> int:
-        """Number of solves that take as long as a factorization."""
-        return self.factor.break_even
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Return (n,) the solution for a right-hand side (n,), 0 at the fixed vertices."""
-        return np.where(self.fixed, 0.0, self.factor.solve(np.where(self.fixed, 0.0, right)))
-
-
-@dataclass(frozen=True, eq=False)
-class CorrectedInverse:
-    """The inverse of a similar matrix, combined with exact solves for the rows that differ most.
-
-    This is a symmetric multiplicative Schwarz method (B. Smith, P. Bjorstad, W. Gropp, "Domain decomposition", 1996):
-    a solve for the chosen rows, a solve with the other inverse for the remaining residual, and again a solve for the
-    chosen rows.
-
-    Attributes:
-        inverse: inverse of the similar matrix.
-        chosen: (c,) rows.
-        columns: (n, c) the columns of the matrix at these rows.
-        factor: factor of the (c, c) block of these rows and columns.
-    """
-
-    inverse: Inverse
-    chosen: IntArray
-    columns: csc_matrix
-    factor: Factor
-
-    @property
-    def break_even(self) -> int:
-        """Number of solves that take as long as a factorization."""
-        return self.inverse.break_even
-
-    @property
-    def laplacian(self) -> csc_matrix:
-        """The similar matrix (n, n)."""
-        return self.inverse.laplacian
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Return (n,) the solution for a right-hand side (n,)."""
-        own = self.factor.solve(right[self.chosen])
-        solution = self.inverse.solve(right - self.columns @ own)
-        solution[self.chosen] += own
-        solution[self.chosen] += self.factor.solve(right[self.chosen] - self.columns.T @ solution)
-        return solution
-
-
-def corrected(inverse: Inverse, matrix: csc_matrix, fixed: BoolArray) -> Inverse:
+def corrected(inverse: LaplacianInverse, matrix: csc_matrix, fixed: BoolArray) -> LaplacianInverse:
     """Return a better approximation to the inverse of a matrix (n, n) with sorted indices.
+
+    The inverse of a similar matrix is combined with exact solves for the rows that differ most. This is a symmetric
+    multiplicative Schwarz method (B. Smith, P. Bjorstad, W. Gropp, "Domain decomposition", 1996): a solve for the
+    chosen rows, a solve with the other inverse for the remaining residual, and again a solve for the chosen rows.
 
     Args:
         inverse: the inverse of a similar matrix.
         matrix: the matrix.
         fixed: (n,) rows that do not count.
     """
-
     one, other = matrix, inverse.laplacian
     share = changed_share(one.indptr, one.indices, one.data, other.indptr, other.indices, other.data, fixed)
     chosen = np.flatnonzero(share > max(CHANGED_SHARE, float(np.quantile(share, 1 - MAX_CORRECTED_SHARE))))
@@ -311,13 +239,22 @@ def corrected(inverse: Inverse, matrix: csc_matrix, fixed: BoolArray) -> Inverse
     columns = matrix[:, chosen]
     block = csc_matrix(columns.T.tocsc()[:, chosen].T)
     try:
-        return CorrectedInverse(inverse, chosen, columns, factorize(block, is_scattered=True))
+        factor = factorize(block, is_scattered=True)
     except MetricError:  # broken triangles there make the block singular
         return inverse
 
+    def solve(right: FloatArray) -> FloatArray:
+        own = factor.solve(right[chosen])
+        solution = inverse.solve(right - columns @ own)
+        solution[chosen] += own
+        solution[chosen] += factor.solve(right[chosen] - columns.T @ solution)
+        return solution
+
+    return replace(inverse, solve=solve)
+
 
 def conjugate_gradients(
-    matrix: csc_matrix, right: FloatArray, inverse: Inverse, accuracy: float
+    matrix: csc_matrix, right: FloatArray, inverse: LaplacianInverse, accuracy: float
 ) -> FloatArray | None:
     """Return the solution of a semidefinite system with a right-hand side in its range; None if it takes too long.
 

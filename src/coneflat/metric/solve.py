@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
@@ -13,7 +11,7 @@ from ..geometry import double_areas
 from ..geometry.intrinsic import IntrinsicTriangulation
 from ..geometry.straight import FlatTriangles
 from ..mesh.connectivity import TriangleMesh
-from ..stages import ConeSolution, FlatMetric, SolveStatistics
+from ..stages import ConeSolution, FlatMetric, MetricSpec, SolveStatistics
 from .boundary import BoundaryCurvature
 from .exact import ExactMetric, exact_metric
 
@@ -30,46 +28,12 @@ LENGTH_TOLERANCE = 1e-9
 TOO_SHARP = 0.99 * np.pi
 
 
-@dataclass(frozen=True, eq=False)
-class ExactChoices:
-    """Conditions of an exact metric.
-
-    Attributes:
-        scale_at_cones: prescribe phi = 0 at the cones and compute their curvatures; else prescribe their curvatures.
-        boundary: prescribed curvature of the boundary; None for a free boundary with phi = 0.
-        rigid: (n,) boundary vertices between which lengths are preserved: phi = 0 there, even if `boundary` is given,
-            and untangling does not move them. None for none.
-        keep_area: scale the metric to the area of the input; else phi stays 0 on a free boundary, which preserves
-            its lengths.
-        accepts_failure: return a metric that did not converge instead of raising an error.
-        names: (n,) vertex numbers of the input, for messages; None if they are those of the mesh.
-    """
-
-    scale_at_cones: bool = True
-    boundary: BoundaryCurvature | None = None
-    rigid: BoolArray | None = None
-    keep_area: bool = True
-    accepts_failure: bool = False
-    names: IntArray | None = None
-
-    def is_open(self, mesh: TriangleMesh) -> BoolArray:
-        """Return (n,) the boundary vertices with prescribed phi = 0, whose curvature is computed."""
-        if self.boundary is None:
-            return mesh.is_boundary_vertex.copy()
-        return np.zeros(len(mesh.vertices), dtype=bool) if self.rigid is None else self.rigid.copy()
-
-    def is_fixed(self, mesh: TriangleMesh) -> BoolArray:
-        """Return (n,) the boundary vertices that untangling must not move."""
-        if self.boundary is not None:
-            return mesh.is_boundary_vertex.copy()
-        return np.zeros(len(mesh.vertices), dtype=bool) if self.rigid is None else self.rigid.copy()
-
-
 def exact_flat_metric(
     mesh: TriangleMesh,
     lengths: FloatArray,
     solution: ConeSolution,
-    choices: ExactChoices,
+    spec: MetricSpec,
+    boundary: BoundaryCurvature | None = None,
     flipped: tuple[IntrinsicTriangulation, IntArray] | None = None,
 ) -> FlatMetric:
     """Return the exact discrete conformal metric; the solve starts from the linear solution.
@@ -78,20 +42,22 @@ def exact_flat_metric(
         mesh: connected.
         lengths: (m, 3) side lengths, model units.
         solution: cones, target curvatures and the linear log scale.
-        choices: what is prescribed.
+        spec: the options of the metric.
+        boundary: prescribed curvature of the boundary; None for a free boundary with phi = 0.
         flipped: the intrinsic Delaunay triangulation and the half-edges flipped for it, if known.
 
     Raises:
-        ConvergenceError: the solve did not reach its tolerance, and `accepts_failure` is False.
+        ConvergenceError: the solve did not reach its tolerance, and `spec` does not accept it.
         CurvatureError: no metric has the curvatures.
     """
-    is_open = choices.is_open(mesh)
+    # Vertices that keep lengths have phi = 0 even on a boundary of prescribed curvature.
+    is_open = mesh.is_boundary_vertex if boundary is None else spec.keeps_length
     fixed = is_open.copy()
-    if choices.scale_at_cones:
+    if spec.scale_at_cones:
         fixed[solution.cones] = True
-    solved, target = _solve(mesh, lengths, solution, choices, fixed, flipped)
-    if not solved.converged and not (choices.accepts_failure and np.isfinite(solved.residual)):
-        worst = solved.worst_vertex if choices.names is None else choices.names[solved.worst_vertex]
+    solved, target = _solve(mesh, lengths, solution, boundary, fixed, flipped)
+    if not solved.converged and not (spec.accepts_failure and np.isfinite(solved.residual)):
+        worst = spec.names[solved.worst_vertex]
         raise ConvergenceError(
             f"the exact metric did not converge: after {solved.steps} steps the curvature at vertex {worst} is "
             f"{error_text(solved.residual)}; --method linear needs no convergence, and other cones, --repair or "
@@ -105,11 +71,11 @@ def exact_flat_metric(
         target=np.where(fixed, solved.curvature, target),
         log_scale=solved.log_scale,
         is_open=is_open,
-        is_fixed=choices.is_fixed(mesh),
+        is_fixed=spec.keeps_length if boundary is None else mesh.is_boundary_vertex,
         statistics=statistics_of(solved),
-        notes=_length_notes(mesh, lengths, solved, triangles, choices),
+        notes=_length_notes(mesh, lengths, solved, triangles, spec.keeps_length),
         triangles=triangles,
-    ).scaled(area_factor(lengths, solved) if choices.keep_area else 1.0)
+    ).scaled(area_factor(lengths, solved) if spec.keeps_area else 1.0)
 
 
 def statistics_of(solved: ExactMetric) -> SolveStatistics:
@@ -127,15 +93,15 @@ def _length_notes(
     lengths: FloatArray,
     solved: ExactMetric,
     flat: FlatTriangles,
-    choices: ExactChoices,
+    keeps_length: BoolArray,
 ) -> tuple[str, ...]:
-    """Return a note with the number of rigid boundary edges whose lengths changed; empty if there are none.
+    """Return a note with the number of boundary edges that should have kept their lengths; empty if there are none.
 
     This happens if the surface was doubled, as boundary edges are then flipped and not edges of the metric.
     """
-    if choices.rigid is None or not solved.doubled:
+    if not solved.doubled:
         return ()
-    sides = mesh.edge_halfedges[mesh.is_boundary_edge & choices.rigid[mesh.edges].all(axis=1), 0]
+    sides = mesh.edge_halfedges[mesh.is_boundary_edge & keeps_length[mesh.edges].all(axis=1), 0]
     off = np.abs(np.abs(flat.sides[sides]) / lengths.ravel()[sides] - 1)
     missed = int(np.count_nonzero(off > LENGTH_TOLERANCE))
     if not missed:
@@ -158,13 +124,11 @@ def _solve(
     mesh: TriangleMesh,
     lengths: FloatArray,
     solution: ConeSolution,
-    choices: ExactChoices,
+    boundary: BoundaryCurvature | None,
     fixed: BoolArray,
     flipped: tuple[IntrinsicTriangulation, IntArray] | None,
 ) -> tuple[ExactMetric, FloatArray]:
     """Return the metric and its target curvature (n,), which for a round boundary depends on the metric."""
-    boundary = choices.boundary
-
     inverse = solution.inverse
     if inverse is not None and not np.array_equal(inverse.is_zero, fixed):
         inverse = None

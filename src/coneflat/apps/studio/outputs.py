@@ -97,7 +97,7 @@ def curve_data(source: Joined, choices: Choices, report: Progress) -> dict[str, 
     words = curve_options(choices)
     n = max(MAX_CONES, len(words.get("required_cones", ())) + 12)  # A dozen of them are free.
     found = whole_curve(
-        source.mesh, None, read_options({**source.map_options(words), "cone_count": n, "progress": report}), n
+        source.mesh, read_options({**source.map_options(words), "cone_count": n, "progress": report}), n
     )
     curve = {"counts": found.counts.tolist(), "distortions": found.distortions.tolist()}
     return {**curve, "knee": found.knee, "parts": found.parts}

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...base.arrays import FloatArray, IntArray
-from ...base.defaults import DISTORTION, MIN_QUANTUM, TYPED_TOLERANCE
-from ...errors import CurvatureError, OptionError
+from ...base.defaults import DISTORTION, TYPED_TOLERANCE
+from ...errors import CurvatureError
 from ...geometry.handles import difference_from_multiple
 from ...stages import ConeSolution
 from ..sparse.dense_model import MIN_RELATIVE_GAIN
@@ -85,7 +85,7 @@ def moved_cones(
         bound: the allowed E.
     """
     operator = search.operator
-    places = search.unknowns_of(quantised.solution.cones)
+    places = operator.unknowns_of(quantised.solution.cones)
     curvatures = quantised.quantum * quantised.indices.astype(np.float64)
     before, penalty = (places, off), 1.0
     for _ in range(MAX_MOVES):
@@ -164,20 +164,17 @@ def quantise_cones(
 
     Args:
         search: the search of the mesh; cones that it has found are used as initial sets.
-        quantum: radians.
-        distortion: the allowed E.
+        quantum: radians, positive and at most 2 pi.
+        distortion: the allowed E, positive.
         count: minimise E with at most this number of cones instead; None to find the fewest.
         most: largest number of cones; None for no limit.
 
     Raises:
-        OptionError: the quantum or the distortion is not valid.
         CurvatureError: no multiples within the bounds sum to 2 pi chi.
     """
     lattice = make_lattice(search, quantum)
     goal = 0.0 if count is not None else distortion * distortion
-    if not goal >= 0 or (count is None and not 0 < distortion < math.inf):
-        raise OptionError(f"the distortion allowed must be a positive number, got {distortion:g}")
-    most = min(search.most_cones, *(limit for limit in (count, most) if limit is not None), search.most_cones)
+    most = min(limit for limit in (count, most, search.most_cones) if limit is not None)
     search_coarse(search, lattice, goal, most)
     exact = Lattice(search.exact, lattice.quanta, lattice.total)
     sizes = [size for size in lattice.best.sizes if size <= most]
@@ -208,11 +205,8 @@ def make_lattice(search: ConeSearch, quantum: float) -> Lattice:
     """Return the lattice of multiples of a quantum within the limits of a search, without cones yet.
 
     Raises:
-        OptionError: the quantum is out of range.
         CurvatureError: no multiples within the bounds have the required sum.
     """
-    if not MIN_QUANTUM <= quantum <= math.tau * (1 + TYPED_TOLERANCE):
-        raise OptionError(f"quantum must be from {MIN_QUANTUM:g} radians to 2 pi, got {quantum:g}")
     parts = round(math.tau / quantum)
     if abs(parts * quantum - math.tau) <= TYPED_TOLERANCE * math.tau:
         quantum = math.tau / parts

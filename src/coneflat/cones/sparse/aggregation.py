@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import csc_matrix, csr_matrix, diags, eye
 
 from ...base.arrays import FloatArray, IntArray
 from ...base.jit import compiled
@@ -38,14 +38,13 @@ class CoarseBasis:
     """Coarse basis functions, and the operators of the mesh in this basis.
 
     Attributes:
-        functions: (n, m) basis functions; None for the identity, which saves products with it.
-        laplacian, mass: (m, m) Laplacian and mass matrix between basis functions; `mass` is None for the identity, as
-            it is then given by the areas.
+        functions: (n, m) basis functions; the identity on small meshes.
+        laplacian, mass: (m, m) Laplacian and mass matrix between basis functions.
     """
 
-    functions: csr_matrix | None
+    functions: csr_matrix
     laplacian: csr_matrix
-    mass: csr_matrix | None
+    mass: csr_matrix
 
 
 def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseBasis:
@@ -56,9 +55,9 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
         areas: (n,) vertex areas.
         size: requested number of basis functions.
     """
-    functions: csr_matrix | None = None
-    level, mass = laplacian, None
-    order = np.arange(laplacian.shape[0])
+    count = laplacian.shape[0]
+    functions, level, mass = eye(count, format="csr"), laplacian, diags(areas, format="csr")
+    order = np.arange(count)
     while level.shape[0] > 1.2 * size:
         level = _without_rounding(level, level.diagonal())
         ratio = level.shape[0] / size
@@ -73,16 +72,10 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
             part = _indicators(np.argsort(order, kind="stable") * size // len(order), size)
         transposed = csr_matrix(part.T)
         level = csr_matrix(transposed @ (level @ part))
-        weighted = mass @ part if mass is not None else _with_scaled_rows(part, areas)
-        mass = csr_matrix(transposed @ weighted)
-        functions = part if functions is None else csr_matrix(functions @ part)
+        mass = csr_matrix(transposed @ (mass @ part))
+        functions = csr_matrix(functions @ part)
         order = _order_of_aggregates(part, order)
     return CoarseBasis(functions, level, mass)
-
-
-def _with_scaled_rows(matrix: csr_matrix, factors: FloatArray) -> csr_matrix:
-    data = matrix.data * np.repeat(factors, np.diff(matrix.indptr))
-    return csr_matrix((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def _indicators(labels: IntArray, number: int) -> csr_matrix:
@@ -208,7 +201,7 @@ def representatives(basis: csr_matrix, fitness: FloatArray) -> IntArray:
 
     Among equal values, the first vertex is taken. Functions that are nowhere positive have none.
     """
-    columns = _with_scaled_rows(basis, fitness).tocsc()
+    columns = csc_matrix(diags(fitness) @ basis)
     column = np.repeat(np.arange(basis.shape[1]), np.diff(columns.indptr))
     largest = np.zeros(basis.shape[1])
     np.maximum.at(largest, column, columns.data)

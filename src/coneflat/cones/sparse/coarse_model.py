@@ -21,13 +21,13 @@ class CoarseModel:
     """The kernel G A G on a coarse basis.
 
     Attributes:
-        basis: (f, m) the m basis functions; None for the identity, which is used for small meshes.
+        basis: (f, m) the m basis functions.
         kernel: (m, m) G A G between basis functions.
         slope: (m,) minus the kernel times the curvature, so that E^2 = constant + 2 slope k + k kernel k.
         constant: E^2 without cones.
     """
 
-    basis: csr_matrix | None
+    basis: csr_matrix
     kernel: FloatArray
     slope: FloatArray
     constant: float
@@ -39,8 +39,6 @@ class CoarseModel:
 
     def at(self, unknowns: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return the kernel (k, k) and the slope (k,) at k unknowns of the mesh."""
-        if self.basis is None:
-            return self.kernel[np.ix_(unknowns, unknowns)], self.slope[unknowns]
         rows = self.basis[unknowns]
         return np.asarray((rows @ (rows @ self.kernel).T).T), np.asarray(rows @ self.slope)
 
@@ -56,11 +54,8 @@ class CoarseModel:
 
     def squared_distances(self, one: int, others: IntArray) -> FloatArray:
         """Return (p,) the squared norms of the differences of one Green's function and each of the others."""
-        basis, kernel = self.basis, self.kernel
-        if basis is None:
-            squares = kernel[one, one] - 2.0 * kernel[one, others] + kernel[others, others]
-            return np.maximum(squares, 0.0)
-        return squared_distances(basis.indptr, basis.indices, basis.data, kernel, one, others)
+        basis = self.basis
+        return squared_distances(basis.indptr, basis.indices, basis.data, self.kernel, one, others)
 
 
 def coarse_model(operator: GreenOperator, curvature: FloatArray, size: int) -> CoarseModel:
@@ -71,20 +66,18 @@ def coarse_model(operator: GreenOperator, curvature: FloatArray, size: int) -> C
         curvature: (f,) curvature of the unknowns, radians.
         size: approximate number of basis functions.
     """
-    areas = operator.areas
-    coarse = coarse_basis(operator.laplacian, areas, size)
+    coarse = coarse_basis(operator.laplacian, operator.areas, size)
     basis = coarse.functions
-    weights = areas if basis is None else basis.T @ areas
+    weights = basis.T @ operator.areas
     stiffness = coarse.laplacian.toarray()
     if operator.is_closed:
         # This makes the matrix definite without changing the result, as the sum of a source is subtracted from it in
         # proportion to area.
         stiffness += np.outer(weights, weights) * (stiffness.trace() / (weights @ weights) / len(weights))
     green = inverse_of_definite(stiffness)
-    weighted = areas[:, None] * green if coarse.mass is None else coarse.mass @ green
-    kernel, mean = green @ weighted, green @ weights
+    kernel, mean = green @ (coarse.mass @ green), green @ weights
     kernel = (kernel + kernel.T) / 2 - np.outer(mean, mean)
-    bare = curvature if basis is None else basis.T @ curvature
+    bare = basis.T @ curvature
     slope = -(kernel @ bare)
     return CoarseModel(basis, kernel, slope, float(-(slope @ bare)))
 
@@ -94,7 +87,7 @@ def candidates(model: CoarseModel, fitness: FloatArray) -> IntArray:
 
     `fitness` (f,) is 0 for unknowns that may not be cones; those of larger fitness are preferred to their neighbours.
     """
-    if model.basis is None or np.count_nonzero(fitness) <= model.size:
+    if np.count_nonzero(fitness) <= model.size:
         return np.flatnonzero(fitness)
     return representatives(model.basis, fitness)
 

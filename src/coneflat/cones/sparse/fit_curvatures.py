@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -47,7 +46,7 @@ def fit_curvatures(
         least, most = np.full(len(slope), -np.inf), np.full(len(slope), np.inf)
     curvatures, multiplier, is_optimal = change_at_once(gram, slope, least, most, total)
     if not is_optimal:
-        curvatures, multiplier = _Program(gram, slope, least, most, total).change_one_by_one(curvatures)
+        curvatures, multiplier = change_one_by_one(gram, slope, least, most, total, curvatures)
     return curvatures, multiplier, feasible
 
 
@@ -68,70 +67,66 @@ def inverse_with_sum(gram: FloatArray, has_sum: bool) -> FloatArray:
     return inverse
 
 
-@dataclass(frozen=True, eq=False)
-class _Program:
-    """The quadratic program. The states (s,) of its variables are -1 at the lower bound, 1 at the upper, 0 free."""
+def change_one_by_one(
+    gram: FloatArray, slope: FloatArray, least: FloatArray, most: FloatArray, total: float, start: FloatArray
+) -> tuple[FloatArray, float]:
+    """Return the optimum (s,) and the multiplier by a primal active set method, which always terminates.
 
-    gram: FloatArray
-    slope: FloatArray
-    least: FloatArray
-    most: FloatArray
-    total: float
-
-    def change_one_by_one(self, start: FloatArray) -> tuple[FloatArray, float]:
-        """Return the optimum (s,) and the multiplier by a primal active set method, which always terminates."""
-        size, has_sum, multiplier = len(self.slope), not math.isnan(self.total), 0.0
-        curvatures = self._allowed(start)
-        state = (curvatures >= self.most).astype(np.int64) - (curvatures <= self.least)
-        for _ in range(20 * size + 20):
-            free, best, multiplier = best_free(self.gram, self.slope, self.total, state, curvatures)
-            # Move towards the best values as far as the bounds allow.
-            here = curvatures[free]
-            bound = np.where(best > here, self.most[free], self.least[free])
-            is_beyond = (best > self.most[free]) | (best < self.least[free])
-            parts = np.ones(len(free))
-            parts[is_beyond] = np.maximum((bound - here)[is_beyond] / (best - here)[is_beyond], 0.0)
-            step = float(parts.min(initial=1.0))
-            curvatures[free] += step * (best - here)
-            if step < 1.0:
-                first = int(parts.argmin())
-                blocking = free[first]
-                state[blocking] = 1 if best[first] > here[first] else -1
-                curvatures[blocking] = bound[first]
-                continue
-            # Find a variable at a bound whose release lowers the objective.
-            gradient = self.gram @ curvatures + self.slope
-            nothing = RELEASE_TOLERANCE * float(np.abs(gradient).max())
-            high = int(np.where(state == 1, gradient, -np.inf).argmax())
-            low = int(np.where(state == -1, gradient, np.inf).argmin())
-            has_high, has_low = state[high] == 1, state[low] == -1
-            if not len(free) and has_sum:
-                # A single variable cannot move with a fixed sum: release the best one at each bound.
-                if not (has_high and has_low):
-                    return curvatures, -float(gradient[high if has_high else low])
-                multiplier = -float(gradient[high] + gradient[low]) / 2
-                if gradient[high] - gradient[low] <= nothing:
-                    break
-                state[[high, low]] = 0
-                continue
-            pull_high = gradient[high] + multiplier if has_high else 0.0
-            pull_low = -gradient[low] - multiplier if has_low else 0.0
-            if max(pull_high, pull_low) <= nothing:
+    The states (s,) of the variables are -1 at the lower bound, 1 at the upper, and 0 for free ones.
+    """
+    size, has_sum, multiplier = len(slope), not math.isnan(total), 0.0
+    curvatures = _allowed(least, most, total, start)
+    state = (curvatures >= most).astype(np.int64) - (curvatures <= least)
+    for _ in range(20 * size + 20):
+        free, best, multiplier = best_free(gram, slope, total, state, curvatures)
+        # Move towards the best values as far as the bounds allow.
+        here = curvatures[free]
+        bound = np.where(best > here, most[free], least[free])
+        is_beyond = (best > most[free]) | (best < least[free])
+        parts = np.ones(len(free))
+        parts[is_beyond] = np.maximum((bound - here)[is_beyond] / (best - here)[is_beyond], 0.0)
+        step = float(parts.min(initial=1.0))
+        curvatures[free] += step * (best - here)
+        if step < 1.0:
+            first = int(parts.argmin())
+            blocking = free[first]
+            state[blocking] = 1 if best[first] > here[first] else -1
+            curvatures[blocking] = bound[first]
+            continue
+        # Find a variable at a bound whose release lowers the objective.
+        gradient = gram @ curvatures + slope
+        nothing = RELEASE_TOLERANCE * float(np.abs(gradient).max())
+        high = int(np.where(state == 1, gradient, -np.inf).argmax())
+        low = int(np.where(state == -1, gradient, np.inf).argmin())
+        has_high, has_low = state[high] == 1, state[low] == -1
+        if not len(free) and has_sum:
+            # A single variable cannot move with a fixed sum: release the best one at each bound.
+            if not (has_high and has_low):
+                return curvatures, -float(gradient[high if has_high else low])
+            multiplier = -float(gradient[high] + gradient[low]) / 2
+            if gradient[high] - gradient[low] <= nothing:
                 break
-            state[high if pull_high >= pull_low else low] = 0
-        return curvatures, multiplier
+            state[[high, low]] = 0
+            continue
+        pull_high = gradient[high] + multiplier if has_high else 0.0
+        pull_low = -gradient[low] - multiplier if has_low else 0.0
+        if max(pull_high, pull_low) <= nothing:
+            break
+        state[high if pull_high >= pull_low else low] = 0
+    return curvatures, multiplier
 
-    def _allowed(self, start: FloatArray) -> FloatArray:
-        """Return (s,) curvatures within the bounds with the given sum, after a uniform change of the given ones."""
-        size, has_sum = len(self.slope), not math.isnan(self.total)
-        curvatures = np.clip(start, self.least, self.most)
-        for _ in range(size if has_sum else 0):
-            missing = self.total - float(curvatures.sum())
-            movable = np.count_nonzero(curvatures < self.most if missing > 0 else curvatures > self.least)
-            if missing == 0.0 or movable == 0:
-                break
-            curvatures = np.clip(curvatures + missing / movable, self.least, self.most)
-        return curvatures
+
+def _allowed(least: FloatArray, most: FloatArray, total: float, start: FloatArray) -> FloatArray:
+    """Return (s,) curvatures within the bounds with the given sum, after a uniform change of the given ones."""
+    size, has_sum = len(start), not math.isnan(total)
+    curvatures = np.clip(start, least, most)
+    for _ in range(size if has_sum else 0):
+        missing = total - float(curvatures.sum())
+        movable = np.count_nonzero(curvatures < most if missing > 0 else curvatures > least)
+        if missing == 0.0 or movable == 0:
+            break
+        curvatures = np.clip(curvatures + missing / movable, least, most)
+    return curvatures
 
 
 @compiled

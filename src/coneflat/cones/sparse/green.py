@@ -77,6 +77,12 @@ class GreenOperator:
         """Return (f,) the product of A and values (f,)."""
         return self.areas * (values - self.areas @ values)
 
+    def unknowns_of(self, vertices: IntArray) -> IntArray:
+        """Return the unknowns of vertices (s,); -1 for boundary vertices."""
+        unknown = np.full(len(self._share), -1, dtype=np.int64)
+        unknown[self.vertices] = np.arange(len(self.vertices))
+        return unknown[vertices]
+
     def solve_at_vertices(self, source: FloatArray) -> FloatArray:
         """Return (n,) G source for a source (n,), both in the numbering of vertices.
 

@@ -42,16 +42,16 @@ class LinearModel:
         curvature: FloatArray,
         share: FloatArray,
         is_boundary: BoolArray,
-        tie_key: FloatArray | None,
+        tie_key: FloatArray,
     ) -> LinearModel:
         """Return the model of a mesh.
 
         Args:
-            laplacian, curvature, is_boundary: see the class.
+            laplacian, curvature, is_boundary: see the class; without boundary vertices the mesh counts as closed.
             share: (n,) weight of each vertex in E; the sum is 1.
-            tie_key: (n,) the unknowns are sorted by this key; None: by area and curvature.
+            tie_key: (n,) the unknowns are sorted by this key.
         """
-        order = np.lexsort((curvature, share)) if tie_key is None else np.argsort(tie_key, kind="stable")
+        order = np.argsort(tie_key, kind="stable")
         return cls(laplacian, curvature, is_boundary, GreenOperator(laplacian, share, is_boundary, order))
 
     def with_weights(self, share: FloatArray) -> LinearModel:

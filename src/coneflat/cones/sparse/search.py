@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_matrix
 
 from ...base.arrays import BoolArray, FloatArray, IntArray
 from ...base.defaults import DISTORTION, MAX_CONE_ANGLE, MIN_CONE_ANGLE
@@ -27,7 +26,7 @@ from ...errors import CurvatureError, OptionError
 from ...geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, edge_lengths, mollify
 from ...geometry.operators import vertex_areas, weighted_areas
 from ...mesh.connectivity import TriangleMesh
-from ...mesh.ties import tie_key as key_of_shape
+from ...mesh.ties import tie_key
 from ...stages import ConeSolution
 from ..solution import TIE_TOLERANCE
 from .coarse_model import candidates
@@ -65,21 +64,14 @@ class ConeSearch:
         search.fewest(0.2).solution.cones
 
     Args:
-        laplacian: (n, n) cotangent Laplacian.
-        curvature: (n,) angle defect, radians.
-        areas: (n,) vertex areas, any unit.
-        is_boundary: (n,) mask of the vertices that absorb curvature without being cones. If there are none, the mesh
-            counts as closed.
+        linear: the linear model of the mesh.
         euler_characteristic: chi of the mesh.
-        tie_key: (n,) breaks ties, the smallest key first; None: areas and curvatures break ties.
         min_cone_angle, max_cone_angle: bounds of the cone angles 2 pi - k, radians.
         positive_only: no cones of negative curvature (angles above 2 pi).
-        weights: (n,) importance of each vertex; None: 1.
         required: vertices that are always cones.
         allowed: (n,) mask of the other vertices that may be cones; None: all.
         max_angles: (n,) largest cone angle at each vertex, radians, in addition to `max_cone_angle`; None: no further
             bound.
-        linear: the linear model of these arrays, with these weights, if it is known.
 
     Attributes:
         progress: function that is called with a text on the progress.
@@ -91,72 +83,60 @@ class ConeSearch:
 
     def __init__(
         self,
-        laplacian: csc_matrix,
-        curvature: FloatArray,
-        areas: FloatArray,
-        is_boundary: BoolArray,
+        linear: LinearModel,
         euler_characteristic: float,
         *,
-        tie_key: FloatArray | None = None,
         min_cone_angle: float = MIN_CONE_ANGLE,
         max_cone_angle: float | None = MAX_CONE_ANGLE,
         positive_only: bool = False,
-        weights: FloatArray | None = None,
         required: Iterable[int] = (),
         allowed: BoolArray | None = None,
         max_angles: FloatArray | None = None,
-        linear: LinearModel | None = None,
     ) -> None:
+        is_boundary = self.is_boundary = linear.is_boundary
         chi = None if is_boundary.any() else euler_characteristic
         limits = self.limits = Limits.of_angles(chi, min_cone_angle, max_cone_angle, positive_only)
         cones = required_vertices(required, is_boundary)
         usable = ~is_boundary if allowed is None else ~is_boundary & allowed
         limits.check_available(usable, cones)
-        self.curvature, self.is_boundary = curvature, is_boundary
         self.progress: Callable[[str], None] = lambda _: None
-        if linear is None:
-            share = weighted_areas(areas, weights)
-            linear = LinearModel.of(laplacian, curvature, share, is_boundary, tie_key)
         self._linear, self.operator, self._coarse_model = linear, linear.operator, linear.coarse
         vertices = self.operator.vertices
         self._least = np.full(len(vertices), limits.least)
         if max_angles is not None:
             self._least = np.maximum(self._least, np.minimum(math.tau - max_angles[vertices], 0.0))
-        self._required = self.unknowns_of(cones)
+        self._required = self.operator.unknowns_of(cones)
         self.exact = ExactModel(linear, self._required, limits, self._least)
         # The exact model will need the score; it is computed while the coarse model is set up.
         with concurrently(lambda: linear.score, 2 * len(vertices)):
             self.restrict(usable)
 
     @classmethod
-    def from_mesh(cls, mesh: TriangleMesh, lengths: FloatArray | None = None, **options: Any) -> ConeSearch:
-        """Return a search on a connected mesh.
+    def from_mesh(
+        cls,
+        mesh: TriangleMesh,
+        lengths: FloatArray | None = None,
+        weights: FloatArray | None = None,
+        **options: Any,
+    ) -> ConeSearch:
+        """Return a search on a connected mesh; its boundary absorbs curvature without having cones.
 
         Args:
             mesh: see `coneflat.check_mesh`.
             lengths: (m, 3) side lengths; None: those of the vertex positions, mollified.
+            weights: (n,) importance of each vertex; None: 1.
             options: keyword arguments of the class.
         """
         lengths = mollify(edge_lengths(mesh.vertices, mesh.faces))[0] if lengths is None else lengths
         count, is_boundary = len(mesh.vertices), mesh.is_boundary_vertex
-        return cls(
+        linear = LinearModel.of(
             cotangent_laplacian(mesh.faces, cotangents(lengths), count),
             angle_defect(mesh.faces, corner_angles(lengths), is_boundary),
-            vertex_areas(mesh.faces, lengths, count),
+            weighted_areas(vertex_areas(mesh.faces, lengths, count), weights),
             is_boundary,
-            mesh.euler_characteristic,
-            **{"tie_key": key_of_shape(mesh.vertices), **options},
+            tie_key(mesh.vertices),
         )
-
-    def unknowns_of(self, vertices: IntArray) -> IntArray:
-        """Return the unknowns of inner vertices; -1 for boundary vertices.
-
-        Args:
-            vertices: (s,) vertex indices.
-        """
-        unknown = np.full(len(self.curvature), -1, dtype=np.int64)
-        unknown[self.operator.vertices] = np.arange(len(self.operator.vertices))
-        return unknown[vertices]
+        return cls(linear, mesh.euler_characteristic, **options)
 
     def restrict(self, usable: BoolArray) -> None:
         """Restrict the search to the usable vertices (n,); cached results for the mesh stay valid.

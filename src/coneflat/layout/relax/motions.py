@@ -172,19 +172,20 @@ class _Builder:
         off = (
             self.points[chains.right] - chains.rotation[chains.chain, None] * self.points[chains.left]
         ).mean(axis=1)
-        count = len(chains.rotation)
-        total = np.zeros(count, dtype=np.complex128)
+        total = np.zeros(len(chains.rotation), dtype=np.complex128)
         np.add.at(total, chains.chain, off)
-        total /= np.maximum(np.bincount(chains.chain, minlength=count), 1)
-        return total
+        return total / np.bincount(chains.chain, minlength=len(total))
 
     def _gaps(self, left: IntArray, right: IntArray, chain: IntArray) -> ComplexArray:
-        """Return the shifts of right points that close the gaps to the mapped left points; zero for rigid seams."""
+        """Return the shifts of right points that close the gaps to the mapped left points, in units of `CLOSING_UNIT`.
+
+        They are zero unless seams are closed.
+        """
         if not self.is_closing:
             return np.zeros(len(left), dtype=np.complex128)
         turned: ComplexArray = self.chains.rotation[chain] * self.points[left]
         gaps: ComplexArray = turned + self.translation[chain] - self.points[right]
-        return gaps / CLOSING_UNIT if self.is_closing else gaps
+        return gaps / CLOSING_UNIT
 
     def motions(self) -> Motions:
         """Return the motions."""
@@ -217,9 +218,6 @@ class _Builder:
             (points[row], np.where(column == self._basis.shape[1] - 1, -1, column), coefficient)
         )
 
-    def _add_unknowns(self, points: IntArray, directions: ComplexArray, unknown: IntArray) -> None:
-        self.entries.append((points, unknown, directions))
-
     def _add_offset(self, points: IntArray, shifts: ComplexArray) -> None:
         moved = shifts != 0
         self.entries.append((points[moved], np.full(int(moved.sum()), -1), shifts[moved]))
@@ -242,8 +240,8 @@ class _Builder:
         unknown = self.count + 2 * np.arange(len(one))
         self.count += 2 * len(one)
         for axis, direction in enumerate((1.0, 1j)):
-            self._add_unknowns(one, np.full(len(one), direction, dtype=np.complex128), unknown + axis)
-            self._add_unknowns(two, direction * turning, unknown + axis)
+            self.entries.append((one, unknown + axis, np.full(len(one), direction, dtype=np.complex128)))
+            self.entries.append((two, unknown + axis, direction * turning))
         moves = self.of_chain[chain] >= 0
         ones = np.ones(int(moves.sum()), dtype=np.complex128)
         self._add(right[moves], self.of_chain[chain[moves]], ones, is_complex=True)
@@ -264,7 +262,7 @@ class _Builder:
         self.count += len(left)
         same: ComplexArray = np.ones_like(turn)
         for points, factor in ((left, same), (right, turn)):
-            self._add_unknowns(points, factor * direction, unknown)
+            self.entries.append((points, unknown, factor * direction))
             self._add_offset(points, factor * off)
             self._add(points[shifts], self.of_line[line[shifts]], (factor * normal)[shifts], is_complex=False)
 
@@ -277,7 +275,7 @@ class _Builder:
         free = np.flatnonzero(rest)
         for axis, step in enumerate((1.0, 1j)):
             directions = np.full(len(free), step, dtype=np.complex128)
-            self._add_unknowns(free, directions, self.count + 2 * np.arange(len(free)) + axis)
+            self.entries.append((free, self.count + 2 * np.arange(len(free)) + axis, directions))
         self.count += 2 * len(free)
 
     def _add_constrained(self, rest: BoolArray) -> None:
@@ -289,7 +287,7 @@ class _Builder:
         on = np.flatnonzero(rest[c.on_line])
         points, line = c.on_line[on], c.line[on]
         direction = as_complex(c.directions)[line]
-        self._add_unknowns(points, direction, self.count + np.arange(len(points)))
+        self.entries.append((points, self.count + np.arange(len(points)), direction))
         self.count += len(points)
         normal = 1j * direction
         self._add_offset(points, normal * self._off_line(points, line))
