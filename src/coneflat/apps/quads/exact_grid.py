@@ -15,8 +15,9 @@ import numpy as np
 from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray, compiled, list_some, plural
 from ...errors import GridError
-from ...geometry import fill_orientations, sides_between
+from ...geometry import fill_orientations, halfedge_twins, sides_between
 from .layout import GRID_TOLERANCE, quarters_around
+from .transitions import rotated
 
 if TYPE_CHECKING:
     from .integer_map import IntegerGrid
@@ -57,9 +58,7 @@ def exact_grid(grid: IntegerGrid) -> ExactGrid:
     """
     mesh = TriangleMesh(np.asarray(grid.vertices, np.float64), np.asarray(grid.faces, np.int64))
     given = np.ascontiguousarray(grid.corner_grid, np.float64)
-    twin = np.full(mesh.faces.size, -1, dtype=np.int64)
-    one, two = mesh.edge_halfedges[~mesh.is_boundary_edge].T
-    twin[one], twin[two] = two, one
+    twin = halfedge_twins(mesh)
     inner = np.flatnonzero(twin >= 0)
     # The motions of a half-edge are those to its twin's triangle, the inverse of the given ones.
     turns, shifts = np.zeros(len(twin), dtype=np.int64), np.zeros((len(twin), 2))
@@ -85,13 +84,6 @@ def exact_grid(grid: IntegerGrid) -> ExactGrid:
     _require_map(exact, given, is_off)
     _require_cones(exact, grid)
     return exact
-
-
-def rotated(turns: IntArray, points: FloatArray) -> FloatArray:
-    """Return (k, 2) points rotated by quarter turns (k,), without rounding."""
-    cosine, sine = np.array([1.0, 0.0, -1.0, 0.0])[turns], np.array([0.0, 1.0, 0.0, -1.0])[turns]
-    x, y = points[:, 0], points[:, 1]
-    return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
 
 
 def _fans(mesh: TriangleMesh, twin: IntArray) -> list[IntArray]:
