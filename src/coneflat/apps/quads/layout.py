@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from ... import Flattening, TriangleMesh
 from ...base import BoolArray, ComplexArray, FloatArray, IntArray
@@ -102,6 +103,15 @@ class GridLayout:
     def area(self) -> float:
         """The area of the layout in squares."""
         return float(self.double_areas().sum()) / 2
+
+    def graph(self) -> csr_matrix:
+        """Return (n, n) the lengths of edges between vertices in the plane."""
+        starts, ends = self.ends
+        lengths = np.abs(self.points[ends] - self.points[starts])
+        halfedges = csr_matrix(
+            (lengths, (self.mesh.tails, self.mesh.heads)), shape=(len(self.mesh.vertices),) * 2
+        )
+        return halfedges.maximum(halfedges.T)
 
     def double_areas(self) -> FloatArray:
         """Return (m,) twice the signed areas of triangles in the plane, negative for flipped ones."""

@@ -23,6 +23,7 @@ from ...geometry import (
 from ...linalg import Factor, factorize
 from ...mesh import tie_key
 from .cross_field import edge_rotations, halfedge_angles
+from .features import lengths_along, vertex_graph
 
 # Numbers of regions over which the log scale and the directions are summed, and largest number of vertices that can be
 # cones.
@@ -146,14 +147,6 @@ class MapModel:
         turned, looped = (each[:, used] @ step[used] for each in (self.turns, self.loops))
         scale = self._base_scale + self.scales[:, used] @ step[used]
         return scale, self._base * np.exp(1j * turned), self._base_loops * np.exp(1j * looped)
-
-
-def vertex_graph(mesh: TriangleMesh) -> csr_matrix:
-    """Return (n, n) the lengths of edges."""
-    one, two = mesh.edges.T
-    lengths = np.linalg.norm(mesh.vertices[one] - mesh.vertices[two], axis=1)
-    both = np.concatenate([one, two]), np.concatenate([two, one])
-    return csr_matrix((np.tile(lengths, 2), both), shape=(len(mesh.vertices),) * 2)
 
 
 def _regions(mesh: TriangleMesh, key: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
@@ -281,7 +274,7 @@ class _Rotations:
         in_tree = np.zeros(len(mesh.edges), dtype=bool)
         in_tree[self.inner[self.edge[self.edge >= 0]]] = True
         left = np.flatnonzero(~in_tree)
-        lengths = np.linalg.norm(np.diff(mesh.vertices[mesh.edges[left]], axis=1)[:, 0], axis=1)
+        lengths = lengths_along(mesh, left)
         # Edges of the boundary come first, so that loops around holes are not among the others.
         weights = lengths / max(float(lengths.max(initial=0.0)), np.finfo(float).tiny) + np.where(
             mesh.is_boundary_edge[left], 1.0, 3.0

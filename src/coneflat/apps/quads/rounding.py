@@ -267,10 +267,7 @@ def _near_pairs(
     """Return the vectors between near cones along the shortest edge paths."""
     mesh, points, cones, (starts, ends) = layout.mesh, layout.points, layout.nodes, layout.ends
     tails, heads = mesh.tails, mesh.heads
-    graph = csr_matrix(
-        (np.abs(points[ends] - points[starts]), (tails, heads)), shape=(len(mesh.vertices),) * 2
-    )
-    graph = graph.maximum(graph.T)
+    graph = layout.graph()
     found, before = dijkstra(graph, indices=cones, limit=NEAR_CONE_DISTANCE, return_predecessors=True)
     halfedge = csr_matrix((np.arange(1, len(tails) + 1), (tails, heads)), shape=graph.shape)
     is_cone = np.zeros(len(mesh.vertices), dtype=bool)

@@ -23,8 +23,8 @@ from ...linalg import factorize
 from ...mesh import CheckedMesh
 from ...source import vertex_numbers
 from .cross_field import CURVATURE_SCALE, curvature_tensors
+from .features import vertex_graph
 from .integer_map import IntegerGrid
-from .map_model import vertex_graph
 
 
 def wanted_scales(mesh: Any, faces: Any, checked: CheckedMesh, sizes: Any) -> FloatArray:
