@@ -39,7 +39,7 @@ from ...io import (
     shading_normals,
     write_parts,
 )
-from .integer_map import IntegerGrid, find_motions, grid_of_corners
+from .integer_map import IntegerGrid, grid_of_corners
 from .quad_mesh import QuadMesh, least_jacobians
 
 Check: TypeAlias = Callable[["str | PathLike[str]"], Path]
@@ -59,6 +59,8 @@ _ARRAYS, _NUMBERS = (
     [field.name for field in fields(IntegerGrid) if str(field.type).endswith(kind)]
     for kind in ("Array", "float")
 )
+#: Arrays from which a grid is restored.
+_RESTORED = ("vertices", "faces", "corner_grid", "corners", "corner_quarters", "features", "report")
 _REPORT = re.compile(rb"(?m)^# grid (\{.*\})[ \t]*\r?$")
 _LINE = re.compile(rb"(?m)^l +(\d+) +(\d+)[ \t]*\r?$")
 _HEAD = (
@@ -311,7 +313,7 @@ def read_grid(path: str | PathLike[str]) -> IntegerGrid:
     """
     path = as_path(path)
     if known_ending(path, GRID_FORMATS, "integer grids are read from") == ".npz":
-        return read_archive(path, (*_ARRAYS, "report"), _grid_of_archive)
+        return read_archive(path, _RESTORED, _grid_of_archive)
     return _grid_of_obj(path, read_bytes(path))
 
 
@@ -359,32 +361,21 @@ def _known(path: Path, text: bytes) -> dict[str, Any]:
 
 
 def _grid_of_archive(reading: CheckedArrays) -> IntegerGrid:
-    reading.need((*_ARRAYS, "report"), "integer grid")
+    reading.need(_RESTORED, "integer grid")
     report = reading.report()
     vertices = reading.finite("vertices", (None, 3))
     n = len(vertices)
     faces = reading.indices("faces", (None, 3), n)
-    m = len(faces)
     numbers: dict[str, Any] = {name: float(number(report[name])) for name in _NUMBERS}
-    cones, corners = (reading.indices(name, (None,), n) for name in ("cones", "corners"))
-    grid = IntegerGrid(
-        vertices=vertices,
-        faces=faces,
-        corner_grid=reading.finite("corner_grid", (m, 3, 2)),
-        turns=reading.indices("turns", (3 * m,), 4, least=-1),
-        shifts=reading.indices("shifts", (3 * m, 2), None, least=-(2**53)),
-        cones=cones,
-        quarters=reading.indices("quarters", (len(cones),), None),
+    corners = reading.indices("corners", (None,), n)
+    _require_mesh(reading.path, vertices, faces)
+    return grid_of_corners(
+        vertices,
+        faces,
+        reading.finite("corner_grid", (len(faces), 3, 2)),
+        **numbers,
+        notes=reading.notes(report),
         corners=corners,
         corner_quarters=reading.indices("corner_quarters", (len(corners),), None),
         features=reading.indices("features", (None, 2), n),
-        **numbers,
-        notes=reading.notes(report),
     )
-    _require_mesh(reading.path, vertices, faces)
-    turns, shifts, _ = find_motions(TriangleMesh(vertices, faces), grid.corner_grid)
-    if (turns != grid.turns).any() or (shifts != grid.shifts).any():
-        raise MeshFileError(
-            f"{reading.path} holds no integer grid: its turns and shifts do not match its corners"
-        )
-    return grid
