@@ -69,9 +69,10 @@ def compare(
     options = {**keywords(given, FindOptions), **(PAPER if flags.paper else {})}
     methods = METHODS if flags.methods is None else tuple(name.strip() for name in flags.methods.split(","))
     if flags.output is not None:
-        from ..peers.pictures import Sight, draw_layouts, draw_qualities, open_folder, write_folder
+        from ..peers.pictures import DPI, draw_layouts, draw_qualities, open_folder, write_folder
+        from ..view import Look
 
-        sight = Sight(flags.eye, up)
+        look = Look(eyes=(flags.eye,), up=up, dpi=DPI)
     with Console(verbosity) as console:
         with console.stage("read", 0.0):
             source = read_joined(mesh, weld)
@@ -93,7 +94,7 @@ def compare(
         if flags.output is not None:
             with console.stage("draw"):
                 texts = comparison_markdown(found), comparison_csv(found)
-                pictures = draw_layouts(found), draw_qualities(found, sight)
+                pictures = draw_layouts(found), draw_qualities(found, look)
                 written = write_folder(flags.output, dict(zip(COMPARED, (*texts, *pictures), strict=True)))
         console.say(comparison_lines(found))
         console.finish(written)

@@ -10,8 +10,8 @@ from scipy.sparse import csr_matrix
 from ... import TriangleMesh
 from ...base import FloatArray, IntArray, plural
 from ...errors import MetricError
-from ...geometry import corner_angles, double_areas
-from ...layout import far_pins, pinned_least_squares
+from ...geometry import double_areas
+from ...layout import far_pins, pinned_least_squares, rest_sides
 from ...stages import ConeSolution, Cut, Embedding, FlatMetric
 
 
@@ -76,10 +76,7 @@ def conformal_equations(mesh: TriangleMesh, lengths: FloatArray) -> csr_matrix:
         raise MetricError(
             f"{int((~(areas > 0)).sum())} of {plural(len(areas), 'triangle')} without area have no conformal energy"
         )
-    angles = corner_angles(lengths)
-    # The directions of sides differ by the exterior angles; side 0, from corner 1 to 2, has direction 0.
-    directions = np.stack([np.zeros(len(angles)), np.pi - angles[:, 2], np.pi + angles[:, 1]], axis=1)
-    sides = lengths * np.exp(1j * directions) / np.sqrt(2 * areas)[:, None]
+    sides = rest_sides(lengths) / np.sqrt(2 * areas)[:, None]
     rows = np.repeat(np.arange(len(sides)), 3)
     return csr_matrix((sides.ravel(), (rows, mesh.faces.ravel())), shape=(len(sides), len(mesh.vertices)))
 
