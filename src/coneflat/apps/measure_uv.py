@@ -15,7 +15,7 @@ from ..base import FloatArray, IntArray, plural, unit_exponent
 from ..errors import MissingUVError
 from ..geometry import MAX_CELLS, approximate_overlap_areas, find_overlaps, signed_double_areas
 from ..io import UVMesh, as_uv_mesh
-from ..measure import MAP_MEASURES, measure_map, path_text
+from ..measure import MAP_MEASURES, measure_map, path_text, sum_angles
 from ..mesh import CheckedMesh, corner_fans, end_corners, joined_edges, label_faces, left_out
 from ..source import at_unit_size
 
@@ -207,8 +207,6 @@ def angle_sum_error(mesh: TriangleMesh, corner_uv: FloatArray) -> float:
 
     It is large at flipped triangles, and where triangles wind around a point twice.
     """
-    from ..measure import sum_angles
-
     points, fan = uv_points(mesh, corner_uv)
     joined = np.zeros(mesh.faces.size, dtype=bool)
     joined[mesh.edge_halfedges[joined_edges(mesh, corner_uv)]] = True
