@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ... import TriangleMesh
-from ...base import FloatArray, IntArray, plural
+from ...base import FloatArray, plural
 from ...errors import MetricError
 from ...geometry import double_areas
 from ...layout import far_pins, pinned_least_squares, rest_sides
@@ -34,10 +34,8 @@ def least_squares_map(mesh: TriangleMesh, lengths: FloatArray, solution: ConeSol
     return embedding_metric(mesh, lengths, solution, embed, has_target_cones=False)
 
 
-def least_squares_conformal(
-    disk: TriangleMesh, lengths: FloatArray, pins: IntArray | None = None
-) -> FloatArray:
-    """Return (n, 2) the least squares conformal map (LSCM) of a disk, with two vertices pinned.
+def least_squares_conformal(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
+    """Return (n, 2) the least squares conformal map (LSCM) of a disk, with two distant vertices pinned.
 
     It minimises the energy of Eq. 4 and 5 of the paper (Levy et al. 2002). Triangles may be flipped. The pins affect
     not only position and size, but also the variation of scale.
@@ -45,13 +43,11 @@ def least_squares_conformal(
     Args:
         disk: a topological disk.
         lengths: (m, 3) side lengths; every triangle has area.
-        pins: (2,) the vertices that are mapped to (0, 0) and (1, 0); by default two distant ones.
 
     Raises:
         MetricError: the solution is not finite.
     """
-    pins = far_pins(disk, lengths) if pins is None else pins
-    z = pinned_least_squares(conformal_equations(disk, lengths), pins)
+    z = pinned_least_squares(conformal_equations(disk, lengths), far_pins(disk, lengths))
     if not np.isfinite(z).all():
         raise MetricError(f"the least squares conformal map of {len(disk.faces):,} triangles is not finite")
     return np.stack([z.real, z.imag], axis=1)

@@ -128,7 +128,7 @@ class GridLayout:
 
 
 def aligned(
-    result: Flattening, quads: float | None, size: float | None, sharp_angle: float = SHARP_ANGLE
+    result: Flattening, quads: float, size: float | None, sharp_angle: float = SHARP_ANGLE
 ) -> GridLayout:
     """Return the layout of a flattening, rotated so that the grid is aligned with creases and boundaries.
 
@@ -158,7 +158,6 @@ def aligned(
         )
     area = float(double_areas(lengths).sum()) / 2
     if size is None:
-        assert quads is not None
         size = float(np.sqrt(area / quads))
     scale = np.sqrt(area / size**2 / (flat.sum() / 2))
     points = scale * as_complex(result.uv)

@@ -59,7 +59,7 @@ class MapModel:
         required: IntArray,
         least: int,
         most: int,
-        triangles: IntArray | None = None,
+        triangles: IntArray,
         log_scale: FloatArray | None = None,
     ) -> None:
         """Set up the model.
@@ -69,7 +69,7 @@ class MapModel:
             wanted: (m,) preferred crosses of triangles, weighted.
             required: vertices that must be places.
             least, most: bounds of the curvature of cones, in quarter turns.
-            triangles: (n,) the number of triangles at each vertex if it is another one in the mesh that gets the cones.
+            triangles: (n,) the number of triangles at each vertex in the mesh that gets the cones.
             log_scale: (n,) the wanted log scale, up to a constant; None for 0.
         """
         lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces))
@@ -99,8 +99,6 @@ class MapModel:
         to_samples = self._rotations.to_frames(samples) + self._rotations.mean_change[samples]
         self.scales = self._functional(self._means)
         self.turns, self.loops = 4 * self._functional(to_samples), 4 * self._functional(self._along)
-        if triangles is None:
-            triangles = np.bincount(mesh.faces.ravel(), minlength=count)
         triangles = triangles[self.places]
         border = mesh.is_boundary_vertex[self.places]
         straight = np.where(border, 2, 4)

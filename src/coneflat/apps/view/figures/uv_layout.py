@@ -36,7 +36,6 @@ def draw_layout(
     *,
     color_charts: bool = False,
     edges: bool = True,
-    cones: bool = True,
     crop: bool = False,
 ) -> None:
     """Draw the charts in the unit square: filled polygons, the edges of their triangles, and the cones.
@@ -50,7 +49,6 @@ def draw_layout(
         axes: matplotlib axes to draw in; their own lines and ticks are hidden.
         color_charts: give the charts different colours.
         edges: draw the edges of triangles.
-        cones: mark the cones.
         crop: show only the charts, not the unit square or the tiles of several textures.
     """
     from matplotlib.patches import PathPatch
@@ -69,11 +67,10 @@ def draw_layout(
     draw_outlines(axes, result, paths, 0.8 * scale)
     if not crop:
         _draw_tiles(axes, chart_tiles(result.uv, result.uv_faces))
-    if cones:
-        vertex, point = layout_cones(result)
-        curvature = dict(zip(result.cones.tolist(), result.curvatures.tolist(), strict=True))
-        values = np.array([curvature[v] for v in vertex.tolist()])
-        draw_dots(axes, result.uv[point], values, share=0.6)
+    vertex, point = layout_cones(result)
+    curvature = dict(zip(result.cones.tolist(), result.curvatures.tolist(), strict=True))
+    values = np.array([curvature[v] for v in vertex.tolist()])
+    draw_dots(axes, result.uv[point], values, share=0.6)
     frame_layout(axes, result, crop)
 
 
