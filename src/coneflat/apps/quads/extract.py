@@ -42,9 +42,6 @@ def extract_quads(grid: IntegerGrid, leave_out: bool = False) -> QuadMesh:
     Raises:
         GridError: the map is not an integer-grid map, is so coarse that a quad has the same vertex or edge twice, or
             has too many squares.
-
-    References:
-        H.-C. Ebke, D. Bommes, M. Campen, L. Kobbelt, "QEx: robust quad mesh extraction", 2013.
     """
     area = float(signed_double_areas(grid.corner_grid).sum()) / 2
     if area > MAX_SQUARES:

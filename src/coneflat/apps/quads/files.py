@@ -86,16 +86,7 @@ def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:
     which has no quads, has two triangles for each and their edges as lines; see `_write_glb`. An .npz has all arrays of
     the `QuadMesh`, from which `read_quads` restores it, and the irregular vertices with their valences. VTK (.vtk,
     .vtu), Abaqus (.inp) and Gmsh (.msh) are written by meshio; all but Abaqus have the valences of vertices, and the
-    least scaled Jacobians of quads.
-
-    Args:
-        path: the file.
-        mesh: the quad mesh.
-
-    Raises:
-        UnknownFormatError: the extension is not one of `QUAD_FORMATS`.
-        OptionError: meshio is needed and not installed.
-        MeshFileError: the file cannot be written.
+    least scaled Jacobians of quads. Errors are those of `QuadMesh.save`.
     """
     path = check_quads_output(path)
     with atomic_write(path) as stream:
@@ -162,12 +153,7 @@ def holds_quads(path: str | PathLike[str]) -> bool:
 
 
 def read_quads(path: str | PathLike[str]) -> QuadMesh:
-    """Return a quad mesh from an .npz file.
-
-    Raises:
-        UnknownFormatError: the extension is not .npz.
-        MeshFileError: the file does not exist, cannot be read, or does not contain a quad mesh.
-    """
+    """Return a quad mesh from an .npz file; see `QuadMesh.load`."""
     path = as_path(path)
     known_ending(path, (".npz",), "quads with their surface are read from")
     return read_archive(path, _NAMES, _quad_mesh)
@@ -245,15 +231,7 @@ def write_grid(path: str | PathLike[str], grid: IntegerGrid) -> Path:
     An .obj has the grid coordinates of every triangle corner as texture coordinates, with all digits, as programs that
     extract quads expect them, for example libQEx. Comments contain the quarter turns and translations of seam edges and
     the measures of the grid. An .npz has all arrays of the `IntegerGrid`, and the content of these comments: `seams`
-    (k, 2), pairs of vertices, with `seam_turns` (k,) and `seam_shifts` (k, 2).
-
-    Args:
-        path: the file.
-        grid: the integer grid.
-
-    Raises:
-        UnknownFormatError: the extension is not one of `GRID_FORMATS`.
-        MeshFileError: the file cannot be written.
+    (k, 2), pairs of vertices, with `seam_turns` (k,) and `seam_shifts` (k, 2). Errors are those of `IntegerGrid.save`.
     """
     path = check_grid_output(path)
     with atomic_write(path) as stream:
@@ -303,13 +281,8 @@ def read_grid(path: str | PathLike[str]) -> IntegerGrid:
     """Return an integer grid from an .npz or .obj file.
 
     An .obj needs triangles with texture coordinates in units of the grid only; quarter turns, translations and cones
-    follow from these. Measures are read from the comments of `write_grid`; without these they are NaN.
-
-    Raises:
-        UnknownFormatError: the extension is not one of `GRID_FORMATS`.
-        MeshFileError: the file does not exist, cannot be read, or does not contain a manifold triangle mesh with UVs.
-        MeshError: the mesh has no vertices or faces, or indices of vertices that do not exist.
-        GridError: the UVs are not an integer-grid map: triangles are flipped, or sides of seams do not match.
+    follow from these. Measures are read from the comments of `write_grid`; without these they are NaN. Errors are those
+    of `IntegerGrid.load`.
     """
     path = as_path(path)
     if known_ending(path, GRID_FORMATS, "integer grids are read from") == ".npz":

@@ -106,7 +106,8 @@ class IntegerGrid:
             UnknownFormatError: the extension is not .obj or .npz.
             MeshFileError: the file does not exist, cannot be read, or does not contain a manifold triangle mesh with
                 UVs.
-            GridError: the UVs are not an integer-grid map.
+            MeshError: the mesh has no vertices or faces, or indices of vertices that do not exist.
+            GridError: the UVs are not an integer-grid map: triangles are flipped, or sides of seams do not match.
         """
         from .files import read_grid
 
