@@ -18,12 +18,11 @@ import time
 from collections.abc import Iterator
 
 import numpy as np
-from common import MODELS, shapes, with_cones_for
+from common import models, shapes, with_cones_for
 
-from coneflat import Flattening, check_mesh, flatten, read_mesh, unwrap
+from coneflat import Flattening, check_mesh, flatten, unwrap
 from coneflat.apps.peers import flatten_by
 from coneflat.apps.peers.packages import installed_peers, run_peer
-from coneflat.errors import ConeflatError
 from coneflat.measure.distortion import Distortion
 from coneflat.mesh.connectivity import TriangleMesh
 
@@ -49,7 +48,7 @@ def main() -> None:
     flatten(*shapes.sphere(2), charts="atlas")
     unwrap(*shapes.sphere(2))
     sums: dict[str, list[tuple[float, ...]]] = {}
-    for name, mesh in models([word for word in arguments.models.split(",") if word], arguments.largest):
+    for name, mesh in chosen([word for word in arguments.models.split(",") if word], arguments.largest):
         for method, result, seconds in (
             matched(mesh) if arguments.matched else flattened(mesh, arguments.more)
         ):
@@ -70,19 +69,10 @@ def main() -> None:
         )
 
 
-def models(names: list[str], largest: int) -> list[tuple[str, TriangleMesh]]:
-    found = [("sphere", check_mesh(*shapes.sphere(5)).mesh)] if not names or "sphere" in names else []
-    for path in sorted(MODELS.glob("*.*")):
-        if path.suffix == ".md" or (names and path.stem not in names):
-            continue
-        source = read_mesh(path)
-        try:
-            mesh = check_mesh(source.vertices, source.triangles).mesh
-        except (ConeflatError, ValueError):
-            continue
-        if len(mesh.faces) <= largest:
-            found.append((path.stem, mesh))
-    return found
+def chosen(names: list[str], largest: int) -> Iterator[tuple[str, TriangleMesh]]:
+    for name, mesh in [("sphere", check_mesh(*shapes.sphere(5)).mesh), *models()]:
+        if len(mesh.faces) <= largest and (not names or name in names):
+            yield name, mesh
 
 
 def row(name: str, mesh: TriangleMesh, method: str, found: Distortion, packed: float, seconds: float) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -17,21 +18,18 @@ sys.path.insert(0, str(ROOT / "tests"))
 import chromium  # noqa: E402, F401 - for benchmarks that open a page
 import shapes  # noqa: E402
 
-from coneflat import Flattening, check_mesh, flatten, read_mesh  # noqa: E402
+from coneflat import ConeflatError, Flattening, check_mesh, flatten, read_mesh  # noqa: E402
 from coneflat.mesh.connectivity import TriangleMesh  # noqa: E402
 
 
-def meshes(names: list[str], largest: int) -> Iterator[tuple[str, TriangleMesh]]:
-    """Yield a sphere and the named models that exist, each subdivided (each triangle into four) up to a size."""
-    sources = [("sphere", shapes.sphere(5))]
-    for name in names:
-        for path in sorted(MODELS.glob(f"{name}.*")):
-            model = read_mesh(path)
-            sources.append((name, (model.vertices, model.triangles)))
-    for name, (vertices, faces) in sources:
-        while len(faces) <= largest:
-            yield name, check_mesh(vertices, faces).mesh
-            vertices, faces = shapes.subdivide(vertices, faces)
+def models(repair: bool = False) -> Iterator[tuple[str, TriangleMesh]]:
+    """Yield the names and meshes of the models that are manifolds, or that a repair makes so."""
+    for path in sorted(MODELS.glob("*.*")):
+        if path.suffix == ".md":
+            continue
+        source = read_mesh(path)
+        with suppress(ConeflatError):
+            yield path.stem, check_mesh(source.vertices, source.triangles, repair=repair).mesh
 
 
 def cases(names: list[str], largest: int) -> Iterator[tuple[str, int]]:

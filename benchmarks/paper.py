@@ -27,6 +27,7 @@ from coneflat.apps.peers.run import (
     markdown,
 )
 from coneflat.apps.view import (
+    Look,
     Panel,
     Row,
     compose,
@@ -224,23 +225,24 @@ class Reproduction:
         one, two = as_csv(TABLE_1, self.table_1()), as_csv(TABLE_2, self.table_2())
         return dict(zip(TEXTS, (self.markdown(), one, two), strict=True))
 
-    def figures(self, sight: pictures.Sight) -> dict[str, Figure]:
+    def figures(self, look: Look) -> dict[str, Figure]:
         """Return the paper's figures by file name."""
         cones, quality, layouts, textures = [], [], [], []
         for model in self.models:
             label = f"{model.name}: {plural(len(model.linear.cones), 'cone')}"
-            cones.append(sight.panel(model.linear, draw_cones, label))
+            cones += look.views(model.linear, draw_cones, label)
             shown = model.comparison.drawn
             scale = pictures.same_scale(shown)
-            quality.append(_row(pictures.quality_panels(shown, scale, sight), scale))
-            pairs = zip(shown, pictures.aligned_layouts(shown), strict=True)
+            quality.append(_row(pictures.quality_panels(shown, scale, look), scale))
+            aligned = pictures.aligned_layouts([result for _, result in shown])
+            pairs = zip(shown, aligned, strict=True)
             layouts.append(
-                _row([layout_panel(result, f"{model.name}, {one.method}") for one, result in pairs])
+                _row([layout_panel(result, f"{model.name}, {method}") for (method, _), result in pairs])
             )
-            linear = [entry for entry in shown if entry.method == "linear"]
+            linear = tuple(each for each in shown if each[0] == "linear")
             own = pictures.same_scale(linear)
-            texture = sight.panel(model.linear, draw_checker, model.name)
-            textures.append(_row([texture, *pictures.quality_panels(linear, own, sight)], own))
+            texture = look.views(model.linear, draw_checker, model.name)
+            textures.append(_row([*texture, *pictures.quality_panels(linear, own, look)], own))
         rows = (pictures.in_rows(cones), quality, layouts, textures)
         marks = (mark_handles(self.models[0].linear), (), (), ())
         return {
@@ -337,7 +339,7 @@ def main() -> None:
     arguments = parser.parse_args()
     pictures.open_folder(arguments.output, FILES)
     found = reproduce(arguments.meshes, progress=lambda what, done: print(f"{done:4.0%} {what}", end="\r"))
-    pictures.write_folder(arguments.output, {**found.texts(), **found.figures(pictures.Sight())})
+    pictures.write_folder(arguments.output, {**found.texts(), **found.figures(Look(dpi=pictures.DPI))})
     print(found.tables().rstrip())
 
 

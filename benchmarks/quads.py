@@ -27,9 +27,9 @@ from typing import Any
 
 import mechanical
 import numpy as np
-from common import MODELS, shapes
+from common import MODELS, models, shapes
 
-from coneflat import check_mesh, quads, read_mesh
+from coneflat import check_mesh, quads
 from coneflat.errors import ConeflatError
 from coneflat.mesh.connectivity import TriangleMesh
 
@@ -72,7 +72,7 @@ def main() -> None:
     names = [name for name, _, _ in COLUMNS]
     print("| model | asked | method | quads | " + " | ".join(names) + " |")
     print("| --- " * (4 + len(names)) + "|")
-    for name, mesh in models([word for word in arguments.models.split(",") if word]):
+    for name, mesh in chosen([word for word in arguments.models.split(",") if word]):
         for count in map(int, arguments.quads.split(",")):
             for method in methods:
                 measures, error = trial(mesh, count, METHODS[method][1], arguments.tool)
@@ -98,17 +98,12 @@ def median(values: list[float]) -> float:
     return float(np.median(values)) if values else float("nan")
 
 
-def models(names: list[str]) -> Iterator[tuple[str, TriangleMesh]]:
+def chosen(names: list[str]) -> Iterator[tuple[str, TriangleMesh]]:
     """Yield the models, decimated ones, and mechanical shapes; of all, those with the given names."""
-    for path in sorted(MODELS.glob("*.*")):
-        if path.suffix == ".md" or (names and path.stem not in names):
+    for name, mesh in models():
+        if names and name not in names:
             continue
-        source = read_mesh(path)
-        try:
-            mesh = check_mesh(source.vertices, source.triangles).mesh
-        except ConeflatError:
-            continue
-        yield path.stem, mesh
+        yield name, mesh
         if len(mesh.faces) > DECIMATED and find_spec("fast_simplification"):
             import fast_simplification
 
@@ -116,7 +111,7 @@ def models(names: list[str]) -> Iterator[tuple[str, TriangleMesh]]:
                 mesh.vertices, mesh.faces, 1 - DECIMATED / 4 / len(mesh.faces)
             )
             try:
-                yield f"{path.stem}, decimated", check_mesh(*small).mesh
+                yield f"{name}, decimated", check_mesh(*small).mesh
             except ConeflatError:
                 continue
     for name, shape in mechanical.shapes().items():

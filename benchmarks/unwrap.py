@@ -16,10 +16,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
-from common import MODELS, shapes
+from common import models, shapes
 
-from coneflat import check_mesh, measure, read_mesh, unwrap
-from coneflat.errors import ConeflatError
+from coneflat import check_mesh, measure, unwrap
 from coneflat.geometry import double_areas, edge_lengths
 from coneflat.mesh.connectivity import TriangleMesh
 
@@ -41,7 +40,7 @@ def main() -> None:
     print("| --- " * 11 + "|")
     unwrap(*shapes.sphere(2))
     rows: dict[str, list[tuple[float, ...]]] = {name: [] for name in PACKAGES}
-    for name, mesh in models(sizes, arguments.largest):
+    for name, mesh in cases(sizes, arguments.largest):
         if only and name not in only:
             continue
         for package, run in PACKAGES.items():
@@ -92,21 +91,14 @@ def summarize(rows: dict[str, list[tuple[float, ...]]]) -> None:
             )
 
 
-def models(sizes: list[int], largest: int) -> Iterator[tuple[str, TriangleMesh]]:
+def cases(sizes: list[int], largest: int) -> Iterator[tuple[str, TriangleMesh]]:
     """Yield the names and meshes of all models."""
-    for path in sorted(MODELS.glob("*.*")):
-        if path.suffix == ".md":
-            continue
-        source = read_mesh(path)
-        try:
-            mesh = check_mesh(source.vertices, source.triangles, repair=True).mesh
-        except ConeflatError:
-            continue
+    for name, mesh in models(repair=True):
         if len(mesh.faces) <= largest:
-            yield path.stem, mesh
+            yield name, mesh
         for size in sizes:
             if size < len(mesh.faces):
-                yield f"{path.stem}-{size}", decimated(mesh, size)
+                yield f"{name}-{size}", decimated(mesh, size)
     yield "handles", check_mesh(*noisy_handles(), repair=True).mesh
     yield "crumbs", check_mesh(*crumbs()).mesh
     yield "letters", check_mesh(*letters(), repair=True).mesh

@@ -15,8 +15,8 @@ from ..base import FloatArray, IntArray, plural, unit_exponent
 from ..errors import MissingUVError
 from ..geometry import MAX_CELLS, approximate_overlap_areas, find_overlaps, signed_double_areas
 from ..io import UVMesh, as_uv_mesh
-from ..measure import MAP_MEASURES, measure_map, path_text
-from ..mesh import CheckedMesh, corner_fans, end_corners, joined_edges, label_charts, left_out
+from ..measure import MAP_MEASURES, measure_map, path_text, sum_angles
+from ..mesh import CheckedMesh, corner_fans, end_corners, joined_edges, label_faces, left_out
 from ..source import at_unit_size
 
 #: Limit of overlapping pairs, per triangle and at least. With more pairs, areas are counted in pixels, because the
@@ -150,7 +150,7 @@ def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:
     distortion = measure_map(scaled.mesh, unit).rescaled((scaled.exponent + exponent) * np.log(2))
     every = mapped.corner_uv[known]
     cover = _cover(np.ldexp(every, -exponent))
-    tiles = len(_tiles(checked.mesh, unit, exponent))
+    tiles = len(chart_tiles(*uv_points(checked.mesh, unit), exponent))
     with np.errstate(over="ignore"):  # A value that is not finite is reported as unknown.
         covered = float(np.ldexp(cover.area, 2 * exponent))
     counts = {
@@ -207,8 +207,6 @@ def angle_sum_error(mesh: TriangleMesh, corner_uv: FloatArray) -> float:
 
     It is large at flipped triangles, and where triangles wind around a point twice.
     """
-    from ..measure import sum_angles
-
     points, fan = uv_points(mesh, corner_uv)
     joined = np.zeros(mesh.faces.size, dtype=bool)
     joined[mesh.edge_halfedges[joined_edges(mesh, corner_uv)]] = True
@@ -221,16 +219,20 @@ def angle_sum_error(mesh: TriangleMesh, corner_uv: FloatArray) -> float:
     return float(np.abs(sums[inside] - 2 * np.pi).max(initial=0.0))
 
 
-def _tiles(mesh: TriangleMesh, unit: FloatArray, exponent: int) -> FloatArray:
+def chart_tiles(points: FloatArray, faces: IntArray, exponent: int = 0) -> FloatArray:
     """Return (k, 2) the lower left corners of the unit squares (UDIM tiles) that contain the centroids of charts.
 
-    unit: (m, 3, 2) UVs divided by 2**exponent.
+    Args:
+        points: (u, 2) points of a layout, divided by 2**exponent.
+        faces: (m, 3) the points of triangles.
+        exponent: a power of two.
     """
-    charts, chart = label_charts(mesh, joined_edges(mesh, unit))
-    weights = np.abs(signed_double_areas(unit)) + np.finfo(np.float64).tiny
-    total = np.bincount(chart, weights, charts)
-    middles = [np.bincount(chart, weights * unit[..., k].mean(axis=1), charts) / total for k in (0, 1)]
-    return np.unique(np.floor(np.ldexp(np.stack(middles, axis=1), exponent)), axis=0)
+    _, chart = np.unique(label_faces(faces, len(points))[1], return_inverse=True)
+    corners = points[faces]
+    weights = np.abs(signed_double_areas(corners)) + np.finfo(np.float64).tiny
+    sums = [np.bincount(chart, weights * corners[..., k].mean(axis=1)) for k in (0, 1)]
+    middles = np.stack(sums, axis=1) / np.bincount(chart, weights)[:, None]
+    return np.unique(np.floor(np.ldexp(middles, exponent)), axis=0)
 
 
 class _Cover(NamedTuple):

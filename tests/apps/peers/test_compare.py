@@ -18,7 +18,7 @@ from coneflat.apps.cli.main import cli
 from coneflat.apps.peers import METHODS, compare_methods, flatten_by
 from coneflat.apps.peers.methods import PEERS as METHODS_OF_OTHERS
 from coneflat.apps.peers.packages import PEERS, Peer, installed_peers, run_peer
-from coneflat.apps.peers.pictures import Sight, aligned_layouts, draw_layouts, draw_qualities
+from coneflat.apps.peers.pictures import aligned_layouts, draw_layouts, draw_qualities
 from coneflat.apps.peers.run import (
     COLUMNS,
     Comparison,
@@ -27,6 +27,7 @@ from coneflat.apps.peers.run import (
     comparison_markdown,
     numbers,
 )
+from coneflat.apps.view import Look
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +76,7 @@ def test_a_method_that_fails_is_named_with_its_reason(ball, monkeypatch):
     assert found["bff"].result is None
     assert found["bff"].note == "bff did not converge"
     assert "bff did not converge" in comparison_markdown(found)
-    assert [entry.method for entry in found.drawn] == ["exact"]
+    assert [method for method, _ in found.drawn] == ["exact"]
 
 
 @pytest.mark.parametrize("name", PEERS)
@@ -186,8 +187,7 @@ def rotated(result, angle, factor=1.0, shift=0.0):
 @pytest.mark.parametrize("angle", [0.3, np.pi / 2, -2.9])
 def test_layouts_are_turned_back_to_lie_as_the_first(hill, angle):
     others = [rotated(hill, angle), rotated(hill, angle, 0.4, 3.0)]
-    entries = [Entry("a", hill, 1.0), *(Entry("b", each, 1.0) for each in others)]
-    first, second, third = aligned_layouts(entries)
+    first, second, third = aligned_layouts([hill, *others])
     assert first is hill
     sides = [np.diff(each.uv[each.uv_faces], axis=1) for each in (first, second, third)]
     np.testing.assert_allclose(sides[1], sides[0], atol=1e-12)
@@ -196,7 +196,7 @@ def test_layouts_are_turned_back_to_lie_as_the_first(hill, angle):
 
 def test_layouts_of_other_charts_stay(hill):
     other = coneflat.flatten(*shapes.box(3), sharp_angle=1.0)
-    assert aligned_layouts([Entry("a", hill, 1.0), Entry("b", other, 1.0)])[1] is other
+    assert aligned_layouts([hill, other])[1] is other
 
 
 @pytest.mark.parametrize("stretch", [1.0, 8.0])
@@ -206,7 +206,7 @@ def test_no_text_runs_into_another_or_over_the_edge(stretch):
     result = coneflat.flatten(vertices * [1, stretch, 1], faces)
     entries = tuple(Entry(LONG, result, 1.0) for _ in range(7))
     comparison = Comparison(entries)
-    for figure in (draw_layouts(comparison), draw_qualities(comparison, Sight())):
+    for figure in (draw_layouts(comparison), draw_qualities(comparison, Look())):
         width, height = figure.get_size_inches() * figure.dpi
         boxes = [text.get_window_extent() for text in figure.texts]
         labels = [text.get_window_extent() for text in figure.texts if text.get_text().startswith(LONG)]

@@ -98,12 +98,9 @@ class TestWhatIsNone:
     @pytest.mark.parametrize(
         ("name", "value", "message"),
         [
-            ("turns", None, "holds no integer grid: 'turns' is missing"),
-            ("turns", 7, "'turns' has indices outside"),
-            ("shifts", 7, "its turns and shifts do not match its corners"),
+            ("corners", None, "holds no integer grid: 'corners' is missing"),
             ("faces", 10**6, "'faces' has indices outside"),
             ("corner_grid", np.inf, "not finite"),
-            ("cones", -1, "'cones' has indices outside"),
             ("report", "", "not a readable NPZ file"),
         ],
     )

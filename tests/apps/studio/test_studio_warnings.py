@@ -7,12 +7,11 @@ import re
 from importlib.resources import files
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import coneflat
 from coneflat.apps.studio.choices import DECLARED, Choices
-from coneflat.apps.studio.messages import CONTROLS, misplaced_warning, page_message, vertices_in
+from coneflat.apps.studio.messages import CONTROLS, misplaced_warning, page_message
 from coneflat.apps.studio.paint import Region
 from coneflat.base.defaults import MAX_CONE_ANGLE
 from coneflat.errors import StudioError
@@ -27,13 +26,6 @@ def settled(session):
 
 
 class TestPlaces:
-    def test_what_is_in_a_region(self):
-        some = np.flatnonzero(np.random.default_rng(7).random(400) < 0.4).tolist()
-        region = Region.of_runs((vertex, vertex) for vertex in some)
-        every = list(range(-3, 410))
-        assert vertices_in(region, every) == [v for v in every if v in set(some)]
-        assert vertices_in(Region(), every) == []
-
     def test_one_and_several(self):
         painted = Choices().painted("no_cone", Region("3-9 20"))
         assert misplaced_warning(painted) == ()

@@ -68,14 +68,14 @@ def compare(
             raise click.UsageError(f"--{name} has no effect without -o: add -o", context)
     options = {**keywords(given, FindOptions), **(PAPER if flags.paper else {})}
     methods = METHODS if flags.methods is None else tuple(name.strip() for name in flags.methods.split(","))
-    if flags.output is not None:
-        from ..peers.pictures import Sight, draw_layouts, draw_qualities, open_folder, write_folder
-
-        sight = Sight(flags.eye, up)
     with Console(verbosity) as console:
         with console.stage("read", 0.0):
             source = read_joined(mesh, weld)
         if flags.output is not None:
+            from ..peers.pictures import DPI, draw_layouts, draw_qualities, open_folder, write_folder
+            from ..view import Look
+
+            look = Look(eyes=(flags.eye,), up=up, dpi=DPI)
             open_folder(flags.output, COMPARED)
         with console.stage("compare", console.READ):
             found = compare_methods(
@@ -93,7 +93,7 @@ def compare(
         if flags.output is not None:
             with console.stage("draw"):
                 texts = comparison_markdown(found), comparison_csv(found)
-                pictures = draw_layouts(found), draw_qualities(found, sight)
+                pictures = draw_layouts(found), draw_qualities(found, look)
                 written = write_folder(flags.output, dict(zip(COMPARED, (*texts, *pictures), strict=True)))
         console.say(comparison_lines(found))
         console.finish(written)

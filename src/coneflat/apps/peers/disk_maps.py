@@ -8,10 +8,10 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ... import TriangleMesh
-from ...base import FloatArray, IntArray, plural
+from ...base import FloatArray, plural
 from ...errors import MetricError
-from ...geometry import corner_angles, double_areas
-from ...layout import far_pins, pinned_least_squares
+from ...geometry import double_areas
+from ...layout import far_pins, pinned_least_squares, rest_sides
 from ...stages import ConeSolution, Cut, Embedding, FlatMetric
 
 
@@ -34,10 +34,8 @@ def least_squares_map(mesh: TriangleMesh, lengths: FloatArray, solution: ConeSol
     return embedding_metric(mesh, lengths, solution, embed, has_target_cones=False)
 
 
-def least_squares_conformal(
-    disk: TriangleMesh, lengths: FloatArray, pins: IntArray | None = None
-) -> FloatArray:
-    """Return (n, 2) the least squares conformal map (LSCM) of a disk, with two vertices pinned.
+def least_squares_conformal(disk: TriangleMesh, lengths: FloatArray) -> FloatArray:
+    """Return (n, 2) the least squares conformal map (LSCM) of a disk, with two distant vertices pinned.
 
     It minimises the energy of Eq. 4 and 5 of the paper (Levy et al. 2002). Triangles may be flipped. The pins affect
     not only position and size, but also the variation of scale.
@@ -45,13 +43,11 @@ def least_squares_conformal(
     Args:
         disk: a topological disk.
         lengths: (m, 3) side lengths; every triangle has area.
-        pins: (2,) the vertices that are mapped to (0, 0) and (1, 0); by default two distant ones.
 
     Raises:
         MetricError: the solution is not finite.
     """
-    pins = far_pins(disk, lengths) if pins is None else pins
-    z = pinned_least_squares(conformal_equations(disk, lengths), pins)
+    z = pinned_least_squares(conformal_equations(disk, lengths), far_pins(disk, lengths))
     if not np.isfinite(z).all():
         raise MetricError(f"the least squares conformal map of {len(disk.faces):,} triangles is not finite")
     return np.stack([z.real, z.imag], axis=1)
@@ -76,10 +72,7 @@ def conformal_equations(mesh: TriangleMesh, lengths: FloatArray) -> csr_matrix:
         raise MetricError(
             f"{int((~(areas > 0)).sum())} of {plural(len(areas), 'triangle')} without area have no conformal energy"
         )
-    angles = corner_angles(lengths)
-    # The directions of sides differ by the exterior angles; side 0, from corner 1 to 2, has direction 0.
-    directions = np.stack([np.zeros(len(angles)), np.pi - angles[:, 2], np.pi + angles[:, 1]], axis=1)
-    sides = lengths * np.exp(1j * directions) / np.sqrt(2 * areas)[:, None]
+    sides = rest_sides(lengths) / np.sqrt(2 * areas)[:, None]
     rows = np.repeat(np.arange(len(sides)), 3)
     return csr_matrix((sides.ravel(), (rows, mesh.faces.ravel())), shape=(len(sides), len(mesh.vertices)))
 

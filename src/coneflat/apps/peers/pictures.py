@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ...geometry import signed_double_areas
 from ...io import atomic_write, check_target, make_folder
 from ...mesh import label_faces
 from .. import view
-from .run import Comparison, Entry
+from .run import Comparison, Drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,72 +24,44 @@ if TYPE_CHECKING:
 DPI = 200.0
 
 
-@dataclass(frozen=True)
-class Sight:
-    """The view direction of models.
-
-    Attributes:
-        eye: direction to the eye, as in `draw_checker`.
-        up: the models' upward axis, "x", "y" or "z".
-
-    Raises:
-        OptionError: the direction or the axis is unknown.
-    """
-
-    eye: view.Eye = "front-right"
-    up: str = "y"
-
-    def __post_init__(self) -> None:
-        view.eye_direction(self.eye, self.up)
-
-    def panel(self, result: Flattening, draw: Callable[..., object], label: str, **more: Any) -> view.Panel:
-        """Return a panel in which a function of axes, a result and view options draws the model."""
-        aspect = view.view_aspect(result.vertices[np.unique(result.faces)], self.eye, self.up)
-        look = {"result": result, "eye": self.eye, "up": self.up, "dpi": DPI, **more}
-        return view.Panel(aspect, lambda axes: draw(axes=axes, **look), label)
-
-
 def draw_layouts(comparison: Comparison) -> Figure:
     """Return a figure of the layouts of all methods, coloured by quasi-conformal distortion on one scale.
 
     The colour bar has a histogram of the distortion by the first method.
     """
     shown = comparison.drawn
-    quantities = same_scale(shown)
+    quantities, layouts = same_scale(shown), aligned_layouts([result for _, result in shown])
     panels = [
         view.Panel(
             view.layout_aspect(result, crop=True),
             partial(view.fill_layout, result=result, quantity=quantity, dpi=DPI),
-            labelled(entry.method, result),
+            labelled(method, result),
         )
-        for entry, quantity, result in zip(shown, quantities, aligned_layouts(shown), strict=True)
+        for (method, _), quantity, result in zip(shown, quantities, layouts, strict=True)
     ]
     return _figure_of(panels, quantities)
 
 
-def draw_qualities(comparison: Comparison, sight: Sight) -> Figure:
+def draw_qualities(comparison: Comparison, look: view.Look) -> Figure:
     """Return a figure of the model with the quasi-conformal distortion of all methods on one scale."""
     quantities = same_scale(comparison.drawn)
-    return _figure_of(quality_panels(comparison.drawn, quantities, sight), quantities)
+    return _figure_of(quality_panels(comparison.drawn, quantities, look), quantities)
 
 
-def quality_panels(
-    entries: Sequence[Entry], quantities: Sequence[view.Quantity], sight: Sight
-) -> list[view.Panel]:
-    """Return a panel of the model for each method, coloured by its quantity."""
+def quality_panels(shown: Drawn, quantities: Sequence[view.Quantity], look: view.Look) -> list[view.Panel]:
+    """Return panels of the model for each method, coloured by its quantity."""
     return [
-        sight.panel(result, view.draw_quantity, labelled(entry.method, result), quantity=quantity)
-        for entry, quantity in zip(entries, quantities, strict=True)
-        if (result := entry.result) is not None
+        panel
+        for (method, result), quantity in zip(shown, quantities, strict=True)
+        for panel in look.views(result, view.draw_quantity, labelled(method, result), quantity=quantity)
     ]
 
 
-def aligned_layouts(entries: Sequence[Entry]) -> list[Flattening]:
-    """Return the results of entries, each rotated to align its largest chart with that of the first one.
+def aligned_layouts(results: Sequence[Flattening]) -> list[Flattening]:
+    """Return results, each rotated to align its largest chart with that of the first one.
 
     Results with different charts are not rotated.
     """
-    results = [entry.result for entry in entries if entry.result is not None]
     return [_rotated_to(result, results[0]) for result in results]
 
 
@@ -114,16 +86,18 @@ def labelled(method: str, result: Flattening) -> str:
     return f"{method}: {result.distortion.qc_mean:.4f}"
 
 
-def same_scale(entries: Sequence[Entry]) -> list[view.Quantity]:
+def same_scale(shown: Drawn) -> list[view.Quantity]:
     """Return the quasi-conformal distortion by each method, with a common colour scale."""
-    quantities = [view.conformal_distortion(entry.result) for entry in entries if entry.result is not None]
+    quantities = [view.conformal_distortion(result) for _, result in shown]
     if not quantities:
         return []
     # The scale is that of the median method, because most methods are far better than the worst.
     by_distortion = sorted((quantity.scale for quantity in quantities), key=lambda scale: scale.high)
     scale = by_distortion[(len(quantities) - 1) // 2]
-    names = [f"QC, {entry.method}" for entry in entries if entry.result is not None]
-    return [replace(one, scale=scale, label=name) for one, name in zip(quantities, names, strict=True)]
+    return [
+        replace(quantity, scale=scale, label=f"QC, {method}")
+        for (method, _), quantity in zip(shown, quantities, strict=True)
+    ]
 
 
 def _figure_of(panels: Sequence[view.Panel], quantities: Sequence[view.Quantity]) -> Figure:

@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,6 +26,8 @@ SHARED = (
 )  # fmt: skip
 # Those of them that contain vertex indices of the input.
 VERTEX_OPTIONS = ("seams", "no_seams", "seam_weights")
+Drawn: TypeAlias = "tuple[tuple[str, Flattening], ...]"
+
 # The stages from cones and cut to a layout.
 TIMED = ("metric", "layout")
 
@@ -58,9 +60,9 @@ class Comparison:
     entries: tuple[Entry, ...]
 
     @property
-    def drawn(self) -> tuple[Entry, ...]:
-        """The entries that have a result."""
-        return tuple(entry for entry in self.entries if entry.result is not None)
+    def drawn(self) -> Drawn:
+        """The method and the result of each entry that has one."""
+        return tuple((entry.method, entry.result) for entry in self.entries if entry.result is not None)
 
     def __getitem__(self, method: str) -> Entry:
         """Return the entry of a method."""

@@ -19,7 +19,8 @@ from ...base import ComplexArray, FloatArray, IntArray
 from ...errors import CurvatureError
 from ..unwrap.coarse import coarse_mesh
 from .cross_field import SHARP_ANGLE, field_indices, preferred_directions, sharp_ends, smoothest_cross_field
-from .map_model import SAMPLES, MapModel, vertex_graph
+from .features import vertex_graph
+from .map_model import SAMPLES, MapModel
 from .options import DISTORTION
 
 # Cost of an area distortion as large as allowed, at first, and of crosses off by 22.5 degrees, which is larger where

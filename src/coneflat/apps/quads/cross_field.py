@@ -131,8 +131,7 @@ def curvature_tensors(mesh: TriangleMesh, areas: FloatArray, radius: float) -> F
 def _dual_laplacian(mesh: TriangleMesh, areas: FloatArray, rotations: FloatArray) -> csr_matrix:
     """Return (m, m) the matrix of the energy sum w |z_g - e^(4 i r) z_f|^2 over the inner edges between f and g."""
     one, two = mesh.edge_faces[~mesh.is_boundary_edge].T
-    lengths = np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
-    weights = 3 * lengths[~mesh.is_boundary_edge] ** 2 / (areas[one] + areas[two])
+    weights = 3 * lengths_along(mesh, np.flatnonzero(~mesh.is_boundary_edge)) ** 2 / (areas[one] + areas[two])
     across = -weights * np.exp(4j * rotations)
     rows, columns = np.concatenate([one, two, one, two]), np.concatenate([one, two, two, one])
     values = np.concatenate([weights, weights, across.conj(), across])

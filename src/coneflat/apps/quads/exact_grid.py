@@ -15,8 +15,9 @@ import numpy as np
 from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray, compiled, list_some, plural
 from ...errors import GridError
-from ...geometry import fill_orientations, sides_between
+from ...geometry import fill_orientations, halfedge_twins, sides_between
 from .layout import GRID_TOLERANCE, quarters_around
+from .transitions import rotated
 
 if TYPE_CHECKING:
     from .integer_map import IntegerGrid
@@ -53,13 +54,11 @@ def exact_grid(grid: IntegerGrid) -> ExactGrid:
 
     Raises:
         GridError: the map is not an integer-grid map: the two sides of an edge do not match, a cone is not a grid
-            point or has a different angle than stated, or a triangle is not counterclockwise.
+            point, or a triangle is not counterclockwise.
     """
     mesh = TriangleMesh(np.asarray(grid.vertices, np.float64), np.asarray(grid.faces, np.int64))
     given = np.ascontiguousarray(grid.corner_grid, np.float64)
-    twin = np.full(mesh.faces.size, -1, dtype=np.int64)
-    one, two = mesh.edge_halfedges[~mesh.is_boundary_edge].T
-    twin[one], twin[two] = two, one
+    twin = halfedge_twins(mesh)
     inner = np.flatnonzero(twin >= 0)
     # The motions of a half-edge are those to its twin's triangle, the inverse of the given ones.
     turns, shifts = np.zeros(len(twin), dtype=np.int64), np.zeros((len(twin), 2))
@@ -83,15 +82,8 @@ def exact_grid(grid: IntegerGrid) -> ExactGrid:
         corners, is_off = _transport(exact, snapped)
     exact = replace(exact, corners=corners)
     _require_map(exact, given, is_off)
-    _require_cones(exact, grid)
+    _require_cones(exact)
     return exact
-
-
-def rotated(turns: IntArray, points: FloatArray) -> FloatArray:
-    """Return (k, 2) points rotated by quarter turns (k,), without rounding."""
-    cosine, sine = np.array([1.0, 0.0, -1.0, 0.0])[turns], np.array([0.0, 1.0, 0.0, -1.0])[turns]
-    x, y = points[:, 0], points[:, 1]
-    return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)
 
 
 def _fans(mesh: TriangleMesh, twin: IntArray) -> list[IntArray]:
@@ -114,21 +106,18 @@ def _fans(mesh: TriangleMesh, twin: IntArray) -> list[IntArray]:
 def _transport(exact: ExactGrid, start: FloatArray) -> tuple[FloatArray, BoolArray]:
     """Return (m, 3, 2) the coordinates of all corners, transported from the first corners of the vertices (n, 2).
 
-    And (n,) whether a vertex is invalid: its coordinates differ after a full loop, or it has holonomy and is not a grid
-    point.
+    And (n,) whether the coordinates of a vertex differ after a full loop.
     """
     flat, here = exact.mesh.faces.ravel(), start.copy()
-    corners, total = np.empty((len(flat), 2)), np.zeros(len(start), dtype=np.int64)
+    corners = np.empty((len(flat), 2))
     for corner in exact.fans:
         corners[corner] = here[flat[corner]]
         out = corner - corner % 3 + (corner + 1) % 3
         goes_on = exact.twin[out] >= 0
         vertex, out = flat[corner[goes_on]], out[goes_on]
         here[vertex] = rotated(exact.turns[out], here[vertex]) + exact.shifts[out]
-        total[vertex] += exact.turns[out]
-    is_off = (here != start).any(axis=1)
-    is_off |= (total % 4 != 0) & (start != np.round(start)).any(axis=1)
-    return corners.reshape(-1, 3, 2), is_off & ~exact.mesh.is_boundary_vertex
+    is_off = (here != start).any(axis=1) & ~exact.mesh.is_boundary_vertex
+    return corners.reshape(-1, 3, 2), is_off
 
 
 @compiled
@@ -155,8 +144,7 @@ def _require_map(exact: ExactGrid, given: FloatArray, is_off: BoolArray) -> None
     bad = np.flatnonzero(is_off)
     if len(bad):
         raise GridError(
-            f"{plural(len(bad), 'vertex', 'vertices')} around which the grid does not close, or is rotated though they "
-            f"are not grid points: {list_some(bad)}"
+            f"{plural(len(bad), 'vertex', 'vertices')} around which the grid does not close: {list_some(bad)}"
         )
     off = np.abs(exact.corners - given).max(axis=(1, 2))
     bad = np.flatnonzero(~(off <= GRID_TOLERANCE))
@@ -172,22 +160,13 @@ def _require_map(exact: ExactGrid, given: FloatArray, is_off: BoolArray) -> None
         )
 
 
-def _require_cones(exact: ExactGrid, grid: IntegerGrid) -> None:
-    """Raise GridError unless the inner vertices with angles other than 2 pi are the cones and lie on grid points."""
+def _require_cones(exact: ExactGrid) -> None:
+    """Raise GridError unless the inner vertices with angles other than 2 pi lie on grid points."""
     mesh = exact.mesh
-    found = quarters_around(mesh, sides_between(exact.corners))
-    expected = np.full(len(found), 4, dtype=np.int64)
-    expected[np.asarray(grid.cones, np.int64)] = grid.quarters
-    inner = ~mesh.is_boundary_vertex & (np.bincount(mesh.faces.ravel(), minlength=len(found)) > 0)
-    bad = np.flatnonzero(inner & (found != expected))
-    if len(bad):
-        raise GridError(
-            f"{plural(len(bad), 'vertex', 'vertices')} with unexpected angles: {list_some(bad)}; vertex {bad[0]} "
-            f"has {found[bad[0]]} quarter turns, expected {expected[bad[0]]}"
-        )
     place = exact.corners.reshape(-1, 2)[exact.fans[0]]
-    is_off = np.zeros(len(found), dtype=bool)
+    is_off = np.zeros(len(mesh.vertices), dtype=bool)
     is_off[mesh.faces.ravel()[exact.fans[0]]] = (place != np.round(place)).any(axis=1)
-    bad = np.flatnonzero(inner & (expected != 4) & is_off)
+    is_cone = quarters_around(mesh, sides_between(exact.corners)) != 4
+    bad = np.flatnonzero(is_off & is_cone & ~mesh.is_boundary_vertex)
     if len(bad):
         raise GridError(f"{plural(len(bad), 'cone')} off the grid points: {list_some(bad)}")

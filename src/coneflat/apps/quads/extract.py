@@ -8,7 +8,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ...base import FloatArray, IntArray, dots, list_some, plural
@@ -17,7 +16,7 @@ from ...geometry import signed_double_areas
 from ...mesh import NEXT, PREVIOUS, label_components
 from .cross_field import SHARP_ANGLE
 from .exact_grid import ExactGrid, exact_grid
-from .features import lengths_along
+from .features import vertex_graph
 from .grid_points import LOST, GridPoints, Ports, find_points, find_ports, join_ports
 from .integer_map import IntegerGrid
 from .quad_mesh import CoarseGridError, QuadMesh, degenerate_quads
@@ -43,9 +42,6 @@ def extract_quads(grid: IntegerGrid, leave_out: bool = False) -> QuadMesh:
     Raises:
         GridError: the map is not an integer-grid map, is so coarse that a quad has the same vertex or edge twice, or
             has too many squares.
-
-    References:
-        H.-C. Ebke, D. Bommes, M. Campen, L. Kobbelt, "QEx: robust quad mesh extraction", 2013.
     """
     area = float(signed_double_areas(grid.corner_grid).sum()) / 2
     if area > MAX_SQUARES:
@@ -173,15 +169,12 @@ def with_borders(quads: QuadMesh) -> QuadMesh:
     correspond, because quads are missing at thin parts or cover a hole.
     """
     mesh, count = quads.surface, len(quads.vertices)
-    sides = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
-    leaving, loop_of, place = np.full((3, len(mesh.vertices)), -1)
-    leaving[mesh.tails[sides]] = sides
-    loops = [leaving[walk] for walk in _walks(mesh.tails[sides], mesh.heads[sides])]
+    loops = mesh.boundary_walks()
+    loop_of, place = np.full((2, len(mesh.vertices)), -1)
     for number, loop in enumerate(loops):
         loop_of[mesh.tails[loop]], place[mesh.tails[loop]] = number, np.arange(len(loop))
-    lengths = lengths_along(mesh, np.arange(len(mesh.edges)))
-    graph = coo_matrix((lengths, mesh.edges.T), shape=(len(place), len(place))).tocsr()
-    away, _, source = dijkstra(graph, False, mesh.tails[sides], return_predecessors=True, min_only=True)
+    graph, border = vertex_graph(mesh), np.flatnonzero(mesh.is_boundary_vertex)
+    away, _, source = dijkstra(graph, indices=border, return_predecessors=True, min_only=True)
     tails, heads = quads.quads.ravel(), np.roll(quads.quads, -1, axis=1).ravel()
     alone = ~np.isin(tails * count + heads, heads * count + tails)
     layers, faces, weights, taken, missing = [quads.quads], [quads.faces], [quads.barycentric], [-1], 0
@@ -193,7 +186,7 @@ def with_borders(quads: QuadMesh) -> QuadMesh:
         starts = mesh.vertices[mesh.tails[loop]]
         steps = mesh.vertices[mesh.heads[loop]] - starts
         at, off = _places_along(points, np.minimum(place[nearest], len(loop) - 1), starts, steps)
-        is_there = off.max() <= 1e-9 * lengths.max()
+        is_there = off.max() <= 1e-9 * graph.max()
         if at is None or is_there or number in taken:
             missing += not is_there
             continue

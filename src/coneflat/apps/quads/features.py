@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray
@@ -18,6 +19,14 @@ def sharp_edges(mesh: TriangleMesh, angle: float) -> IntArray:
 def lengths_along(mesh: TriangleMesh, edges: IntArray) -> FloatArray:
     """Return (k,) the lengths of edges."""
     return np.linalg.norm(np.diff(mesh.vertices[mesh.edges[edges]], axis=1)[:, 0], axis=1)
+
+
+def vertex_graph(mesh: TriangleMesh) -> csr_matrix:
+    """Return (n, n) the lengths of edges."""
+    one, two = mesh.edges.T
+    both = np.concatenate([one, two]), np.concatenate([two, one])
+    lengths = lengths_along(mesh, np.arange(len(mesh.edges)))
+    return csr_matrix((np.tile(lengths, 2), both), shape=(len(mesh.vertices),) * 2)
 
 
 def without_stubs(mesh: TriangleMesh, edges: IntArray, least: float) -> IntArray:

@@ -39,7 +39,7 @@ from ...io import (
     shading_normals,
     write_parts,
 )
-from .integer_map import IntegerGrid, find_motions, grid_of_corners
+from .integer_map import IntegerGrid, grid_of_corners
 from .quad_mesh import QuadMesh, least_jacobians
 
 Check: TypeAlias = Callable[["str | PathLike[str]"], Path]
@@ -59,6 +59,8 @@ _ARRAYS, _NUMBERS = (
     [field.name for field in fields(IntegerGrid) if str(field.type).endswith(kind)]
     for kind in ("Array", "float")
 )
+#: Arrays from which a grid is restored.
+_RESTORED = ("vertices", "faces", "corner_grid", "corners", "corner_quarters", "features", "report")
 _REPORT = re.compile(rb"(?m)^# grid (\{.*\})[ \t]*\r?$")
 _LINE = re.compile(rb"(?m)^l +(\d+) +(\d+)[ \t]*\r?$")
 _HEAD = (
@@ -84,16 +86,7 @@ def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:
     which has no quads, has two triangles for each and their edges as lines; see `_write_glb`. An .npz has all arrays of
     the `QuadMesh`, from which `read_quads` restores it, and the irregular vertices with their valences. VTK (.vtk,
     .vtu), Abaqus (.inp) and Gmsh (.msh) are written by meshio; all but Abaqus have the valences of vertices, and the
-    least scaled Jacobians of quads.
-
-    Args:
-        path: the file.
-        mesh: the quad mesh.
-
-    Raises:
-        UnknownFormatError: the extension is not one of `QUAD_FORMATS`.
-        OptionError: meshio is needed and not installed.
-        MeshFileError: the file cannot be written.
+    least scaled Jacobians of quads. Errors are those of `QuadMesh.save`.
     """
     path = check_quads_output(path)
     with atomic_write(path) as stream:
@@ -160,12 +153,7 @@ def holds_quads(path: str | PathLike[str]) -> bool:
 
 
 def read_quads(path: str | PathLike[str]) -> QuadMesh:
-    """Return a quad mesh from an .npz file.
-
-    Raises:
-        UnknownFormatError: the extension is not .npz.
-        MeshFileError: the file does not exist, cannot be read, or does not contain a quad mesh.
-    """
+    """Return a quad mesh from an .npz file; see `QuadMesh.load`."""
     path = as_path(path)
     known_ending(path, (".npz",), "quads with their surface are read from")
     return read_archive(path, _NAMES, _quad_mesh)
@@ -243,15 +231,7 @@ def write_grid(path: str | PathLike[str], grid: IntegerGrid) -> Path:
     An .obj has the grid coordinates of every triangle corner as texture coordinates, with all digits, as programs that
     extract quads expect them, for example libQEx. Comments contain the quarter turns and translations of seam edges and
     the measures of the grid. An .npz has all arrays of the `IntegerGrid`, and the content of these comments: `seams`
-    (k, 2), pairs of vertices, with `seam_turns` (k,) and `seam_shifts` (k, 2).
-
-    Args:
-        path: the file.
-        grid: the integer grid.
-
-    Raises:
-        UnknownFormatError: the extension is not one of `GRID_FORMATS`.
-        MeshFileError: the file cannot be written.
+    (k, 2), pairs of vertices, with `seam_turns` (k,) and `seam_shifts` (k, 2). Errors are those of `IntegerGrid.save`.
     """
     path = check_grid_output(path)
     with atomic_write(path) as stream:
@@ -301,17 +281,12 @@ def read_grid(path: str | PathLike[str]) -> IntegerGrid:
     """Return an integer grid from an .npz or .obj file.
 
     An .obj needs triangles with texture coordinates in units of the grid only; quarter turns, translations and cones
-    follow from these. Measures are read from the comments of `write_grid`; without these they are NaN.
-
-    Raises:
-        UnknownFormatError: the extension is not one of `GRID_FORMATS`.
-        MeshFileError: the file does not exist, cannot be read, or does not contain a manifold triangle mesh with UVs.
-        MeshError: the mesh has no vertices or faces, or indices of vertices that do not exist.
-        GridError: the UVs are not an integer-grid map: triangles are flipped, or sides of seams do not match.
+    follow from these. Measures are read from the comments of `write_grid`; without these they are NaN. Errors are those
+    of `IntegerGrid.load`.
     """
     path = as_path(path)
     if known_ending(path, GRID_FORMATS, "integer grids are read from") == ".npz":
-        return read_archive(path, (*_ARRAYS, "report"), _grid_of_archive)
+        return read_archive(path, _RESTORED, _grid_of_archive)
     return _grid_of_obj(path, read_bytes(path))
 
 
@@ -359,32 +334,21 @@ def _known(path: Path, text: bytes) -> dict[str, Any]:
 
 
 def _grid_of_archive(reading: CheckedArrays) -> IntegerGrid:
-    reading.need((*_ARRAYS, "report"), "integer grid")
+    reading.need(_RESTORED, "integer grid")
     report = reading.report()
     vertices = reading.finite("vertices", (None, 3))
     n = len(vertices)
     faces = reading.indices("faces", (None, 3), n)
-    m = len(faces)
     numbers: dict[str, Any] = {name: float(number(report[name])) for name in _NUMBERS}
-    cones, corners = (reading.indices(name, (None,), n) for name in ("cones", "corners"))
-    grid = IntegerGrid(
-        vertices=vertices,
-        faces=faces,
-        corner_grid=reading.finite("corner_grid", (m, 3, 2)),
-        turns=reading.indices("turns", (3 * m,), 4, least=-1),
-        shifts=reading.indices("shifts", (3 * m, 2), None, least=-(2**53)),
-        cones=cones,
-        quarters=reading.indices("quarters", (len(cones),), None),
+    corners = reading.indices("corners", (None,), n)
+    _require_mesh(reading.path, vertices, faces)
+    return grid_of_corners(
+        vertices,
+        faces,
+        reading.finite("corner_grid", (len(faces), 3, 2)),
+        **numbers,
+        notes=reading.notes(report),
         corners=corners,
         corner_quarters=reading.indices("corner_quarters", (len(corners),), None),
         features=reading.indices("features", (None, 2), n),
-        **numbers,
-        notes=reading.notes(report),
     )
-    _require_mesh(reading.path, vertices, faces)
-    turns, shifts, _ = find_motions(TriangleMesh(vertices, faces), grid.corner_grid)
-    if (turns != grid.turns).any() or (shifts != grid.shifts).any():
-        raise MeshFileError(
-            f"{reading.path} holds no integer grid: its turns and shifts do not match its corners"
-        )
-    return grid

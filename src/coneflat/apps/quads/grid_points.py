@@ -16,7 +16,8 @@ import numpy as np
 
 from ...base import BoolArray, FloatArray, IntArray, compiled, dots
 from ...geometry import fill_orientations, orientation
-from .exact_grid import ExactGrid, rotated, turn
+from .exact_grid import ExactGrid, turn
+from .transitions import rotated
 
 #: Values for a port without a mate: its line ends at the boundary, or the map is invalid.
 BOUNDARY, LOST = -1, -2

@@ -106,7 +106,8 @@ class IntegerGrid:
             UnknownFormatError: the extension is not .obj or .npz.
             MeshFileError: the file does not exist, cannot be read, or does not contain a manifold triangle mesh with
                 UVs.
-            GridError: the UVs are not an integer-grid map.
+            MeshError: the mesh has no vertices or faces, or indices of vertices that do not exist.
+            GridError: the UVs are not an integer-grid map: triangles are flipped, or sides of seams do not match.
         """
         from .files import read_grid
 
@@ -153,7 +154,8 @@ def grid_of_corners(
     Args:
         vertices, faces: (n, 3), (m, 3) a consistently oriented manifold mesh.
         corner_grid: (m, 3, 2) grid coordinates of every triangle corner.
-        known: measures of the grid, notes and features; missing measures are NaN, except the size, which is computed.
+        known: measures of the grid, notes, features and corners; missing measures are NaN, except the size and the
+            corners of the boundary, which are computed.
 
     Raises:
         GridError: triangles are flipped, or the sides of seams are not related by quarter turns and integer
@@ -186,9 +188,12 @@ def grid_of_corners(
         shifts=shifts,
         cones=cones,
         quarters=quarters[cones],
-        corners=corners,
-        corner_quarters=quarters[corners],
-        **{"size": float(np.sqrt(area / flat.sum())), **known},  # type: ignore[arg-type]
+        **{  # type: ignore[arg-type]
+            "size": float(np.sqrt(area / flat.sum())),
+            "corners": corners,
+            "corner_quarters": quarters[corners],
+            **known,
+        },
     )
 
 

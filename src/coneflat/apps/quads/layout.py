@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from ... import Flattening, TriangleMesh
 from ...base import BoolArray, ComplexArray, FloatArray, IntArray
@@ -103,6 +104,15 @@ class GridLayout:
         """The area of the layout in squares."""
         return float(self.double_areas().sum()) / 2
 
+    def graph(self) -> csr_matrix:
+        """Return (n, n) the lengths of edges between vertices in the plane."""
+        starts, ends = self.ends
+        lengths = np.abs(self.points[ends] - self.points[starts])
+        halfedges = csr_matrix(
+            (lengths, (self.mesh.tails, self.mesh.heads)), shape=(len(self.mesh.vertices),) * 2
+        )
+        return halfedges.maximum(halfedges.T)
+
     def double_areas(self) -> FloatArray:
         """Return (m,) twice the signed areas of triangles in the plane, negative for flipped ones."""
         return signed_double_areas(as_pairs(self.points)[self.corners])
@@ -118,7 +128,7 @@ class GridLayout:
 
 
 def aligned(
-    result: Flattening, quads: float | None, size: float | None, sharp_angle: float = SHARP_ANGLE
+    result: Flattening, quads: float, size: float | None, sharp_angle: float = SHARP_ANGLE
 ) -> GridLayout:
     """Return the layout of a flattening, rotated so that the grid is aligned with creases and boundaries.
 
@@ -148,7 +158,6 @@ def aligned(
         )
     area = float(double_areas(lengths).sum()) / 2
     if size is None:
-        assert quads is not None
         size = float(np.sqrt(area / quads))
     scale = np.sqrt(area / size**2 / (flat.sum() / 2))
     points = scale * as_complex(result.uv)

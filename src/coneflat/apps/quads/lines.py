@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from itertools import count
 
 import numpy as np
-from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from ...base import BoolArray, ComplexArray, FloatArray, IntArray, plural
@@ -120,11 +119,8 @@ class _Lined:
         energy = before.double_areas() / 2 * np.minimum(excess, FOLDED_ENERGY)
         at = np.zeros(len(mesh.vertices), dtype=np.int64)
         at[mesh.edges[self.edges]] = self.chain[:, None]
-        starts, ends = before.ends
-        lengths = np.abs(before.points[ends] - before.points[starts])
-        graph = csr_matrix((lengths, (mesh.tails, mesh.heads)), shape=(len(at),) * 2)
         on = np.unique(mesh.edges[self.edges])
-        nearest = dijkstra(graph.maximum(graph.T), indices=on, min_only=True, return_predecessors=True)[2]
+        nearest = dijkstra(before.graph(), indices=on, min_only=True, return_predecessors=True)[2]
         near = np.flatnonzero(nearest[mesh.faces[:, 0]] >= 0)
         chain = at[nearest[mesh.faces[near, 0]]]
         along = np.bincount(self.chain, lengths_along(mesh, self.edges), chains) / before.size

@@ -23,6 +23,7 @@ from ...geometry import (
 from ...linalg import Factor, factorize
 from ...mesh import tie_key
 from .cross_field import edge_rotations, halfedge_angles
+from .features import lengths_along, vertex_graph
 
 # Numbers of regions over which the log scale and the directions are summed, and largest number of vertices that can be
 # cones.
@@ -58,7 +59,7 @@ class MapModel:
         required: IntArray,
         least: int,
         most: int,
-        triangles: IntArray | None = None,
+        triangles: IntArray,
         log_scale: FloatArray | None = None,
     ) -> None:
         """Set up the model.
@@ -68,7 +69,7 @@ class MapModel:
             wanted: (m,) preferred crosses of triangles, weighted.
             required: vertices that must be places.
             least, most: bounds of the curvature of cones, in quarter turns.
-            triangles: (n,) the number of triangles at each vertex if it is another one in the mesh that gets the cones.
+            triangles: (n,) the number of triangles at each vertex in the mesh that gets the cones.
             log_scale: (n,) the wanted log scale, up to a constant; None for 0.
         """
         lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces))
@@ -98,8 +99,6 @@ class MapModel:
         to_samples = self._rotations.to_frames(samples) + self._rotations.mean_change[samples]
         self.scales = self._functional(self._means)
         self.turns, self.loops = 4 * self._functional(to_samples), 4 * self._functional(self._along)
-        if triangles is None:
-            triangles = np.bincount(mesh.faces.ravel(), minlength=count)
         triangles = triangles[self.places]
         border = mesh.is_boundary_vertex[self.places]
         straight = np.where(border, 2, 4)
@@ -146,14 +145,6 @@ class MapModel:
         turned, looped = (each[:, used] @ step[used] for each in (self.turns, self.loops))
         scale = self._base_scale + self.scales[:, used] @ step[used]
         return scale, self._base * np.exp(1j * turned), self._base_loops * np.exp(1j * looped)
-
-
-def vertex_graph(mesh: TriangleMesh) -> csr_matrix:
-    """Return (n, n) the lengths of edges."""
-    one, two = mesh.edges.T
-    lengths = np.linalg.norm(mesh.vertices[one] - mesh.vertices[two], axis=1)
-    both = np.concatenate([one, two]), np.concatenate([two, one])
-    return csr_matrix((np.tile(lengths, 2), both), shape=(len(mesh.vertices),) * 2)
 
 
 def _regions(mesh: TriangleMesh, key: FloatArray) -> tuple[IntArray, IntArray, IntArray]:
@@ -281,7 +272,7 @@ class _Rotations:
         in_tree = np.zeros(len(mesh.edges), dtype=bool)
         in_tree[self.inner[self.edge[self.edge >= 0]]] = True
         left = np.flatnonzero(~in_tree)
-        lengths = np.linalg.norm(np.diff(mesh.vertices[mesh.edges[left]], axis=1)[:, 0], axis=1)
+        lengths = lengths_along(mesh, left)
         # Edges of the boundary come first, so that loops around holes are not among the others.
         weights = lengths / max(float(lengths.max(initial=0.0)), np.finfo(float).tiny) + np.where(
             mesh.is_boundary_edge[left], 1.0, 3.0

@@ -14,7 +14,7 @@ from ...mesh import label_components
 from ..view import PageText, page_html, uv_flattening
 from .quad_mesh import QuadMesh
 from .quality import measure_quads
-from .transitions import TURNS
+from .transitions import TURNS, rotated
 
 # The corners of a square, counterclockwise, and the directions of its sides.
 SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
@@ -111,8 +111,8 @@ def _unfold(twin: IntArray, is_cut: BoolArray, count: int) -> tuple[Domains, Boo
         here, there = sides // 4, twin[sides] // 4
         # The side has the opposite direction in the neighbouring quad.
         turn[there] = (turn[here] + sides % 4 + 2 - twin[sides] % 4) % 4
-        end = origin[here] + _turned(turn[here], SQUARE[(sides + 1) % 4])
-        origin[there] = end - _turned(turn[there], SQUARE[twin[sides] % 4])
+        end = origin[here] + rotated(turn[here], SQUARE[(sides + 1) % 4])
+        origin[there] = end - rotated(turn[there], SQUARE[twin[sides] % 4])
         front = there
     places = origin[:, None] + np.einsum("qxy,cy->qcx", TURNS[turn], SQUARE)
     low, high = np.full((number, 2), np.iinfo(np.int64).max), np.full((number, 2), np.iinfo(np.int64).min)
@@ -125,14 +125,10 @@ def _unfold(twin: IntArray, is_cut: BoolArray, count: int) -> tuple[Domains, Boo
     is_bad = sides.prod(axis=1) != np.bincount(domain, minlength=number)
     is_bad[domain[inner[~fits] // 4]] = True
     is_tall = sides[:, 1] > sides[:, 0]
-    rotated = places[..., ::-1] * [-1, 1] + np.stack([sides[:, 1], 0 * sides[:, 1]], axis=1)[domain][:, None]
-    places = np.where(is_tall[domain][:, None, None], rotated, places)
+    lying = places[..., ::-1] * [-1, 1] + np.stack([sides[:, 1], 0 * sides[:, 1]], axis=1)[domain][:, None]
+    places = np.where(is_tall[domain][:, None, None], lying, places)
     sides = np.where(is_tall[:, None], sides[:, ::-1], sides)
     return Domains(domain, places, sides, is_cut), is_bad
-
-
-def _turned(turn: IntArray, vectors: IntArray) -> IntArray:
-    return np.einsum("qxy,qy->qx", TURNS[turn], vectors)
 
 
 def arranged(domains: Domains) -> tuple[IntArray, int]:

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from ...base import BoolArray, ComplexArray, FloatArray, IntArray
 from ...errors import GridError
-from ...geometry import as_complex, as_pairs, cotangents
+from ...geometry import as_complex, as_pairs, cotangent_laplacian, cotangents
 from ...linalg import factorize
 from .lattice import Lattice, integer_solutions
 from .layout import GridLayout
@@ -31,7 +31,10 @@ class Stiffness:
 
     def __init__(self, layout: GridLayout, transitions: Transitions) -> None:
         self._shifts = transitions.shifts
-        self._energy = kron(_laplacian(layout), np.eye(2)).tocsr()
+        points, (starts, ends) = layout.points, layout.ends
+        lengths = np.abs(points[ends] - points[starts]).reshape(-1, 3)
+        laplacian = cotangent_laplacian(layout.corners, cotangents(lengths), len(points))
+        self._energy = kron(laplacian, np.eye(2)).tocsr()
         self._turned = _turned_copies(transitions)
         system = (self._turned.T @ self._energy @ self._turned).tocsc()
         ridge = 1e-10 * float(system.diagonal().mean()) if system.shape[0] else 0.0
@@ -59,16 +62,6 @@ class Stiffness:
         """Return (2u, d) the matrix whose products with displacements are derivatives of the energy by coordinates."""
         # Few points are on seams, so the sparse matrix is small.
         return self._energy @ (self._shifts @ csr_matrix(basis))
-
-
-def _laplacian(layout: GridLayout) -> csr_matrix:
-    """Return (u, u) the cotangent Laplacian of the layout."""
-    points, (starts, ends) = layout.points, layout.ends
-    weights = cotangents(np.abs(points[ends] - points[starts]).reshape(-1, 3)).ravel() / 2
-    rows = np.concatenate([starts, ends, starts, ends])
-    columns = np.concatenate([ends, starts, starts, ends])
-    both = np.concatenate([-weights, -weights, weights, weights])
-    return coo_matrix((both, (rows, columns)), shape=(len(points), len(points))).tocsr()
 
 
 def _turned_copies(transitions: Transitions) -> csr_matrix:
@@ -267,10 +260,7 @@ def _near_pairs(
     """Return the vectors between near cones along the shortest edge paths."""
     mesh, points, cones, (starts, ends) = layout.mesh, layout.points, layout.nodes, layout.ends
     tails, heads = mesh.tails, mesh.heads
-    graph = csr_matrix(
-        (np.abs(points[ends] - points[starts]), (tails, heads)), shape=(len(mesh.vertices),) * 2
-    )
-    graph = graph.maximum(graph.T)
+    graph = layout.graph()
     found, before = dijkstra(graph, indices=cones, limit=NEAR_CONE_DISTANCE, return_predecessors=True)
     halfedge = csr_matrix((np.arange(1, len(tails) + 1), (tails, heads)), shape=graph.shape)
     is_cone = np.zeros(len(mesh.vertices), dtype=bool)

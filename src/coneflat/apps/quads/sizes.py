@@ -20,11 +20,12 @@ from ...geometry import (
 )
 from ...io import as_input
 from ...linalg import factorize
+from ...measure import quantile
 from ...mesh import CheckedMesh
 from ...source import vertex_numbers
 from .cross_field import CURVATURE_SCALE, curvature_tensors
+from .features import vertex_graph
 from .integer_map import IntegerGrid
-from .map_model import vertex_graph
 
 
 def wanted_scales(mesh: Any, faces: Any, checked: CheckedMesh, sizes: Any) -> FloatArray:
@@ -60,10 +61,9 @@ def _scales_of_curvature(mesh: TriangleMesh, ratio: float = 4.0) -> FloatArray:
     tensors = curvature_tensors(mesh, areas, radius)
     squared = np.maximum((tensors**2).sum(axis=(1, 2)), np.finfo(float).tiny)
     corners = mesh.faces.ravel()
-    share = np.bincount(corners, areas.repeat(3) / 3, count)
+    share = np.asarray(np.bincount(corners, areas.repeat(3) / 3, count), dtype=np.float64)
     mean = np.bincount(corners, (areas * np.log(squared) / 8).repeat(3) / 3, count) / share
-    order = np.argsort(mean)
-    middle = mean[order][np.searchsorted(np.cumsum(share[order]), share.sum() / 2)]
+    middle = quantile(mean, share, 0.5)
     bound = np.log(ratio) / 2
     smoothed = csc_matrix(
         diags(share) + 4 * radius**2 * cotangent_laplacian(mesh.faces, cotangents(lengths), count)
@@ -102,8 +102,7 @@ def note_on_sizes(grid: IntegerGrid, wanted: FloatArray) -> str:
     off, weight = reached - asked, number / number.sum()
     covariance = np.cov(np.stack([asked, reached]), aweights=weight)
     spread = np.sqrt(covariance[0, 0] * covariance[1, 1])
-    order = np.argsort(off)
-    low, high = np.interp([0.05, 0.95], np.cumsum(weight[order]), off[order])
+    low, high = (quantile(off, weight, part) for part in (0.05, 0.95))
     return (
         f"Sizes of quads have a correlation of {covariance[0, 1] / spread if spread else 1.0:.2f} with the wanted "
         f"ones; the ratio of both varies by a factor of {np.exp(high - low):.2f} over 90 % of the quads."

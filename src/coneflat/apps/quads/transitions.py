@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
@@ -18,9 +19,16 @@ from ...errors import GridError
 from ...layout import SeamChains
 from .layout import GRID_TOLERANCE, GridLayout, charts_of, first_points, joining_chains
 
+Vectors = TypeVar("Vectors", FloatArray, IntArray)
+
 UNITS = np.array([1, 1j, -1, -1j])
 # The same rotations, counterclockwise quarter turns, as integer matrices.
 TURNS = np.array([[[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[0, 1], [-1, 0]]])
+
+
+def rotated(turns: IntArray, vectors: Vectors) -> Vectors:
+    """Return (k, 2) vectors rotated counterclockwise by quarter turns (k,), without rounding."""
+    return np.einsum("kxy,ky->kx", TURNS[turns], vectors)
 
 
 @dataclass(frozen=True, eq=False)

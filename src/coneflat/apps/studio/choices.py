@@ -432,5 +432,5 @@ def _written(value: Any) -> str:
 
 def _ranges(vertices: list[int]) -> str:
     """Return ascending vertices as the content of a Python list, with consecutive vertices as ranges."""
-    runs = Region.of_runs((vertex, vertex) for vertex in vertices).runs
+    runs = Region.of_vertices(vertices).runs
     return ", ".join(str(a) if a == b else f"*range({a}, {b + 1})" for a, b in runs)

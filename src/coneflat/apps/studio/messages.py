@@ -7,16 +7,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from ...base import MAX_CONE_ANGLE, MIN_CONE_ANGLE, list_some, plural
 from ...mesh import REPAIR_ADVICE
 from .choices import Choices
-from .paint import Region
 
 if TYPE_CHECKING:
     from ... import Flattening
@@ -62,7 +58,7 @@ def _control(found: re.Match[str]) -> str:
 
 def misplaced_warning(chosen: Choices) -> tuple[str, ...]:
     """Return a sentence on cones in regions painted as "no cones", or nothing; these regions restrict searches only."""
-    inside = vertices_in(chosen.paint.no_cone, [cone.vertex for cone in chosen.cones])
+    inside = sorted({cone.vertex for cone in chosen.cones}.intersection(chosen.paint.no_cone.vertices()))
     if not inside or chosen.for_texture:
         return ()
     verb, what = ("lies", "vertex") if len(inside) == 1 else ("lie", "vertices")
@@ -70,13 +66,6 @@ def misplaced_warning(chosen: Choices) -> tuple[str, ...]:
         f"{plural(len(inside), 'cone')} set by hand or locked {verb} in regions painted as “No cones”: "
         f"{what} {list_some(inside)}. Searches avoid these regions; cones set by hand remain.",
     )
-
-
-def vertices_in(region: Region, vertices: Iterable[int]) -> list[int]:
-    """Return those of the given vertices that are in a region."""
-    named, runs = list(vertices), np.array(region.runs or [(0, -1)])
-    at = np.searchsorted(runs[:, 0], named, side="right") - 1
-    return [vertex for vertex, k in zip(named, at, strict=True) if k >= 0 and vertex <= runs[k, 1]]
 
 
 def angle_warning(chosen: Choices, result: Flattening) -> tuple[str, ...]:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from ...base import short_repr
 from ...errors import StudioError
@@ -19,8 +22,6 @@ MAX_IMPORTANCE = 1e6
 #: Largest number of painted vertices: above that of any mesh that a browser can draw, but small enough for lists.
 MAX_PAINTED = 20_000_000
 
-Runs = tuple[tuple[int, int], ...]
-
 
 @dataclass(frozen=True)
 class Region:
@@ -33,9 +34,12 @@ class Region:
     text: str = ""
 
     @classmethod
-    def of_runs(cls, runs: Iterable[tuple[int, int]]) -> Region:
-        """Return the union of runs, each given by its first and last vertex."""
-        return cls(" ".join(str(a) if a == b else f"{a}-{b}" for a, b in _merged(runs)))
+    def of_vertices(cls, vertices: ArrayLike) -> Region:
+        """Return the region of some vertices."""
+        ascending = np.unique(np.asarray(vertices, dtype=np.int64))
+        first = ascending[np.diff(ascending, prepend=-2) > 1].tolist()
+        last = ascending[np.diff(ascending, append=2**62) > 1].tolist()
+        return cls(" ".join(str(a) if a == b else f"{a}-{b}" for a, b in zip(first, last, strict=True)))
 
     @classmethod
     def of_text(cls, text: object) -> Region:
@@ -46,28 +50,23 @@ class Region:
         """
         if not isinstance(text, str):
             raise StudioError(f"a region must be a text such as 3-17 20, got {short_repr(text)}")
-        runs = []
+        runs, count = [np.empty(0, dtype=np.int64)], 0
         for word in text.split():
             found = _RUN.fullmatch(word)
             first, last = (found[1], found[2] or found[1]) if found else ("1", "0")
             if int(first) > int(last):
                 raise StudioError(f"a region must be a text such as 3-17 20; {short_repr(word)} is not valid")
-            runs.append((int(first), int(last)))
-        region = cls.of_runs(runs)
-        if region.count > MAX_PAINTED:
-            raise StudioError(f"{region.count:,} painted vertices are above the limit of {MAX_PAINTED:,}")
-        return region
+            count += int(last) - int(first) + 1
+            if count > MAX_PAINTED:
+                raise StudioError(f"{count:,} painted vertices are above the limit of {MAX_PAINTED:,}")
+            runs.append(np.arange(int(first), int(last) + 1))
+        return cls.of_vertices(np.concatenate(runs))
 
     @property
-    def runs(self) -> Runs:
+    def runs(self) -> tuple[tuple[int, int], ...]:
         """Return the first and last vertex of each maximal run of consecutive vertices, ascending."""
         ends = (word.partition("-") for word in self.text.split())
         return tuple((int(first), int(last or first)) for first, _, last in ends)
-
-    @property
-    def count(self) -> int:
-        """Return the number of vertices."""
-        return sum(last - first + 1 for first, last in self.runs)
 
     def vertices(self) -> list[int]:
         """Return the vertices, ascending."""
@@ -75,32 +74,14 @@ class Region:
 
     def joined(self, other: Region) -> Region:
         """Return the union of two regions."""
-        return Region.of_runs((*self.runs, *other.runs))
+        return Region.of_vertices(self.vertices() + other.vertices())
 
     def without(self, other: Region) -> Region:
         """Return the vertices of this region that are not in another."""
-        # At each end of a run, the number of runs of this or the other region that contain the next vertices changes.
-        ends = [(at, way, 0) for first, last in self.runs for at, way in ((first, 1), (last + 1, -1))]
-        ends += [(at, 0, way) for first, last in other.runs for at, way in ((first, 1), (last + 1, -1))]
-        left, begin, inside, taken = list[tuple[int, int]](), 0, 0, 0
-        for at, change, other_change in sorted(ends):
-            if inside and not taken and begin < at:
-                left.append((begin, at - 1))
-            begin, inside, taken = at, inside + change, taken + other_change
-        return Region.of_runs(left)
+        return Region.of_vertices(np.setdiff1d(self.vertices(), other.vertices()))
 
     def __bool__(self) -> bool:
         return bool(self.text)
-
-
-def _merged(runs: Iterable[tuple[int, int]]) -> Runs:
-    merged: list[tuple[int, int]] = []
-    for first, last in sorted(runs):
-        if merged and first <= merged[-1][1] + 1:
-            merged[-1] = (merged[-1][0], max(last, merged[-1][1]))
-        else:
-            merged.append((first, last))
-    return tuple(merged)
 
 
 @dataclass(frozen=True)

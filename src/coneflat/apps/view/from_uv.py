@@ -81,7 +81,7 @@ def uv_flattening(mapped: UVMesh, *, strict: bool = False) -> Flattening:
 
 def is_from_file(result: Flattening) -> bool:
     """Return whether a flattening was read from the UVs of a file."""
-    return getattr(result, "settings", {}).get("method") == FILE_UVS
+    return result.settings.get("method") == FILE_UVS
 
 
 def shown_rows(result: Flattening) -> list[tuple[str, str, str]]:

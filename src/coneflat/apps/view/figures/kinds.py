@@ -198,30 +198,21 @@ _ROWS: dict[str, Callable[[Any, Look], _Rows]] = {
 KINDS = tuple(_ROWS)
 
 
-def demo_figure(result: Flattening, *, up: str = "y", dpi: float = 220.0) -> Figure:
+def demo_figure(result: Flattening) -> Figure:
     """Return an overview figure of a flattening: the textured model, its layout, its distortion from two sides.
 
-    Args:
-        result: the flattening.
-        up: the model's upward axis, "x", "y" or "z".
-        dpi: resolution in dots per inch.
-
     Raises:
-        OptionError: matplotlib is not installed, or `up` is not valid.
+        OptionError: matplotlib is not installed.
     """
-    front, back = "front-right", "back-left"
-    vertices = result.vertices[np.unique(result.faces)]
-    checker = partial(draw_checker, result, up=up, cones=True, dpi=dpi)
+    front, both = Look(dpi=220.0), Look(dpi=220.0, eyes=("front-right", "back-left"))
     quality = conformal_distortion(result)
-    distortion = partial(draw_quantity, result, quantity=quality, up=up, dpi=dpi)
     panels = [
-        Panel(view_aspect(vertices, front, up), checker, "Model, textured by its UVs"),
+        *front.views(result, draw_checker, "Model, textured by its UVs", cones=True),
         Panel(layout_aspect(result, crop=True), partial(draw_layout, result, crop=True), "UV layout"),
-        Panel(view_aspect(vertices, front, up), partial(distortion, eye=front), "Distortion, front and back"),
-        Panel(view_aspect(vertices, back, up), partial(distortion, eye=back)),
+        *both.views(result, draw_quantity, "Distortion, front and back", quantity=quality),
     ]
     rows = [Row(panels, [quality])]
-    return compose(rows, title=title(result), marks=mark_handles(result), dpi=dpi, width=10.0)
+    return compose(rows, title=title(result), marks=mark_handles(result), dpi=both.dpi, width=10.0)
 
 
 def title(result: Flattening) -> str:
@@ -234,5 +225,4 @@ def title(result: Flattening) -> str:
         f"{measures.flipped:,} flipped",
         f"seam length {measures.seam_length:.2f} √area",
     ]
-    source = getattr(result, "source", None)
-    return "  ·  ".join(parts if source is None else [source.path.name, *parts])
+    return "  ·  ".join(parts if result.source is None else [result.source.path.name, *parts])

@@ -8,7 +8,8 @@ import numpy as np
 
 from .... import TriangleMesh
 from ....base import FloatArray, IntArray
-from ....mesh import end_corners, label_components, label_faces
+from ....mesh import end_corners, label_faces
+from ...measure_uv import chart_tiles
 from ..quantity import Quantity
 from .cone_marks import BOUNDARY_COLOR, SEAM_COLOR, draw_dots, mark_scale, pixels_of
 from .render import render_mesh
@@ -35,7 +36,6 @@ def draw_layout(
     *,
     color_charts: bool = False,
     edges: bool = True,
-    cones: bool = True,
     crop: bool = False,
 ) -> None:
     """Draw the charts in the unit square: filled polygons, the edges of their triangles, and the cones.
@@ -49,7 +49,6 @@ def draw_layout(
         axes: matplotlib axes to draw in; their own lines and ticks are hidden.
         color_charts: give the charts different colours.
         edges: draw the edges of triangles.
-        cones: mark the cones.
         crop: show only the charts, not the unit square or the tiles of several textures.
     """
     from matplotlib.patches import PathPatch
@@ -67,12 +66,11 @@ def draw_layout(
         _draw_segments(axes, inner, "edges", color=EDGE_COLOR, width=0.2 * scale, zorder=1)
     draw_outlines(axes, result, paths, 0.8 * scale)
     if not crop:
-        _draw_tiles(axes, layout_tiles(result))
-    if cones:
-        vertex, point = layout_cones(result)
-        curvature = dict(zip(result.cones.tolist(), result.curvatures.tolist(), strict=True))
-        values = np.array([curvature[v] for v in vertex.tolist()])
-        draw_dots(axes, result.uv[point], values, share=0.6)
+        _draw_tiles(axes, chart_tiles(result.uv, result.uv_faces))
+    vertex, point = layout_cones(result)
+    curvature = dict(zip(result.cones.tolist(), result.curvatures.tolist(), strict=True))
+    values = np.array([curvature[v] for v in vertex.tolist()])
+    draw_dots(axes, result.uv[point], values, share=0.6)
     frame_layout(axes, result, crop)
 
 
@@ -115,23 +113,11 @@ def frame_layout(axes: Axes, result: Flattening, crop: bool) -> None:
     axes.set_axis_off()
 
 
-def layout_tiles(result: Flattening) -> FloatArray:
-    """Return the (k, 2) lower left corners of the unit squares (tiles) that contain charts.
-
-    A chart of a file made by other programs may extend beyond its tile.
-    """
-    count, chart = label_faces(result.uv_faces, len(result.uv))
-    size = np.maximum(np.bincount(chart, minlength=count), 1)
-    points = result.uv[result.uv_faces].mean(axis=1)
-    middles = [np.bincount(chart, points[:, k], minlength=count) / size for k in (0, 1)]
-    return np.unique(np.floor(np.stack(middles, axis=1)[chart]), axis=0)
-
-
 def layout_box(result: Flattening, crop: bool) -> tuple[FloatArray, FloatArray]:
     """Return the (2,) lower left and upper right corners of the box around the charts and, unless `crop`, the tiles."""
     used = result.uv[np.unique(result.uv_faces)]
     if not crop:
-        tiles = layout_tiles(result)
+        tiles = chart_tiles(result.uv, result.uv_faces)
         used = np.concatenate([tiles, tiles + 1, used])
     return used.min(axis=0), used.max(axis=0)
 
@@ -147,37 +133,13 @@ def chart_paths(uv: FloatArray, uv_faces: IntArray) -> list[Path]:
     """Return a matplotlib path for each chart: its closed outline and those of its holes."""
     from matplotlib.path import Path
 
-    points = np.unique(uv_faces)
-    sides = np.concatenate([uv_faces[:, [0, 1]], uv_faces[:, [1, 2]]])
-    chart = label_components(len(uv), sides[:, 0], sides[:, 1])[1]
-    number = np.unique(chart[points], return_inverse=True)[1]
-    chart[points] = number.ravel()
-    outlines: list[list[Path]] = [[] for _ in range(int(number.max()) + 1)]
-    for loop in outline_loops(uv, uv_faces):
-        corners = uv[[*loop, loop[0]]]
-        outlines[chart[loop[0]]].append(Path(corners, closed=True))
-    return [Path.make_compound_path(*loops) for loops in outlines]
-
-
-def outline_loops(uv: FloatArray, uv_faces: IntArray) -> list[list[int]]:
-    """Return the points of each closed boundary curve of the charts, in order; the chart is on the left."""
     mesh = TriangleMesh(uv, uv_faces)
-    sides = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
-    tails, heads = mesh.tails[sides], mesh.heads[sides]
-    following = np.empty_like(sides)
-    # Where curves touch, several sides end and begin at a point; any pairing of these gives closed curves.
-    following[np.argsort(heads, kind="stable")] = np.argsort(tails, kind="stable")
-    seen = np.zeros(len(sides), dtype=bool)
-    loops = []
-    for first in range(len(sides)):
-        loop, side = [], first
-        while not seen[side]:
-            seen[side] = True
-            loop.append(int(tails[side]))
-            side = int(following[side])
-        if loop:
-            loops.append(loop)
-    return loops
+    charts, chart = np.unique(label_faces(uv_faces, len(uv))[1], return_inverse=True)
+    outlines: list[list[Path]] = [[] for _ in charts]
+    for walk in mesh.boundary_walks():
+        points = mesh.tails[walk]
+        outlines[chart[walk[0] // 3]].append(Path(uv[[*points, points[0]]], closed=True))
+    return [Path.make_compound_path(*loops) for loops in outlines]
 
 
 def layout_cones(result: Flattening) -> tuple[IntArray, IntArray]:

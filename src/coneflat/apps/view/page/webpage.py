@@ -13,12 +13,10 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ....base import short_repr
 from ....errors import OptionError
 from ....io import atomic_write, checked_target, read_picture
-from ....options import MAX_SHOWN_TRIANGLES, SHOWS
+from ....options import MAX_SHOWN_TRIANGLES, SHOWS, as_integer
 from ..quantity import Quantity, own_quantity
 from .content import content_of
 from .payload import PageText, as_payload, head_and_block
@@ -71,10 +69,9 @@ def page_html(
     if not isinstance(show, str) or (show not in SHOWS and (show != "own" or color is None)):
         raise OptionError(f"unknown show {short_repr(show)}: choose from {', '.join(SHOWS)}")
     picture = None if texture is None else read_picture(texture)
-    if isinstance(most_triangles, bool) or not isinstance(most_triangles, (int, np.integer)):
-        raise OptionError(f"most_triangles must be an integer, got {short_repr(most_triangles)}")
+    most = as_integer("most_triangles", most_triangles)
     own = color if color is None or isinstance(color, Quantity) else own_quantity(result, color)
-    content = content_of(result, most_triangles, own=own)
+    content = content_of(result, most, own=own)
     if name is None:
         name = "Flattening" if result.source is None else result.source.path.name
     head, arrays = as_payload(*head_and_block(result, content, picture, name, up, show, text))
