@@ -36,28 +36,28 @@ CEILINGS = {
     "apps.blender": 884,
     "apps.cli": 1623,
     "apps.measure_uv": 160,
-    "apps.peers": 453,
-    "apps.quads": 3825,
-    "apps.studio": 1734,
+    "apps.peers": 438,
+    "apps.quads": 3795,
+    "apps.studio": 1713,
     "apps.transfer": 323,
     "apps.brains": 262,
     "apps.pyvista": 26,
     "apps.unwrap": 1485,
-    "apps.view": 1591,
-    "atlas": 1439,
+    "apps.view": 1557,
+    "atlas": 1388,
     "base": 321,
     "cone_curve": 108,
-    "cones": 2098,
-    "evaluate": 194,
+    "cones": 2062,
+    "evaluate": 182,
     "flatten": 221,
     "flattener": 35,
-    "geometry": 1471,
+    "geometry": 1466,
     "io": 2881,
-    "layout": 1951,
+    "layout": 1926,
     "linalg": 453,
-    "measure": 829,
+    "measure": 810,
     "mesh": 666,
-    "metric": 999,
+    "metric": 948,
     "options": 522,
     "result": 96,
     "sample": 5,
@@ -69,8 +69,8 @@ CEILINGS = {
 #: Applications with a ceiling of their own, which the ceilings of everything else leave out.
 OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_320, 232, 25_160
-CONSTANTS, KERNELS, NAMES, LEVELS = 295, 88, 30, 8
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_121, 232, 24_861
+CONSTANTS, KERNELS, NAMES, LEVELS = 295, 87, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .defaults import DISTORTION, MAX_CONE_ANGLE, MAX_CONES, MIN_CONE_ANGLE
+from .defaults import DISTORTION, MAX_CONE_ANGLE, MAX_CONES, MIN_CONE_ANGLE, TYPED_TOLERANCE
 from .progress import Progress, Stopwatch, cancel_with, check_cancelled
 from .text import exit_text, list_some, plural, printable, short_repr
 from .threads import THREADS, limit_threads
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BoolArray", "ComplexArray", "DISTORTION", "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE",
-    "MIN_CONE_ANGLE", "Progress", "Stopwatch", "THREADS", "cancel_with", "check_cancelled", "compiled",
-    "dots", "exit_text", "limit_threads", "list_some", "plural", "printable", "short_repr", "unit_exponent",
+    "MIN_CONE_ANGLE", "Progress", "Stopwatch", "THREADS", "TYPED_TOLERANCE", "cancel_with", "check_cancelled",
+    "compiled", "dots", "exit_text", "limit_threads", "list_some", "plural", "printable", "short_repr", "unit_exponent",
 ]  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from .find import (
     CONE_ANGLE_PER_TRIANGLE,
+    MAX_POLYHEDRON_CORNERS,
     close_search,
     coneless_solution,
     find_cones,
@@ -16,7 +17,7 @@ from .sparse.limits import MAX_SEARCHED
 from .sparse.search import ConeSearch
 
 __all__ = [
-    "ConeSearch", "GroundedLaplacian", "CONE_ANGLE_PER_TRIANGLE", "MAX_SEARCHED", "SparseCones", "close_search",
-    "cones_at", "cones_with_curvature", "find_cones", "greedy_cones", "coneless_solution", "open_search",
-    "uses_sparse_search",
+    "ConeSearch", "GroundedLaplacian", "CONE_ANGLE_PER_TRIANGLE", "MAX_POLYHEDRON_CORNERS", "MAX_SEARCHED",
+    "SparseCones", "close_search", "cones_at", "cones_with_curvature", "find_cones", "greedy_cones",
+    "coneless_solution", "open_search", "uses_sparse_search",
 ]  # fmt: skip

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import BoolArray, FloatArray, IntArray, check_cancelled
+from ...base import TYPED_TOLERANCE, BoolArray, FloatArray, IntArray, check_cancelled
+from ...cones import MAX_POLYHEDRON_CORNERS
 from ...geometry import double_areas, find_overlaps, signed_double_areas
 from ...layout import StretchEnergy, embedded_disks, joined, relax
 from ...linalg import factorize
@@ -18,9 +19,8 @@ from .free import laid_out
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .search import FIRST_DISTORTION, TOLERANCE, Candidate, CutSearch
 
-# Number of times that cones are added; and, as in the search for the cones of one part, the number of corners of a
-# polyhedron that all become cones, and the least curvature of a corner.
-MAX_ROUNDS, MAX_CORNERS, LEAST_CURVATURE = 12, 24, 1e-6
+# Number of times that cones are added.
+MAX_ROUNDS = 12
 
 
 class MinorParts:
@@ -99,8 +99,8 @@ class MinorParts:
     def _first_cones(self) -> BoolArray:
         """Return (n,) the corners of polyhedra with few of them, and one vertex of other closed parts."""
         curvature, of, is_boundary = self._surface.curvature, self._of, self._mesh.is_boundary_vertex
-        cones = (np.abs(curvature) > LEAST_CURVATURE) & self._is_allowed
-        cones &= (np.bincount(of, cones) <= MAX_CORNERS)[of]
+        cones = (np.abs(curvature) > TYPED_TOLERANCE) & self._is_allowed
+        cones &= (np.bincount(of, cones) <= MAX_POLYHEDRON_CORNERS)[of]
         is_closed = np.bincount(of, cones | is_boundary, len(self._searches)) == 0
         cones[self._largest(curvature - curvature.min() + 1, is_closed)] = True
         return cones

@@ -79,6 +79,9 @@ class CutSearch:
         self, part: Part, max_energy: float, method: Method, is_coarse: bool = False, by_area: bool = False
     ) -> None:
         self.part, self.max_energy, self._method, self._by_area = part, max_energy, method, by_area
+        # Energies up to which a candidate may be within the bound once it is settled, and above which it is given up.
+        allowed = max_energy - ISOMETRIC
+        self._near, self._reach = max_energy + 2 * TOLERANCE * allowed, max_energy + allowed
         self._has_coarse = len(part.faces) > 2 * COARSE and not (is_coarse or part.seams.is_forbidden.any())
 
     @cached_property
@@ -117,8 +120,7 @@ class CutSearch:
         found = self._by_distortion()
         near = [one for one in found if one.energy <= self._reach]
         for one in sorted(near, key=self._expected_cost)[:2]:
-            if one.energy > self.max_energy:
-                found.append(self.shortened(one))
+            found.append(one if one.energy <= self.max_energy else self.shortened(one))
             if found[-1].energy <= self.max_energy:
                 break
         close_search(self._surface)
@@ -153,16 +155,6 @@ class CutSearch:
 
     def cost_of(self, layout: Layout) -> float:
         return float(self.seam_costs[seam_edges(layout)].sum())
-
-    @property
-    def _reach(self) -> float:
-        """The energy above which a candidate is given up."""
-        return ISOMETRIC + 2 * (self.max_energy - ISOMETRIC)
-
-    @property
-    def _near(self) -> float:
-        """The energy up to which a candidate may be within the bound once it is settled."""
-        return self.max_energy + 2 * TOLERANCE * (self.max_energy - ISOMETRIC)
 
     def _with_fewest_seams(self) -> Candidate:
         """Return a candidate cut between the fewest cones, and only along closed curves where there are handles."""
@@ -305,7 +297,7 @@ class CutSearch:
             one = self._candidate(layout, start.distortion)
             excess = one.energy - self.max_energy
             tried.append((slack, excess))
-            if excess <= 2 * TOLERANCE * allowed:
+            if one.energy <= self._near:
                 found.append(one)
             # A start beyond the bound only has to get within it: the tips move again after the cuts for packing.
             if excess <= 0 and (excess >= -2 * TOLERANCE * allowed or start.energy > self.max_energy):

@@ -23,8 +23,6 @@ MIN_PROGRESS = 1e-3
 # factor by which more unknowns than there are count for the choice of the solver, since matrices of one pattern are
 # factorized repeatedly: with 6,000 unknowns this halves the time.
 MIN_ACTIVE_SHARE, REPEATED = 0.6, 6
-# Number of times that a step is lengthened: where negative eigenvalues of the Hessian are cut off, steps are too short.
-LENGTHENINGS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,8 +125,9 @@ def descend(
             length[~good] /= 2
         length[~good] = 0.0
         active &= length > 0
-        for _ in range(0 if remaining else LENGTHENINGS):
-            longer = np.minimum(1.5 * length, farthest)
+        # Without the negative eigenvalues of the Hessians, steps are too short.
+        for times in () if remaining else (1.5, 1.5):
+            longer = np.minimum(times * length, farthest)
             beyond = sums(elements.energies(energy, maps.plus(longer[part], change)))
             better = beyond < there
             if not better.any():
