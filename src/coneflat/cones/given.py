@@ -49,7 +49,7 @@ def cones_at(
         if euler_characteristic != 0:
             raise CurvatureError(
                 f"a closed surface of Euler characteristic {euler_characteristic} has a total curvature of "
-                f"{2 * euler_characteristic} pi and needs cones to carry it, but has none"
+                f"{2 * euler_characteristic} pi and needs cones to carry it, but has none: give or allow some"
             )
         grounded[0] = True
     phi = GroundedLaplacian(laplacian, grounded).solve(-curvature)
