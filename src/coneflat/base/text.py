@@ -45,11 +45,11 @@ def short_repr(value: object) -> str:
     return text if len(text) <= MAX_SHOWN_CHARACTERS else f"{text[:MAX_SHOWN_CHARACTERS]}..."
 
 
-def error_text(residual: float, unit: str = " rad") -> str:
+def error_text(residual: float) -> str:
     """Return the part of a message that states an error: "off by 0.1 rad"."""
     if not math.isfinite(residual):
         return "off by more than double precision can represent"
-    return f"off by {residual:.2g}{unit}"
+    return f"off by {residual:.2g} rad"
 
 
 def exit_text(code: int) -> str:

@@ -91,10 +91,10 @@ def _flattening(reading: CheckedArrays) -> Flattening:
             raise MeshFileError(
                 f"{path} holds no {what}: {name!r} is missing; write it by `coneflat flatten`"
             )
-    report = json.loads(str(arrays["report"]))
+    report = reading.report()
     arrays.setdefault("prescribed", np.full(len(arrays["vertices"]), np.nan))
-    for name, kind in {"seconds": dict, "settings": dict, "notes": list}.items():
-        if not isinstance(report[name], kind):
+    for name in ("seconds", "settings"):
+        if not isinstance(report[name], dict):
             raise ValueError(f"{name!r} of its report is a {type(report[name]).__name__}")
     notes, efficiency = reading.notes(report), number(report["packing_efficiency"])
     for value in report["seconds"].values():
@@ -200,17 +200,15 @@ class CheckedArrays:
             raise MeshFileError(f"{self.path}: {name!r} has numbers that are not finite")
         return values
 
-    def indices(
-        self, name: str, shape: tuple[int | None, ...], bound: int | None, least: int = 0
-    ) -> IntArray:
-        """Return an array of integers from `least` to below `bound`, or below 2^53 if it is None.
+    def indices(self, name: str, shape: tuple[int | None, ...], bound: int | None) -> IntArray:
+        """Return an array of integers from 0 to below `bound`, or below 2^53 if it is None.
 
         Raises:
             MeshFileError: it has another shape, or values out of range.
         """
         values = self.floats(name, shape)
         end = 2**53 if bound is None else bound
-        if not np.all((values >= least) & (values < end) & (values == np.floor(values))):
+        if not np.all((values >= 0) & (values < end) & (values == np.floor(values))):
             there = "integers" if bound is None else f"{bound} elements"
             raise MeshFileError(f"{self.path}: {name!r} has indices outside the range of {there}")
         return values.astype(np.int64)

@@ -21,12 +21,9 @@ from .connectivity import (
     NEXT,
     PREVIOUS,
     TriangleMesh,
-    corner_fans,
-    has_one_fan_each,
     label_components,
-    pair_sides,
-    sort_by_counting,
     sort_pairs,
+    split_vertices,
 )
 
 REPAIR_ADVICE = "pass repair=True (on the command line: leave out --strict)"
@@ -135,19 +132,16 @@ class _Check:
         self.face_origin = np.arange(len(faces))
         self.is_flipped = np.zeros(len(faces), dtype=bool)
         self.pairs = np.empty((0, 2), dtype=np.int64)
-        self.vertex_origin = np.arange(len(vertices))
         self.notes: list[str] = []
-        self.pairing: tuple[IntArray, IntArray, IntArray] | None = None
 
     def run(self) -> CheckedMesh:
         """Run all steps and return the checked mesh."""
         self.drop_degenerate_faces()
-        if self.is_manifold():
-            return self.finish()
         self.pair_halfedges()
         self.orient()
         self.split_fans()
-        return self.finish()
+        mesh = TriangleMesh(self.vertices[self.vertex_origin], self.faces)
+        return CheckedMesh(mesh, self.vertex_origin, self.face_origin, self.is_flipped, tuple(self.notes))
 
     def _keep(self, keep: BoolArray) -> None:
         self.faces = self.faces[keep]
@@ -180,14 +174,6 @@ class _Check:
                 keep[first] = True
                 self.notes.append(f"Dropped {plural(int((~keep).sum()), 'duplicate face')}.")
                 self._keep(keep)
-
-    def is_manifold(self) -> bool:
-        """Return whether the faces form an oriented manifold already, as in most meshes; then nothing is to be done."""
-        *pairing, is_plain = pair_sides(self.faces, len(self.vertices))
-        if not is_plain or not has_one_fan_each(self.faces, len(self.vertices), *pairing[1:]):
-            return False
-        self.pairing = (pairing[0], pairing[1], pairing[2])
-        return True
 
     def pair_halfedges(self) -> None:
         """Find the pairs (k, 2) of half-edges that are glued; those of edges with three or more faces are not.
@@ -271,10 +257,10 @@ class _Check:
         Raises:
             NonManifoldError: a vertex has more than one fan and the mesh is not repaired.
         """
-        fans, fan = corner_fans(self.faces, *self.pairs.T)
-        origin = np.empty(fans, dtype=np.int64)
-        origin[fan] = self.faces
-        fans_at = np.bincount(origin, minlength=len(self.vertices))
+        # Vertices are numbered in the order of the input; the copies of a split vertex follow one another.
+        count = len(self.vertices)
+        self.vertex_origin, self.faces = split_vertices(self.faces, count, *self.pairs.T)
+        fans_at = np.bincount(self.vertex_origin, minlength=count)
         isolated = int((fans_at == 0).sum())
         split = np.flatnonzero(fans_at > 1)
         if len(split):
@@ -286,19 +272,6 @@ class _Check:
             self.notes.append(f"Split {plural(len(split), 'non-manifold vertex', 'non-manifold vertices')}.")
         if isolated:
             self.notes.append(left_out(isolated))
-        # Vertices are numbered in the order of the input; the copies of a split vertex follow one another.
-        order = sort_by_counting(origin, len(self.vertices))
-        rank = np.empty(fans, dtype=np.int64)
-        rank[order] = np.arange(fans)
-        self.vertex_origin = origin[order]
-        self.faces = rank[fan]
-
-    def finish(self) -> CheckedMesh:
-        """Return the checked mesh with its relation to the input."""
-        mesh = TriangleMesh(self.vertices[self.vertex_origin], self.faces)
-        if self.pairing is not None:
-            mesh.__dict__["_pairing"] = self.pairing  # cached, so that the mesh does not compute it again
-        return CheckedMesh(mesh, self.vertex_origin, self.face_origin, self.is_flipped, tuple(self.notes))
 
 
 def weld(vertices: FloatArray) -> tuple[IntArray, IntArray]:

@@ -97,8 +97,15 @@ class TriangleMesh:
     @cached_property
     def _pairing(self) -> tuple[IntArray, IntArray, IntArray]:
         """Edges as vertex pairs (e, 2), edge of each half-edge (3m,), half-edges of each edge (e, 2)."""
-        pairs, edge_of, sides, _ = pair_sides(self.faces, len(self.vertices))
-        return pairs, edge_of, sides
+        tails, heads = _permuted(self.faces, NEXT), _permuted(self.faces, PREVIOUS)
+        order, is_first = sort_pairs(tails, heads, len(self.vertices))
+        edge_of = np.empty(len(order), dtype=np.int64)
+        edge_of[order] = np.cumsum(is_first) - 1
+        starts = np.flatnonzero(is_first)
+        ends = np.append(starts[1:], len(order)) - 1
+        one = order[starts]
+        pairs = np.sort(np.stack([tails[one], heads[one]], axis=1), axis=1)
+        return pairs, edge_of, np.stack([one, np.where(ends > starts, order[ends], -1)], axis=1)
 
     def moved_to(self, vertices: FloatArray) -> TriangleMesh:
         """Return the mesh with other vertex positions (n, 3); cached connectivity is shared."""
@@ -250,6 +257,25 @@ def corner_fans(faces: IntArray, one: IntArray, two: IntArray) -> tuple[int, Int
     return count, labels.reshape(faces.shape)
 
 
+def split_vertices(faces: IntArray, count: int, one: IntArray, two: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the vertex of each fan, ascending, and (m, 3) the fan of each corner.
+
+    The fans of a vertex are in the order of their first corners.
+
+    Args:
+        faces: (m, 3) vertex indices.
+        count: number of vertices.
+        one, two: (k,) half-edges glued to each other, on the same pair of vertices.
+    """
+    fans, fan = corner_fans(faces, one, two)
+    origin = np.empty(fans, dtype=np.int64)
+    origin[fan] = faces
+    order = sort_by_counting(origin, count)
+    rank = np.empty(fans, dtype=np.int64)
+    rank[order] = np.arange(fans)
+    return origin[order], rank[fan]
+
+
 def end_corners(halfedges: IntArray) -> tuple[IntArray, IntArray]:
     """Return the start and end corners of half-edges, as indices into `faces.ravel()`.
 
@@ -267,58 +293,6 @@ MAX_INSERTION_SORT = 64
 
 
 @compiled
-def pair_sides(faces: IntArray, count: int) -> tuple[IntArray, IntArray, IntArray, bool]:
-    """Return the edges of faces between `count` vertices, in the order of their ends, and the half-edges of each.
-
-    Returns:
-        (e, 2) the ends, the smaller index first; (3m,) the edge of each half-edge; (e, 2) the half-edges of each edge,
-        the second -1 if there is only one; and whether all edges have one half-edge, or two of opposite directions.
-    """
-    size, bits = 3 * len(faces), 1
-    while 2**bits < size:
-        bits += 1
-    starts = np.zeros(count + 1, dtype=np.int64)
-    for f in range(len(faces)):
-        for i in range(3):
-            starts[min(faces[f, i], faces[f, (i + 1) % 3]) + 1] += 1
-    for v in range(count):
-        starts[v + 1] += starts[v]
-    place = starts[:-1].copy()
-    # For each half-edge, listed at its end of smaller index: the other end in the high bits, the half-edge in the low.
-    keys = np.empty(size, dtype=np.int64)
-    for f in range(len(faces)):
-        for i in range(3):
-            tail, head = faces[f, (i + 1) % 3], faces[f, (i + 2) % 3]
-            low = min(tail, head)
-            keys[place[low]] = (max(tail, head) << bits) | (3 * f + i)
-            place[low] += 1
-    edges = 0
-    for v in range(count):
-        sort_keys(keys[starts[v] : starts[v + 1]])
-        last = -1
-        for at in range(starts[v], starts[v + 1]):
-            edges += keys[at] >> bits != last
-            last = keys[at] >> bits
-    pairs, sides = np.empty((edges, 2), dtype=np.int64), np.empty((edges, 2), dtype=np.int64)
-    edge_of, is_plain, edge = np.empty(size, dtype=np.int64), True, -1
-    for v in range(count):
-        last = -1
-        for at in range(starts[v], starts[v + 1]):
-            high, h = keys[at] >> bits, keys[at] & (2**bits - 1)
-            if high != last:
-                edge, last = edge + 1, high
-                pairs[edge, 0], pairs[edge, 1] = v, high
-                sides[edge, 0], sides[edge, 1] = h, -1
-            else:
-                first = sides[edge, 0]
-                is_opposed = faces[first // 3, (first + 1) % 3] != faces[h // 3, (h + 1) % 3]
-                is_plain = is_plain and is_opposed and sides[edge, 1] < 0
-                sides[edge, 1] = h
-            edge_of[h] = edge
-    return pairs, edge_of, sides, is_plain
-
-
-@compiled
 def sort_keys(keys: IntArray) -> None:
     """Sort distinct integers (k,) in place; fast if there are few."""
     if len(keys) > MAX_INSERTION_SORT:
@@ -330,43 +304,6 @@ def sort_keys(keys: IntArray) -> None:
             keys[before + 1] = keys[before]
             before -= 1
         keys[before + 1] = key
-
-
-@compiled
-def has_one_fan_each(faces: IntArray, count: int, edge_of: IntArray, sides: IntArray) -> bool:
-    """Return whether every vertex has faces, and these form a single fan across edges.
-
-    Args:
-        faces: (m, 3), consistently oriented.
-        count: number of vertices.
-        edge_of, sides: (3m,) the edge of each half-edge, and (e, 2) the half-edges of each edge, one or two.
-    """
-    valence, corner = np.zeros(count, dtype=np.int64), np.full(count, -1)
-    for c in range(3 * len(faces)):
-        vertex = faces[c // 3, c % 3]
-        valence[vertex] += 1
-        corner[vertex] = c
-    for vertex in range(count):
-        if corner[vertex] < 0:
-            return False
-        seen = 0
-        # Walk around the vertex in one direction, and if that ends at the boundary, in the other direction.
-        for turn in (1, 2):
-            here = corner[vertex]
-            while here >= 0:
-                seen += 1
-                h = here - here % 3 + (here % 3 + turn) % 3
-                pair = sides[edge_of[h]]
-                other = pair[1] if pair[0] == h else pair[0]
-                here = -1 if other < 0 else other - other % 3 + (other % 3 + turn) % 3
-                if here == corner[vertex]:
-                    break
-            if here == corner[vertex]:
-                break
-            seen -= turn == 1  # the first corner counts once
-        if seen != valence[vertex]:
-            return False
-    return True
 
 
 @compiled
