@@ -52,11 +52,11 @@ CEILINGS = {
     "flatten": 221,
     "flattener": 35,
     "geometry": 1466,
-    "io": 2881,
-    "layout": 1926,
+    "io": 2879,
+    "layout": 1925,
     "linalg": 453,
     "measure": 810,
-    "mesh": 666,
+    "mesh": 553,
     "metric": 948,
     "options": 522,
     "result": 96,
@@ -69,8 +69,8 @@ CEILINGS = {
 #: Applications with a ceiling of their own, which the ceilings of everything else leave out.
 OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_121, 232, 24_861
-CONSTANTS, KERNELS, NAMES, LEVELS = 295, 87, 30, 8
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_005, 232, 24_745
+CONSTANTS, KERNELS, NAMES, LEVELS = 295, 84, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
 

@@ -249,7 +249,9 @@ def _check_boundary_turns(trial: Trial) -> None:
                 )
         return
     named = dict.fromkeys(trial.boundary) if not isinstance(trial.boundary, (str, dict)) else trial.boundary
-    corner_at = np.flatnonzero(np.isin(result.vertex_origin, list(named) if isinstance(named, dict) else []))
+    # Another copy of a vertex may be inside.
+    is_named = np.isin(result.vertex_origin, list(named) if isinstance(named, dict) else [])
+    corner_at = np.flatnonzero(is_named & topology.is_border)
     share = np.zeros(len(curvature))
     edge_at = topology.edges[topology.count == 1]
     length = np.empty(len(topology.edges))
