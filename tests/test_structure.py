@@ -47,7 +47,7 @@ CEILINGS = {
     "atlas": 1388,
     "base": 321,
     "cone_curve": 108,
-    "cones": 2062,
+    "cones": 2064,
     "evaluate": 182,
     "flatten": 221,
     "flattener": 35,
@@ -69,7 +69,7 @@ CEILINGS = {
 #: Applications with a ceiling of their own, which the ceilings of everything else leave out.
 OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_005, 232, 24_745
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_007, 232, 24_747
 CONSTANTS, KERNELS, NAMES, LEVELS = 295, 84, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

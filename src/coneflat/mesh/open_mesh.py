@@ -54,7 +54,11 @@ def cut_open(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
 
 
 def open_along(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
-    """Return a mesh cut open along given edges (k,); the copies of vertices are in the order of the vertices."""
+    """Return a mesh cut open along given edges (k,).
+
+    Each fan of triangles around a vertex has a copy of it, in the order of the vertices; those without triangles have
+    none.
+    """
     is_glued = ~mesh.is_boundary_edge
     is_glued[seams] = False
     origin, faces = split_vertices(mesh.faces, len(mesh.vertices), *mesh.edge_halfedges[is_glued].T)

@@ -18,6 +18,7 @@ pytest.importorskip("matplotlib")
 
 from coneflat.apps.cli import figure as figure_command
 from coneflat.apps.view.figures.kinds import KINDS
+from coneflat.apps.view.figures.uv_layout import chart_paths
 
 
 @pytest.fixture(scope="module")
@@ -169,3 +170,12 @@ class TestCommand:
 def test_what_is_no_result_has_no_figure(shown):
     with pytest.raises(OptionError, match="expected a result of `coneflat.flatten`, got"):
         coneflat.make_figure(shown, "layout")
+
+
+def test_outlines_that_touch_themselves_enclose_the_triangles():
+    """A square of 4 by 4 cells without two that share a corner."""
+    places = np.array([[x, y] for y in range(5) for x in range(5)], dtype=float)
+    cells = [5 * y + x for y in range(4) for x in range(4) if (x, y) not in ((0, 0), (1, 1))]
+    faces = np.array([side for at in cells for side in ([at, at + 1, at + 6], [at, at + 6, at + 5])])
+    loops = [loop.T for path in chart_paths(places, faces) for loop in path.to_polygons()]
+    assert sum((x[:-1] @ y[1:] - x[1:] @ y[:-1]) / 2 for x, y in loops) == len(cells)

@@ -57,8 +57,8 @@ class SparseCones:
 class ConeSearch:
     """A search for cones on a connected mesh; the Laplacian is factorized once for any number of queries.
 
-    The distortion E is the area-weighted standard deviation of the linear log scale. A boundary has phi = 0 and absorbs
-    the remaining curvature.
+    It is made by `from_mesh`. The distortion E is the area-weighted standard deviation of the linear log scale. A
+    boundary has phi = 0 and absorbs the remaining curvature.
 
         search = ConeSearch.from_mesh(mesh)
         search.fewest(0.2).solution.cones
@@ -96,6 +96,8 @@ class ConeSearch:
         is_boundary = self.is_boundary = linear.is_boundary
         chi = None if is_boundary.any() else euler_characteristic
         limits = self.limits = Limits.of_angles(chi, min_cone_angle, max_cone_angle, positive_only)
+        if allowed is not None and allowed.shape != is_boundary.shape:
+            raise OptionError(f"allowed must be {len(is_boundary):,} flags, got the shape {allowed.shape}")
         cones = required_vertices(required, is_boundary)
         usable = ~is_boundary if allowed is None else ~is_boundary & allowed
         limits.check_available(usable, cones)

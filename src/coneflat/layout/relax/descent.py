@@ -55,9 +55,9 @@ def descend(
 ) -> Descent:
     """Return points of lower energy, found by Newton's method.
 
-    Parts that no triangle connects have separate step lengths. While constraints do not hold, all parts have a common
-    step length, as long towards the constraints as the triangles permit (an infeasible start: Boyd and Vandenberghe
-    2004, Section 10.3).
+    Parts that no triangle connects have separate step lengths, longer than 1 while their energy falls. While
+    constraints do not hold, all parts have a common step length, as long towards the constraints as the triangles
+    permit (an infeasible start: Boyd and Vandenberghe 2004, Section 10.3).
 
     Args:
         points: (u,) start positions as complex numbers, where no moving triangle is flipped.
@@ -129,7 +129,7 @@ def descend(
         for times in () if remaining else (1.5, 1.5):
             longer = np.minimum(times * length, farthest)
             beyond = sums(elements.energies(energy, maps.plus(longer[part], change)))
-            better = beyond < there
+            better = active & (beyond < there)
             if not better.any():
                 break
             length[better], there[better] = longer[better], beyond[better]

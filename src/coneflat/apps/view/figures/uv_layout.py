@@ -8,7 +8,7 @@ import numpy as np
 
 from .... import TriangleMesh
 from ....base import FloatArray, IntArray
-from ....mesh import end_corners, label_faces
+from ....mesh import end_corners, label_faces, open_along
 from ...measure_uv import chart_tiles
 from ..quantity import Quantity
 from .cone_marks import BOUNDARY_COLOR, SEAM_COLOR, draw_dots, mark_scale, pixels_of
@@ -133,12 +133,13 @@ def chart_paths(uv: FloatArray, uv_faces: IntArray) -> list[Path]:
     """Return a matplotlib path for each chart: its closed outline and those of its holes."""
     from matplotlib.path import Path
 
-    mesh = TriangleMesh(uv, uv_faces)
+    # Where an outline touches itself, the triangles on each side of the point have a copy of it.
+    mesh = open_along(TriangleMesh(uv, uv_faces), np.empty(0, dtype=np.int64)).mesh
     charts, chart = np.unique(label_faces(uv_faces, len(uv))[1], return_inverse=True)
     outlines: list[list[Path]] = [[] for _ in charts]
     for walk in mesh.boundary_walks():
         points = mesh.tails[walk]
-        outlines[chart[walk[0] // 3]].append(Path(uv[[*points, points[0]]], closed=True))
+        outlines[chart[walk[0] // 3]].append(Path(mesh.vertices[[*points, points[0]]], closed=True))
     return [Path.make_compound_path(*loops) for loops in outlines]
 
 
