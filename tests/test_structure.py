@@ -56,7 +56,7 @@ CEILINGS = {
     "layout": 1925,
     "linalg": 453,
     "measure": 810,
-    "mesh": 553,
+    "mesh": 555,
     "metric": 948,
     "options": 522,
     "result": 96,
@@ -69,7 +69,7 @@ CEILINGS = {
 #: Applications with a ceiling of their own, which the ceilings of everything else leave out.
 OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_007, 232, 24_747
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 15_009, 232, 24_749
 CONSTANTS, KERNELS, NAMES, LEVELS = 295, 84, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

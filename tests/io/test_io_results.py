@@ -12,8 +12,9 @@ from bars import cut_bar, read_bar
 
 import coneflat
 from coneflat.errors import ConeflatError, MeshFileError, UnknownFormatError
-from coneflat.io import OUTPUT_FORMATS, atomic_write, check_output, write_flattening
+from coneflat.io import atomic_write, check_output, write_flattening
 from coneflat.io.texture import read_picture
+from coneflat.io.write import OUTPUT_FORMATS
 
 
 @pytest.fixture(scope="module")

@@ -6,6 +6,8 @@ import shapes
 
 from coneflat import TriangleMesh, check_mesh
 from coneflat.base.arrays import unit_exponent
+from coneflat.errors import SeamError
+from coneflat.mesh import cut_open
 from coneflat.mesh.charts import joined_edges, label_charts, point_seams, uv_seams
 from coneflat.mesh.connectivity import corner_fans, sort_pairs
 
@@ -129,3 +131,18 @@ def test_a_mesh_that_is_moved_has_the_same_edges():
         moved.is_boundary_vertex, TriangleMesh(2 * vertices, faces).is_boundary_vertex
     )
     np.testing.assert_array_equal(moved.vertices, 2 * vertices)
+
+
+@pytest.mark.parametrize("edge", [-1, 10**7])
+def test_only_edges_of_the_mesh_are_cut(edge):
+    with pytest.raises(SeamError, match="edges from 0"):
+        cut_open(TriangleMesh(*shapes.sphere(1)), np.array([edge]))
+
+
+def test_vertices_without_triangles_have_no_copies_in_a_cut_mesh():
+    vertices, faces = shapes.sphere(1)
+    mesh = TriangleMesh(np.concatenate([[[9.0, 9.0, 9.0]], vertices]), faces + 1)
+    # Two edges from one vertex.
+    seams = np.flatnonzero((mesh.edges == 1).any(axis=1))[:2]
+    cut = cut_open(mesh, seams)
+    assert cut.origin.tolist() == [1, 1, *range(2, len(mesh.vertices))]

@@ -69,11 +69,11 @@ def pack_charts(
         chart_of_triangle: (m,) chart index of each triangle, from 0; None for one chart.
         resolution: texels along a side of the texture.
         padding: minimum number of texels between charts, and between charts and the border of the texture.
-        rotate: "any" rotates charts to fill the texture best; charts with a straight border are aligned with the
-            axes. "quarter" aligns each chart, its long side along u or v. "none" does not rotate
-            charts. An integer rotates each chart by a multiple of that fraction of a full turn, for example 4 by
-            quarter turns; charts with a straight border only so that the border is as parallel to the axes as
-            possible. A single chart is rotated by "any" by at most an eighth of a turn, and by an integer not at all.
+        rotate: "any" rotates charts to fill the texture best; charts with a straight border are aligned with the axes.
+            "quarter" aligns each chart, its long side along u or v. "none" does not rotate charts. An integer rotates
+            each chart by a multiple of that fraction of a full turn, for example 4 by quarter turns; charts with a
+            straight border only so that the border is as parallel to the axes as possible. A single chart is rotated
+            by "any" by at most an eighth of a turn, and by an integer not at all.
         tiles: number of textures to distribute charts over. Charts are not cut, so the largest chart limits the scale.
 
     Returns:

@@ -32,15 +32,15 @@ from .texture import (
     encode_png,
     read_picture,
 )
-from .write import OUTPUT_FORMATS, as_written, check_output, write_flattening, write_measured, write_stream
+from .write import as_written, check_output, stored_in_glb, write_flattening, write_measured, write_stream
 
 __all__ = [
     "uv_mesh_of", "CELLS", "CheckedArrays", "DARK_CELL", "FOR_INDICES", "FOR_VERTICES", "Glb", "INPUT_FORMATS",
-    "Joined", "LIGHT_CELL", "MATERIAL", "UVMesh", "VALUES", "OUTPUT_FORMATS", "PIPE", "Texture", "as_input",
+    "Joined", "LIGHT_CELL", "MATERIAL", "UVMesh", "VALUES", "PIPE", "Texture", "as_input",
     "as_uv_mesh", "as_path", "as_written", "atomic_write", "bounds", "cell_side", "check_cells", "check_output",
     "check_target", "checked_target", "decode_image", "encode_png", "find_meshes", "has_uv", "imported",
     "known_ending", "lines_of", "make_folder", "nibabel", "number", "parse_obj", "read_archive", "read_bytes",
     "read_flattening", "read_joined", "read_label", "read_mesh", "read_mesh_from", "read_picture", "read_vertex_values",
-    "remove_unfinished", "shading_normals", "split_at_seams", "write_flattening", "write_measured", "write_parts",
-    "write_stream",
+    "remove_unfinished", "shading_normals", "split_at_seams", "stored_in_glb", "write_flattening", "write_measured",
+    "write_parts", "write_stream",
 ]  # fmt: skip

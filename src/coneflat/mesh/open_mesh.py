@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.arrays import IntArray, rows_of
 from ..base.text import plural
-from ..errors import MetricError
+from ..errors import MetricError, SeamError
 from .connectivity import TriangleMesh, label_components, split_vertices
 
 
@@ -33,8 +33,11 @@ def cut_open(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
         seams: (k,) edges, none of them on the boundary.
 
     Raises:
+        SeamError: an index is not that of an edge.
         MetricError: a component of the cut mesh is not a disk.
     """
+    if len(seams) and not 0 <= seams.min() <= seams.max() < len(mesh.edges):
+        raise SeamError(f"seams must be edges from 0 to {len(mesh.edges) - 1:,}")
     cut = open_along(mesh, seams)
     sides = np.concatenate(
         [mesh.edge_halfedges[seams].ravel(), mesh.edge_halfedges[mesh.is_boundary_edge, 0]]

@@ -280,9 +280,9 @@ def _write_grid_npz(grid: IntegerGrid, stream: IO[bytes]) -> None:
 def read_grid(path: str | PathLike[str]) -> IntegerGrid:
     """Return an integer grid from an .npz or .obj file.
 
-    An .obj needs triangles with texture coordinates in units of the grid only; quarter turns, translations and cones
-    follow from these. Measures are read from the comments of `write_grid`; without these they are NaN. Errors are those
-    of `IntegerGrid.load`.
+    An .obj needs triangles with texture coordinates in units of the grid only. Quarter turns, translations and cones
+    follow from the coordinates of corners. Measures are read from the comments of `write_grid`; without these they are
+    NaN. Errors are those of `IntegerGrid.load`.
     """
     path = as_path(path)
     if known_ending(path, GRID_FORMATS, "integer grids are read from") == ".npz":

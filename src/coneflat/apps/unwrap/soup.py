@@ -11,6 +11,7 @@ from ...atlas import pack_charts, round_safely
 from ...base import FloatArray, IntArray
 from ...errors import ConeflatError
 from ...geometry import as_pairs, edge_lengths
+from ...io import stored_in_glb
 from ...layout import rest_sides
 from ...mesh import label_components, label_faces
 from .unwrap import unwrap
@@ -60,8 +61,7 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
         result = unwrap(points, corner, repair=True, **options)
     except ConeflatError as error:
         notes.append(f"Each face is a chart of its own: {error}.")
-        lengths = edge_lengths(points, corner)
-        sides = rest_sides(lengths)
+        sides = rest_sides(edge_lengths(points, corner))
         flat = np.stack([np.zeros(len(sides)), sides[:, 2], -sides[:, 1]], axis=1)
         packed = pack_charts(as_pairs(flat.ravel()).reshape(-1, 3, 2), np.arange(len(chosen)))
         corner_uv[chosen], chart[chosen] = packed.corner_uv, np.arange(len(chosen))
@@ -69,12 +69,12 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
     assert result.face_origin is not None
     known = chosen[result.face_origin]
     # Where charts touch themselves, rounding to single precision may make overlaps.
-    uv, _ = round_safely(result.uv, result.uv_faces, lambda uv: uv.astype(np.float32).astype(np.float64))
-    corner_uv[known] = uv[result.uv_faces]
-    chart[known] = label_faces(result.uv_faces, len(result.uv))[1]
-    return UnwrappedSoup(
-        corner_uv, chart, result.packing_efficiency, result.uv_scale, (*notes, *result.notes)
-    )
+    uv, overlaps = round_safely(result.uv, result.uv_faces, stored_in_glb)
+    notes.extend(result.notes)
+    if len(overlaps.pairs) > result.distortion.overlapping_pairs:
+        notes.append("Triangles overlap in single precision.")
+    corner_uv[known], chart[known] = uv[result.uv_faces], label_faces(result.uv_faces, len(uv))[1]
+    return UnwrappedSoup(corner_uv, chart, result.packing_efficiency, result.uv_scale, tuple(notes))
 
 
 def _oriented(faces: IntArray) -> IntArray:
