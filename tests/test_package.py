@@ -84,33 +84,6 @@ print(*sys.modules)
     assert not unused & set(printed[-2].split())
 
 
-def test_a_kernel_that_was_loaded_is_compiled_into_others(tmp_path):
-    """To load one leaves out what only compiling needs; what is compiled with it has all of it."""
-    (tmp_path / "counting.py").write_text("""
-from coneflat.base.jit import compiled
-from coneflat.mesh.connectivity import label_nodes
-
-@compiled
-def count(nodes, tails, heads):
-    return label_nodes(nodes, tails, heads)[0]
-""")
-    script = """
-import sys
-from importlib import import_module
-import numpy as np
-from counting import count, label_nodes
-pairs = np.array([0, 3]), np.array([1, 4])
-if len(sys.argv) > 1:
-    label_nodes(6, *pairs)
-print(count(6, *pairs), count.stats.cache_hits.total(), label_nodes.stats.cache_hits.total())
-"""
-    command = [sys.executable, "-c", script]
-    runs = [[*command, "loaded"], [*command, "loaded"], command]
-    printed = [subprocess.run(run, capture_output=True, text=True, cwd=tmp_path).stdout for run in runs]
-    # Six nodes and two edges between them.
-    assert [line.split() for line in printed[1:]] == [["4", "1", "1"], ["4", "1", "0"]]
-
-
 @pytest.mark.parametrize("name", coneflat.__all__)
 def test_examples_of_public_names_run(name, tmp_path, monkeypatch):
     """Those of its own docstring; plain values have none, and theirs are in the docstring of the package."""
