@@ -35,8 +35,8 @@ class TestReadingResults:
     @pytest.mark.parametrize(
         ("name", "value", "message"),
         [
-            ("uv", None, "holds no UVs: 'uv' is missing"),
-            ("seams", None, "holds no result of coneflat: 'seams' is missing"),
+            ("uv", None, "holds no result of coneflat with UVs: 'uv' is missing"),
+            ("seams", None, "holds no result of coneflat with UVs: 'seams' is missing"),
             ("uv", np.zeros((4, 3)), r"'uv' has the shape \(4, 3\)"),
             (
                 "uv_faces",
@@ -52,7 +52,7 @@ class TestReadingResults:
             ("curvatures", np.ones(7), "curvatures"),
             ("qc", np.ones(959), "qc"),
             ("qc", np.array(["a"] * 960), "bad.npz"),
-            ("uv_scale", np.float64(np.nan), "its UV scale is nan"),
+            ("uv_scale", np.float64(np.nan), "'uv_scale' has numbers that are not finite"),
             ("vertices", np.full((525, 3), np.nan), "not finite"),
             ("report", np.array("{}"), "not a readable NPZ file"),
             ("report", np.array("[1"), "not a readable NPZ file"),

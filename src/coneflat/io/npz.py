@@ -85,12 +85,7 @@ def _flattening(reading: CheckedArrays) -> Flattening:
     from ..stages import SolveStatistics
 
     path, arrays, floats, indices = reading.path, reading.arrays, reading.floats, reading.indices
-    for name in _NAMES:
-        if name not in arrays:
-            what = "UVs" if name.startswith("uv") else "result of coneflat"
-            raise MeshFileError(
-                f"{path} holds no {what}: {name!r} is missing; write it by `coneflat flatten`"
-            )
+    reading.need(_NAMES, "result of coneflat with UVs")
     report = reading.report()
     arrays.setdefault("prescribed", np.full(len(arrays["vertices"]), np.nan))
     for name in ("seconds", "settings"):
@@ -99,19 +94,15 @@ def _flattening(reading: CheckedArrays) -> Flattening:
     notes, efficiency = reading.notes(report), number(report["packing_efficiency"])
     for value in report["seconds"].values():
         number(value)
-    vertices, uv = floats("vertices", (None, 3)), floats("uv", (None, 2))
+    vertices, uv = reading.finite("vertices", (None, 3)), reading.finite("uv", (None, 2))
     n, u = len(vertices), len(uv)
     faces = indices("faces", (None, 3), n)
     m = len(faces)
     uv_faces, cones = indices("uv_faces", (m, 3), u), indices("cones", (None,), n)
     if not m:
         raise MeshFileError(f"{path} is not a result of coneflat: it has no faces")
-    if not (np.isfinite(vertices).all() and np.isfinite(uv).all()):
-        raise MeshFileError(
-            f"{path} is not a result of coneflat: it has positions or UVs that are not finite"
-        )
-    uv_scale = float(floats("uv_scale", ()))
-    if not (np.isfinite(uv_scale) and uv_scale > 0):
+    uv_scale = float(reading.finite("uv_scale", ()))
+    if not uv_scale > 0:
         raise MeshFileError(f"{path} is not a result of coneflat: its UV scale is {uv_scale:g}")
     measures: dict[str, Any] = {name: number(report.get(name)) for name in MEASURES}
     settings, rotations = report["settings"], None

@@ -149,7 +149,7 @@ class TestCommand:
             (("ball.obj", "--kind", "cones", "--eye", "1,x,2"), "'1,x,2' is not a direction"),
             (("ball.obj", "--dpi", "9000"), "between 10 and 2400"),
             (("ball.obj", "--kind", "quality", "--colors", "no"), "no colour map 'no'"),
-            (("uvless.npz",), "holds no UVs: 'uv' is missing"),
+            (("uvless.npz",), "holds no result of coneflat with UVs: 'uv' is missing"),
             (("broken.obj", "--strict"), "1 edge with more than two faces"),
         ],
     )

@@ -210,7 +210,7 @@ class TestCommand:
         with np.load(saved) as archive:
             np.savez(tmp_path / "bare.npz", **{k: v for k, v in archive.items() if k != "uv"})
         for arguments, message in (
-            (("bare.npz",), "holds no UVs"),
+            (("bare.npz",), "holds no result of coneflat with UVs"),
             ((saved, "--texture", "none.png"), "none.png: there is no such file"),
             ((saved, "--show", "heat"), "'heat' is not one of"),
             ((saved, "-o", "page.pdf"), "ends with '.pdf'"),
