@@ -67,14 +67,14 @@ class TestBlocks:
         assert mesh.properties.keys() == expected.properties.keys()
         if ending == ".obj":
             assert mesh.obj.gaps == {place: gap for place, gap in expected.obj.gaps.items() if gap}
-            np.testing.assert_array_equal(mesh.obj.normals, expected.obj.normals)
+            np.testing.assert_array_equal(mesh.normal, expected.normal)
             assert mesh.obj.newline == b"\r\n"
 
     def test_obj_is_read_as_meant(self, whole):
         mesh = whole[".obj"]
         np.testing.assert_array_equal(mesh.vertices, [[0, 0, 0], [1, 0.5, 1e-3], [1, 1, 0], [0.5, 2, np.nan]])
         assert mesh.corners.tolist() == [0, 1, 2, 0, 1, 2, 3, 2, 1, 0]
-        assert mesh.obj.normals.tolist() == [0, 0, 0, -1, 1, 0, 1, 0, 0, 0]
+        assert mesh.normal.tolist() == [-1, -1, -1, 0, 0, -1, 0, -1, -1, -1]
         assert mesh.obj.gaps[1] == b"# first\r\ng one\r\nl 1 2 # 1/1\r\n"
         assert mesh.obj.gaps[2] == b"v .5 2 nan\r\ng two\r\nusemtl red\r\n"
         assert b"vt" not in b"".join(mesh.obj.gaps.values())

@@ -44,11 +44,11 @@ class TestObj:
         lines = lines_of(out)
         assert [line for line in lines if line.startswith(b"f")] == [
             b"f 1/1/1 2/2/1 5/5/1 4/4/1",
-            b"f 2/8/-1 3/3/-1 6/6/-1",
+            b"f 2/8/1 3/3/1 6/6/1",
             b"f 2/8 6/6 5/9",
         ]
         assert b"l 1 2" in lines
-        assert lines.index(b"# the triangle") == lines.index(b"f 2/8/-1 3/3/-1 6/6/-1") + 1
+        assert lines.index(b"# the triangle") == lines.index(b"f 2/8/1 3/3/1 6/6/1") + 1
         texture = [i for i, line in enumerate(lines) if line.startswith(b"vt ")]
         assert len(texture) == 9
         assert texture[-1] < lines.index(b"f 1/1/1 2/2/1 5/5/1 4/4/1")
@@ -85,7 +85,7 @@ class TestObj:
         out = write_flattening(cut_bar(bar, flip=(0, 1, 3)), tmp_path / "out.obj")
         assert [line for line in lines_of(out) if line.startswith(b"f")] == [
             b"f 1/1/1 4/4/1 5/5/1 2/2/1",
-            b"f 2/8/-1 3/3/-1 6/6/-1",
+            b"f 2/8/1 3/3/1 6/6/1",
             b"f 2/8 5/9 6/6",
         ]
 

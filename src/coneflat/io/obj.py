@@ -46,13 +46,10 @@ class ObjText:
     Attributes:
         gaps: the text before the line of polygon i, verbatim except for texture coordinates, which are left out; the
             text after the last polygon has the number of polygons as key.
-        normals: (c,) the normal index at every polygon corner as in the file (it may be negative, to count backwards),
-            0 where there is none; None if no corner has one.
         newline: the line ending of the file.
     """
 
     gaps: Mapping[int, bytes]
-    normals: IntArray | None
     newline: bytes
 
 
@@ -68,7 +65,7 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
     """
     newline = newline_of(content)
     vertices, colours, directions = (Growing(np.float64, 3) for _ in range(3))
-    corners, textures, normals, shading, sizes = (Growing(np.int64) for _ in range(5))
+    corners, textures, normals, sizes = (Growing(np.int64) for _ in range(4))
     uv = Growing(np.float64, 2)
     gaps: defaultdict[int, bytearray] = defaultdict(bytearray)
     for block in text_blocks(path, content, continued=True):
@@ -96,19 +93,18 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
             # -1 means that there is no UV point; an index that counts back too far becomes -2, which is an error.
             texture = np.where(texture < 0, np.where(counted < 0, -2, counted), texture - 1)
         uv.add(_uv_points(block, np.flatnonzero(kinds == _TEXTURE)))
-        shade = normal
         if normal is not None:
             beyond = len(directions) + np.cumsum(kinds == _NORMAL)[rows]
-            shade = np.where(normal < 0, np.repeat(beyond, counts) + normal + 1, normal)
+            normal = np.where(normal < 0, np.repeat(beyond, counts) + normal + 1, normal)
         directions.add(_directions(block, np.flatnonzero(kinds == _NORMAL)))
-        for known, found, none in ((textures, texture, -1), (normals, normal, 0), (shading, shade, 0)):
+        for known, found, none in ((textures, texture, -1), (normals, normal, 0)):
             if found is not None:
                 known.add(np.full(len(corners) - len(known), none))
                 known.add(found)
         # A negative index counts back from the last vertex above the face.
         corners.add(np.where(given < 0, np.repeat(above, counts) + given, given - 1))
     check_filled(path, len(vertices), len(sizes))
-    for known, none in ((textures, -1), (normals, 0), (shading, 0)):
+    for known, none in ((textures, -1), (normals, 0)):
         if len(known):
             known.add(np.full(len(corners) - len(known), none))
     mesh = MeshFile(
@@ -118,7 +114,6 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
         offsets=offsets_of(sizes.done()),
         obj=ObjText(
             gaps={polygon: bytes(gaps.pop(polygon)) for polygon in list(gaps)},
-            normals=normals.done() if len(normals) else None,
             newline=newline,
         ),
         properties=dict(zip(COLOURS, colours.done().T, strict=True)) if len(colours) == len(vertices) else {},
@@ -126,7 +121,7 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
         # Some programs write indices of UV points, but not the points.
         uv=uv.done() if len(textures) and len(uv) else None,
         normals=directions.done(),
-        normal=shading.done() - 1 if len(shading) else None,
+        normal=normals.done() - 1 if len(normals) else None,
     )
     _check_corners(path, content, mesh)
     return mesh
@@ -216,29 +211,28 @@ def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
         stream: a binary file.
         folder: folder of the file, for paths of material libraries.
     """
-    source, text, normals = result.source, ObjText({}, None, b"\n"), None
+    source, text, normals, normal = result.source, ObjText({}, b"\n"), None, None
     vertices, faces, face_corners = result.vertices, result.faces, result.face_corners
     if source is not None and face_corners is not None:
         vertices, offsets, numbers = source.vertices, source.offsets, source.corners + 1
+        normals, normal = source.normals, source.normal
         if source.obj is not None:
             # The text contains the vertices of the file, including merged ones.
             numbers = numbers if source.unwelded is None else source.unwelded + 1
             text = _relocated(source.obj, source.path.parent, folder)
-        elif source.normals is not None and source.normal is not None:
-            normals, text = source.normals, replace(text, normals=source.normal + 1)
     else:
         source, numbers = None, faces.reshape(-1) + 1
         offsets = np.arange(0, len(numbers) + 1, 3)
         face_corners = np.arange(len(numbers)).reshape(-1, 3)
     to_write = find_pieces(result.uv, result.uv_faces, offsets, face_corners)
     columns = [numbers[to_write.corners], to_write.points + 1]
-    if text.normals is not None:
-        columns.append(text.normals[to_write.corners])
+    if normal is not None:
+        columns.append(normal[to_write.corners] + 1)
     newline, last = text.newline, len(offsets) - 1
     if source is None or source.obj is None:
         stream.writelines(lines_of("v", vertices, newline))
-    if normals is not None:
-        stream.writelines(lines_of("vn", normals, newline))
+        if normals is not None:
+            stream.writelines(lines_of("vn", normals, newline))
     before = sorted({0, last, *text.gaps})
     begins = np.searchsorted(to_write.polygons, before).tolist()
     starts = np.concatenate(([0], np.cumsum(to_write.sizes)))
