@@ -61,27 +61,20 @@ def split_at_seams(result: Flattening, normals: CornerNormals | None = None) -> 
         result: the flattening.
         normals: normals of the triangle corners; vertices are also split where these differ.
     """
-    own, point, faces = _pairs(result.faces.reshape(-1), result.uv_faces.reshape(-1), len(result.uv))
+    own, point, faces = distinct_pairs(result.faces.reshape(-1), result.uv_faces.reshape(-1), len(result.uv))
     shading = None
     if normals is not None:
         corners = normals.corners.reshape(-1)
-        pair, normal, faces = _pairs(faces, corners, len(normals.normals))
+        pair, normal, faces = distinct_pairs(faces, corners, len(normals.normals))
         own, point, shading = own[pair], point[pair], normals.normals[normal]
     origin = own if result.vertex_origin is None else result.vertex_origin[own]
     return SplitMesh(result.vertices[own], result.uv[point], faces.reshape(-1, 3), own, origin, shading)
 
 
-def _pairs(vertices: IntArray, points: IntArray, point_count: int) -> tuple[IntArray, IntArray, IntArray]:
+def distinct_pairs(
+    vertices: IntArray, points: IntArray, point_count: int
+) -> tuple[IntArray, IntArray, IntArray]:
     """Return the vertices and the points of all distinct pairs, in order, and the index of every given pair."""
-    vertex_of = np.full(point_count, -1, dtype=np.int64)
-    vertex_of[points] = vertices
-    if np.array_equal(vertex_of[points], vertices):
-        # Each point has one vertex, as in all layouts of this package: sorting the points is faster than the pairs.
-        used = np.flatnonzero(vertex_of >= 0)
-        point = used[np.argsort(vertex_of[used], kind="stable")]
-        number = np.empty(point_count, dtype=np.int64)
-        number[point] = np.arange(len(point))
-        return vertex_of[point], point, number[points]
     pairs, number = np.unique(vertices * point_count + points, return_inverse=True)
     return *np.divmod(pairs, point_count), number.reshape(-1)
 
@@ -116,8 +109,9 @@ def source_normals(result: Flattening) -> CornerNormals | None:
         normals = np.concatenate([normals, vertex_normals(result.vertices, result.faces)])
     used, numbers = np.unique(corners, return_inverse=True)
     # Many files have a normal for every corner, most of them equal.
-    kept, merged = weld(shading_normals(normals[used]))
-    return CornerNormals(shading_normals(normals[used][kept]), merged[numbers.reshape(corners.shape)])
+    shown = shading_normals(normals[used])
+    kept, merged = weld(shown)
+    return CornerNormals(shown[kept], merged[numbers.reshape(corners.shape)])
 
 
 def _smoothing_groups(source: MeshFile) -> IntArray | None:

@@ -24,7 +24,7 @@ from ...base.text import plural
 from ...errors import ConeflatError, MeshFileError
 from ...geometry.triangles import vertex_normals
 from ..files import moved_path, read_bytes
-from ..split import shading_normals, source_normals, split_at_seams
+from ..split import distinct_pairs, shading_normals, source_normals, split_at_seams
 from ..texture import Texture, image_kind
 from .data import COMPRESSED, GltfData, Item
 from .read import DRACO, GltfScene, Mode, ScenePart
@@ -313,8 +313,7 @@ def _fill(
     glb: Glb, data: GltfData, target: Item, before: Item, vertices: IntArray, points: IntArray, uv: FloatArray
 ) -> None:
     """Write the triangles of a primitive, with its vertex and the point in the plane of every corner."""
-    pairs, number = np.unique(vertices * len(uv) + points, return_inverse=True)
-    own, point = np.divmod(pairs, len(uv))
+    own, point, number = distinct_pairs(vertices, points, len(uv))
     replaced = _replaced(data, before)
 
     def gathered(arrays: dict[str, int]) -> dict[str, int]:
