@@ -7,6 +7,7 @@ from .files import (
     atomic_write,
     check_target,
     checked_target,
+    imported,
     known_ending,
     make_folder,
     read_bytes,
@@ -17,7 +18,7 @@ from .join import Joined
 from .mapped import UVMesh, as_uv_mesh, has_uv, uv_mesh_of
 from .npz import CheckedArrays, number, read_archive, read_flattening
 from .obj import lines_of, parse_obj
-from .packages import as_input, imported
+from .packages import as_input
 from .ply import write_parts
 from .read import INPUT_FORMATS, find_meshes, read_joined, read_mesh, read_mesh_from
 from .split import shading_normals, split_at_seams

@@ -5,7 +5,6 @@ GIFTI, annotations and MGH are read by nibabel (the extra `brains`); FreeSurfer'
 
 from __future__ import annotations
 
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ import numpy as np
 from ..base.arrays import FloatArray, IntArray
 from ..base.text import list_some
 from ..errors import MeshFileError, OptionError
-from .files import PathName, as_path, read_bytes, readable
+from .files import PathName, as_path, imported, read_bytes, readable
 from .mesh_file import MeshFile
 
 #: Names of FreeSurfer's surfaces, which stand in the place of an ending: lh.pial.
@@ -30,10 +29,7 @@ def nibabel() -> Any:
     Raises:
         OptionError: it is not installed.
     """
-    try:
-        return import_module("nibabel")
-    except ImportError as error:
-        raise OptionError('files of brain surfaces need nibabel: pip install "coneflat[brains]"') from error
+    return imported("nibabel", "files of brain surfaces need nibabel", '"coneflat[brains]"')
 
 
 def is_freesurfer(content: bytes) -> bool:

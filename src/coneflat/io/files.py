@@ -10,16 +10,34 @@ import stat
 import sys
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
+from importlib import import_module
 from os import PathLike
 from pathlib import Path
 from typing import IO, Any, TypeAlias
 
-from ..errors import ConeflatError, EmptyMeshError, MeshFileError, UnknownFormatError
+from ..errors import ConeflatError, EmptyMeshError, MeshFileError, OptionError, UnknownFormatError
 
 #: The types of file names that users may pass.
 PathName: TypeAlias = "str | PathLike[str]"
 #: Stands for standard input, and for standard output.
 PIPE = Path("-")
+
+
+def imported(module: str, need: str, package: str) -> Any:
+    """Return a module that not every installation has.
+
+    Args:
+        module: its name.
+        need: what needs it, for the message: "textures need Pillow".
+        package: what pip installs.
+
+    Raises:
+        OptionError: it is not installed.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise OptionError(f"{need}: pip install {package}") from error
 
 
 def read_bytes(path: Path) -> bytes:
@@ -204,8 +222,6 @@ def atomic_write(path: PathName, mode: str = "wb") -> Iterator[IO[Any]]:
     Raises:
         MeshFileError: the file cannot be written, or the disk is full.
     """
-    if mode not in ("w", "wb"):
-        raise ValueError(f"mode must be 'w' or 'wb', got {mode!r}")
     target = check_target(path)
     # Created by open() instead of tempfile, so that it has the default permissions of a new file.
     temporary = target.with_name(_temporary(target.name, secrets.token_hex(6)))

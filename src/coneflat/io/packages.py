@@ -5,16 +5,16 @@ Other packages are imported only when they are needed.
 
 from __future__ import annotations
 
-from importlib import import_module
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import ArrayShapeError, OptionError
+from ..errors import ArrayShapeError
 from ..geometry.triangulate import triangulate
 from ..source.input_mesh import InputMesh
+from .files import imported
 from .mesh_file import MeshFile, offsets_of
 from .read import read_mesh
 from .split import split_at_seams
@@ -102,7 +102,7 @@ def _from_polygons(points: ArrayLike, polygons: list[list[int]]) -> InputMesh:
 
 def to_trimesh(result: Flattening) -> Any:
     """Return a `trimesh.Trimesh`; see `Flattening.to_trimesh`."""
-    trimesh = imported("trimesh", "trimesh")
+    trimesh = imported("trimesh", "meshes of trimesh need trimesh", "trimesh")
     split = split_at_seams(result)
     return trimesh.Trimesh(
         split.vertices,
@@ -116,7 +116,7 @@ def to_trimesh(result: Flattening) -> Any:
 
 def to_pyvista(result: Flattening) -> Any:
     """Return a `pyvista.PolyData`; see `Flattening.to_pyvista`."""
-    pyvista = imported("pyvista", "PyVista")
+    pyvista = imported("pyvista", "meshes of PyVista need PyVista", "pyvista")
     split = split_at_seams(result)
     # Each triangle is preceded by its number of corners.
     padded = np.insert(split.faces, 0, 3, axis=1)
@@ -130,7 +130,7 @@ def to_pyvista(result: Flattening) -> Any:
 
 def to_meshio(result: Flattening) -> Any:
     """Return a `meshio.Mesh`; see `Flattening.to_meshio`."""
-    meshio = imported("meshio", "meshio")
+    meshio = imported("meshio", "meshes of meshio need meshio", "meshio")
     split = split_at_seams(result)
     return meshio.Mesh(
         split.vertices,
@@ -139,15 +139,3 @@ def to_meshio(result: Flattening) -> Any:
         point_data={"obj:vt": split.uv, "vertex": split.own},
         cell_data={"chart": [result.seam_data.face_chart]},
     )
-
-
-def imported(module: str, name: str) -> Any:
-    """Return a module that not every installation has.
-
-    Raises:
-        OptionError: it is not installed.
-    """
-    try:
-        return import_module(module)
-    except ImportError as error:
-        raise OptionError(f"meshes of {name} need {name}: pip install {module}") from error

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..base.arrays import FloatArray, IntArray
 from ..errors import MeshFileError, OptionError
 from ..geometry.planar import signed_double_areas
-from .files import PathName, as_path, read_bytes, readable
+from .files import PathName, as_path, imported, read_bytes, readable
 
 if TYPE_CHECKING:
     from ..result import Flattening
@@ -135,10 +135,9 @@ def read_picture(path: PathName) -> Texture:
 
 
 def _pillow() -> Any:
-    try:
-        from PIL import Image
-    except ImportError as error:
-        raise OptionError('textures need Pillow: pip install "coneflat[figures]"') from error
+    imported("PIL", "textures need Pillow", '"coneflat[figures]"')
+    from PIL import Image
+
     return Image
 
 

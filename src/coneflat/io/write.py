@@ -13,7 +13,7 @@ import numpy as np
 from ..atlas import round_safely
 from ..base.arrays import FloatArray, IntArray
 from ..base.text import plural, short_repr
-from ..errors import MeshFileError, OptionError, UnknownFormatError
+from ..errors import MeshFileError, OptionError
 from ..measure.guarantees import DOUBLE, SINGLE, remeasured
 from ..mesh.polygons import polygon_of
 from ..options.declared import FORMATS
@@ -111,13 +111,9 @@ def write_stream(
         folder: folder of the file, for relative paths in it; by default the current one.
 
     Raises:
-        UnknownFormatError, MeshFileError, OptionError: as of `write_flattening`.
+        MeshFileError, OptionError: as of `write_flattening`.
     """
     ending, folder = ending.lower(), Path() if folder is None else folder
-    if ending not in OUTPUT_FORMATS:
-        raise UnknownFormatError(
-            f"{ending!r} is not a format that results are written as: {', '.join(OUTPUT_FORMATS)}"
-        )
     _check_texture(f"a {ending}", ending, texture)
     image = None if texture is None else find_texture(texture, result)
     # A .glb has fewer digits; triangles must also be positively oriented and disjoint after rounding.

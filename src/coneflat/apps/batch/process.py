@@ -20,7 +20,7 @@ from typing import Any
 
 from ...base import exit_text
 from ...errors import OptionError
-from ...io import remove_unfinished
+from ...io import imported, remove_unfinished
 from .jobs import Job
 
 # Each process uses one thread, because there are as many processes as cores.
@@ -164,20 +164,17 @@ def rows_of_cluster(
     Raises:
         OptionError: no cluster can be reached at the address, or Dask is not installed.
     """
-    try:
-        from distributed import Client, as_completed
-    except ImportError as error:
-        raise OptionError("a Dask cluster needs distributed: pip install 'coneflat[dask]'") from error
+    distributed = imported("distributed", "a Dask cluster needs distributed", '"coneflat[dask]"')
     try:
         _require_scheduler(address)
-        client = Client(address, timeout=ANSWER_SECONDS, set_as_default=False)
+        client = distributed.Client(address, timeout=ANSWER_SECONDS, set_as_default=False)
     except Exception as error:  # The library raises many types of errors for a wrong address.
         why = " ".join(str(error).split()) or type(error).__name__
         raise OptionError(f"no Dask scheduler answers at {address}: {why}") from error
     with client:
         futures = {client.submit(flatten_here, job, limit, pure=False, retries=RETRIES): job for job in jobs}
         try:
-            for future in as_completed(futures, loop=client.loop):
+            for future in distributed.as_completed(futures, loop=client.loop):
                 job = futures[future]
                 lost = future.exception()
                 if lost is None:

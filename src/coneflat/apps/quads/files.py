@@ -75,7 +75,7 @@ def check_quads_output(path: str | PathLike[str]) -> Path:
     """Return a path that `write_quads` can write, or raise the same errors in advance."""
     found = checked_target(path, endings=QUAD_FORMATS, what="quads are written as")
     if found.suffix.lower() in _MESHIO:
-        imported("meshio", "meshio")
+        imported("meshio", "meshes of meshio need meshio", "meshio")
     return found
 
 
@@ -111,7 +111,7 @@ def write_quads_stream(mesh: QuadMesh, stream: IO[bytes], ending: str) -> None:
 
 
 def _write_by_meshio(mesh: QuadMesh, stream: IO[bytes], ending: str) -> None:
-    meshio = imported("meshio", "meshio")
+    meshio = imported("meshio", "meshes of meshio need meshio", "meshio")
     least = least_jacobians(mesh.vertices, mesh.quads)
     is_bare = ending == ".inp"
     found = meshio.Mesh(

@@ -15,7 +15,7 @@ from typing import IO, TYPE_CHECKING, Any
 import numpy as np
 
 from ....errors import OptionError
-from ....io import atomic_write, checked_target
+from ....io import atomic_write, checked_target, imported
 from ..quantity import Quantity
 from .cone_marks import check_dpi
 
@@ -259,12 +259,10 @@ def new_figure(width: float, height: float, dpi: float = 150) -> Figure:
     Raises:
         OptionError: matplotlib is not installed.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise OptionError('figures need matplotlib: pip install "coneflat[figures]"') from error
-    figure = Figure(figsize=(width, height), dpi=dpi, facecolor="white")
+    module = imported("matplotlib.figure", "figures need matplotlib", '"coneflat[figures]"')
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure: Figure = module.Figure(figsize=(width, height), dpi=dpi, facecolor="white")
     FigureCanvasAgg(figure)
     return figure
 
