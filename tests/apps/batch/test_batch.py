@@ -104,7 +104,7 @@ def test_a_mesh_that_hangs_is_ended(models, tmp_path):
         (["models", "--out", "models"], "would overwrite"),
         (["models", "--out", "out", "--jobs", "0"], "at least one process"),
         (["models", "--out", "out", "--time-limit", "0"], "must be positive"),
-        (["models", "--out", "out", "--summary", "table.xls"], "a .csv file"),
+        (["models", "--out", "out", "--summary", "table.xls"], "summaries are written as .csv"),
         (["models", "--out", "out", "--distortion", "-1"], "distortion must be a number above 0"),
         (["models", "--out", "out", "--jobs", "2", "--dask", "tcp://localhost:1"], "leave out --jobs"),
         (["models", "--out", "broken", "--cones", "none", "--distortion", "2"], "leave out --distortion"),

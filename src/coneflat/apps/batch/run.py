@@ -13,7 +13,7 @@ from typing import Any
 
 from ...base import plural, printable
 from ...errors import MeshFileError, OptionError
-from ...io import atomic_write, check_target, make_folder
+from ...io import atomic_write, check_target, checked_target, make_folder
 from .jobs import COLUMNS, Job
 
 #: Function that is called with the row of each completed mesh, the number completed so far, and the total number.
@@ -78,7 +78,7 @@ def run_batch(
         limit = None
     summary = folder / "summary.csv" if summary is None else summary
     make_folder(folder)
-    check_summary(summary)
+    checked_target(summary, (".csv",), "summaries are written as")
     journal = Journal(folder)
     open_jobs = [job for job in jobs if redo or not journal.is_done(job)]
     try:
@@ -167,18 +167,6 @@ def _row(line: bytes) -> dict[str, Any] | None:
     except (ValueError, RecursionError):
         return None
     return row if isinstance(row, dict) and all(isinstance(row.get(name), str) for name in NEEDED) else None
-
-
-def check_summary(path: Path) -> None:
-    """Raise an error if the summary cannot be written.
-
-    Raises:
-        OptionError: the file does not end in .csv.
-        MeshFileError: its folder is missing, or writing is not permitted.
-    """
-    if path.suffix.lower() != ".csv":
-        raise OptionError(f"the summary must be a .csv file, got {path.name}")
-    check_target(path)
 
 
 def write_summary(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
