@@ -56,7 +56,7 @@ def _entries(flag: str, noun: str, texts: Sequence[str]) -> Iterator[tuple[str, 
         if not is_file(word):
             yield from ((text.strip(), flag) for text in word.split(","))
             continue
-        lines = [line.split("#", 1)[0].strip() for line in _lines(Path(word))]
+        lines = _lines(Path(word))
         if not any(lines):
             raise OptionError(f"{word} contains no {noun}s")
         yield from ((text, f"{word}, line {number}:") for number, text in enumerate(lines, 1) if text)
@@ -70,8 +70,7 @@ def read_vertices(option: str, text: str) -> tuple[int, ...]:
         MeshFileError: the file cannot be read.
     """
     if is_file(text):
-        lines = _lines(Path(text))
-        option, text = text, " ".join(line.split("#", 1)[0] for line in lines)
+        option, text = text, " ".join(_lines(Path(text)))
     words = text.replace(",", " ").split()
     for word in words:
         if not re.fullmatch(r"[-+]?[0-9]{1,18}", word):
@@ -89,8 +88,7 @@ def read_pairs(name: str) -> IntArray:
     import numpy as np
 
     path, pairs = Path(name), []
-    for number, line in enumerate(_lines(path), start=1):
-        text = line.split("#", 1)[0].strip()
+    for number, text in enumerate(_lines(path), start=1):
         if not text:
             continue
         if not re.fullmatch(r"[0-9]{1,18}(\s*[,;-]\s*|\s+)[0-9]{1,18}", text):
@@ -119,8 +117,7 @@ def read_vertices_or_pairs(option: str, texts: Sequence[str]) -> IntArray:
 
 
 def _holds_pairs(path: Path) -> bool:
-    lines = [re.split(r"[\s,;-]+", line.split("#", 1)[0].strip()) for line in _lines(path)]
-    return all(len(words) == 2 for words in lines if words != [""])
+    return all(len(re.split(r"[\s,;-]+", line)) == 2 for line in _lines(path) if line)
 
 
 def read_numbers(noun: str, text: str) -> str | float | FloatArray:
@@ -177,11 +174,13 @@ def parse_curvature(text: str, where: str, noun: str = "curvature") -> float:
 
 
 def _lines(path: Path) -> list[str]:
+    """Return the lines of a text file without their comments."""
     try:
-        return path.read_text(encoding="utf-8").splitlines()
+        lines = path.read_text(encoding="utf-8").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         raise MeshFileError(f"cannot read {path}: {reason}") from error
+    return [line.split("#", 1)[0].strip() for line in lines]
 
 
 def is_file(text: str) -> bool:
