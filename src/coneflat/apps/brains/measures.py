@@ -95,7 +95,8 @@ def metric_distortion(vertices: FloatArray, faces: IntArray, flat: FloatArray) -
     graph, mean = _graph(vertices, faces)
     sources = np.unique(faces)
     sources = sources[:: -(-len(sources) // MAX_SOURCES)]
-    flat = flat * np.sqrt(_area(vertices[faces]) / _area(np.pad(flat, ((0, 0), (0, 1)))[faces]))
+    area = double_areas(edge_lengths(vertices, faces)).sum()
+    flat = flat * np.sqrt(area / np.abs(signed_double_areas(flat[faces])).sum())
     errors = total = 0.0
     for begin in range(0, len(sources), SOURCES_AT_ONCE):
         check_cancelled()
@@ -106,11 +107,6 @@ def metric_distortion(vertices: FloatArray, faces: IntArray, flat: FloatArray) -
         errors += float(np.abs(np.linalg.norm(flat[from_[i]] - flat[j], axis=1) - on_surface).sum())
         total += float(on_surface.sum())
     return 100 * errors / total
-
-
-def _area(corners: FloatArray) -> float:
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return float(np.linalg.norm(normals, axis=1).sum()) / 2
 
 
 def _graph(vertices: FloatArray, faces: IntArray) -> tuple[csr_matrix, float]:
