@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, require_finite
+from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats, require_finite
 from ..base.sets import grow_forest
 from ..base.text import list_some, plural
 from ..errors import (
@@ -105,13 +105,7 @@ def is_left_out(note: str) -> bool:
 
 
 def _as_vertices(vertices: ArrayLike) -> FloatArray:
-    try:
-        array = np.asarray(vertices)
-        if array.dtype.kind not in "fiu":
-            raise TypeError(f"their type is {array.dtype}")
-        points = np.ascontiguousarray(array, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise ArrayShapeError(f"vertices must be an (n, 3) array of numbers: {error}") from error
+    points = as_floats("vertices", vertices)
     if points.size == 0:
         raise EmptyMeshError("the mesh has no vertices")
     if points.ndim != 2 or points.shape[1] != 3:
