@@ -18,10 +18,11 @@ ANGLE, SIDES = 1e-6, 1e-8
 #: The latter where triangles had to be opened by a hair, and at the seams that a note names; above it another note says
 #: by how much sides differ.
 LOOSE_SIDES = 1e-6
-#: The notes that name seams with unequal sides: near a vertex, and marked ones, with the largest error of a side.
+#: The notes that name seams with unequal sides: those near a vertex; so many marked ones, and their largest error.
 NO_ROOM = re.compile(r".* had no room .* as at vertex (\d+): .* the sides of seams near them are unequal")
 NOT_KEPT = re.compile(
-    r".* on marked seams could not keep their lengths, with relative errors of up to (\S+):"
+    r"([\d,]+) edges? of [\d,]+ on the boundary or on marked seams could not keep their lengths, "
+    r"with relative errors of up to (\S+):"
 )
 #: Rings of triangles around that vertex in which points may have moved; an error of both sides, rounded in the note.
 NO_ROOM_RINGS, BOTH_SIDES = 8, 2.1
@@ -204,7 +205,7 @@ def _check_sides(trial: Trial) -> None:
     off -= 8 * EPS / np.maximum(np.minimum(one, two), EPS)
     cause = f"sides of seams differ, {_method(trial)}{', marked' if trial.is_marked else ''}"
     bad = off > (LOOSE_SIDES if is_opened else SIDES)
-    is_named = bad & (off <= _named_differences(trial))
+    is_named = bad & (off <= _named_differences(trial, bad))
     if is_named.any():
         trial.outcome.excuse(cause)
     bad &= ~is_named
@@ -212,8 +213,11 @@ def _check_sides(trial: Trial) -> None:
         trial.broken("sides", cause, f"{bad.sum()} edges, by up to {off[bad].max():.3g}")
 
 
-def _named_differences(trial: Trial) -> np.ndarray:
-    """Return (k,) the largest relative differences of the sides of inner edges that notes name, up to `LOOSE_SIDES`."""
+def _named_differences(trial: Trial, bad: np.ndarray) -> np.ndarray:
+    """Return (k,) the largest relative differences of the sides of inner edges that notes name, up to `LOOSE_SIDES`.
+
+    bad: (k,) the edges whose sides differ.
+    """
     result, topology = trial.result, trial.topology
     named = np.zeros(len(topology.inner))
     for note in result.notes:
@@ -223,8 +227,9 @@ def _named_differences(trial: Trial) -> np.ndarray:
                 near[result.faces[near[result.faces].any(axis=1)]] = True
             named[near[topology.edges[topology.inner]].any(axis=1)] = LOOSE_SIDES
         elif (found := NOT_KEPT.match(note)) and trial.is_marked:
-            seams = topology.is_seam(result.uv_faces)
-            named[seams] = np.maximum(named[seams], min(BOTH_SIDES * float(found[1]), LOOSE_SIDES))
+            seams = np.flatnonzero(bad & topology.is_seam(result.uv_faces))
+            if len(seams) <= int(found[1].replace(",", "")):
+                named[seams] = np.maximum(named[seams], min(BOTH_SIDES * float(found[2]), LOOSE_SIDES))
     return named
 
 
