@@ -82,6 +82,13 @@ def test_a_sound_result_breaks_no_promise(ball):
     assert breaches_of(result, options, *mesh) == []
 
 
+@pytest.mark.parametrize("seed", [1_704_966, 1_708_730])
+def test_seams_that_a_note_names_are_noted(seed):
+    outcome = run_case("mesh", seed)
+    assert outcome.breaches == []
+    assert any("sides of seams differ" in cause for cause in outcome.noted)
+
+
 def planted(result, fault):
     """A result with a fault of one kind that it does not report."""
     uv = result.uv.copy()
@@ -98,6 +105,8 @@ def planted(result, fault):
         uv[inner] += 2 * (uv[face[face != inner]].mean(axis=0) - uv[inner])
     elif fault == "moved a little":
         uv[on_seam] += 1e-4 * (uv[inner] - uv[on_seam])
+    elif fault == "moved by a hair":
+        uv[on_seam] += 1e-7 * (uv[inner] - uv[on_seam])
     elif fault == "other cone":
         return replace(result, curvatures=result.curvatures + np.eye(1, len(result.cones))[0])
     elif fault == "other vertices":
@@ -121,6 +130,7 @@ def planted(result, fault):
         ("flipped", "flipped: report differs"),
         ("flipped", "overlap: report differs"),
         ("moved a little", "curvature error understated"),
+        ("moved by a hair", "sides of seams differ, exact"),
         ("other cone", "angle off by less than a full turn, exact"),
         ("other cone", "cones: sum of curvatures"),
         ("other vertices", "origin: vertices are not the input's"),
@@ -150,6 +160,33 @@ def test_a_fault_that_its_own_note_names_is_no_breach(ball):
         assert (cause in breaches_of(replace(turned, notes=notes), options, *mesh)) == is_breach
     other = replace(planted(result, "other cone"), notes=("The sum of curvatures is off at 1 cone.",))
     assert "cones: sum of curvatures" in breaches_of(other, options, *mesh)
+
+
+def test_seams_differ_only_where_and_as_much_as_their_note_says(ball):
+    result, options, mesh = ball
+    is_moved = (planted(result, "moved by a hair").corner_uv != result.corner_uv).any(axis=2)
+    here = int(result.faces[is_moved][0])
+    far = int(np.argmax(np.linalg.norm(result.vertices - result.vertices[here], axis=1)))
+    room = (
+        "1 triangle had no room between seams with equal sides, as at vertex {}: they are positively oriented, but "
+        "the sides of seams near them are unequal."
+    )
+    kept = (
+        "{} of 4 on the boundary or on marked seams could not keep their lengths, with relative errors of up to "
+        "{}: the triangles there are too coarse for the curvature nearby."
+    )
+    marked = options | {"seams": result.seams}
+    for fault, note, chosen, is_breach in (
+        ("moved by a hair", room.format(here), options, False),
+        ("moved by a hair", room.format(far), options, True),
+        ("moved a little", room.format(here), options, True),
+        ("moved by a hair", kept.format("2 edges", "1e-06"), marked, False),
+        ("moved by a hair", kept.format("1 edge", "1e-06"), marked, True),
+        ("moved by a hair", kept.format("2 edges", "1e-09"), marked, True),
+        ("moved by a hair", kept.format("2 edges", "1e-06"), options, True),
+    ):
+        found = breaches_of(replace(planted(result, fault), notes=(note,)), chosen, *mesh)
+        assert any("sides of seams differ" in cause for cause in found) == is_breach
 
 
 def test_an_energy_above_the_bound_is_found(ball):
