@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from markers import ROOT
 from measured import Measured
+from quad_edges import draw_quads
 
 import coneflat
-from coneflat.apps.quads.figure import draw_quads
 from coneflat.apps.view import Panel, Row, compose, view_aspect
 from coneflat.apps.view.figures.cone_marks import pixels_of
 from coneflat.apps.view.figures.render import render_mesh
@@ -55,7 +55,11 @@ def boards_figure(measured: Measured) -> Any:
 def quads_figure(measured: Measured) -> Any:
     """Return a figure of a quad mesh, from two sides."""
     quads = coneflat.quads(measured.path("bunny"), quads=4000)
-    return coneflat.make_figure(quads, "quads", eyes=["front-right", "back-left"], dpi=DPI)
+    panels = [
+        Panel(view_aspect(quads.vertices, eye), partial(draw_quads, quads, eye=eye, dpi=DPI))
+        for eye in ("front-right", "back-left")
+    ]
+    return compose([Row(panels)], dpi=DPI, width=8.0)
 
 
 def subdivided_figure(measured: Measured) -> Any:

@@ -37,7 +37,7 @@ __all__ = [
     "CREASE_COSINE", "FlatTriangles", "MAX_CELLS", "Overlaps", "angle_defect", "as_complex", "as_pairs",
     "corner_angles", "corner_normals", "cotangent_laplacian", "cotangents", "dihedral_angles", "double_areas",
     "edge_lengths", "face_normals", "fill_nearest", "fill_orientations", "find_overlaps", "flat_triangles",
-    "halfedge_twins", "is_broken", "approximate_overlap_areas", "layout_curvature", "map_factors", "mollify",
-    "orientation", "sides_between", "signed_angles", "signed_double_areas", "unit_vectors", "vertex_log_scale",
-    "vertex_normals", "visible_share",
+    "halfedge_twins", "is_broken", "approximate_overlap_areas", "layout_curvature",
+    "map_factors", "mollify", "orientation", "sides_between", "signed_angles", "signed_double_areas", "unit_vectors",
+    "vertex_log_scale", "vertex_normals", "visible_share",
 ]  # fmt: skip

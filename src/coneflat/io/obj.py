@@ -219,7 +219,7 @@ def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
         if source.obj is not None:
             # The text contains the vertices of the file, including merged ones.
             numbers = numbers if source.unwelded is None else source.unwelded + 1
-            text = _relocated(source.obj, source.path.parent, folder)
+            text = relocated(source.obj, source.path.parent, folder)
     else:
         source, numbers = None, faces.reshape(-1) + 1
         offsets = np.arange(0, len(numbers) + 1, 3)
@@ -267,7 +267,7 @@ def _ended(text: bytes, newline: bytes, is_last: bool) -> bytes:
     return text + newline if text and not is_last and not text.endswith((b"\n", b"\r")) else text
 
 
-def _relocated(text: ObjText, old: Path, new: Path) -> ObjText:
+def relocated(text: ObjText, old: Path, new: Path) -> ObjText:
     """Return the text with paths of material libraries rewritten relative to another folder."""
     here, there = os.path.realpath(old), os.path.realpath(new)
     if here == there:

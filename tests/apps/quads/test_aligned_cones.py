@@ -74,7 +74,7 @@ def test_the_linear_model_agrees_with_an_exact_map(name):
     wanted = preferred_directions(mesh).both
     start = field_indices(mesh, smoothest_cross_field(mesh, preferred_directions(mesh)))
     triangles = np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
-    model = MapModel(mesh, wanted, np.flatnonzero(start), -2, 1, triangles)
+    model = MapModel(mesh, wanted, -2, 1, triangles)
     indices = np.append(start[model.places], 0)
     model.linearise(indices)
     scale, waves, loops = model.state(indices)

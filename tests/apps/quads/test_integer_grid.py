@@ -155,7 +155,6 @@ def test_a_flat_rectangle_keeps_its_shape():
     assert grid.corner_quarters.tolist() == [1] * 4
     assert sorted(np.ptp(grid.corner_grid.reshape(-1, 2), axis=0)) == [4, 6]
     assert grid.qc_mean == pytest.approx(1)
-    assert grid.least_area == pytest.approx(1)
 
 
 def test_a_grid_that_is_too_coarse_is_made_finer(shared):

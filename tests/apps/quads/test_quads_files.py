@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from dataclasses import fields
 
 import numpy as np
 import pytest
+import shapes
 from grid_maps import L_SHAPE, on_squares, polycube
 
+import coneflat
 from coneflat import QuadMesh, read_mesh
 from coneflat.apps.quads.extract import extract_quads
 from coneflat.apps.quads.quad_mesh import least_jacobians
@@ -20,6 +23,40 @@ from coneflat.io.gltf.data import GltfData
 def cube():
     """Quads of an L of cubes, 3 to a side: 14 squares, ten vertices of valence 3 and two of 5."""
     return extract_quads(on_squares(*polycube(L_SHAPE), 3, inside=7, along=2, seed=3))
+
+
+class TestObj:
+    def test_quads_are_equal_squares_in_the_unit_square(self, cube, tmp_path):
+        mesh = read_mesh(cube.save(tmp_path / "quads.obj"))
+        np.testing.assert_array_equal(mesh.corners.reshape(-1, 4), cube.quads)
+        uv = mesh.uv[mesh.texture].reshape(-1, 4, 2)
+        np.testing.assert_array_equal(uv, cube.uv)
+        assert uv.min() >= 0
+        assert uv.max() <= 1
+        sides = np.roll(uv, -1, axis=1) - uv
+        np.testing.assert_allclose(np.linalg.norm(sides, axis=2), np.linalg.norm(sides[0, 0]))
+        assert (np.cross(sides[:, 0], sides[:, 1]) > 0).all()
+        assert len(np.unique(np.round(uv.mean(axis=1), 9), axis=0)) == len(uv)
+
+    def test_materials_and_groups_of_the_model(self, tmp_path):
+        """A sphere whose upper half is of another material and group, and a square of a third part."""
+        (tmp_path / "in").mkdir()
+        (tmp_path / "in" / "a.mtl").write_text("newmtl red\nnewmtl blue\n")
+        vertices, faces = shapes.sphere(3)
+        upper = vertices[faces].mean(axis=1)[:, 2] > 0
+        lines = ["mtllib a.mtl", *(f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist())]
+        for words, which in ((["g low", "usemtl red"], ~upper), (["usemtl blue", "g top cap"], upper)):
+            lines += [*words, *(f"f {a} {b} {c}" for a, b, c in (faces[which] + 1).tolist())]
+        (tmp_path / "in" / "ball.obj").write_text("\n".join(lines) + "\n")
+        found = coneflat.quads(tmp_path / "in" / "ball.obj", quads=300)
+        text = found.save(tmp_path / "quads.obj").read_text()
+        assert text.count("mtllib in/a.mtl\n") == 2
+        low, top = (part.count("\nf ") for part in re.split("usemtl blue", text))
+        assert all(line in text for line in ("usemtl red\n", "g low\n", "g top cap\n"))
+        assert low + top == len(found.quads)
+        height = found.vertices[found.quads].mean(axis=1)[:, 2]
+        assert top == pytest.approx((height > 0).sum(), abs=20)
+        assert low > 50
 
 
 class TestGlb:

@@ -1,4 +1,4 @@
-"""Quads in pictures and pages: rectangles of quads, dots at irregular vertices."""
+"""The page of quads, and the rectangles that they form."""
 
 from __future__ import annotations
 
@@ -7,16 +7,10 @@ import re
 
 import numpy as np
 import pytest
-import shapes
-from click.testing import CliRunner
-from drawing import SVG, count_dots, groups
 from grid_maps import CUBE, L_SHAPE, RING, TRIPOD, TWO_RINGS, on_squares, polycube, torus_map
 
-import coneflat
-from coneflat.apps.cli.main import cli
 from coneflat.apps.quads.extract import extract_quads
 from coneflat.apps.quads.page import as_flattening, find_domains, page_of_quads
-from coneflat.errors import MeshFileError, OptionError
 
 SOLIDS = {"cube": CUBE, "l": L_SHAPE, "tripod": TRIPOD, "ring": RING, "double torus": TWO_RINGS}
 
@@ -84,7 +78,7 @@ def head_of(page):
 def test_the_page_of_quads():
     mesh = quads_of(L_SHAPE)
     domains = find_domains(mesh)
-    result = as_flattening(mesh, domains)
+    result = as_flattening(mesh)
     assert result.distortion.charts == len(domains.sides)
     assert result.distortion.flipped == 0
     assert result.distortion.overlap == 0
@@ -99,39 +93,3 @@ def test_the_page_of_quads():
     assert head["title"].startswith(f"{len(mesh.quads)} quads")
     assert ["irregular", "12", "inner vertices with a valence other than 4: 10 of 3, 2 of 5"] in head["rows"]
     assert ["black dots", "2", "vertices with more than four quads"] in head["rows"]
-
-
-@pytest.fixture
-def run(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(2))
-    quads_of(L_SHAPE).save("l.npz")
-    return lambda *words: CliRunner().invoke(cli, words, catch_exceptions=False)
-
-
-class TestFigures:
-    pytest.importorskip("matplotlib")
-
-    def test_edges_and_dots(self, tmp_path):
-        mesh = quads_of(CUBE, 4)
-        figure = coneflat.make_figure(mesh, "quads", eyes=[(3, 2, 4)], dpi=80)
-        found = groups(coneflat.save_figure(figure, tmp_path / "cube.svg"))
-        # Seven of eight corners of a cube are seen, and three of its six sides: 3 * 16 squares.
-        assert count_dots(found["fewer"]) == 7
-        assert count_dots(found.get("more")) == 0
-        edges = list(found["edges"].iter(f"{SVG}path"))
-        # Three sides have 24 edges each within them and share 12; 24 more are on the outline, where some of those
-        # behind it are seen as well.
-        assert 3 * 24 + 12 <= len(edges) < 3 * 24 + 12 + 2 * 24 + 4
-        assert [text.get_text() for text in figure.legends[0].get_texts()] == ["valence 3: 8"]
-
-    def test_command(self, run, tmp_path):
-        assert run("figure", "l.npz", "--kind", "quads", "-o", "l.png", "--dpi", "50").exit_code == 0
-        assert (tmp_path / "l.png").stat().st_size > 2000
-        done = run("figure", "ball.obj", "--kind", "quads", "--quads", "200", "-o", "ball.png", "--dpi", "50")
-        assert done.exit_code == 0, done.output
-        with pytest.raises(OptionError, match="contains quads already: leave out --quads"):
-            run("figure", "l.npz", "--kind", "quads", "--quads", "5")
-        coneflat.flatten(*shapes.sphere(2)).save("flat.npz")
-        with pytest.raises(MeshFileError, match="holds no mesh of quads"):
-            run("figure", "flat.npz", "--kind", "quads")

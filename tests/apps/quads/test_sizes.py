@@ -148,7 +148,7 @@ def test_a_coarse_mesh_without_a_grid_is_refined():
         pytest.skip("the shared meshes are not here")
     model = coneflat.read_mesh(path)
     vertices, faces = simplify(model.vertices.astype(np.float32), model.triangles, target_count=800)
-    grid = coneflat.integer_grid(vertices.astype(float), faces, quads=1000)
+    grid = coneflat.integer_grid(vertices.astype(float), faces, quads=3000)
     assert any(note.startswith("Split all 1,200 edges") for note in grid.notes)
     assert not any("follow no sharp edges" in note for note in grid.notes)
     assert coneflat.quads(grid).euler_characteristic == -4

@@ -8,28 +8,24 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...errors import OptionError
-from ..quads.options import QUADS
 from .options import flag, flag_name, is_given, option_flags, parse_eye, path_flag, pop_flags
 from .shared import again_option, color_option, input_options, repair_keywords, up_option, verbosity_options
 
 if TYPE_CHECKING:
-    from ... import QuadMesh
-    from .run import Console
+    pass
 
-KINDS = ("layout", "checker", "quality", "cones", "curvature", "color", "curve", "quads")
+KINDS = ("layout", "checker", "quality", "cones", "curvature", "color", "curve")
 
 _VIEWS = ("checker", "quality", "color", "cones", "curvature")
 #: The kinds of figures on which an option has an effect.
 _KINDS_OF_OPTION = {
-    "eye": (*_VIEWS, "quads"),
-    "up": (*_VIEWS, "quads"),
+    "eye": _VIEWS,
+    "up": _VIEWS,
     "colors": ("quality", "color", "curvature"),
     "color": ("color",),
     "cells": ("checker",),
     "color_charts": ("layout",),
     "most": ("curve",),
-    "quads": ("quads",),
     "again": ("layout", *_VIEWS),
 }
 
@@ -42,7 +38,6 @@ class FigureFlags:
         kind: layout: the charts in the unit square.  checker: the model with a checkerboard.  quality: distortion of
             angles and scale.  color: your own values, given by --color.  cones: cones and seams on the model.
             curvature: the curvature before and after flattening.  curve: area distortion against the number of cones.
-            quads: the model as quads.
         output: File to write: .png, .svg or .pdf.  [default: MESH's name with _KIND, as .png]
         eye: Direction from which the model is seen: front, back, left, right, top, bottom, two of these for a
             three-quarter view, or a vector X,Y,Z; repeat for several views.  [default: front-right]
@@ -52,7 +47,6 @@ class FigureFlags:
         cells: Number of checkerboard squares along the square root of the surface area.
         color_charts: Give each chart of the layout its own colour.
         most: Largest number of cones of the curve.
-        quads: Approximate number of quads.
         title: Title above the figure.
     """
 
@@ -65,7 +59,6 @@ class FigureFlags:
     cells: float = flag(36.0, type=float)
     color_charts: bool = flag(False, is_flag=True)
     most: int = flag(30, type=int)
-    quads: int = flag(QUADS, type=int)
     title: str = flag("")
 
 
@@ -98,7 +91,6 @@ def figure(
     Examples:
       coneflat figure bunny.obj --kind layout -o bunny.svg
       coneflat figure horse.ply --kind checker --up z --eye right-back --eye left-front
-      coneflat figure hand.obj --kind quads --quads 3000
       coneflat figure scan.ply --color quality
       coneflat flatten horse.ply -o horse.npz --distortion 0.1 && coneflat figure horse.npz --kind quality
     """
@@ -128,10 +120,6 @@ def figure(
             with console.stage("cones", console.READ):
                 part = console.part()
                 shown = cone_curve(surface, most=flags.most, progress=part, **repair_keywords(repair))
-        elif kind == "quads":
-            count = flags.quads if is_given(context, "quads") else None
-            shown, notes = _quads(mesh, console, count, repair=repair, weld=weld)
-            console.say(f"note: {note}" for note in notes)
         else:
             shown = open_result(mesh, console, again=again, repair=repair, weld=weld)
             if color is not None:
@@ -152,26 +140,6 @@ def _surface(file: Path, weld: bool | None) -> tuple[Any, tuple[str, ...]]:
         return joined.mesh, joined.notes()
     result = read_flattening(file)
     return (result.vertices, result.faces), ()
-
-
-def _quads(
-    file: Path, console: Console, count: int | None, *, repair: bool, weld: bool | None
-) -> tuple[QuadMesh, tuple[str, ...]]:
-    """Return the quads in a .npz file, or those computed from a mesh, and the notes on them."""
-    from ... import quads
-    from ...io import read_joined
-    from ..quads.files import read_quads
-
-    with console.stage("read", 0.0):
-        if file.suffix.lower() == ".npz":
-            if count is not None:
-                raise OptionError(f"{file} contains quads already: leave out --quads")
-            found = read_quads(file)
-            return found, found.notes
-        joined = read_joined(file, weld)
-    found = quads(joined.mesh, quads=count, progress=console.part(), **repair_keywords(repair))
-    console.seconds.update(found.seconds)
-    return found, joined.all_notes(found.notes)
 
 
 def _check_combinations(context: click.Context, kind: str) -> None:

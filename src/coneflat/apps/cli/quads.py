@@ -137,15 +137,6 @@ def _check_combinations(context: click.Context, mesh: Path) -> None:
 
 def _grid_rows(grid: IntegerGrid) -> Iterator[tuple[str, str, str]]:
     """Yield the rows (name, value, meaning) of the table of a grid."""
-    moved = f"; rounding moved cones by {grid.move_rms:.2f} squares, {grid.move_max:.2f} at most"
-    yield (
-        "square",
-        f"{grid.size:.4g}",
-        f"side of a grid square in model units{moved if math.isfinite(grid.move_rms) else ''}",
-    )
+    yield "square", f"{grid.size:.4g}", "side of a grid square in model units"
     if math.isfinite(grid.qc_mean):
-        yield (
-            "grid QC",
-            f"{grid.qc_mean:.4f}",
-            f"mean distortion of the map; {grid.qc_before:.4f} before rounding",
-        )
+        yield "grid QC", f"{grid.qc_mean:.4f}", "mean distortion of the map"

@@ -18,10 +18,9 @@ from ... import TriangleMesh
 from ...base import ComplexArray, FloatArray, IntArray
 from ...errors import CurvatureError
 from ..unwrap.coarse import coarse_mesh
-from .cross_field import SHARP_ANGLE, field_indices, preferred_directions, sharp_ends, smoothest_cross_field
+from .cross_field import SHARP_ANGLE, directions_and_indices, sharp_ends
 from .features import vertex_graph
 from .map_model import SAMPLES, MapModel
-from .options import DISTORTION
 
 # Cost of an area distortion as large as allowed, at first, and of crosses off by 22.5 degrees, which is larger where
 # sharp edges are required on grid lines; a cone costs 1 for each quarter turn, and a missing one more than all others.
@@ -34,7 +33,7 @@ COARSE = 25_000
 MIN_GAIN = 1e-3
 # How often the cost of areas is doubled to meet the bound, and the bound for a distortion of 1: the log of the ratio of
 # the 95% and 5% quantiles of the areas of quads.
-MAX_DOUBLINGS, SPREAD = 3, np.log(2.0) / DISTORTION
+MAX_DOUBLINGS, SPREAD = 3, 10 * np.log(2.0)
 
 
 def aligned_cones(
@@ -64,10 +63,9 @@ def aligned_cones(
     degrees = np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
     if len(mesh.faces) > 2 * COARSE:
         mesh, kept, _ = coarse_mesh(mesh, COARSE)
-    directions = preferred_directions(mesh, angle)
-    start = field_indices(mesh, smoothest_cross_field(mesh, directions))
+    directions, start = directions_and_indices(mesh, angle)
     scale = None if log_scale is None else log_scale[kept]
-    model = MapModel(mesh, directions.both, np.flatnonzero(start), least, most, degrees[kept], scale)
+    model = MapModel(mesh, directions.both, least, most, degrees[kept], scale)
     search = _Search(mesh, model, start, price, angle)
     along = COST_OF_DIRECTIONS * (1.0 if sharp_angle is None else TIMES_REQUIRED)
     areas = COST_OF_AREAS

@@ -16,6 +16,8 @@ from ...base import ComplexArray, FloatArray, IntArray
 from ...geometry import (
     angle_defect,
     corner_angles,
+    cotangent_laplacian,
+    cotangents,
     dihedral_angles,
     double_areas,
     edge_lengths,
@@ -88,12 +90,22 @@ def preferred_directions(mesh: TriangleMesh, angle: float = SHARP_ANGLE) -> Dire
 
 
 def sharp_or_boundary(mesh: TriangleMesh, shortest: float, angle: float = SHARP_ANGLE) -> IntArray:
-    """Return the edges that are on the boundary or sharp; connected sharp edges shorter than `shortest` are noise."""
-    sharp = sharp_edges(mesh, angle)
-    ends = mesh.edges[sharp]
-    _, label = label_components(len(mesh.vertices), ends[:, 0], ends[:, 1])
-    total = np.bincount(label[ends[:, 0]], lengths_along(mesh, sharp), len(mesh.vertices))
-    return np.union1d(sharp[total[label[ends[:, 0]]] > shortest], np.flatnonzero(mesh.is_boundary_edge))
+    """Return the edges that are on the boundary or sharp and not noise.
+
+    Connected sharp edges are noise if they are together shorter than `shortest`, or if they have many vertices where
+    convex and concave ones meet: more than one on this length, and more than 20%. These are at most 6% on mechanical
+    shapes, and more than 20% where noise of 0.15 edges makes edges sharp.
+    """
+    sharp, count = sharp_edges(mesh, angle), len(mesh.vertices)
+    ends, is_convex = mesh.edges[sharp], dihedral_angles(mesh)[sharp] > 0
+    _, label = label_components(count, ends[:, 0], ends[:, 1])
+    length = np.bincount(label[ends[:, 0]], lengths_along(mesh, sharp), count)
+    convex, concave = (
+        np.bincount(ends[which].ravel(), minlength=count) > 0 for which in (is_convex, ~is_convex)
+    )
+    mixed, vertices = (np.bincount(label[on], minlength=count) for on in (convex & concave, convex | concave))
+    is_noise = (length <= shortest) | ((mixed > 0.2 * vertices) & (mixed * shortest > length))
+    return np.union1d(sharp[~is_noise[label[ends[:, 0]]]], np.flatnonzero(mesh.is_boundary_edge))
 
 
 def sharp_ends(mesh: TriangleMesh, angle: float = SHARP_ANGLE) -> IntArray:
@@ -184,3 +196,40 @@ def field_indices(mesh: TriangleMesh, field: ComplexArray) -> IntArray:
     )
     turn += np.bincount(mesh.tails[border], off, count) - np.bincount(mesh.heads[border], off, count)
     return np.rint((defect + turn) / (np.pi / 2)).astype(np.int64)
+
+
+def directions_and_indices(mesh: TriangleMesh, angle: float) -> tuple[Directions, IntArray]:
+    """Return preferred directions, and (n,) the curvatures of the cones of the smoothest field along them.
+
+    Sharp edges are those of the mesh; curvatures and the field are those of a smoothed mesh: on a noisy surface, there
+    are thousands of cones otherwise. See `preferred_directions` and `field_indices`.
+    """
+    smooth = _smoothed(mesh)
+    before, after = (
+        halfedge_angles(corner_angles(mollify(edge_lengths(one.vertices, one.faces))[0])).reshape(-1, 3)
+        for one in (smooth, mesh)
+    )
+    # From the frame of a smoothed triangle to that of the triangle, so that sides agree in the mean.
+    turn = np.exp(4j * (after - before).mean(axis=1))
+    sharp, curved = preferred_directions(mesh, angle).sharp, preferred_directions(smooth, angle).curved
+    field = smoothest_cross_field(smooth, Directions(sharp / turn, curved))
+    return Directions(sharp, curved * turn), field_indices(smooth, field)
+
+
+def _smoothed(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a mesh with its vertices averaged over half the radius of curvatures."""
+    found = diffused(mesh, mesh.vertices, CURVATURE_SCALE / 2)
+    # Digits that depend on the numbering are left out.
+    digits = 30 - int(np.frexp(np.abs(found).max())[1])
+    return mesh.moved_to(np.ldexp(np.rint(np.ldexp(found, digits)), -digits))
+
+
+def diffused(mesh: TriangleMesh, values: FloatArray, radius: float) -> FloatArray:
+    """Return values (n, k) at vertices after an implicit step of diffusion; the radius is relative to the root area."""
+    lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces))
+    areas, count = double_areas(lengths) / 2, len(mesh.vertices)
+    share = np.asarray(np.bincount(mesh.faces.ravel(), areas.repeat(3) / 3, count))
+    stiffness = cotangent_laplacian(mesh.faces, cotangents(lengths), count)
+    system = csc_matrix(diags(share) + radius**2 * areas.sum() * stiffness)
+    system.sort_indices()
+    return factorize(system).solve(share[:, None] * values)

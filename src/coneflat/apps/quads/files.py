@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import fields
 from functools import partial
 from os import PathLike
@@ -33,13 +33,13 @@ from ...io import (
     known_ending,
     lines_of,
     number,
-    parse_obj,
     read_archive,
-    read_bytes,
+    relocated,
     shading_normals,
     write_parts,
 )
 from .integer_map import IntegerGrid, grid_of_corners
+from .nearest import TriangleTree
 from .quad_mesh import QuadMesh, least_jacobians
 
 Check: TypeAlias = Callable[["str | PathLike[str]"], Path]
@@ -50,7 +50,7 @@ _MESHIO = {".vtk": "vtk", ".vtu": "vtu", ".inp": "abaqus", ".msh": "gmsh"}
 QUAD_FORMATS = (".obj", ".ply", ".glb", ".npz", *_MESHIO)
 #: Arrays from which a quad mesh is restored.
 _NAMES = ("vertices", "quads", "faces", "barycentric", "surface_vertices", "surface_faces", "report")
-#: Extensions of the files that `write_grid` writes and `read_grid` reads.
+#: Extensions of the files that `write_grid` writes.
 GRID_FORMATS = (".obj", ".npz")
 #: The same check for `write_grid`.
 check_grid_output: Check = partial(checked_target, endings=GRID_FORMATS, what="integer grids are written as")
@@ -61,8 +61,7 @@ _ARRAYS, _NUMBERS = (
 )
 #: Arrays from which a grid is restored.
 _RESTORED = ("vertices", "faces", "corner_grid", "corners", "corner_quarters", "features", "report")
-_REPORT = re.compile(rb"(?m)^# grid (\{.*\})[ \t]*\r?$")
-_LINE = re.compile(rb"(?m)^l +(\d+) +(\d+)[ \t]*\r?$")
+_STATE = re.compile(rb"(?m)^[ \t]*(mtllib|usemtl|g|o)[ \t]+([^\r\n]*?)[ \t]*\r?$")
 _HEAD = (
     "# An integer grid by coneflat. Texture coordinates are in units of the grid, which continues across seams.",
     "# seam V W TURNS X Y: the point p in the triangle right of the edge from V to W is R p + (X, Y) in the triangle",
@@ -82,23 +81,23 @@ def check_quads_output(path: str | PathLike[str]) -> Path:
 def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:
     """Write a quad mesh atomically and return the path.
 
-    An .obj has as many digits as are needed to read the same numbers; a .ply is binary with double coordinates. A .glb,
-    which has no quads, has two triangles for each and their edges as lines; see `_write_glb`. An .npz has all arrays of
-    the `QuadMesh`, from which `read_quads` restores it, and the irregular vertices with their valences. VTK (.vtk,
-    .vtu), Abaqus (.inp) and Gmsh (.msh) are written by meshio; all but Abaqus have the valences of vertices, and the
-    least scaled Jacobians of quads. Errors are those of `QuadMesh.save`.
+    An .obj has as many digits as are needed to read the same numbers, the UVs of `QuadMesh.uv`, and the materials and
+    groups of the .obj that the mesh was read from, by which quads are sorted; a .ply is binary with double coordinates.
+    A .glb, which has no quads, has two triangles for each and their edges as lines; see `_write_glb`. An .npz has all
+    arrays of the `QuadMesh`, from which `read_quads` restores it, and the irregular vertices with their valences. VTK
+    (.vtk, .vtu), Abaqus (.inp) and Gmsh (.msh) are written by meshio; all but Abaqus have the valences of vertices, and
+    the least scaled Jacobians of quads. Errors are those of `QuadMesh.save`.
     """
     path = check_quads_output(path)
     with atomic_write(path) as stream:
-        write_quads_stream(mesh, stream, path.suffix.lower())
+        write_quads_stream(mesh, stream, path.suffix.lower(), path)
     return path
 
 
-def write_quads_stream(mesh: QuadMesh, stream: IO[bytes], ending: str) -> None:
-    """Write a quad mesh to a binary stream; `ending` is one of `QUAD_FORMATS`, see `write_quads`."""
+def write_quads_stream(mesh: QuadMesh, stream: IO[bytes], ending: str, path: Path = Path()) -> None:
+    """Write a quad mesh to the binary stream of a file; `ending` is one of `QUAD_FORMATS`, see `write_quads`."""
     if ending == ".obj":
-        stream.writelines(lines_of("v", mesh.vertices, b"\n"))
-        stream.writelines(lines_of("f", mesh.quads + 1, b"\n"))
+        _write_obj(mesh, stream, path)
     elif ending == ".ply":
         places = np.ascontiguousarray(mesh.vertices, "<f8")
         write_parts(stream, "quads by coneflat", [f"double {axis}" for axis in "xyz"], places, mesh.quads)
@@ -108,6 +107,45 @@ def write_quads_stream(mesh: QuadMesh, stream: IO[bytes], ending: str) -> None:
         _write_by_meshio(mesh, stream, ending)
     else:
         _write_quads_npz(mesh, stream)
+
+
+def _write_obj(mesh: QuadMesh, stream: IO[bytes], path: Path) -> None:
+    state_of, states = _states(mesh, path)
+    points, index = np.unique(mesh.uv.reshape(-1, 2), axis=0, return_inverse=True)
+    stream.writelines(lines_of("v", mesh.vertices, b"\n"))
+    stream.writelines(lines_of("vt", points, b"\n"))
+    corners = np.stack([mesh.quads, index.reshape(mesh.quads.shape)], axis=2).reshape(-1, 8) + 1
+    for which, lines in enumerate(states):
+        if len(rows := corners[state_of == which]):
+            stream.write(lines)
+            stream.writelines(_face_lines(rows))
+
+
+def _face_lines(corners: IntArray, at_once: int = 1 << 15) -> Iterator[bytes]:
+    """Yield the lines of faces of k corners, each with the numbers (p, 2k) of a vertex and a UV point."""
+    line = "f" + " %d/%d" * (corners.shape[1] // 2) + "\n"
+    for i in range(0, len(corners), at_once):
+        block = corners[i : i + at_once]
+        yield (line * len(block) % tuple(block.ravel().tolist())).encode()
+
+
+def _states(mesh: QuadMesh, path: Path) -> tuple[IntArray, list[bytes]]:
+    """Return (p,) a number for the material and groups of each quad in the OBJ file that it is from, and their lines.
+
+    They are those of the polygon nearest to the centre of the quad.
+    """
+    source, known, states, starts = mesh.source, dict[bytes, bytes](), dict[bytes, int]({b"": 0}), [(0, 0)]
+    if source is None or source.obj is None:
+        return np.zeros(len(mesh.quads), dtype=np.int64), [b""]
+    for polygon, gap in sorted(relocated(source.obj, source.path.parent, path.parent).gaps.items()):
+        known |= {word: b"%s %s\n" % (word, names) for word, names in _STATE.findall(gap)}
+        starts.append((polygon, states.setdefault(b"".join(known.values()), len(states))))
+    corners = mesh.vertices[mesh.quads]
+    normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    on, _ = TriangleTree(source.vertices, source.triangles).nearest(corners.mean(axis=1), normals)
+    polygon_of = np.repeat(np.arange(len(source.offsets) - 1), np.diff(source.offsets) - 2)[on]
+    first, which = np.array(starts).T
+    return which[np.searchsorted(first, polygon_of, side="right") - 1], list(states)
 
 
 def _write_by_meshio(mesh: QuadMesh, stream: IO[bytes], ending: str) -> None:
@@ -229,9 +267,9 @@ def write_grid(path: str | PathLike[str], grid: IntegerGrid) -> Path:
     """Write an integer grid atomically and return the path.
 
     An .obj has the grid coordinates of every triangle corner as texture coordinates, with all digits, as programs that
-    extract quads expect them, for example libQEx. Comments contain the quarter turns and translations of seam edges and
-    the measures of the grid. An .npz has all arrays of the `IntegerGrid`, and the content of these comments: `seams`
-    (k, 2), pairs of vertices, with `seam_turns` (k,) and `seam_shifts` (k, 2). Errors are those of `IntegerGrid.save`.
+    extract quads expect them, for example libQEx. Comments contain the quarter turns and translations of seam edges. An
+    .npz has all arrays of the `IntegerGrid`, its report, and the content of these comments: `seams` (k, 2), pairs of
+    vertices, with `seam_turns` (k,) and `seam_shifts` (k, 2). Errors are those of `IntegerGrid.save`.
     """
     path = check_grid_output(path)
     with atomic_write(path) as stream:
@@ -243,17 +281,14 @@ def _write_grid_obj(grid: IntegerGrid, stream: IO[bytes]) -> None:
     # Corners of the same vertex with equal coordinates share a point.
     keys = np.concatenate([grid.faces.reshape(-1, 1), grid.corner_grid.reshape(-1, 2)], axis=1)
     points, number_of = np.unique(keys, axis=0, return_inverse=True)
-    report = {**grid.report(), "notes": list(grid.notes)}
-    stream.write(("\n".join([*_HEAD, f"# grid {json.dumps(report)}"]) + "\n").encode("ascii"))
+    stream.write(("\n".join(_HEAD) + "\n").encode("ascii"))
     edges, turns, shifts = _seams(grid)
     rows = np.concatenate([edges + 1, turns[:, None], shifts], axis=1)
     stream.writelines(lines_of("# seam", rows, b"\n"))
     stream.writelines(lines_of("v", grid.vertices, b"\n"))
     stream.writelines(lines_of("vt", points[:, 1:], b"\n"))
     corners = np.stack([grid.faces.ravel(), number_of.ravel()], axis=1).reshape(-1, 6) + 1
-    for i in range(0, len(corners), 1 << 15):
-        block = corners[i : i + (1 << 15)]
-        stream.write(("f %d/%d %d/%d %d/%d\n" * len(block) % tuple(block.ravel().tolist())).encode())
+    stream.writelines(_face_lines(corners))
     stream.writelines(lines_of("l", grid.features + 1, b"\n"))
 
 
@@ -278,33 +313,10 @@ def _write_grid_npz(grid: IntegerGrid, stream: IO[bytes]) -> None:
 
 
 def read_grid(path: str | PathLike[str]) -> IntegerGrid:
-    """Return an integer grid from an .npz or .obj file.
-
-    An .obj needs triangles with texture coordinates in units of the grid only. Quarter turns, translations and cones
-    follow from the coordinates of corners. Measures are read from the comments of `write_grid`; without these they are
-    NaN. Errors are those of `IntegerGrid.load`.
-    """
+    """Return an integer grid from an .npz file; see `IntegerGrid.load`."""
     path = as_path(path)
-    if known_ending(path, GRID_FORMATS, "integer grids are read from") == ".npz":
-        return read_archive(path, _RESTORED, _grid_of_archive)
-    return _grid_of_obj(path, read_bytes(path))
-
-
-def _grid_of_obj(path: Path, content: bytes) -> IntegerGrid:
-    mesh = parse_obj(path, content)
-    if (np.diff(mesh.offsets) != 3).any():
-        raise MeshFileError(f"{path} holds no integer grid: it has polygons that are not triangles")
-    uv, at = mesh.uv, mesh.texture
-    if uv is None or at is None or at.min() < 0 or at.max() >= len(uv):
-        raise MeshFileError(f"{path} holds no integer grid: there are triangle corners without UVs")
-    faces, places = mesh.corners.reshape(-1, 3), uv[at].reshape(-1, 3, 2)
-    _require_mesh(path, mesh.vertices, faces)
-    match = _REPORT.search(content)
-    known = {} if match is None else _known(path, match[1])
-    features = np.array(_LINE.findall(content), dtype=np.int64).reshape(-1, 2) - 1
-    if len(features) and not (features.min() >= 0 and features.max() < len(mesh.vertices)):
-        raise MeshFileError(f"{path} has lines with vertex indices that do not exist")
-    return grid_of_corners(mesh.vertices, faces, places, **known, features=features)
+    known_ending(path, (".npz",), "integer grids are read from")
+    return read_archive(path, _RESTORED, _grid_of_archive)
 
 
 def _require_mesh(path: Path, vertices: FloatArray, faces: IntArray) -> None:
@@ -320,17 +332,6 @@ def _require_mesh(path: Path, vertices: FloatArray, faces: IntArray) -> None:
         raise MeshFileError(
             f"{path} holds no integer grid: neighbouring triangles have opposite orientations"
         )
-
-
-def _known(path: Path, text: bytes) -> dict[str, Any]:
-    """Return the measures and notes in a comment."""
-    try:
-        report = json.loads(text)
-        known: dict[str, Any] = {name: float(number(report[name])) for name in _NUMBERS if name in report}
-        known["notes"] = tuple(str(note) for note in report.get("notes", ()))
-    except (ValueError, TypeError, AttributeError) as error:
-        raise MeshFileError(f"{path} has a comment on its grid that cannot be read: {error}") from error
-    return known
 
 
 def _grid_of_archive(reading: CheckedArrays) -> IntegerGrid:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from numbers import Real
@@ -15,7 +14,6 @@ from numpy.typing import ArrayLike
 from ... import Flattening, TriangleMesh, check_mesh, flatten
 from ...base import THREADS, Progress, Stopwatch, limit_threads, plural, unit_exponent
 from ...errors import (
-    ConeflatError,
     ConvergenceError,
     CurvatureError,
     GridError,
@@ -77,7 +75,7 @@ def integer_grid(
     *,
     quads: int | None = None,
     size: ArrayLike | None = None,
-    stretch: float = 0.0,
+    stretch: float = QuadOptions.stretch,
     sharp_angle: float | str | None = None,
     **options: Any,
 ) -> IntegerGrid:
@@ -312,20 +310,6 @@ class _Search:
         mesh = checked.mesh.moved_to(np.ldexp(checked.mesh.vertices, exponent))
         return replace(checked, mesh=mesh, exponent=exponent)
 
-    def _finer(self, how: tuple[Split, str, str], given: dict[str, Any]) -> Flattening | None:
-        """Return a flattening of a finer mesh with a note on the number of splits; None if there is none."""
-        # Arrays and vertices in options would not fit another mesh.
-        if not all(one is None or isinstance(one, (str, float, int)) for one in self.options.values()):
-            return None
-        checked, (split, note, noun) = self._checked, how
-        mesh, count = split(checked.mesh)
-        with suppress(ConeflatError):
-            if count:
-                result = flatten(np.ldexp(mesh.vertices, -checked.exponent), mesh.faces, **given)
-                told = note.format(plural(count, noun))
-                return replace(result, notes=(*checked.notes, told, *result.notes))
-        return None
-
     def _of_flattening(self, boundary: Any, all_sides: bool = False) -> IntegerGrid:
         """Return the grid of a flattening with a boundary; `all_sides` requires all straight sides on grid lines.
 
@@ -336,15 +320,7 @@ class _Search:
         self.stages.done = 0.0
         given = {**_defaults(options), **options, "progress": self.progress}
         with self.stages("flatten"):
-            try:
-                result = flatten(self.mesh, self.faces, **given)
-            except (CurvatureError, MetricError) as error:
-                split = FEW_VERTICES if isinstance(error, CurvatureError) else CHORDS
-                if (found := self._finer(split, given)) is None:
-                    raise
-                result = found
-        if boundary == "straight" and result.distortion.flipped + result.distortion.degenerate:
-            result = self._finer(CHORDS, given) or result
+            result = flatten(self.mesh, self.faces, **given)
         return self._with_notes(result, all_sides)
 
     def _with_notes(self, result: Flattening, all_sides: bool, sharp_lines: bool = False) -> IntegerGrid:

@@ -36,10 +36,7 @@ class IntegerGrid:
         cones: (s,) vertices on grid points whose number of quads is not four.
         quarters: (s,) the number of quads at each cone: its angle in quarter turns.
         size: edge length of a square of the grid in model units: square root of the surface area over the grid's area.
-        move_rms, move_max: root mean square and largest displacement of cones by rounding, in units of the grid.
-        energy_before, energy: the mean distortion that is minimised, in the smooth layout and in the grid.
-        qc_before, qc_mean: mean quasi-conformal distortion, weighted by area, in the smooth layout and in the grid.
-        least_area: least area of a triangle divided by its ideal area.
+        qc_mean: mean quasi-conformal distortion, weighted by area.
         notes: one sentence each.
         corners: (k,) further vertices on grid points, where straight sides of the boundary, or sharp edges, meet at an
             angle; these sides and edges lie on grid lines.
@@ -64,13 +61,7 @@ class IntegerGrid:
     cones: IntArray
     quarters: IntArray
     size: float
-    move_rms: float = np.nan
-    move_max: float = np.nan
-    energy_before: float = np.nan
-    energy: float = np.nan
-    qc_before: float = np.nan
     qc_mean: float = np.nan
-    least_area: float = np.nan
     notes: tuple[str, ...] = ()
     corners: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     corner_quarters: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
@@ -210,8 +201,6 @@ def joined_grids(grids: Sequence[IntegerGrid], notes: Sequence[str]) -> IntegerG
             values[each.name] = np.concatenate(own)
         elif each.type == "float":
             values[each.name] = float(np.average(own, weights=squares))
-    values["move_max"] = max(grid.move_max for grid in grids)
-    values["least_area"] = min(grid.least_area for grid in grids)
     values["notes"] = tuple(dict.fromkeys([*notes, *(note for grid in grids for note in grid.notes)]))
     return IntegerGrid(**values)
 

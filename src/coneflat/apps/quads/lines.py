@@ -150,11 +150,16 @@ def _with_lines(layout: GridLayout, edges: IntArray, off: FloatArray) -> _Lined:
         turned += np.bincount(tails, off[edge], len(turned)) - np.bincount(heads, off[edge], len(turned))
         quarters = np.rint(turned / (np.pi / 2)).astype(np.int64)
         is_same = cut.mesh.is_boundary_vertex & (quarters <= 0)
-        same = np.intersect1d(edge[is_same[tails] | is_same[heads]], edges)
-        if not len(same):
+        size = np.where(np.isin(edge, edges), np.abs(off[edge]), -1.0)
+        largest = np.full(len(turned), -1.0)
+        for ends_at in (tails, heads):
+            np.maximum.at(largest, ends_at, size)
+        clashes = np.stack([is_same[tails], is_same[heads]])
+        is_least = (clashes & (size + 1e-9 < np.stack([largest[tails], largest[heads]]))).any(axis=0)
+        if not len(same := edge[clashes.any(axis=0) & (size >= 0)]):
             break
-        worst = same[np.abs(off[same]) >= np.abs(off[same]).max() - 1e-9]
-        edges = _long_chains(layout, np.setdiff1d(edges, worst))
+        # The farther of each two, unless a third one is still farther from the same direction.
+        edges = _long_chains(layout, np.setdiff1d(edges, np.setdiff1d(same, edge[is_least])))
     on, turns, on_side = np.zeros((3, len(mesh.vertices)), dtype=bool)
     on[mesh.edges[edges]] = True
     turns[cut.origin[cut.mesh.is_boundary_vertex & (quarters != 2)]] = True

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix
-from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
+from scipy.sparse.csgraph import dijkstra
 
 from ... import TriangleMesh
 from ...base import ComplexArray, FloatArray, IntArray
@@ -20,14 +18,14 @@ from ...geometry import (
     edge_lengths,
     mollify,
 )
-from ...linalg import Factor, factorize
+from ...geometry.handles import handle_loops
+from ...linalg import Factor, MultiGraph, factorize
 from ...mesh import tie_key
 from .cross_field import edge_rotations, halfedge_angles
-from .features import lengths_along, vertex_graph
+from .features import vertex_graph
 
-# Numbers of regions over which the log scale and the directions are summed, and largest number of vertices that can be
-# cones.
-REGIONS, SAMPLES, MAX_PLACES = 500, 250, 20_000
+# Numbers of regions over which the log scale and the directions are summed.
+REGIONS, SAMPLES = 500, 250
 # Number of right-hand sides that are solved at once.
 BLOCK = 64
 
@@ -39,7 +37,7 @@ class MapModel:
     Rotations are linearised at given cones. There, directions within a region agree best.
 
     Attributes:
-        places: (p,) vertices at which cones are searched, in an order that does not depend on the numbering.
+        places: (p,) all vertices, in an order that does not depend on the numbering.
         key: (p,) numbers by which they are sorted.
         curvature: (p,) the angle defects of the surface there, in quarter turns.
         centres: indices of places that are the centres of regions; each is far from the previous ones.
@@ -56,7 +54,6 @@ class MapModel:
         self,
         mesh: TriangleMesh,
         wanted: ComplexArray,
-        required: IntArray,
         least: int,
         most: int,
         triangles: IntArray,
@@ -67,7 +64,6 @@ class MapModel:
         Args:
             mesh: connected mesh.
             wanted: (m,) preferred crosses of triangles, weighted.
-            required: vertices that must be places.
             least, most: bounds of the curvature of cones, in quarter turns.
             triangles: (n,) the number of triangles at each vertex in the mesh that gets the cones.
             log_scale: (n,) the wanted log scale, up to a constant; None for 0.
@@ -89,7 +85,7 @@ class MapModel:
         order = np.lexsort((key[mesh.faces].sum(axis=1), rank, of_face))
         samples = order[np.concatenate([[True], np.diff(of_face[order]) > 0])]
         self._number = np.searchsorted(of_face[samples], of_face)
-        self.places = _places(key, np.union1d(centres, required))
+        self.places = np.argsort(key, kind="stable")
         self.key, self.curvature = key[self.places], self._defect[self.places] / (np.pi / 2)
         number = np.empty(count, dtype=np.int64)
         number[self.places] = np.arange(len(self.places))
@@ -176,15 +172,6 @@ def _region_means(region: IntArray, share: FloatArray) -> csr_matrix:
     return csr_matrix((share / root[region], (region, np.arange(len(region)))), shape=(count, len(region)))
 
 
-def _places(key: FloatArray, required: IntArray) -> IntArray:
-    """Return the vertices at which cones are searched, sorted by the key: all, or some of a large mesh."""
-    order = np.argsort(key, kind="stable")
-    is_place = np.zeros(len(key), dtype=bool)
-    is_place[required] = True
-    is_place[order[:: int(np.ceil(len(key) / MAX_PLACES))]] = True
-    return order[is_place[order]]
-
-
 class _Poisson:
     """Solves L x = y on a connected mesh for y without its mean; x has mean 0 by area."""
 
@@ -224,23 +211,21 @@ class _Rotations:
         # A triangle rotates as its three half-edges do on average.
         self.mean_change = csr_matrix((change[0::3] + change[1::3] + change[2::3]) / 3)
         centres = mesh.vertices[mesh.faces].mean(axis=1)
-        self.one, self.two = one // 3, two // 3
-        steps = np.linalg.norm(centres[self.one] - centres[self.two], axis=1)
-        steps += 1e-9 * steps.max(initial=1.0)
-        ends = np.concatenate([self.one, self.two]), np.concatenate([self.two, self.one])
-        graph = csr_matrix((np.tile(steps, 2), ends), shape=(count, count))
+        steps = np.linalg.norm(centres[one // 3] - centres[two // 3], axis=1)
         root = int(np.argmax(tie_key(centres)))
-        _, before = dijkstra(graph, indices=root, return_predecessors=True)
-        self.root, self.before = root, np.where(before < 0, root, before).astype(np.int64)
-        # Two triangles can share several edges; the one of the tree is the last.
-        pairs = zip(self.one.tolist(), self.two.tolist(), strict=True)
-        number = {pair: k for k, pair in enumerate(pairs)}
-        self.edge, self.sign = np.full(count, -1), np.zeros(count)
-        for face, previous in enumerate(self.before.tolist()):
-            if face != root:
-                forth = number.get((previous, face), -1)
-                self.edge[face] = forth if forth >= 0 else number[(face, previous)]
-                self.sign[face] = 1.0 if forth >= 0 else -1.0
+        dual = MultiGraph(count, np.stack([one, two], axis=1) // 3, steps + 1e-9 * steps.max(initial=1.0))
+        paths = dual.shortest_paths(np.array([root]))
+        self.root, self.before, self.edge = root, np.where(paths.before < 0, root, paths.before), paths.edge
+        self.sign = np.where(self.edge < 0, 0.0, np.where(one[self.edge] // 3 == self.before, 1.0, -1.0))
+        # Which inner edges each loop along a handle crosses, and in which direction.
+        loops = [np.empty(0, np.int64), *handle_loops(mesh)]
+        crossed, of_loop = (
+            np.concatenate(loops),
+            np.repeat(np.arange(-1, len(loops) - 1), list(map(len, loops))),
+        )
+        edges = np.searchsorted(self.inner, mesh.halfedge_edges[crossed])
+        signs = np.where(one[edges] == crossed, 1.0, -1.0)
+        self._around = csr_matrix((signs, (of_loop, edges)), shape=(len(loops) - 1, len(one)))
 
     def of_frames(self, log_scale: FloatArray) -> FloatArray:
         """Return (m,) the rotations of first half-edges in the plane for a log scale (n,)."""
@@ -263,41 +248,15 @@ class _Rotations:
             signs.append(self.sign[here])
             here = self.before[here]
         parts = np.concatenate(signs), (np.concatenate(rows), np.concatenate(edges))
-        return csr_matrix(csr_matrix(parts, shape=(len(faces), len(self.one))) @ self.change)
-
-    @cached_property
-    def closing(self) -> IntArray:
-        """The inner edges that close a loop along a handle with the tree."""
-        mesh = self.mesh
-        in_tree = np.zeros(len(mesh.edges), dtype=bool)
-        in_tree[self.inner[self.edge[self.edge >= 0]]] = True
-        left = np.flatnonzero(~in_tree)
-        lengths = lengths_along(mesh, left)
-        # Edges of the boundary come first, so that loops around holes are not among the others.
-        weights = lengths / max(float(lengths.max(initial=0.0)), np.finfo(float).tiny) + np.where(
-            mesh.is_boundary_edge[left], 1.0, 3.0
-        )
-        one, two = mesh.edges[left].T
-        graph = csr_matrix((weights, (one, two)), shape=(len(mesh.vertices),) * 2)
-        tree = minimum_spanning_tree(graph).tocoo()
-        chosen = set(zip(tree.row.tolist(), tree.col.tolist(), strict=True))
-        is_left = np.array(
-            [pair not in chosen for pair in zip(one.tolist(), two.tolist(), strict=True)], dtype=bool
-        )
-        is_left &= ~mesh.is_boundary_edge[left]
-        return np.searchsorted(self.inner, left[is_left])
+        return csr_matrix(csr_matrix(parts, shape=(len(faces), len(self.inner))) @ self.change)
 
     def loops(self) -> csr_matrix:
         """Return (l, n) the matrix from the log scale to the rotations of loops."""
-        edges = self.closing
-        there, back = self.to_frames(self.one[edges]), self.to_frames(self.two[edges])
-        return csr_matrix(there + self.change[edges] - back)
+        return csr_matrix(self._around @ self.change)
 
     def around_loops(self, log_scale: FloatArray) -> FloatArray:
-        """Return (l,) the rotations around loops for a log scale (n,)."""
-        edges, in_plane = self.closing, self.of_frames(log_scale)
-        steps = np.pi - self.by_edge[edges] + self.change[edges] @ log_scale
-        return in_plane[self.one[edges]] + steps - in_plane[self.two[edges]]
+        """Return (l,) the rotations around loops for a log scale (n,), up to half turns."""
+        return np.asarray(self._around @ (np.pi - self.by_edge + self.change @ log_scale))
 
 
 def _angle_changes(mesh: TriangleMesh, angles: FloatArray) -> csr_matrix:

@@ -27,8 +27,9 @@ if TYPE_CHECKING:
 
 #: Defaults: the number of quads, and the rounds of smoothing; further rounds change little.
 QUADS, ROUNDS = 10_000, 10
-#: Default bound of the area distortion: the areas of 90% of the quads differ by a factor of two.
-DISTORTION = 0.1
+#: Default bound of the area distortion of the map before areas are evened: those of 90% of the quads then differ by a
+#: factor of two.
+DISTORTION = 0.13
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ class QuadOptions(ConeNumber, ConeBounds, RunOptions):
     distortion: float = option(DISTORTION, Number(is_positive=True))
     quads: int | None = option(None, COUNT)
     size: ArrayLike | None = option(None, SIZE)
-    stretch: float = option(0.0, strength(1))
+    stretch: float = option(0.3, strength(1))
     smooth: int = option(ROUNDS, COUNT)
     sharp_angle: float | None = option(None, ANGLE_OR_NONE)
     cones: str | Mapping[int, float] = option(

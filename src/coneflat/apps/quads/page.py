@@ -156,7 +156,7 @@ def page_of_quads(quads: QuadMesh, *, name: str = "Quads", show: str | None = No
     their borders. Irregular vertices are cones: red if fewer than four quads meet there, black if more.
     """
     domains = find_domains(quads)
-    result, charts = as_flattening(quads, domains), len(domains.sides)
+    result, charts = as_flattening(quads), len(domains.sides)
     irregular = plural(len(quads.irregular), "irregular vertex", "irregular vertices")
     text = PageText(
         title=f"{plural(len(quads.quads), 'quad')}  ·  {irregular}  ·  {plural(charts, 'rectangle')}",
@@ -173,10 +173,9 @@ def page_of_quads(quads: QuadMesh, *, name: str = "Quads", show: str | None = No
     return page_html(result, name=name, show=show, text=text, **look)
 
 
-def as_flattening(quads: QuadMesh, domains: Domains) -> Flattening:
+def as_flattening(quads: QuadMesh) -> Flattening:
     """Return the triangles of quads with UVs in which all quads are squares of one size, in disjoint rectangles."""
-    places, side = arranged(domains)
-    corner_uv = places.reshape(-1, 2)[quads.triangle_corners] / side
+    corner_uv = quads.uv.reshape(-1, 2)[quads.triangle_corners]
     result = uv_flattening(UVMesh(quads.vertices, quads.triangles, corner_uv, len(quads.quads), 0, 0))
     irregular = quads.irregular
     return replace(

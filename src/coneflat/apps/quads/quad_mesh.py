@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ...errors import GridError
 from ...mesh import sort_pairs
 
 if TYPE_CHECKING:
-    from ..view import Look, Row
+    from ... import MeshFile
     from .integer_map import IntegerGrid
 
 
@@ -35,7 +35,9 @@ class QuadMesh:
         surface: the triangle mesh.
         notes: notes on the computation and on problems, one sentence each.
         seconds: wall time of each stage; not stored in files.
-        grid: the integer grid that the quads are extracted from; not stored in files.
+        grid: the integer grid that the quads are extracted from, on a coarse mesh of a surface of many triangles; not
+            stored in files.
+        source: the file that the surface was read from, of which an .obj keeps materials and groups; not stored.
 
     Examples:
         >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
@@ -56,6 +58,7 @@ class QuadMesh:
     notes: tuple[str, ...] = ()
     seconds: dict[str, float] = field(default_factory=dict)
     grid: IntegerGrid | None = None
+    source: MeshFile | None = None
 
     @cached_property
     def _edges(self) -> tuple[IntArray, IntArray]:
@@ -101,6 +104,14 @@ class QuadMesh:
         """(q,) the number of edges at each vertex."""
         return np.bincount(self.edges.ravel(), minlength=len(self.vertices))
 
+    @cached_property
+    def uv(self) -> FloatArray:
+        """(p, 4, 2) UVs of the corners of quads: squares of one size in disjoint rectangles, in the unit square."""
+        from .page import arranged, find_domains
+
+        places, side = arranged(find_domains(self))
+        return places / side
+
     @property
     def irregular(self) -> IntArray:
         """(s,) the inner vertices whose valence is not 4."""
@@ -128,13 +139,6 @@ class QuadMesh:
         from .files import write_quads
 
         return write_quads(path, self)
-
-    def figure_rows(self, look: Look) -> tuple[list[Row], list[Any]]:
-        """Return the rows and the legend handles of a figure of the kind "quads" for `make_figure`."""
-        from ..view import Row
-        from .figure import draw_quads, irregular_handles
-
-        return [Row(look.views(self, draw_quads, faces=self.quads))], irregular_handles(self)
 
     @staticmethod
     def load(path: str | PathLike[str]) -> QuadMesh:

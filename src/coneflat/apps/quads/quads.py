@@ -12,10 +12,14 @@ from numpy.typing import ArrayLike
 
 from ...base import Stopwatch, plural
 from ...errors import OptionError
+from ...io import as_input
+from ...options import read_options
+from .coarse_input import coarse_input
+from .cross_field import SHARP_ANGLE, sharp_ends
 from .extract import extract_quads, with_borders
 from .integer_grid import integer_grid
 from .integer_map import IntegerGrid
-from .options import DISTORTION, ROUNDS
+from .options import DISTORTION, ROUNDS, QuadOptions
 from .quad_mesh import CoarseGridError, QuadMesh, least_jacobians
 from .smooth import smooth_quads, untangled
 
@@ -29,7 +33,7 @@ def quads(
     *,
     quads: int | None = None,
     size: ArrayLike | None = None,
-    stretch: float = 0.0,
+    stretch: float = QuadOptions.stretch,
     sharp_angle: float | str | None = None,
     smooth: int = ROUNDS,
     **options: Any,
@@ -65,6 +69,12 @@ def quads(
     stages, stated = Stopwatch(options.get("progress")), (faces, quads, size, sharp_angle)
     if is_given and (any(one is not None for one in stated) or options.keys() - {"progress"}):
         raise OptionError("a grid already has faces, size and options: no others can be given")
+    source = None if is_given else as_input(mesh, faces).source
+    mesh = mesh if source is None else source
+    with stages("coarsen"):
+        small = None if is_given else coarse_input(mesh, faces, quads, size, options)
+    if small is not None:
+        mesh, faces, size = small.mesh.vertices, small.mesh.faces, small.sizes
     search = partial(integer_grid, mesh, faces, stretch=stretch, sharp_angle=sharp_angle, **options)
     grid, coarse = mesh if is_given else search(quads=quads, size=size), list[str]()
     if not isinstance(size, Real):
@@ -90,15 +100,26 @@ def quads(
                 search, finer = partial(search, cones="sparse", distortion=2 * DISTORTION), 1.0
             grid = search(quads=finer * grid.squares)
     found = with_borders(found) if found.left_out else found
+    features = grid.features
     with stages("smooth"):
-        found = smooth_quads(found, smooth, grid.features)
+        if small is not None:
+            angle = float(read_options({"sharp_angle": sharp_angle}, QuadOptions).sharp_angle or SHARP_ANGLE)
+            found, features = small.moved(found, angle), sharp_ends(small.given, angle)
+        found = smooth_quads(found, smooth, features)
         if smooth:
             found = untangled(found)
     return replace(
         found,
-        notes=(*grid.notes, *coarse[:1], *found.notes, *_notes(found)),
+        notes=(
+            *(() if small is None else small.notes),
+            *grid.notes,
+            *coarse[:1],
+            *found.notes,
+            *_notes(found),
+        ),
         seconds={**grid.seconds, **stages.seconds},
         grid=grid,
+        source=source,
     )
 
 

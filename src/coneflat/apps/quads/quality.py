@@ -26,14 +26,11 @@ class QuadMeasures:
         irregular_valences: number of irregular vertices for each valence.
         euler_characteristic: vertices minus edges plus quads.
         surface_euler: Euler characteristic of the surface, which is the same unless squares were left out.
-        boundary_edges: number of edges with one quad.
         angle_mean, angle_p95, angle_max: deviation of all corner angles from 90 degrees, in degrees.
         edge_mean, edge_cv: mean edge length, and the standard deviation of edge lengths divided by the mean.
         jacobian_mean, jacobian_min: mean and minimum of the least scaled Jacobian of each quad, 1 for rectangles,
             negative if a quad is flipped at a corner.
-        to_surface, from_surface: largest distance from the quads to the surface, and from the surface to the quads,
-            model units; see `surface_gaps`.
-        hausdorff: the larger of both.
+        hausdorff: largest distance between quads and surface, model units; see `hausdorff_distance`.
         left_out, area_left_out: see `QuadMesh`.
     """
 
@@ -43,7 +40,6 @@ class QuadMeasures:
     irregular_valences: dict[int, int]
     euler_characteristic: int
     surface_euler: int
-    boundary_edges: int
     angle_mean: float
     angle_p95: float
     angle_max: float
@@ -51,8 +47,6 @@ class QuadMeasures:
     edge_cv: float
     jacobian_mean: float
     jacobian_min: float
-    to_surface: float
-    from_surface: float
     hausdorff: float
     left_out: int
     area_left_out: float
@@ -84,7 +78,7 @@ def measure_quads(quads: QuadMesh) -> QuadMeasures:
     """Return the measures of a quad mesh on a surface.
 
     Angles are in degrees, lengths and distances in model units; Jacobians and `edge_cv` are ratios. Distances to and
-    from the surface are the largest at samples, see `surface_gaps`.
+    from the surface are the largest at samples, see `hausdorff_distance`.
 
     Args:
         quads: p quads, at least one, with q vertices on their surface, as `coneflat.quads` returns them or
@@ -113,7 +107,6 @@ def measure_quads(quads: QuadMesh) -> QuadMeasures:
     length = np.linalg.norm(points[quads.edges[:, 0]] - points[quads.edges[:, 1]], axis=1)
     least = least_jacobians(points, quads.quads)
     which, many = np.unique(quads.valences[quads.irregular], return_counts=True)
-    there, back = surface_gaps(quads)
     return QuadMeasures(
         vertices=len(points),
         quads=len(quads.quads),
@@ -121,7 +114,6 @@ def measure_quads(quads: QuadMesh) -> QuadMeasures:
         irregular_valences=dict(zip(which.tolist(), many.tolist(), strict=True)),
         euler_characteristic=quads.euler_characteristic,
         surface_euler=quads.surface_euler,
-        boundary_edges=int(quads.is_boundary_edge.sum()),
         angle_mean=float(off.mean()),
         angle_p95=float(np.percentile(off, 95)),
         angle_max=float(off.max()),
@@ -129,9 +121,7 @@ def measure_quads(quads: QuadMesh) -> QuadMeasures:
         edge_cv=float(length.std() / length.mean()),
         jacobian_mean=float(least.mean()),
         jacobian_min=float(least.min()),
-        to_surface=there,
-        from_surface=back,
-        hausdorff=max(there, back),
+        hausdorff=hausdorff_distance(quads),
         left_out=quads.left_out,
         area_left_out=quads.area_left_out,
     )
@@ -145,8 +135,8 @@ def corner_angles_of(quads: QuadMesh) -> FloatArray:
     return np.degrees(np.arccos(np.clip(dots(one, two) / scale, -1.0, 1.0)))
 
 
-def surface_gaps(quads: QuadMesh) -> tuple[float, float]:
-    """Return the largest sampled distances from the quads to the surface, and from the surface to the quads.
+def hausdorff_distance(quads: QuadMesh) -> float:
+    """Return the largest sampled distance from the quads to the surface, or from the surface to the quads.
 
     Distances are exact, but measured at samples: at 5 x 5 points of the bilinear patch of each quad, and at points of
     each triangle with a spacing of at most half the mean edge of the quads. Distances to quads are those to their two
@@ -161,7 +151,7 @@ def surface_gaps(quads: QuadMesh) -> tuple[float, float]:
     there = surface_distances(mesh.vertices, mesh.faces, np.concatenate([quads.vertices, inner]))
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     back = surface_distances(quads.vertices, quads.triangles, _samples(mesh, float(sides.mean()) / 2))
-    return float(there.max()), float(back.max())
+    return float(max(there.max(), back.max()))
 
 
 def _samples(mesh: TriangleMesh, spacing: float) -> FloatArray:

@@ -104,7 +104,7 @@ def _grid_near(rounding: Rounding, energy: StretchEnergy) -> tuple[IntegerGrid |
             tries, why = tries + 1, "sides of triangles on grid lines change their direction"
             continue
         if (replace(layout, points=points).double_areas() > 0).all():
-            return _make_grid(layout, points, found, tries), ""
+            return _make_grid(layout, points, tries), ""
         tries, why = tries + 1, "rounding flipped a very small triangle"
     return None, why
 
@@ -187,7 +187,7 @@ def _snapped(found: Relaxed, transitions: Transitions, values: IntArray) -> Comp
     return transitions.places(as_complex(rounded), values.astype(np.float64))
 
 
-def _make_grid(layout: GridLayout, points: ComplexArray, found: Relaxed, tries: int) -> IntegerGrid:
+def _make_grid(layout: GridLayout, points: ComplexArray, tries: int) -> IntegerGrid:
     mesh, corner_grid = layout.mesh, as_pairs(points)[layout.corners]
     quarters = quarters_around(mesh, sides_between(corner_grid))
     cones, corners = layout.cones, layout.sides.corners
@@ -203,30 +203,16 @@ def _make_grid(layout: GridLayout, points: ComplexArray, found: Relaxed, tries: 
         cones,
         quarters[cones],
     )
-    moves, energies = _moves(layout, points), (found.energy_before, found.energy)
-    qc = _distortion(layout, layout.points)[0], *_distortion(layout, points)
-    # In the order of the attributes.
-    notes = (note,) if tries else ()
-    return IntegerGrid(*arrays, layout.size, *moves, *energies, *qc, notes, corners, quarters[corners])
+    notes, qc = (note,) if tries else (), _distortion(layout, points)
+    return IntegerGrid(*arrays, layout.size, qc, notes, corners, quarters[corners])
 
 
-def _moves(layout: GridLayout, points: ComplexArray) -> tuple[float, float]:
-    """Return the root mean square and the largest displacement of cones in grid units, relative to their mean."""
-    at = np.isin(layout.mesh.faces, layout.nodes)
-    if not at.any():
-        return 0.0, 0.0
-    move = (points - layout.points)[np.unique(layout.corners[at])]
-    size = np.abs(move - move.mean())
-    return float(np.sqrt((size**2).mean())), float(size.max())
-
-
-def _distortion(layout: GridLayout, points: ComplexArray) -> tuple[float, float]:
-    """Return the mean quasi-conformal distortion weighted by area, and the least area of a triangle over its ideal."""
+def _distortion(layout: GridLayout, points: ComplexArray) -> float:
+    """Return the mean quasi-conformal distortion weighted by area."""
     areas = double_areas(layout.lengths) / 2
     real = areas > 0
     along, across = map_factors(rest_sides(layout.lengths[real] / layout.size))
     places = points[layout.corners[real]]
     places = places - places[:, :1]
     one, two = np.abs((along * places).sum(axis=1)), np.abs((across * places).sum(axis=1))
-    ratio = (one + two) / (one - two)
-    return float(np.average(ratio, weights=areas[real])), float((one**2 - two**2).min())
+    return float(np.average((one + two) / (one - two), weights=areas[real]))

@@ -5,25 +5,22 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csc_matrix, csr_matrix, diags
+from scipy.sparse import csr_matrix
 
 from ... import TriangleMesh
 from ...base import FloatArray
 from ...errors import OptionError
 from ...geometry import (
-    cotangent_laplacian,
-    cotangents,
     double_areas,
     edge_lengths,
     mollify,
     signed_double_areas,
 )
 from ...io import as_input
-from ...linalg import factorize
 from ...measure import quantile
 from ...mesh import CheckedMesh
 from ...source import vertex_numbers
-from .cross_field import CURVATURE_SCALE, curvature_tensors
+from .cross_field import CURVATURE_SCALE, curvature_tensors, diffused
 from .features import vertex_graph
 from .integer_map import IntegerGrid
 
@@ -65,11 +62,7 @@ def _scales_of_curvature(mesh: TriangleMesh, ratio: float = 4.0) -> FloatArray:
     mean = np.bincount(corners, (areas * np.log(squared) / 8).repeat(3) / 3, count) / share
     middle = quantile(mean, share, 0.5)
     bound = np.log(ratio) / 2
-    smoothed = csc_matrix(
-        diags(share) + 4 * radius**2 * cotangent_laplacian(mesh.faces, cotangents(lengths), count)
-    )
-    smoothed.sort_indices()
-    return factorize(smoothed).solve((share * np.clip(mean - middle, -bound, bound))[:, None])[:, 0]
+    return diffused(mesh, np.clip(mean - middle, -bound, bound)[:, None], 2 * CURVATURE_SCALE)[:, 0]
 
 
 def extended(values: FloatArray, mesh: TriangleMesh) -> FloatArray:

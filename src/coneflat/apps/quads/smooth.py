@@ -43,7 +43,7 @@ def smooth_quads(quads: QuadMesh, rounds: int = ROUNDS, features: ArrayLike = ()
     if not isinstance(rounds, Integral) or rounds < 0:
         raise OptionError(f"rounds of smoothing must be an integer, 0 or more, not {rounds!r}")
     movable = ~(
-        quads.is_boundary_vertex | _is_on_feature(quads, np.asarray(features, dtype=np.int64).reshape(-1, 2))
+        quads.is_boundary_vertex | is_on_feature(quads, np.asarray(features, dtype=np.int64).reshape(-1, 2))
     )
     surface = Stars.of(quads.surface.vertices, quads.surface.faces)
     points, faces, barycentric = quads.vertices.copy(), quads.faces.copy(), quads.barycentric.copy()
@@ -94,7 +94,7 @@ def _blocked(old: FloatArray, new: FloatArray, quads: IntArray) -> BoolArray:
         stays[quads[bad]] = True
 
 
-def _is_on_feature(quads: QuadMesh, features: IntArray) -> BoolArray:
+def is_on_feature(quads: QuadMesh, features: IntArray) -> BoolArray:
     """Return (q,) whether each vertex is on a sharp edge of the surface or on a feature (f, 2)."""
     mesh = quads.surface
     sharp = np.zeros(len(mesh.edges), dtype=bool)

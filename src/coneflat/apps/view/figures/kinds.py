@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -90,23 +90,15 @@ class Look:
 _Rows: TypeAlias = "tuple[list[Row], list[Any]]"
 
 
-class Quads(Protocol):
-    """A mesh that provides its figure of the kind "quads", as `QuadMesh` does."""
-
-    def figure_rows(self, look: Look) -> _Rows:
-        """Return the rows of the figure and the handles of its legend."""
-
-
-def make_figure(shown: Flattening | ConeCurve | Quads, kind: str, **look: Any) -> Figure:
+def make_figure(shown: Flattening | ConeCurve, kind: str, **look: Any) -> Figure:
     """Return a figure for print, which `save_figure` writes.
 
     Args:
-        shown: the flattening; for the kind "curve" a `ConeCurve`, for the kind "quads" a `QuadMesh`.
+        shown: the flattening; for the kind "curve" a `ConeCurve`.
         kind: "layout": the charts in the unit square with cones. "checker": the model with a checkerboard texture.
             "quality": distortion of angles and of scale on the model and in the layout. "color": the quantity `own` on
             the model and in the layout. "cones": the model with cones and seams. "curvature": angle defects before and
-            after flattening. "curve": area distortion against the number of cones. "quads": the edges of quads, and
-            their irregular vertices.
+            after flattening. "curve": area distortion against the number of cones.
         look: attributes of `coneflat.apps.view.Look`: `size` in inches, `dpi`, `eyes` (directions to the eye), upward
             axis `up`, `colors`, `cells` of the checkerboard, `color_charts`, quantity `own`, target `distortion`,
             `title`.
@@ -123,13 +115,9 @@ def make_figure(shown: Flattening | ConeCurve | Quads, kind: str, **look: Any) -
     """
     if not isinstance(kind, str) or kind not in KINDS:
         raise OptionError(f"unknown kind of figure {short_repr(kind)}: choose from {', '.join(KINDS)}")
-    is_curve, is_quads = isinstance(shown, ConeCurve), hasattr(shown, "figure_rows")
-    for name, fits, function in (("curve", is_curve, "cone_curve"), ("quads", is_quads, "quads")):
-        if fits != (kind == name):
-            raise OptionError(
-                f"results of `coneflat.{function}` are shown by figures of the kind {name!r} only"
-            )
-    if kind not in ("curve", "quads") and not hasattr(shown, "uv_faces"):
+    if isinstance(shown, ConeCurve) != (kind == "curve"):
+        raise OptionError("results of `coneflat.cone_curve` are shown by figures of the kind 'curve' only")
+    if kind != "curve" and not hasattr(shown, "uv_faces"):
         raise OptionError(f"expected a result of `coneflat.flatten`, got {short_repr(shown)}")
     chosen = Look(**look)
     rows, marks = _ROWS[kind](shown, chosen)
@@ -192,7 +180,6 @@ _ROWS: dict[str, Callable[[Any, Look], _Rows]] = {
     "curvature": _curvature,
     "color": _color,
     "curve": _curve,
-    "quads": lambda quads, look: quads.figure_rows(look),
 }
 
 KINDS = tuple(_ROWS)

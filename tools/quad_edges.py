@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..view import DOT_REACH, DOTS_PER_INCH, Eye, mark_scale, show_mesh
+from coneflat.apps.view import DOT_REACH, DOTS_PER_INCH, Eye, mark_scale, show_mesh
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .quad_mesh import QuadMesh
+    from coneflat import QuadMesh
 
 #: Colours of vertices with less and with more than four quads; distinguishable in colour blindness and in grey.
 FEWER_COLOR, MORE_COLOR = "#0072b2", "#e69f00"

@@ -1,0 +1,116 @@
+"""Meshes of many triangles: the grid is computed on a coarse mesh, and its quads move to the given surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
+
+from ... import Flattening, TriangleMesh, check_mesh
+from ...base import FloatArray, IntArray
+from ...geometry import double_areas, edge_lengths
+from ...io import as_input
+from ...mesh import NEXT, PREVIOUS
+from ...options import declarations
+from ...source import at_unit_size
+from ..unwrap.coarse import coarse_mesh
+from .aligned_cones import COARSE
+from .cross_field import sharp_ends
+from .features import edge_indices, vertex_graph
+from .nearest import Stars, TriangleTree, slide_near
+from .options import QUADS, QuadOptions
+from .quad_mesh import QuadMesh
+from .sizes import wanted_scales
+from .smooth import is_on_feature
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseInput:
+    """A coarse mesh of a surface.
+
+    Attributes:
+        mesh: the coarse mesh, in model units.
+        kept: its vertices in the given mesh.
+        given: the given mesh, checked.
+        sizes: relative sizes of quads at its vertices, a length, or None.
+        notes: on the given mesh.
+    """
+
+    mesh: TriangleMesh
+    kept: IntArray
+    given: TriangleMesh
+    sizes: FloatArray | float | None
+    notes: tuple[str, ...]
+
+    def moved(self, quads: QuadMesh, angle: float) -> QuadMesh:
+        """Return quads of the coarse mesh, or of a refinement of it, on the given mesh.
+
+        Vertices slide along the surface from a nearby vertex that both meshes have, so that they do not jump to another
+        sheet. Those on the boundary and on edges sharper than an angle move to the nearest point on such edges.
+        """
+        mesh, surface, points = self.given, quads.surface, quads.vertices
+        off, which = cKDTree(self.mesh.vertices).query(surface.vertices)
+        graph, common = vertex_graph(surface), np.flatnonzero(off == 0)
+        _, _, source = dijkstra(graph, indices=common, return_predecessors=True, min_only=True)
+        corners = surface.faces[quads.faces, quads.barycentric.argmax(axis=1)]
+        stars, start = Stars.of(mesh.vertices, mesh.faces), self.kept[which[source[corners]]]
+        faces = stars.star[stars.start[start]]
+        weights = (mesh.faces[faces] == start[:, None]).astype(np.float64)
+        slide_near(stars, points, faces, weights)
+        side = np.sqrt(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum() / 2 / len(quads.quads))
+        sharp = edge_indices(mesh, sharp_ends(mesh, angle)), side / 2
+        border = np.flatnonzero(mesh.is_boundary_edge), np.inf
+        is_on = is_on_feature(quads, sharp_ends(surface, angle)), quads.is_boundary_vertex
+        for moves, (edges, reach) in zip(is_on, (sharp, border), strict=True):
+            if not (len(edges) and moves.any()):
+                continue
+            halfedges = mesh.edge_halfedges[edges, 0]
+            tails, heads = mesh.ends_of(halfedges)
+            # Each edge is a triangle without area.
+            tree = TriangleTree(mesh.vertices, np.stack([tails, heads, heads], axis=1))
+            on, (share, *_) = (found.T for found in tree.nearest(points[moves]))
+            starts, ends = mesh.vertices[tails[on]], mesh.vertices[heads[on]]
+            near = ends + share[:, None] * (starts - ends)
+            within = np.linalg.norm(near - points[moves], axis=1) <= reach
+            at, halfedge, share = np.flatnonzero(moves)[within], halfedges[on[within]], share[within]
+            faces[at], weights[at] = halfedge // 3, 0.0
+            weights[at, np.take(NEXT, halfedge % 3)] = share
+            weights[at, np.take(PREVIOUS, halfedge % 3)] = 1 - share
+        moved = stars.at(faces, weights)
+        return replace(quads, vertices=moved, faces=faces, barycentric=weights, surface=mesh)
+
+
+def coarse_input(
+    mesh: Any, faces: Any, quads: float | None, size: Any, options: dict[str, Any]
+) -> CoarseInput | None:
+    """Return a coarse mesh for about `quads` quads; None if the given one has few triangles, or options refer to it.
+
+    Raises:
+        MeshError: the mesh cannot be flattened.
+        OptionError: sizes are not positive numbers.
+    """
+    length: float | None = float(size) if isinstance(size, Real) else None
+    # Invalid numbers and options are reported later. Weights, and options that are not simple values, name vertices.
+    is_simple = all(one is None or isinstance(one, (str, Real)) or callable(one) for one in options.values())
+    is_simple &= options.keys() <= declarations(QuadOptions).keys() - {"weights"}
+    numbers = [one for one in (quads, length) if one is not None]
+    if not is_simple or not all(isinstance(one, Real) and 0 < float(one) < np.inf for one in numbers):
+        return None
+    given = as_input(mesh, faces)
+    if isinstance(mesh, Flattening) or (np.shape(given.faces) or (0,))[0] <= 2 * COARSE:
+        return None
+    checked = check_mesh(given.vertices, given.faces, repair=bool(options.get("repair", False)))
+    scaled = at_unit_size(checked)
+    area = float(double_areas(edge_lengths(scaled.mesh.vertices, scaled.mesh.faces)).sum()) / 2
+    if length is not None:
+        quads = area / max(float(np.ldexp(length, scaled.exponent)), np.finfo(float).tiny) ** 2
+    count = COARSE * max(1.0, (quads or QUADS) / QUADS)
+    if len(checked.mesh.faces) <= 2 * count:
+        return None
+    coarse, kept, _ = coarse_mesh(scaled.mesh, int(count))
+    sizes = length if size is None or length else np.exp(-wanted_scales(mesh, faces, scaled, size)[kept])
+    return CoarseInput(coarse.moved_to(checked.mesh.vertices[kept]), kept, checked.mesh, sizes, checked.notes)
