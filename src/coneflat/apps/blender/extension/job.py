@@ -28,11 +28,8 @@ def popen_options() -> dict[str, Any]:
     environment.pop("PYTHONHOME", None)  # Blender's own
     pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
     text = {"text": True, "encoding": "utf-8", "errors": "replace"}
-    apart = {
-        "start_new_session": os.name == "posix",
-        "creationflags": getattr(subprocess, "CREATE_NO_WINDOW", 0),
-    }
-    return {"env": environment, **pipes, **text, **apart}
+    hidden = {"creationflags": getattr(subprocess, "CREATE_NO_WINDOW", 0)}
+    return {"env": environment, "start_new_session": os.name == "posix", **pipes, **text, **hidden}
 
 
 class Failure(Exception):

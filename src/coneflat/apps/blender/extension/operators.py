@@ -233,9 +233,10 @@ class Command(Runner):
         """
         settings = context.scene.coneflat
         group = getattr(settings, self.command)
-        weights = [each["name"] for each in COMMANDS[self.command] if each["kind"] == "weights"]
-        groups = {name: getattr(group, name) for name in weights if getattr(group, name)}
-        for name in groups.values():
+        given = [(each, getattr(group, each["name"])) for each in COMMANDS[self.command]]
+        named = [(each, name) for each, name in given if exchange.names_group(each, name)]
+        groups = {each["name"]: (name, each["kind"]) for each, name in named}
+        for name, _ in groups.values():
             if not any(name in each.vertex_groups for each in objects):
                 names = ", ".join(each.name for each in objects)
                 raise Failure(f"there is no vertex group {name!r} in {names}")
