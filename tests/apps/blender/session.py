@@ -397,6 +397,9 @@ def vertex_lists():
     settings().select, settings().flatten.required_cones, settings().flatten.cone_count = "CONES", "cones", 4
     assert "cones 4" in run("flatten")
     assert [vertex.index for vertex in ball.data.vertices if vertex.select] == [5, 40, 70, 200]
+    ball.vertex_groups.new(name="nobody")
+    settings().flatten.required_cones = "nobody"
+    assert "Error: the vertex group 'nobody' has no vertices of the chosen faces of ball" in run("flatten")
     coarse = ball.vertex_groups.new(name="coarse")
     coarse.add([vertex.index for vertex in ball.data.vertices if vertex.co.z > 0], 0.2, "REPLACE")
     settings().quads.size, settings().quads.quads = "coarse", 500

@@ -258,7 +258,8 @@ def test_a_job_reports_its_progress(extension):
 @pytest.mark.parametrize(
     ("code", "message"),
     [
-        ("print('coneflat: error: no faces'); raise SystemExit(2)", "Work: no faces"),
+        ("print('coneflat: error: no faces'); raise SystemExit(2)", "^Work: no faces$"),
+        ("print('Error: no faces (see `coneflat unwrap --help`)'); raise SystemExit(2)", "^Work: no faces$"),
         ("print('ERROR: no wheel\\n leaked'); raise SystemExit(1)", "Work: no wheel"),
         ("raise ValueError('bad')", "Work ended with code 1: ValueError: bad"),
         ("print('x' * 10**6); raise SystemExit(2)", "Work ended with code 2: x"),
@@ -286,10 +287,10 @@ def test_a_program_that_does_not_exist(extension):
         extension.job.Job("Work", ["missing"])
 
 
-def fake(folder, version):
-    """Return a program that prints a version of coneflat."""
+def fake(folder, version, what="coneflat,"):
+    """Return a program that prints a version, of coneflat by default."""
     program = folder / "python"
-    program.write_text(f"#!/bin/sh\necho coneflat, version {version}\n")
+    program.write_text(f"#!/bin/sh\necho {what} version {version}\n")
     program.chmod(0o755)
     return str(program)
 
@@ -304,6 +305,8 @@ def test_the_environment_is_found(extension, tmp_path, monkeypatch):
     assert found.version == coneflat.__version__
     with pytest.raises(failure, match="older than the extension"):
         environment.find(fake(tmp_path, "0.1.0"), own)
+    with pytest.raises(failure, match="does not run coneflat: other coneflat, licence version 3"):
+        environment.find(fake(tmp_path, "3", "other coneflat, licence"), own)
     fake(tmp_path, "99.0")
     monkeypatch.setenv("PATH", str(tmp_path))
     assert environment.find("", own).command == (str(tmp_path / "python"), "-m", "coneflat")

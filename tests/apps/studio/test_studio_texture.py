@@ -292,3 +292,52 @@ def test_the_page_switches_between_the_maps(visit, studio):
     assert page.is_visible("#cones-by")
     assert visit.cones() == cones
     assert visit.run("coneflat.state.get('cones')")
+
+
+def test_less_common_options_are_set_by_the_page(visit):
+    page = visit.page
+    visit.settle()
+    page.click("#more summary")
+    assert page.is_hidden("#more-area")
+    page.fill("#more-quantise", "90")
+    page.keyboard.press("Enter")
+    visit.settle()
+    assert "--quantise 1.57079" in page.text_content("#command")
+    page.fill("#more-quantise", "")
+    page.keyboard.press("Enter")
+    page.select_option("#purpose", "texture")
+    visit.settle()
+    assert page.is_hidden("#more-quantise")
+    assert page.is_hidden("#chart-number")
+    page.fill("#more-area", "0.3")
+    page.keyboard.press("Enter")
+    page.select_option("#more-up", "-z")
+    page.select_option("#charts", "number")
+    page.fill("#chart-number", "5")
+    page.keyboard.press("Enter")
+    visit.settle()
+    assert page.text_content("#command") == (
+        "coneflat unwrap sample.obj --area 0.3 --up 0.0,0.0,-1.0 --charts 5"
+    )
+    assert [page.input_value(f"#{name}") for name in ("more-up", "more-area", "charts")] == [
+        "-z",
+        "0.3",
+        "number",
+    ]
+    assert "5 charts" in page.inner_text("#title")
+    assert page.input_value("#max-energy") == ""
+    page.click("#no-more")
+    visit.wait("studio.refused")
+    visit.troubles.clear()  # The browser reports the refused request.
+    assert "Seams none and area cannot be combined" in page.inner_text("#refusal-text")
+    assert not page.is_checked("#no-more")
+    page.fill("#more-area", "")
+    page.keyboard.press("Enter")
+    page.select_option("#charts", "atlas")
+    page.check("#no-more")
+    visit.settle()
+    assert "--seams none" in page.text_content("#command")
+    page.screenshot(path="/tmp/studio_more2.png")
+    page.select_option("#purpose", "angles")
+    visit.settle()
+    assert page.text_content("#command") == "coneflat flatten sample.obj --up 0.0,0.0,-1.0"

@@ -37,8 +37,8 @@ def _draw_command(operator: Any) -> Any:
         group = getattr(context.scene.coneflat, command)
         for title, records in groupby(COMMANDS[command], lambda record: record["group"]):
             # What stands last is rarely used.
-            is_last = title == COMMANDS[command][-1]["group"]
-            header, body = layout.panel(f"coneflat_{command}_{title}", default_closed=is_last)
+            is_rare = title == COMMANDS[command][-1]["group"]
+            header, body = layout.panel(f"coneflat_{command}_{title}", default_closed=is_rare)
             header.label(text=title)
             for record in records if body is not None else ():
                 if record["kind"] in ("weights", "vertices") and context.object is not None:

@@ -77,10 +77,9 @@ def arguments(records: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -
     found = list[str]()
     for record in records:
         name, value, kind = record["name"], values[record["name"]], record["kind"]
+        is_default = value in (record["default"], "")
         if kind in ("number", "angle"):  # Blender's numbers have single precision.
             is_default = np.float32(value) == np.float32(record["default"])
-        else:
-            is_default = value == record["default"]
         if not is_default and kind != "vertices":
             # The angles that are wanted exactly are integers in degrees.
             texts = {"angle": "={1:.5g}deg", "number": "={0:.7g}", "flag": ""}

@@ -27,13 +27,11 @@ def _property(record: dict[str, Any]) -> Any:
         return make(**look, default=default)
     if record["kind"] == "angle":
         return FloatProperty(**look, min=0.0, default=record["default"], subtype="ANGLE")
-    if is_group:
-        return StringProperty(**look)
+    if is_group or record["kind"] == "text":
+        suggested = {} if is_group else {"search": lambda item, context, text: record["words"]}
+        return StringProperty(**look, **suggested, default=record["default"])
     if record["kind"] == "flag":
         return BoolProperty(**look, default=record["default"])
-    if record["kind"] == "text":
-        suggested = {"search": lambda item, context, text: record["words"], "search_options": {"SUGGESTION"}}
-        return StringProperty(**look, **suggested, default=record["default"])
     words = [(word, word.capitalize(), "") for word in record["words"]]
     return EnumProperty(**look, items=words, default=record["default"])
 

@@ -127,7 +127,7 @@ class Panel {
     this.part("redo").disabled = !news?.redo;
     const {forTexture} = this.studio;
     this.part("purpose").value = forTexture ? "texture" : "angles";
-    this.value("max-energy", options.max_energy);
+    this.value("max-energy", options.area == null ? options.max_energy : "");
     for (const part of document.querySelectorAll(".for-angles, .for-texture")) part.hidden = forTexture !== part.classList.contains("for-texture");
     for (const [key, , , hint] of [...TOOLS, ...BRUSHES]) {
       this.part(`tool-${key}`).setAttribute("aria-pressed", String(tools.mode === key));
