@@ -6,6 +6,7 @@ from .declared import (
     FORMATS,
     MAX_SHOWN_TRIANGLES,
     PAPER,
+    RARE,
     SHOWS,
     AtlasOptions,
     ConeBounds,
@@ -43,7 +44,7 @@ from .reading import read_options, settings, takes
 __all__ = [
     "ANGLE", "ANGLE_OR_NONE", "AtlasOptions", "CONES", "COUNT", "Choice", "ConeBounds", "ConeNumber", "ConeOptions",
     "CurveOptions", "Declaration", "Direction", "Edges", "FORMATS", "FindOptions", "Flag", "Kind",
-    "MAX_SHOWN_TRIANGLES", "MetricOptions", "Number", "Options", "PAPER", "RunOptions", "SHOWS", "SeamOptions",
+    "MAX_SHOWN_TRIANGLES", "MetricOptions", "Number", "Options", "PAPER", "RARE", "RunOptions", "SHOWS",
     "Vertices", "VerticesOrEdges", "Weights", "WordOrVertices", "as_number", "as_integer", "declarations", "option",
-    "SEARCH_OPTIONS", "read_options", "settings", "strength", "takes",
+    "SEARCH_OPTIONS", "SeamOptions", "read_options", "settings", "strength", "takes",
 ]  # fmt: skip

@@ -49,12 +49,11 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 CONES = ("auto", "sparse", "greedy", "none")
-#: How a layout is computed from cones: by the method of this package, or that of the paper.
-METHODS = ("exact", "linear")
-#: Which triangles of a flat metric are relaxed.
-RELAXED = ("auto", "off", "whole")
-CHARTS = ("atlas", "one")
-BOUNDARIES = ("free", "lengths", "disk", "straight")
+#: Rarely used options, which helps and panels list at the end.
+RARE = (
+    "max_cones", "required_cones", "forbidden_cones", "weights", "min_cone_angle", "max_cone_angle", "quantise",
+    "relax", "no_seams", "hide_seams", "seam_weights", "tiles", "threads",
+)  # fmt: skip
 NO_CORNERS = "boundary must have at least one corner; for a round boundary use 'disk'"
 
 # Radians. A larger bound has no effect on any triangulation.
@@ -63,12 +62,7 @@ WIDEST_CONE = 1000 * math.pi
 Cones = str | Mapping[int, float] | Mapping[int, float | None] | Iterable[int]
 
 #: The published method: `flatten(mesh, **PAPER)`.
-PAPER: Mapping[str, Any] = {
-    "cones": "greedy",
-    "max_cones": None,
-    "method": "linear",
-    "charts": "one",
-}
+PAPER: Mapping[str, Any] = {"cones": "greedy", "max_cones": None, "method": "linear", "charts": "one"}
 
 
 #: Formats in which flattened meshes are written: file extensions.
@@ -218,9 +212,11 @@ class MetricOptions:
             isometric as the cones allow. Above 0 all vertices move, except on a prescribed boundary.
     """
 
-    method: str = option("exact", Choice(METHODS))
-    boundary: Cones = option("free", WordOrVertices(BOUNDARIES, "corner", NO_CORNERS), only="exact")
-    relax: str = option("auto", Choice(RELAXED), only="exact")
+    method: str = option("exact", Choice(("exact", "linear")))
+    boundary: Cones = option(
+        "free", WordOrVertices(("free", "lengths", "disk", "straight"), "corner", NO_CORNERS), only="exact"
+    )
+    relax: str = option("auto", Choice(("auto", "off", "whole")), only="exact")
     stretch: float = option(0.0, strength(1.0), only="exact")
 
 
@@ -264,7 +260,7 @@ class AtlasOptions:
             are rotated to fill the texture best.
     """
 
-    charts: str = option("atlas", Choice(CHARTS))
+    charts: str = option("atlas", Choice(("atlas", "one")))
     resolution: int = option(RESOLUTION, integer(2**16))
     padding: float = option(PADDING, Number())
     tiles: int = option(1, integer(1000))

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from numbers import Integral
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..base.text import short_repr
 from ..errors import OptionError
@@ -21,7 +21,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Kind:
-    """The values that an option takes; the base class takes any value."""
+    """The values that an option takes; the base class takes any value.
+
+    Attributes:
+        metavar: what helps show for a text that is a word or something else, such as "curvature|NAME".
+    """
+
+    metavar: ClassVar[str] = ""
 
     def parse(self, name: str, value: Any) -> Any:
         """Return a value in the form that the rest of the package uses.

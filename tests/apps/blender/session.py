@@ -310,6 +310,7 @@ def failures():
     preferences().requirement = "coneflat"
     assert f"Error: online access is off: allow it; or, {named}" in run("unwrap")
     preferences().wheels = os.environ["BLENDER_USER_RESOURCES"]
+    os.environ.pop("PYTHONPATH")  # With a coneflat there, pip has nothing to do.
     lines = run("install")
     assert "Error: install coneflat: No matching distribution found for coneflat" in lines, lines
     assert not flags(cube.data).any()
@@ -376,6 +377,106 @@ def edited_together():
     settings().together = False
     lines = run("unwrap")
     assert [line.split()[1] for line in lines.splitlines() if "charts" in line] == ["ball:", "ring:"], lines
+
+
+def vertex_lists():
+    """A vertex group keeps seams away, or has the cones; also for one of several objects, and with sizes of quads."""
+    ball = add("uv_sphere", "ball", segments=32, ring_count=16)
+    add("cube", "cube", location=(3, 0, 0))
+    select(ball, bpy.data.objects["cube"])
+    group = ball.vertex_groups.new(name="face")
+    front = [vertex.index for vertex in ball.data.vertices if vertex.co.y < -0.2]
+    group.add(front, 1.0, "REPLACE")
+    group.add([vertex.index for vertex in ball.data.vertices if vertex.co.y >= -0.2], 0.3, "REPLACE")
+    settings().unwrap.no_seams = "face"
+    assert "ball, cube: charts" in run("unwrap")
+    assert not any(edge.use_seam and set(edge.vertices) <= set(front) for edge in ball.data.edges)
+    cones = ball.vertex_groups.new(name="cones")
+    cones.add([5, 40, 70, 200], 1.0, "REPLACE")
+    select(ball)
+    settings().select, settings().flatten.required_cones, settings().flatten.cone_count = "CONES", "cones", 4
+    assert "cones 4" in run("flatten")
+    assert [vertex.index for vertex in ball.data.vertices if vertex.select] == [5, 40, 70, 200]
+    ball.vertex_groups.new(name="nobody")
+    settings().flatten.required_cones = "nobody"
+    assert "Error: the vertex group 'nobody' has no vertices of the chosen faces of ball" in run("flatten")
+    coarse = ball.vertex_groups.new(name="coarse")
+    coarse.add([vertex.index for vertex in ball.data.vertices if vertex.co.z > 0], 0.2, "REPLACE")
+    settings().quads.size, settings().quads.quads = "coarse", 500
+    run("quads")
+    lengths = [(polygon.center.z > 0, polygon.area**0.5) for polygon in bpy.context.object.data.polygons]
+    upper, lower = ([length for is_upper, length in lengths if is_upper == side] for side in (True, False))
+    assert np.median(upper) > 1.5 * np.median(lower)
+    select(ball)
+    settings().quads.size = "nose"
+    assert "Error: there is no vertex group 'nose' in ball" in run("quads")
+
+
+def mirrored():
+    """The two halves of a mirrored model share their texels; and without further seams only marked ones are cut."""
+    wing = add("grid", "wing", x_subdivisions=8, y_subdivisions=6)
+    for vertex in wing.data.vertices:
+        vertex.co.x, vertex.co.z = vertex.co.x + 1, np.sin(3 * vertex.co.x + vertex.co.y) / 3
+    wing.modifiers.new("two", "MIRROR")
+    bpy.ops.object.modifier_apply(modifier="two")
+    settings().unwrap.stack = "mirrored"
+    lines = run("unwrap")
+    assert "The two halves share their texels" in lines, lines
+    places, counts = np.unique(np.round(uv_of(wing.data), 5), axis=0, return_counts=True)
+    assert (counts % 2 == 0).all()
+    assert len(places) == 9 * 7
+    ring = add("torus", "ring", major_segments=24, minor_segments=12)
+    settings().unwrap.stack, settings().unwrap.seams = "none", "none"
+    for edge in ring.data.edges:
+        edge.use_seam = all(vertex % 12 == 0 for vertex in edge.vertices)
+    assert "ring: charts 1, cones 0" in run("unwrap")
+    settings().unwrap.charts = "4"
+    assert "ring: charts 4" in run("unwrap")
+    settings().unwrap.charts = "some"
+    assert "Error: Unwrap: charts must be atlas, one or an integer" in run("unwrap")
+
+
+class Layout:
+    """Stands for the layout of a panel, which Blender gives in windows only; it notes what is drawn."""
+
+    def __init__(self, drawn):
+        self.drawn = drawn
+
+    def prop(self, owner, name, **_):
+        assert name in owner.bl_rna.properties
+        self.drawn.append(name)
+
+    def prop_search(self, owner, name, where, collection):
+        assert collection in where.bl_rna.properties
+        self.prop(owner, name)
+
+    def operator(self, name):
+        self.drawn.append(name)
+
+    def label(self, **_):
+        pass
+
+    def panel(self, idname, default_closed=False):
+        assert {"idname", "default_closed"} <= set(
+            bpy.types.UILayout.bl_rna.functions["panel"].parameters.keys()
+        )
+        return self, self
+
+
+def panels():
+    """The panels draw every option once, in the sidebars of both editors."""
+    add("cube", "cube")
+    known = module("settings").COMMANDS
+    for panel in importlib.import_module(NAME).PANELS:
+        drawn = []
+        panel.draw(SimpleNamespace(layout=Layout(drawn)), bpy.context)
+        assert len(set(drawn)) == len(drawn)
+        command = panel.__name__.rpartition("_")[2]
+        expected = {f"coneflat.{command}", *(record["name"] for record in known.get(command, ()))}
+        assert command == "coneflat" or expected <= set(drawn) <= expected | {"modifiers"}
+    properties = settings().unwrap.bl_rna.properties
+    assert {"seams", "charts", "area", "stack", "threads"} <= set(properties.keys())
+    assert [word.identifier for word in properties["seams"].enum_items] == ["automatic", "none"]
 
 
 class Manager:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import itertools
 import os
 import subprocess
 import sys
@@ -19,13 +20,13 @@ from command import command
 from shapes import box, torus
 
 import coneflat
-from coneflat.apps.blender import SHOWN, build_extension
+from coneflat.apps.blender import COMMANDS, HIDDEN, build_extension
 from coneflat.apps.cli.main import cli
 
 SESSION = Path(__file__).with_name("session.py")
 SESSIONS = (
     "three_objects", "again", "selected_faces", "sharp_edges", "vertex_groups", "quads", "unapplied", "failures",
-    "escape", "disable", "edited_together", "all_or_none",
+    "escape", "disable", "edited_together", "all_or_none", "vertex_lists", "mirrored", "panels",
 )  # fmt: skip
 
 
@@ -104,18 +105,53 @@ def test_the_extension_imports_only_what_blender_has(archive):
                 assert roots <= {"bpy", "numpy", *sys.stdlib_module_names}, name
 
 
-@pytest.mark.parametrize("name", sorted(SHOWN))
-def test_every_option_is_one_of_the_command(name, extension):
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_every_option_of_a_command_is_shown_or_hidden_for_a_reason(name, extension):
     records = extension.environment.KNOWN["commands"][name]
-    assert [record["name"] for record in records] == list(SHOWN[name])
+    shown = [record["name"] for record in records]
+    hidden = {each.removeprefix(f"{name} ") for names in HIDDEN.values() for each in names}
+    params = {each.name for each in cli.commands[name].params}
+    assert len(set(shown)) == len(shown)
+    assert params - hidden == set(shown)
+
+
+def test_no_option_is_hidden_that_no_command_has():
+    known = {name for command in COMMANDS for each in cli.commands[command].params for name in
+        (each.name, f"{command} {each.name}")}  # fmt: skip
+    assert {name for names in HIDDEN.values() for name in names} - known == {"strict"}  # a word of repair
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_the_groups_are_those_of_the_command(name, extension):
+    records = extension.environment.KNOWN["commands"][name]
+    groups = {each.name: getattr(each, "group", "") for each in cli.commands[name].params}
+    assert all(groups[record["name"]].startswith(record["group"]) for record in records)
+    order = [title for title, _ in itertools.groupby(record["group"] for record in records)]
+    assert len(set(order)) == len(order)
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_every_option_becomes_a_flag(name, extension):
+    records = extension.environment.KNOWN["commands"][name]
     flags = {flag for each in cli.commands[name].params for flag in each.opts}
     defaults = {record["name"]: record["default"] for record in records}
     assert extension.exchange.arguments(records, defaults) == []
     for record in records:
-        other = {"choice": "none of these", "weights": "group"}.get(record["kind"], record["default"] + 1
-            if record["kind"] in ("number", "integer", "angle") else None)  # fmt: skip
-        (argument,) = extension.exchange.arguments(records, {**defaults, record["name"]: other})
-        assert argument.split("=")[0] in flags
+        kind = record["kind"]
+        other = record["default"] + 1 if kind in ("number", "integer", "angle") else "group"
+        found = extension.exchange.arguments(records, {**defaults, record["name"]: other})
+        assert [argument.split("=")[0] in flags for argument in found] == [True] * (kind != "vertices")
+
+
+@pytest.mark.parametrize(
+    ("value", "argument"),
+    [("", None), ("curvature", "curvature"), ("0.25", "0.25"), ("1e-3", "1e-3"), ("coarse.001", "size")],
+)
+def test_a_size_is_a_number_a_word_or_a_vertex_group(value, argument, extension):
+    (record,) = (each for each in extension.environment.KNOWN["commands"]["quads"] if each["name"] == "size")
+    found = extension.exchange.arguments([record], {"size": value})
+    assert found == ([] if argument is None else [f"--size={argument}"])
+    assert extension.exchange.names_group(record, value) == (argument == "size")
 
 
 def test_numbers_of_single_precision_are_written_as_they_were_typed(extension):
@@ -123,7 +159,7 @@ def test_numbers_of_single_precision_are_written_as_they_were_typed(extension):
     values = {record["name"]: record["default"] for record in records}
     values |= {"distortion": float(np.float32(0.1)), "quantise": float(np.float32(np.pi / 2)), "up": "-x"}
     found = extension.exchange.arguments(records, values)
-    assert found == ["--distortion=0.1", "--quantise=90deg", "--up=-x"]
+    assert set(found) == {"--distortion=0.1", "--quantise=90deg", "--up=-x"}
     values["distortion"] = float(np.float32(0.2))
     assert "--distortion" not in " ".join(extension.exchange.arguments(records, values))
 
@@ -139,15 +175,13 @@ def test_maps_of_two_meshes_in_one_atlas(extension, tmp_path):
     quads = np.stack([(i + a) % around * across + (j + b) % across for a, b in steps], axis=1)
     loop = np.stack([np.arange(across), np.roll(np.arange(across), -1)], axis=1)
     points, faces = box(3)
-    none = np.empty((0, 2), np.int64)
     parts = [
-        exchange.Part("ring", ring, quads.ravel(), np.full(len(quads), 4), loop),
+        exchange.Part("ring", ring, quads.ravel(), np.full(len(quads), 4), lists={"seams": loop}),
         exchange.Part(
             "box",
             points + np.array([1, 0, 0]),  # They intersect, which does not matter.
             faces.ravel(),
             np.full(len(faces), 3),
-            none,
             {"seam_weights": np.linspace(0, 1, len(points))},
         ),
     ]
@@ -185,8 +219,7 @@ def test_a_mesh_that_is_repaired_keeps_its_corners(extension, tmp_path):
     points, faces = torus(16, 8)
     faces = np.concatenate([faces, faces[:1]])
     faces[5] = faces[5][::-1]
-    none = np.empty((0, 2), np.int64)
-    part = exchange.Part("torus", points, faces.ravel(), np.full(len(faces), 3), none)
+    part = exchange.Part("torus", points, faces.ravel(), np.full(len(faces), 3))
     arguments = exchange.write_parts(tmp_path, [part])
     assert command("flatten", *arguments, cwd=tmp_path).returncode == 0
     (found,), _ = exchange.read_maps(tmp_path, [part])
@@ -225,7 +258,8 @@ def test_a_job_reports_its_progress(extension):
 @pytest.mark.parametrize(
     ("code", "message"),
     [
-        ("print('coneflat: error: no faces'); raise SystemExit(2)", "Work: no faces"),
+        ("print('coneflat: error: no faces'); raise SystemExit(2)", "^Work: no faces$"),
+        ("print('Error: no faces (see `coneflat unwrap --help`)'); raise SystemExit(2)", "^Work: no faces$"),
         ("print('ERROR: no wheel\\n leaked'); raise SystemExit(1)", "Work: no wheel"),
         ("raise ValueError('bad')", "Work ended with code 1: ValueError: bad"),
         ("print('x' * 10**6); raise SystemExit(2)", "Work ended with code 2: x"),
@@ -253,10 +287,10 @@ def test_a_program_that_does_not_exist(extension):
         extension.job.Job("Work", ["missing"])
 
 
-def fake(folder, version):
-    """Return a program that prints a version of coneflat."""
+def fake(folder, version, what="coneflat,"):
+    """Return a program that prints a version, of coneflat by default."""
     program = folder / "python"
-    program.write_text(f"#!/bin/sh\necho coneflat, version {version}\n")
+    program.write_text(f"#!/bin/sh\necho {what} version {version}\n")
     program.chmod(0o755)
     return str(program)
 
@@ -271,6 +305,8 @@ def test_the_environment_is_found(extension, tmp_path, monkeypatch):
     assert found.version == coneflat.__version__
     with pytest.raises(failure, match="older than the extension"):
         environment.find(fake(tmp_path, "0.1.0"), own)
+    with pytest.raises(failure, match="does not run coneflat: other coneflat, licence version 3"):
+        environment.find(fake(tmp_path, "3", "other coneflat, licence"), own)
     fake(tmp_path, "99.0")
     monkeypatch.setenv("PATH", str(tmp_path))
     assert environment.find("", own).command == (str(tmp_path / "python"), "-m", "coneflat")

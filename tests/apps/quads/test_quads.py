@@ -209,6 +209,14 @@ def test_distances_are_the_least_of_all_triangles():
     assert (found >= dense - 0.03).all()
 
 
+def test_components_without_area_get_no_quads():
+    vertices, faces = rectangle(4, 4)
+    line = np.array([[0, 9, 0], [1, 9, 0], [2, 9, 0]])
+    alone = coneflat.quads(vertices, faces, quads=100)
+    both = coneflat.quads(np.concatenate([vertices, line]), [*faces, len(vertices) + np.arange(3)], quads=100)
+    assert len(both.quads) == len(alone.quads)
+
+
 def test_components_with_few_vertices_get_quads():
     """A tetrahedron has four vertices for the eight cones of a cube: its triangles are split."""
     vertices, faces = shapes.join(shapes.sphere(3), shapes.tetrahedron())

@@ -15,9 +15,8 @@ import shapes
 import coneflat
 from coneflat.apps.studio.child import PLACEHOLDER, JobRunner, Jobs, serve
 from coneflat.apps.studio.choices import Choices
-from coneflat.apps.studio.known import SentPictures, with_hashes
 from coneflat.apps.studio.session import Session
-from coneflat.apps.studio.worker import read_frame, write_frame
+from coneflat.apps.studio.worker import SentPictures, read_frame, with_hashes, write_frame
 from coneflat.apps.view.page.payload import pack
 from coneflat.base.progress import check_cancelled
 

@@ -14,8 +14,8 @@ from studio_browsing import sample, studio, visit  # noqa: F401
 import coneflat
 from coneflat.apps.cli.main import cli
 from coneflat.apps.studio.child import JobRunner
-from coneflat.apps.studio.choices import DECLARED, Choices, command_line, python_lines
-from coneflat.apps.studio.messages import with_warnings
+from coneflat.apps.studio.choices import DECLARED, PLAIN_OPTIONS, Choices, command_line, python_lines
+from coneflat.apps.studio.messages import CONTROLS, with_warnings
 from coneflat.apps.studio.outputs import curve_options
 from coneflat.apps.studio.paint import Region
 from coneflat.apps.studio.project import Project, file_hash, read_project
@@ -25,6 +25,29 @@ from coneflat.errors import OptionError, StudioError
 from coneflat.options import declarations
 
 CONES = (3, 60, 200, 410, 500)
+#: Options of `coneflat flatten` and `coneflat unwrap` that the studio does not set, by the reason.
+NOT_IN_THE_STUDIO = {
+    "they are placed, drawn or painted": (
+        "cones",
+        "required_cones",
+        "forbidden_cones",
+        "weights",
+        "no_seams",
+    ),
+    "no seams are painted instead": ("seam_weights",),
+    "the page opens, saves and shows": (
+        "mesh",
+        "output",
+        "format",
+        "texture",
+        "report",
+        "project",
+        "required",
+    ),
+    "the studio asks before it repairs, and reports in the page": ("weld", "verbosity"),
+    "they are for comparisons with the published method": ("method", "paper"),
+    "the default gives the same digits on every machine": ("threads",),
+}
 
 
 def both_kinds():
@@ -53,6 +76,47 @@ class TestChoices:
         assert chosen.with_texture(False).keywords() == {}
         assert chosen.with_option("resolution", 512).keywords() == {"resolution": 512}
         assert chosen.with_option("texel_density", None).keywords() == {}
+
+    def test_every_option_of_the_commands_is_set_or_left_out_for_a_reason(self):
+        known = {param.name for name in ("flatten", "unwrap") for param in cli.commands[name].params}
+        known -= {name for names in NOT_IN_THE_STUDIO.values() for name in names}
+        assert known == set(PLAIN_OPTIONS)
+
+    def test_every_option_has_a_label(self):
+        assert set(PLAIN_OPTIONS) <= set(CONTROLS)
+
+    def test_further_options_come_back_from_a_command_line(self):
+        chosen = Choices().with_texture(True)
+        values = {
+            "area": 0.2,
+            "stack": "mirrored",
+            "charts": 3,
+            "seams": "none",
+            "up": [0, 0, -1],
+            "tiles": 2,
+        }
+        for name, value in values.items():
+            chosen = chosen.with_option(name, value)
+        assert Choices.from_plain(json.loads(json.dumps(chosen.with_option("area", None).as_plain())))
+        with pytest.raises(OptionError, match="seams none and area cannot be combined"):
+            chosen.keywords()
+        chosen = chosen.with_option("seams", None)
+        line = command_line("ball.obj", "project.json", chosen)
+        expected = "--area 0.2 --stack mirrored --charts 3 --up 0.0,0.0,-1.0 --tiles 2"
+        assert line == f"coneflat unwrap ball.obj {expected}"
+        assert cli.commands["unwrap"].make_context("unwrap", line.split()[2:]).params["up"] == (0, 0, -1)
+        assert chosen.with_texture(False).keywords() == {"up": (0, 0, -1), "tiles": 2}
+        assert chosen.with_option("max_energy", 4.2).keywords()["max_energy"] == 4.2
+
+    def test_drawn_seams_may_be_all(self):
+        chosen = Choices().with_texture(True).cut((1, 2)).with_option("seams", "none")
+        word, pairs = chosen.keywords()["seams"]
+        assert (word, pairs.tolist()) == ("none", [[1, 2]])
+        assert chosen.with_texture(False).keywords()["seams"].tolist() == [[1, 2]]
+
+    def test_cones_placed_by_hand_have_no_search(self):
+        chosen = Choices().with_option("max_cones", 8).with_option("quantise", math.pi / 2).placed([3, 60])
+        assert set(chosen.keywords()) == {"cones"}
 
     @pytest.mark.parametrize("value", [4, 3.9, -1, "much", math.nan])
     def test_a_bound_that_cannot_be_met_is_refused(self, value):
@@ -228,3 +292,52 @@ def test_the_page_switches_between_the_maps(visit, studio):
     assert page.is_visible("#cones-by")
     assert visit.cones() == cones
     assert visit.run("coneflat.state.get('cones')")
+
+
+def test_less_common_options_are_set_by_the_page(visit):
+    page = visit.page
+    visit.settle()
+    page.click("#more summary")
+    assert page.is_hidden("#more-area")
+    page.fill("#more-quantise", "90")
+    page.keyboard.press("Enter")
+    visit.settle()
+    assert "--quantise 1.57079" in page.text_content("#command")
+    page.fill("#more-quantise", "")
+    page.keyboard.press("Enter")
+    page.select_option("#purpose", "texture")
+    visit.settle()
+    assert page.is_hidden("#more-quantise")
+    assert page.is_hidden("#chart-number")
+    page.fill("#more-area", "0.3")
+    page.keyboard.press("Enter")
+    page.select_option("#more-up", "-z")
+    page.select_option("#charts", "number")
+    page.fill("#chart-number", "5")
+    page.keyboard.press("Enter")
+    visit.settle()
+    assert page.text_content("#command") == (
+        "coneflat unwrap sample.obj --area 0.3 --up 0.0,0.0,-1.0 --charts 5"
+    )
+    assert [page.input_value(f"#{name}") for name in ("more-up", "more-area", "charts")] == [
+        "-z",
+        "0.3",
+        "number",
+    ]
+    assert "5 charts" in page.inner_text("#title")
+    assert page.input_value("#max-energy") == ""
+    page.click("#no-more")
+    visit.wait("studio.refused")
+    visit.troubles.clear()  # The browser reports the refused request.
+    assert "Seams none and area cannot be combined" in page.inner_text("#refusal-text")
+    assert not page.is_checked("#no-more")
+    page.fill("#more-area", "")
+    page.keyboard.press("Enter")
+    page.select_option("#charts", "atlas")
+    page.check("#no-more")
+    visit.settle()
+    assert "--seams none" in page.text_content("#command")
+    page.screenshot(path="/tmp/studio_more2.png")
+    page.select_option("#purpose", "angles")
+    visit.settle()
+    assert page.text_content("#command") == "coneflat flatten sample.obj --up 0.0,0.0,-1.0"

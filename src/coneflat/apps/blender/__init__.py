@@ -14,18 +14,26 @@ from typing import Any
 
 from ... import __version__
 from ...io import atomic_write, checked_target
-from ...options import Choice, Declaration, Direction, Number, Options, Weights, WordOrVertices, declarations
+from ...options import Options
+from ..controls import controls_of
+from ..quads.options import QUADS, QuadOptions
 from ..unwrap.options import UnwrapOptions
 
-_TEXTURE = ("seam_weights", "sharp_angle", "hide_seams", "resolution", "padding", "tiles", "up")
-#: The options of each command that the extension shows.
-SHOWN: dict[str, tuple[str, ...]] = {
-    "unwrap": ("max_energy", "texel_density", *_TEXTURE),
-    "flatten": ("distortion", "cone_count", "weights", "quantise", "boundary", "stretch", *_TEXTURE),
-    "quads": (
-        "quads", "size", "stretch", "boundary", "sharp_angle", "distortion", "cone_count", "weights", "smooth",
-    ),
+#: The options of each command.
+COMMANDS: dict[str, type] = {"unwrap": UnwrapOptions, "flatten": Options, "quads": QuadOptions}
+#: The options of the commands that the extension does not show, by the reason.
+HIDDEN = {
+    "Blender has the mesh and takes the result": ("mesh", "output", "format", "texture", "project", "grid", "view"),
+    "the extension shows the measures and notes": ("report", "required", "verbosity"),
+    "meshes are repaired, and objects that touch are not merged": ("repair", "strict", "weld"),
+    "cones, method and charts have the same effect": ("paper",),
+    "seams are marked in Blender; those of unwrap have a further word": ("flatten seams",),
 }  # fmt: skip
+#: What differs from the declarations of options.
+_OTHERWISE: dict[str, dict[str, Any]] = {
+    "seams": {"doc": "none: only marked seams and those that open each component, whatever the energy"},
+    "quads": {"default": QUADS, "is_optional": False},
+}
 #: Files of the extension that are copied into the zip; its version is filled in.
 _MANIFEST = "blender_manifest.toml"
 
@@ -54,36 +62,10 @@ def build_extension(path: str | PathLike[str]) -> Path:
 
 
 def option_records() -> dict[str, Any]:
-    """Return the version, and the options of each command as records, for `options.json`."""
-    from ..quads.options import QUADS, QuadOptions
-
-    known = {"unwrap": UnwrapOptions, "flatten": Options, "quads": QuadOptions}
-    found: dict[str, Any] = {"version": __version__, "commands": {}}
-    for command, names in SHOWN.items():
-        declared = declarations(known[command])
-        found["commands"][command] = [_record(declared[name]) for name in names]
-    number = next(each for each in found["commands"]["quads"] if each["name"] == "quads")
-    number |= {"default": QUADS, "is_optional": False}
-    return found
-
-
-def _record(declaration: Declaration) -> dict[str, Any]:
-    """Return an option as numbers and texts; numbers without a default have 0, words the first."""
-    kind, default = declaration.kind, declaration.default
-    record: dict[str, Any] = {"name": declaration.name, "group": declaration.group, "doc": declaration.doc}
-    record["is_optional"] = isinstance(kind, Number) and default is None
-    match kind:
-        case Number():
-            word = "angle" if kind.is_angle else "integer" if kind.is_integer else "number"
-            least = 0 if kind.least < 0 else kind.least
-            record |= {"kind": word, "default": default or 0, "least": least, "most": min(kind.most, 2**30)}
-        case Choice() | WordOrVertices():
-            record |= {"kind": "choice", "default": default, "words": list(kind.words)}
-        case Direction():
-            words = ["none", "x", "y", "z", "-x", "-y", "-z"]
-            record |= {"kind": "choice", "default": words[0], "words": words}
-        case Weights():
-            record |= {"kind": "weights", "default": ""}
-        case _:
-            raise TypeError(f"{declaration.name} has no control in Blender")
-    return record
+    """Return the version, and the controls of the options of each command, group by group, for `options.json`."""
+    hidden = {name for names in HIDDEN.values() for name in names}
+    commands = {}
+    for command, options in COMMANDS.items():
+        controls = controls_of(options, {name.removeprefix(f"{command} ") for name in hidden})
+        commands[command] = [control | _OTHERWISE.get(control["name"], {}) for control in controls]
+    return {"version": __version__, "commands": commands}

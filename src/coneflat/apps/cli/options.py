@@ -17,7 +17,7 @@ from ...errors import OptionError
 from ...options import ConeOptions, Declaration, Kind, MetricOptions, Number, Options, declarations, option
 from ..quads.options import Sizes
 from . import values
-from .shared import BRIEF, RARE, RARE_TITLE, Grouped, repair_keywords
+from .shared import BRIEF, RARE_TITLE, Grouped, repair_keywords
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 G = TypeVar("G")
@@ -123,12 +123,14 @@ def _may_fit_any_mesh(declaration: Declaration) -> bool:
 def _flag(declaration: Declaration) -> Callable[[Command], Command]:
     """Return a decorator that adds one option; its value is None, or an empty tuple, if it is not given."""
     kind, name = declaration.kind, declaration.name
-    more, spelled, doc = {"metavar": getattr(kind, "metavar", None)}, flag_name(name), declaration.doc
+    more, spelled, doc = dict[str, Any](), flag_name(name), declaration.doc
     if declaration.default is True:
         spelled += f"/--no-{spelled[2:]}"
     match kind:
         case ClickKind():
             more = dict(kind.more)
+        case _ if kind.metavar:
+            more = {"metavar": kind.metavar}
         case declared.Flag():
             more = {"is_flag": True, "default": None}
         case declared.Choice():
@@ -140,8 +142,6 @@ def _flag(declaration: Declaration) -> Callable[[Command], Command]:
             more = {"type": _angle, "metavar": "ANGLE"}
         case Number(is_strength=True):
             more = {"type": _strength, "is_flag": False, "flag_value": 1.0, "metavar": "STRENGTH"}
-        case Sizes():
-            more = {"metavar": "LENGTH|curvature|NAME|FILE"}
         case Number():
             more = {"type": int if kind.is_integer else float}
         case declared.Direction():
@@ -154,7 +154,7 @@ def _flag(declaration: Declaration) -> Callable[[Command], Command]:
             more = {"multiple": True, "metavar": "|".join((*kind.words, "FILE"))}
         case declared.Weights():
             more = {"metavar": "NAME|FILE"}
-    title = RARE_TITLE if name in RARE else declaration.group
+    title = RARE_TITLE if name in declared.RARE else declaration.group
     if name in BRIEF:
         doc = doc.split(". ")[0].rstrip(".") + "."
     shown = shown_default(declaration)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from ...options import MAX_SHOWN_TRIANGLES
+from ...options import MAX_SHOWN_TRIANGLES, RARE
 
 if TYPE_CHECKING:
     from ...measure import Requirement
@@ -16,9 +16,6 @@ if TYPE_CHECKING:
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-_BOUNDS = ("max_cones", "required_cones", "forbidden_cones", "weights", "min_cone_angle", "max_cone_angle")
-#: Rarely used options, which the help lists at the end.
-RARE = (*_BOUNDS, "quantise", "relax", "no_seams", "hide_seams", "seam_weights", "tiles", "threads")
 #: Options of which the help shows only the first sentence of the description.
 BRIEF = (*RARE, "distortion", "cone_count", "stretch", "seams", "sharp_angle", "resolution", "up")
 RARE_TITLE = "Less common options (all details: docs/reference/command-line.md)"

@@ -229,7 +229,8 @@ class _Search:
         areas = double_areas(edge_lengths(mesh.vertices, mesh.faces))
         of_face = scales[mesh.faces].mean(axis=1)
         size = self.size or grow * float(np.sqrt(areas.sum() / 2 / self.quads))
-        for part, vertices, faces in mesh.split_components():
+        # Nothing of a component without area can be seen.
+        for part, vertices, faces in (each for each in mesh.split_components() if areas[each[2]].any()):
             # The mean of the log scale on the component, relative to that on the whole mesh.
             mean = np.average(of_face[faces], weights=areas[faces]) - np.average(of_face, weights=areas)
             search = replace(

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ...options import (
     ANGLE,
@@ -36,15 +36,14 @@ DISTORTION = 0.13
 class Sizes(Number):
     """A length; or relative sizes at the vertices, which are checked with the mesh."""
 
+    metavar: ClassVar[str] = "LENGTH|curvature|NAME|FILE"
+
     def parse(self, name: str, value: Any) -> Any:
         return super().parse(name, value) if isinstance(value, Real) else value
 
     @property
     def text(self) -> str:
         return f"{super().text}, `curvature`, numbers or the name of a vertex property"
-
-
-SIZE = Sizes(is_positive=True, optional=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +76,7 @@ class QuadOptions(ConeNumber, ConeBounds, RunOptions):
 
     distortion: float = option(DISTORTION, Number(is_positive=True))
     quads: int | None = option(None, COUNT)
-    size: ArrayLike | None = option(None, SIZE)
+    size: ArrayLike | None = option(None, Sizes(is_positive=True, optional=True))
     stretch: float = option(0.3, strength(1))
     smooth: int = option(ROUNDS, COUNT)
     sharp_angle: float | None = option(None, ANGLE_OR_NONE)

@@ -26,10 +26,9 @@ from ...io import Joined, Texture, read_joined
 from ...options import MAX_SHOWN_TRIANGLES
 from ..view import Model, PageText, Quantity, content_of, head_and_block, own_quantity, pack, shown_rows
 from .choices import Choices
-from .known import with_hashes
 from .messages import angle_warning, page_message, with_warnings
 from .outputs import bad_places, curve_data, own_picture, quads_file, repaired, result_file, without_layout
-from .worker import Head, read_frame, write_frame
+from .worker import Head, read_frame, with_hashes, write_frame
 
 #: The text that stands for unknown numbers, and the title of the preview.
 PLACEHOLDER = "…"

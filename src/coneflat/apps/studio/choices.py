@@ -21,17 +21,24 @@ from ...options import Flag, Options, as_integer, as_number, declarations, read_
 from ..unwrap.options import UnwrapOptions
 from .paint import Paint, Region
 
+#: Options whose controls are made from their declarations, with the labels of these.
+MORE = {
+    "area": "Area distortion at most", "stack": "Stack halves", "tiles": "Tiles (UDIM)", "up": "Up in the texture",
+    "quantise": "Multiples of angle, °", "max_cones": "Cones at most", "min_cone_angle": "Smallest cone angle, °",
+    "max_cone_angle": "Largest cone angle, °", "relax": "Relax",
+}  # fmt: skip
 #: Options that the studio sets directly; cones and seams are edited individually.
 PLAIN_OPTIONS = (
     "distortion", "cone_count", "boundary", "stretch", "charts", "seams", "sharp_angle", "hide_seams",
-    "resolution", "padding", "repair", "max_energy", "texel_density",
+    "resolution", "padding", "repair", "max_energy", "texel_density", *MORE,
 )  # fmt: skip
-#: Declarations of all options, by name.
-DECLARED = declarations(UnwrapOptions) | declarations(Options)
-#: Options that determine the number of cones of a search; at most one of them is set.
+#: Declarations of all options, by name; those of both kinds of maps take further values for textures.
+DECLARED = declarations(Options) | declarations(UnwrapOptions)
+#: Options that determine the number of cones of a search, and all options of a search.
 NUMBERS = ("distortion", "cone_count")
-#: Options that determine the size of the texture; at most one of them is set.
-SIZES = ("resolution", "texel_density")
+SEARCH = (*NUMBERS, "quantise", "max_cones", "min_cone_angle", "max_cone_angle")
+#: Options of which at most one is set.
+SINGLE = (NUMBERS, ("resolution", "texel_density"), ("max_energy", "area"))
 #: Shapes of the boundary; the four corners of a rectangle are picked by the user.
 BOUNDARIES = ("free", "lengths", "disk", "straight", "rectangle")
 #: Units of length of a file; "" if unknown. They affect only the lengths that are shown.
@@ -98,12 +105,12 @@ class Choices:
             raise OptionError(f"unknown option {short_repr(name)}: choose from {', '.join(PLAIN_OPTIONS)}")
         if name == "boundary" and value not in BOUNDARIES:
             raise OptionError(f"unknown boundary {short_repr(value)}: choose from {', '.join(BOUNDARIES)}")
-        if name == "seams" and value not in (None, "input"):
-            raise OptionError(f"seams must be drawn or 'input', those of the file, got {short_repr(value)}")
+        if name == "seams" and value not in (None, "input", "none"):
+            raise OptionError(f"seams must be drawn, 'input' or 'none', got {short_repr(value)}")
         options, declared = dict(self.options), DECLARED[name]
         if value != "rectangle":
             value = declared.kind.parse(name, value)
-        for other in NUMBERS if name in NUMBERS else SIZES if name in SIZES else (name,):
+        for other in next((names for names in SINGLE if name in names), (name,)):
             options.pop(other, None)
         if value != declared.default or isinstance(declared.kind, Flag):
             options[name] = value
@@ -245,8 +252,10 @@ class Choices:
             OptionError: they cannot be combined.
         """
         words = dict(self.options)
+        if not self.for_texture:  # Only the others have a number of charts, and none but drawn seams.
+            words = {n: v for n, v in words.items() if v != "none" and (n, type(v)) != ("charts", int)}
         if self.by_hand:
-            words = {name: value for name, value in words.items() if name not in NUMBERS}
+            words = {name: value for name, value in words.items() if name not in SEARCH}
             words["cones"] = {cone.vertex: cone.curvature for cone in self.cones} or "none"
         elif self.cones:
             words["required_cones"] = [cone.vertex for cone in self.cones]
@@ -257,7 +266,7 @@ class Choices:
                 words["boundary"] = dict.fromkeys(self.corners)
         if self.cuts:
             cut = _pairs(self.cuts)
-            words["seams"] = ("input", cut) if "seams" in words else cut
+            words["seams"] = (words["seams"], cut) if "seams" in words else cut
         paint = self.paint
         if paint.no_seam:
             words["no_seams"] = np.array([*paint.no_seam.vertices(), *chain(*self.kept)])
@@ -397,7 +406,8 @@ def command_line(mesh: str, project: str, choices: Choices) -> str:
         elif isinstance(value, dict):
             parts += [flag, ",".join(str(v) if k is None else f"{v}:{k!r}" for v, k in value.items())]
         else:
-            parts += [flag, repr(value) if isinstance(value, float) else str(value)]
+            numbers = value if isinstance(value, tuple) else (value,)
+            parts += [flag, ",".join(repr(n) if isinstance(n, float) else str(n) for n in numbers)]
     return shlex.join(parts)
 
 

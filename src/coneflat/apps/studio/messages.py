@@ -12,31 +12,19 @@ from typing import TYPE_CHECKING
 
 from ...base import MAX_CONE_ANGLE, MIN_CONE_ANGLE, list_some, plural
 from ...mesh import REPAIR_ADVICE
-from .choices import Choices
+from .choices import MORE, Choices
 
 if TYPE_CHECKING:
     from ... import Flattening
 
 #: Label of the control of each option in the page.
 CONTROLS = {
-    "distortion": "Distortion",
-    "cone_count": "Number",
-    "required_cones": "Lock",
-    "forbidden_cones": "No cones",
-    "weights": "Important",
-    "seams": "Keep the UV seams of the file",
-    "no_seams": "No seams",
-    "sharp_angle": "Cut edges sharper than",
-    "hide_seams": "Hide seams",
-    "boundary": "Boundary",
-    "stretch": "From angles to areas",
-    "charts": "Charts",
-    "resolution": "Texels per side",
-    "padding": "Texels between charts",
-    "texel_density": "Texels per unit of length",
-    "max_energy": "Energy at most",
-    "repair": "Repair the mesh",
-}
+    "distortion": "Distortion", "cone_count": "Number", "required_cones": "Lock", "forbidden_cones": "No cones",
+    "weights": "Important", "seams": "Seams", "no_seams": "No seams", "sharp_angle": "Cut edges sharper than",
+    "hide_seams": "Hide seams", "boundary": "Boundary", "stretch": "From angles to areas", "charts": "Charts",
+    "resolution": "Texels per side", "padding": "Texels between charts",
+    "texel_density": "Texels per unit of length", "max_energy": "Energy at most", "repair": "Repair the mesh", **MORE,
+}  # fmt: skip
 #: A flag, or the name of an option; names that are ordinary words count at the beginning of a message only.
 _NAMED = re.compile(
     r"--(?P<flag>[a-z]+(?:-[a-z]+)*)(?: (?:greedy|exact|linear)\b)?"

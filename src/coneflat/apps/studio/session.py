@@ -15,12 +15,11 @@ from ...errors import MeshFileError, StudioError
 from ...io import read_joined
 from ...options import as_integer
 from .choices import Choices, command_line, python_lines
-from .known import SentPictures
 from .messages import misplaced_warning
 from .outputs import EXPORTS, MAX_QUADS, QUADS, curve_options
 from .project import Project, file_within, open_project
 from .steps import STEPS, History
-from .worker import Head, Worker
+from .worker import Head, SentPictures, Worker
 
 PATIENCE = 600.0  # Seconds that exports wait for the current flattening.
 

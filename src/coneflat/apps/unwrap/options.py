@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ...base import short_repr
 from ...errors import OptionError
@@ -36,7 +36,7 @@ class ChartNumber(Kind):
     """A word, or a number of charts; a text may be a number, too."""
 
     words: tuple[str, ...] = ("atlas", "one")
-    metavar: str = "atlas|one|NUMBER"
+    metavar: ClassVar[str] = "atlas|one|NUMBER"
     most: int = 10_000
 
     def parse(self, name: str, value: Any) -> str | int:

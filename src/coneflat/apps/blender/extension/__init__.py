@@ -5,6 +5,7 @@ This file has the panels in the sidebars of the 3D view and the UV editor, the e
 
 from __future__ import annotations
 
+from itertools import groupby
 from typing import Any
 
 import bpy
@@ -33,15 +34,17 @@ def _draw_command(operator: Any) -> Any:
         layout, command = self.layout, operator.command
         layout.use_property_split, layout.use_property_decorate = True, False
         layout.operator(operator.bl_idname)
-        group, title = getattr(context.scene.coneflat, command), ""
-        for record in COMMANDS[command]:
-            if record["group"] != title:
-                title = record["group"]
-                layout.label(text=title)
-            if record["kind"] == "weights" and context.object is not None:
-                layout.prop_search(group, record["name"], context.object, "vertex_groups")
-            else:
-                layout.prop(group, record["name"])
+        group = getattr(context.scene.coneflat, command)
+        for title, records in groupby(COMMANDS[command], lambda record: record["group"]):
+            # What stands last is rarely used.
+            is_rare = title == COMMANDS[command][-1]["group"]
+            header, body = layout.panel(f"coneflat_{command}_{title}", default_closed=is_rare)
+            header.label(text=title)
+            for record in records if body is not None else ():
+                if record["kind"] in ("weights", "vertices") and context.object is not None:
+                    body.prop_search(group, record["name"], context.object, "vertex_groups")
+                else:
+                    body.prop(group, record["name"])
         if command == "quads":
             layout.prop(context.scene.coneflat, "modifiers")
 

@@ -80,7 +80,7 @@ def _checked(command: Sequence[str]) -> Environment:
         Failure: it does not run, or coneflat is older than the extension.
     """
     code, text = _output([*command, "--version"])
-    match = re.search(r"version (\d+(?:\.\d+)*)", text)
+    match = re.search(r"coneflat, version (\d+(?:\.\d+)*)", text)
     if code != 0 or match is None:
         last = ([line.strip() for line in text.splitlines() if line.strip()] or [f"code {code}"])[-1]
         raise Failure(f"{command[0]} does not run coneflat: {last}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from .job import Failure
 
 #: The names of the files of a job in its folder.
-MESH, SEAMS, RESULT = "mesh.ply", "seams.txt", "result.npz"
+MESH, RESULT = "mesh.ply", "result.npz"
 #: The factor of a vertex with the full weight of a vertex group, as for vertices of a pure colour.
 FULL_WEIGHT = 100.0
 
@@ -29,16 +30,16 @@ class Part:
         positions: (n, 3) in the space of the scene.
         corners: (c,) vertex of every polygon corner, polygon after polygon.
         sizes: (p,) numbers of corners of the polygons.
-        cut: (k, 2) edges to be cut, as pairs of vertices.
         weights: (n,) weights of vertex groups, 0 to 1, by the name of their option.
+        lists: (k,) vertices, or (k, 2) edges as pairs of vertices, by the name of their option.
     """
 
     name: str
     positions: NDArray[np.float64]
     corners: NDArray[np.int64]
     sizes: NDArray[np.int64]
-    cut: NDArray[np.int64]
     weights: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    lists: Mapping[str, NDArray[np.int64]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +59,16 @@ class Map:
     torn: int
 
 
+def names_group(record: Mapping[str, Any], value: Any) -> bool:
+    """Return whether the value of an option is the name of a vertex group."""
+    if record["kind"] == "text":
+        is_number = re.fullmatch(r"[-+]?[\d.]+(e[-+]?\d+)?", value.strip().lower())
+        return record["takes_names"] and bool(value) and value not in record["words"] and not is_number
+    return record["kind"] in ("weights", "vertices") and bool(value)
+
+
 def arguments(records: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -> list[str]:
-    """Return the arguments of a command for options that do not have their defaults.
+    """Return the arguments of a command for options that do not have their defaults, without those of `write_parts`.
 
     Args:
         records: the options of the command.
@@ -68,16 +77,19 @@ def arguments(records: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -
     found = list[str]()
     for record in records:
         name, value, kind = record["name"], values[record["name"]], record["kind"]
+        is_default = value in (record["default"], "")
         if kind in ("number", "angle"):  # Blender's numbers have single precision.
             is_default = np.float32(value) == np.float32(record["default"])
-        else:
-            is_default = value == record["default"]
-        if not is_default:
+        if not is_default and kind != "vertices":
             # The angles that are wanted exactly are integers in degrees.
-            texts = {"angle": "{1:.5g}deg", "number": "{0:.7g}", "weights": name}
-            text = texts.get(kind, "{0}").format(value, math.degrees(value) if kind == "angle" else 0)
-            found.append(f"--{name.replace('_', '-')}={text}")
+            texts = {"angle": "={1:.5g}deg", "number": "={0:.7g}", "flag": ""}
+            text = f"={name}" if names_group(record, value) else texts.get(kind, "={0}")
+            found.append(_flag(name) + text.format(value, math.degrees(value) if kind == "angle" else 0))
     return found
+
+
+def _flag(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
 
 
 def write_parts(folder: Path, parts: Sequence[Part]) -> list[str]:
@@ -106,10 +118,12 @@ def write_parts(folder: Path, parts: Sequence[Part]) -> list[str]:
     header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\n{properties}end_header\n"
     (folder / MESH).write_bytes(header.encode() + rows.tobytes() + words.tobytes())
     found = [MESH, "-o", RESULT, "--no-weld"]
-    cut = np.concatenate([part.cut + start for part, start in zip(parts, starts, strict=False)])
-    if len(cut):
-        np.savetxt(folder / SEAMS, cut, fmt="%d")
-        found += ["--seams", SEAMS]
+    for name in sorted(set().union(*(part.lists for part in parts))):
+        pairs = zip(parts, starts, strict=False)
+        rows = np.concatenate([part.lists[name] + start for part, start in pairs if name in part.lists])
+        if len(rows):
+            np.savetxt(folder / f"{name}.txt", rows, fmt="%d")
+            found += [_flag(name), f"{name}.txt"]
     return found
 
 

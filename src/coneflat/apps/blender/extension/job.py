@@ -16,7 +16,8 @@ from typing import Any
 
 #: A line of progress of a command: seconds, percent and stage.
 _PROGRESS = re.compile(r"\s*[\d.]+ s +(\d+)%\s+(\S.*)")
-_ERROR = re.compile(r"(?:coneflat: )?error: (.+)", re.IGNORECASE)
+#: An error, without the reference to the help of the command.
+_ERROR = re.compile(r"(?:coneflat: )?error: (.+?)(?: \(see `.+`\))?$", re.IGNORECASE)
 HINT = "in the preferences of the extension, name a Python that has coneflat, or a folder of wheels"
 #: Seconds to wait for the end of a process that was killed.
 _PATIENCE = 5.0
@@ -28,11 +29,8 @@ def popen_options() -> dict[str, Any]:
     environment.pop("PYTHONHOME", None)  # Blender's own
     pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
     text = {"text": True, "encoding": "utf-8", "errors": "replace"}
-    apart = {
-        "start_new_session": os.name == "posix",
-        "creationflags": getattr(subprocess, "CREATE_NO_WINDOW", 0),
-    }
-    return {"env": environment, **pipes, **text, **apart}
+    hidden = {"creationflags": getattr(subprocess, "CREATE_NO_WINDOW", 0)}
+    return {"env": environment, "start_new_session": os.name == "posix", **pipes, **text, **hidden}
 
 
 class Failure(Exception):

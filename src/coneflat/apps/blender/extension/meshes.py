@@ -17,6 +17,8 @@ from .job import Failure
 #: Marks the seams that coneflat has marked, which do not constrain the next cut.
 OWN_SEAMS = "coneflat_seams"
 MAX_UV_MAPS = 8
+#: The name of the vertex group that an option takes, and the kind of the option, by the name of the option.
+Groups = dict[str, tuple[str, str]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +87,7 @@ def values(rows: Any, name: str, kind: Any = np.int64, width: int = 1) -> NDArra
 
 
 def read_source(
-    item: Any, mesh: Any, *, selected: bool, groups: dict[str, str], marks: str = "NONE", sharp: bool = False
+    item: Any, mesh: Any, *, selected: bool, groups: Groups, marks: str = "NONE", sharp: bool = False
 ) -> Source | None:
     """Return the faces of an object's mesh; None if there are none to use.
 
@@ -93,7 +95,7 @@ def read_source(
         item: the object.
         mesh: its mesh, or the one that its modifiers make.
         selected: use the selected faces only.
-        groups: names of vertex groups by the option that takes their weights; those that it lacks are left out.
+        groups: vertex groups by option; those that the object lacks are left out.
         marks: which marked seams are cut: OWN for those that coneflat has not marked, ALL or NONE.
         sharp: also cut edges that are marked as sharp.
 
@@ -127,10 +129,15 @@ def read_source(
         is_cut |= values(mesh.edges, "use_edge_sharp", bool)
     inner = used[(times > 1) & is_cut[used]]
     ends = values(mesh.edges, "vertices", np.int64, 2)[inner]
-    found = {option: item.vertex_groups.get(name) for option, name in groups.items()}
-    weights = {option: _weights(mesh, each.index)[vertices] for option, each in found.items() if each}
-    cut = np.searchsorted(vertices, ends).reshape(-1, 2)
-    part = Part(item.name, positions, corners.reshape(-1), sizes, cut, weights)
+    weights, lists = {}, {"seams": np.searchsorted(vertices, ends).reshape(-1, 2)}
+    for option, (name, kind) in groups.items():
+        if name in item.vertex_groups:
+            found = _weights(mesh, item.vertex_groups[name].index)[vertices]
+            if kind == "vertices":
+                lists[option] = np.flatnonzero(found >= 0.5)
+            else:
+                weights[option] = found
+    part = Part(item.name, positions, corners.reshape(-1), sizes, weights, lists)
     return Source(item.name, part, vertices, loops, edges, bool(determinant < 0), counts(mesh))
 
 
@@ -141,12 +148,8 @@ def counts(mesh: Any) -> tuple[int, int, int]:
 
 def _weights(mesh: Any, group: int) -> NDArray[np.float64]:
     """Return (n,) the weights of a vertex group, 0 outside."""
-    found = np.zeros(len(mesh.vertices))
-    for i, vertex in enumerate(mesh.vertices):
-        for each in vertex.groups:
-            if each.group == group:
-                found[i] = each.weight
-    return found
+    found = [next((each.weight for each in v.groups if each.group == group), 0.0) for v in mesh.vertices]
+    return np.array(found, np.float64)
 
 
 def own_seams(mesh: Any) -> NDArray[np.bool_]:

@@ -233,11 +233,12 @@ class Command(Runner):
         """
         settings = context.scene.coneflat
         group = getattr(settings, self.command)
-        weights = [each["name"] for each in COMMANDS[self.command] if each["kind"] == "weights"]
-        groups = {name: getattr(group, name) for name in weights if getattr(group, name)}
-        for name in groups.values():
+        given = [(each, getattr(group, each["name"])) for each in COMMANDS[self.command]]
+        named = [(each, name) for each, name in given if exchange.names_group(each, name)]
+        groups = {each["name"]: (name, each["kind"]) for each, name in named}
+        names = ", ".join(each.name for each in objects)
+        for name, _ in groups.values():
             if not any(name in each.vertex_groups for each in objects):
-                names = ", ".join(each.name for each in objects)
                 raise Failure(f"there is no vertex group {name!r} in {names}")
         is_quads = self.command == "quads"
         applied = is_quads and not in_edit and settings.modifiers
@@ -254,6 +255,9 @@ class Command(Runner):
             found += [source] if source is not None else []
         if not found:
             raise Failure("no faces are selected" if in_edit else "the selected objects have no faces")
+        for option, (name, kind) in groups.items():
+            if kind == "vertices" and not any(len(each.part.lists.get(option, ())) for each in found):
+                raise Failure(f"the vertex group {name!r} has no vertices of the chosen faces of {names}")
         return found
 
     def load(self, context: Any, folder: Path, sources: Sequence[meshes.Source]) -> Any:

@@ -17,8 +17,9 @@ COMMANDS: dict[str, list[dict[str, Any]]] = KNOWN["commands"]
 def _property(record: dict[str, Any]) -> Any:
     """Return the property of an option; 0 stands for no value."""
     title = record["name"].replace("_", " ").capitalize()
-    doc = record["doc"].rstrip(".") + (". 0: no value" if record["is_optional"] else "")
-    look = {"name": title, "description": doc}
+    is_group = record["kind"] in ("weights", "vertices")
+    doc = record["doc"].rstrip(".") + (". 0: no value" if record.get("is_optional") else "")
+    look = {"name": title, "description": f"Vertex group. {doc}" if is_group else doc}
     if record["kind"] in ("integer", "number"):
         kind, make = (int, IntProperty) if record["kind"] == "integer" else (float, FloatProperty)
         default = kind(record["default"])
@@ -26,9 +27,12 @@ def _property(record: dict[str, Any]) -> Any:
         return make(**look, default=default)
     if record["kind"] == "angle":
         return FloatProperty(**look, min=0.0, default=record["default"], subtype="ANGLE")
-    if record["kind"] == "weights":
-        return StringProperty(**{**look, "description": f"Vertex group. {doc}"})
-    words = [(word, word.replace("_", " ").capitalize(), "") for word in record["words"]]
+    if is_group or record["kind"] == "text":
+        suggested = {} if is_group else {"search": lambda item, context, text: record["words"]}
+        return StringProperty(**look, **suggested, default=record["default"])
+    if record["kind"] == "flag":
+        return BoolProperty(**look, default=record["default"])
+    words = [(word, word.capitalize(), "") for word in record["words"]]
     return EnumProperty(**look, items=words, default=record["default"])
 
 
@@ -72,9 +76,7 @@ Settings = _group("settings", {**_OWN, **_POINTERS})
 
 
 _PYTHON = "Python or environment that has coneflat. Empty: the extension's own, or one on the PATH"
-_WHEELS = (
-    "Folder of wheels of coneflat and what it needs, from which Install makes the extension's own environment"
-)
+_WHEELS = "Folder of wheels of coneflat and what it needs, from which Install makes its environment"
 _PACKAGE = "What pip installs, for example a wheel. Empty: coneflat, this version or later, from the folder of wheels"
 
 

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from functools import cache
 from importlib.resources import files
 
+from ...controls import control_of
 from ...view import page_around
-from ..choices import DECLARED, PLAIN_OPTIONS
+from ..choices import DECLARED, MORE, PLAIN_OPTIONS
 
 #: Content security policy: only connections to the server of the page are allowed.
 POLICY = (
@@ -25,7 +26,13 @@ _SCRIPTS = (
 def studio_page(formats: Sequence[str]) -> str:
     """Return the page as text; formats: extensions of meshes that can be dropped on it."""
     defaults = {name: DECLARED[name].default for name in PLAIN_OPTIONS}
-    scripts = [f"const DEFAULTS = {json.dumps(defaults)};", *(_read(f"{name}.js") for name in _SCRIPTS)]
+    uses = {"Texture": "for-texture", "Cones": "for-angles", "Metric": "for-angles"}
+    more = [
+        {**control_of(DECLARED[name]), "label": label, "use": uses.get(DECLARED[name].group, "")}
+        for name, label in MORE.items()
+    ]
+    constants = f"const DEFAULTS = {json.dumps(defaults)}, MORE = {json.dumps(more)};"
+    scripts = [constants, *(_read(f"{name}.js") for name in _SCRIPTS)]
     return page_around(
         POLICY,
         "",

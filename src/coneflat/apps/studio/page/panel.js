@@ -25,6 +25,7 @@ class Panel {
       button("Picture", "Save the layout as a picture, .png", () => this.studio.save("png"), {id: "save-png"}),
       button("Report", "Save the report, .json", () => this.studio.save("json"), {id: "save-json"}),
     );
+    this.part("more").append(...MORE.map((control) => this.further(control)));
     for (const id of ["unit", "shown-in"]) this.part(id).replaceChildren(...UNITS.map(([key, name]) => new Option(key || id === "unit" ? name : "unit of the file", key)));
   }
 
@@ -46,13 +47,15 @@ class Panel {
     this.slider("distortion", (value) => ({do: "set", name: "distortion", value: Number((10 ** value).toPrecision(3))}));
     this.slider("stretch", (value) => ({do: "set", name: "stretch", value}));
     this.slider("hide", (value) => ({do: "set", name: "hide_seams", value}));
-    for (const name of ["boundary", "charts"]) this.part(name).addEventListener("change", (event) => set(name, event.target.value));
+    this.part("boundary").addEventListener("change", (event) => set("boundary", event.target.value));
+    this.part("charts").addEventListener("change", (event) => set("charts", event.target.value === "number" ? 2 : event.target.value));
+    this.part("chart-number").addEventListener("change", (event) => set("charts", Math.round(Number(event.target.value))));
     this.part("boundary").addEventListener("change", (event) => event.target.value === "rectangle" && studio.setTool("corner"));
     this.part("purpose").addEventListener("change", (event) => act({do: "texture", value: event.target.value === "texture"}));
     this.part("max-energy").addEventListener("change", (event) => set("max_energy", Number(event.target.value)));
     this.part("texel-density").addEventListener("change", (event) => set("texel_density", event.target.value === "" ? null : Number(event.target.value)));
     for (const name of ["resolution", "padding"]) this.part(name).addEventListener("change", (event) => set(name, Number(event.target.value)));
-    this.part("own-seams").addEventListener("change", (event) => set("seams", event.target.checked ? "input" : null));
+    for (const [id, word] of [["own-seams", "input"], ["no-more", "none"]]) this.part(id).addEventListener("change", (event) => set("seams", event.target.checked ? word : null));
     this.part("follow").addEventListener("change", (event) => studio.setFollowing(event.target.checked));
     this.part("save-quads").addEventListener("click", () => studio.saveQuads(this.part("quad-count").value));
     this.part("brush-size").addEventListener("input", (event) => studio.growBrush(Number(event.target.value) / studio.brush.radius));
@@ -66,6 +69,17 @@ class Panel {
     for (const id of ["tools", "brushes", "exports"]) rove(this.part(id), "button", true);
     this.part("cone-list").addEventListener("keydown", (event) => this.changeRow(event));
     this.part("snap").addEventListener("change", (event) => (this.snap = Number(event.target.value)));
+  }
+
+  /** Return the control of an option that is made from its declaration. */
+  further({name, kind, words, least, most, doc, label, use}) {
+    const id = `more-${name}`, line = Object.assign(document.createElement("label"), {className: `line ${use}`, htmlFor: id, title: doc});
+    const field = Object.assign(document.createElement(kind === "choice" ? "select" : "input"), {id});
+    if (kind === "choice") field.append(...words.map((word) => new Option(word)));
+    else Object.assign(field, {type: "number", min: least, step: kind === "integer" ? 1 : "any", placeholder: DEFAULTS[name] == null ? "none" : ""});
+    field.addEventListener("change", () => this.studio.act({do: "set", name, value: furtherValue(name, kind, field.value)}));
+    line.append(`${label} `, field);
+    return line;
   }
 
   /** Apply the value of a slider while it moves, as often as possible, and at the end; one motion is one step. */
@@ -113,7 +127,7 @@ class Panel {
     this.part("redo").disabled = !news?.redo;
     const {forTexture} = this.studio;
     this.part("purpose").value = forTexture ? "texture" : "angles";
-    this.value("max-energy", options.max_energy);
+    this.value("max-energy", options.area == null ? options.max_energy : "");
     for (const part of document.querySelectorAll(".for-angles, .for-texture")) part.hidden = forTexture !== part.classList.contains("for-texture");
     for (const [key, , , hint] of [...TOOLS, ...BRUSHES]) {
       this.part(`tool-${key}`).setAttribute("aria-pressed", String(tools.mode === key));
@@ -130,13 +144,18 @@ class Panel {
     this.value("hide", options.hide_seams);
     this.part("hide-value").textContent = options.hide_seams;
     this.part("own-seams").checked = options.seams === "input";
+    this.part("no-more").checked = options.seams === "none";
+    for (const {name, kind} of MORE) this.value(`more-${name}`, furtherText(kind, options[name]));
     this.value("boundary", options.boundary);
     this.part("boundary").closest("label").hidden = this.part("tool-corner").hidden = forTexture || !this.studio.hasBoundary();
     this.value("resolution", options.resolution);
     this.value("texel-density", options.texel_density ?? "");
     this.value("padding", options.padding);
     this.value("stretch", options.stretch);
-    this.value("charts", options.charts);
+    const isNumber = forTexture && typeof options.charts === "number";
+    this.part("charts").value = isNumber ? "number" : typeof options.charts === "number" ? "atlas" : options.charts;
+    this.value("chart-number", isNumber ? options.charts : "");
+    this.part("chart-number").closest("label").hidden = !isNumber;
     for (const saving of this.part("exports").children) saving.disabled = !this.studio.hasLayout();
     this.part("save-quads").disabled = !this.studio.hasLayout() || this.studio.making === "quads";
     this.part("save-quads").textContent = this.studio.making === "quads" ? "Computing quads…" : "Quads, OBJ";
@@ -304,6 +323,28 @@ function button(text, title, does, more = {}) {
   if (text.length < 2 && !more.ariaLabel) made.setAttribute("aria-label", title);
   made.addEventListener("click", does);
   return made;
+}
+
+const AXES = ["x", "y", "z"];
+
+/** Return the value of an option for the text of its control; angles are in degrees there, and axes directions. */
+function furtherValue(name, kind, text) {
+  if (kind === "choice" && DEFAULTS[name] !== null) return text;
+  if (kind === "choice") return text === "none" ? null : AXES.map((axis) => (text.at(-1) !== axis ? 0 : text[0] === "-" ? -1 : 1));
+  if (text === "") return DEFAULTS[name];
+  return kind === "angle" ? (Number(text) * Math.PI) / 180 : Number(text);
+}
+
+/** Return the text of the control of an option. */
+function furtherText(kind, value) {
+  if (kind === "choice") return Array.isArray(value) ? axisOf(value) : value ?? "none";
+  return value == null ? "" : kind === "angle" ? Number(((value * 180) / Math.PI).toFixed(2)) : value;
+}
+
+/** Return the name of the axis of a direction; "" if there is none. */
+function axisOf(direction) {
+  const others = direction.filter((part) => part !== 0), at = direction.findIndex((part) => part !== 0);
+  return others.length === 1 ? `${others[0] < 0 ? "-" : ""}${AXES[at]}` : "";
 }
 
 /** Make controls one tab stop, among which the arrow keys to the sides move; vertical: the other arrow keys, too. */
