@@ -1,6 +1,7 @@
 """Geometry: lengths, angles, areas, Laplacian, intrinsic triangulations, exact predicates, overlaps, visibility."""
 
 from .coverage import approximate_overlap_areas
+from .handles import handle_loops
 from .intrinsic import halfedge_twins
 from .layers import MAX_CELLS
 from .operators import angle_defect, cotangent_laplacian
@@ -37,7 +38,7 @@ __all__ = [
     "CREASE_COSINE", "FlatTriangles", "MAX_CELLS", "Overlaps", "angle_defect", "as_complex", "as_pairs",
     "corner_angles", "corner_normals", "cotangent_laplacian", "cotangents", "dihedral_angles", "double_areas",
     "edge_lengths", "face_normals", "fill_nearest", "fill_orientations", "find_overlaps", "flat_triangles",
-    "halfedge_twins", "is_broken", "approximate_overlap_areas", "layout_curvature",
+    "handle_loops", "halfedge_twins", "is_broken", "approximate_overlap_areas", "layout_curvature",
     "map_factors", "mollify", "orientation", "sides_between", "signed_angles", "signed_double_areas", "unit_vectors",
     "vertex_log_scale", "vertex_normals", "visible_share",
 ]  # fmt: skip

@@ -35,8 +35,7 @@ def area_distortion(log_scale: FloatArray, areas: FloatArray) -> float:
     log_scale, areas: (n,).
     """
     share = areas / areas.sum()
-    mean = share @ log_scale
-    return float(np.sqrt(share @ (log_scale - mean) ** 2))
+    return float(np.sqrt(share @ (log_scale - share @ log_scale) ** 2))
 
 
 def weighted_areas(areas: FloatArray, weights: FloatArray | None) -> FloatArray:

@@ -16,9 +16,9 @@ from ...geometry import (
     cotangents,
     double_areas,
     edge_lengths,
+    handle_loops,
     mollify,
 )
-from ...geometry.handles import handle_loops
 from ...linalg import Factor, MultiGraph, factorize
 from ...mesh import tie_key
 from .cross_field import edge_rotations, halfedge_angles
