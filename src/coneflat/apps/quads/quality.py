@@ -159,7 +159,7 @@ def _samples(mesh: TriangleMesh, spacing: float) -> FloatArray:
     parts = [mesh.vertices[np.unique(mesh.faces)]]
     longest = edge_lengths(mesh.vertices, mesh.faces).max(axis=1)
     rows = np.minimum(np.ceil(longest / spacing), 64).astype(np.int64)
-    for count in np.unique(rows):
+    for count in np.unique(rows[rows > 1]):
         i, j = (x.ravel() for x in np.meshgrid(np.arange(count), np.arange(count), indexing="ij"))
         # Centroids of the small triangles with the orientation of the large one.
         u, v = ((x[i + j < count] + 1 / 3) / count for x in (i, j))
