@@ -34,11 +34,11 @@ CEILINGS = {
     "apps.ahead": 37,
     "apps.batch": 384,
     "apps.blender": 884,
-    "apps.cli": 1585,
+    "apps.cli": 1583,
     "apps.controls": 49,
     "apps.measure_uv": 160,
     "apps.peers": 438,
-    "apps.quads": 3788,
+    "apps.quads": 3795,
     "apps.studio": 1712,
     "apps.transfer": 323,
     "apps.brains": 260,
@@ -70,7 +70,7 @@ CEILINGS = {
 #: Applications with a ceiling of their own, which the ceilings of everything else leave out.
 OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 142, 14_926, 232, 24_657
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_931, 232, 24_664
 CONSTANTS, KERNELS, NAMES, LEVELS = 295, 84, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from .options import flag, flag_name, is_given, option_flags, parse_eye, path_flag, pop_flags
 from .shared import again_option, color_option, input_options, repair_keywords, up_option, verbosity_options
-
-if TYPE_CHECKING:
-    pass
 
 KINDS = ("layout", "checker", "quality", "cones", "curvature", "color", "curve")
 

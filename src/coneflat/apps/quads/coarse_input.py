@@ -46,11 +46,12 @@ class CoarseInput:
     sizes: FloatArray | float | None
     notes: tuple[str, ...]
 
-    def moved(self, quads: QuadMesh, angle: float) -> QuadMesh:
+    def moved(self, quads: QuadMesh) -> QuadMesh:
         """Return quads of the coarse mesh, or of a refinement of it, on the given mesh.
 
         Vertices slide along the surface from a nearby vertex that both meshes have, so that they do not jump to another
-        sheet. Those on the boundary and on edges sharper than an angle move to the nearest point on such edges.
+        sheet. Those on the boundary and on sharp edges of the coarse mesh move to the nearest point on the boundary, or
+        on sharp edges within half the side of a quad. Of vertices at the same place, any may be taken.
         """
         mesh, surface, points = self.given, quads.surface, quads.vertices
         off, which = cKDTree(self.mesh.vertices).query(surface.vertices)
@@ -62,9 +63,9 @@ class CoarseInput:
         weights = (mesh.faces[faces] == start[:, None]).astype(np.float64)
         slide_near(stars, points, faces, weights)
         side = np.sqrt(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum() / 2 / len(quads.quads))
-        sharp = edge_indices(mesh, sharp_ends(mesh, angle)), side / 2
+        sharp = edge_indices(mesh, sharp_ends(mesh)), side / 2
         border = np.flatnonzero(mesh.is_boundary_edge), np.inf
-        is_on = is_on_feature(quads, sharp_ends(surface, angle)), quads.is_boundary_vertex
+        is_on = is_on_feature(quads, sharp_ends(surface)), quads.is_boundary_vertex
         for moves, (edges, reach) in zip(is_on, (sharp, border), strict=True):
             if not (len(edges) and moves.any()):
                 continue
@@ -111,6 +112,9 @@ def coarse_input(
     count = COARSE * max(1.0, (quads or QUADS) / QUADS)
     if len(checked.mesh.faces) <= 2 * count:
         return None
+    sizes = None if size is None or length else np.exp(-wanted_scales(mesh, faces, scaled, size))
     coarse, kept, _ = coarse_mesh(scaled.mesh, int(count))
-    sizes = length if size is None or length else np.exp(-wanted_scales(mesh, faces, scaled, size)[kept])
-    return CoarseInput(coarse.moved_to(checked.mesh.vertices[kept]), kept, checked.mesh, sizes, checked.notes)
+    wanted = length if sizes is None else sizes[kept]
+    return CoarseInput(
+        coarse.moved_to(checked.mesh.vertices[kept]), kept, checked.mesh, wanted, checked.notes
+    )

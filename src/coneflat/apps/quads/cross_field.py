@@ -92,19 +92,18 @@ def preferred_directions(mesh: TriangleMesh, angle: float = SHARP_ANGLE) -> Dire
 def sharp_or_boundary(mesh: TriangleMesh, shortest: float, angle: float = SHARP_ANGLE) -> IntArray:
     """Return the edges that are on the boundary or sharp and not noise.
 
-    Connected sharp edges are noise if they are together shorter than `shortest`, or if they have many vertices where
-    convex and concave ones meet: more than one on this length, and more than 20%. These are at most 6% on mechanical
-    shapes, and more than 20% where noise of 0.15 edges makes edges sharp.
+    Connected sharp edges are noise if they are together shorter than `shortest`, or if they change between convex and
+    concave at more than an eighth of the vertices with two of them: at most 2% on mechanical shapes, and 15% to 50%
+    where noise of 0.15 to 0.3 edges makes edges sharp.
     """
     sharp, count = sharp_edges(mesh, angle), len(mesh.vertices)
     ends, is_convex = mesh.edges[sharp], dihedral_angles(mesh)[sharp] > 0
     _, label = label_components(count, ends[:, 0], ends[:, 1])
     length = np.bincount(label[ends[:, 0]], lengths_along(mesh, sharp), count)
-    convex, concave = (
-        np.bincount(ends[which].ravel(), minlength=count) > 0 for which in (is_convex, ~is_convex)
-    )
-    mixed, vertices = (np.bincount(label[on], minlength=count) for on in (convex & concave, convex | concave))
-    is_noise = (length <= shortest) | ((mixed > 0.2 * vertices) & (mixed * shortest > length))
+    convex, concave = (np.bincount(ends[which].ravel(), minlength=count) for which in (is_convex, ~is_convex))
+    inner = np.flatnonzero(convex + concave == 2)
+    changes, every = (np.bincount(label[at], minlength=count) for at in (inner[convex[inner] == 1], inner))
+    is_noise = (length <= shortest) | (8 * changes > every)
     return np.union1d(sharp[~is_noise[label[ends[:, 0]]]], np.flatnonzero(mesh.is_boundary_edge))
 
 

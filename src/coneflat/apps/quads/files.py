@@ -61,7 +61,7 @@ _ARRAYS, _NUMBERS = (
 )
 #: Arrays from which a grid is restored.
 _RESTORED = ("vertices", "faces", "corner_grid", "corners", "corner_quarters", "features", "report")
-_STATE = re.compile(rb"(?m)^[ \t]*(mtllib|usemtl|g|o)[ \t]+([^\r\n]*?)[ \t]*\r?$")
+_STATE = re.compile(rb"(?m)^[ \t]*(mtllib|usemtl|g|o)(?![^ \t\r\n])[ \t]*([^\r\n]*?)[ \t]*\r?$")
 _HEAD = (
     "# An integer grid by coneflat. Texture coordinates are in units of the grid, which continues across seams.",
     "# seam V W TURNS X Y: the point p in the triangle right of the edge from V to W is R p + (X, Y) in the triangle",
@@ -110,8 +110,9 @@ def write_quads_stream(mesh: QuadMesh, stream: IO[bytes], ending: str, path: Pat
 
 
 def _write_obj(mesh: QuadMesh, stream: IO[bytes], path: Path) -> None:
-    state_of, states = _states(mesh, path)
+    libraries, states, state_of = _states(mesh, path)
     points, index = np.unique(mesh.uv.reshape(-1, 2), axis=0, return_inverse=True)
+    stream.write(libraries)
     stream.writelines(lines_of("v", mesh.vertices, b"\n"))
     stream.writelines(lines_of("vt", points, b"\n"))
     corners = np.stack([mesh.quads, index.reshape(mesh.quads.shape)], axis=2).reshape(-1, 8) + 1
@@ -121,31 +122,35 @@ def _write_obj(mesh: QuadMesh, stream: IO[bytes], path: Path) -> None:
             stream.writelines(_face_lines(rows))
 
 
-def _face_lines(corners: IntArray, at_once: int = 1 << 15) -> Iterator[bytes]:
-    """Yield the lines of faces of k corners, each with the numbers (p, 2k) of a vertex and a UV point."""
-    line = "f" + " %d/%d" * (corners.shape[1] // 2) + "\n"
-    for i in range(0, len(corners), at_once):
-        block = corners[i : i + at_once]
-        yield (line * len(block) % tuple(block.ravel().tolist())).encode()
+def _states(mesh: QuadMesh, path: Path) -> tuple[bytes, list[bytes], IntArray]:
+    """Return lines for the material libraries, and for materials and groups, and (p,) which of these each quad has.
 
-
-def _states(mesh: QuadMesh, path: Path) -> tuple[IntArray, list[bytes]]:
-    """Return (p,) a number for the material and groups of each quad in the OBJ file that it is from, and their lines.
-
-    They are those of the polygon nearest to the centre of the quad.
+    They are those of the OBJ file that the mesh was read from, of the polygon nearest to the centre of the quad.
     """
     source, known, states, starts = mesh.source, dict[bytes, bytes](), dict[bytes, int]({b"": 0}), [(0, 0)]
     if source is None or source.obj is None:
-        return np.zeros(len(mesh.quads), dtype=np.int64), [b""]
+        return b"", [b""], np.zeros(len(mesh.quads), dtype=np.int64)
+    libraries = list[bytes]()
     for polygon, gap in sorted(relocated(source.obj, source.path.parent, path.parent).gaps.items()):
-        known |= {word: b"%s %s\n" % (word, names) for word, names in _STATE.findall(gap)}
+        found = [(word, b"%s %s\n" % (word, names)) for word, names in _STATE.findall(gap)]
+        libraries += [line for word, line in found if word == b"mtllib"]
+        known |= {word: line for word, line in found if word != b"mtllib"}
         starts.append((polygon, states.setdefault(b"".join(known.values()), len(states))))
     corners = mesh.vertices[mesh.quads]
     normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     on, _ = TriangleTree(source.vertices, source.triangles).nearest(corners.mean(axis=1), normals)
     polygon_of = np.repeat(np.arange(len(source.offsets) - 1), np.diff(source.offsets) - 2)[on]
     first, which = np.array(starts).T
-    return which[np.searchsorted(first, polygon_of, side="right") - 1], list(states)
+    state_of = which[np.searchsorted(first, polygon_of, side="right") - 1]
+    return b"".join(dict.fromkeys(libraries)), list(states), state_of
+
+
+def _face_lines(corners: IntArray, at_once: int = 1 << 15) -> Iterator[bytes]:
+    """Yield the lines of faces of k corners, each with the numbers (p, 2k) of a vertex and a UV point."""
+    line = "f" + " %d/%d" * (corners.shape[1] // 2) + "\n"
+    for i in range(0, len(corners), at_once):
+        block = corners[i : i + at_once]
+        yield (line * len(block) % tuple(block.ravel().tolist())).encode()
 
 
 def _write_by_meshio(mesh: QuadMesh, stream: IO[bytes], ending: str) -> None:

@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 from ...base import Stopwatch, plural
 from ...errors import OptionError
 from ...io import as_input
-from ...options import read_options
 from .coarse_input import coarse_input
-from .cross_field import SHARP_ANGLE, sharp_ends
+from .cross_field import sharp_ends
 from .extract import extract_quads, with_borders
 from .integer_grid import integer_grid
 from .integer_map import IntegerGrid
@@ -72,7 +71,9 @@ def quads(
     source = None if is_given else as_input(mesh, faces).source
     mesh = mesh if source is None else source
     with stages("coarsen"):
-        small = None if is_given else coarse_input(mesh, faces, quads, size, options)
+        # Sharp edges that are required are those of the given mesh.
+        is_exact = is_given or sharp_angle is not None
+        small = None if is_exact else coarse_input(mesh, faces, quads, size, options)
     if small is not None:
         mesh, faces, size = small.mesh.vertices, small.mesh.faces, small.sizes
     search = partial(integer_grid, mesh, faces, stretch=stretch, sharp_angle=sharp_angle, **options)
@@ -103,8 +104,7 @@ def quads(
     features = grid.features
     with stages("smooth"):
         if small is not None:
-            angle = float(read_options({"sharp_angle": sharp_angle}, QuadOptions).sharp_angle or SHARP_ANGLE)
-            found, features = small.moved(found, angle), sharp_ends(small.given, angle)
+            found, features = small.moved(found), sharp_ends(small.given)
         found = smooth_quads(found, smooth, features)
         if smooth:
             found = untangled(found)
