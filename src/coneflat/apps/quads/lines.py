@@ -56,8 +56,8 @@ def grid_with_lines(
             break
         rounding = find_rounding(lined.layout)
         costs, is_folded = lined.costs(layout, rounding.displaced([rounding.smooth])[0])
-        # Each failure lowers the bound, so that the attempts end soon.
-        is_bad = costs >= 0.5 ** (1 + attempt / 4) * costs.max()
+        # Each failure lowers the bound, so that the attempts end soon; those for preferred edges sooner.
+        is_bad = costs >= (0.5 ** (1 + attempt / 4) if is_required else 0.1) * costs.max()
         if not is_required and costs.max() > MAX_COST * np.sqrt(layout.area):
             is_bad = costs > MAX_COST * np.sqrt(layout.area)
         elif not is_folded or (is_required and attempt == 0):
