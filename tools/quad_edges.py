@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -68,17 +68,3 @@ def draw_quads(
             clip_on=False,
             gid=name,
         )
-
-
-def irregular_handles(quads: QuadMesh) -> list[Any]:
-    """Return the legend handles of matplotlib for the dots, labelled with valences and counts."""
-    from matplotlib.lines import Line2D
-
-    dot: dict[str, Any] = {"linestyle": "", "marker": "o", "ms": 5.5, "mec": "black", "mew": 0.6}
-    valences = quads.valences[quads.irregular]
-    marks: list[Any] = []
-    for color, chosen in ((FEWER_COLOR, valences[valences < 4]), (MORE_COLOR, valences[valences > 4])):
-        if len(chosen):
-            which = " and ".join(map(str, np.unique(chosen).tolist()))
-            marks.append(Line2D([], [], color=color, label=f"valence {which}: {len(chosen)}", **dot))
-    return marks

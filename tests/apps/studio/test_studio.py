@@ -12,7 +12,8 @@ from click.testing import CliRunner
 
 import coneflat
 from coneflat.apps.cli.main import cli
-from coneflat.apps.studio.choices import Choices, Cone, command_line, python_lines
+from coneflat.apps.studio.choices import Choices, Cone
+from coneflat.apps.studio.messages import command_line, python_lines
 from coneflat.apps.studio.project import Project, file_hash, read_project
 from coneflat.apps.studio.steps import History
 from coneflat.errors import OptionError, ProjectError, StudioError

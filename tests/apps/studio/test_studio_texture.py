@@ -14,8 +14,8 @@ from studio_browsing import sample, studio, visit  # noqa: F401
 import coneflat
 from coneflat.apps.cli.main import cli
 from coneflat.apps.studio.child import JobRunner
-from coneflat.apps.studio.choices import DECLARED, PLAIN_OPTIONS, Choices, command_line, python_lines
-from coneflat.apps.studio.messages import CONTROLS, with_warnings
+from coneflat.apps.studio.choices import DECLARED, PLAIN_OPTIONS, Choices
+from coneflat.apps.studio.messages import CONTROLS, command_line, python_lines, with_warnings
 from coneflat.apps.studio.outputs import curve_options
 from coneflat.apps.studio.paint import Region
 from coneflat.apps.studio.project import Project, file_hash, read_project
@@ -337,7 +337,6 @@ def test_less_common_options_are_set_by_the_page(visit):
     page.check("#no-more")
     visit.settle()
     assert "--seams none" in page.text_content("#command")
-    page.screenshot(path="/tmp/studio_more2.png")
     page.select_option("#purpose", "angles")
     visit.settle()
     assert page.text_content("#command") == "coneflat flatten sample.obj --up 0.0,0.0,-1.0"

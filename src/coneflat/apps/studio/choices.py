@@ -6,7 +6,6 @@ They are also converted to a command line and to Python code that give the same 
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from itertools import chain, pairwise
@@ -386,61 +385,3 @@ def _pairs(paths: Iterable[tuple[int, ...]]) -> Any:
 def edges_of(path: tuple[int, ...]) -> set[frozenset[int]]:
     """Return the edges of a path."""
     return {frozenset(edge) for edge in pairwise(path)}
-
-
-#: Number of values above which lists are written as ranges.
-LISTED_NUMBERS = 12
-
-
-def command_line(mesh: str, project: str, choices: Choices) -> str:
-    """Return a command that maps a mesh with these choices; drawn paths and paint need the project file."""
-    if choices.cuts or choices.kept or choices.paint:
-        return shlex.join(["coneflat", choices.command, "--project", project])
-    parts = ["coneflat", choices.command, mesh]
-    for name, value in choices.keywords().items():
-        flag = "--" + name.replace("_", "-")
-        if name == "repair":
-            parts += ["--repair"] if value else []
-        elif name == "required_cones":
-            parts += [flag, ",".join(str(vertex) for vertex in value)]
-        elif isinstance(value, dict):
-            parts += [flag, ",".join(str(v) if k is None else f"{v}:{k!r}" for v, k in value.items())]
-        else:
-            numbers = value if isinstance(value, tuple) else (value,)
-            parts += [flag, ",".join(repr(n) if isinstance(n, float) else str(n) for n in numbers)]
-    return shlex.join(parts)
-
-
-def python_lines(mesh: str, choices: Choices) -> str:
-    """Return Python code that maps a mesh with these choices."""
-    given = [f"    {name}={_written(value)}," for name, value in choices.keywords().items()]
-    if sum(map(len, given)) > 20_000:  # Characters in the panel.
-        return "# The drawn paths and the paint are too large to be shown here; they are in the project file."
-    call = "\n".join([f"result = coneflat.{choices.command}(\n    {mesh!r},", *given, ")"])
-    return f"import coneflat\n\n{call}"
-
-
-def _written(value: Any) -> str:
-    if hasattr(value, "tolist"):
-        return repr(value.tolist())
-    if isinstance(value, tuple):
-        return f"({', '.join(_written(each) for each in value)})"
-    if isinstance(value, list) and len(value) > LISTED_NUMBERS:
-        return f"[{_ranges(value)}]"
-    if isinstance(value, dict) and len(value) > LISTED_NUMBERS:
-        # Vertices with the same value are grouped.
-        groups: dict[Any, list[int]] = {}
-        for vertex, each in value.items():
-            groups.setdefault(each, []).append(vertex)
-        if len(groups) <= LISTED_NUMBERS:
-            parts = (
-                f"**dict.fromkeys([{_ranges(sorted(group))}], {each!r})" for each, group in groups.items()
-            )
-            return f"{{{', '.join(parts)}}}"
-    return repr(value)
-
-
-def _ranges(vertices: list[int]) -> str:
-    """Return ascending vertices as the content of a Python list, with consecutive vertices as ranges."""
-    runs = Region.of_vertices(vertices).runs
-    return ", ".join(str(a) if a == b else f"*range({a}, {b + 1})" for a, b in runs)

@@ -14,8 +14,8 @@ from ...base import short_repr
 from ...errors import MeshFileError, StudioError
 from ...io import read_joined
 from ...options import as_integer
-from .choices import Choices, command_line, python_lines
-from .messages import misplaced_warning
+from .choices import Choices
+from .messages import command_line, misplaced_warning, python_lines
 from .outputs import EXPORTS, MAX_QUADS, QUADS, curve_options
 from .project import Project, file_within, open_project
 from .steps import STEPS, History
