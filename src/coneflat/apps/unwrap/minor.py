@@ -77,8 +77,9 @@ class MinorParts:
         for i, search in enumerate(self._searches):
             cut = own_seams[i] - self._first_edge[i], own_cones[i] - self._first[i]
             layout = laid_out(search.part.mesh, search.part.lengths, own_places[i], *cut)
-            one = Candidate(layout, float(energies[i]), search.cost_of(layout), float(distortion[i]))
-            one = search.settled(search.separated(one)) if i in overlapping else one
+            cost, alone = search.cost_of(layout), i not in overlapping
+            one = Candidate(layout, float(energies[i]), cost, float(distortion[i]), is_separated=alone)
+            one = one if alone else search.settled(search.separated(one))
             found.append(one if one.energy <= bound else None)
         return found
 

@@ -30,7 +30,7 @@ MIN_PIECE, MAX_CHARTS = 0.02, 32
 # Points of a border between which cuts are searched. Cuts whose ends are closer than MIN_SEPARATION of it are alike.
 SAMPLES, MIN_SEPARATION = 96, 0.06
 # Cuts tried per set of charts, sets continued per step, and steps without a gain after which the search ends.
-TRIED, CONTINUED, PATIENCE = 16, 2, 2
+TRIED, CONTINUED, PATIENCE = 10, 2, 2
 QUICK = Effort(columns=128, tries=12)
 
 
@@ -102,9 +102,14 @@ class _Shape:
     @classmethod
     def of(cls, sides: ComplexArray) -> _Shape:
         turned = sides * np.exp(1j * straight_angle(sides.ravel(), np.empty(0)))
-        swept, height = (np.conj(sides[:, 0]) * sides[:, 1]).imag / 2, turned.imag
+        swept, height = _swept(sides), turned.imag
         is_top_heavy = swept @ (height.sum(axis=1) / 3 - (height.min() + height.max()) / 2) > 0
         return cls(-turned if is_top_heavy else turned, float(swept.sum()))
+
+
+def _swept(sides: ComplexArray) -> FloatArray:
+    """Return (s,) the signed areas of the triangles between sides (s, 2) and the origin."""
+    return np.asarray((np.conj(sides[:, 0]) * sides[:, 1]).imag / 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,18 +120,25 @@ class _Cut:
         piece: the piece.
         edges: edges of its disk.
         cost: their cost.
-        shapes: the two outlines.
+        outlines: the sides of the two outlines, (s, 2) each.
+        area: the area of the smaller one.
     """
 
     piece: _Piece
     edges: IntArray
     cost: float
-    shapes: tuple[_Shape, _Shape]
+    outlines: tuple[ComplexArray, ComplexArray]
+    area: float
 
     @property
     def score(self) -> float:
         """The cost relative to the root of the area of the smaller piece."""
-        return self.cost / min(one.area for one in self.shapes) ** 0.5
+        return self.cost / self.area**0.5
+
+    @cached_property
+    def shapes(self) -> list[_Shape]:
+        """The two outlines."""
+        return [_Shape.of(sides) for sides in self.outlines]
 
     @cached_property
     def pieces(self) -> tuple[_Piece, ...]:
@@ -244,10 +256,11 @@ class _Piece:
             np.concatenate([self._rim[low : high + 1], inner]),
             np.concatenate([self._rim[high:], self._rim[: low + 1], inner[::-1]]),
         )
-        shapes = tuple(_Shape.of(self._places[np.column_stack([own, np.roll(own, -1)])]) for own in loops)
-        if min(shape.area for shape in shapes) < self.least:
+        one_side, other_side = (self._places[np.column_stack([own, np.roll(own, -1)])] for own in loops)
+        area = min(_swept(sides).sum() for sides in (one_side, other_side))
+        if area < self.least:
             return None
-        return _Cut(self, edges, float(self.graph.costs[edges].sum()), (shapes[0], shapes[1]))
+        return _Cut(self, edges, float(self.graph.costs[edges].sum()), (one_side, other_side), float(area))
 
 
 @dataclass(frozen=True, eq=False)

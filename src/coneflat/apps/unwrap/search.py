@@ -8,6 +8,7 @@ coarse mesh, and only the cones found there are taken over.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -52,16 +53,18 @@ class Candidate:
     """A layout with free seams.
 
     Attributes:
-        layout: the layout, without overlaps if its energy is in reach of the bound.
+        layout: the layout.
         energy: its mean symmetric Dirichlet energy, or the energy that belongs to its area distortion.
         cost: the cost of its seams.
         distortion: the area distortion for which its cones were searched.
+        is_separated: whether its overlaps are separated, which may add seams.
     """
 
     layout: Layout
     energy: float
     cost: float
     distortion: float
+    is_separated: bool = False
 
 
 class CutSearch:
@@ -119,15 +122,26 @@ class CutSearch:
             return self._from_coarse()
         found = self._by_distortion()
         near = [one for one in found if one.energy <= self._reach]
-        for one in sorted(near, key=self._expected_cost)[:2]:
+        for _ in range(min(2, len(near))):
+            one = self._cheapest(near, self._expected_cost)
             found.append(one if one.energy <= self.max_energy else self.shortened(one))
             if found[-1].energy <= self.max_energy:
+                near.append(found[-1])
                 break
         close_search(self._surface)
-        within = [one for one in found if one.energy <= self.max_energy]
+        within = [one for one in near if one.energy <= self.max_energy]
         if within:
-            return min(within, key=self._expected_cost)
+            return self._cheapest(within, self._expected_cost)
         return self.separated(min(found, key=lambda one: one.energy))
+
+    def _cheapest(self, candidates: list[Candidate], cost: Callable[[Candidate], float]) -> Candidate:
+        """Remove the candidate of least cost without overlaps, and return it; only those that may be it are separated."""
+        while True:
+            one = min(candidates, key=cost)
+            candidates.remove(one)
+            if one.is_separated:
+                return one
+            candidates.append(self.separated(one))
 
     def shortened(self, start: Candidate, layout: Layout | None = None) -> Candidate:
         """Return a candidate with the tips of its seams moved to where its energy is about the largest allowed.
@@ -136,6 +150,7 @@ class CutSearch:
             start: a candidate.
             layout: its layout, if that was cut further.
         """
+        start = self.separated(start)
         if len(self.part.faces) > MANY_TRIANGLES:
             return start if layout is None else replace(start, layout=layout)
         if layout is not None:
@@ -147,8 +162,10 @@ class CutSearch:
         slack = self.max_energy - start.energy
         if self._has_coarse and 0 <= slack <= 10 * TOLERANCE * (self.max_energy - ISOMETRIC):
             return start
-        for moved in self._moved(start):
-            one = self.settled(moved) if moved.energy > self.max_energy else moved
+        moved = self._moved(start)
+        while moved:
+            one = self._cheapest(moved, lambda one: one.cost)
+            one = self.settled(one) if one.energy > self.max_energy else one
             if one.energy <= self.max_energy and (one.cost < start.cost or start.energy > self.max_energy):
                 return one
         return start
@@ -184,7 +201,7 @@ class CutSearch:
             one = self._candidate(layout, best.distortion)
             if one.energy > self.max_energy:
                 one = self.shortened(one)
-            found.append(one)
+            found.append(self.separated(one))
             excess = one.energy - self.max_energy
             if excess <= 0:
                 break
@@ -223,8 +240,7 @@ class CutSearch:
     def _candidate(self, layout: Layout, distortion: float) -> Candidate:
         # What the cones or the metric do not meet does not matter where seams are free.
         layout, energy = self._freed(replace(layout, notes=()), tolerance=TOLERANCE)
-        one = Candidate(layout, energy, self.cost_of(layout), distortion)
-        return one if energy > self._reach else self.separated(one)
+        return Candidate(layout, energy, self.cost_of(layout), distortion)
 
     def _freed(
         self, layout: Layout, free: BoolArray | None = None, tolerance: float = 1e-3
@@ -245,10 +261,12 @@ class CutSearch:
 
     def separated(self, one: Candidate) -> Candidate:
         """Return a candidate whose overlaps are separated."""
-        if not self._method.separates:
+        if one.is_separated:
             return one
-        layout = separate_charts(one.layout, self.seam_costs, self.part)
-        return replace(one, layout=layout, cost=self.cost_of(layout))
+        layout = one.layout
+        if self._method.separates:
+            layout = separate_charts(layout, self.seam_costs, self.part)
+        return replace(one, layout=layout, cost=self.cost_of(layout), is_separated=True)
 
     def settled(self, one: Candidate) -> Candidate:
         """Return a candidate with the least energy without overlaps: its separating cuts are free, too."""
@@ -314,7 +332,7 @@ class CutSearch:
                     break  # The energy hardly depends on the tips.
                 wished = slack - excess * (slack - slack_before) / change if change else np.inf
                 slack *= float(np.clip(wished / slack, 1.25, 3)) if wished * slack > 0 else 3.0
-        return sorted(found, key=lambda one: one.cost)
+        return found
 
     def _with_tips(self, start: Layout, seams: IntArray, cones: IntArray) -> Layout | None:
         """Return the layout with given cones that is cut along given edges; None if there is none.

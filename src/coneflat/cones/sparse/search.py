@@ -109,6 +109,7 @@ class ConeSearch:
             self._least = np.maximum(self._least, np.minimum(math.tau - max_angles[vertices], 0.0))
         self._required = self.operator.unknowns_of(cones)
         self.exact = ExactModel(linear, self._required, limits, self._least)
+        self._usable = np.empty(0, dtype=bool)
         # The exact model will need the score; it is computed while the coarse model is set up.
         with concurrently(lambda: linear.score, 2 * len(vertices)):
             self.restrict(usable)
@@ -141,12 +142,14 @@ class ConeSearch:
         return cls(linear, mesh.euler_characteristic, **options)
 
     def restrict(self, usable: BoolArray) -> None:
-        """Restrict the search to the usable vertices (n,); cached results for the mesh stay valid.
+        """Restrict the search to the usable vertices (n,); if they are the same as before, sets found stay known.
 
         Raises:
             CurvatureError: cones at these vertices cannot carry the curvature.
         """
         required, operator = self._required, self.operator
+        if np.array_equal(usable, self._usable):
+            return
         self.limits.check_available(usable, operator.vertices[required])
         is_usable = usable[operator.vertices]
         is_usable[required] = False
@@ -166,6 +169,7 @@ class ConeSearch:
             self._least[self.places],
         )
         self.exact.restrict(is_usable)
+        self._usable, self._refined = usable, dict[int, tuple[float, float]]()
 
     @property
     def most_cones(self) -> int:
@@ -282,7 +286,10 @@ class ConeSearch:
 
     def _climb(self, bound: float, most: int, count: int) -> None:
         """Find sets of at most `most` cones on the coarse model; raise CurvatureError if none has at most `count`."""
-        self.coarse.climb(bound, most)
+        best = self.coarse.best
+        known = [size for size in best.sizes if size <= most]
+        if all(best.energy(size) > bound for size in known):
+            self.coarse.climb(bound, most, max(known, default=None))
         if min(self.coarse.best.sizes, default=count + 1) > count:
             raise CurvatureError(
                 f"no set of {count} cones was found that carries a total curvature of "
@@ -297,6 +304,10 @@ class ConeSearch:
         """
         self.progress(plural(count, "cone"))
         exact, starts = self.exact, []
+        state = (self.coarse.best.energy(count), exact.best.energy(count + 1))
+        if self._refined.get(count) == state:
+            return exact.best.energy(count)
+        self._refined[count] = state
         if count in self.coarse.best:
             starts.append(exact.insert(self.places[self.coarse.best[count].members]))
         if count + 1 in exact.best:
