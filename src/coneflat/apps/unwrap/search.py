@@ -46,6 +46,8 @@ COST_PER_ENERGY = 0.6
 # Tolerance of the energies of candidates, see `relax`. Those above the bound by less than twice as much may be within
 # it once they are settled.
 TOLERANCE = 1e-2
+# Energy above the bound, relative to what is allowed above that of an isometry, from which a candidate is given up.
+REACH = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +86,7 @@ class CutSearch:
         self.part, self.max_energy, self._method, self._by_area = part, max_energy, method, by_area
         # Energies up to which a candidate may be within the bound once it is settled, and above which it is given up.
         allowed = max_energy - ISOMETRIC
-        self._near, self._reach = max_energy + 2 * TOLERANCE * allowed, max_energy + allowed
+        self._near, self._reach = max_energy + 2 * TOLERANCE * allowed, max_energy + REACH * allowed
         self._has_coarse = len(part.faces) > 2 * COARSE and not (is_coarse or part.seams.is_forbidden.any())
 
     @cached_property
@@ -135,7 +137,7 @@ class CutSearch:
         return self.separated(min(found, key=lambda one: one.energy))
 
     def _cheapest(self, candidates: list[Candidate], cost: Callable[[Candidate], float]) -> Candidate:
-        """Remove the candidate of least cost without overlaps, and return it; only those that may be it are separated."""
+        """Remove and return the candidate that costs least without overlaps; others are not separated."""
         while True:
             one = min(candidates, key=cost)
             candidates.remove(one)
