@@ -4,27 +4,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from numbers import Real
-from typing import Any
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from ... import Flattening, TriangleMesh, check_mesh
+from ... import Flattening, TriangleMesh
 from ...base import FloatArray, IntArray
 from ...geometry import double_areas, edge_lengths
 from ...io import as_input
 from ...mesh import NEXT, PREVIOUS
 from ...options import declarations
-from ...source import at_unit_size
+from ...source import Source
 from ..unwrap.coarse import coarse_mesh
 from .aligned_cones import COARSE
 from .cross_field import sharp_ends
 from .features import edge_indices, vertex_graph
+from .integer_grid import GridSearch
 from .nearest import Stars, TriangleTree, slide_near
 from .options import QUADS, QuadOptions
 from .quad_mesh import QuadMesh
-from .sizes import wanted_scales
 from .smooth import is_on_feature
 
 
@@ -36,15 +35,20 @@ class CoarseInput:
         mesh: the coarse mesh, in model units.
         kept: its vertices in the given mesh.
         given: the given mesh, checked.
-        sizes: relative sizes of quads at its vertices, a length, or None.
+        sizes: relative sizes of quads at its vertices, or None.
         notes: on the given mesh.
     """
 
     mesh: TriangleMesh
     kept: IntArray
     given: TriangleMesh
-    sizes: FloatArray | float | None
+    sizes: FloatArray | None
     notes: tuple[str, ...]
+
+    @property
+    def source(self) -> Source:
+        """The coarse mesh as an input."""
+        return Source(as_input(self.mesh))
 
     def moved(self, quads: QuadMesh) -> QuadMesh:
         """Return quads of the coarse mesh, or of a refinement of it, on the given mesh.
@@ -85,36 +89,28 @@ class CoarseInput:
         return replace(quads, vertices=moved, faces=faces, barycentric=weights, surface=mesh)
 
 
-def coarse_input(
-    mesh: Any, faces: Any, quads: float | None, size: Any, options: dict[str, Any]
-) -> CoarseInput | None:
-    """Return a coarse mesh for about `quads` quads; None if the given one has few triangles, or options refer to it.
+def coarse_input(search: GridSearch) -> CoarseInput | None:
+    """Return a coarse mesh for a grid; None if the given one has few triangles, or options refer to it.
 
     Raises:
         MeshError: the mesh cannot be flattened.
         OptionError: sizes are not positive numbers.
     """
-    length: float | None = float(size) if isinstance(size, Real) else None
-    # Invalid numbers and options are reported later. Weights, and options that are not simple values, name vertices.
+    # Weights, and options that are not simple values, name vertices. Required sharp edges are those of the given mesh.
+    quads, options = search.quads, {**search.options, "boundary": search.boundary}
     is_simple = all(one is None or isinstance(one, (str, Real)) or callable(one) for one in options.values())
     is_simple &= options.keys() <= declarations(QuadOptions).keys() - {"weights"}
-    numbers = [one for one in (quads, length) if one is not None]
-    if not is_simple or not all(isinstance(one, Real) and 0 < float(one) < np.inf for one in numbers):
+    is_simple &= search.sharp_angle is None and not isinstance(search.mesh, Flattening)
+    if not is_simple or (np.shape(search.source.given.faces) or (0,))[0] <= 2 * COARSE:
         return None
-    given = as_input(mesh, faces)
-    if isinstance(mesh, Flattening) or (np.shape(given.faces) or (0,))[0] <= 2 * COARSE:
+    checked, mesh = search.checked, search.checked.mesh
+    if search.size is not None:
+        area = float(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum()) / 2
+        quads = area / max(float(np.ldexp(search.size, checked.exponent)), np.finfo(float).tiny) ** 2
+    count = COARSE * max(1.0, quads / QUADS)
+    if len(mesh.faces) <= 2 * count:
         return None
-    checked = check_mesh(given.vertices, given.faces, repair=bool(options.get("repair", False)))
-    scaled = at_unit_size(checked)
-    area = float(double_areas(edge_lengths(scaled.mesh.vertices, scaled.mesh.faces)).sum()) / 2
-    if length is not None:
-        quads = area / max(float(np.ldexp(length, scaled.exponent)), np.finfo(float).tiny) ** 2
-    count = COARSE * max(1.0, (quads or QUADS) / QUADS)
-    if len(checked.mesh.faces) <= 2 * count:
-        return None
-    sizes = None if size is None or length else np.exp(-wanted_scales(mesh, faces, scaled, size))
-    coarse, kept, _ = coarse_mesh(scaled.mesh, int(count))
-    wanted = length if sizes is None else sizes[kept]
-    return CoarseInput(
-        coarse.moved_to(checked.mesh.vertices[kept]), kept, checked.mesh, wanted, checked.notes
-    )
+    coarse, kept, _ = coarse_mesh(mesh, int(count))
+    given = mesh.moved_to(np.ldexp(mesh.vertices, -checked.exponent))
+    sizes = None if search.scales is None else np.exp(-search.scales[kept])
+    return CoarseInput(coarse.moved_to(given.vertices[kept]), kept, given, sizes, checked.notes)
