@@ -187,17 +187,8 @@ class GridSearch:
                 raise OptionError("a flattening already has faces and options: no others can be given")
         else:
             mesh = Source(as_input(mesh, faces))
-        return cls(
-            mesh,
-            o.quads or QUADS,
-            length,
-            sizes,
-            StretchEnergy(o.stretch),
-            o.sharp_angle,
-            "auto" if is_auto else parsed.boundary,
-            rest,
-            stages,
-        )
+        energy, boundary = StretchEnergy(o.stretch), "auto" if is_auto else parsed.boundary
+        return cls(mesh, o.quads or QUADS, length, sizes, energy, o.sharp_angle, boundary, rest, stages)
 
     def grid(self) -> IntegerGrid:
         """Return the grid, with the time of each stage; errors are those of `integer_grid`."""
