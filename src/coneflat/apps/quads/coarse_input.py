@@ -11,12 +11,11 @@ from scipy.spatial import cKDTree
 
 from ... import Flattening, TriangleMesh
 from ...base import FloatArray, IntArray
-from ...geometry import double_areas, edge_lengths
+from ...geometry import coarse_mesh, double_areas, edge_lengths
 from ...io import as_input
 from ...mesh import NEXT, PREVIOUS
 from ...options import declarations
 from ...source import Source
-from ..unwrap.coarse import coarse_mesh
 from .aligned_cones import COARSE
 from .cross_field import sharp_ends
 from .features import edge_indices, vertex_graph
