@@ -38,7 +38,7 @@ CEILINGS = {
     "apps.controls": 49,
     "apps.measure_uv": 160,
     "apps.peers": 438,
-    "apps.quads": 3792,
+    "apps.quads": 3794,
     "apps.studio": 1712,
     "apps.transfer": 323,
     "apps.brains": 260,
@@ -73,7 +73,7 @@ OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 FRONT = ("apps.ahead", "apps.blender", "apps.cli", "apps.studio")
 SHARED = ("apps.quads.nearest",)
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 145, 15_054, 233, 24_782
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 145, 15_054, 233, 24_784
 CONSTANTS, KERNELS, NAMES, LEVELS = 298, 85, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -48,6 +48,16 @@ def test_quads_lie_on_the_given_surface(coarser, name):
     assert ((weights <= 1e-12) & (sides[at] | (weights.max(axis=1) > 1 - 1e-12)[:, None])).any(axis=1).all()
 
 
+def test_vertices_stay_on_their_component_where_borders_touch(coarser):
+    """Two hills, one of them upside down, have the same border."""
+    vertices, faces = shapes.grid(60, 50, lambda x, y: x * (1 - x) * y * (1 - y))
+    both = shapes.join((vertices, faces), (vertices * [1, 1, -1], faces[:, ::-1]))
+    found = coneflat.quads(*both, quads=300)
+    of_quads = (found.faces >= len(faces))[found.quads]
+    assert (of_quads == of_quads[:, :1]).all()
+    assert len(np.unique(of_quads)) == 2
+
+
 def test_creases_are_kept(coarser):
     vertices, faces = MODELS["box"]()
     found = coneflat.quads(vertices, faces, quads=300)

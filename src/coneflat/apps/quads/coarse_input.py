@@ -6,16 +6,15 @@ from dataclasses import dataclass, replace
 from numbers import Real
 
 import numpy as np
+from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from ... import Flattening, TriangleMesh
 from ...base import FloatArray, IntArray
 from ...geometry import coarse_mesh, double_areas, edge_lengths
-from ...io import as_input
 from ...mesh import NEXT, PREVIOUS
 from ...options import declarations
-from ...source import Source
 from .aligned_cones import COARSE
 from .cross_field import sharp_ends
 from .features import edge_indices, vertex_graph
@@ -44,30 +43,35 @@ class CoarseInput:
     sizes: FloatArray | None
     notes: tuple[str, ...]
 
-    @property
-    def source(self) -> Source:
-        """The coarse mesh as an input."""
-        return Source(as_input(self.mesh))
-
     def moved(self, quads: QuadMesh) -> QuadMesh:
         """Return quads of the coarse mesh, or of a refinement of it, on the given mesh.
 
         Vertices slide along the surface from a nearby vertex that both meshes have, so that they do not jump to another
         sheet. Those on the boundary and on sharp edges of the coarse mesh move to the nearest point on the boundary, or
-        on sharp edges within half the side of a quad. Of vertices at the same place, any may be taken.
+        on sharp edges within half the mean length of the edges there, of the same component.
         """
         mesh, surface, points = self.given, quads.surface, quads.vertices
+        label, part = mesh.components[1], surface.components[1]
         off, which = cKDTree(self.mesh.vertices).query(surface.vertices)
-        graph, common = vertex_graph(surface), np.flatnonzero(off == 0)
+        # Where components touch, the vertex found may be of another one; most are not.
+        is_common, there = off == 0, label[self.kept[which]]
+        votes = csr_matrix((is_common.astype(np.int64), (part, there)))
+        homes = np.asarray(votes.argmax(axis=1)).ravel()[part]
+        graph, common = vertex_graph(surface), np.flatnonzero(is_common & (there == homes))
         _, _, source = dijkstra(graph, indices=common, return_predecessors=True, min_only=True)
         corners = surface.faces[quads.faces, quads.barycentric.argmax(axis=1)]
         stars, start = Stars.of(mesh.vertices, mesh.faces), self.kept[which[source[corners]]]
         faces = stars.star[stars.start[start]]
         weights = (mesh.faces[faces] == start[:, None]).astype(np.float64)
         slide_near(stars, points, faces, weights)
-        side = np.sqrt(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum() / 2 / len(quads.quads))
-        sharp = edge_indices(mesh, sharp_ends(mesh)), side / 2
-        border = np.flatnonzero(mesh.is_boundary_edge), np.inf
+        # Components are moved apart, so that the nearest edge is one of the same, or out of reach.
+        apart = np.ptp(mesh.vertices, axis=0)
+        places = mesh.vertices + 2 * np.outer(label, apart)
+        wanted = points + 2 * np.outer(homes[corners], apart)
+        lengths = np.linalg.norm(np.diff(points[quads.edges], axis=1)[:, 0], axis=1)
+        half = np.bincount(quads.edges.ravel(), lengths.repeat(2)) / quads.valences / 2
+        sharp = edge_indices(mesh, sharp_ends(mesh)), half
+        border = np.flatnonzero(mesh.is_boundary_edge), np.full(len(points), np.linalg.norm(apart))
         is_on = is_on_feature(quads, sharp_ends(surface)), quads.is_boundary_vertex
         for moves, (edges, reach) in zip(is_on, (sharp, border), strict=True):
             if not (len(edges) and moves.any()):
@@ -75,11 +79,10 @@ class CoarseInput:
             halfedges = mesh.edge_halfedges[edges, 0]
             tails, heads = mesh.ends_of(halfedges)
             # Each edge is a triangle without area.
-            tree = TriangleTree(mesh.vertices, np.stack([tails, heads, heads], axis=1))
-            on, (share, *_) = (found.T for found in tree.nearest(points[moves]))
-            starts, ends = mesh.vertices[tails[on]], mesh.vertices[heads[on]]
-            near = ends + share[:, None] * (starts - ends)
-            within = np.linalg.norm(near - points[moves], axis=1) <= reach
+            tree = TriangleTree(places, np.stack([tails, heads, heads], axis=1))
+            on, (share, *_) = (found.T for found in tree.nearest(wanted[moves]))
+            near = places[heads[on]] + share[:, None] * (places[tails[on]] - places[heads[on]])
+            within = np.linalg.norm(near - wanted[moves], axis=1) <= reach[moves]
             at, halfedge, share = np.flatnonzero(moves)[within], halfedges[on[within]], share[within]
             faces[at], weights[at] = halfedge // 3, 0.0
             weights[at, np.take(NEXT, halfedge % 3)] = share

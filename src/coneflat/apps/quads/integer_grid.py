@@ -217,10 +217,7 @@ class GridSearch:
         """Return a grid for the options as given."""
         if not self._may_align():
             if self.sizes is not None:
-                raise OptionError(
-                    "relative sizes need cones and a boundary that are found automatically: leave out size, or the "
-                    "other options"
-                )
+                raise OptionError("relative sizes need cones and boundaries 'auto': leave out other options")
             return self._with_fewest_cones()
         if self.checked.mesh.components[0] > 1:
             return self._of_components()

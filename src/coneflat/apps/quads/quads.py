@@ -11,7 +11,9 @@ from numpy.typing import ArrayLike
 from ... import Flattening
 from ...base import Stopwatch, plural
 from ...errors import OptionError
+from ...io import as_input
 from ...options import read_options
+from ...source import Source
 from .coarse_input import coarse_input
 from .cross_field import sharp_ends
 from .extract import extract_quads, with_borders
@@ -79,7 +81,7 @@ def quads(
         with stages("coarsen"):
             small = coarse_input(search)
         if small is not None:
-            search = replace(search, mesh=small.source, sizes=small.sizes)
+            search = replace(search, mesh=Source(as_input(small.mesh)), sizes=small.sizes)
         grid = search.grid()
     # Where the surface is as thin as a square, quads have a vertex twice. Then 1.6 times as many quads are tried, at
     # most twice. If that does not help, these quads are left out.
