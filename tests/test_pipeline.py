@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 from importlib import import_module
 
 import numpy as np
@@ -241,6 +242,19 @@ def test_surfaces_with_very_many_handles_come_through(monkeypatch):
     assert result.distortion.flipped == 0
     assert result.distortion.seam_mismatch_max < 1e-11
     assert any("5 handles" in note for note in result.notes)
+
+
+def test_notes_name_every_cone_and_vertex_where_triangles_fail():
+    """Five triangles around a vertex cannot form an angle of 5.1 pi."""
+    vertices, faces = shapes.sphere(2)
+    wide = np.flatnonzero(np.bincount(faces.ravel()) == 5)[[0, -1]].tolist()
+    others = [v for v in range(len(vertices)) if v not in wide][::2]
+    cones = {**dict.fromkeys(others, 10.2 * np.pi / len(others)), **dict.fromkeys(wide, -3.1 * np.pi)}
+    notes = flatten(vertices, faces, cones=cones).notes
+    cannot = next(note for note in notes if "surrounding triangles cannot form" in note)
+    assert f"form: vertex {wide[0]} (5.1 pi), vertex {wide[1]} (5.1 pi), vertex" in cannot
+    no_room = next(note for note in notes if "had no room" in note)
+    assert re.search(r"next to vertex \d+, vertex \d+.*: they are positively oriented", no_room)
 
 
 def test_bounds_of_angles_count_for_the_sparse_search():

@@ -18,13 +18,13 @@ ANGLE, SIDES = 1e-6, 1e-8
 #: The latter where triangles had to be opened by a hair, and at the seams that a note names; above it another note says
 #: by how much sides differ.
 LOOSE_SIDES = 1e-6
-#: The notes that name seams with unequal sides: those near a vertex; so many marked ones, and their largest error.
-NO_ROOM = re.compile(r".* had no room .* as at vertex (\d+): .* the sides of seams near them are unequal")
+#: The notes that name seams with unequal sides: those near vertices; so many marked ones, and their largest error.
+NO_ROOM = re.compile(r".* had no room .* next to (vertex .*): .* the sides of seams near them are unequal")
 NOT_KEPT = re.compile(
     r"([\d,]+) edges? of [\d,]+ on the boundary or on marked seams could not keep their lengths, "
     r"with relative errors of up to (\S+):"
 )
-#: Rings of triangles around that vertex in which points may have moved; an error of both sides, rounded in the note.
+#: Rings of triangles around those vertices in which points may have moved; an error of both sides, rounded in the note.
 NO_ROOM_RINGS, BOTH_SIDES = 8, 2.1
 #: A round boundary is found in rounds, each of which changes curvatures by less than the one before.
 ROUND = 0.02
@@ -222,7 +222,7 @@ def _named_differences(trial: Trial, bad: np.ndarray) -> np.ndarray:
     named = np.zeros(len(topology.inner))
     for note in result.notes:
         if found := NO_ROOM.match(note):
-            near = result.vertex_origin == int(found[1])
+            near = np.isin(result.vertex_origin, [int(name) for name in re.findall(r"\d+", found[1])])
             for _ in range(NO_ROOM_RINGS):
                 near[result.faces[near[result.faces].any(axis=1)]] = True
             named[near[topology.edges[topology.inner]].any(axis=1)] = LOOSE_SIDES

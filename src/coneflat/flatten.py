@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from .atlas import separate_overlaps
 from .base.arrays import FloatArray, IntArray
 from .base.progress import Stopwatch
-from .base.text import plural
+from .base.text import list_some, plural
 from .base.threads import concurrently, limit_threads
 from .cones import MAX_SEARCHED, close_search, find_cones, uses_sparse_search
 from .errors import CurvatureError, MetricError, SeamError
@@ -305,12 +305,12 @@ def _failures(layout: Layout) -> tuple[int, int]:
 
 
 def _infeasible_notes(layout: Layout, part: Part) -> Iterator[str]:
-    infeasible = infeasible_cones(layout)
-    if len(infeasible):
-        angle = 2 - layout.target[infeasible[0]] / np.pi
+    infeasible = sorted(infeasible_cones(layout), key=layout.target.item)
+    if infeasible:
+        shown = [f"vertex {part.cones.names[v]} ({2 - layout.target[v] / np.pi:.3g} pi)" for v in infeasible]
         yield (
-            f"{plural(len(infeasible), 'cone')} with angles too large for the triangles around: that at vertex "
-            f"{part.cones.names[infeasible[0]]} has an angle of {angle:.3g} pi. Choose others, or refine the mesh."
+            f"{plural(len(infeasible), 'cone')} with an angle that the surrounding triangles cannot form: "
+            f"{list_some(shown)}; choose others, or refine the mesh."
         )
 
 

@@ -1,5 +1,6 @@
 """Geometry: lengths, angles, areas, Laplacian, intrinsic triangulations, exact predicates, overlaps, visibility."""
 
+from .coarsen import coarse_mesh
 from .coverage import approximate_overlap_areas
 from .handles import handle_loops
 from .intrinsic import halfedge_twins
@@ -35,7 +36,7 @@ from .triangles import (
 from .visibility import fill_nearest, visible_share
 
 __all__ = [
-    "CREASE_COSINE", "FlatTriangles", "MAX_CELLS", "Overlaps", "angle_defect", "as_complex", "as_pairs",
+    "CREASE_COSINE", "FlatTriangles", "MAX_CELLS", "Overlaps", "angle_defect", "as_complex", "as_pairs", "coarse_mesh",
     "corner_angles", "corner_normals", "cotangent_laplacian", "cotangents", "dihedral_angles", "double_areas",
     "edge_lengths", "face_normals", "fill_nearest", "fill_orientations", "find_overlaps", "flat_triangles",
     "handle_loops", "halfedge_twins", "is_broken", "approximate_overlap_areas", "layout_curvature",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import FloatArray, IntArray
-from ..base.text import plural
+from ..base.text import list_some, plural
 from ..geometry.intrinsic import halfedge_twins
 from ..geometry.operators import cotangent_laplacian
 from ..geometry.planar import sides_between, signed_double_areas
@@ -95,10 +95,10 @@ def untangle_seams(
     flipped = np.flatnonzero(was_bad & ~find_degenerate(sides_between(points[disk.faces])))
     if not len(flipped):
         return layout
-    name = names[layout.mesh.faces[flipped[0], 0]]
+    where = list_some(f"vertex {name}" for name in np.unique(names[layout.mesh.faces[flipped, 0]]))
     return found.with_notes(
-        f"{plural(len(flipped), 'triangle')} had no room between seams with equal sides, as at vertex "
-        f"{name}: they are positively oriented, but {caveat}."
+        f"{plural(len(flipped), 'triangle')} had no room between seams with equal sides, next to "
+        f"{where}: they are positively oriented, but {caveat}."
     )
 
 

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import BoolArray, IntArray
+from ..base.arrays import BoolArray, FloatArray, IntArray, unit_exponent
+from ..errors import NonFiniteError
+from ..geometry.intrinsic import as_lengths, check_lengths
 from ..geometry.triangulate import is_polygon_side
+from ..mesh.check import CheckedMesh
 
 if TYPE_CHECKING:
     from ..io.mesh_file import MeshFile
-
-
-from dataclasses import replace
-from typing import TypeVar
-
-from ..base.arrays import FloatArray, unit_exponent
-from ..errors import NonFiniteError
-from ..geometry.intrinsic import as_lengths, check_lengths
-from ..mesh.check import CheckedMesh
 
 # Smallest size of a mesh for which texels per unit of length, and similar ratios, are finite.
 MIN_COORDINATE = 1e-300

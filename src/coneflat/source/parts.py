@@ -121,6 +121,14 @@ class Source:
         self._fits: LatestCache[None] = LatestCache()
         self._pieces: LatestCache[tuple[Piece, ...]] = LatestCache()
 
+    def checked(self, repair: bool) -> CheckedMesh:
+        """Return the checked input, scaled to about unit size.
+
+        Raises:
+            MeshError: the mesh cannot be flattened.
+        """
+        return self._checked.of(repair, lambda: self._check(repair))[0]
+
     def prepared(self, options: Options) -> Prepared:
         """Return the checked input, split into parts with the specifications that the options give.
 

@@ -11,6 +11,7 @@ from coneflat import check_mesh
 from coneflat.apps.quads import coarse_input as module
 from coneflat.apps.quads.coarse_input import coarse_input
 from coneflat.apps.quads.cross_field import SHARP_ANGLE, sharp_ends
+from coneflat.apps.quads.integer_grid import GridSearch
 
 
 @pytest.fixture
@@ -47,6 +48,16 @@ def test_quads_lie_on_the_given_surface(coarser, name):
     assert ((weights <= 1e-12) & (sides[at] | (weights.max(axis=1) > 1 - 1e-12)[:, None])).any(axis=1).all()
 
 
+def test_vertices_stay_on_their_component_where_borders_touch(coarser):
+    """Two hills, one of them upside down, have the same border."""
+    vertices, faces = shapes.grid(60, 50, lambda x, y: x * (1 - x) * y * (1 - y))
+    both = shapes.join((vertices, faces), (vertices * [1, 1, -1], faces[:, ::-1]))
+    found = coneflat.quads(*both, quads=300)
+    of_quads = (found.faces >= len(faces))[found.quads]
+    assert (of_quads == of_quads[:, :1]).all()
+    assert len(np.unique(of_quads)) == 2
+
+
 def test_creases_are_kept(coarser):
     vertices, faces = MODELS["box"]()
     found = coneflat.quads(vertices, faces, quads=300)
@@ -61,21 +72,21 @@ def test_creases_are_kept(coarser):
         {"cones": {0: np.pi}},
         {"weights": "area"},
         {"forbidden_cones": [1]},
-        {"size": -1.0},
+        {"sharp_angle": 1.0},
         {"quads": 100_000},
     ],
 )
 def test_options_for_which_the_given_mesh_is_used(coarser, options):
     vertices, faces = MODELS["ball"]()
-    size, quads = options.pop("size", None), options.pop("quads", 300)
-    assert (coarse_input(vertices, faces, quads, None, {}) is None) == (quads > 300)
-    assert coarse_input(vertices, faces, quads, size, options) is None
+    own = {"quads": 300, **{name: options.pop(name) for name in ("quads", "sharp_angle") if name in options}}
+    assert coarse_input(GridSearch.of(vertices, faces, {"quads": 300}, {})) is not None
+    assert coarse_input(GridSearch.of(vertices, faces, own, options)) is None
 
 
 def test_sizes_are_those_of_the_given_mesh(coarser):
     vertices, faces = MODELS["ball"]()
     sizes = np.linspace(1, 2, len(vertices))
-    small = coarse_input(vertices, faces, 300, sizes, {})
+    small = coarse_input(GridSearch.of(vertices, faces, {"quads": 300, "size": sizes}, {}))
     np.testing.assert_allclose(small.sizes, sizes[small.kept])
     np.testing.assert_array_equal(small.mesh.vertices, vertices[small.kept])
 

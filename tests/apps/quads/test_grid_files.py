@@ -125,6 +125,31 @@ class TestWhatIsNone:
             IntegerGrid.load(tmp_path / "bad.npz")
         assert "\n" not in str(caught.value)
 
+    @pytest.mark.parametrize(
+        ("change", "message"),
+        [
+            (
+                lambda a: {"corner_quarters": a["corner_quarters"] + 1},
+                "corners are not grid points with these angles",
+            ),
+            (lambda a: {"corners": np.zeros_like(a["corners"])}, "corners are not grid points"),
+            (lambda a: {"corners": a["faces"][5][:1], "corner_quarters": [2]}, "corners are not grid points"),
+            (
+                lambda a: {"features": [[0, len(a["vertices"]) - 1]]},
+                "sharp edges are not edges on grid lines",
+            ),
+            (lambda a: {"features": a["faces"][:, :2]}, "sharp edges are not edges on grid lines"),
+        ],
+    )
+    def test_corners_and_sharp_edges_that_are_not_those_of_the_map(self, tmp_path, change, message):
+        grid = MAPS["straight border"]()
+        with np.load(grid.save(tmp_path / "grid.npz")) as archive:
+            arrays = dict(archive)
+        assert len(arrays["corners"]) == 4
+        np.savez(tmp_path / "bad.npz", **{**arrays, **change(arrays)})
+        with pytest.raises(MeshFileError, match=f"holds no integer grid: its {message}"):
+            IntegerGrid.load(tmp_path / "bad.npz")
+
     def test_maps_that_do_not_fit(self, known):
         places = known.corner_grid.copy()
         with pytest.raises(GridError, match="flipped or without area"):

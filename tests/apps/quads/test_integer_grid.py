@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 import shapes
 
+import coneflat
 from coneflat import errors, flatten, integer_grid
 from coneflat.apps.quads.layout import aligned, between_nodes, split_edges
 from coneflat.apps.quads.transitions import find_transitions
+from coneflat.flatten import flatten_source
 from coneflat.geometry import edge_lengths
 from coneflat.mesh.connectivity import TriangleMesh
 
@@ -171,13 +173,13 @@ def test_a_grid_that_is_too_coarse_is_made_finer(shared):
 def test_more_cones_are_tried_where_a_grid_is_not_found(monkeypatch):
     module, tried = import_module("coneflat.apps.quads.integer_grid"), []
 
-    def failing(*mesh, **given):
-        tried.append(given["distortion"])
+    def failing(source, options):
+        tried.append(options.distortion)
         if len(tried) < 2:
             raise errors.ConvergenceError("rotations did not reach multiples")
-        return flatten(*mesh, **given)
+        return flatten_source(source, options)
 
-    monkeypatch.setattr(module, "flatten", failing)
+    monkeypatch.setattr(module, "flatten_source", failing)
     grid = integer_grid(*shapes.sphere(3), quads=300, distortion=0.1, cones="sparse")
     assert tried == pytest.approx([0.1, 0.07])
     assert "With a distortion above 0.07, no grid was found." in grid.notes
@@ -198,14 +200,22 @@ def test_numbering_changes_nothing():
     ("options", "message"),
     [
         ({"quads": 10, "size": 1.0}, "must not be given together"),
-        ({"quads": 0}, "quads must be a positive number"),
-        ({"size": -1.0}, "size must be a positive number"),
+        ({"quads": 0}, "quads must be an integer, 1 or more, got 0"),
+        ({"size": -1.0}, "size must be a number above 0, .*got -1"),
         ({"stretch": -1.0}, "stretch must be"),
+        ({"boundary": "foo"}, "unknown boundary 'foo'"),
+        ({"boundary": {"a": 1}}, "a corner's vertex must be a number"),
+        ({"min_cone_angle": -1.0}, "the smallest cone angle must be positive"),
+        ({"max_cone_angle": 1.0}, "must exceed the smallest"),
+        ({"cones": "foo"}, "unknown cones 'foo'"),
+        ({"threads": 0}, "threads must be an integer"),
+        ({"progress": 1}, "progress must be a function"),
     ],
 )
-def test_options_that_make_no_sense(options, message):
-    with pytest.raises(errors.OptionError, match=message):
-        integer_grid(*shapes.sphere(2), **options)
+def test_invalid_options_are_refused_before_the_mesh_is_read(options, message):
+    for find in (integer_grid, coneflat.quads):
+        with pytest.raises(errors.OptionError, match=message):
+            find("missing.obj", **options)
 
 
 def test_cones_that_are_no_quarter_turns_are_refused():

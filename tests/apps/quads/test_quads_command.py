@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -58,6 +59,32 @@ def test_a_grid_may_be_given():
         coneflat.quads(own, quads=100)
 
 
+@pytest.mark.parametrize("smooth", [-1, 1.5, None, "x"])
+def test_rounds_of_smoothing_are_checked_before_the_work(smooth):
+    for mesh in ("missing.obj", on_squares(*polycube(RING), 4)):
+        with pytest.raises(OptionError, match="smooth must be"):
+            coneflat.quads(mesh, smooth=smooth)
+
+
+@pytest.mark.parametrize("options", [{"cones": "sparse"}, {"size": "curvature"}])
+def test_the_mesh_is_read_and_checked_once(tmp_path, monkeypatch, ball, options):
+    path, calls = write_obj(tmp_path / "ball.obj", *ball), []
+
+    def counted(name, function):
+        return lambda *given, **more: (calls.append(name), function(*given, **more))[1]
+
+    for module, name in (
+        ("io.packages", "triangulate"),
+        ("io.packages", "read_mesh"),
+        ("source.parts", "check_mesh"),
+    ):
+        module = import_module(f"coneflat.{module}")
+        monkeypatch.setattr(module, name, counted(name, getattr(module, name)))
+    coneflat.quads(str(path), quads=300, **options)
+    # The mesh that is flattened for aligned cones is another one.
+    assert calls == ["read_mesh", "triangulate", "check_mesh", *["check_mesh"] * ("size" in options)]
+
+
 def test_command_refuses_before_the_work(tmp_path, ball):
     path = write_obj(tmp_path / "ball.obj", *ball)
     done = run(path, "--faces", 600, "--size", 0.1)
@@ -68,6 +95,7 @@ def test_command_refuses_before_the_work(tmp_path, ball):
         (("-o", path), "the input and the output"),
         (("--grid", tmp_path / "grid.ply"), "integer grids are written as .obj, .npz"),
         (("--grid", path), "the input and the grid"),
+        (("--quads", -1), "quads must be an integer, 1 or more, got -1"),
         (("--smooth", -1), "smooth must be an integer, 0 or more"),
         (("--stretch", 2), "stretch must be a number from 0 to 1"),
     ):

@@ -38,7 +38,8 @@ class TestObj:
         assert (np.cross(sides[:, 0], sides[:, 1]) > 0).all()
         assert len(np.unique(np.round(uv.mean(axis=1), 9), axis=0)) == len(uv)
 
-    def test_materials_and_groups_of_the_model(self, tmp_path):
+    @pytest.mark.parametrize("is_flat", [False, True])
+    def test_materials_and_groups_of_the_model(self, tmp_path, is_flat):
         """A sphere whose upper half is of another material and group; its top is in the group without a name."""
         (tmp_path / "in").mkdir()
         (tmp_path / "in" / "a.mtl").write_text("newmtl red\nnewmtl blue\n")
@@ -50,7 +51,10 @@ class TestObj:
         for words, which in zip(parts, (~upper, upper & ~cap, cap), strict=True):
             lines += [*words, *(f"f {a} {b} {c}" for a, b, c in (faces[which] + 1).tolist())]
         (tmp_path / "in" / "ball.obj").write_text("\n".join(lines) + "\n")
-        found = coneflat.quads(tmp_path / "in" / "ball.obj", quads=300)
+        model = tmp_path / "in" / "ball.obj"
+        if is_flat:
+            model = coneflat.flatten(model, quantise=np.pi / 2, correct_handles=True, charts="one")
+        found = coneflat.quads(model, quads=300)
         text = found.save(tmp_path / "quads.obj").read_text()
         assert text.startswith("mtllib in/a.mtl\nmtllib in/b.mtl\nv ")
         low, *top = (part.count("\nf ") for part in re.split("usemtl blue", text))
@@ -124,6 +128,7 @@ class TestNpz:
         [
             ("quads", None, "holds no mesh of quads: 'quads' is missing"),
             ("quads", np.zeros((3, 3)), "'quads' has the shape"),
+            ("quads", np.zeros((0, 4)), "holds no mesh of quads: it has none"),
             ("quads", np.full((3, 4), 10**6), "'quads' has indices outside"),
             ("faces", np.zeros(1), "'faces' has the shape"),
             ("surface_vertices", np.full((100, 3), np.nan), "not finite"),

@@ -41,7 +41,7 @@ def test_smoothing_makes_quads_squarer_and_stays_on_the_surface():
     assert (smooth.barycentric >= 0).all()
     # What lies on the sharp edges, the corners of the cubes among it, stays.
     assert (smooth.vertices == mesh.vertices).all(axis=1).sum() >= len(mesh.irregular)
-    with pytest.raises(OptionError, match="not -1"):
+    with pytest.raises(OptionError, match="rounds must be an integer, 0 or more, got -1"):
         smooth_quads(mesh, -1)
 
 

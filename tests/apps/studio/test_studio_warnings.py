@@ -13,8 +13,10 @@ from coneflat.apps.studio.choices import DECLARED, Choices
 from coneflat.apps.studio.messages import CONTROLS, misplaced_warning, page_message
 from coneflat.apps.studio.page import studio_page
 from coneflat.apps.studio.paint import Region
+from coneflat.apps.unwrap.options import UnwrapOptions
 from coneflat.base.defaults import MAX_CONE_ANGLE
-from coneflat.errors import StudioError
+from coneflat.errors import OptionError, StudioError
+from coneflat.options import read_options
 
 SOURCES = Path(coneflat.__file__).parent
 
@@ -100,11 +102,30 @@ class TestWords:
             ("cone_count must be an integer", "“Number” must be an integer"),
             ("padding must be 0 and up", "“Texels between charts” must be 0 and up"),
             ("the padding must be 0", "the padding must be 0"),
+            ("boundary 'straight' needs the search", "“Boundary” 'straight' needs the search"),
             ("the greedy search (--cones greedy)", "the greedy search (--cones greedy of coneflat flatten)"),
         ],
     )
     def test_options_are_named_as_the_page_has_them(self, message, said):
         assert page_message(message) == said
+
+    @pytest.mark.parametrize(
+        ("one", "other"),
+        [
+            ({"resolution": 512}, {"texel_density": 2.0}),
+            ({"max_energy": 4.3}, {"area": 0.1}),
+            ({"seams": "none"}, {"max_energy": 4.3}),
+            ({"seams": "none"}, {"area": 0.1}),
+        ],
+    )
+    def test_options_that_exclude_each_other_are_named_as_the_page_has_them(self, one, other):
+        with pytest.raises(OptionError) as caught:
+            read_options({**one, **other}, UnwrapOptions)
+        said = page_message(str(caught.value))
+        assert said.endswith(" cannot be combined: leave out one of them")
+        for name in (*one, *other):
+            assert f"“{CONTROLS[name]}”" in said
+            assert name not in said.split()
 
     def test_no_flag_that_has_a_control_is_left(self):
         """In none of the messages of the package."""

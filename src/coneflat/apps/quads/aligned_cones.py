@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import dijkstra
 from ... import TriangleMesh
 from ...base import ComplexArray, FloatArray, IntArray
 from ...errors import CurvatureError
-from ..unwrap.coarse import coarse_mesh
+from ...geometry import coarse_mesh
 from .cross_field import SHARP_ANGLE, directions_and_indices, sharp_ends
 from .features import vertex_graph
 from .map_model import SAMPLES, MapModel

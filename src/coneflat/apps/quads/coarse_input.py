@@ -4,27 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from numbers import Real
-from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from ... import Flattening, TriangleMesh, check_mesh
+from ... import Flattening, TriangleMesh
 from ...base import FloatArray, IntArray
-from ...geometry import double_areas, edge_lengths
-from ...io import as_input
+from ...geometry import coarse_mesh, double_areas, edge_lengths
 from ...mesh import NEXT, PREVIOUS
 from ...options import declarations
-from ...source import at_unit_size
-from ..unwrap.coarse import coarse_mesh
 from .aligned_cones import COARSE
 from .cross_field import sharp_ends
 from .features import edge_indices, vertex_graph
+from .integer_grid import GridSearch
 from .nearest import Stars, TriangleTree, slide_near
 from .options import QUADS, QuadOptions
 from .quad_mesh import QuadMesh
-from .sizes import wanted_scales
 from .smooth import is_on_feature
 
 
@@ -36,14 +33,14 @@ class CoarseInput:
         mesh: the coarse mesh, in model units.
         kept: its vertices in the given mesh.
         given: the given mesh, checked.
-        sizes: relative sizes of quads at its vertices, a length, or None.
+        sizes: relative sizes of quads at its vertices, or None.
         notes: on the given mesh.
     """
 
     mesh: TriangleMesh
     kept: IntArray
     given: TriangleMesh
-    sizes: FloatArray | float | None
+    sizes: FloatArray | None
     notes: tuple[str, ...]
 
     def moved(self, quads: QuadMesh) -> QuadMesh:
@@ -51,20 +48,30 @@ class CoarseInput:
 
         Vertices slide along the surface from a nearby vertex that both meshes have, so that they do not jump to another
         sheet. Those on the boundary and on sharp edges of the coarse mesh move to the nearest point on the boundary, or
-        on sharp edges within half the side of a quad. Of vertices at the same place, any may be taken.
+        on sharp edges within half the mean length of the edges there, of the same component.
         """
         mesh, surface, points = self.given, quads.surface, quads.vertices
+        label, part = mesh.components[1], surface.components[1]
         off, which = cKDTree(self.mesh.vertices).query(surface.vertices)
-        graph, common = vertex_graph(surface), np.flatnonzero(off == 0)
+        # Where components touch, the vertex found may be of another one; most are not.
+        is_common, there = off == 0, label[self.kept[which]]
+        votes = csr_matrix((is_common.astype(np.int64), (part, there)))
+        homes = np.asarray(votes.argmax(axis=1)).ravel()[part]
+        graph, common = vertex_graph(surface), np.flatnonzero(is_common & (there == homes))
         _, _, source = dijkstra(graph, indices=common, return_predecessors=True, min_only=True)
         corners = surface.faces[quads.faces, quads.barycentric.argmax(axis=1)]
         stars, start = Stars.of(mesh.vertices, mesh.faces), self.kept[which[source[corners]]]
         faces = stars.star[stars.start[start]]
         weights = (mesh.faces[faces] == start[:, None]).astype(np.float64)
         slide_near(stars, points, faces, weights)
-        side = np.sqrt(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum() / 2 / len(quads.quads))
-        sharp = edge_indices(mesh, sharp_ends(mesh)), side / 2
-        border = np.flatnonzero(mesh.is_boundary_edge), np.inf
+        # Components are moved apart, so that the nearest edge is one of the same, or out of reach.
+        apart = np.ptp(mesh.vertices, axis=0)
+        places = mesh.vertices + 2 * np.outer(label, apart)
+        wanted = points + 2 * np.outer(homes[corners], apart)
+        lengths = np.linalg.norm(np.diff(points[quads.edges], axis=1)[:, 0], axis=1)
+        half = np.bincount(quads.edges.ravel(), lengths.repeat(2)) / quads.valences / 2
+        sharp = edge_indices(mesh, sharp_ends(mesh)), half
+        border = np.flatnonzero(mesh.is_boundary_edge), np.full(len(points), np.linalg.norm(apart))
         is_on = is_on_feature(quads, sharp_ends(surface)), quads.is_boundary_vertex
         for moves, (edges, reach) in zip(is_on, (sharp, border), strict=True):
             if not (len(edges) and moves.any()):
@@ -72,11 +79,10 @@ class CoarseInput:
             halfedges = mesh.edge_halfedges[edges, 0]
             tails, heads = mesh.ends_of(halfedges)
             # Each edge is a triangle without area.
-            tree = TriangleTree(mesh.vertices, np.stack([tails, heads, heads], axis=1))
-            on, (share, *_) = (found.T for found in tree.nearest(points[moves]))
-            starts, ends = mesh.vertices[tails[on]], mesh.vertices[heads[on]]
-            near = ends + share[:, None] * (starts - ends)
-            within = np.linalg.norm(near - points[moves], axis=1) <= reach
+            tree = TriangleTree(places, np.stack([tails, heads, heads], axis=1))
+            on, (share, *_) = (found.T for found in tree.nearest(wanted[moves]))
+            near = places[heads[on]] + share[:, None] * (places[tails[on]] - places[heads[on]])
+            within = np.linalg.norm(near - wanted[moves], axis=1) <= reach[moves]
             at, halfedge, share = np.flatnonzero(moves)[within], halfedges[on[within]], share[within]
             faces[at], weights[at] = halfedge // 3, 0.0
             weights[at, np.take(NEXT, halfedge % 3)] = share
@@ -85,36 +91,28 @@ class CoarseInput:
         return replace(quads, vertices=moved, faces=faces, barycentric=weights, surface=mesh)
 
 
-def coarse_input(
-    mesh: Any, faces: Any, quads: float | None, size: Any, options: dict[str, Any]
-) -> CoarseInput | None:
-    """Return a coarse mesh for about `quads` quads; None if the given one has few triangles, or options refer to it.
+def coarse_input(search: GridSearch) -> CoarseInput | None:
+    """Return a coarse mesh for a grid; None if the given one has few triangles, or options refer to it.
 
     Raises:
         MeshError: the mesh cannot be flattened.
         OptionError: sizes are not positive numbers.
     """
-    length: float | None = float(size) if isinstance(size, Real) else None
-    # Invalid numbers and options are reported later. Weights, and options that are not simple values, name vertices.
+    # Weights, and options that are not simple values, name vertices. Required sharp edges are those of the given mesh.
+    quads, options = search.quads, {**search.options, "boundary": search.boundary}
     is_simple = all(one is None or isinstance(one, (str, Real)) or callable(one) for one in options.values())
     is_simple &= options.keys() <= declarations(QuadOptions).keys() - {"weights"}
-    numbers = [one for one in (quads, length) if one is not None]
-    if not is_simple or not all(isinstance(one, Real) and 0 < float(one) < np.inf for one in numbers):
+    is_simple &= search.sharp_angle is None and not isinstance(search.mesh, Flattening)
+    if not is_simple or (np.shape(search.source.given.faces) or (0,))[0] <= 2 * COARSE:
         return None
-    given = as_input(mesh, faces)
-    if isinstance(mesh, Flattening) or (np.shape(given.faces) or (0,))[0] <= 2 * COARSE:
+    checked, mesh = search.checked, search.checked.mesh
+    if search.size is not None:
+        area = float(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum()) / 2
+        quads = area / max(float(np.ldexp(search.size, checked.exponent)), np.finfo(float).tiny) ** 2
+    count = COARSE * max(1.0, quads / QUADS)
+    if len(mesh.faces) <= 2 * count:
         return None
-    checked = check_mesh(given.vertices, given.faces, repair=bool(options.get("repair", False)))
-    scaled = at_unit_size(checked)
-    area = float(double_areas(edge_lengths(scaled.mesh.vertices, scaled.mesh.faces)).sum()) / 2
-    if length is not None:
-        quads = area / max(float(np.ldexp(length, scaled.exponent)), np.finfo(float).tiny) ** 2
-    count = COARSE * max(1.0, (quads or QUADS) / QUADS)
-    if len(checked.mesh.faces) <= 2 * count:
-        return None
-    sizes = None if size is None or length else np.exp(-wanted_scales(mesh, faces, scaled, size))
-    coarse, kept, _ = coarse_mesh(scaled.mesh, int(count))
-    wanted = length if sizes is None else sizes[kept]
-    return CoarseInput(
-        coarse.moved_to(checked.mesh.vertices[kept]), kept, checked.mesh, wanted, checked.notes
-    )
+    coarse, kept, _ = coarse_mesh(mesh, int(count))
+    given = mesh.moved_to(np.ldexp(mesh.vertices, -checked.exponent))
+    sizes = None if search.scales is None else np.exp(-search.scales[kept])
+    return CoarseInput(coarse.moved_to(given.vertices[kept]), kept, given, sizes, checked.notes)

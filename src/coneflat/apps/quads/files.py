@@ -18,7 +18,7 @@ import numpy as np
 from ... import TriangleMesh, check_mesh
 from ...base import FloatArray, IntArray
 from ...errors import MeshError, MeshFileError
-from ...geometry import vertex_normals
+from ...geometry import sides_between, vertex_normals
 from ...io import (
     FOR_INDICES,
     FOR_VERTICES,
@@ -38,7 +38,8 @@ from ...io import (
     shading_normals,
     write_parts,
 )
-from .integer_map import IntegerGrid, grid_of_corners
+from .integer_map import IntegerGrid, grid_of_corners, on_lines
+from .layout import quarters_around
 from .nearest import TriangleTree
 from .quad_mesh import QuadMesh, least_jacobians
 
@@ -207,9 +208,12 @@ def _quad_mesh(reading: CheckedArrays) -> QuadMesh:
     report = reading.report()
     vertices, surface = reading.finite("vertices", (None, 3)), reading.finite("surface_vertices", (None, 3))
     faces = reading.indices("surface_faces", (None, 3), len(surface))
+    quads = reading.indices("quads", (None, 4), len(vertices))
+    if not len(quads):
+        raise MeshFileError(f"{reading.path} holds no mesh of quads: it has none")
     return QuadMesh(
         vertices=vertices,
-        quads=reading.indices("quads", (None, 4), len(vertices)),
+        quads=quads,
         faces=reading.indices("faces", (len(vertices),), len(faces)),
         barycentric=reading.finite("barycentric", (len(vertices), 3)),
         left_out=int(number(report["left_out"])),
@@ -339,6 +343,21 @@ def _require_mesh(path: Path, vertices: FloatArray, faces: IntArray) -> None:
         )
 
 
+def _require_lines(path: Path, grid: IntegerGrid) -> None:
+    """Raise MeshFileError unless corners are grid points with the given angles, and features edges on grid lines."""
+    mesh, corners, n = TriangleMesh(grid.vertices, grid.faces), grid.corners, len(grid.vertices)
+    quarters = quarters_around(mesh, sides_between(grid.corner_grid))[corners]
+    places = grid.corner_grid[np.isin(grid.faces, corners)]
+    is_twice = len(np.unique(corners)) < len(corners)
+    if is_twice or (quarters != grid.corner_quarters).any() or (places != np.rint(places)).any():
+        raise MeshFileError(
+            f"{path} holds no integer grid: its corners are not grid points with these angles"
+        )
+    known = mesh.edges[on_lines(mesh, grid.corner_grid)] @ [n, 1]
+    if not np.isin(np.sort(grid.features, axis=1) @ [n, 1], known).all():
+        raise MeshFileError(f"{path} holds no integer grid: its sharp edges are not edges on grid lines")
+
+
 def _grid_of_archive(reading: CheckedArrays) -> IntegerGrid:
     reading.need(_RESTORED, "integer grid")
     report = reading.report()
@@ -348,7 +367,7 @@ def _grid_of_archive(reading: CheckedArrays) -> IntegerGrid:
     numbers: dict[str, Any] = {name: float(number(report[name])) for name in _NUMBERS}
     corners = reading.indices("corners", (None,), n)
     _require_mesh(reading.path, vertices, faces)
-    return grid_of_corners(
+    grid = grid_of_corners(
         vertices,
         faces,
         reading.finite("corner_grid", (len(faces), 3, 2)),
@@ -358,3 +377,5 @@ def _grid_of_archive(reading: CheckedArrays) -> IntegerGrid:
         corner_quarters=reading.indices("corner_quarters", (len(corners),), None),
         features=reading.indices("features", (None, 2), n),
     )
+    _require_lines(reading.path, grid)
+    return grid

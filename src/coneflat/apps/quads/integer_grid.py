@@ -5,28 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from numbers import Real
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ... import Flattening, TriangleMesh, check_mesh, flatten
-from ...base import THREADS, Progress, Stopwatch, limit_threads, plural, unit_exponent
-from ...errors import (
-    ConvergenceError,
-    CurvatureError,
-    GridError,
-    MetricError,
-    OptionError,
-    SeamError,
-)
+from ... import Flattening, TriangleMesh, flatten
+from ...base import THREADS, FloatArray, Stopwatch, limit_threads, plural
+from ...errors import ConvergenceError, CurvatureError, GridError, MetricError, OptionError, SeamError
+from ...flatten import flatten_source
 from ...geometry import double_areas, edge_lengths
 from ...io import as_input
 from ...layout import StretchEnergy
 from ...measure import unmet_guarantees
 from ...mesh import CheckedMesh
-from ...options import SEARCH_OPTIONS, WordOrVertices, read_options
+from ...options import SEARCH_OPTIONS, Options, WordOrVertices, read_options
+from ...source import Source
 from .aligned_cones import COARSE, aligned_cones
 from .cross_field import SHARP_ANGLE, sharp_ends
 from .features import split_all, split_chords, split_small_components
@@ -117,23 +111,8 @@ def integer_grid(
         >>> grid.corners, grid.corner_quarters
         (array([0, 1, 2, 3]), array([1, 1, 1, 1]))
     """
-    length, sizes = (size, None) if isinstance(size, Real) else (None, size)
-    wanted, name = (length, "size") if length is not None else (QUADS if quads is None else quads, "quads")
-    if quads is not None and length is not None:
-        raise OptionError("quads and size must not be given together")
-    if not (isinstance(wanted, Real) and 0 < wanted < np.inf):
-        raise OptionError(f"{name} must be a positive number, not {wanted!r}")
-    progress = options.pop("progress", None)
-    stages = Stopwatch(progress)
-    energy, angle = StretchEnergy(stretch), read_options({"sharp_angle": sharp_angle}).sharp_angle
-    search = _Search(mesh, faces, quads or QUADS, length, energy, options, progress, stages, sizes, angle)
-    if isinstance(mesh, Flattening):
-        if any(one is not None for one in (faces, sizes, sharp_angle)) or options:
-            raise OptionError("a flattening already has faces and options: no others can be given")
-        found = search.of_result(mesh)
-    else:
-        found = search.with_more_cones(options.pop("boundary", "auto"))
-    return replace(found, seconds=stages.seconds)
+    own = {"quads": quads, "size": size, "stretch": stretch, "sharp_angle": sharp_angle}
+    return GridSearch.of(mesh, faces, own, options).grid()
 
 
 def _defaults(options: Mapping[str, Any]) -> dict[str, Any]:
@@ -159,48 +138,89 @@ def _defaults(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Search:
-    """The search for a grid; attributes are the arguments of `integer_grid` and a stopwatch."""
+class GridSearch:
+    """The search for a grid.
 
-    mesh: Any
-    faces: ArrayLike | None
+    Attributes:
+        mesh: the mesh, or a flattening of it.
+        quads, size: the number of squares; or their side in model units, which replaces it.
+        sizes: relative sizes of squares, or None.
+        energy: the energy of the grid.
+        sharp_angle: the dihedral angle of edges required on grid lines, or None.
+        boundary: the option of that name of `integer_grid`.
+        options: the other options, those of the flattening.
+        stages: the stopwatch.
+    """
+
+    mesh: Source | Flattening
     quads: float
     size: float | None
+    sizes: Any
     energy: StretchEnergy
-    options: dict[str, Any]
-    progress: Progress | None
+    sharp_angle: float | None
+    boundary: Any
+    options: Mapping[str, Any]
     stages: Stopwatch
-    sizes: Any = None
-    sharp_angle: float | None = None
 
-    def with_more_cones(self, boundary: Any) -> IntegerGrid:
-        """Return a grid for the option `boundary`, with less distortion if there is none as given.
+    @classmethod
+    def of(
+        cls, mesh: Any, faces: ArrayLike | None, own: Mapping[str, Any], options: Mapping[str, Any]
+    ) -> GridSearch:
+        """Return the search for arguments of `integer_grid`; `own` are its named options.
+
+        Raises:
+            OptionError: options are invalid.
+            MeshError, MeshFileError: the mesh cannot be read.
+        """
+        o = read_options(own, QuadOptions)
+        length, sizes = (o.size, None) if isinstance(o.size, float) else (None, o.size)
+        if o.quads is not None and length is not None:
+            raise OptionError("quads and size must not be given together")
+        boundary = options.get("boundary", "auto")
+        is_auto = isinstance(boundary, str) and boundary == "auto"
+        rest = {name: one for name, one in options.items() if name != "boundary"}
+        shared = {"sharp_angle": o.sharp_angle, "boundary": "free" if is_auto else boundary}
+        parsed = read_options({**_defaults(options), **rest, **shared}, Options)
+        stages = Stopwatch(parsed.progress)
+        if isinstance(mesh, Flattening):
+            if any(one is not None for one in (faces, sizes, o.sharp_angle)) or options.keys() - {"progress"}:
+                raise OptionError("a flattening already has faces and options: no others can be given")
+        else:
+            mesh = Source(as_input(mesh, faces))
+        energy, boundary = StretchEnergy(o.stretch), "auto" if is_auto else parsed.boundary
+        return cls(mesh, o.quads or QUADS, length, sizes, energy, o.sharp_angle, boundary, rest, stages)
+
+    def grid(self) -> IntegerGrid:
+        """Return the grid, with the time of each stage; errors are those of `integer_grid`."""
+        self.stages.done = 0.0
+        found = self.of_result(self.mesh) if isinstance(self.mesh, Flattening) else self.with_more_cones()
+        return replace(found, seconds=self.stages.seconds)
+
+    def with_more_cones(self) -> IntegerGrid:
+        """Return a grid, with less distortion if there is none as given.
 
         Where few cones leave rotations around handles far from quarter turns, more cones help.
         """
         given = self.options
         is_searched = isinstance(given.get("cones", "auto"), str) and not given.get("cone_count")
         try:
-            return self.with_boundary(boundary)
+            return self._as_given()
         except (ConvergenceError, GridError):
             if not is_searched:
                 raise
         less = 0.7 * given.get("distortion", DISTORTION)
         search = replace(self, options={**given, "distortion": less})
         note = f"With a distortion above {less:.3g}, no grid was found."
-        return with_note(search.with_boundary(boundary), note)
+        return with_note(search._as_given(), note)
 
-    def with_boundary(self, boundary: Any) -> IntegerGrid:
-        """Return a grid for the option `boundary` of `integer_grid`."""
-        if not self._may_align(boundary):
+    def _as_given(self) -> IntegerGrid:
+        """Return a grid for the options as given."""
+        if not self._may_align():
             if self.sizes is not None:
-                raise OptionError(
-                    "relative sizes need cones and a boundary that are found automatically: leave out size, or the "
-                    "other options"
-                )
-            return self._with_fewest_cones(boundary)
-        if self._checked.mesh.components[0] > 1:
-            return self._of_components(boundary)
+                raise OptionError("relative sizes need cones and boundaries 'auto': leave out other options")
+            return self._with_fewest_cones()
+        if self.checked.mesh.components[0] > 1:
+            return self._of_components()
         what = "sharp edges or curvature" if self.sizes is None else "sharp edges, curvature or wanted sizes"
         for is_finer in (False, True):
             try:
@@ -208,11 +228,11 @@ class _Search:
             except (ConvergenceError, CurvatureError, GridError, MetricError, SeamError) as error:
                 note = f"Quads follow no {what}, because no grid with such cones was found: {error}."
             # Meshes of more triangles have places enough for cones.
-            if 2 * len(self._checked.mesh.faces) > COARSE:
+            if 2 * len(self.checked.mesh.faces) > COARSE:
                 break
-        return with_note(self._with_fewest_cones(boundary), note)
+        return with_note(self._with_fewest_cones(), note)
 
-    def _of_components(self, boundary: Any) -> IntegerGrid:
+    def _of_components(self) -> IntegerGrid:
         """Return the grid of the components, each with a search of its own.
 
         One that needs a finer grid, or that has none, thus does not change those of the others. On human.obj, five
@@ -221,11 +241,9 @@ class _Search:
         Raises:
             GridError: no component has a grid.
         """
-        checked, found, why = self._checked, list[IntegerGrid](), list[str]()
+        checked, found, why = self.checked, list[IntegerGrid](), list[str]()
         mesh, grow = checked.mesh, np.exp2(-checked.exponent)
-        scales = np.zeros(len(mesh.vertices))
-        if self.sizes is not None:
-            scales = wanted_scales(self.mesh, self.faces, checked, self.sizes)
+        scales = np.zeros(len(mesh.vertices)) if self.scales is None else self.scales
         areas = double_areas(edge_lengths(mesh.vertices, mesh.faces))
         of_face = scales[mesh.faces].mean(axis=1)
         size = self.size or grow * float(np.sqrt(areas.sum() / 2 / self.quads))
@@ -235,32 +253,31 @@ class _Search:
             mean = np.average(of_face[faces], weights=areas[faces]) - np.average(of_face, weights=areas)
             search = replace(
                 self,
-                mesh=grow * part.vertices,
-                faces=part.faces,
+                mesh=Source(as_input(grow * part.vertices, part.faces)),
                 size=size * float(np.exp(-mean)),
                 sizes=None if self.sizes is None else np.exp(-scales[vertices]),
             )
             try:
-                found.append(search.with_more_cones(boundary))
+                found.append(search.with_more_cones())
             except (ConvergenceError, CurvatureError, GridError, MetricError, SeamError) as error:
                 why.append(f"Left out a component of {plural(len(part.faces), 'triangle')}: {error}.")
         if not found:
             raise GridError(f"no grid was found for any of {mesh.components[0]} components: {why[0]}")
         return joined_grids(found, (*checked.notes, *why))
 
-    def _may_align(self, boundary: Any) -> bool:
+    def _may_align(self) -> bool:
         """Return whether the options leave open which cones a grid has."""
         cones = self.options.get("cones", "auto")
         if not (isinstance(cones, str) and cones == "auto") or any(n in self.options for n in SPARSE_OPTIONS):
             return False
-        return boundary in ("auto", "straight") or not self._checked.mesh.is_boundary_edge.any()
+        return self.boundary in ("auto", "straight") or not self.checked.mesh.is_boundary_edge.any()
 
     def _of_aligned_cones(self, is_finer: bool) -> IntegerGrid:
         """Return a grid of a connected mesh whose cones are chosen for even sizes and its directions.
 
         is_finer: split all edges, for more places for cones and smaller triangles between them.
         """
-        checked, options = self._checked, read_options(self.options, QuadOptions)
+        checked, options = self.checked, read_options(self.options, QuadOptions)
         mesh, notes = checked.mesh, list(checked.notes)
         for split, note, noun in (*[EVERY] * is_finer, FEW_VERTICES, CHORDS):
             mesh, count = split(mesh)
@@ -272,8 +289,7 @@ class _Search:
             int(np.ceil((2 * np.pi - (options.max_cone_angle or np.inf)) / (np.pi / 2) - GRID_TOLERANCE)),
             int(np.floor((2 * np.pi - options.min_cone_angle) / (np.pi / 2) + GRID_TOLERANCE)),
         )
-        asked = None if self.sizes is None else wanted_scales(self.mesh, self.faces, checked, self.sizes)
-        scales = None if asked is None else extended(asked, mesh)
+        scales = None if self.scales is None else extended(self.scales, mesh)
         area = float(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum()) / 2
         quads = area / np.ldexp(self.size, checked.exponent) ** 2 if self.size else self.quads
         price = max(1.0, QUADS_PER_CONE / quads)
@@ -286,16 +302,16 @@ class _Search:
             given["boundary"] = "straight"
         with self.stages("flatten"):
             vertices = np.ldexp(mesh.vertices, -checked.exponent)
-            result = flatten(vertices, mesh.faces, **given, progress=self.progress)
+            result = flatten(vertices, mesh.faces, **given)
         grid = self._with_notes(replace(result, notes=(*notes, *result.notes)), True, True)
-        return grid if asked is None else with_note(grid, note_on_sizes(grid, asked))
+        return grid if self.scales is None else with_note(grid, note_on_sizes(grid, self.scales))
 
-    def _with_fewest_cones(self, boundary: Any) -> IntegerGrid:
-        """Return a grid with the fewest cones for the option `boundary` of `integer_grid`."""
-        if boundary != "auto":
-            return self._of_flattening(boundary)
+    def _with_fewest_cones(self) -> IntegerGrid:
+        """Return a grid with the fewest cones."""
+        if self.boundary != "auto":
+            return self._of_flattening(self.boundary)
         may_be_straight = isinstance(self.options.get("cones", "auto"), str)
-        if not (may_be_straight and self._checked.mesh.is_boundary_edge.any()):
+        if not (may_be_straight and self.checked.mesh.is_boundary_edge.any()):
             return self._of_flattening("free")
         try:
             return self._of_flattening("straight", all_sides=True)
@@ -303,13 +319,21 @@ class _Search:
             why = f"The boundary cuts squares, because no grid with the boundary on grid lines was found: {error}."
         return with_note(self._of_flattening("free"), why)
 
+    @property
+    def checked(self) -> CheckedMesh:
+        """The checked mesh, at about unit size."""
+        return self.source.checked(bool(self.options.get("repair", False)))
+
     @cached_property
-    def _checked(self) -> CheckedMesh:
-        given, repair = as_input(self.mesh, self.faces), bool(self.options.get("repair", False))
-        checked = check_mesh(given.vertices, given.faces, repair=repair)
-        exponent = -unit_exponent(checked.mesh.vertices)
-        mesh = checked.mesh.moved_to(np.ldexp(checked.mesh.vertices, exponent))
-        return replace(checked, mesh=mesh, exponent=exponent)
+    def scales(self) -> FloatArray | None:
+        """(n,) the wanted log scale at the vertices of the checked mesh, if relative sizes are given."""
+        return None if self.sizes is None else wanted_scales(self.source, self.checked, self.sizes)
+
+    @property
+    def source(self) -> Source:
+        """The mesh, if no flattening is given."""
+        assert isinstance(self.mesh, Source)
+        return self.mesh
 
     def _of_flattening(self, boundary: Any, all_sides: bool = False) -> IntegerGrid:
         """Return the grid of a flattening with a boundary; `all_sides` requires all straight sides on grid lines.
@@ -319,9 +343,8 @@ class _Search:
         """
         options = {**self.options, "boundary": boundary}
         self.stages.done = 0.0
-        given = {**_defaults(options), **options, "progress": self.progress}
         with self.stages("flatten"):
-            result = flatten(self.mesh, self.faces, **given)
+            result = flatten_source(self.source, read_options({**_defaults(options), **options}))
         return self._with_notes(result, all_sides)
 
     def _with_notes(self, result: Flattening, all_sides: bool, sharp_lines: bool = False) -> IntegerGrid:

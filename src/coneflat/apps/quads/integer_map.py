@@ -207,9 +207,12 @@ def joined_grids(grids: Sequence[IntegerGrid], notes: Sequence[str]) -> IntegerG
 
 def _between_sides(mesh: TriangleMesh, corner_grid: FloatArray) -> BoolArray:
     """Return (n,) whether each vertex is on the boundary and both boundary edges there are on grid lines."""
-    border = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
-    starts, ends = (corner_grid[:, which].reshape(-1, 2)[border] for which in (NEXT, PREVIOUS))
-    is_on = ((starts == ends) & (starts == np.rint(starts))).any(axis=1)
-    lines = np.zeros(len(mesh.vertices), dtype=np.int64)
-    np.add.at(lines, mesh.edges[mesh.is_boundary_edge].ravel(), np.repeat(is_on, 2))
-    return lines == 2
+    sides = mesh.edges[mesh.is_boundary_edge & on_lines(mesh, corner_grid)]
+    return np.bincount(sides.ravel(), minlength=len(mesh.vertices)) == 2
+
+
+def on_lines(mesh: TriangleMesh, corner_grid: FloatArray) -> BoolArray:
+    """Return (e,) whether each edge is on a grid line."""
+    one = mesh.edge_halfedges[:, 0]
+    starts, ends = (corner_grid[:, which].reshape(-1, 2)[one] for which in (NEXT, PREVIOUS))
+    return ((starts == ends) & (starts == np.rint(starts))).any(axis=1)

@@ -20,7 +20,7 @@ from ...options import (
     WordOrVertices,
     option,
     strength,
-)
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -75,10 +75,10 @@ class QuadOptions(ConeNumber, ConeBounds, RunOptions):
     """
 
     distortion: float = option(DISTORTION, Number(is_positive=True))
-    quads: int | None = option(None, COUNT)
+    quads: int | None = option(None, Number(1, is_integer=True, optional=True))
     size: ArrayLike | None = option(None, Sizes(is_positive=True, optional=True))
     stretch: float = option(0.3, strength(1))
-    smooth: int = option(ROUNDS, COUNT)
+    smooth: int = option(ROUNDS, Number(0, is_integer=True))
     sharp_angle: float | None = option(None, ANGLE_OR_NONE)
     cones: str | Mapping[int, float] = option(
         "auto", WordOrVertices(("auto", "sparse"), "cone"), one_mesh=True

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
-from numbers import Real
 from typing import Any
 
 from numpy.typing import ArrayLike
 
+from ... import Flattening
 from ...base import Stopwatch, plural
 from ...errors import OptionError
 from ...io import as_input
+from ...options import read_options
+from ...source import Source
 from .coarse_input import coarse_input
 from .cross_field import sharp_ends
 from .extract import extract_quads, with_borders
-from .integer_grid import integer_grid
+from .integer_grid import GridSearch
 from .integer_map import IntegerGrid
 from .options import DISTORTION, ROUNDS, QuadOptions
 from .quad_mesh import CoarseGridError, QuadMesh, least_jacobians
@@ -64,42 +65,42 @@ def quads(
         >>> mesh.quads.shape, mesh.vertices.shape
         ((9, 4), (16, 3))
     """
-    is_given = isinstance(mesh, IntegerGrid)
-    stages, stated = Stopwatch(options.get("progress")), (faces, quads, size, sharp_angle)
-    if is_given and (any(one is not None for one in stated) or options.keys() - {"progress"}):
-        raise OptionError("a grid already has faces, size and options: no others can be given")
-    source = None if is_given else as_input(mesh, faces).source
-    mesh = mesh if source is None else source
-    with stages("coarsen"):
-        # Sharp edges that are required are those of the given mesh.
-        is_exact = is_given or sharp_angle is not None
-        small = None if is_exact else coarse_input(mesh, faces, quads, size, options)
-    if small is not None:
-        mesh, faces, size = small.mesh.vertices, small.mesh.faces, small.sizes
-    search = partial(integer_grid, mesh, faces, stretch=stretch, sharp_angle=sharp_angle, **options)
-    grid, coarse = mesh if is_given else search(quads=quads, size=size), list[str]()
-    if not isinstance(size, Real):
-        search = partial(search, size=size)
+    own = {"quads": quads, "size": size, "stretch": stretch, "sharp_angle": sharp_angle, "smooth": smooth}
+    small, search, source, most, coarse = None, None, None, 0, tuple[str, ...]()
+    if isinstance(mesh, IntegerGrid):
+        if any(one is not None for one in (faces, quads, size, sharp_angle)) or options.keys() - {"progress"}:
+            raise OptionError("a grid already has faces, size and options: no others can be given")
+        read_options(own, QuadOptions)
+        grid, stages = mesh, Stopwatch(options.get("progress"))
+    else:
+        search = GridSearch.of(mesh, faces, own, options)
+        is_fixed = isinstance(mesh, Flattening) or bool(options.keys() & {"cones", "distortion"})
+        is_fixed |= search.sizes is not None or sharp_angle is not None
+        stages, most = search.stages, FINER_TRIES + (not is_fixed)
+        source = mesh.source if isinstance(mesh, Flattening) else search.source.given.source
+        with stages("coarsen"):
+            small = coarse_input(search)
+        if small is not None:
+            search = replace(search, mesh=Source(as_input(small.mesh)), sizes=small.sizes)
+        grid = search.grid()
     # Where the surface is as thin as a square, quads have a vertex twice. Then 1.6 times as many quads are tried, at
     # most twice. If that does not help, these quads are left out.
-    is_relative = not (size is None or isinstance(size, Real))
-    is_fixed = is_relative or sharp_angle is not None or bool(options.keys() & {"cones", "distortion"})
-    most = 0 if is_given else FINER_TRIES + (not is_fixed)
     for retries in range(most, -1, -1):
         stages.done = 1.0
         try:
             with stages("extract"):
-                found = extract_quads(grid, leave_out=not (is_given or retries))
+                found = extract_quads(grid, leave_out=not (search is None or retries))
             break
         except CoarseGridError:
-            if not retries:
+            if search is None or not retries:
                 raise
-            coarse.append("More quads than wanted: with fewer, some have a vertex or an edge twice.")
-            finer = 1.6
+            coarse, finer = ("More quads than wanted: with fewer, some have a vertex or an edge twice.",), 1.6
             if retries == FINER_TRIES + 1:
                 # The fewest cones need the least room.
-                search, finer = partial(search, cones="sparse", distortion=2 * DISTORTION), 1.0
-            grid = search(quads=finer * grid.squares)
+                sparse = {"cones": "sparse", "distortion": 2 * DISTORTION}
+                search, finer = replace(search, options={**search.options, **sparse}), 1.0
+            search = replace(search, quads=finer * grid.squares, size=None)
+            grid = search.grid()
     found = with_borders(found) if found.left_out else found
     features = grid.features
     with stages("smooth"):
@@ -110,13 +111,7 @@ def quads(
             found = untangled(found)
     return replace(
         found,
-        notes=(
-            *(() if small is None else small.notes),
-            *grid.notes,
-            *coarse[:1],
-            *found.notes,
-            *_notes(found),
-        ),
+        notes=(*(() if small is None else small.notes), *grid.notes, *coarse, *found.notes, *_notes(found)),
         seconds={**grid.seconds, **stages.seconds},
         grid=grid,
         source=source,

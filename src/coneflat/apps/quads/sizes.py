@@ -10,26 +10,20 @@ from scipy.sparse import csr_matrix
 from ... import TriangleMesh
 from ...base import FloatArray
 from ...errors import OptionError
-from ...geometry import (
-    double_areas,
-    edge_lengths,
-    mollify,
-    signed_double_areas,
-)
-from ...io import as_input
+from ...geometry import double_areas, edge_lengths, mollify, signed_double_areas
 from ...measure import quantile
 from ...mesh import CheckedMesh
-from ...source import vertex_numbers
+from ...source import Source, vertex_numbers
 from .cross_field import CURVATURE_SCALE, curvature_tensors, diffused
 from .features import vertex_graph
 from .integer_map import IntegerGrid
 
 
-def wanted_scales(mesh: Any, faces: Any, checked: CheckedMesh, sizes: Any) -> FloatArray:
+def wanted_scales(source: Source, checked: CheckedMesh, sizes: Any) -> FloatArray:
     """Return (n,) the wanted log scale of a flattening at the vertices of a checked mesh: minus the log of the sizes.
 
     Args:
-        mesh, faces: the input.
+        source: the input.
         checked: the same, checked.
         sizes: relative sizes of quads, one for each vertex of the input or the name of a vertex property; or
             "curvature".
@@ -39,7 +33,7 @@ def wanted_scales(mesh: Any, faces: Any, checked: CheckedMesh, sizes: Any) -> Fl
     """
     if isinstance(sizes, str) and sizes == "curvature":
         return _scales_of_curvature(checked.mesh)
-    found = vertex_numbers("sizes", sizes, as_input(mesh, faces), checked.vertex_origin)
+    found = vertex_numbers("sizes", sizes, source.given, checked.vertex_origin)
     if found is None or not found.min() > 0:
         raise OptionError("sizes must be positive; there are some of 0")
     return -np.log(found)

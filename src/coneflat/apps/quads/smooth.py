@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from numbers import Integral
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base import BoolArray, FloatArray, IntArray, dots
-from ...errors import OptionError
+from ...options import declarations
 from .cross_field import SHARP_ANGLE
 from .features import edge_indices, sharp_edges
 from .nearest import Stars, slide_near
-from .options import ROUNDS
+from .options import ROUNDS, QuadOptions
 from .quad_mesh import QuadMesh, least_jacobians
 
 # Least scaled Jacobian: no quad falls below it, and quads that are below it do not get worse.
@@ -34,14 +33,13 @@ def smooth_quads(quads: QuadMesh, rounds: int = ROUNDS, features: ArrayLike = ()
         features: (f, 2) vertices of further edges of the surface on which vertices do not move.
 
     Raises:
-        OptionError: the number of rounds is negative.
+        OptionError: the number of rounds is not an integer, 0 or more.
 
     References:
         S. Bouaziz, M. Deuss, Y. Schwartzburg, T. Weise, M. Pauly, "Shape-Up: shaping discrete geometry with
         projections", 2012, Section 4.
     """
-    if not isinstance(rounds, Integral) or rounds < 0:
-        raise OptionError(f"rounds of smoothing must be an integer, 0 or more, not {rounds!r}")
+    rounds = declarations(QuadOptions)["smooth"].kind.parse("rounds", rounds)
     movable = ~(
         quads.is_boundary_vertex | is_on_feature(quads, np.asarray(features, dtype=np.int64).reshape(-1, 2))
     )

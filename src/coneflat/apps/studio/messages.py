@@ -27,11 +27,12 @@ CONTROLS = {
     "resolution": "Texels per side", "padding": "Texels between charts",
     "texel_density": "Texels per unit of length", "max_energy": "Energy at most", "repair": "Repair the mesh", **MORE,
 }  # fmt: skip
-#: A flag, or the name of an option; names that are ordinary words count at the beginning of a message only.
+#: A flag, or the name of an option. Names that are ordinary words count at the beginning of a message, with or without
+#: a value, and as the second of two options.
 _NAMED = re.compile(
     r"--(?P<flag>[a-z]+(?:-[a-z]+)*)(?: (?:greedy|exact|linear)\b)?"
     rf"|\b(?P<name>{'|'.join(name for name in CONTROLS if '_' in name)})\b"
-    rf"|\A(?P<first>{'|'.join(CONTROLS)})(?= (?:must|cannot|is|needs)\b)"
+    rf"|(?:\A|(?<= and ))(?P<first>{'|'.join(CONTROLS)})(?=(?: none| mirrored| '\w+')? (?:and|must|cannot|is|needs)\b)"
 )
 
 

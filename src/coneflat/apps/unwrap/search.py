@@ -20,13 +20,12 @@ from ...base import BoolArray, FloatArray, IntArray
 from ...cones import close_search, find_cones
 from ...errors import CurvatureError, MetricError
 from ...flatten import Method, lay_out_once
-from ...geometry import double_areas, find_overlaps, signed_double_areas
+from ...geometry import coarse_mesh, double_areas, edge_lengths, find_overlaps, mollify, signed_double_areas
 from ...layout import lay_out
 from ...mesh import label_faces, open_along
 from ...seams import seam_costs, without_loose_ends
 from ...source import Part
 from ...stages import ConeSpec, Cut, Layout, Surface, VertexCurvatures
-from .coarse import coarse_part
 from .free import freed, recut, seam_edges, triangle_energies
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .tips import RINGS, find_tips, moved_tips, moves_for
@@ -394,3 +393,31 @@ def separate_charts(layout: Layout, costs: FloatArray, part: Part) -> Layout:
     return with_charts(
         layout, ChartLayout(layout.points, layout.corners, layout.chart).split(label).renumbered()
     )
+
+
+def coarse_part(part: Part, count: int) -> tuple[Part, IntArray]:
+    """Return a part with about `count` triangles, and (k,) the vertices of the given part that it keeps."""
+    coarse, kept, faces = coarse_mesh(part.mesh, count)
+    own = edge_lengths(coarse.vertices, coarse.faces)
+    seams, none = part.seams, np.zeros(len(coarse.edges), dtype=bool)
+    return Part(
+        coarse,
+        part.vertices[kept],
+        faces,
+        mollify(own)[0],
+        double_areas(own),
+        replace(
+            part.cones,
+            is_allowed=part.cones.is_allowed[kept],
+            absorbs_curvature=part.cones.absorbs_curvature[kept],
+            names=part.cones.names[kept],
+        ),
+        replace(part.metric, keeps_length=part.metric.keeps_length[kept], names=part.metric.names[kept]),
+        replace(
+            seams,
+            visibility=None if seams.visibility is None else seams.visibility[kept],
+            weights=None if seams.weights is None else seams.weights[kept],
+            is_avoided=none,
+            is_forbidden=none,
+        ),
+    ), kept

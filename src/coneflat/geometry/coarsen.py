@@ -1,50 +1,20 @@
-"""Coarse meshes on which cuts are searched: edges collapse to one of their ends."""
+"""Simplification of meshes: edges collapse to one of their ends."""
 
 from __future__ import annotations
 
 import heapq
-from dataclasses import replace
 
 import numpy as np
 
-from ... import TriangleMesh
-from ...base import BoolArray, FloatArray, IntArray, compiled
-from ...geometry import double_areas, edge_lengths, mollify
-from ...mesh import tie_key
-from ...source import Part
+from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..base.jit import compiled
+from ..mesh.connectivity import TriangleMesh
+from ..mesh.ties import tie_key
 
 # Cosine of the largest rotation of a triangle by a collapse; the double area of a triangle, relative to half the sum of
 # its squared sides, below which its normal is not considered; and the weight of the length of an edge in its cost:
 # lengths decide where the surface is flat.
 MAX_ROTATION, MIN_SHAPE, LENGTH_WEIGHT = 0.2, 0.1, 0.1
-
-
-def coarse_part(part: Part, count: int) -> tuple[Part, IntArray]:
-    """Return a part with about `count` triangles, and (k,) the vertices of the given part that it keeps."""
-    coarse, kept, faces = coarse_mesh(part.mesh, count)
-    own = edge_lengths(coarse.vertices, coarse.faces)
-    seams, none = part.seams, np.zeros(len(coarse.edges), dtype=bool)
-    return Part(
-        coarse,
-        part.vertices[kept],
-        faces,
-        mollify(own)[0],
-        double_areas(own),
-        replace(
-            part.cones,
-            is_allowed=part.cones.is_allowed[kept],
-            absorbs_curvature=part.cones.absorbs_curvature[kept],
-            names=part.cones.names[kept],
-        ),
-        replace(part.metric, keeps_length=part.metric.keeps_length[kept], names=part.metric.names[kept]),
-        replace(
-            seams,
-            visibility=None if seams.visibility is None else seams.visibility[kept],
-            weights=None if seams.weights is None else seams.weights[kept],
-            is_avoided=none,
-            is_forbidden=none,
-        ),
-    ), kept
 
 
 def coarse_mesh(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntArray, IntArray]:

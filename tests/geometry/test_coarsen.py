@@ -1,0 +1,50 @@
+"""Simplified meshes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+from scipy.spatial import cKDTree
+
+from coneflat import TriangleMesh, check_mesh
+from coneflat.geometry import coarse_mesh
+
+
+@pytest.fixture
+def sphere() -> TriangleMesh:
+    return check_mesh(*shapes.sphere(4)).mesh
+
+
+def test_the_number_of_triangles_is_reached(sphere: TriangleMesh):
+    coarse, kept, faces = coarse_mesh(sphere, 1_000)
+    assert len(coarse.faces) == len(faces) == 1_000
+    assert np.array_equal(coarse.vertices, sphere.vertices[kept])
+
+
+def test_the_topology_stays():
+    for vertices, faces in (shapes.torus(48, 24), shapes.grid(30, 30)):
+        mesh = check_mesh(vertices, faces).mesh
+        coarse, _, _ = coarse_mesh(mesh, 300)
+        assert len(coarse.faces) <= 300
+        assert coarse.genus() == mesh.genus()
+        assert coarse.boundary_loops[0] == mesh.boundary_loops[0]
+        assert coarse.components[0] == 1
+
+
+def test_the_surface_stays(sphere: TriangleMesh):
+    coarse, _, _ = coarse_mesh(sphere, 1_000)
+    centres = coarse.vertices[coarse.faces].mean(axis=1)
+    fine = sphere.vertices[sphere.faces].mean(axis=1)
+    assert cKDTree(fine).query(centres)[0].max() < 0.06
+    corners = [each.vertices[each.faces].transpose(1, 0, 2) for each in (coarse, sphere)]
+    volumes = [np.linalg.det(np.stack(each, axis=1)).sum() for each in corners]
+    assert volumes[0] == pytest.approx(volumes[1], rel=0.02)
+
+
+def test_renumbering_changes_nothing(sphere: TriangleMesh):
+    order = np.random.default_rng(1).permutation(len(sphere.vertices))
+    place = np.argsort(order)
+    shuffled = TriangleMesh(sphere.vertices[order], place[sphere.faces][::-1])
+    one, two = (coarse_mesh(each, 500)[0].vertices for each in (sphere, shuffled))
+    assert np.array_equal(one[np.lexsort(one.T)], two[np.lexsort(two.T)])
