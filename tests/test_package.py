@@ -115,7 +115,7 @@ def test_examples_of_public_names_run(name, tmp_path, monkeypatch):
     "call",
     [
         lambda result: coneflat.quads(coneflat.sample_path(), quads=set()),
-        lambda result: coneflat.quads(coneflat.sample_path(), quads=300, smooth=2.5),
+        lambda result: coneflat.quads(result.vertices, result.faces, quads=30, smooth=2.5),
         lambda result: coneflat.integer_grid(result, stretch="x"),
         lambda result: result.as_written(np.array([])),
         lambda result: coneflat.measure_uv(1j, 2, 3),

@@ -126,7 +126,8 @@ def test_a_sphere_needs_enough_cones():
 
 
 def test_more_cones_are_no_worse():
-    energies = [sparse(*shapes.sphere(3), count=count).distortion for count in range(3, 9)]
+    search = search_on(*SHAPES["sphere"])
+    energies = [search.best_of(count).distortion for count in range(3, 9)]
     assert (np.diff(energies) < 0).all()
 
 

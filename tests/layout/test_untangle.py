@@ -79,19 +79,25 @@ WILD = {
 }
 
 
+@pytest.fixture(scope="module", params=WILD)
+def untangled(request):
+    """The result of a wild mesh in one chart, and the patches that were untangled for it."""
+    seen = []
+
+    def watched(flat, faces, angles, on_boundary, stays, rest):
+        result = untangle(flat, faces, angles, on_boundary, stays, rest)
+        seen.append((result, faces, angles, flat, on_boundary))
+        return result
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(import_module("coneflat.layout.lay_out"), "untangle", watched)
+        return coneflat.flatten(*WILD[request.param], charts="one"), seen
+
+
 class TestWinding:
-    @pytest.mark.parametrize("name", WILD)
-    def test_no_untangled_patch_winds_around_a_vertex(self, name, monkeypatch):
+    def test_no_untangled_patch_winds_around_a_vertex(self, untangled):
         """Where it would, triangles stay upside down, and are named."""
-        seen = []
-
-        def watched(flat, faces, angles, on_boundary, stays, rest):
-            result = untangle(flat, faces, angles, on_boundary, stays, rest)
-            seen.append((result, faces, angles, flat, on_boundary))
-            return result
-
-        monkeypatch.setattr(import_module("coneflat.layout.lay_out"), "untangle", watched)
-        coneflat.flatten(*WILD[name])
+        _, seen = untangled
         assert seen
         for result, faces, angles, before, on_boundary in seen:
             for vertex in np.setdiff1d(
@@ -101,9 +107,8 @@ class TestWinding:
                 if heights(sides).min() > DEGENERATE_HEIGHT:
                     assert total_angle(result.flat, faces, vertex) == pytest.approx(angles[vertex], abs=1e-6)
 
-    @pytest.mark.parametrize("name", WILD)
-    def test_the_residual_is_that_of_the_layout(self, name):
-        result = coneflat.flatten(*WILD[name], charts="one")
+    def test_the_residual_is_that_of_the_layout(self, untangled):
+        result, _ = untangled
         inner = inside(result)
         np.testing.assert_allclose(
             result.curvature_residual[inner], (angle_sums(result) - 2 * np.pi)[inner], atol=1e-7
@@ -135,7 +140,7 @@ class TestWinding:
 
 class TestFreeSeams:
     @pytest.mark.parametrize(
-        "mesh", [spikes(17, 1.0, 2), stretched(shapes.torus(30, 12), 60), stretched(shapes.sphere(3), 100)]
+        "mesh", [spikes(11, 1.0, 2), stretched(shapes.torus(30, 12), 60), stretched(shapes.sphere(3), 100)]
     )
     def test_what_has_no_room_is_upright_at_the_expense_of_seams(self, mesh):
         result = coneflat.flatten(*mesh, charts="one")
@@ -178,12 +183,12 @@ class TestPrescribed:
         result = coneflat.flatten(points * [9, 7, 1], faces, boundary=[0, 1, 2])
         assert np.abs(result.curvature_residual[is_upright(result)]).max() < 1e-9
 
-    @pytest.mark.parametrize("noise", [0.3])
     @pytest.mark.parametrize(
-        "boundary", ["disk", "straight", {0: np.pi / 2, 16: np.pi / 2, 288: np.pi / 2, 272: np.pi / 2}]
+        ("boundary", "cells"),
+        [("disk", 16), ("straight", 12), (dict.fromkeys((0, 16, 288, 272), np.pi / 2), 16)],
     )
-    def test_a_prescribed_boundary_is_not_moved(self, noise, boundary):
-        result = coneflat.flatten(*folded(noise), boundary=boundary)
+    def test_a_prescribed_boundary_is_not_moved(self, boundary, cells):
+        result = coneflat.flatten(*folded(0.3, cells), boundary=boundary)
         assert result.solve.untangled_triangles
         border = TriangleMesh(result.vertices, result.faces).is_boundary_vertex
         if isinstance(boundary, dict):
@@ -195,9 +200,8 @@ class TestPrescribed:
         off = np.abs(result.curvature_residual[border & is_upright(result)]).max()
         assert off < 1e-9 or any("the angle sum differs" in note for note in result.notes)
 
-    @pytest.mark.parametrize("noise", [0.3, 0.5])
-    def test_lengths_of_the_boundary_are_kept(self, noise):
-        result = coneflat.flatten(*folded(noise), boundary="lengths")
+    def test_lengths_of_the_boundary_are_kept(self):
+        result = coneflat.flatten(*folded(0.3), boundary="lengths")
         assert result.solve.untangled_triangles
         mesh = TriangleMesh(result.vertices, result.faces)
         sides = mesh.edge_halfedges[mesh.is_boundary_edge, 0]

@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 import time
+from functools import partial
 
 import pytest
 import shapes
@@ -67,22 +68,23 @@ def test_textures(models, tmp_path):
 
 def test_a_further_run_does_what_is_left(models, tmp_path):
     out = tmp_path / "out"
-    invoke("batch", models, "--out", out)
+    run = partial(invoke, "batch", models, "--out", out, "--jobs", 1)
+    run()
     before = (out / "ball.obj").stat().st_mtime_ns
     shapes.write_obj(models / "broken.obj", *shapes.torus(12, 8))
-    result = invoke("batch", models, "--out", out)
+    result = run()
     assert result.exit_code == 0
     assert "3 of 3 meshes are flattened, 2 of them before" in result.output
     assert (out / "ball.obj").stat().st_mtime_ns == before
     # Other options, another mesh, a result that is gone: each is a reason to work again.
-    assert "of them before" not in invoke("batch", models, "--out", out, "--distortion", 0.5).output
+    assert "of them before" not in run("--distortion", 0.5).output
     shapes.write_obj(models / "ball.obj", *shapes.sphere(1))
     (out / "hill.obj").unlink()
-    assert "1 of them before" in invoke("batch", models, "--out", out, "--distortion", 0.5).output
-    assert "of them before" not in invoke("batch", models, "--out", out, "--distortion", 0.5, "--redo").output
+    assert "1 of them before" in run("--distortion", 0.5).output
+    assert "of them before" not in run("--distortion", 0.5, "--redo").output
     # So is an incomplete result.
     (out / "hill.obj").write_bytes((out / "hill.obj").read_bytes()[:1000])
-    assert "2 of them before" in invoke("batch", models, "--out", out, "--distortion", 0.5).output
+    assert "2 of them before" in run("--distortion", 0.5).output
 
 
 def test_a_mesh_that_hangs_is_ended(models, tmp_path):
@@ -181,16 +183,15 @@ def test_a_link_that_leads_nowhere_is_one_failed_mesh(models, tmp_path):
 
 def test_broken_lines_of_the_journal_are_left_out_and_named(models, tmp_path):
     out = tmp_path / "out"
-    invoke("batch", models / "ball.obj", "--out", out)
+    run = partial(invoke, "batch", "--out", out, "--jobs", 1, models / "ball.obj")
+    run()
     with (out / "batch.jsonl").open("ab") as file:
         file.write(b'\xff\xfe\x00\n[]\n{"output": []}\n' + b"[" * 100_000 + b'\n{"mesh": "hal')
-    result = invoke("batch", models / "ball.obj", models / "hill.obj", "--out", out)
+    result = run(models / "hill.obj")
     assert "Left out 5 broken lines of the journal" in result.output
     assert "2 of 2 meshes are flattened, 1 of them before" in result.output
     # What is written after a line that was cut off is whole.
-    assert (
-        "2 of them before" in invoke("batch", models / "ball.obj", models / "hill.obj", "--out", out).output
-    )
+    assert "2 of them before" in run(models / "hill.obj").output
 
 
 def test_what_cannot_be_written_is_said_before_the_work(models, tmp_path):

@@ -113,15 +113,15 @@ def test_saving_is_in_sight_and_the_unit_square_is_in_the_view(visit):
         assert 0 < y < pane["height"]
 
 
-@pytest.mark.parametrize("axis", "xyz")
-def test_the_view_can_have_another_axis_up(visit, axis):
+def test_the_view_can_have_another_axis_up(visit):
     visit.settle()
     visit.page.locator("#sizes summary").click()
-    visit.page.select_option("#up", axis)
-    turn = np.reshape(visit.run("coneflat.panes[0].camera.turn"), (3, 3))
-    up = turn @ np.eye(3)["xyz".index(axis)]
-    assert up[1] > 0.7
-    assert np.linalg.det(turn) == pytest.approx(1)
+    for axis in "xyz":
+        visit.page.select_option("#up", axis)
+        turn = np.reshape(visit.run("coneflat.panes[0].camera.turn"), (3, 3))
+        up = turn @ np.eye(3)["xyz".index(axis)]
+        assert up[1] > 0.7, axis
+        assert np.linalg.det(turn) == pytest.approx(1), axis
 
 
 def test_drawn_cuts_keep_their_colour_in_every_mode(visit, studio):

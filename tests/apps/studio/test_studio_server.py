@@ -206,23 +206,20 @@ def test_the_page_costs_edges_as_seams_do():
 class TestFailedOpening:
     """What is shown stays, and no file is left, if a dropped file cannot be opened."""
 
-    @pytest.mark.parametrize(
-        ("name", "content"),
-        [
+    def test_what_is_shown_stays_and_no_file_is_left(self, page, session, ball, tmp_path):
+        assert page.post("/mesh?name=ball.obj", content=ball.read_bytes()).status_code == 200
+        assert session.wait_until_idle(120)
+        before, files_before = page.get("/state").json(), sorted(tmp_path.iterdir())
+        for name, content in (
             ("garbage.obj", b"\x00\x01 nonsense"),
             ("empty.obj", b""),
             ("faceless.obj", b"v 0 0 0\n"),
             ("cut.glb", b"glTF\x02\x00\x00\x00"),
             ("other.json", b"{}"),
-        ],
-    )
-    def test_what_is_shown_stays_and_no_file_is_left(self, page, session, ball, tmp_path, name, content):
-        assert page.post("/mesh?name=ball.obj", content=ball.read_bytes()).status_code == 200
-        assert session.wait_until_idle(120)
-        before, files_before = page.get("/state").json(), sorted(tmp_path.iterdir())
-        assert page.post(f"/mesh?name={name}", content=content).status_code == 400
-        assert page.get("/state").json() == before
-        assert sorted(tmp_path.iterdir()) == files_before
+        ):
+            assert page.post(f"/mesh?name={name}", content=content).status_code == 400, name
+            assert page.get("/state").json() == before, name
+            assert sorted(tmp_path.iterdir()) == files_before, name
 
     def test_a_file_that_was_there_is_not_removed(self, page, tmp_path):
         (tmp_path / "mine.obj").write_bytes(b"v 0 0 0\n")

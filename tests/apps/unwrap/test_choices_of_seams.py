@@ -88,15 +88,15 @@ def test_no_seams_but_those_given():
     assert not any("sides of seams" in note for note in result.notes)
 
 
-@pytest.mark.parametrize("count", [2, 3, 7, 20])
 @pytest.mark.parametrize("shape", [shapes.sphere(3), shapes.hill(), shapes.genus(2)])
-def test_there_are_as_many_charts_as_requested(shape, count):
+def test_there_are_as_many_charts_as_requested(shape):
     few = unwrap(*shape, charts=1)
-    result = unwrap(*shape, charts=count)
-    assert is_valid(result)
-    assert result.distortion.energy <= 4.1
-    assert result.distortion.charts == max(count, few.distortion.charts)
-    assert any("instead of" in note for note in result.notes) == (count < few.distortion.charts)
+    for count in (2, 3, 7, 20):
+        result = unwrap(*shape, charts=count)
+        assert is_valid(result), count
+        assert result.distortion.energy <= 4.1, count
+        assert result.distortion.charts == max(count, few.distortion.charts)
+        assert any("instead of" in note for note in result.notes) == (count < few.distortion.charts), count
 
 
 def test_charts_are_counted_over_all_components():

@@ -35,9 +35,21 @@ def test_the_energy_is_within_the_bound(shape, bound):
     assert (d.flipped, d.degenerate, d.overlapping_pairs) == (0, 0, 0)
 
 
-def test_models_have_short_seams_within_the_bound(shared):
-    for name, most in (("spot.obj", 4.5), ("hand.obj", 4.5), ("fandisk.obj", 2.8)):
-        d = unwrap(shared(name)).distortion
+@pytest.fixture(scope="module")
+def hand():
+    path = shapes.SHARED / "hand.obj"
+    if not path.exists():
+        pytest.skip("the shared meshes are not here")
+    return unwrap(path)
+
+
+def test_models_have_short_seams_within_the_bound(shared, hand):
+    for result, most in (
+        (unwrap(shared("spot.obj")), 4.5),
+        (hand, 4.5),
+        (unwrap(shared("fandisk.obj")), 2.8),
+    ):
+        d = result.distortion
         assert d.energy <= 4.1
         assert d.area_std <= 0.08
         assert (d.flipped, d.overlapping_pairs) == (0, 0)
@@ -160,13 +172,12 @@ def test_the_energy_of_a_stretched_square():
         assert coneflat.measure(mesh, stretched).energy == pytest.approx(5.0)
 
 
-def test_branching_charts_are_cut_to_fill_the_texture(shared, monkeypatch):
-    result = unwrap(shared("hand.obj"))
+def test_branching_charts_are_cut_to_fill_the_texture(shared, hand, monkeypatch):
     monkeypatch.setattr("coneflat.apps.unwrap.unwrap.cut_for_packing", lambda layouts, *_: layouts)
     whole = unwrap(shared("hand.obj"))
-    assert result.packing_efficiency > 1.2 * whole.packing_efficiency
-    assert result.distortion.seam_length <= 1.3 * whole.distortion.seam_length
-    assert max(result.distortion.energy, whole.distortion.energy) <= 4.1
+    assert hand.packing_efficiency > 1.2 * whole.packing_efficiency
+    assert hand.distortion.seam_length <= 1.3 * whole.distortion.seam_length
+    assert max(hand.distortion.energy, whole.distortion.energy) <= 4.1
 
 
 def test_the_cut_of_a_large_mesh_is_searched_on_a_coarse_one(monkeypatch):
