@@ -44,6 +44,16 @@ def sparse(vertices, faces, distortion=0.2, count=None, **options):
 
 
 @pytest.mark.parametrize("name", SHAPES)
+def test_what_was_asked_before_costs_no_cone(name):
+    search = search_on(*SHAPES[name])
+    search.fewest(0.3)
+    search.restrict(~search.is_boundary)
+    found, alone = search.fewest(0.1), search_on(*SHAPES[name]).fewest(0.1)
+    assert found.distortion <= 0.1
+    assert len(found.solution.cones) <= len(alone.solution.cones)
+
+
+@pytest.mark.parametrize("name", SHAPES)
 def test_reported_distortion_is_that_of_the_log_scale(name):
     laplacian, curvature, areas, is_boundary, chi = surface(*SHAPES[name])
     found = sparse(*SHAPES[name], distortion=0.1)

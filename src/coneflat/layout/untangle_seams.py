@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import FloatArray, IntArray
+from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..base.text import list_some, plural
 from ..geometry.intrinsic import halfedge_twins
 from ..geometry.operators import cotangent_laplacian
@@ -53,30 +53,10 @@ def untangle_seams(
     disk = TriangleMesh(np.zeros((len(layout.points), 3)), layout.corners)
     vertex = np.empty(len(layout.points), dtype=np.int64)
     vertex[layout.corners] = layout.mesh.faces
-    fixed = layout.is_fixed[vertex]
-    # The angle at a vertex of a prescribed boundary is preserved if the adjacent seam edges do not move.
-    border = disk.edges[disk.is_boundary_edge]
-    is_near = fixed.copy()
-    is_near[border[fixed[border].any(axis=1)]] = True
-    # The angles on the border of the chart are free.
-    angles = np.where(disk.is_boundary_vertex, np.nan, 2 * np.pi)
-    untangled = untangle(
-        FlatTriangles(sides.ravel(), np.ones(sides.size, dtype=np.complex128), halfedge_twins(disk)),
-        disk.faces,
-        angles,
-        disk.is_boundary_vertex,
-        (is_near, fixed),
-        rest_sides(layout.lengths),
-        2 * MAX_RINGS,
+    points, is_free, is_embedded = untangled_disk(
+        disk, layout.points, layout.lengths, layout.is_fixed[vertex]
     )
-    points, is_free = unfold(untangled.flat, disk.faces), np.zeros(len(vertex), dtype=bool)
-    is_free[untangled.moved] = True
-    caveat = "the sides of seams near them are unequal"
-    if len(untangled.left) and not fixed.any() and disk.boundary_loops[0] == 1:
-        areas = np.abs(signed_double_areas(points[disk.faces])) / 2
-        embedded = embedded_disks(disk, np.zeros(len(areas), dtype=np.int64), areas)
-        if not find_degenerate(sides_between(embedded[disk.faces])).any():
-            points, is_free, caveat = embedded, ~fixed, "no seam or cone is exact"
+    caveat = "no seam or cone is exact" if is_embedded else "the sides of seams near them are unequal"
     if not is_free.any():
         return layout
     group = LayoutGroup([layout], [weights])
@@ -100,6 +80,44 @@ def untangle_seams(
         f"{plural(len(flipped), 'triangle')} had no room between seams with equal sides, next to "
         f"{where}: they are positively oriented, but {caveat}."
     )
+
+
+def untangled_disk(
+    disk: TriangleMesh, points: FloatArray, lengths: FloatArray, fixed: BoolArray
+) -> tuple[FloatArray, BoolArray, bool]:
+    """Return points of a disk with its triangles positively oriented, as far as possible.
+
+    Args:
+        disk: the disk; the angles at its border are free.
+        points: (c, 2) its points.
+        lengths: (m, 3) side lengths of its triangles on the surface.
+        fixed: (c,) points that do not move.
+
+    Returns:
+        (c, 2) points, (c,) those that moved, and whether all did since the disk was embedded again.
+    """
+    # The angle at a vertex of a prescribed boundary is preserved if the adjacent seam edges do not move.
+    border = disk.edges[disk.is_boundary_edge]
+    is_near = fixed.copy()
+    is_near[border[fixed[border].any(axis=1)]] = True
+    sides = sides_between(points[disk.faces])
+    untangled = untangle(
+        FlatTriangles(sides.ravel(), np.ones(sides.size, dtype=np.complex128), halfedge_twins(disk)),
+        disk.faces,
+        np.where(disk.is_boundary_vertex, np.nan, 2 * np.pi),
+        disk.is_boundary_vertex,
+        (is_near, fixed),
+        rest_sides(lengths),
+        2 * MAX_RINGS,
+    )
+    found, moved = unfold(untangled.flat, disk.faces), np.zeros(len(points), dtype=bool)
+    moved[untangled.moved] = True
+    if len(untangled.left) and not fixed.any() and disk.boundary_loops[0] == 1:
+        areas = np.abs(signed_double_areas(found[disk.faces])) / 2
+        embedded = embedded_disks(disk, np.zeros(len(areas), dtype=np.int64), areas)
+        if not find_degenerate(sides_between(embedded[disk.faces])).any():
+            return embedded, ~fixed, True
+    return found, moved, False
 
 
 def embedded_disks(disks: TriangleMesh, of_face: IntArray, areas: FloatArray) -> FloatArray:

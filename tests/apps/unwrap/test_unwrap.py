@@ -15,6 +15,7 @@ from coneflat.apps.unwrap.free import freed
 from coneflat.apps.unwrap.unwrap import along_sharp_edges
 from coneflat.base import Stopwatch
 from coneflat.flatten import Method, lay_out_part
+from coneflat.geometry import signed_double_areas
 from coneflat.io import as_input
 from coneflat.metric import find_metric
 from coneflat.options import Options
@@ -84,6 +85,19 @@ def test_a_flipped_start_is_replaced():
     points[layout.corners[part.mesh.faces == inner][0]] += 100.0
     wanted, found = freed(layout)[1], freed(replace(layout, points=points))[1]
     assert found == pytest.approx(wanted, rel=1e-3)
+
+
+def test_few_flipped_triangles_are_turned_over_where_they_are(monkeypatch):
+    """Embedding the whole chart anew takes many more steps."""
+    part = Source(as_input(*shapes.hill(20, 20))).prepared(Options()).parts[0]
+    method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
+    layout = lay_out_part(part, method)
+    wanted, points = freed(layout)[1], layout.points.copy()
+    at = layout.corners[part.mesh.faces == np.flatnonzero(~part.mesh.is_boundary_vertex)[150]]
+    points[at[0]] += 2 * np.ptp(points[layout.corners[(layout.corners == at[0]).any(axis=1)]], axis=(0, 1))
+    assert (signed_double_areas(points[layout.corners]) <= 0).any()
+    monkeypatch.setattr("coneflat.apps.unwrap.free.embedded_disks", None)
+    assert freed(replace(layout, points=points))[1] == pytest.approx(wanted, rel=1e-3)
 
 
 @pytest.mark.parametrize("shape", [shapes.sphere(3), shapes.hill(20, 20)])

@@ -32,6 +32,8 @@ from .tips import RINGS, find_tips, moved_tips, moves_for
 
 # The area distortion of the first candidate, one that the fewest cones reach, and the maximum number of candidates.
 FIRST_DISTORTION, ANY_DISTORTION, MAX_CANDIDATES = 0.25, 1e3, 5
+# Numbers of cones that differ by this factor or by one are not told apart.
+SIMILAR = 1.05
 # Number of triangles of a coarse mesh; number of coarse searches to meet the bound on the given mesh; and what its
 # energy has more, relative to what is allowed above that of an isometry.
 COARSE, COARSE_TRIES, COARSE_EXCESS = 4_000, 3, 0.15
@@ -136,13 +138,19 @@ class CutSearch:
         return self.separated(min(found, key=lambda one: one.energy))
 
     def _cheapest(self, candidates: list[Candidate], cost: Callable[[Candidate], float]) -> Candidate:
-        """Remove and return the candidate that costs least without overlaps; others are not separated."""
+        """Remove and return the candidate that costs least without overlaps.
+
+        Separating another one is taken to cost at least as much as those before.
+        """
+        least, more = 0.0, list[float]()
         while True:
-            one = min(candidates, key=cost)
+            one = min(candidates, key=lambda one: cost(one) + (0.0 if one.is_separated else least))
             candidates.remove(one)
             if one.is_separated:
                 return one
             candidates.append(self.separated(one))
+            more.append(cost(candidates[-1]) - cost(one))
+            least = min(more)
 
     def shortened(self, start: Candidate, layout: Layout | None = None) -> Candidate:
         """Return a candidate with the tips of its seams moved to where its energy is about the largest allowed.
@@ -229,7 +237,7 @@ class CutSearch:
             if low and (tried >= MAX_CANDIDATES - 1 or not len(low.layout.seams)):
                 break
             if low and high:
-                if len(low.layout.cones) <= len(high.layout.cones) + 1:
+                if len(low.layout.cones) <= SIMILAR * len(high.layout.cones) + 1:
                     break
                 distortion = float(np.sqrt(low.distortion * high.distortion))
             else:
@@ -273,7 +281,7 @@ class CutSearch:
         """Return a candidate with the least energy without overlaps: its separating cuts are free, too."""
         is_free = np.ones(len(one.layout.points), dtype=bool)
         for _ in range(MAX_TRIES):
-            layout, energy = self._freed(one.layout, is_free)
+            layout, energy = self._freed(one.layout, is_free, TOLERANCE)
             pairs = find_overlaps(side_by_side(layout).points[layout.corners]).pairs
             if not (len(pairs) and self._method.separates):
                 return replace(one, layout=layout, energy=energy)
