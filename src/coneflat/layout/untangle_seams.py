@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import FloatArray, IntArray
+from ..base.arrays import FloatArray, IntArray, mask_of
 from ..base.text import list_some, plural
 from ..geometry.intrinsic import halfedge_twins
 from ..geometry.operators import cotangent_laplacian
@@ -89,8 +89,7 @@ def untangle_seams(
         weights=group.weights,
         free=is_free,
     ).points
-    was_free = np.zeros(len(layout.mesh.vertices), dtype=bool)
-    was_free[vertex[is_free]] = True
+    was_free = mask_of(len(layout.mesh.vertices), vertex[is_free])
     found = group.updated(points, was_free)[0]
     flipped = np.flatnonzero(was_bad & ~find_degenerate(sides_between(points[disk.faces])))
     if not len(flipped):
