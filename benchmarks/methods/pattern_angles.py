@@ -66,7 +66,7 @@ def coherent_angles(
         Newton's method still converges. If no bound is active, the first step is the least squares solution.
     """
     count = len(angles)
-    rows = triangulation.face_count
+    rows = len(triangulation.faces)
     summed = np.flatnonzero(is_summed)
     number = np.full(triangulation.vertex_count, -1, dtype=np.int64)
     number[summed] = rows + np.arange(len(summed))

@@ -13,7 +13,7 @@ from .atlas import arrange_charts, separate_touching
 from .base.arrays import FloatArray, IntArray, rows_of
 from .base.progress import Stopwatch
 from .geometry.overlap import Overlaps
-from .measure.distortion import Distortion, curvature_errors, measure
+from .measure.distortion import curvature_errors, measure
 from .measure.guarantees import unmet_guarantees
 from .measure.seam_data import Rotations, measure_rotations
 from .mesh.connectivity import TriangleMesh
@@ -56,21 +56,6 @@ class _Numbering:
 
 
 @dataclass(frozen=True, eq=False)
-class _Triangles:
-    """The triangles of the result, in the order of the input's faces.
-
-    Attributes:
-        order: (m,) index of each triangle in the concatenation of all components.
-        faces: (m, 3) vertices of the result.
-        face_origin: (m,) the input face of each.
-    """
-
-    order: IntArray
-    faces: IntArray
-    face_origin: IntArray
-
-
-@dataclass(frozen=True, eq=False)
 class _Packed:
     """The charts in the unit square.
 
@@ -107,10 +92,13 @@ def evaluate(
     """
     checked = prepared.checked
     numbering = _number_vertices(prepared)
-    triangles = _sort_triangles(prepared, numbering)
-    mesh = _known_or_new(checked.mesh, np.ldexp(numbering.positions, checked.exponent), triangles.faces)
+    # The triangles of all components are sorted in the order of the input's faces.
+    origin = np.concatenate([part.faces for part in prepared.parts])
+    order = np.argsort(origin, kind="stable")
+    faces = rows_of(numbering.renumber([part.mesh.faces for part in prepared.parts]), order)
+    mesh = _known_or_new(checked.mesh, np.ldexp(numbering.positions, checked.exponent), faces)
     with watch("pack"):
-        layout = _pack(layouts, triangles, numbering.positions, mesh, options)
+        layout = _pack(layouts, order, mesh, options)
     source, face_corners = prepared.given.source, prepared.given.face_corners
     if face_corners is not None and source is not None:
         face_corners = reorder_corners(checked, face_corners)
@@ -121,11 +109,25 @@ def evaluate(
     prescribed[numbering.of_checked[prepared.seams]] = np.nan
     cones = numbering.renumber([one.cones for one in layouts])
     with watch("measure"):
-        layout, distortion = _measure(prepared, mesh, layout, residual, prescribed, cones, options, overlaps)
+        measured = partial(
+            measure,
+            mesh,
+            curvature_error=curvature_errors(residual[np.isfinite(residual)]),
+            cones=cones,
+            prescribed=prescribed,
+            lengths=prepared.own_lengths,
+        )
+        distortion = measured(rows_of(layout.uv, layout.corners), overlaps=overlaps)
+        # In an atlas, triangles that overlap by rounding alone are separated.
+        if options.charts == "atlas" and distortion.overlapping_pairs:
+            separated, left = separate_touching(layout.uv, layout.corners)
+            if len(left.pairs) < distortion.overlapping_pairs:
+                layout = replace(layout, uv=separated)
+                distortion = measured(separated[layout.corners], overlaps=left)
         rotations = _rotations(layouts, layout.uv[layout.own], options)
     result = Flattening(
         vertices=numbering.positions,
-        faces=triangles.faces,
+        faces=faces,
         uv=layout.uv,
         uv_faces=layout.corners,
         uv_scale=float(np.ldexp(layout.scale, checked.exponent)),
@@ -151,7 +153,7 @@ def evaluate(
         ),
         rotations=rotations,
         vertex_origin=numbering.vertex_origin,
-        face_origin=triangles.face_origin,
+        face_origin=checked.face_origin[origin[order]],
         face_corners=face_corners,
         source=source,
         lengths=None if prepared.own_lengths is None else np.ldexp(prepared.own_lengths, -checked.exponent),
@@ -167,28 +169,14 @@ def _number_vertices(prepared: Prepared) -> _Numbering:
     return _Numbering(points[vertex_origin], vertex_origin, number, of_parts)
 
 
-def _sort_triangles(prepared: Prepared, numbering: _Numbering) -> _Triangles:
-    """Return the triangles of all components in the order of the input's faces."""
-    origin = np.concatenate([part.faces for part in prepared.parts])
-    faces = numbering.renumber([part.mesh.faces for part in prepared.parts])
-    order = np.argsort(origin, kind="stable")
-    return _Triangles(order, rows_of(faces, order), prepared.checked.face_origin[origin[order]])
-
-
-def _pack(
-    layouts: Sequence[Layout],
-    triangles: _Triangles,
-    positions: FloatArray,
-    mesh: TriangleMesh,
-    options: Options,
-) -> _Packed:
+def _pack(layouts: Sequence[Layout], order: IntArray, mesh: TriangleMesh, options: Options) -> _Packed:
     """Return the packed charts of all components."""
     points, own, chart, component = _all_charts(layouts)
-    corners = rows_of(own, triangles.order)
-    heights = None if options.up is None else (positions @ options.up)[triangles.faces]
+    corners = rows_of(own, order)
+    heights = None if options.up is None else (mesh.vertices @ options.up)[mesh.faces]
     packed = arrange_charts(
         rows_of(points, corners),
-        chart[triangles.order],
+        chart[order],
         component,
         heights,
         resolution=options.resolution,
@@ -201,33 +189,6 @@ def _pack(
     # Assigning both coordinates as one complex number is several times as fast in NumPy.
     uv.view(np.complex128)[:, 0][corners] = packed.corner_uv.view(np.complex128)[..., 0]
     return _Packed(uv, corners, own, packed.scale, packed.efficiency)
-
-
-def _measure(
-    prepared: Prepared,
-    mesh: TriangleMesh,
-    layout: _Packed,
-    residual: FloatArray,
-    prescribed: FloatArray,
-    cones: IntArray,
-    options: Options,
-    overlaps: Overlaps | None,
-) -> tuple[_Packed, Distortion]:
-    """Return the layout and its measures; in an atlas, triangles that overlap by rounding alone are separated."""
-    measured = partial(
-        measure,
-        mesh,
-        curvature_error=curvature_errors(residual[np.isfinite(residual)]),
-        cones=cones,
-        prescribed=prescribed,
-        lengths=prepared.own_lengths,
-    )
-    distortion = measured(rows_of(layout.uv, layout.corners), overlaps=overlaps)
-    if options.charts == "atlas" and distortion.overlapping_pairs:
-        separated, left = separate_touching(layout.uv, layout.corners)
-        if len(left.pairs) < distortion.overlapping_pairs:
-            return replace(layout, uv=separated), measured(separated[layout.corners], overlaps=left)
-    return layout, distortion
 
 
 def _rotations(layouts: Sequence[Layout], corner_uv: FloatArray, options: Options) -> Rotations | None:

@@ -40,13 +40,9 @@ class VertexCurvatures:
         return len(self.vertices)
 
     def within(self, component: IntArray) -> VertexCurvatures:
-        """Return the vertices inside a component, in its numbering; `component` holds the component's vertices."""
-        if not len(self):
-            return self
+        """Return the vertices inside a component, in its numbering; `component` has its vertices in ascending order."""
         inside = np.isin(self.vertices, component)
-        order = np.argsort(component, kind="stable")
-        places = order[np.searchsorted(component, self.vertices[inside], sorter=order)]
-        return VertexCurvatures(places, self.curvatures[inside])
+        return VertexCurvatures(np.searchsorted(component, self.vertices[inside]), self.curvatures[inside])
 
 
 @dataclass(frozen=True, eq=False)

@@ -228,7 +228,7 @@ class TestSplitFormats:
         ):
             with pytest.raises(kind, match=message):
                 write_flattening(result, tmp_path / path, texture)
-        monkeypatch.setitem(sys.modules, "PIL", None)
+        monkeypatch.setitem(sys.modules, "PIL.Image", None)
         with pytest.raises(OptionError, match=r'textures need Pillow: pip install "coneflat\[figures\]"'):
             write_flattening(result, tmp_path / "out.glb", "checker")
         assert not list(tmp_path.glob("out.*"))

@@ -143,7 +143,7 @@ class TestTwoRoutes:
         once = intrinsic_triangulation(mesh, lengths)
         doubled, original = double(once)
         n, m = len(mesh.vertices), len(mesh.faces)
-        assert doubled.face_count == 2 * m
+        assert len(doubled.faces) == 2 * m
         np.testing.assert_array_equal(original[:n], np.arange(n))
         np.testing.assert_array_equal(doubled.twin[doubled.twin], np.arange(6 * m))
         heads = doubled.faces[:, [2, 0, 1]].ravel()

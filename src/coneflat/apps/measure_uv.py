@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import Distortion, TriangleMesh, check_mesh
-from ..base import FloatArray, IntArray, plural, unit_exponent
+from ..base import FloatArray, IntArray, mask_of, plural, unit_exponent
 from ..errors import MissingUVError
 from ..geometry import MAX_CELLS, approximate_overlap_areas, find_overlaps, signed_double_areas
 from ..io import UVMesh, as_uv_mesh
@@ -208,8 +208,7 @@ def angle_sum_error(mesh: TriangleMesh, corner_uv: FloatArray) -> float:
     It is large at flipped triangles, and where triangles wind around a point twice.
     """
     points, fan = uv_points(mesh, corner_uv)
-    joined = np.zeros(mesh.faces.size, dtype=bool)
-    joined[mesh.edge_halfedges[joined_edges(mesh, corner_uv)]] = True
+    joined = mask_of(mesh.faces.size, mesh.edge_halfedges[joined_edges(mesh, corner_uv)])
     inside = np.ones(len(points), dtype=bool)
     for end in end_corners(np.flatnonzero(~joined)):
         inside[fan.reshape(-1)[end]] = False

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats
+from ..base.arrays import FloatArray, IntArray, as_floats
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..geometry.coverage import cancel_sides
 from ..geometry.layers import open_sides
@@ -62,12 +62,31 @@ class Charts:
         return np.ascontiguousarray(self.corners).view(np.float64).reshape(-1, 3, 2)
 
     def outlines(self) -> Outlines:
-        """Return the outline of each chart."""
-        is_open = None
+        """Return the outline of each chart; its winding number at a point counts the triangles that cover the point.
+
+        Two sides with opposite directions between the same points cancel. Interior sides whose two copies of a
+        point differ by rounding may remain; this is harmless. Flipped triangles are reversed, so that the area that
+        they cover also counts.
+        """
+        corners, chart, is_flipped = self.corners, self.chart, self.areas < 0
+        # The sides, each starting at its corner, that are not known to cancel in pairs.
+        kept = np.ones(corners.shape, dtype=bool)
         if self.edge_halfedges is not None:
-            group = np.where(self.areas < 0, -1, self.chart)
-            is_open = open_sides(self.edge_halfedges, self.places, group).reshape(-1, 3)[:, PREVIOUS]
-        return find_outlines(self.corners, self.areas < 0, self.chart, self.count, is_open)
+            group = np.where(is_flipped, -1, chart)
+            kept = open_sides(self.edge_halfedges, self.places, group).reshape(-1, 3)[:, PREVIOUS]
+        if is_flipped.any():
+            corners = np.where(is_flipped[:, None], corners[:, [0, 2, 1]], corners)
+        triangle, corner = np.nonzero(kept)
+        sides = np.stack([corners[triangle, corner], corners[triangle, NEXT[corner]]], axis=1)
+        same, balance = cancel_sides(sides, chart[triangle])
+        kept[triangle, corner] = balance[same] != 0
+        # If all sides of a chart cancel, it has no area: all its sides are used as the outline.
+        kept |= (np.bincount(chart, weights=kept.any(axis=1), minlength=self.count) == 0)[chart][:, None]
+        triangle, corner = np.nonzero(kept)
+        order = np.argsort(chart[triangle], kind="stable")
+        triangle, corner = triangle[order], corner[order]
+        sides = np.stack([corners[triangle, corner], corners[triangle, NEXT[corner]]], axis=1)
+        return Outlines(sides, np.searchsorted(chart[triangle], np.arange(self.count + 1)))
 
     def rotated(self, angles: FloatArray) -> Charts:
         """Return the charts rotated about the origin, each by its angle in (k,), radians."""
@@ -144,43 +163,6 @@ class Outlines:
     def points(self, chart: int) -> NDArray[np.complex128]:
         """Return the end points of the sides of a chart."""
         return self.sides[self.start[chart] : self.start[chart + 1]].ravel()
-
-
-def find_outlines(
-    corners: NDArray[np.complex128],
-    flipped: BoolArray,
-    chart: IntArray,
-    count: int,
-    is_open: BoolArray | None = None,
-) -> Outlines:
-    """Return the outlines of charts; the winding number of an outline at a point counts the triangles that cover it.
-
-    Two sides with opposite directions between the same points cancel. Interior sides whose two copies of a
-    point differ by rounding may remain; this is harmless. Flipped triangles are reversed, so that the area that
-    they cover also counts.
-
-    Args:
-        corners: (m, 3) corner positions of the triangles as complex numbers.
-        flipped: (m,) True for flipped triangles.
-        chart: (m,) chart of each triangle, below `count`. Every chart has at least one triangle.
-        count: number of charts.
-        is_open: (m, 3) True for the sides, each starting at its corner, that are not known to cancel in pairs; None
-            for all.
-    """
-    if flipped.any():
-        corners = np.where(flipped[:, None], corners[:, [0, 2, 1]], corners)
-    kept = np.ones(corners.shape, dtype=bool) if is_open is None else is_open.copy()
-    triangle, corner = np.nonzero(kept)
-    sides = np.stack([corners[triangle, corner], corners[triangle, NEXT[corner]]], axis=1)
-    same, balance = cancel_sides(sides, chart[triangle])
-    kept[triangle, corner] = balance[same] != 0
-    # If all sides of a chart cancel, it has no area: all its sides are used as the outline.
-    kept |= (np.bincount(chart, weights=kept.any(axis=1), minlength=count) == 0)[chart][:, None]
-    triangle, corner = np.nonzero(kept)
-    order = np.argsort(chart[triangle], kind="stable")
-    triangle, corner = triangle[order], corner[order]
-    sides = np.stack([corners[triangle, corner], corners[triangle, NEXT[corner]]], axis=1)
-    return Outlines(sides, np.searchsorted(chart[triangle], np.arange(count + 1)))
 
 
 @dataclass(frozen=True, eq=False)

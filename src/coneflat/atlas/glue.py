@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, has_any
+from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, mask_of
 from ..base.progress import check_cancelled
 from ..geometry.overlap import find_overlaps
 from ..geometry.planar import as_pairs, bounds, signed_double_areas
@@ -79,12 +79,8 @@ class _Gluing:
             check_cancelled()
             members = self.stretches[best]
             one, other = self.seams.charts[members[0]]
-            key = (
-                int(self.seams.edges[members[0]]),
-                len(members),
-                len(self.faces[one]),
-                len(self.faces[other]),
-            )
+            sizes = len(self.faces[one]), len(self.faces[other])
+            key = (int(self.seams.edges[members[0]]), len(members), *sizes)
             if one == other or key in rejected:
                 continue
             if self._glue_at(members):
@@ -117,8 +113,7 @@ class _Gluing:
         if not self._fits(kept, moved):
             self.places = before
             return False
-        is_joined = np.zeros(len(before), dtype=bool)
-        is_joined[pairs] = True
+        is_joined = mask_of(len(before), pairs)
         own = self.faces[kept]
         changed = np.concatenate([own[has_any(is_joined, self.corners[own])], self.faces[moved]])
         self.corners[changed] = joined[self.corners[changed]]

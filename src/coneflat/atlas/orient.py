@@ -237,7 +237,7 @@ def _runs_of_curve(sides: ComplexArray) -> ComplexArray:
         curve = np.roll(curve, -begin)
     curve = np.append(curve, curve[0] if sides[-1, 1] == sides[0, 0] else sides[-1, 1])
     is_end = np.zeros(len(curve), dtype=np.bool_)
-    split_curve(curve.view(np.float64).reshape(-1, 2), MAX_STRAY, is_end)
+    split_curve(curve.view(np.float64).reshape(-1, 2), is_end)
     ends = np.flatnonzero(is_end)
     along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(curve)))])
     start, length = along[ends[:-1]], np.diff(along[ends])
@@ -249,12 +249,11 @@ def _runs_of_curve(sides: ComplexArray) -> ComplexArray:
 
 
 @compiled
-def split_curve(curve: FloatArray, stray: float, is_end: BoolArray) -> None:
+def split_curve(curve: FloatArray, is_end: BoolArray) -> None:
     """Mark the points at which a curve is split into straight runs, including its ends.
 
     Args:
         curve: (n, 2) its points.
-        stray: largest distance of a run from the segment between its ends, relative to the segment's length.
         is_end: (n,) all False on entry; filled with True at the splits.
     """
     stack = np.empty((len(curve), 2), dtype=np.int64)
@@ -266,7 +265,7 @@ def split_curve(curve: FloatArray, stray: float, is_end: BoolArray) -> None:
         start, stop = stack[count, 0], stack[count, 1]
         x, y = curve[stop, 0] - curve[start, 0], curve[stop, 1] - curve[start, 1]
         square = x * x + y * y
-        farthest, where = stray * stray * square, -1
+        farthest, where = MAX_STRAY * MAX_STRAY * square, -1
         for i in range(start + 1, stop):
             u, v = curve[i, 0] - curve[start, 0], curve[i, 1] - curve[start, 1]
             part = min(max((u * x + v * y) / square, 0.0), 1.0) if square > 0 else 0.0
@@ -294,21 +293,18 @@ def border_curves(sides: IntArray, count: int) -> tuple[IntArray, IntArray]:
     leaving = np.empty(count, dtype=np.int64)
     leaving[start] = np.arange(len(sides))
     following = np.where(passes[end], leaving[end], -1)
-    order, first = np.empty(len(sides), dtype=np.int64), np.empty(len(sides) + 1, dtype=np.int64)
-    curves = follow_curves(following, ~passes[start], order, first)
-    return order, first[: curves + 1]
+    return follow_curves(following, ~passes[start])
 
 
 @compiled
-def follow_curves(following: IntArray, begins: BoolArray, order: IntArray, first: IntArray) -> int:
-    """Fill in the sides curve by curve and where each curve begins; return the number of curves.
+def follow_curves(following: IntArray, begins: BoolArray) -> tuple[IntArray, IntArray]:
+    """Return (s,) the sides curve by curve, and (c + 1,) where each of the c curves begins, with s after the last.
 
     Args:
         following: (s,) the side after each side; -1 at an end.
         begins: (s,) True where a curve begins; curves without such a side are closed.
-        order: (s,) filled with the sides in order.
-        first: (s + 1,) filled with where each curve begins in `order`, and with s after the last.
     """
+    order, first = np.empty(len(following), np.int64), np.empty(len(following) + 1, np.int64)
     done = np.zeros(len(following), dtype=np.bool_)
     found, curves = 0, 0
     for closed in (False, True):
@@ -323,4 +319,4 @@ def follow_curves(following: IntArray, begins: BoolArray, order: IntArray, first
                 found += 1
                 side = following[side]
     first[curves] = found
-    return curves
+    return order, first[: curves + 1]

@@ -123,11 +123,8 @@ def cover(
     runs, found, first = np.empty((1024, 3), np.int64), 0, np.zeros(angles.size + 1, np.int64)
     for j in range(angles.size):
         chart, t = j // angles.shape[1], j % angles.shape[1]
-        turn, left, below = (
-            np.exp(1j * angles[chart, t]),
-            low[chart, t].real / cell,
-            low[chart, t].imag / cell,
-        )
+        turn = np.exp(1j * angles[chart, t])
+        left, below = low[chart, t].real / cell, low[chart, t].imag / cell
         cosine, sine = turn.real / cell, turn.imag / cell
         columns, rows = size[j]
         winding = np.zeros((rows, columns + 1), np.int32)

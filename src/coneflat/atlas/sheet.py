@@ -7,6 +7,8 @@ off are small: neither the search for a cut nor the labelling of its sides visit
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
@@ -120,12 +122,7 @@ class Sheet:
 
         A set that encloses the other is reduced to a single triangle. border: the triangles along the border.
         """
-        for first, second in (
-            (one, other),
-            (_single(one), other),
-            (one, _single(other)),
-            (_single(one), _single(other)),
-        ):
+        for second, first in product((other, _single(other)), (one, _single(one))):
             wide = self._to_the_border(own, border, first, second)
             if wide is None:
                 continue

@@ -4,16 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import FloatArray, IntArray
+from ..base.arrays import FloatArray, IntArray, mask_of
 from ..base.progress import check_cancelled
-from ..mesh.connectivity import (
-    NEXT,
-    TriangleMesh,
-    corner_fans,
-    label_components,
-    sort_by_counting,
-    sort_pairs,
-)
+from ..mesh.connectivity import NEXT, TriangleMesh, corner_fans, label_components, sort_pairs
 from .sheet import Sheet
 
 
@@ -101,8 +94,7 @@ class _Sheet(Sheet):
 
 def as_disk(points: FloatArray, corners: IntArray) -> TriangleMesh:
     """Return triangles of the plane as a separate mesh, cut open at pinch points."""
-    is_used = np.zeros(len(points), dtype=bool)
-    is_used[corners] = True
+    is_used = mask_of(len(points), corners)
     return unpinched(TriangleMesh(points[is_used], (np.cumsum(is_used) - 1)[corners]))
 
 
@@ -165,7 +157,7 @@ def _steps(pairs: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
     chosen, index = np.unique(pairs, return_inverse=True)
     pairs, count = index.reshape(-1, 2), len(chosen)
     one, two = _neighbours(triangles[chosen])
-    two = two[sort_by_counting(one, count)]
+    two = two[np.argsort(one, kind="stable")]
     degree = np.bincount(one, minlength=count)
     starts = np.cumsum(degree) - degree
     # Every pair in both orders; the second triangle moves to each of its neighbours.

@@ -22,7 +22,7 @@ from ..mesh.connectivity import NEXT
 TOUCHING_OVERLAP, SEPARATING_GAP = 1e-11, 2.0**-49
 # Spacing of 32-bit numbers below 1. Points stored as such are touching if they overlap by less than sixteen spacings,
 # and are separated to a distance of two spacings.
-SINGLE_SPACING = 2.0**-24
+SINGLE_SPACING = float(np.finfo(np.float32).epsneg)
 # Maximum number of repetitions: moved points may cause new overlaps, and repaired triangles may flip others.
 MAX_ROUNDS = 10
 
@@ -147,12 +147,8 @@ def _unflipped(
     is_positive: (m,) True for triangles that must be positively oriented.
     """
     points = points.copy()
-    steps = (
-        SINGLE_SPACING
-        * np.mgrid[-MAX_GRID_STEPS : MAX_GRID_STEPS + 1, -MAX_GRID_STEPS : MAX_GRID_STEPS + 1]
-        .reshape(2, -1)
-        .T
-    )
+    along = SINGLE_SPACING * np.arange(-MAX_GRID_STEPS, MAX_GRID_STEPS + 1)
+    steps = np.stack(np.meshgrid(along, along, indexing="ij"), axis=-1).reshape(-1, 2)
     steps = steps[np.argsort((steps**2).sum(axis=1), kind="stable")]
     for _ in range(MAX_ROUNDS):
         bad = np.flatnonzero((signed_double_areas(points[corners]) <= 0) & is_positive)

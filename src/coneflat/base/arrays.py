@@ -36,6 +36,13 @@ def has_any(mask: BoolArray, sets: IntArray) -> BoolArray:
     return found
 
 
+def mask_of(count: int, places: IntArray | BoolArray) -> BoolArray:
+    """Return (count,) True at the given indices, of any shape."""
+    mask = np.zeros(count, dtype=bool)
+    mask[places] = True
+    return mask
+
+
 def unit_exponent(values: FloatArray) -> int:
     """Return the exponent of the smallest power of two that exceeds the magnitude of all values.
 

@@ -24,6 +24,15 @@ def edges_at_nodes(ends: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
 
 
 @compiled
+def find_root(parent: IntArray, node: int) -> int:
+    """Return the root of the union-find tree of a node; the path to it is halved."""
+    while parent[node] != node:
+        parent[node] = parent[parent[node]]
+        node = parent[node]
+    return node
+
+
+@compiled
 def grow_forest(ends: IntArray, nodes: int) -> BoolArray:
     """Return (e,) which edges are in the spanning forest that takes edges greedily in their order (Kruskal 1956)."""
     parent, in_tree = np.arange(nodes), np.zeros(len(ends), np.bool_)
@@ -52,24 +61,8 @@ def label_nodes(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntA
 def unite(parent: IntArray, one: int, two: int) -> bool:
     """Join the union-find trees of two nodes; return whether the trees were different.
 
-    The root with the larger index becomes a child of the other. Paths to roots are halved.
+    The root with the larger index becomes a child of the other.
     """
-    while parent[one] != one:
-        parent[one] = parent[parent[one]]
-        one = parent[one]
-    while parent[two] != two:
-        parent[two] = parent[parent[two]]
-        two = parent[two]
-    if one < two:
-        parent[two] = one
-    else:
-        parent[one] = two
+    one, two = find_root(parent, one), find_root(parent, two)
+    parent[max(one, two)] = min(one, two)
     return one != two
-
-
-@compiled
-def find_root(parent: IntArray, node: int) -> int:
-    """Return the root of the union-find tree of a node."""
-    while parent[node] != node:
-        node = parent[node]
-    return node

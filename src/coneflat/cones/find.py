@@ -20,11 +20,12 @@ from ..stages import ConeSolution, ConeSpec, Surface
 from .given import cones_at, cones_with_curvature, fitted_cones
 from .greedy import greedy_cones
 from .solution import check_enough, check_feasible
+from .sparse import ConeSearch, SparseCones
+from .sparse.limits import MAX_SEARCHED
+from .sparse.linear_model import LinearModel
 
 if TYPE_CHECKING:
     from .integer.search import QuantisedCones
-    from .sparse import ConeSearch, SparseCones
-    from .sparse.linear_model import LinearModel
 
 # Cone angle per triangle around a cone, radians, up to which the triangles can hold the angle with straight sides. It
 # is less than pi, since the angle cannot be distributed evenly over the triangles.
@@ -99,8 +100,6 @@ def uses_sparse_search(mesh: TriangleMesh, spec: ConeSpec) -> bool:
 
 def has_many_handles(mesh: TriangleMesh, spec: ConeSpec) -> bool:
     """Return whether a mesh has so many handles that the sparse search would take too long for the required cones."""
-    from .sparse.limits import MAX_SEARCHED
-
     if spec.strategy != "auto" or spec.needs_sparse_search or mesh.is_boundary_vertex.any():
         return False
     # Each handle except one needs two cones of angle 4 pi.
@@ -114,7 +113,7 @@ def polyhedron_corners(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
     mesh, curvature = surface.mesh, surface.curvature
     corners = np.flatnonzero((np.abs(curvature) > TYPED_TOLERANCE) & ~mesh.is_boundary_vertex)
     angles = 2 * np.pi - curvature[corners]
-    most = min(MAX_POLYHEDRON_CORNERS, MAX_POLYHEDRON_CORNERS if spec.max_count is None else spec.max_count)
+    most = MAX_POLYHEDRON_CORNERS if spec.max_count is None else min(MAX_POLYHEDRON_CORNERS, spec.max_count)
     if not 0 < len(corners) <= most or not spec.is_allowed[corners].all():
         return None
     if angles.min() < spec.min_angle or angles.max() > (spec.max_angle or np.inf):
@@ -145,8 +144,6 @@ def open_search(surface: Surface, spec: ConeSpec, watch: Stopwatch) -> ConeSearc
         spec: what is required of the cones.
         watch: measures time and reports progress.
     """
-    from .sparse import ConeSearch
-
     mesh = surface.mesh
     search: ConeSearch | None = surface.memo.get("search")
     if search is not None:
@@ -185,8 +182,6 @@ def linear_model(surface: Surface, spec: ConeSpec) -> LinearModel:
 
     The last model is cached, unless the mesh is huge: its factorization is valid for other weights, too.
     """
-    from .sparse.linear_model import LinearModel
-
     share, absorbs = weighted_areas(surface.areas, spec.weights), spec.absorbs_curvature
     linear: LinearModel | None = surface.memo.get("linear")
     if linear is not None and np.array_equal(linear.is_boundary, absorbs):

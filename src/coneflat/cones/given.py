@@ -5,8 +5,6 @@ Cones that a user gives are handled by `fitted_cones`, and the case of no cones 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy.sparse import csc_matrix
 
@@ -15,9 +13,9 @@ from ..base.defaults import TYPED_TOLERANCE
 from ..errors import CurvatureError
 from ..stages import ConeSolution
 from .solution import GroundedLaplacian, target_from_log_scale
-
-if TYPE_CHECKING:
-    from .sparse.linear_model import LinearModel
+from .sparse.fit_curvatures import fit_curvatures
+from .sparse.limits import Limits
+from .sparse.linear_model import LinearModel
 
 
 def cones_at(
@@ -137,9 +135,6 @@ def fitted_cones(
     Raises:
         CurvatureError: all curvatures are given, and on a closed mesh they do not sum to 2 pi chi.
     """
-    from .sparse.fit_curvatures import fit_curvatures
-    from .sparse.limits import Limits
-
     operator, is_free = linear.operator, np.isnan(curvatures)
     euler = euler_characteristic if operator.is_closed else None
     if not is_free.any():

@@ -117,14 +117,11 @@ class _Search:
         if self.floating:
             # On a torus, a single cone has curvature 0 and no effect, so two are added or none.
             return [top, bottom] if remaining >= 2 and self.phi[top] - self.phi[bottom] > epsilon else []
-        if self.phi[top] - self.phi[bottom] <= epsilon and self._is_feasible():
+        if self.phi[top] - self.phi[bottom] <= epsilon and (self._target()[self.cones] < math.tau).all():
             return []
         pair = [v for v in (top, bottom) if not self.is_singular[v]]
         pair.sort(key=lambda v: -abs(self.phi[v]))
         return pair[: max(remaining, 0)]
-
-    def _is_feasible(self) -> bool:
-        return bool((self._target()[self.cones] < math.tau).all())
 
     def _target(self) -> FloatArray:
         return target_from_log_scale(self.laplacian, self.curvature, self.phi, self.is_singular)
@@ -164,18 +161,15 @@ class _Search:
         self._mark(vertex)
         self.phi[self.cones] = 0.0  # otherwise rounding errors there would enter max - min
         if len(self.anchors) == MAX_COLUMNS:
-            self._ground_all()
+            # The Laplacian is grounded at all cones so far, which makes the cached columns unnecessary.
+            self.grounded = GroundedLaplacian(self.laplacian, self.is_singular)
+            self.phi = self.grounded.solve(-self.curvature)
+            self.anchors, self.reference = [], None
             return
         if len(self.anchors) == self.columns.shape[1]:
             self.columns = np.asfortranarray(np.hstack([self.columns, np.empty_like(self.columns)]))
         self.columns[:, len(self.anchors)] = g
         self.anchors.append(vertex)
-
-    def _ground_all(self) -> None:
-        """Factorize the Laplacian grounded at all cones so far, which makes the cached columns unnecessary."""
-        self.grounded = GroundedLaplacian(self.laplacian, self.is_singular)
-        self.phi = self.grounded.solve(-self.curvature)
-        self.anchors, self.reference = [], None
 
     def solution(self) -> ConeSolution:
         cones: IntArray = np.array(self.cones, dtype=np.int64)

@@ -136,19 +136,24 @@ def euclidean_diagonal(e: float, b: float, c: float, b2: float, c2: float) -> fl
 
 
 @compiled
-def relink(
-    twin: IntArray, tail: IntArray, length: FloatArray, h: int, diagonal: float
+def flip(
+    twin: IntArray, tail: IntArray, length: FloatArray, h: int, is_euclidean: bool
 ) -> tuple[int, int, int, int]:
     """Flip the edge h by a counterclockwise rotation in its quad; return the four half-edges of the sides of the quad.
 
-    Sides move between half-edge indices (h2 to h1, t1 to h2, t2 to t1, h1 to t2). If the quad is glued to itself, their
-    twins move with them. Four flips restore every index.
+    A Euclidean flip preserves the metric, others the conformal class of the lengths, by Ptolemy's relation. Sides move
+    between half-edge indices (h2 to h1, t1 to h2, t2 to t1, h1 to t2). If the quad is glued to itself, their twins move
+    with them. Four flips restore every index.
     """
     t = twin[h]
     h1 = h - h % 3 + (h + 1) % 3
     h2 = h - h % 3 + (h + 2) % 3
     t1 = t - t % 3 + (t + 1) % 3
     t2 = t - t % 3 + (t + 2) % 3
+    if is_euclidean:
+        diagonal = euclidean_diagonal(length[h], length[h2], length[h1], length[t1], length[t2])
+    else:
+        diagonal = (length[h1] * length[t1] + length[h2] * length[t2]) / length[h]
     twins = (twin[h2], twin[t1], twin[t2], twin[h1])
     sides = (length[h2], length[t1], length[t2], length[h1])
     u, v, p, q = tail[h], tail[t], tail[h2], tail[t2]
@@ -208,22 +213,13 @@ def flip_until_delaunay(
         size = drop_first(keys, items, size)
         if key == 0.0 or -violation(twin, tail, length, scale, h) != key:  # outdated: the quad has changed
             continue
-        t = twin[h]
-        h1 = h - h % 3 + (h + 1) % 3
-        h2 = h - h % 3 + (h + 2) % 3
-        t1 = t - t % 3 + (t + 1) % 3
-        t2 = t - t % 3 + (t + 2) % 3
-        if is_euclidean:
-            diagonal = euclidean_diagonal(length[h], length[h2], length[h1], length[t1], length[t2])
-        else:  # Ptolemy's relation, which preserves the conformal class
-            diagonal = (length[h1] * length[t1] + length[h2] * length[t2]) / length[h]
         if count == len(record):
             record = np.concatenate((record, record))
         record[count] = h
         count += 1
         if size + 4 > len(items):
             keys, items = np.concatenate((keys, keys)), np.concatenate((items, items))
-        for side in relink(twin, tail, length, h, diagonal):
+        for side in flip(twin, tail, length, h, is_euclidean):
             amount = violation(twin, tail, length, scale, side)
             if amount > 0.0:
                 size = push(keys, items, size, -amount, side)

@@ -35,10 +35,7 @@ class Fans:
 
     def sorted(self, order: IntArray) -> IntArray:
         """Return an order of the triangles in which those of each fan are consecutive and sorted by angle."""
-        rank = np.empty(len(order))
-        rank[order] = np.arange(len(order))
-        is_outside = self.numbers < 0
-        return np.lexsort((np.where(is_outside, rank, self.angles[:, 0]), self.numbers))
+        return np.lexsort((np.where(self.numbers < 0, np.argsort(order), self.angles[:, 0]), self.numbers))
 
     def tree(self, order: IntArray, leaves: int) -> tuple[IntArray, FloatArray]:
         """Return the fan and the range of angles of each node of a binary tree over the triangles in an order.

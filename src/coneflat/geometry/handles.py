@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix
 
-from ..base.arrays import FloatArray, IntArray
+from ..base.arrays import FloatArray, IntArray, mask_of
 from ..linalg.shortest_paths import MultiGraph, Paths
 from ..mesh.connectivity import TriangleMesh
 from ..mesh.ties import tie_key
@@ -41,14 +41,12 @@ def handle_loops(mesh: TriangleMesh, holes: bool = False) -> list[IntArray]:
     dual = MultiGraph(len(mesh.faces), pairs, np.linalg.norm(steps, axis=1))
     root = int(np.argmax(tie_key(mesh.vertices)[mesh.faces].sum(axis=1)))
     paths = dual.shortest_paths(np.array([root]))
-    in_tree = np.zeros(len(inside), dtype=bool)
-    in_tree[paths.edge[paths.edge >= 0]] = True
+    in_tree = mask_of(len(inside), paths.edge[paths.edge >= 0])
 
     node_of = _contract_loops(mesh, holes)
     left = np.flatnonzero(~in_tree)
     primal = MultiGraph(len(node_of), node_of[mesh.edges[inside[left]]], np.ones(len(left)))
-    closes = np.ones(len(left), dtype=bool)
-    closes[primal.minimum_spanning_tree()] = False
+    closes = ~mask_of(len(left), primal.minimum_spanning_tree())
     return [_loop(paths, across, edge) for edge in left[closes]]
 
 
@@ -67,8 +65,7 @@ def _contract_loops(mesh: TriangleMesh, together: bool) -> IntArray:
 
 def _loop(paths: Paths, across: IntArray, edge: int) -> IntArray:
     """Return (k,) the half-edges crossed by the loop that goes over an edge and returns through the tree."""
-    start, end = across[edge] // 3
-    there, back = _path_to_root(start, paths.before), _path_to_root(end, paths.before)
+    there, back = ([*paths.nodes_to(face), paths.source[face[0]]] for face in across[edge][:, None] // 3)
     # The common part of both paths to the root is removed.
     while len(there) > 1 and len(back) > 1 and there[-2] == back[-2]:
         there.pop(), back.pop()
@@ -76,14 +73,6 @@ def _loop(paths: Paths, across: IntArray, edge: int) -> IntArray:
     pairs = across[np.concatenate([paths.edge[out[1:]], [edge], paths.edge[home[:-1]]])]
     faces = np.concatenate([out, home[:-1]])
     return np.where(pairs[:, 0] // 3 == faces, pairs[:, 0], pairs[:, 1])
-
-
-def _path_to_root(face: int, before: IntArray) -> list[int]:
-    """Return the faces from a face to the root of the tree."""
-    path = [int(face)]
-    while before[path[-1]] >= 0:
-        path.append(int(before[path[-1]]))
-    return path
 
 
 def corner_signs(loop: IntArray, twin: IntArray) -> tuple[IntArray, FloatArray]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats
+from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats, mask_of
 from ..base.text import list_some, plural
 from ..errors import ArrayShapeError, LengthError, NonFiniteError
 from ..mesh.connectivity import TriangleMesh
@@ -138,20 +138,9 @@ class IntrinsicTriangulation:
     vertex_count: int
 
     @property
-    def face_count(self) -> int:
-        """The number of triangles."""
-        return len(self.twin) // 3
-
-    @property
     def faces(self) -> IntArray:
         """(m, 3) the vertex at each corner."""
         return self.tail.reshape(-1, 3)[:, [2, 0, 1]]
-
-    def copy(self) -> IntrinsicTriangulation:
-        """Return an independent copy."""
-        return IntrinsicTriangulation(
-            self.twin.copy(), self.tail.copy(), self.length.copy(), self.vertex_count
-        )
 
 
 def halfedge_twins(mesh: TriangleMesh) -> IntArray:
@@ -193,9 +182,7 @@ def double(triangulation: IntrinsicTriangulation) -> tuple[IntrinsicTriangulatio
     head = tail[slots - slots % 3 + (slots + 1) % 3]
     mirror = len(twin) + slots - slots % 3 + np.array([0, 2, 1])[slots % 3]
     outer = twin < 0
-    inside = np.ones(n, dtype=bool)
-    inside[tail[outer]] = False
-    inside[head[outer]] = False
+    inside = ~mask_of(n, np.append(tail[outer], head[outer]))
     image = np.arange(n)
     image[inside] = n + np.arange(inside.sum())
 

@@ -65,9 +65,8 @@ def at_unit_scale(values: FloatArray) -> FloatArray:
 
 def at_safe_scale(values: FloatArray) -> FloatArray:
     """Return the values unchanged if sums of their products with lengths are finite, else scaled to unit size."""
-    return (
-        values if 1 / MAX_SAFE_NUMBER < values.max(initial=1.0) < MAX_SAFE_NUMBER else at_unit_scale(values)
-    )
+    is_safe = 1 / MAX_SAFE_NUMBER < values.max(initial=1.0) < MAX_SAFE_NUMBER
+    return values if is_safe else at_unit_scale(values)
 
 
 def angle_defect(faces: IntArray, angles: FloatArray, is_boundary_vertex: BoolArray) -> FloatArray:

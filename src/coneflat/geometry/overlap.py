@@ -102,8 +102,6 @@ def _overlaps(oriented: FloatArray, exponent: int, chosen: IntArray, limit: int 
     pairs, complete = _find_pairs(oriented, chosen, limit)
     if not complete:
         return Overlaps(pairs, float("nan"), float("nan"), False)
-    if not len(pairs):
-        return Overlaps(pairs, 0.0, 0.0)
     twice, once = overlap_areas(oriented, pairs)
     return Overlaps(pairs, float(np.ldexp(twice, 2 * exponent)), 0.0 if once <= 0 else twice / once)
 
@@ -210,12 +208,7 @@ def fill_boxes(
             u, v = c[(i + 2) % 6] - c[i], c[(i + 3) % 6] - c[i + 1]
             real += u * u - v * v
             imaginary += 2 * u * v
-        boxes[t, 0], boxes[t, 1], boxes[t, 2], boxes[t, 3] = (
-            x0 - margin,
-            y0 - margin,
-            x1 - margin,
-            y1 - margin,
-        )
+        boxes[t] = x0 - margin, y0 - margin, x1 - margin, y1 - margin
         area += (x0 + x1) * (y0 + y1)
     return area, real, imaginary
 
@@ -316,8 +309,7 @@ def join(
         if i >= first_leaf:
             one, two = i - first_leaf, j - first_leaf
             if not _lies_outside(corners, one, two, parts) and not _lies_outside(corners, two, one, parts):
-                found[count, 0] = one
-                found[count, 1] = two
+                found[count] = one, two
                 count += 1
             continue
         for a in range(2 * i + 1, 2 * i + 3):
@@ -325,7 +317,6 @@ def join(
                 if (a == b and a < first_leaf) or (
                     a < b and _boxes_meet(tree, a, b) and not (len(fans) and are_disjoint(fans, angles, a, b))
                 ):
-                    stack[top, 0] = a
-                    stack[top, 1] = b
+                    stack[top] = a, b
                     top += 1
     return top, count

@@ -15,7 +15,7 @@ from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats, dots
 from ..base.jit import compiled
 from ..base.text import list_some, plural
 from ..errors import ArrayShapeError, DegenerateFaceError, FaceIndexError
-from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh, corner_fans
+from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh, corner_fans, measure_sides
 
 # Twice the area divided by the square of the longest side, at which a triangle counts as having no area. Smaller values
 # cannot be represented by rounded lengths; the flattest triangles of real scans have 1e-3.
@@ -38,8 +38,6 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
         ArrayShapeError: the vertices are not (n, 3) or (n, 2), or the faces are not (m, 3).
         FaceIndexError: a face refers to a vertex that does not exist.
     """
-    from ..mesh.connectivity import measure_sides
-
     points, triangles = as_floats("vertices", vertices), np.asarray(faces, dtype=np.int64)
     if points.ndim != 2:
         raise ArrayShapeError(
@@ -54,11 +52,11 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
     return measure_sides(points, triangles)
 
 
-def as_triples(name: str, values: ArrayLike) -> FloatArray:
-    """Return values as a contiguous (m, 3) float array, as compiled loops need; raise ArrayShapeError otherwise."""
-    array = as_floats(name, values)
+def as_triples(lengths: ArrayLike) -> FloatArray:
+    """Return lengths as a contiguous (m, 3) float array, as compiled loops need; raise ArrayShapeError otherwise."""
+    array = as_floats("lengths", lengths)
     if array.ndim != 2 or array.shape[1] != 3:
-        raise ArrayShapeError(f"{name} must have the shape (m, 3), got {array.shape}")
+        raise ArrayShapeError(f"lengths must have the shape (m, 3), got {array.shape}")
     return array
 
 
@@ -68,10 +66,7 @@ def slacks(lengths: FloatArray) -> FloatArray:
     Args:
         lengths: (m, 3) side lengths, column i opposite corner i.
     """
-    lengths = as_triples("lengths", lengths)
-    slack = np.empty_like(lengths)
-    fill_slacks(lengths, slack)
-    return slack
+    return measure_slacks(as_triples(lengths))
 
 
 def is_broken(lengths: FloatArray) -> BoolArray:
@@ -89,10 +84,7 @@ def double_areas(lengths: FloatArray) -> FloatArray:
     Args:
         lengths: (m, 3) side lengths, column i opposite corner i.
     """
-    lengths = as_triples("lengths", lengths)
-    areas = np.empty(len(lengths))
-    fill_double_areas(lengths, areas)
-    return areas
+    return measure_double_areas(as_triples(lengths))
 
 
 def corner_angles(lengths: FloatArray) -> FloatArray:
@@ -105,7 +97,8 @@ def corner_angles(lengths: FloatArray) -> FloatArray:
         lengths: (m, 3) side lengths, column i opposite corner i.
     """
     slack = np.maximum(slacks(lengths), 0)
-    perimeter = _perimeter(lengths)[:, None]
+    # Computed column by column, as NumPy is slow at sums along an axis of length three.
+    perimeter = (lengths[:, 0] + lengths[:, 1] + lengths[:, 2])[:, None]
     angles: FloatArray = 2 * np.arctan2(
         np.sqrt(slack[:, NEXT] * slack[:, PREVIOUS]), np.sqrt(perimeter * slack)
     )
@@ -118,15 +111,7 @@ def cotangents(lengths: FloatArray) -> FloatArray:
     Args:
         lengths: (m, 3) side lengths, column i opposite corner i.
     """
-    lengths = as_triples("lengths", lengths)
-    cots = np.empty(lengths.shape)
-    fill_cotangents(lengths, cots)
-    return cots
-
-
-def _perimeter(lengths: FloatArray) -> FloatArray:
-    # Computed column by column, as NumPy is slow at sums along an axis of length three.
-    return lengths[:, 0] + lengths[:, 1] + lengths[:, 2]
+    return measure_cotangents(as_triples(lengths))
 
 
 def mollify(
@@ -148,7 +133,7 @@ def mollify(
     Raises:
         DegenerateFaceError: `strict` is True and a triangle has no area, or the total area of the mesh is zero.
     """
-    lengths = as_triples("lengths", lengths)
+    lengths = as_triples(lengths)
     longest = np.maximum(np.maximum(lengths[:, 0], lengths[:, 1]), lengths[:, 2])
     areas, squares = double_areas(lengths), longest**2
     bad = np.flatnonzero(areas <= ZERO_AREA * squares)
@@ -181,38 +166,44 @@ def side_slack(lengths: FloatArray, t: int, i: int) -> float:
 
 
 @compiled
-def fill_slacks(lengths: FloatArray, slack: FloatArray) -> None:
-    """Write the slacks (m, 3), b + c - a for every side a, of triangles with sides (m, 3)."""
+def measure_slacks(lengths: FloatArray) -> FloatArray:
+    """Return the slacks (m, 3), b + c - a for every side a, of triangles with sides (m, 3)."""
+    slack = np.empty(lengths.shape)
     for t in range(len(lengths)):
         for i in range(3):
             slack[t, i] = side_slack(lengths, t, i)
+    return slack
 
 
 @compiled
-def fill_cotangents(lengths: FloatArray, cots: FloatArray) -> None:
-    """Write the cotangents (m, 3) of the angles of triangles with sides (m, 3); NumPy would need a dozen arrays."""
+def measure_cotangents(lengths: FloatArray) -> FloatArray:
+    """Return the cotangents (m, 3) of the angles of triangles with sides (m, 3); NumPy would need a dozen arrays."""
+    cots = np.empty(lengths.shape)
     for t in range(len(lengths)):
         perimeter, product = lengths[t, 0] + lengths[t, 1] + lengths[t, 2], 1.0
         for i in range(3):
             cots[t, i] = side_slack(lengths, t, i)
             product *= 0.0 if cots[t, i] < 0.0 else cots[t, i]
-        # Eight times the area, with the same rounding as in `fill_double_areas`.
+        # Eight times the area, with the same rounding as in `measure_double_areas`.
         eightfold = 4 * (math.sqrt(perimeter * product) / 2)
         one, two, three = cots[t, 0], cots[t, 1], cots[t, 2]
         cots[t, 0] = (perimeter * one - two * three) / eightfold
         cots[t, 1] = (perimeter * two - three * one) / eightfold
         cots[t, 2] = (perimeter * three - one * two) / eightfold
+    return cots
 
 
 @compiled
-def fill_double_areas(lengths: FloatArray, areas: FloatArray) -> None:
-    """Write twice the area (m,) of triangles with sides (m, 3)."""
+def measure_double_areas(lengths: FloatArray) -> FloatArray:
+    """Return twice the area (m,) of triangles with sides (m, 3)."""
+    areas = np.empty(len(lengths))
     for t in range(len(lengths)):
         product = 1.0
         for i in range(3):
             slack = side_slack(lengths, t, i)
             product *= 0.0 if slack < 0.0 else slack  # NaN is preserved
         areas[t] = math.sqrt((lengths[t, 0] + lengths[t, 1] + lengths[t, 2]) * product) / 2
+    return areas
 
 
 def face_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:

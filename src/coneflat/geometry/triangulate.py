@@ -50,21 +50,15 @@ def triangulate(vertices: FloatArray, corners: IntArray, offsets: IntArray) -> t
     first_triangle = np.cumsum(sizes - 2) - (sizes - 2)
     face_corners = np.empty((int((sizes - 2).sum()), 3), dtype=np.int64)
 
-    triangles = sizes == 3
-    face_corners[first_triangle[triangles]] = offsets[:-1][triangles, None] + np.arange(3)
-
-    quads = np.flatnonzero(sizes == 4)
-    if len(quads):
-        own = offsets[quads, None] + np.arange(4)
-        use_02 = _splits_at_first_corner(vertices, corners[own])[:, None, None]
-        local = np.where(use_02, [[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]])
-        rows = first_triangle[quads, None] + np.arange(2)
-        face_corners[rows] = offsets[quads, None, None] + local
-
-    for size in np.unique(sizes[sizes > 4]).tolist():
+    for size in np.unique(sizes).tolist():
         polygons = np.flatnonzero(sizes == size)
-        own = offsets[polygons, None] + np.arange(size)
-        local = _ngons(vertices[corners[own]])
+        own = corners[offsets[polygons, None] + np.arange(size)]
+        local = fan_corners(np.array([0, size]))
+        if size == 4:
+            use_02 = _splits_at_first_corner(vertices, own)[:, None, None]
+            local = np.where(use_02, local, [[0, 1, 3], [1, 2, 3]])
+        elif size > 4:
+            local = _ngons(vertices[own])
         rows = first_triangle[polygons, None] + np.arange(size - 2)
         face_corners[rows] = offsets[polygons, None, None] + local
     return corners[face_corners], face_corners
@@ -79,10 +73,7 @@ def is_polygon_side(face_corners: IntArray, offsets: IntArray) -> BoolArray:
         face_corners: (m, 3) polygon corner at each triangle corner.
         offsets: (p + 1,) where the corners of each polygon start.
     """
-    sizes = np.diff(offsets)
-    if np.all(sizes == 3):
-        return np.ones(face_corners.shape, dtype=bool)
-    sizes = sizes[polygon_of(face_corners, offsets)][:, None]
+    sizes = np.diff(offsets)[polygon_of(face_corners, offsets)][:, None]
     steps = np.abs(face_corners - np.roll(face_corners, -1, axis=1))
     return np.asarray((steps == 1) | (steps == sizes - 1))
 

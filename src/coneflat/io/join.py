@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import BoolArray, IntArray
+from ..base.arrays import BoolArray, IntArray, mask_of
 from ..base.text import plural
 from ..errors import OptionError
 from ..geometry.triangulate import triangulate
@@ -175,11 +175,8 @@ def _opposite(
 
 def _inconsistent(tails: IntArray, heads: IntArray, count: int) -> BoolArray:
     """Return (n,) True for the vertices of components with two half-edges of the same tail and head."""
-    again = _repeated(tails, heads, count)
-    if not again.any():
-        return np.zeros(count, dtype=bool)
     _, component = label_components(count, tails, heads)
-    return np.isin(component, component[tails[again]])
+    return np.isin(component, component[tails[_repeated(tails, heads, count)]])
 
 
 def _repeated(tails: IntArray, heads: IntArray, count: int) -> BoolArray:
@@ -200,6 +197,4 @@ def _invalid(tails: IntArray, heads: IntArray, bad: BoolArray, count: int) -> Bo
     """Return (n,) True for vertices at which joining makes invalid triangles or edges, outside bad components."""
     # If two corners of a triangle are equal, the half-edge between them has equal ends.
     is_invalid = (_repeated(tails, heads, count) | (tails == heads)) & ~bad[tails]
-    invalid = np.zeros(count, dtype=bool)
-    invalid[tails[is_invalid]] = invalid[heads[is_invalid]] = True
-    return invalid
+    return mask_of(count, np.append(tails[is_invalid], heads[is_invalid]))

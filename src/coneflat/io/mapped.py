@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,14 +13,12 @@ from numpy.typing import ArrayLike
 from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats
 from ..errors import ArrayShapeError, MissingUVError
 from ..mesh.polygons import fan_corners
+from ..result import Flattening
 from .join import Joined
 from .mesh_file import MeshFile
 from .npz import read_flattening
 from .packages import as_input
 from .read import read_joined
-
-if TYPE_CHECKING:
-    from ..result import Flattening
 
 
 @dataclass(frozen=True, eq=False)

@@ -109,6 +109,4 @@ def check_filled(path: Path, vertices: int, faces: int) -> None:
 
 def offsets_of(sizes: IntArray) -> IntArray:
     """Return (p + 1,) the offsets of polygons with given sizes (p,)."""
-    offsets = np.zeros(len(sizes) + 1, dtype=np.int64)
-    np.cumsum(sizes, out=offsets[1:])
-    return offsets
+    return np.concatenate([[0], np.cumsum(sizes, dtype=np.int64)])

@@ -12,17 +12,19 @@ from collections.abc import Callable, Iterable
 from dataclasses import fields
 from io import BytesIO
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, TypeVar
+from typing import IO, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import FloatArray, IntArray
 from ..errors import MeshFileError
+from ..measure.distortion import Distortion
+from ..measure.report import MEASURES
+from ..measure.seam_data import Rotations
+from ..result import Flattening
+from ..stages import SolveStatistics
 from .files import PathName, as_path, read_bytes, readable
-
-if TYPE_CHECKING:
-    from ..result import Flattening
 
 #: The arrays that define a result. The other arrays of an archive, those of `SeamData`, follow from them.
 _NAMES = (
@@ -78,12 +80,6 @@ def read_flattening(path: PathName) -> Flattening:
 
 
 def _flattening(reading: CheckedArrays) -> Flattening:
-    from ..measure.distortion import Distortion
-    from ..measure.report import MEASURES
-    from ..measure.seam_data import Rotations
-    from ..result import Flattening
-    from ..stages import SolveStatistics
-
     path, arrays, floats, indices = reading.path, reading.arrays, reading.floats, reading.indices
     reading.need(_NAMES, "result of coneflat with UVs")
     report = reading.report()

@@ -12,7 +12,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +20,11 @@ from numpy.typing import NDArray
 from ..base.arrays import FloatArray, IntArray
 from ..errors import FaceIndexError, MeshFileError
 from ..mesh.polygons import COLOURS, first_bad_corner
+from ..result import Flattening
 from .convex_pieces import find_pieces
 from .files import moved_path
 from .mesh_file import MeshFile, check_filled, offsets_of
 from .text import Growing, TextBlock, newline_of, text_blocks
-
-if TYPE_CHECKING:
-    from ..result import Flattening
 
 _OTHER, _VERTEX, _FACE, _TEXTURE, _NORMAL, _ELEMENT, _COMMENTED_FACE = range(7)
 #: The kind of a line by its first two characters as a 16-bit number.

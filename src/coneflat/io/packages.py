@@ -6,21 +6,19 @@ Other packages are imported only when they are needed.
 from __future__ import annotations
 
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import ArrayShapeError
 from ..geometry.triangulate import triangulate
+from ..result import Flattening
 from ..source.input_mesh import InputMesh
 from .files import imported
 from .mesh_file import MeshFile, offsets_of
 from .read import read_mesh
 from .split import split_at_seams
-
-if TYPE_CHECKING:
-    from ..result import Flattening
 
 
 def as_input(mesh: Any, faces: ArrayLike | None = None) -> InputMesh:

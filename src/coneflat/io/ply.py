@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, TypeAlias
+from typing import IO, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +19,10 @@ from numpy.typing import NDArray
 from ..base.arrays import FloatArray, IntArray
 from ..errors import MeshFileError
 from ..mesh.polygons import COLOURS
+from ..result import Flattening
 from .mesh_file import MeshFile, check_filled, offsets_of
 from .split import source_normals, split_at_seams
 from .text import Growing, text_blocks
-
-if TYPE_CHECKING:
-    from ..result import Flattening
 
 #: The code of each type, in numpy and in struct.
 _TYPES = {

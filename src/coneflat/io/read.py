@@ -129,19 +129,16 @@ def read_mesh_from(
 def format_of(content: bytes) -> str:
     """Return the ending in `INPUT_FORMATS` for the format of a content; .obj if it is none of the others."""
     head = content[:512].removeprefix(b"\xef\xbb\xbf").lstrip()
-    if content.startswith(b"glTF"):
-        return ".glb"
-    if is_freesurfer(content):
-        return FREESURFER[0]
-    if is_gifti(content):
-        return ".gii"
-    if head.startswith(b"{"):
-        return ".gltf"
-    if content.startswith(b"ply"):
-        return ".ply"
-    if is_stl(content):
-        return ".stl"
-    return ".off" if is_off(content) else ".obj"
+    formats = (
+        (".glb", content.startswith(b"glTF")),
+        (FREESURFER[0], is_freesurfer(content)),
+        (".gii", is_gifti(content)),
+        (".gltf", head.startswith(b"{")),
+        (".ply", content.startswith(b"ply")),
+        (".stl", is_stl(content)),
+        (".off", is_off(content)),
+    )
+    return next((ending for ending, is_found in formats if is_found), ".obj")
 
 
 def _welded(mesh: MeshFile) -> MeshFile:

@@ -6,7 +6,7 @@ This is needed for formats with one UV point and one normal per vertex.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,10 +14,8 @@ from ..base.arrays import FloatArray, IntArray
 from ..geometry.triangles import face_normals, sums_at, unit_vectors, vertex_normals
 from ..mesh.check import weld
 from ..mesh.polygons import polygon_of
+from ..result import Flattening
 from .mesh_file import MeshFile
-
-if TYPE_CHECKING:
-    from ..result import Flattening
 
 _SMOOTHING = re.compile(rb"(?m)^[ \t]*s[ \t]+(\S+)")
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from io import BytesIO
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 from ..base.arrays import FloatArray, IntArray
 from ..errors import MeshFileError, OptionError
 from ..geometry.planar import signed_double_areas
+from ..result import Flattening
 from .files import PathName, as_path, imported, read_bytes, readable
-
-if TYPE_CHECKING:
-    from ..result import Flattening
 
 #: A light, slightly cool grey.
 LIGHT_CELL = (0.86, 0.87, 0.89)
@@ -135,10 +133,7 @@ def read_picture(path: PathName) -> Texture:
 
 
 def _pillow() -> Any:
-    imported("PIL", "textures need Pillow", '"coneflat[figures]"')
-    from PIL import Image
-
-    return Image
+    return imported("PIL.Image", "textures need Pillow", '"coneflat[figures]"')
 
 
 def _checkerboard(result: Flattening, image: Any) -> Texture:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ..errors import MeshFileError, OptionError
 from ..measure.guarantees import DOUBLE, SINGLE, remeasured
 from ..mesh.polygons import polygon_of
 from ..options.declared import FORMATS
+from ..result import Flattening
 from .convex_pieces import find_pieces
 from .files import PathName, atomic_write, checked_target
 from .gltf.write import scene_losses, write_glb
@@ -24,10 +25,6 @@ from .npz import write_npz
 from .obj import write_obj
 from .ply import write_ply
 from .texture import find_texture
-
-if TYPE_CHECKING:
-    from ..result import Flattening
-
 
 #: Endings of the files that `write_flattening` writes.
 OUTPUT_FORMATS = tuple(f".{name}" for name in FORMATS)

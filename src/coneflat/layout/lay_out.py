@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.arrays import FloatArray, rows_of
+from ..base.arrays import FloatArray, mask_of, rows_of
 from ..base.text import plural
 from ..errors import MetricError
 from ..geometry import angle_defect, corner_angles, double_areas
@@ -68,8 +68,7 @@ def _unfolded(metric: FlatMetric, triangles: FlatTriangles, cut: Cut) -> Layout:
     mesh = metric.mesh
     on_boundary, stays = mesh.is_boundary_vertex, metric.is_fixed.copy()
     stays[metric.cones] = True
-    on_seam = np.zeros(len(mesh.vertices), dtype=bool)
-    on_seam[mesh.edges[cut.seams]] = True
+    on_seam = mask_of(len(mesh.vertices), mesh.edges[cut.seams])
     angles = np.where(on_boundary, np.pi, 2 * np.pi) - metric.target
     untangled = untangle(
         triangles,

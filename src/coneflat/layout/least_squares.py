@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ..base.arrays import ComplexArray, FloatArray, IntArray
+from ..base.arrays import ComplexArray, FloatArray, IntArray, mask_of
 from ..errors import MetricError
 from ..geometry import corner_angles, is_broken
 from ..geometry.planar import as_pairs
@@ -47,8 +47,7 @@ def pinned_least_squares(equations: csr_matrix, pins: IntArray) -> ComplexArray:
         pins: (2,) columns with prescribed values.
     """
     normal = csr_matrix(equations.conj().T @ equations)
-    free = np.ones(equations.shape[1], dtype=bool)
-    free[pins] = False
+    free = ~mask_of(equations.shape[1], pins)
     factor = HermitianFactor(normal[free][:, free])
     z = np.zeros(len(free), dtype=np.complex128)
     z[pins[1]] = 1.0
@@ -88,8 +87,7 @@ def far_pins(disk: TriangleMesh, lengths: FloatArray) -> IntArray:
         lengths: (m, 3) side lengths.
     """
     graph = MultiGraph(len(disk.vertices), disk.edges, lengths.ravel()[disk.edge_halfedges[:, 0]])
-    allowed = np.ones(len(disk.vertices), dtype=bool)
-    allowed[disk.faces[is_broken(lengths)]] = False
+    allowed = ~mask_of(len(disk.vertices), disk.faces[is_broken(lengths)])
     if allowed.sum() < 2:
         allowed[:] = True
     key = tie_key(disk.vertices)

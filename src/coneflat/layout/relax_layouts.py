@@ -8,17 +8,16 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, rows_of
+from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, mask_of, rows_of
 from ..errors import LengthError, MetricError, SeamError
 from ..geometry import double_areas
 from ..geometry.operators import MIN_WEIGHT, area_distortion, at_unit_scale, vertex_areas, weighted_areas
 from ..geometry.planar import as_complex, layout_curvature, map_factors, signed_double_areas, vertex_log_scale
-from ..mesh.connectivity import TriangleMesh, label_components
+from ..mesh.connectivity import TriangleMesh, label_components, nearby
 from ..stages import Layout, RelaxSpec
 from .relax import StretchEnergy, relax
 from .relax.elements import Maps
 from .relax.relax import rest_sides
-from .untangle import nearby
 
 # Triangles with more quasi-conformal distortion than this are relaxed, with this number of rings around them. Measured:
 # with a twentieth of the vertices of a fine mesh and three quarters of a coarse one free, the mean comes within 0.0025
@@ -228,16 +227,14 @@ class LayoutGroup:
         np.maximum.at(worst, of_face, after[touched])
         is_worse = worst[patch] > (1 + RELATIVE_TOLERANCE) * self.largest(before)[self.of_vertex]
         is_lost = ((gained < least)[patch] | is_worse) & was_free
-        back = np.zeros(len(moved), dtype=bool)
-        back[self.corners[is_lost[faces]]] = True
+        back = mask_of(len(moved), self.corners[is_lost[faces]])
         return np.where(back[:, None], points, moved), is_lost
 
     def updated(self, points: FloatArray, was_free: BoolArray) -> list[Layout]:
         """Return the layouts with moved points and with updated curvature, target and log scale."""
         mesh, corners = self.mesh, rows_of(points, self.corners)
         # Curvatures change only at vertices of moved triangles.
-        changed = np.zeros(len(mesh.vertices), dtype=bool)
-        changed[mesh.faces[has_any(was_free, mesh.faces)]] = True
+        changed = mask_of(len(mesh.vertices), mesh.faces[has_any(was_free, mesh.faces)])
         old = np.concatenate([one.curvature for one in self.layouts])
         curvature = np.where(changed, layout_curvature(mesh, corners, changed), old)
         # Areas are relative to those of each layout, as the threshold for zero area is.

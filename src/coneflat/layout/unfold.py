@@ -184,11 +184,11 @@ def spread(
     frame: ComplexArray,
     placed: BoolArray,
     points: ComplexArray,
-) -> int:
+) -> None:
     """Lay out, breadth first, all triangles that can be reached from the first `last` ones in the queue.
 
     corner: (3m,) vertex of the cut mesh at each corner. Triangles in the queue are marked as reached and have frames
-    and at least one placed corner. Returns the length of the queue, the number of triangles laid out.
+    and at least one placed corner.
     """
     first = 0
     while first < last:
@@ -211,7 +211,6 @@ def spread(
                 reached[t // 3] = True
                 queue[last] = t // 3
                 last += 1
-    return last
 
 
 @compiled

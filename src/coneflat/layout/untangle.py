@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
+from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any, mask_of
 from ..geometry.planar import heights, signed_angles
 from ..geometry.straight import FlatTriangles
+from ..mesh.connectivity import nearby
 from .patches import DEGENERATE_HEIGHT, Patches
 
 # Minimum ratio of height to longest side of the target shapes.
@@ -88,27 +89,26 @@ def untangle(
     )
 
 
+@dataclass(eq=False)
 class _Untangling:
     """The state of untangling the triangles of a surface.
 
     Attributes:
+        flat, faces, angles, on_boundary, rest: see `untangle`; the target shapes are not thin.
         sides: (m, 3) current sides of the triangles.
         is_bad: (m,) True for triangles that are inverted or degenerate.
         moves: (n,) distance by which each vertex was moved, relative to the mean length of the edges around it.
     """
 
-    def __init__(
-        self,
-        flat: FlatTriangles,
-        faces: IntArray,
-        angles: FloatArray,
-        on_boundary: BoolArray,
-        rest: ComplexArray,
-    ) -> None:
-        self.rest = rest
-        self.flat, self.faces, self.angles, self.on_boundary = flat, faces, angles, on_boundary
-        self.sides = flat.sides.reshape(-1, 3).copy()
-        self.moves = np.zeros(len(angles))
+    flat: FlatTriangles
+    faces: IntArray
+    angles: FloatArray
+    on_boundary: BoolArray
+    rest: ComplexArray
+
+    def __post_init__(self) -> None:
+        self.sides = self.flat.sides.reshape(-1, 3).copy()
+        self.moves = np.zeros(len(self.angles))
         self.is_bad = find_degenerate(self.sides)
 
     def improve(self, rings: int, stay: BoolArray) -> None:
@@ -121,12 +121,9 @@ class _Untangling:
     def _accept(self, patches: Patches, shifts: ComplexArray) -> None:
         """Accept the patches whose triangles are now positively oriented and wind around every vertex once."""
         result = patches.moved(shifts)
-        failed = np.zeros(patches.count, dtype=bool)
-        failed[patches.face_patch[find_degenerate(result)]] = True
+        failed = mask_of(patches.count, patches.face_patch[find_degenerate(result)])
         trial = np.where(failed[patches.face_patch, None], patches.sides, result)
-        winding = self._winding(patches, trial)
-        winds = np.zeros(len(self.angles), dtype=bool)
-        winds[winding] = True
+        winds = mask_of(len(self.angles), self._winding(patches, trial))
         failed[patches.face_patch[winds[self.faces[patches.faces]].any(axis=1)]] = True
         good = ~failed[patches.face_patch]
         self.sides[patches.faces[good]] = result[good]
@@ -135,8 +132,7 @@ class _Untangling:
 
     def _winding(self, patches: Patches, trial: ComplexArray) -> IntArray:
         """Return the vertices with a wrong angle sum only after the patches' triangles get the trial sides (f, 3)."""
-        near = np.zeros(len(self.angles), dtype=bool)
-        near[self.faces[patches.faces]] = True
+        near = mask_of(len(self.angles), self.faces[patches.faces])
         rows = np.flatnonzero(has_any(near, self.faces))
         is_free = np.zeros(len(self.angles), dtype=bool)
         is_free[patches.vertices] = self.on_boundary[patches.vertices]
@@ -163,21 +159,11 @@ def winding_vertices(
         angles: (n,) the angle around each vertex, radians.
         is_free: (n,) True for boundary vertices at which any angle of less than a full turn is allowed.
     """
-    is_bad = np.zeros(len(angles), dtype=bool)
-    is_bad[faces[find_degenerate(sides)]] = True
+    is_bad = mask_of(len(angles), faces[find_degenerate(sides)])
     sums = np.bincount(faces.ravel(), signed_angles(sides).ravel(), len(angles))
     winds = np.abs(sums - angles) > WINDING_ERROR
     winds[is_free] = sums[is_free] >= np.maximum(2 * np.pi, angles[is_free] + WINDING_ERROR)
     return np.flatnonzero(~is_bad & winds)
-
-
-def nearby(faces: IntArray, seeds: BoolArray, rings: int) -> BoolArray:
-    """Return (n,) True for the vertices of seed triangles (m,) and of `rings` rings of triangles around them."""
-    inside = np.zeros(int(faces.max()) + 1, dtype=bool)
-    inside[faces[seeds]] = True
-    for _ in range(rings):
-        inside[faces[has_any(inside, faces)]] = True
-    return inside
 
 
 def _thickened(rest: ComplexArray) -> ComplexArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of
 from ..base.text import list_some, plural
 from ..geometry.intrinsic import halfedge_twins
 from ..geometry.operators import cotangent_laplacian
@@ -69,8 +69,7 @@ def untangle_seams(
         weights=group.weights,
         free=is_free,
     ).points
-    was_free = np.zeros(len(layout.mesh.vertices), dtype=bool)
-    was_free[vertex[is_free]] = True
+    was_free = mask_of(len(layout.mesh.vertices), vertex[is_free])
     found = group.updated(points, was_free)[0]
     flipped = np.flatnonzero(was_bad & ~find_degenerate(sides_between(points[disk.faces])))
     if not len(flipped):
@@ -110,8 +109,7 @@ def untangled_disk(
         rest_sides(lengths),
         2 * MAX_RINGS,
     )
-    found, moved = unfold(untangled.flat, disk.faces), np.zeros(len(points), dtype=bool)
-    moved[untangled.moved] = True
+    found, moved = unfold(untangled.flat, disk.faces), mask_of(len(points), untangled.moved)
     if len(untangled.left) and not fixed.any() and disk.boundary_loops[0] == 1:
         areas = np.abs(signed_double_areas(found[disk.faces])) / 2
         embedded = embedded_disks(disk, np.zeros(len(areas), dtype=np.int64), areas)

@@ -13,7 +13,7 @@ from ..base.progress import check_cancelled
 from ..errors import MetricError
 
 # Relative size of a step that does not change the variables in floating point.
-ROUNDING = 2.0**-52
+ROUNDING = float(np.finfo(np.float64).eps)
 # Fraction of the linear decrease that a step must attain where function values are compared (Armijo), and largest
 # number of halvings of a step. After them the step is below 1e-9 of the first trial and counts as rounding.
 ARMIJO, HALVINGS = 1e-4, 30

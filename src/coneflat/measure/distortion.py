@@ -207,7 +207,7 @@ def measure_map(
     """Return all measures except those of overlaps; arguments are those of `measure`."""
     corner_uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
     shapes = (mesh.vertices, mesh.faces) if lengths is None else _place_separately(lengths)
-    area, has_area, uv_area, has_uv_area, qc = measure_triangles(*shapes, corner_uv, ZERO_AREA)
+    area, has_area, uv_area, has_uv_area, qc = measure_triangles(*shapes, corner_uv)
     valid = has_area & has_uv_area
     # In most meshes all triangles are valid; a slice then avoids copies.
     chosen = slice(None) if valid.all() else valid
@@ -330,7 +330,7 @@ def _place_separately(lengths: FloatArray) -> tuple[FloatArray, IntArray]:
 
 @compiled
 def measure_triangles(
-    vertices: FloatArray, faces: IntArray, corner_uv: FloatArray, zero: float
+    vertices: FloatArray, faces: IntArray, corner_uv: FloatArray
 ) -> tuple[FloatArray, BoolArray, FloatArray, BoolArray, FloatArray]:
     """Return the areas of triangles on the model and in the plane, and their QC distortion.
 
@@ -338,7 +338,6 @@ def measure_triangles(
         vertices: (n, 3) positions.
         faces: (m, 3).
         corner_uv: (m, 3, 2).
-        zero: bound of twice the area over the square of the longest side, up to which a triangle is degenerate.
 
     Returns:
         Five arrays (m,): twice the area on the model, whether it is nonzero, twice the signed area in the plane,
@@ -363,12 +362,12 @@ def measure_triangles(
             normal[x] = one[y] * two[z] - one[z] * two[y]
             square += normal[x] * normal[x]
         area[f] = math.sqrt(square)
-        has_area[f] = area[f] > zero * max(along, across, opposite)
+        has_area[f] = area[f] > ZERO_AREA * max(along, across, opposite)
         u1, v1 = corner_uv[f, 1, 0] - corner_uv[f, 0, 0], corner_uv[f, 1, 1] - corner_uv[f, 0, 1]
         u2, v2 = corner_uv[f, 2, 0] - corner_uv[f, 0, 0], corner_uv[f, 2, 1] - corner_uv[f, 0, 1]
         uv_area[f] = u1 * v2 - v1 * u2
         longest = max(u1 * u1 + v1 * v1, u2 * u2 + v2 * v2, (u2 - u1) ** 2 + (v2 - v1) ** 2)
-        has_uv_area[f] = abs(uv_area[f]) > zero * longest
+        has_uv_area[f] = abs(uv_area[f]) > ZERO_AREA * longest
         ratio[f] = np.nan
         if has_area[f] and has_uv_area[f]:
             # (x1, y1) and (x2, y2) are the images of two orthonormal vectors, the first along the first side.

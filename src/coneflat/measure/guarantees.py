@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..result import Flattening
 
 # Relative rounding of a double, and of the 32-bit numbers of GLB files.
-DOUBLE, SINGLE = 2.0**-53, 2.0**-24
+DOUBLE, SINGLE = (float(np.finfo(kind).epsneg) for kind in (np.float64, np.float32))
 # Largest error of points, in roundings: of the coordinates, and of the operations that rotate, move and scale them.
 MAX_ROUNDINGS = 8
 # Tolerance of a layout in addition to rounding: radians, or relative to a length. Metrics are solved to about 1e-11.

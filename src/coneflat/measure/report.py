@@ -99,17 +99,18 @@ def as_rows(result: Flattening) -> list[Row]:
     d = result.distortion
     curvatures = result.curvatures / np.pi
     solve = result.solve
+    used = np.count_nonzero(np.bincount(result.faces.ravel()))
     cones = f"{len(result.cones)}"
     if len(result.cones):
         cones += f"  ({curvatures.min():+.3f} to {curvatures.max():+.3f} pi)"
-    untangled = ""
+    of_map = map_rows(d)
     if solve.untangled_vertices:
         untangled = (
             f"flipped triangles; {solve.untangled_triangles:,} before "
             f"{plural(solve.untangled_vertices, 'vertex', 'vertices')} were moved by at most "
             f"{solve.untangled_move:.2g} edge lengths"
         )
-    of_map = map_rows(d)
+        of_map["flipped"] = (*of_map["flipped"][:2], untangled)
     if solve.relaxed_vertices:
         moved = f"{plural(solve.relaxed_vertices, 'vertex', 'vertices')} moved"
         relaxed = f"; {moved} to reduce it"
@@ -118,10 +119,8 @@ def as_rows(result: Flattening) -> list[Row]:
             relaxed = f"; before {moved} {before[0]}, worst {before[1]}"
         name, value, meaning = of_map["QC distortion"]
         of_map["QC distortion"] = (name, value, meaning + relaxed)
-    if untangled:
-        of_map["flipped"] = (*of_map["flipped"][:2], untangled)
     return [
-        ("triangles", f"{len(result.faces):,}", f"{_used(result):,} vertices"),
+        ("triangles", f"{len(result.faces):,}", f"{used:,} vertices"),
         ("cones", cones, "singular vertices and their curvatures"),
         (
             "curvature error",
@@ -143,13 +142,6 @@ def as_rows(result: Flattening) -> list[Row]:
         *(of_map[name] for name in ("texel density", "seam length", "seam mismatch")),
         *_rotation_rows(result),
     ]
-
-
-def _used(result: Flattening) -> int:
-    """Return the number of vertices that have triangles."""
-    is_used = np.zeros(len(result.vertices), dtype=bool)
-    is_used[result.faces] = True
-    return int(np.count_nonzero(is_used))
 
 
 def map_rows(d: Distortion) -> dict[str, Row]:
@@ -200,10 +192,10 @@ def map_rows(d: Distortion) -> dict[str, Row]:
 def _texture_rows(result: Flattening) -> list[Row]:
     """Return the row on the texture, if its size is known."""
     side = result.settings.get("resolution")
-    density = "" if side is None else number_text(result.uv_scale * side, ".4g")
-    return (
-        [] if side is None else [("texture", f"{side:,}", f"texels per side; {density} per unit of length")]
-    )
+    if side is None:
+        return []
+    density = number_text(result.uv_scale * side, ".4g")
+    return [("texture", f"{side:,}", f"texels per side; {density} per unit of length")]
 
 
 def packing_row(efficiency: float, tiles: str = "") -> Row:

@@ -1,9 +1,17 @@
 """Triangle meshes: connectivity, checks and repair, cutting open, charts and seams of UVs."""
 
-from .charts import joined_edges, label_charts, point_seams, point_vertices, uv_seams
+from .charts import (
+    CutMesh,
+    cut_open,
+    joined_edges,
+    label_charts,
+    open_along,
+    point_seams,
+    point_vertices,
+    uv_seams,
+)
 from .check import REPAIR_ADVICE, CheckedMesh, left_out
 from .connectivity import NEXT, PREVIOUS, corner_fans, end_corners, label_components, label_faces, sort_pairs
-from .open_mesh import CutMesh, cut_open, open_along
 from .ties import tie_key
 
 __all__ = [

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats, require_finite
+from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats, mask_of, require_finite
 from ..base.sets import grow_forest
 from ..base.text import list_some, plural
 from ..errors import (
@@ -17,14 +17,7 @@ from ..errors import (
     NonManifoldError,
     NonOrientableError,
 )
-from .connectivity import (
-    NEXT,
-    PREVIOUS,
-    TriangleMesh,
-    label_components,
-    sort_pairs,
-    split_vertices,
-)
+from .connectivity import NEXT, PREVIOUS, TriangleMesh, label_components, sort_pairs, split_vertices
 
 REPAIR_ADVICE = "pass repair=True (on the command line: leave out --strict)"
 
@@ -164,8 +157,7 @@ class _Check:
         if self.repair:
             _, first = np.unique(np.sort(self.faces, axis=1), axis=0, return_index=True)
             if len(first) < len(self.faces):
-                keep = np.zeros(len(self.faces), dtype=bool)
-                keep[first] = True
+                keep = mask_of(len(self.faces), first)
                 self.notes.append(f"Dropped {plural(int((~keep).sum()), 'duplicate face')}.")
                 self._keep(keep)
 
@@ -181,7 +173,7 @@ class _Check:
         counts = np.diff(np.append(starts, len(order)))
         crowded = starts[counts > 2]
         if len(crowded):
-            edges = ["{}-{}".format(*sorted((tails[h], heads[h]))) for h in order[crowded[:5]]]
+            edges = [self._edge_name(h) for h in order[crowded[:5]]]
             what = plural(len(crowded), "edge")
             if not self.repair:
                 raise NonManifoldError(
@@ -220,7 +212,7 @@ class _Check:
             if not self.repair:
                 raise NonOrientableError(
                     "the surface is not orientable, like a Moebius strip: its faces cannot be oriented "
-                    f"consistently (edge {self._edge_name(int(np.flatnonzero(conflict)[0]))}); "
+                    f"consistently (edge {self._edge_name(self.pairs[conflict][0, 0])}); "
                     f"{REPAIR_ADVICE} to cut it open"
                 )
             self.pairs = self.pairs[~conflict]
@@ -231,10 +223,10 @@ class _Check:
         flip ^= (flipped > sizes / 2)[component]
         self._flip(flip)
 
-    def _edge_name(self, pair: int) -> str:
-        h = self.pairs[pair, 0]
-        ends = sorted((int(self.faces[h // 3, NEXT[h % 3]]), int(self.faces[h // 3, PREVIOUS[h % 3]])))
-        return f"{ends[0]}-{ends[1]}"
+    def _edge_name(self, h: np.int64) -> str:
+        return "{}-{}".format(
+            *sorted(self.faces.ravel()[[h - h % 3 + NEXT[h % 3], h - h % 3 + PREVIOUS[h % 3]]])
+        )
 
     def _flip(self, flip: BoolArray) -> None:
         self.faces = np.where(flip[:, None], self.faces[:, [0, 2, 1]], self.faces)

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, mask_of
 from ..base.jit import compiled
 from ..base.sets import edges_at_nodes, label_nodes
 
@@ -31,9 +31,8 @@ def label_components(count: int, tails: IntArray, heads: IntArray) -> tuple[int,
         count: number of nodes.
         tails, heads: (e,) the nodes that each edge connects.
     """
-    number, labels = label_nodes(
-        count, *(np.ascontiguousarray(ends, dtype=np.int64) for ends in (tails, heads))
-    )
+    ends = (np.ascontiguousarray(each, dtype=np.int64) for each in (tails, heads))
+    number, labels = label_nodes(count, *ends)
     return int(number), labels
 
 
@@ -161,9 +160,7 @@ class TriangleMesh:
     @cached_property
     def is_boundary_vertex(self) -> BoolArray:
         """(n,) True for vertices on a boundary loop."""
-        mask = np.zeros(len(self.vertices), dtype=bool)
-        mask[self.edges[self.is_boundary_edge]] = True
-        return mask
+        return mask_of(len(self.vertices), self.edges[self.is_boundary_edge])
 
     @cached_property
     def incident_edges(self) -> tuple[IntArray, IntArray]:
@@ -224,6 +221,14 @@ class TriangleMesh:
             local[vertices] = np.arange(len(vertices))
             parts.append((TriangleMesh(self.vertices[vertices], local[self.faces[faces]]), vertices, faces))
         return parts
+
+
+def nearby(faces: IntArray, seeds: BoolArray, rings: int) -> BoolArray:
+    """Return (n,) True for the vertices of seed triangles (m,) and of `rings` rings of triangles around them."""
+    inside = mask_of(int(faces.max()) + 1, faces[seeds])
+    for _ in range(rings):
+        inside[faces[has_any(inside, faces)]] = True
+    return inside
 
 
 def corner_fans(faces: IntArray, one: IntArray, two: IntArray) -> tuple[int, IntArray]:

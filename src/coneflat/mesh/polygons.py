@@ -66,10 +66,8 @@ class Polygons:
         points: (c,) as returned by `points`.
         """
         counts = np.bincount(self.owner, minlength=len(self.sizes))
-        complete: BoolArray = (counts == self.sizes - 2) & np.logical_and.reduceat(
-            points >= 0, self.offsets[:-1]
-        )
-        return complete
+        is_whole = np.logical_and.reduceat(points >= 0, self.offsets[:-1])
+        return np.asarray((counts == self.sizes - 2) & is_whole)
 
     def corner_triples(self, points: IntArray) -> tuple[IntArray, IntArray]:
         """Return (k, 3) the points before, at and after each corner of the complete polygons, and (k,) the polygon.

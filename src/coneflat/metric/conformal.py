@@ -91,16 +91,6 @@ class ConformalProblem:
         """Whether there is a boundary: its edges cannot be flipped, and triangles there may remain broken."""
         return bool((self.triangulation.twin < 0).any())
 
-    def prepare(self, delaunay: bool, flipped: IntArray | None = None) -> int:
-        """Flip the input to Delaunay in its own metric, if `delaunay`; return the number of flips.
-
-        flipped: the flipped half-edges, if the triangulation is Delaunay already.
-        """
-        if not delaunay:
-            return 0
-        self.records.append(make_delaunay(self.triangulation) if flipped is None else flipped)
-        return len(self.records[0])
-
     def flat_lengths(self, log_scale: FloatArray) -> FloatArray:
         """Return (3m,) the scaled lengths; both sides of an edge get the same bits."""
         at_tail = log_scale[self.triangulation.tail].reshape(-1, 3)
@@ -118,11 +108,6 @@ class ConformalProblem:
         scale = np.exp(centred(log_scale) / 2)
         return sum_angles(self.triangulation.tail, self.triangulation.length, scale, sums, cots)
 
-    def record(self, flipped: IntArray) -> None:
-        """Record flipped half-edges; the sparsity pattern of the Hessian becomes invalid."""
-        self.records.append(flipped)
-        self._pattern = None
-
     def evaluate(self, log_scale: FloatArray) -> State:
         """Return the state of a log scale (n,); the triangulation is flipped to Delaunay in the scaled metric."""
         sums = np.empty(len(log_scale))
@@ -134,7 +119,8 @@ class ConformalProblem:
         if len(suspects):
             flipped = make_delaunay(self.triangulation, log_scale, suspects)
             if len(flipped):
-                self.record(flipped)
+                self.records.append(flipped)
+                self._pattern = None  # no longer valid
                 broken = self.sum_angles(log_scale, sums, cots)
         curvature = self.flat_angle - sums
         residual = np.where(self.fixed, 0.0, self.target - curvature)
@@ -273,27 +259,20 @@ def _has_no_weights(cots: FloatArray, h: int) -> bool:
 
 
 @compiled
-def may_be_flipped(cots: FloatArray, h: int, t: int) -> bool:
-    """Return whether the edge of two half-edges may not be Delaunay.
+def find_suspects(twin: IntArray, cots: FloatArray, found: IntArray) -> int:
+    """Write to `found` one half-edge of each edge that may not be Delaunay; return their number.
 
     Its cotangents have a negative sum, or it belongs to a triangle that breaks the triangle inequality.
     """
-    # The margin is the rounding error of the cotangents; the test that decides on a flip has its own margin.
-    is_negative = cots[h] + cots[t] < -1e-13 * (abs(cots[h]) + abs(cots[t]))
-    return bool(
-        is_negative
-        or (cots[h] == 0.0 and _has_no_weights(cots, h))
-        or (cots[t] == 0.0 and _has_no_weights(cots, t))
-    )
-
-
-@compiled
-def find_suspects(twin: IntArray, cots: FloatArray, found: IntArray) -> int:
-    """Write to `found` one half-edge of each edge that may not be Delaunay; return their number."""
     count = 0
     for h in range(len(twin)):
         t = twin[h]
-        if t > h and may_be_flipped(cots, h, t):
+        # The margin is the rounding error of the cotangents; the test that decides on a flip has its own margin.
+        if t > h and (
+            cots[h] + cots[t] < -1e-13 * (abs(cots[h]) + abs(cots[t]))
+            or (cots[h] == 0.0 and _has_no_weights(cots, h))
+            or (cots[t] == 0.0 and _has_no_weights(cots, t))
+        ):
             found[count] = h
             count += 1
     return count

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats
+from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats, mask_of
 from ..base.text import list_some, plural
 from ..errors import ArrayShapeError, CurvatureError, NonFiniteError
+from ..geometry.delaunay import make_delaunay
 from ..geometry.intrinsic import IntrinsicTriangulation, check_lengths, double, intrinsic_triangulation
 from ..geometry.straight import FlatTriangles, straight_triangles
 from ..geometry.triangles import double_areas
@@ -61,7 +63,7 @@ class ExactMetric:
 
     def straight(self) -> FlatTriangles:
         """Return the m triangles of the input with straight sides in the metric, which `unfold` lays out."""
-        count = self.triangulation.face_count
+        count = len(self.triangulation.twin) // 3
         return straight_triangles(self.triangulation, self.flips, count // 2 if self.doubled else count)
 
 
@@ -131,13 +133,13 @@ def exact_metric(
     copies = np.where(mesh.is_boundary_vertex, 2.0, 1.0)
     doubled = False
 
-    def solved_from(first: FloatArray) -> tuple[ConformalProblem, State, IntArray, int, int]:
-        """Return the problem, its best state, the mesh vertex of each of its vertices, the Euclidean flips, and steps.
+    def solved_from(first: FloatArray) -> tuple[ConformalProblem, State, IntArray, int]:
+        """Return the problem, its best state, the mesh vertex of each of its vertices, and the number of steps.
 
         first: (n,) initial phi.
         """
         original, known = np.arange(n), flipped if delaunay and not doubled else None
-        triangulation = intrinsic_triangulation(mesh, lengths) if known is None else known[0].copy()
+        triangulation = intrinsic_triangulation(mesh, lengths) if known is None else deepcopy(known[0])
         if doubled:
             triangulation, original = double(triangulation)
             problem = ConformalProblem(
@@ -149,14 +151,15 @@ def exact_metric(
             )
         else:
             problem = ConformalProblem(triangulation, flat_angle, target, fixed, pinned, preconditioner)
-        euclidean = problem.prepare(delaunay, None if known is None else known[1])
+        if delaunay:
+            problem.records.append(make_delaunay(triangulation) if known is None else known[1])
         state, steps = find_scale(problem, first[original], tolerance, max_steps)
-        return problem, state, original, euclidean, steps
+        return problem, state, original, steps
 
-    problem, state, original, euclidean, steps = solved_from(log_scale)
+    problem, state, original, steps = solved_from(log_scale)
     if not _is_solved(state, tolerance) and mesh.is_boundary_vertex.any():
         doubled = True
-        problem, state, original, euclidean, more = solved_from(log_scale)
+        problem, state, original, more = solved_from(log_scale)
         steps += more
     if not _is_solved(state, tolerance) and (log_scale != plain).any():
         # An initial phi may be so far off, for example on a surface of many spikes, that triangles there vanish. With
@@ -164,12 +167,25 @@ def exact_metric(
         again = solved_from(plain)
         steps += again[-1]
         if again[1].largest < state.largest:
-            problem, state, original, euclidean, _ = again
+            problem, state, original, _ = again
     if doubled:
         state.curvature[:n] /= copies
     if pinned.any():
         state.variables = _keep_area(mesh, lengths, problem, state.variables, original)
-    return _finish(problem, state, n, euclidean, steps, tolerance, doubled)
+    triangulation, records = problem.triangulation, problem.records
+    triangulation.length = problem.flat_lengths(state.variables)
+    return ExactMetric(
+        log_scale=state.variables[:n],
+        curvature=state.curvature[:n],
+        triangulation=triangulation,
+        flips=np.concatenate(records) if records else np.empty(0, dtype=np.int64),
+        euclidean_flips=len(records[0]) if delaunay else 0,
+        steps=steps,
+        residual=state.largest,
+        worst_vertex=int(np.abs(state.residual[:n]).argmax()),
+        converged=_is_solved(state, tolerance),
+        doubled=doubled,
+    )
 
 
 def _per_vertex(name: str, values: ArrayLike, count: int) -> FloatArray:
@@ -203,8 +219,7 @@ def _keep_area(
     """
     count, labels = mesh.components
     component = labels[original]
-    free = np.ones(count, dtype=bool)
-    free[component[problem.fixed]] = False
+    free = ~mask_of(count, component[problem.fixed])
     centre = np.full(count, -np.inf)
     np.maximum.at(centre, component, log_scale)
     log_scale = log_scale - np.where(free, centre, 0.0)[component]
@@ -218,34 +233,6 @@ def _keep_area(
     is_left = np.isfinite(after) & (after > 0)
     shift = np.log(copies * before / np.where(is_left, after, copies * before)) / 2
     return log_scale + np.where(free, shift, 0.0)[component]
-
-
-def _finish(
-    problem: ConformalProblem,
-    state: State,
-    n: int,
-    euclidean: int,
-    steps: int,
-    tolerance: float,
-    doubled: bool,
-) -> ExactMetric:
-    """Return the result: the lengths of the metric are written to the triangulation, statistics are collected."""
-    triangulation = problem.triangulation
-    triangulation.length = problem.flat_lengths(state.variables)
-    residual = np.abs(state.residual[:n])
-    records = problem.records
-    return ExactMetric(
-        log_scale=state.variables[:n],
-        curvature=state.curvature[:n],
-        triangulation=triangulation,
-        flips=np.concatenate(records) if records else np.empty(0, dtype=np.int64),
-        euclidean_flips=euclidean,
-        steps=steps,
-        residual=state.largest,
-        worst_vertex=int(residual.argmax()),
-        converged=_is_solved(state, tolerance),
-        doubled=doubled,
-    )
 
 
 def checked_target(mesh: TriangleMesh, target: FloatArray, fixed: BoolArray) -> tuple[FloatArray, BoolArray]:
@@ -281,8 +268,7 @@ def checked_target(mesh: TriangleMesh, target: FloatArray, fixed: BoolArray) -> 
     pinned = np.zeros(len(target), dtype=bool)
     count, component = mesh.components
     target = target.copy()
-    has_fixed = np.zeros(count, dtype=bool)
-    has_fixed[component[fixed]] = True
+    has_fixed = mask_of(count, component[fixed])
     for label in np.flatnonzero(~has_fixed):
         inside = component == label
         faces = int(inside[mesh.faces[:, 0]].sum())

@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, mask_of
 from ..errors import ConvergenceError
 from ..geometry import corner_angles, double_areas
 from ..geometry.handles import (
@@ -27,7 +27,7 @@ from ..geometry.handles import (
 from ..geometry.straight import FlatTriangles
 from ..geometry.triangles import slacks
 from ..linalg import factorize
-from ..mesh.connectivity import TriangleMesh
+from ..mesh.connectivity import TriangleMesh, nearby
 from ..stages import ConeSolution, FlatMetric, MetricSpec, Surface
 from .boundary import BoundaryCurvature, prescribed_boundary, straight_boundary
 from .linear import linear_flat_metric
@@ -218,16 +218,10 @@ def shear_norm(mesh: TriangleMesh, lengths: FloatArray, cones: IntArray) -> csc_
     )
     harmonics = np.stack([np.ones_like(directions), np.cos(2 * directions), np.sin(2 * directions)], axis=2)
     parts = np.linalg.inv(harmonics)  # (m, 3, 3): from the changes of the sides to m, a, b
-    near = np.zeros(len(mesh.vertices), dtype=bool)
-    near[cones] = True
-    for _ in range(CONE_RINGS - 1):
-        near[mesh.edges[near[mesh.edges].any(axis=1)]] = True
-    is_stiff = near[mesh.faces].any(axis=1)
-    norms = (double_areas(lengths) * np.where(is_stiff, 1 / SCALING_WEIGHT, 1.0))[:, None] * [
-        SCALING_WEIGHT,
-        1.0,
-        1.0,
-    ]
+    at_cones = has_any(mask_of(len(mesh.vertices), cones), mesh.faces)
+    is_stiff = has_any(nearby(mesh.faces, at_cones, CONE_RINGS - 2), mesh.faces)
+    areas = double_areas(lengths) * np.where(is_stiff, 1 / SCALING_WEIGHT, 1.0)
+    norms = areas[:, None] * [SCALING_WEIGHT, 1.0, 1.0]
     blocks = np.einsum("fki,fk,fkj->fij", parts, norms, parts)
     edges = mesh.halfedge_edges.reshape(-1, 3)
     rows, columns = np.repeat(edges, 3, axis=1), np.tile(edges, (1, 3))

@@ -63,7 +63,11 @@ def exact_flat_metric(
             f"{error_text(solved.residual)}; --method linear needs no convergence, and other cones, --repair or "
             "remeshing may help"
         )
-    triangles = solved.straight()
+    triangles, factor = solved.straight(), 1.0
+    if spec.keeps_area:
+        flat = solved.triangulation.length.reshape(-1, 3)
+        copies = len(flat) / len(lengths)  # 2 where the surface was doubled
+        factor = float(np.sqrt(copies * double_areas(lengths).sum() / double_areas(flat).sum()))
     return FlatMetric(
         mesh=mesh,
         lengths=lengths,
@@ -72,20 +76,15 @@ def exact_flat_metric(
         log_scale=solved.log_scale,
         is_open=is_open,
         is_fixed=spec.keeps_length if boundary is None else mesh.is_boundary_vertex,
-        statistics=statistics_of(solved),
+        statistics=SolveStatistics(
+            newton_steps=solved.steps,
+            euclidean_flips=solved.euclidean_flips,
+            ptolemy_flips=solved.ptolemy_flips,
+            residual=solved.residual,
+        ),
         notes=_length_notes(mesh, lengths, solved, triangles, spec.keeps_length),
         triangles=triangles,
-    ).scaled(area_factor(lengths, solved) if spec.keeps_area else 1.0)
-
-
-def statistics_of(solved: ExactMetric) -> SolveStatistics:
-    """Return the statistics of the solve of a metric."""
-    return SolveStatistics(
-        newton_steps=solved.steps,
-        euclidean_flips=solved.euclidean_flips,
-        ptolemy_flips=solved.ptolemy_flips,
-        residual=solved.residual,
-    )
+    ).scaled(factor)
 
 
 def _length_notes(
@@ -111,13 +110,6 @@ def _length_notes(
         f"with relative errors of up to {off.max():.2g}: the triangles there are too coarse for the curvature nearby. "
         "Remesh there, or allow more cones.",
     )
-
-
-def area_factor(lengths: FloatArray, solved: ExactMetric) -> float:
-    """Return the factor of lengths that scales a metric to the area of a mesh with given (m, 3) side lengths."""
-    flat = solved.triangulation.length.reshape(-1, 3)
-    copies = len(flat) / len(lengths)  # 2 where the surface was doubled
-    return float(np.sqrt(copies * double_areas(lengths).sum() / double_areas(flat).sum()))
 
 
 def _solve(

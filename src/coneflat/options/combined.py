@@ -107,11 +107,6 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
         return self.boundary if isinstance(self.boundary, Mapping) else {}
 
     @property
-    def prescribes_boundary(self) -> bool:
-        """Whether boundary vertices have a prescribed curvature."""
-        return self.boundary_kind not in ("free", "lengths")
-
-    @property
     def marks_seams(self) -> bool:
         """Whether edges may be marked as seams, by `seams` or by `sharp_angle`."""
         return self.seams is not None or self.sharp_angle is not None
@@ -123,4 +118,5 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
         This is the case if cones have no prescribed curvatures. Searched cones keep their curvatures, because the
         resulting cone angles might violate the bounds that the search respects.
         """
-        return not (self.searches_cones or self.named_cones or self.prescribes_boundary)
+        has_curvatures = self.searches_cones or self.named_cones
+        return not has_curvatures and self.boundary_kind in ("free", "lengths")

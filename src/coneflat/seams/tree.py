@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of
 from ..base.text import plural
 from ..errors import OptionError, SeamError
 from ..geometry.operators import at_safe_scale
 from ..linalg.shortest_paths import MultiGraph, Paths
+from ..mesh.charts import cut_open
 from ..mesh.connectivity import TriangleMesh, label_components
-from ..mesh.open_mesh import cut_open
 from ..mesh.ties import mesh_tie_key
 from ..stages import Cut, SeamSpec
 
@@ -45,8 +45,7 @@ def find_seams(
         SeamError: every set of seams needs forbidden edges.
         OptionError: costs are not positive numbers.
     """
-    is_forbidden = np.zeros(len(mesh.edges), dtype=bool)
-    is_forbidden[forbidden] = True
+    is_forbidden = mask_of(len(mesh.edges), forbidden)
     key = mesh_tie_key(mesh)
     costs = _checked(edge_costs, len(mesh.edges)) * (1 + TIE_BREAK * key[mesh.edges].sum(axis=1))
     for is_costly in (is_avoided, is_forbidden):
@@ -54,8 +53,8 @@ def find_seams(
             costs = np.where(is_costly, costs + costs.sum(), costs)
 
     is_cut = mesh.is_boundary_edge.copy()
-    is_end = np.zeros(len(mesh.vertices), dtype=bool)
-    is_end[mesh.edges[is_cut]] = is_end[cones] = True
+    is_end = mask_of(len(mesh.vertices), mesh.edges[is_cut])
+    is_end[cones] = True
     if is_end.any():
         is_cut |= _tree(mesh, costs, is_cut, is_end)
         is_end[mesh.edges[is_cut]] = True
@@ -143,8 +142,7 @@ def _costs_over(mesh: TriangleMesh, costs: FloatArray, paths: Paths, edges: IntA
 
 def _paths_over(mesh: TriangleMesh, paths: Paths, edges: IntArray) -> BoolArray:
     """Return (e,) the edges of the paths through given edges (k,), from source to source."""
-    found = np.zeros(len(mesh.edges), dtype=bool)
-    found[edges] = True
+    found = mask_of(len(mesh.edges), edges)
     found[paths.edge[paths.nodes_to(mesh.edges[edges].ravel())]] = True
     return found
 

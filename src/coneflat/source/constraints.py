@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -46,12 +46,6 @@ class Constraints:
     seam_weights: FloatArray | None = None
     on_marks: BoolArray | None = None
 
-    def without(self, vertices: IntArray) -> Constraints:
-        """Return constraints that forbid cones at further vertices."""
-        is_allowed = self.is_allowed.copy()
-        is_allowed[vertices] = False
-        return replace(self, is_allowed=is_allowed)
-
     def check_off_seams(self, seams: IntArray) -> None:
         """Raise OptionError if a given or required cone is among the vertices of marked seams."""
         for place in (self.cones, self.required):
@@ -59,12 +53,6 @@ class Constraints:
                 raise OptionError(
                     f"cone {self.names[vertex]} lies on a seam that is marked, where the curvature is free"
                 )
-
-    def with_marks(self, seams: IntArray) -> Constraints:
-        """Return constraints with the marked seams, given by their vertices."""
-        on_marks = np.zeros(len(self.names), dtype=bool)
-        on_marks[seams] = True
-        return replace(self, on_marks=on_marks)
 
     def within(self, component: IntArray) -> Constraints:
         """Return the constraints of a component, in its numbering; `component` holds the component's vertices."""

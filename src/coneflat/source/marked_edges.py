@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import BoolArray, IntArray
+from ..base.arrays import BoolArray, IntArray, mask_of
 from ..base.text import list_some, plural
 from ..errors import OptionError, SeamError
 from ..geometry.triangles import dihedral_angles
@@ -109,14 +109,11 @@ def forbidden_edges(checked: CheckedMesh, options: Options, count: int) -> BoolA
     """
     given = np.asarray(() if options.no_seams is None else options.no_seams, dtype=np.int64)
     if given.ndim == 2:
-        forbidden = np.zeros(len(checked.mesh.edges), dtype=bool)
-        forbidden[named_edges(checked, given)] = True
-        return forbidden
+        return mask_of(len(checked.mesh.edges), named_edges(checked, given))
     invalid = given[(given < 0) | (given >= count)]
     if len(invalid):
         raise OptionError(f"no_seams: {invalid[0]} is not a vertex: indices are from 0 to {count - 1}")
-    inside = np.zeros(count, dtype=bool)
-    inside[given] = True
+    inside = mask_of(count, given)
     ends: BoolArray = inside[checked.vertex_origin][checked.mesh.edges]
     return ends[:, 0] & ends[:, 1]
 
@@ -147,6 +144,4 @@ def _seams_of_input(checked: CheckedMesh, given: InputMesh) -> BoolArray:
     if texture is None:
         raise OptionError("the input has no UV coordinates, so it has no seams to use")
     mesh = checked.mesh
-    marked = np.zeros(len(mesh.edges), dtype=bool)
-    marked[point_seams(mesh, reorder_corners(checked, texture))] = True
-    return marked
+    return mask_of(len(mesh.edges), point_seams(mesh, reorder_corners(checked, texture)))

@@ -14,9 +14,9 @@ from ..errors import OptionError
 from ..geometry import double_areas, edge_lengths, mollify
 from ..geometry.visibility import visible_share
 from ..linalg.memory import check_memory
+from ..mesh.charts import CutMesh, open_along
 from ..mesh.check import CheckedMesh, check_mesh
 from ..mesh.connectivity import TriangleMesh
-from ..mesh.open_mesh import CutMesh, open_along
 from ..options import Options
 from ..stages import ConeSpec, MetricSpec, SeamSpec
 from .constraints import Constraints, locate_constraints
@@ -152,14 +152,15 @@ class Source:
             if len(isolated):
                 notes.append(_isolated_note(constraints.names[checked.mesh.edges[isolated]]))
             constraints.check_off_seams(checked.mesh.edges[marked])
-            constraints = constraints.with_marks(checked.mesh.edges[marked])
+            on_marks = np.isin(np.arange(len(constraints.names)), checked.mesh.edges[marked])
+            constraints = replace(constraints, on_marks=on_marks)
         pieces = self._pieces.of((metric, marked.tobytes()), lambda: _pieces(checked.mesh, marked, lengths))
         seen = self._visibility(checked, options) if options.hide_seams else None
         is_forbidden = forbidden[checked.mesh.halfedge_edges].reshape(-1, 3)
         parts = tuple(
             _part(
                 piece,
-                _forbid_unreachable(constraints.within(piece[1]), piece[0], is_forbidden[piece[2]]),
+                constraints.within(piece[1]),
                 is_diagonal[piece[2]],
                 is_forbidden[piece[2]],
                 None if seen is None else seen[piece[1]],
@@ -198,11 +199,6 @@ def _pieces(mesh: TriangleMesh, marked: IntArray, lengths: FloatArray) -> tuple[
     opened = open_along(mesh, marked) if len(marked) else CutMesh(mesh, np.arange(len(mesh.vertices)))
     parts = opened.mesh.split_components()
     return tuple((part, opened.origin[at], faces, lengths[faces]) for part, at, faces in parts)
-
-
-def _forbid_unreachable(constraints: Constraints, mesh: TriangleMesh, is_forbidden: BoolArray) -> Constraints:
-    """Return the constraints of a component, with cones forbidden where no seam can reach them."""
-    return constraints.without(unreachable(mesh, is_forbidden)) if is_forbidden.any() else constraints
 
 
 def _own_lengths(given: InputMesh, checked: CheckedMesh, options: Options) -> FloatArray | None:
@@ -264,6 +260,8 @@ def _part(
         scale_at_cones=options.scale_at_cones and options.method == "exact",
         names=limits.names,
     )
+    if is_forbidden.any():  # no cones where no seam can reach them
+        cones = cones.without(unreachable(mesh, is_forbidden))
     metric = MetricSpec(
         method=options.method,
         boundary=kind,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ... import Flattening, MeshFile, check_mesh, flatten
-from ...base import BoolArray, FloatArray, IntArray, plural
+from ...base import BoolArray, FloatArray, IntArray, mask_of, plural
 from ...errors import OptionError
 from ...geometry import signed_double_areas
 from ...io import UVMesh, as_path, checked_target, read_label, read_mesh
@@ -88,8 +88,7 @@ def flatten_cortex(
     path = as_path(surface)
     mesh = read_mesh(path, weld=False)
     wall, kept = (_vertices(mesh, labels) for labels in (remove, keep))
-    cut_off = np.zeros(len(mesh.vertices), dtype=bool)
-    cut_off[wall] = True
+    cut_off = mask_of(len(mesh.vertices), wall)
     faces = mesh.triangles[~cut_off[mesh.triangles].any(axis=1)]
     if not len(faces):
         raise OptionError(f"the labels to remove must leave triangles of {path}, got all of them")

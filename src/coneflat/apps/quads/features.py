@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ... import TriangleMesh
-from ...base import BoolArray, FloatArray, IntArray
+from ...base import BoolArray, FloatArray, IntArray, mask_of
 from ...geometry import dihedral_angles
 from ...mesh import label_components, label_faces, tie_key
 
@@ -39,8 +39,7 @@ def without_stubs(mesh: TriangleMesh, edges: IntArray, least: float) -> IntArray
     while True:
         chain, ends = feature_chains(mesh, edges[kept])
         count = int(chain.max(initial=-1)) + 1
-        is_stub = np.zeros(count, dtype=bool)
-        is_stub[chain[(ends == 1).any(axis=1)]] = True
+        is_stub = mask_of(count, chain[(ends == 1).any(axis=1)])
         is_stub &= (np.bincount(chain, minlength=count) < 2) | (
             np.bincount(chain, lengths[kept], count) < least
         )
@@ -123,8 +122,7 @@ def _chords(mesh: TriangleMesh, edges: IntArray) -> BoolArray:
     """Return (e,) whether each edge joins two vertices on features or the boundary without being such an edge."""
     is_fixed = mesh.is_boundary_edge.copy()
     is_fixed[edges] = True
-    on = np.zeros(len(mesh.vertices), dtype=bool)
-    on[mesh.edges[is_fixed]] = True
+    on = mask_of(len(mesh.vertices), mesh.edges[is_fixed])
     return on[mesh.edges].all(axis=1) & ~is_fixed
 
 

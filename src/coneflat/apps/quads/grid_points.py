@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ...base import BoolArray, FloatArray, IntArray, compiled, dots
+from ...base import BoolArray, FloatArray, IntArray, compiled, dots, mask_of
 from ...geometry import fill_orientations, orientation
 from .exact_grid import ExactGrid, turn
 from .transitions import rotated
@@ -190,8 +190,7 @@ def find_ports(exact: ExactGrid, found: GridPoints) -> Ports:
     order = np.argsort(points, kind="stable")
     wedge, which = np.nonzero(directions[order] >= 0)
     wedge = order[wedge]
-    is_boundary = np.zeros(len(found.entry), dtype=bool)
-    is_boundary[points[closed]] = True
+    is_boundary = mask_of(len(found.entry), points[closed])
     start = np.concatenate([[0], np.cumsum(np.bincount(points[wedge], minlength=len(found.entry)))])
     return Ports(start, faces[wedge], directions[wedge, which], places[wedge], is_boundary)
 

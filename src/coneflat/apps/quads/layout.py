@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ... import Flattening, TriangleMesh
-from ...base import BoolArray, ComplexArray, FloatArray, IntArray
+from ...base import BoolArray, ComplexArray, FloatArray, IntArray, mask_of
 from ...errors import GridError
 from ...geometry import (
     as_complex,
@@ -178,8 +178,7 @@ def joined_charts(layout: GridLayout) -> tuple[GridLayout, IntArray]:
     chains, points = layout.chains(), layout.points.copy()
     chart, component = charts_of(layout, chains)
     _, firsts = np.unique(chains.chain, return_index=True)
-    done = np.zeros(int(chart.max(initial=-1)) + 1, dtype=bool)
-    done[chart[np.unique(component, return_index=True)[1]]] = True
+    done = mask_of(int(chart.max(initial=-1)) + 1, chart[np.unique(component, return_index=True)[1]])
     left_over = joining_chains(chains, chart).tolist()
     while left_over:
         later = []
@@ -304,8 +303,7 @@ def between_nodes(layout: GridLayout) -> BoolArray:
 
     A triangle of three such vertices degenerates if they are rounded to collinear points.
     """
-    is_node = np.zeros(len(layout.mesh.vertices), dtype=bool)
-    is_node[layout.nodes] = True
+    is_node = mask_of(len(layout.mesh.vertices), layout.nodes)
     return np.asarray(is_node[layout.mesh.edges].all(axis=1))
 
 

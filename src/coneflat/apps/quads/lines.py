@@ -13,7 +13,7 @@ from itertools import count
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from ...base import BoolArray, ComplexArray, FloatArray, IntArray, plural
+from ...base import BoolArray, ComplexArray, FloatArray, IntArray, mask_of, plural
 from ...errors import GridError
 from ...geometry import map_factors, signed_angles
 from ...layout import StretchEnergy
@@ -167,8 +167,7 @@ def _with_lines(layout: GridLayout, edges: IntArray, off: FloatArray) -> _Lined:
     copies = np.bincount(cut.origin, minlength=len(on))
     turns |= copies != np.where(mesh.is_boundary_vertex, 1, 2)
     nodes = np.setdiff1d(np.flatnonzero(on & turns & (on_side | ~mesh.is_boundary_vertex)), layout.cones)
-    is_line = np.zeros(len(mesh.edges), dtype=bool)
-    is_line[edges] = True
+    is_line = mask_of(len(mesh.edges), edges)
     inner = ~mesh.is_boundary_edge
     there, back = mesh.edge_halfedges[inner].T
     is_seam = is_line.copy()

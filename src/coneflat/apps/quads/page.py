@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ... import Flattening
-from ...base import BoolArray, IntArray, plural
+from ...base import BoolArray, IntArray, mask_of, plural
 from ...io import UVMesh
 from ...mesh import label_components
 from ..view import PageText, page_html, uv_flattening
@@ -45,8 +45,7 @@ def find_domains(mesh: QuadMesh) -> Domains:
     """
     twin, starts = _twins(mesh), mesh.quads.ravel()
     is_cut = twin < 0
-    reached = np.zeros(len(mesh.vertices), dtype=bool)
-    reached[starts[is_cut]] = True
+    reached = mask_of(len(mesh.vertices), starts[is_cut])
     # Four half-edges leave a regular inner vertex. Two leave a regular boundary vertex: its third edge has none there.
     leaving = np.bincount(starts, minlength=len(mesh.vertices))
     odd = np.where(mesh.is_boundary_vertex, leaving > 2, leaving != 4)

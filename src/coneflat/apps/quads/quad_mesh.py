@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import BoolArray, FloatArray, IntArray, dots
+from ...base import BoolArray, FloatArray, IntArray, dots, mask_of
 from ...errors import GridError
 from ...mesh import sort_pairs
 
@@ -81,9 +81,7 @@ class QuadMesh:
     @cached_property
     def is_boundary_vertex(self) -> BoolArray:
         """(q,) whether each vertex is on the boundary."""
-        mask = np.zeros(len(self.vertices), dtype=bool)
-        mask[self.edges[self.is_boundary_edge]] = True
-        return mask
+        return mask_of(len(self.vertices), self.edges[self.is_boundary_edge])
 
     @cached_property
     def triangle_corners(self) -> IntArray:

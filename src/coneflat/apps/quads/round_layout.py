@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...base import ComplexArray, IntArray, plural
+from ...base import ComplexArray, IntArray, mask_of, plural
 from ...errors import ConvergenceError, GridError, OptionError
 from ...geometry import as_complex, as_pairs, double_areas, map_factors, sides_between
 from ...layout import Lines, PointConstraints, Relaxed, StretchEnergy, relax, rest_sides
@@ -111,8 +111,7 @@ def _grid_near(rounding: Rounding, energy: StretchEnergy) -> tuple[IntegerGrid |
 
 def _folds_sides(layout: GridLayout, transitions: Transitions, points: ComplexArray) -> bool:
     """Return whether an edge on a side turns by more than a right angle if points move, which flips no triangle."""
-    on = np.zeros(len(points), dtype=bool)
-    on[layout.sides.points] = True
+    on = mask_of(len(points), layout.sides.points)
     sides = np.concatenate([layout.border, transitions.chains.halfedges.ravel()])
     starts, ends = (each[sides] for each in layout.ends)
     turned = (points[ends] - points[starts]) * np.conj(layout.points[ends] - layout.points[starts])

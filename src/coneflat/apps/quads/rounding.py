@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags, kron
 from scipy.sparse.csgraph import dijkstra
 
-from ...base import BoolArray, ComplexArray, FloatArray, IntArray
+from ...base import BoolArray, ComplexArray, FloatArray, IntArray, mask_of
 from ...errors import GridError
 from ...geometry import as_complex, as_pairs, cotangent_laplacian, cotangents
 from ...linalg import factorize
@@ -263,8 +263,7 @@ def _near_pairs(
     graph = layout.graph()
     found, before = dijkstra(graph, indices=cones, limit=NEAR_CONE_DISTANCE, return_predecessors=True)
     halfedge = csr_matrix((np.arange(1, len(tails) + 1), (tails, heads)), shape=graph.shape)
-    is_cone = np.zeros(len(mesh.vertices), dtype=bool)
-    is_cone[cones] = True
+    is_cone = mask_of(len(mesh.vertices), cones)
     rows, ends_of = [], []
 
     def joining(path: list[int]) -> PathVector:

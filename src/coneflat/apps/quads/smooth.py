@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...base import BoolArray, FloatArray, IntArray, dots
+from ...base import BoolArray, FloatArray, IntArray, dots, mask_of
 from ...options import declarations
 from .cross_field import SHARP_ANGLE
 from .features import edge_indices, sharp_edges
@@ -95,11 +95,9 @@ def _blocked(old: FloatArray, new: FloatArray, quads: IntArray) -> BoolArray:
 def is_on_feature(quads: QuadMesh, features: IntArray) -> BoolArray:
     """Return (q,) whether each vertex is on a sharp edge of the surface or on a feature (f, 2)."""
     mesh = quads.surface
-    sharp = np.zeros(len(mesh.edges), dtype=bool)
-    sharp[sharp_edges(mesh, SHARP_ANGLE)] = True
+    sharp = mask_of(len(mesh.edges), sharp_edges(mesh, SHARP_ANGLE))
     sharp[edge_indices(mesh, features)] = True
-    has_sharp = np.zeros(len(mesh.vertices), dtype=bool)
-    has_sharp[mesh.edges[sharp]] = True
+    has_sharp = mask_of(len(mesh.vertices), mesh.edges[sharp])
     zero, edges = quads.barycentric <= 0, mesh.halfedge_edges.reshape(-1, 3)[quads.faces]
     at_corner = has_sharp[mesh.faces[quads.faces]] & ~zero & (zero.sum(axis=1) == 2)[:, None]
     return ((zero & sharp[edges]) | at_corner).any(axis=1)
@@ -190,8 +188,7 @@ def untangled(quads: QuadMesh) -> QuadMesh:
         if not near.any():
             break
         surface = Stars.of(quads.surface.vertices, quads.surface.faces) if surface is None else surface
-        movable = np.zeros(len(points), dtype=bool)
-        movable[quads.quads[near]] = True
+        movable = mask_of(len(points), quads.quads[near])
         for _ in range(rings):
             movable[quads.quads[movable[quads.quads].any(axis=1)]] = True
         movable &= ~quads.is_boundary_vertex

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import BoolArray, FloatArray, IntArray
+from ...base import BoolArray, FloatArray, IntArray, mask_of
 from ...stages import Layout
 from .free import freed, recut, triangle_energies
 
@@ -42,8 +42,7 @@ class Tips:
 def find_tips(layout: Layout, seams: IntArray, costs: FloatArray) -> Tips:
     """Return the tips of the seams (k,) of a layout, for (e,) costs of cutting the edges."""
     mesh, size = layout.mesh, np.sqrt(layout.area)
-    is_seam = np.zeros(len(mesh.edges), dtype=bool)
-    is_seam[seams] = True
+    is_seam = mask_of(len(mesh.edges), seams)
     degree = np.bincount(mesh.edges[seams].ravel(), minlength=len(mesh.vertices))
     vertices = np.flatnonzero((degree == 1) & ~mesh.is_boundary_vertex)
     inside = ~mesh.is_boundary_vertex

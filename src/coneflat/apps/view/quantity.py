@@ -10,7 +10,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import FloatArray, IntArray, short_repr
+from ...base import FloatArray, IntArray, mask_of, short_repr
 from ...errors import MeshFileError, OptionError
 from ...geometry import angle_defect, corner_angles, double_areas, edge_lengths
 from ...io import VALUES, read_vertex_values
@@ -166,8 +166,7 @@ def angle_defects(result: Flattening, flat: bool, mesh: TriangleMesh | None = No
         mesh: the mesh of the result, if its boundary has been computed already.
     """
     mesh = TriangleMesh(result.vertices, result.faces) if mesh is None else mesh
-    inside = np.zeros(len(mesh.vertices), dtype=bool)
-    inside[mesh.faces] = True
+    inside = mask_of(len(mesh.vertices), mesh.faces)
     inside &= ~mesh.is_boundary_vertex
     if flat:
         values = -result.curvature_residual

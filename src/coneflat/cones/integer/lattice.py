@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...base.arrays import FloatArray, IntArray
-from ..sparse.dense_model import MIN_RELATIVE_GAIN, BestSets, DenseModel, nonnegative
+from ..sparse.dense_model import MIN_RELATIVE_GAIN, BestSets, ConeSet, DenseModel, nonnegative
 from ..sparse.fit_curvatures import fit_curvatures
 from .moves import Quanta, best_merge, best_pair, best_split, descend, energy_of
 
@@ -17,21 +17,14 @@ MAX_EXCHANGES = 1000
 
 
 @dataclass(frozen=True, eq=False)
-class IndexedCones:
+class IndexedCones(ConeSet):
     """A set of cones with integer indices.
 
     Attributes:
-        energy: E^2.
-        members: (s,) candidates, the required ones first.
         indices: (s,) curvature of each cone in quanta, not 0.
     """
 
-    energy: float
-    members: IntArray
     indices: IntArray
-
-    def __len__(self) -> int:
-        return len(self.members)
 
 
 @dataclass(eq=False)

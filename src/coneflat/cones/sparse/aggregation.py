@@ -6,8 +6,6 @@ order elliptic problems", Computing 56, 1996.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags, eye
 
@@ -33,27 +31,19 @@ MAX_SIZE_RATIO = 1.05
 MAX_LEVEL_SHARE = 0.9
 
 
-@dataclass(frozen=True, eq=False)
-class CoarseBasis:
-    """Coarse basis functions, and the operators of the mesh in this basis.
-
-    Attributes:
-        functions: (n, m) basis functions; the identity on small meshes.
-        laplacian, mass: (m, m) Laplacian and mass matrix between basis functions.
-    """
-
-    functions: csr_matrix
-    laplacian: csr_matrix
-    mass: csr_matrix
-
-
-def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseBasis:
+def coarse_basis(
+    laplacian: csr_matrix, areas: FloatArray, size: int
+) -> tuple[csr_matrix, csr_matrix, csr_matrix]:
     """Return about `size` basis functions that approximate smooth functions on the mesh.
 
     Args:
         laplacian: (n, n) positive (semi)definite; vertices become centres of aggregates in its order.
         areas: (n,) vertex areas.
         size: requested number of basis functions.
+
+    Returns:
+        (n, m) the basis functions, the identity on small meshes; (m, m) the Laplacian and (m, m) the mass matrix
+        between basis functions.
     """
     count = laplacian.shape[0]
     functions, level, mass = eye(count, format="csr"), laplacian, diags(areas, format="csr")
@@ -75,7 +65,7 @@ def coarse_basis(laplacian: csr_matrix, areas: FloatArray, size: int) -> CoarseB
         mass = csr_matrix(transposed @ (mass @ part))
         functions = csr_matrix(functions @ part)
         order = _order_of_aggregates(part, order)
-    return CoarseBasis(functions, level, mass)
+    return functions, level, mass
 
 
 def _indicators(labels: IntArray, number: int) -> csr_matrix:
@@ -189,8 +179,7 @@ def aggregate(
 
 def _order_of_aggregates(part: csr_matrix, order: IntArray) -> IntArray:
     """Return the order of aggregates by their first members."""
-    place = np.empty(len(order), dtype=np.int64)
-    place[order] = np.arange(len(order))
+    place = np.argsort(order)
     columns = part.tocsc()
     first = np.minimum.reduceat(place[columns.indices], columns.indptr[:-1])
     return np.argsort(first, kind="stable")

@@ -66,16 +66,15 @@ def coarse_model(operator: GreenOperator, curvature: FloatArray, size: int) -> C
         curvature: (f,) curvature of the unknowns, radians.
         size: approximate number of basis functions.
     """
-    coarse = coarse_basis(operator.laplacian, operator.areas, size)
-    basis = coarse.functions
+    basis, laplacian, mass = coarse_basis(operator.laplacian, operator.areas, size)
     weights = basis.T @ operator.areas
-    stiffness = coarse.laplacian.toarray()
+    stiffness = laplacian.toarray()
     if operator.is_closed:
         # This makes the matrix definite without changing the result, as the sum of a source is subtracted from it in
         # proportion to area.
         stiffness += np.outer(weights, weights) * (stiffness.trace() / (weights @ weights) / len(weights))
     green = inverse_of_definite(stiffness)
-    kernel, mean = green @ (coarse.mass @ green), green @ weights
+    kernel, mean = green @ (mass @ green), green @ weights
     kernel = (kernel + kernel.T) / 2 - np.outer(mean, mean)
     bare = basis.T @ curvature
     slope = -(kernel @ bare)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -26,16 +26,6 @@ MIN_RELATIVE_GAIN = 1e-6
 MIN_INDEPENDENT_SHARE = 1e-10
 # The search stops if this number of additional cones does not lower E^2 below this factor, as bounds prevent it.
 STALL_CONES, STALL_FACTOR = 10, 0.99
-
-
-class Sized(Protocol):
-    """Interface of sets with an energy E^2 and a number of cones."""
-
-    @property
-    def energy(self) -> float:
-        """E^2."""
-
-    def __len__(self) -> int: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +44,7 @@ class ConeSet:
         return len(self.members)
 
 
-SetT = TypeVar("SetT", bound=Sized)
+SetT = TypeVar("SetT", bound=ConeSet)
 
 
 class BestSets(Generic[SetT]):

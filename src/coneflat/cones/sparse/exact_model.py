@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import BoolArray, FloatArray, IntArray
+from ...base.arrays import BoolArray, FloatArray, IntArray, mask_of
 from ...base.jit import compiled
 from .dense_model import BestSets, DenseModel, argmin_tied
 from .limits import Limits
@@ -53,8 +53,7 @@ class ExactModel(DenseModel):
 
     def insert(self, unknowns: IntArray) -> IntArray:
         """Add those vertices that are not candidates yet; return the candidate number of each."""
-        is_new = np.zeros(len(self._log_scale), dtype=bool)
-        is_new[unknowns] = True
+        is_new = mask_of(len(self._log_scale), unknowns)
         is_new[self.unknowns] = False
         new = np.flatnonzero(is_new)
         for some in self._operator.batches(new):
@@ -74,7 +73,12 @@ class ExactModel(DenseModel):
         """Add k vertices with their Green's functions (k, f)."""
         old = len(self.unknowns)
         self.unknowns = np.concatenate([self.unknowns, new])
-        rows = self._covariances(responses)
+        areas = self._operator.areas
+        weighted, means = responses * areas, responses @ areas
+        self._responses.append(responses)
+        self._means.append(means)
+        blocks = zip(self._responses, self._means, strict=True)
+        rows = np.hstack([weighted @ block.T - np.outer(means, others) for block, others in blocks])
         gram = np.empty((len(self.unknowns), len(self.unknowns)))
         gram[:old, :old] = self.gram
         gram[old:] = rows
@@ -85,20 +89,6 @@ class ExactModel(DenseModel):
         self.usable = self._usable[self.unknowns]
         self.usable[self.fixed] = False
         self.least = self._least[self.unknowns]
-
-    def _covariances(self, responses: FloatArray) -> FloatArray:
-        """Add the Green's functions (k, f) of k new unknowns; return (k, m + k) their covariances with all."""
-        areas = self._operator.areas
-        means = responses @ areas
-        weighted = responses * areas
-        self._responses.append(responses)
-        self._means.append(means)
-        return np.hstack(
-            [
-                weighted @ block.T - np.outer(means, others)
-                for block, others in zip(self._responses, self._means, strict=True)
-            ]
-        )
 
     def refine(self, members: IntArray) -> float:
         """Move cones over the mesh until E converges; return E^2 of the best set of this number of cones."""

@@ -7,7 +7,7 @@ from functools import cached_property, partial
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from ...base.arrays import BoolArray, FloatArray, IntArray
+from ...base.arrays import BoolArray, FloatArray, IntArray, mask_of
 from ...base.threads import concurrently
 from ...stages import ConeSolution, LaplacianInverse
 from ..solution import target_from_log_scale
@@ -94,7 +94,6 @@ class LinearModel:
         log_scale = np.zeros(len(target))
         log_scale[operator.vertices] = operator.solve((target - self.curvature)[operator.vertices])
         absorbed = target_from_log_scale(self.laplacian, self.curvature, log_scale, self.is_boundary)
-        is_zero = np.ones(len(target), dtype=bool)
-        is_zero[operator.vertices] = False
+        is_zero = ~mask_of(len(target), operator.vertices)
         inverse = LaplacianInverse(operator.solve_at_vertices, self.laplacian, is_zero, operator.break_even)
         return ConeSolution(cones, target + absorbed, log_scale, inverse)

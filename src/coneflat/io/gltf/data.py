@@ -111,9 +111,7 @@ class GltfData:
 
     def item(self, name: str, index: Any) -> Item:
         """Return an object of one of the tree's lists, such as "meshes"."""
-        every = self.tree.get(name, [])
-        if not isinstance(every, list):
-            self.fail(f"{name!r} is not a list")
+        every = self.entry(self.tree, name, list)
         if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(every):
             self.fail(f"{str(index)[:20]} is not one of its {len(every)} {name}")
         if not isinstance(every[index], dict):

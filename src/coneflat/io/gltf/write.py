@@ -13,7 +13,7 @@ import struct
 from collections import defaultdict, deque
 from copy import deepcopy
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 from urllib.parse import quote, unquote
 
 import numpy as np
@@ -23,15 +23,13 @@ from ...base.arrays import FloatArray, IntArray
 from ...base.text import plural
 from ...errors import ConeflatError, MeshFileError
 from ...geometry.triangles import vertex_normals
+from ...result import Flattening
 from ..files import moved_path, read_bytes
 from ..split import distinct_pairs, shading_normals, source_normals, split_at_seams
 from ..texture import Texture, image_kind
 from .data import COMPRESSED, GltfData, Item
 from .read import DRACO, GltfScene, Mode, ScenePart
 from .references import accessors_of_arrays, keys_of, numbers_in_extensions, view_owners, views_of_images
-
-if TYPE_CHECKING:
-    from ...result import Flattening
 
 #: Targets of buffer views, for the graphics card.
 FOR_VERTICES, FOR_INDICES = 34962, 34963
@@ -174,10 +172,7 @@ def write_glb(result: Flattening, stream: IO[bytes], texture: Texture | None, fo
         MeshFileError: the file would be larger than GLB permits.
     """
     scene = None if result.source is None or result.face_corners is None else result.source.scene
-    if scene is None:
-        glb = _one_mesh(result, texture)
-    else:
-        glb = scene_with_uvs(result, scene, folder, texture)
+    glb = _one_mesh(result, texture) if scene is None else scene_with_uvs(result, scene, folder, texture)
     glb.write(stream)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .... import TriangleMesh
-from ....base import BoolArray, FloatArray, IntArray
+from ....base import BoolArray, FloatArray, IntArray, mask_of
 from ....errors import ArrayShapeError, MeshError, OptionError
 from ....geometry import signed_double_areas
 from ....io import cell_side, split_at_seams
@@ -177,8 +177,7 @@ class Model:
     def of(cls, result: Flattening) -> Model:
         """Return the surface of a result."""
         mesh = TriangleMesh(result.vertices, result.faces)
-        is_used = np.zeros(len(mesh.vertices), dtype=bool)
-        is_used[mesh.faces] = True
+        is_used = mask_of(len(mesh.vertices), mesh.faces)
         used = np.flatnonzero(is_used)
         places, centre, radius = _into_unit_ball(result.vertices[used])
         curvature = angle_defects(result, False, mesh)[used] / np.pi
