@@ -35,6 +35,8 @@ SHARP, CREASES = np.radians(40), 0.3
 OWN = (*declarations(TextureOptions), "charts", "seams")
 # Fraction of a texture that charts cover, roughly, and the largest resolution.
 COVERED, MAX_RESOLUTION = 0.65, 2**16
+# Triangles of a part from which several threads are faster than one.
+PARALLEL = 20_000
 #: The `method` in the settings of a result.
 FREE = "free seams"
 
@@ -89,7 +91,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     if o.texel_density is not None:
         side = np.sqrt(areas.sum() / 2 / COVERED / o.tiles) / 2.0**prepared.checked.exponent
         shared = replace(shared, resolution=_resolution(o.texel_density, side, o.padding))
-    with limit_threads(o.threads):
+    with limit_threads(o.threads if sizes.max() > PARALLEL else 1):
         # Copies cannot have different numbers of charts.
         copies = [None] * len(parts) if isinstance(o.charts, int) else find_copies(parts)
         originals = [i for i, copy in enumerate(copies) if copy is None]
