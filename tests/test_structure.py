@@ -38,12 +38,12 @@ CEILINGS = {
     "apps.controls": 49,
     "apps.measure_uv": 159,
     "apps.peers": 438,
-    "apps.quads": 3780,
+    "apps.quads": 3782,
     "apps.studio": 1711,
     "apps.transfer": 323,
     "apps.brains": 259,
     "apps.pyvista": 26,
-    "apps.unwrap": 1389,
+    "apps.unwrap": 1391,
     "apps.view": 1545,
     "atlas": 1355,
     "base": 282,
@@ -63,7 +63,7 @@ CEILINGS = {
     "result": 96,
     "sample": 5,
     "seams": 169,
-    "source": 507,
+    "source": 509,
     "stages": 219,
     "xatlas": 2,
 }
@@ -73,7 +73,7 @@ OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 FRONT = ("apps.ahead", "apps.blender", "apps.cli", "apps.studio")
 SHARED = ("apps.quads.nearest",)
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_825, 232, 24_537
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_827, 232, 24_541
 CONSTANTS, KERNELS, NAMES, LEVELS = 294, 84, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

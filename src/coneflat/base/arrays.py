@@ -37,7 +37,7 @@ def has_any(mask: BoolArray, sets: IntArray) -> BoolArray:
 
 
 def mask_of(count: int, places: IntArray | BoolArray) -> BoolArray:
-    """Return (count,) True at the given indices, of any shape."""
+    """Return (count,) True at the given places: indices of any shape, or another mask."""
     mask = np.zeros(count, dtype=bool)
     mask[places] = True
     return mask

@@ -84,7 +84,7 @@ def untangle_seams(
 def untangled_disk(
     disk: TriangleMesh, points: FloatArray, lengths: FloatArray, fixed: BoolArray
 ) -> tuple[FloatArray, BoolArray, bool]:
-    """Return points of a disk with its triangles positively oriented, as far as possible.
+    """Return points of a disk whose inverted triangles are positively oriented, except those that cannot be untangled.
 
     Args:
         disk: the disk; the angles at its border are free.
@@ -93,7 +93,7 @@ def untangled_disk(
         fixed: (c,) points that do not move.
 
     Returns:
-        (c, 2) points, (c,) those that moved, and whether all did since the disk was embedded again.
+        (c, 2) points, (c,) those that moved, and whether the whole disk was embedded anew.
     """
     # The angle at a vertex of a prescribed boundary is preserved if the adjacent seam edges do not move.
     border = disk.edges[disk.is_boundary_edge]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, unit_exponent
-from ..errors import NonFiniteError
+from ..errors import DegenerateFaceError, NonFiniteError
 from ..geometry.intrinsic import as_lengths, check_lengths
 from ..geometry.triangulate import is_polygon_side
 from ..mesh.check import CheckedMesh
@@ -76,9 +76,12 @@ def at_unit_size(checked: CheckedMesh) -> CheckedMesh:
     This is exact, and avoids underflow and overflow of squared lengths.
 
     Raises:
+        DegenerateFaceError: all vertices are at 0.
         NonFiniteError: the mesh is so small that UV units per unit of length are not finite.
     """
     size = float(np.abs(checked.mesh.vertices).max())
+    if not size:
+        raise DegenerateFaceError("the mesh has no area: all its vertices are at 0")
     if size < MIN_COORDINATE:
         raise NonFiniteError(f"coordinates of at most {size:.3g} are too small: scale the mesh")
     exponent = -unit_exponent(checked.mesh.vertices)

@@ -130,10 +130,10 @@ class TestWhatIsNone:
         [
             (
                 lambda a: {"corner_quarters": a["corner_quarters"] + 1},
-                "corners are not grid points with these angles",
+                "corners are listed twice, are not on grid points",
             ),
-            (lambda a: {"corners": np.zeros_like(a["corners"])}, "corners are not grid points"),
-            (lambda a: {"corners": a["faces"][5][:1], "corner_quarters": [2]}, "corners are not grid points"),
+            (lambda a: {"corners": np.zeros_like(a["corners"])}, "corners are listed twice"),
+            (lambda a: {"corners": a["faces"][5][:1], "corner_quarters": [2]}, "corners are listed twice"),
             (
                 lambda a: {"features": [[0, len(a["vertices"]) - 1]]},
                 "sharp edges are not edges on grid lines",

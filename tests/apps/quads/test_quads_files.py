@@ -128,7 +128,7 @@ class TestNpz:
         [
             ("quads", None, "holds no mesh of quads: 'quads' is missing"),
             ("quads", np.zeros((3, 3)), "'quads' has the shape"),
-            ("quads", np.zeros((0, 4)), "holds no mesh of quads: it has none"),
+            ("quads", np.zeros((0, 4)), "holds no mesh of quads: its array 'quads' is empty"),
             ("quads", np.full((3, 4), 10**6), "'quads' has indices outside"),
             ("faces", np.zeros(1), "'faces' has the shape"),
             ("surface_vertices", np.full((100, 3), np.nan), "not finite"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from command import command
 import coneflat
 from coneflat import errors, measure_uv, unwrap
 from coneflat.apps.unwrap.free import freed
+from coneflat.apps.unwrap.search import coarse_part
 from coneflat.apps.unwrap.unwrap import along_sharp_edges
 from coneflat.base import Stopwatch
 from coneflat.flatten import Method, lay_out_part
@@ -87,7 +89,7 @@ def test_a_flipped_start_is_replaced():
     assert found == pytest.approx(wanted, rel=1e-3)
 
 
-def test_few_flipped_triangles_are_turned_over_where_they_are(monkeypatch):
+def test_few_flipped_triangles_are_untangled_in_place(monkeypatch):
     """Embedding the whole chart anew takes many more steps."""
     part = Source(as_input(*shapes.hill(20, 20))).prepared(Options()).parts[0]
     method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
@@ -96,7 +98,8 @@ def test_few_flipped_triangles_are_turned_over_where_they_are(monkeypatch):
     at = layout.corners[part.mesh.faces == np.flatnonzero(~part.mesh.is_boundary_vertex)[150]]
     points[at[0]] += 2 * np.ptp(points[layout.corners[(layout.corners == at[0]).any(axis=1)]], axis=(0, 1))
     assert (signed_double_areas(points[layout.corners]) <= 0).any()
-    monkeypatch.setattr("coneflat.apps.unwrap.free.embedded_disks", None)
+    for module in ("apps.unwrap.free", "layout.untangle_seams"):
+        monkeypatch.setattr(import_module(f"coneflat.{module}"), "embedded_disks", None)
     assert freed(replace(layout, points=points))[1] == pytest.approx(wanted, rel=1e-3)
 
 
@@ -248,3 +251,22 @@ def test_seams_follow_sharp_edges_where_these_bend_the_surface():
         for shape in (shapes.box(), shapes.sphere(3, 0.0))
     ]
     assert creases == [pytest.approx(0.3), 0.0]
+
+
+def test_a_coarse_part_keeps_what_belongs_to_its_vertices():
+    vertices, faces = shapes.hill(20, 20)
+    weights = np.arange(1.0, len(vertices) + 1)
+    options = Options(forbidden_cones=[3, 50], boundary="lengths", seam_weights=weights)
+    part = Source(as_input(vertices, faces)).prepared(options).parts[0]
+    coarse, kept = coarse_part(part, 300)
+    assert np.array_equal(coarse.vertices, part.vertices[kept])
+    assert np.array_equal(coarse.mesh.vertices, part.mesh.vertices[kept])
+    for one, every in (
+        (coarse.cones.is_allowed, part.cones.is_allowed),
+        (coarse.cones.absorbs_curvature, part.cones.absorbs_curvature),
+        (coarse.cones.names, part.cones.names),
+        (coarse.metric.keeps_length, part.metric.keeps_length),
+        (coarse.seams.weights, part.seams.weights),
+    ):
+        assert np.array_equal(one, every[kept])
+        assert len(np.unique(one)) > 1

@@ -210,7 +210,7 @@ def _quad_mesh(reading: CheckedArrays) -> QuadMesh:
     faces = reading.indices("surface_faces", (None, 3), len(surface))
     quads = reading.indices("quads", (None, 4), len(vertices))
     if not len(quads):
-        raise MeshFileError(f"{reading.path} holds no mesh of quads: it has none")
+        raise MeshFileError(f"{reading.path} holds no mesh of quads: its array 'quads' is empty")
     return QuadMesh(
         vertices=vertices,
         quads=quads,
@@ -351,7 +351,7 @@ def _require_lines(path: Path, grid: IntegerGrid) -> None:
     is_twice = len(np.unique(corners)) < len(corners)
     if is_twice or (quarters != grid.corner_quarters).any() or (places != np.rint(places)).any():
         raise MeshFileError(
-            f"{path} holds no integer grid: its corners are not grid points with these angles"
+            f"{path} holds no integer grid: its corners are listed twice, are not on grid points, or have other angles"
         )
     known = mesh.edges[on_lines(mesh, grid.corner_grid)] @ [n, 1]
     if not np.isin(np.sort(grid.features, axis=1) @ [n, 1], known).all():

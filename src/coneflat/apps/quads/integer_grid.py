@@ -194,7 +194,7 @@ class GridSearch:
         """Return the grid, with the time of each stage; errors are those of `integer_grid`."""
         self.stages.done = 0.0
         found = self.of_result(self.mesh) if isinstance(self.mesh, Flattening) else self.with_more_cones()
-        return replace(found, seconds=self.stages.seconds)
+        return replace(found, seconds=dict(self.stages.seconds))
 
     def with_more_cones(self) -> IntegerGrid:
         """Return a grid, with less distortion if there is none as given.
@@ -217,7 +217,9 @@ class GridSearch:
         """Return a grid for the options as given."""
         if not self._may_align():
             if self.sizes is not None:
-                raise OptionError("relative sizes need cones and boundaries 'auto': leave out other options")
+                raise OptionError(
+                    "relative sizes cannot be combined with options of cones, boundaries or weights"
+                )
             return self._with_fewest_cones()
         if self.checked.mesh.components[0] > 1:
             return self._of_components()

@@ -20,7 +20,7 @@ from ...options import (
     WordOrVertices,
     option,
     strength,
-)  # fmt: skip
+)
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -169,7 +169,7 @@ class ConeSearch:
             self._least[self.places],
         )
         self.exact.restrict(is_usable)
-        self._usable, self._refined = usable, dict[int, tuple[float, float]]()
+        self._usable, self._refined = usable.copy(), dict[int, tuple[float, float]]()
 
     @property
     def most_cones(self) -> int:
