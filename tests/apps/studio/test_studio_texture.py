@@ -329,7 +329,7 @@ def test_less_common_options_are_set_by_the_page(visit):
     page.click("#no-more")
     visit.wait("studio.refused")
     visit.troubles.clear()  # The browser reports the refused request.
-    assert "Seams none and area cannot be combined" in page.inner_text("#refusal-text")
+    assert "“Seams” none and “Area distortion at most” cannot be combined" in page.inner_text("#refusal-text")
     assert not page.is_checked("#no-more")
     page.fill("#more-area", "")
     page.keyboard.press("Enter")
