@@ -8,17 +8,19 @@ from typing import Any
 import numpy as np
 
 from ... import TriangleMesh
+from ...atlas import ChartLayout, separate_overlaps, with_charts
 from ...base import BoolArray, FloatArray, IntArray
 from ...geometry import (
     cotangents,
     double_areas,
+    find_overlaps,
     layout_curvature,
     signed_double_areas,
     vertex_log_scale,
 )
 from ...layout import StretchEnergy, embedded_disks, relax, untangled_disk
 from ...mesh import label_faces, open_along
-from ...stages import Layout, SolveStatistics
+from ...stages import Layout, SeamSpec, SolveStatistics
 from .options import ISOMETRIC
 
 # Fraction of flipped triangles up to which they are untangled in place. On a noisy surface of 52,000 triangles, 6 of
@@ -108,6 +110,40 @@ def recut(layout: Layout, seams: IntArray) -> Layout:
         disk=cut.mesh,
         seams=layout.mesh.edges[seams],
         chart=label_faces(cut.mesh.faces, len(points))[1],
+    )
+
+
+def side_by_side(layout: Layout) -> Layout:
+    """Return a layout whose charts do not overlap one another."""
+    place = np.zeros(len(layout.points))
+    place[layout.corners] = layout.chart[:, None]
+    width = 1.1 * float(np.ptp(layout.points[:, 0]))
+    return replace(layout, points=layout.points + np.stack([width * place, 0 * place], axis=1))
+
+
+def separate_charts(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layout:
+    """Return a layout in any number of charts, split so that no chart overlaps itself."""
+    if not layout.chart.any():
+        separated = separate_overlaps(layout, costs, spec)
+        return replace(separated, chart=label_faces(separated.corners, len(separated.points))[1])
+    pairs = find_overlaps(side_by_side(layout).points[layout.corners]).pairs
+    label = layout.chart.copy()
+    for chart in np.unique(layout.chart[pairs[:, 0]]).tolist():
+        faces = np.flatnonzero(layout.chart == chart)
+        used, corners = np.unique(layout.corners[faces], return_inverse=True)
+        points = layout.points[used]
+        disk = TriangleMesh(np.pad(points, ((0, 0), (0, 1))), corners.reshape(-1, 3))
+        sides = disk.edge_halfedges[:, 0]
+        edges = layout.mesh.halfedge_edges[3 * faces[sides // 3] + sides % 3]
+        avoided, forbidden = spec.is_avoided[edges], spec.is_forbidden[edges]
+        one_chart = np.zeros(len(faces), dtype=np.int64)
+        alone = replace(layout, mesh=disk, points=points, corners=disk.faces, chart=one_chart, disk=None)
+        own = replace(spec, is_avoided=avoided, is_forbidden=forbidden)
+        separated = separate_overlaps(alone, costs[edges], own)
+        layout, pieces = replace(layout, notes=separated.notes), separated.chart
+        label[faces] = np.where(pieces > 0, label.max() + pieces, chart)
+    return with_charts(
+        layout, ChartLayout(layout.points, layout.corners, layout.chart).split(label).renumbered()
     )
 
 

@@ -14,8 +14,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ... import TriangleMesh
-from ...atlas import ChartLayout, separate_overlaps, with_charts
 from ...base import BoolArray, FloatArray, IntArray
 from ...cones import close_search, find_cones
 from ...errors import CurvatureError, MetricError
@@ -26,7 +24,7 @@ from ...mesh import label_faces, open_along
 from ...seams import seam_costs, without_loose_ends
 from ...source import Part
 from ...stages import ConeSpec, Cut, Layout, Surface, VertexCurvatures
-from .free import freed, recut, seam_edges, triangle_energies
+from .free import freed, recut, seam_edges, separate_charts, side_by_side, triangle_energies
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .tips import RINGS, find_tips, moved_tips, moves_for
 
@@ -276,7 +274,7 @@ class CutSearch:
             return one
         layout = one.layout
         if self._method.separates:
-            layout = separate_charts(layout, self.seam_costs, self.part)
+            layout = separate_charts(layout, self.seam_costs, self.part.seams)
         return replace(one, layout=layout, cost=self.cost_of(layout), is_separated=True)
 
     def settled(self, one: Candidate) -> Candidate:
@@ -369,40 +367,6 @@ class CutSearch:
         """Return the specification of given cones, whose curvatures are found."""
         given = VertexCurvatures(cones, np.full(len(cones), np.nan))
         return replace(self.part.cones, strategy="given", given=given)
-
-
-def side_by_side(layout: Layout) -> Layout:
-    """Return a layout whose charts do not overlap one another."""
-    place = np.zeros(len(layout.points))
-    place[layout.corners] = layout.chart[:, None]
-    width = 1.1 * float(np.ptp(layout.points[:, 0]))
-    return replace(layout, points=layout.points + np.stack([width * place, 0 * place], axis=1))
-
-
-def separate_charts(layout: Layout, costs: FloatArray, part: Part) -> Layout:
-    """Return a layout in any number of charts, split so that no chart overlaps itself."""
-    if not layout.chart.any():
-        separated = separate_overlaps(layout, costs, part.seams)
-        return replace(separated, chart=label_faces(separated.corners, len(separated.points))[1])
-    pairs = find_overlaps(side_by_side(layout).points[layout.corners]).pairs
-    label = layout.chart.copy()
-    for chart in np.unique(layout.chart[pairs[:, 0]]).tolist():
-        faces = np.flatnonzero(layout.chart == chart)
-        used, corners = np.unique(layout.corners[faces], return_inverse=True)
-        points = layout.points[used]
-        disk = TriangleMesh(np.pad(points, ((0, 0), (0, 1))), corners.reshape(-1, 3))
-        sides = disk.edge_halfedges[:, 0]
-        edges = layout.mesh.halfedge_edges[3 * faces[sides // 3] + sides % 3]
-        avoided, forbidden = part.seams.is_avoided[edges], part.seams.is_forbidden[edges]
-        one_chart = np.zeros(len(faces), dtype=np.int64)
-        alone = replace(layout, mesh=disk, points=points, corners=disk.faces, chart=one_chart, disk=None)
-        spec = replace(part.seams, is_avoided=avoided, is_forbidden=forbidden)
-        separated = separate_overlaps(alone, costs[edges], spec)
-        layout, pieces = replace(layout, notes=separated.notes), separated.chart
-        label[faces] = np.where(pieces > 0, label.max() + pieces, chart)
-    return with_charts(
-        layout, ChartLayout(layout.points, layout.corners, layout.chart).split(label).renumbered()
-    )
 
 
 def coarse_part(part: Part, count: int) -> tuple[Part, IntArray]:
