@@ -8,7 +8,7 @@ from typing import Generic, TypeAlias, TypeVar
 
 import numpy as np
 
-from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of
 from ..base.text import list_some, plural
 from ..errors import OptionError
 from ..geometry import double_areas, edge_lengths, mollify
@@ -152,7 +152,7 @@ class Source:
             if len(isolated):
                 notes.append(_isolated_note(constraints.names[checked.mesh.edges[isolated]]))
             constraints.check_off_seams(checked.mesh.edges[marked])
-            on_marks = np.isin(np.arange(len(constraints.names)), checked.mesh.edges[marked])
+            on_marks = mask_of(len(constraints.names), checked.mesh.edges[marked])
             constraints = replace(constraints, on_marks=on_marks)
         pieces = self._pieces.of((metric, marked.tobytes()), lambda: _pieces(checked.mesh, marked, lengths))
         seen = self._visibility(checked, options) if options.hide_seams else None

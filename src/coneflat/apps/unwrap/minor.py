@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import TYPED_TOLERANCE, BoolArray, FloatArray, IntArray, check_cancelled
+from ...base import TYPED_TOLERANCE, BoolArray, FloatArray, IntArray, check_cancelled, mask_of
 from ...cones import MAX_POLYHEDRON_CORNERS
 from ...geometry import double_areas, find_overlaps, signed_double_areas
 from ...layout import StretchEnergy, embedded_disks, joined, relax
@@ -88,7 +88,7 @@ class MinorParts:
         of, is_moved = self._of_face, is_open[self._of_face]
         points = embedded_disks(disk, of, self._areas)
         points[disk.faces[~is_moved]] = places[~is_moved]
-        free = np.isin(np.arange(len(points)), disk.faces[is_moved])
+        free = mask_of(len(points), disk.faces[is_moved])
         energy = StretchEnergy(1.0)
         found = relax(disk, points, disk.faces, energy, lengths=self._lengths, free=free, tolerance=TOLERANCE)
         places[:] = found.points[disk.faces]

@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...base import BoolArray, FloatArray, IntArray
+from ...base import BoolArray, FloatArray, IntArray, mask_of
 from ...cones import close_search, find_cones
 from ...errors import CurvatureError, MetricError
 from ...flatten import Method, lay_out_once
@@ -188,8 +188,7 @@ class CutSearch:
         layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
         close_search(self._surface)
         if len(layout.cones) and mesh.euler_characteristic < 2 and not mesh.is_boundary_edge.any():
-            is_cut = np.zeros(len(mesh.edges), dtype=bool)
-            is_cut[seam_edges(layout)] = True
+            is_cut = mask_of(len(mesh.edges), seam_edges(layout))
             seams = np.flatnonzero(without_loose_ends(mesh, is_cut))
             disk, none = open_along(mesh, seams).mesh, np.empty(0, dtype=np.int64)
             points = np.zeros((len(disk.vertices), 2))
@@ -287,8 +286,7 @@ class CutSearch:
                 return replace(one, layout=layout, energy=energy)
             # Points where charts would touch themselves stay.
             for _ in range(RINGS):
-                is_near = np.zeros(len(is_free), dtype=bool)
-                is_near[layout.corners[pairs]] = True
+                is_near = mask_of(len(is_free), layout.corners[pairs])
                 pairs = np.flatnonzero(is_near[layout.corners].any(axis=1))
             is_free[layout.corners[pairs]] = False
         return one
