@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from .defaults import DISTORTION, MAX_CONE_ANGLE, MAX_CONES, MIN_CONE_ANGLE, TYPED_TOLERANCE
 from .progress import Progress, Stopwatch, cancel_with, check_cancelled
-from .text import exit_text, list_some, plural, printable, short_repr
+from .text import MAX_LISTED, exit_text, list_some, plural, printable, short_repr
 from .threads import THREADS, limit_threads
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .jit import compiled
 
 __all__ = [
-    "BoolArray", "ComplexArray", "DISTORTION", "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE",
+    "BoolArray", "ComplexArray", "DISTORTION", "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE", "MAX_LISTED",
     "MIN_CONE_ANGLE", "Progress", "Stopwatch", "THREADS", "TYPED_TOLERANCE", "cancel_with", "check_cancelled",
     "compiled", "dots", "exit_text", "limit_threads", "list_some", "mask_of", "plural", "printable", "short_repr",
     "unit_exponent",

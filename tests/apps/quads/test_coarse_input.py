@@ -1,10 +1,12 @@
-"""Meshes of many triangles: the grid is that of a coarse mesh, and quads lie on the given one."""
+"""Meshes of many triangles, holes or components: the grid is that of a simpler mesh; quads lie on the given one."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 import shapes
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components
 
 import coneflat
 from coneflat import check_mesh
@@ -12,6 +14,7 @@ from coneflat.apps.quads import coarse_input as module
 from coneflat.apps.quads.coarse_input import coarse_input
 from coneflat.apps.quads.cross_field import SHARP_ANGLE, sharp_ends
 from coneflat.apps.quads.integer_grid import GridSearch
+from coneflat.errors import GridError
 
 
 @pytest.fixture
@@ -79,16 +82,93 @@ def test_creases_are_kept(coarser):
 def test_options_for_which_the_given_mesh_is_used(coarser, options):
     vertices, faces = MODELS["ball"]()
     own = {"quads": 300, **{name: options.pop(name) for name in ("quads", "sharp_angle") if name in options}}
-    assert coarse_input(GridSearch.of(vertices, faces, {"quads": 300}, {})) is not None
-    assert coarse_input(GridSearch.of(vertices, faces, own, options)) is None
+    assert coarse_input(GridSearch.of(vertices, faces, {"quads": 300}, {}))[1] is not None
+    search = GridSearch.of(vertices, faces, own, options)
+    assert coarse_input(search) == (search, None)
 
 
 def test_sizes_are_those_of_the_given_mesh(coarser):
     vertices, faces = MODELS["ball"]()
     sizes = np.linspace(1, 2, len(vertices))
-    small = coarse_input(GridSearch.of(vertices, faces, {"quads": 300, "size": sizes}, {}))
-    np.testing.assert_allclose(small.sizes, sizes[small.kept])
+    search, small = coarse_input(GridSearch.of(vertices, faces, {"quads": 300, "size": sizes}, {}))
+    np.testing.assert_allclose(search.sizes, sizes[small.kept])
     np.testing.assert_array_equal(small.mesh.vertices, vertices[small.kept])
+
+
+def components_of(found):
+    """The number of components of quads, and of their surface."""
+    quads = csr_matrix((np.ones(len(found.edges)), found.edges.T), shape=(len(found.vertices),) * 2)
+    return connected_components(quads)[0], found.surface.components[0]
+
+
+def test_all_but_the_largest_components_are_divided(monkeypatch):
+    monkeypatch.setattr(module, "MAX_COMPONENTS", 2)
+    cube, (ball, faces) = shapes.box(1, (1.0, 1.0, 1.0)), shapes.sphere(3)
+    parts = [(4.0 * k + size * cube[0], cube[1]) for k, size in enumerate((3, 1, 2, 0.1))]
+    found = coneflat.quads(*shapes.join(*parts, (ball - 9, faces)), quads=300)
+    assert components_of(found) == (5, 5)
+    assert "of 3 components without a grid" in found.notes[-1]
+    on = np.einsum("qi,qix->qx", found.barycentric, found.surface.vertices[found.surface.faces[found.faces]])
+    np.testing.assert_allclose(on, found.vertices, atol=1e-12)
+    measures = coneflat.measure_quads(found)
+    assert measures.euler_characteristic == measures.surface_euler == 10
+    assert measures.jacobian_min > 0
+    assert measures.hausdorff < measures.edge_mean
+    # The unit cube has about as many quads as its area needs, or up to four times as many.
+    corners = found.vertices[found.quads].mean(axis=1)
+    is_unit = (np.abs(corners - 4.5).max(axis=1) < 0.6).sum()
+    assert 0.8 < is_unit / (300 * 6 / (14.01 * 6 + 4 * np.pi)) < 4
+
+
+def with_holes(count, corners=((20, 20), (60, 20), (20, 60), (60, 60))):
+    """A flat grid without some of its squares, and the sides of these."""
+    vertices, faces = shapes.grid(count, count)
+    middle = vertices[faces].mean(axis=1) * count
+    gone = np.any([(np.abs(middle[:, :2] - corner - 0.5) < 0.5).all(axis=1) for corner in corners], axis=0)
+    return vertices, faces[~gone]
+
+
+def test_holes_smaller_than_quads_are_filled():
+    found = coneflat.quads(*with_holes(80), quads=100)
+    assert (len(found.quads), found.euler_characteristic, len(found.irregular)) == (100, 1, 0)
+    assert any(note.startswith("Filled 4 holes, smaller than a quad") for note in found.notes)
+    assert found.surface.euler_characteristic == -3
+
+
+def test_quads_over_filled_holes_are_left_out(monkeypatch):
+    monkeypatch.setattr(module, "MAX_HOLES", 1)
+    found = coneflat.quads(*with_holes(20, ((3, 3), (15, 3), (3, 15), (15, 15))), quads=1600)
+    assert any(note.startswith("Filled 3 holes") for note in found.notes)
+    assert found.euler_characteristic == found.surface_euler == -3
+    places = found.vertices[found.quads].mean(axis=1)[:, None, :2] * 20 - [[3.5, 3.5], [15.5, 3.5]]
+    assert (np.abs(places).max(axis=2) > 0.4).all()
+    assert coneflat.measure_quads(found).jacobian_min > 0
+
+
+def test_a_boundary_with_very_many_corners_is_refused(monkeypatch):
+    monkeypatch.setattr(module, "MAX_CORNERS", 3)
+    sheet, ball = shapes.grid(8, 8), shapes.sphere(3)
+    with pytest.raises(GridError, match=r"^the boundary has more than 3 corners"):
+        coneflat.quads(*sheet, quads=50)
+    found = coneflat.quads(*shapes.join(sheet, (ball[0] + 3, ball[1])), quads=200)
+    assert components_of(found) == (2, 2)
+    assert "1 component without a grid" in found.notes[-1]
+
+
+def test_components_for_which_no_grid_is_found_are_divided(monkeypatch):
+    search = GridSearch._as_given
+
+    def fail_for_few(self):
+        if len(self.checked.mesh.faces) == 12:
+            raise GridError("none")
+        return search(self)
+
+    monkeypatch.setattr(GridSearch, "_as_given", fail_for_few)
+    ball, cube = shapes.sphere(3), shapes.box(1)
+    found = coneflat.quads(*shapes.join(ball, (cube[0] + 3, cube[1])), quads=200)
+    assert components_of(found) == (2, 2)
+    assert "No grid for a component of 12 triangles: none." in found.notes
+    assert "1 component without a grid" in found.notes[-1]
 
 
 def test_noise_is_not_a_crease():

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,7 +14,7 @@ from .options import is_given, keywords, option_flags, path_flag, pop_flags, ref
 from .shared import GroupedCommand, input_options, verbosity_options
 
 if TYPE_CHECKING:
-    from ... import IntegerGrid
+    pass
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,11 +107,12 @@ def quads(
         notes = list(done.notes if joined is None else joined.all_notes(done.notes))
         if flags.report is not None:
             measured = {} if measures is None else measures.report()
-            rest = {"grid": grid_map.report(), "seconds": dict(console.seconds), "notes": notes}
+            rest = {"grid": {"size": grid_map.size}, "seconds": dict(console.seconds), "notes": notes}
             write_report(flags.report, {**measured, **rest})
         console.say(f"note: {note}" for note in notes)
         console.finish([path for path in files.values() if path is not None])
-        console.table([*_grid_rows(grid_map), *(() if measures is None else measures.rows())])
+        square = "square", f"{grid_map.size:.4g}", "side of a grid square in model units"
+        console.table([square, *(() if measures is None else measures.rows())])
 
 
 def _check_combinations(context: click.Context, mesh: Path) -> None:
@@ -133,10 +132,3 @@ def _check_combinations(context: click.Context, mesh: Path) -> None:
         allowed = ("mesh", "output", "grid", "view", "smooth", "report", "verbosity")
         if parameter.name not in allowed and parameter.name is not None and is_given(context, parameter.name):
             raise click.UsageError(f"{mesh} is a grid: leave out {parameter.opts[0]}", context)
-
-
-def _grid_rows(grid: IntegerGrid) -> Iterator[tuple[str, str, str]]:
-    """Yield the rows (name, value, meaning) of the table of a grid."""
-    yield "square", f"{grid.size:.4g}", "side of a grid square in model units"
-    if math.isfinite(grid.qc_mean):
-        yield "grid QC", f"{grid.qc_mean:.4f}", "mean distortion of the map"

@@ -145,44 +145,69 @@ class _Search:
 
     def _descend(self, one: IntArray, two: IntArray, costs: _Costs) -> None:
         """Decrease the cost by steps between a place of `one` and a place of `two`, in both directions."""
-        model, indices, price = self.model, self.indices, self.price
         first, second = self._block(one), self._block(two)
-        is_same = np.array_equal(one, two)
         gram = first.scales.T @ second.scales
         squares = (first.scales**2).sum(axis=0)[:, None] + (second.scales**2).sum(axis=0) - 2 * gram
         while True:
-            scale, waves, loops = model.state(indices)
-            now = _direction_cost(waves.sum()[None], loops.sum()[None], model, costs)[0]
-            rise = np.where(indices < model.most, np.abs(indices + 1) - np.abs(indices), np.inf) * price
-            fall = np.where(indices > model.least, np.abs(indices - 1) - np.abs(indices), np.inf) * price
-            slopes = 2 * (scale @ first.scales)[:, None] - 2 * (scale @ second.scales)
-            best = -MIN_GAIN
-            for sign in (1, -1)[: 1 if is_same else 2]:
-                waves_of, loops_of = (
-                    (state[:, None] * (one_part if sign > 0 else one_part.conj())).T
-                    @ (two_part.conj() if sign > 0 else two_part)
-                    for state, one_part, two_part in (
-                        (waves, first.waves, second.waves),
-                        (loops, first.loops, second.loops),
-                    )
-                )
-                cost = (
-                    costs.areas * (squares + sign * slopes)
-                    + _direction_cost(waves_of, loops_of, model, costs)
-                    - now
-                )
-                cost += rise[one][:, None] + fall[two] if sign > 0 else fall[one][:, None] + rise[two]
-                cost[one[:, None] == two] = np.inf
-                i, j = np.unravel_index(np.argmin(np.round(cost, 6)), cost.shape)
-                if cost[i, j] < best:
-                    best, plus, minus = (
-                        float(cost[i, j]),
-                        *((one[i], two[j]) if sign > 0 else (two[j], one[i])),
-                    )
-            if best == -MIN_GAIN:
+            plus, minus = self._best_steps(first, second, squares, costs)
+            if not len(plus):
                 return
-            indices[plus] += 1
-            indices[minus] -= 1
+            best = 0
+            while True:
+                self.indices[plus[best]] += 1
+                self.indices[minus[best]] -= 1
+                change = self._changes(plus, minus, costs)
+                best = int(np.argmin(np.round(change, 6)))
+                if change[best] >= -MIN_GAIN:
+                    break
+
+    def _best_steps(
+        self, first: _Block, second: _Block, squares: FloatArray, costs: _Costs
+    ) -> tuple[IntArray, IntArray]:
+        """Return (k,) places where a quarter turn is added, and those where it is subtracted, by the best steps first.
+
+        Of the steps to each place of one block, from any place of the other, only the best is among them.
+
+        squares: the squared norms of the differences of the blocks' scales.
+        """
+        model = self.model
+        scale, waves, loops = model.state(self.indices)
+        now = _direction_cost(waves.sum()[None], loops.sum()[None], model, costs)[0]
+        found = list[tuple[FloatArray, IntArray, IntArray]]()
+        for to, of, square in ((first, second, squares), (second, first, squares.T)):
+            waves_of = (waves[:, None] * to.waves).T @ of.waves.conj()
+            loops_of = (loops[:, None] * to.loops).T @ of.loops.conj()
+            change = square + 2 * ((scale @ to.scales)[:, None] - scale @ of.scales)
+            change = costs.areas * change + _direction_cost(waves_of, loops_of, model, costs) - now
+            change += self._price_of(1)[to.places][:, None] + self._price_of(-1)[of.places]
+            change[to.places[:, None] == of.places] = np.inf
+            best = np.round(change, 6).argmin(axis=1)
+            found.append((change[np.arange(len(best)), best], to.places, of.places[best]))
+            if np.array_equal(to.places, of.places):
+                break
+        change, plus, minus = (np.concatenate(each) for each in zip(*found, strict=True))
+        order = np.argsort(np.round(change, 6), kind="stable")[: int((change < -MIN_GAIN).sum())]
+        return plus[order], minus[order]
+
+    def _changes(self, plus: IntArray, minus: IntArray, costs: _Costs) -> FloatArray:
+        """Return (k,) the changes of the cost by steps from `minus` to `plus`."""
+        model = self.model
+        scale, waves, loops = model.state(self.indices)
+        now = _direction_cost(waves.sum()[None], loops.sum()[None], model, costs)[0]
+        scales = model.scales[:, plus] - model.scales[:, minus]
+        waves_of, loops_of = (
+            state @ np.exp(1j * (turns[:, plus] - turns[:, minus]))
+            for state, turns in ((waves, model.turns), (loops, model.loops))
+        )
+        change = costs.areas * ((scales**2).sum(axis=0) + 2 * scale @ scales) - now
+        change += _direction_cost(waves_of, loops_of, model, costs)
+        return change + self._price_of(1)[plus] + self._price_of(-1)[minus]
+
+    def _price_of(self, step: int) -> FloatArray:
+        """Return (p + 1,) the change of the price of cones by a quarter turn more (1) or less (-1)."""
+        model, indices = self.model, self.indices
+        may = indices < model.most if step > 0 else indices > model.least
+        return np.where(may, np.abs(indices + step) - np.abs(indices), np.inf) * self.price
 
     def _block(self, places: IntArray) -> _Block:
         model = self.model

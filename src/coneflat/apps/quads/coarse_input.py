@@ -1,7 +1,8 @@
-"""Meshes of many triangles: the grid is computed on a coarse mesh, and its quads move to the given surface."""
+"""Meshes of many triangles, holes or components: a grid of a simpler mesh, whose quads move to the given surface."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
 
@@ -11,36 +12,46 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from ... import Flattening, TriangleMesh
-from ...base import FloatArray, IntArray
-from ...geometry import coarse_mesh, double_areas, edge_lengths
-from ...mesh import NEXT, PREVIOUS
+from ...base import BoolArray, IntArray, mask_of, plural
+from ...errors import GridError
+from ...geometry import angle_defect, coarse_mesh, corner_angles, double_areas, edge_lengths, mollify
+from ...io import as_input
+from ...mesh import NEXT, PREVIOUS, tie_key
 from ...options import declarations
+from ...source import Source
 from .aligned_cones import COARSE
 from .cross_field import sharp_ends
-from .features import edge_indices, vertex_graph
+from .features import edge_indices, lengths_along, split_edges, vertex_graph
 from .integer_grid import GridSearch
 from .nearest import Stars, TriangleTree, slide_near
 from .options import QUADS, QuadOptions
 from .quad_mesh import QuadMesh
+from .sizes import extended
 from .smooth import is_on_feature
+
+# Largest numbers of components, of holes, and of corners of the longest boundary, for which grids are found in some
+# seconds.
+MAX_COMPONENTS, MAX_HOLES, MAX_CORNERS = 64, 32, 400
 
 
 @dataclass(frozen=True, eq=False)
 class CoarseInput:
-    """A coarse mesh of a surface.
+    """A simpler mesh of a surface.
 
     Attributes:
-        mesh: the coarse mesh, in model units.
-        kept: its vertices in the given mesh.
-        given: the given mesh, checked.
-        sizes: relative sizes of quads at its vertices, or None.
+        mesh: the simpler mesh, in model units; vertices in filled holes come last.
+        kept: its other vertices in the given mesh.
+        given: the given mesh, checked, without `rest`.
+        is_filling: (m,) whether each of its triangles is in a filled hole.
+        rest: the other components of the mesh, for which no grid is searched.
         notes: on the given mesh.
     """
 
     mesh: TriangleMesh
     kept: IntArray
     given: TriangleMesh
-    sizes: FloatArray | None
+    is_filling: BoolArray
+    rest: tuple[TriangleMesh, ...]
     notes: tuple[str, ...]
 
     def moved(self, quads: QuadMesh) -> QuadMesh:
@@ -50,9 +61,14 @@ class CoarseInput:
         sheet. Those on the boundary and on sharp edges of the coarse mesh move to the nearest point on the boundary, or
         on sharp edges within half the mean length of the edges there, of the same component.
         """
+        if self.is_filling.any():
+            tree = TriangleTree(self.mesh.vertices, self.mesh.faces)
+            on, _ = tree.nearest(quads.vertices[quads.quads].mean(axis=1))
+            is_over = self.is_filling[on]
+            quads = quads.without(is_over & ~is_over.all())
         mesh, surface, points = self.given, quads.surface, quads.vertices
         label, part = mesh.components[1], surface.components[1]
-        off, which = cKDTree(self.mesh.vertices).query(surface.vertices)
+        off, which = cKDTree(self.mesh.vertices[: len(self.kept)]).query(surface.vertices)
         # Where components touch, the vertex found may be of another one; most are not.
         is_common, there = off == 0, label[self.kept[which]]
         votes = csr_matrix((is_common.astype(np.int64), (part, there)))
@@ -91,28 +107,141 @@ class CoarseInput:
         return replace(quads, vertices=moved, faces=faces, barycentric=weights, surface=mesh)
 
 
-def coarse_input(search: GridSearch) -> CoarseInput | None:
-    """Return a coarse mesh for a grid; None if the given one has few triangles, or options refer to it.
+def coarse_input(search: GridSearch) -> tuple[GridSearch, CoarseInput | None]:
+    """Return the search for the grid of a simpler mesh, and this mesh.
+
+    The search is the given one if its options name vertices, or if the mesh has few triangles, holes and components.
 
     Raises:
         MeshError: the mesh cannot be flattened.
         OptionError: sizes are not positive numbers.
     """
     # Weights, and options that are not simple values, name vertices. Required sharp edges are those of the given mesh.
-    quads, options = search.quads, {**search.options, "boundary": search.boundary}
+    options = {**search.options, "boundary": search.boundary}
     is_simple = all(one is None or isinstance(one, (str, Real)) or callable(one) for one in options.values())
     is_simple &= options.keys() <= declarations(QuadOptions).keys() - {"weights"}
-    is_simple &= search.sharp_angle is None and not isinstance(search.mesh, Flattening)
-    if not is_simple or (np.shape(search.source.given.faces) or (0,))[0] <= 2 * COARSE:
-        return None
+    if not is_simple or search.sharp_angle is not None or isinstance(search.mesh, Flattening):
+        return search, None
     checked, mesh = search.checked, search.checked.mesh
-    if search.size is not None:
-        area = float(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum()) / 2
-        quads = area / max(float(np.ldexp(search.size, checked.exponent)), np.finfo(float).tiny) ** 2
+    area = max(_area(mesh), np.finfo(float).tiny)
+    side = np.sqrt(area / search.quads) if search.size is None else np.ldexp(search.size, checked.exponent)
+    is_kept, walks = _manageable(mesh, 4 * float(side))
+    walks = walks if search.boundary == "auto" else []
+    (part, kept), *others = [_part(mesh, chosen) for chosen in (is_kept, ~is_kept) if chosen.any()]
+    loops = [np.searchsorted(kept, mesh.tails[walk]) for walk in walks]
+    filled = _filled(part, loops)
+    quads = _area(filled) / max(float(side), np.finfo(float).tiny) ** 2
     count = COARSE * max(1.0, quads / QUADS)
-    if len(mesh.faces) <= 2 * count:
-        return None
-    coarse, kept, _ = coarse_mesh(mesh, int(count))
-    given = mesh.moved_to(np.ldexp(mesh.vertices, -checked.exponent))
-    sizes = None if search.scales is None else np.exp(-search.scales[kept])
-    return CoarseInput(coarse.moved_to(given.vertices[kept]), kept, given, sizes, checked.notes)
+    simple, some, of = filled, np.arange(len(filled.vertices)), np.arange(len(filled.faces))
+    if len(filled.faces) > 2 * count:
+        simple, some, of = coarse_mesh(filled, int(count))
+    elif not (loops or others):
+        return search, None
+    own = some[some < len(kept)]
+    sizes = None if search.scales is None else np.exp(extended(-search.scales[kept[own]], simple))
+    simple, part, *rest = (
+        one.moved_to(np.ldexp(one.vertices, -checked.exponent))
+        for one in (simple, part, *(other for other, _ in others))
+    )
+    if loops:
+        holes = f"Filled {plural(len(loops), 'hole')}, smaller than a quad or beyond the {MAX_HOLES} longest."
+    notes = (*checked.notes, holes) if loops else checked.notes
+    search = replace(search, mesh=Source(as_input(simple)), sizes=sizes, quads=quads)
+    return search, CoarseInput(simple, own, part, of >= len(part.faces), tuple(rest), notes)
+
+
+def _area(mesh: TriangleMesh) -> float:
+    return float(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum()) / 2
+
+
+def _part(mesh: TriangleMesh, is_in: BoolArray) -> tuple[TriangleMesh, IntArray]:
+    """Return some triangles (m,) of a mesh, and their vertices there."""
+    kept, faces = np.unique(mesh.faces[is_in], return_inverse=True)
+    return TriangleMesh(mesh.vertices[kept], faces.reshape(-1, 3)), kept
+
+
+def _filled(mesh: TriangleMesh, loops: list[IntArray]) -> TriangleMesh:
+    """Return a mesh with some boundaries filled, given as their vertices, by triangles around their centroids."""
+    n = len(mesh.vertices)
+    centres = [mesh.vertices[loop].mean(axis=0, keepdims=True) for loop in loops]
+    fans = [np.stack([np.roll(loop, -1), loop, 0 * loop + n + k], axis=1) for k, loop in enumerate(loops)]
+    return TriangleMesh(np.concatenate([mesh.vertices, *centres]), np.concatenate([mesh.faces, *fans]))
+
+
+def _manageable(mesh: TriangleMesh, shortest: float) -> tuple[BoolArray, list[IntArray]]:
+    """Return (m,) the triangles of components to search grids for, and the half-edges of boundaries to fill there.
+
+    These are not the longest of a component, and shorter than a length or not among the longest others.
+
+    Raises:
+        GridError: the boundaries of all components have too many corners.
+    """
+    (count, label), key, walks = mesh.components, tie_key(mesh.vertices), mesh.boundary_walks()
+    areas = np.bincount(label[mesh.faces[:, 0]], double_areas(edge_lengths(mesh.vertices, mesh.faces)))
+    order = np.lexsort((np.bincount(label, key), -np.round(areas / areas.max(), 9)))
+    is_kept = mask_of(count, order[:MAX_COMPONENTS]) & (areas > 0)
+    seen, holes, filled = set[int](), 0, list[IntArray]()
+    lengths = np.array([lengths_along(mesh, mesh.halfedge_edges[walk]).sum() for walk in walks])
+    keys = [key[mesh.tails[walk]].sum() for walk in walks]
+    angles = corner_angles(mollify(edge_lengths(mesh.vertices, mesh.faces))[0])
+    quarters = np.rint(angle_defect(mesh.faces, angles, mesh.is_boundary_vertex) / (np.pi / 2))
+    for k in np.lexsort((keys, -np.round(lengths / lengths.max(initial=1e-300), 9))):
+        component = int(label[mesh.tails[walks[k][0]]])
+        if component not in seen:
+            seen.add(component)
+            is_kept[component] &= np.abs(quarters[mesh.tails[walks[k]]]).sum() <= MAX_CORNERS
+        elif is_kept[component]:
+            holes += 1
+            filled += [walks[k]] if holes > MAX_HOLES or lengths[k] < shortest else []
+    if not is_kept.any():
+        raise GridError(
+            f"the boundary has more than {MAX_CORNERS} corners, too many for a grid: fill holes, or smooth it"
+        )
+    return is_kept[label[mesh.faces[:, 0]]], filled
+
+
+def with_rest(quads: QuadMesh, pieces: Sequence[TriangleMesh]) -> QuadMesh:
+    """Return quads of a surface, and three for each triangle of further pieces of it.
+
+    Pieces of many triangles are simplified before, to about twice the quads that their area needs, because these are
+    less regular. Long edges are split.
+    """
+    # Nothing of a component without area can be seen.
+    parts = [part for one in pieces for part, _, _ in one.split_components() if _area(part) > 0]
+    if not parts:
+        return quads
+    first = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    faces = np.concatenate([part.faces + start for part, start in zip(parts, first, strict=False)])
+    whole = TriangleMesh(np.concatenate([part.vertices for part in parts]), faces)
+    square = _area(quads.surface) / len(quads.quads)
+    count = int(2 * _area(whole) / square / 3)
+    small = coarse_mesh(whole, count)[0] if len(faces) > count else whole
+    while (is_long := lengths_along(small, np.arange(len(small.edges))) > 4 * np.sqrt(square)).any():
+        small = split_edges(small, is_long)
+    n, middles = len(small.vertices), small.halfedge_edges.reshape(-1, 3)
+    points = np.concatenate(
+        [small.vertices, small.vertices[small.edges].mean(axis=1), small.vertices[small.faces].mean(axis=1)]
+    )
+    centres = n + len(small.edges) + np.arange(len(small.faces))
+    corners = [
+        (small.faces[:, i], n + middles[:, i - 1], centres, n + middles[:, (i + 1) % 3]) for i in range(3)
+    ]
+    on, weights = TriangleTree(whole.vertices, whole.faces).nearest(points)
+    note = f"Made three quads of each triangle of {plural(len(parts), 'component')} without a grid."
+    surface = quads.surface
+    return replace(
+        quads,
+        vertices=np.concatenate(
+            [quads.vertices, np.einsum("qi,qix->qx", weights, whole.vertices[faces[on]])]
+        ),
+        quads=np.concatenate(
+            [quads.quads, *(len(quads.vertices) + np.stack(each, axis=1) for each in corners)]
+        ),
+        faces=np.concatenate([quads.faces, len(surface.faces) + on]),
+        barycentric=np.concatenate([quads.barycentric, weights]),
+        surface=TriangleMesh(
+            np.concatenate([surface.vertices, whole.vertices]),
+            np.concatenate([surface.faces, len(surface.vertices) + faces]),
+        ),
+        notes=(*quads.notes, note),
+    )

@@ -67,6 +67,11 @@ def halfedge_angles(angles: FloatArray) -> FloatArray:
     return np.stack([zero, np.pi - angles[:, 2], np.pi + angles[:, 1]], axis=1).ravel()
 
 
+def complex_sums(labels: IntArray, values: ComplexArray, count: int) -> ComplexArray:
+    """Return (count,) the sum of the values (k,) that have each label (k,)."""
+    return np.bincount(labels, values.real, count) + 1j * np.bincount(labels, values.imag, count)
+
+
 def preferred_directions(mesh: TriangleMesh, angle: float = SHARP_ANGLE) -> Directions:
     """Return the preferred crosses of a mesh, at edges sharper than an angle and along curvature."""
     lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces))
@@ -76,8 +81,7 @@ def preferred_directions(mesh: TriangleMesh, angle: float = SHARP_ANGLE) -> Dire
     sides = mesh.edge_halfedges[sharp_or_boundary(mesh, SHARP_LENGTH * scale, angle)].ravel()
     sides = sides[sides >= 0]
     crosses = lengths.ravel()[sides] * np.exp(4j * halfedge_angles(corner_angles(lengths))[sides])
-    sharp = np.zeros(len(mesh.faces), dtype=np.complex128)
-    np.add.at(sharp, sides // 3, crosses / scale)
+    sharp = complex_sums(sides // 3, crosses / scale, len(mesh.faces))
     tensors = curvature_tensors(mesh, areas, CURVATURE_SCALE * scale)
     # The direction of a tensor is that of an angle up to half turns.
     double = (tensors[:, 0, 0] - tensors[:, 1, 1]) + 2j * tensors[:, 0, 1]
@@ -130,8 +134,11 @@ def curvature_tensors(mesh: TriangleMesh, areas: FloatArray, radius: float) -> F
     sums = [np.bincount(both, np.tile(column, 2), len(mesh.faces)) for column in inner.T]
     stiffness = _dual_laplacian(mesh, areas, np.zeros(len(one)))
     system = csc_matrix(diags(areas) + radius**2 * stiffness.real)
-    system.sort_indices()
-    mean = factorize(system).solve(np.ascontiguousarray(np.stack(sums, axis=1))).reshape(-1, 3, 3)
+    mean = (
+        factorize(system.sorted_indices())
+        .solve(np.ascontiguousarray(np.stack(sums, axis=1)))
+        .reshape(-1, 3, 3)
+    )
     x = mesh.vertices[mesh.faces[:, 2]] - mesh.vertices[mesh.faces[:, 1]]
     normal = face_normals(mesh.vertices, mesh.faces)
     axes = np.stack([x, np.cross(normal, x)], axis=1)
@@ -230,5 +237,4 @@ def diffused(mesh: TriangleMesh, values: FloatArray, radius: float) -> FloatArra
     share = np.asarray(np.bincount(mesh.faces.ravel(), areas.repeat(3) / 3, count))
     stiffness = cotangent_laplacian(mesh.faces, cotangents(lengths), count)
     system = csc_matrix(diags(share) + radius**2 * areas.sum() * stiffness)
-    system.sort_indices()
-    return factorize(system).solve(share[:, None] * values)
+    return factorize(system.sorted_indices()).solve(share[:, None] * values)

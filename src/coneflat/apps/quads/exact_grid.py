@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import BoolArray, FloatArray, IntArray, compiled, list_some, plural
+from ...base import BoolArray, FloatArray, IntArray, compiled, list_some, mask_of, plural
 from ...errors import GridError
 from ...geometry import fill_orientations, halfedge_twins, sides_between
 from .layout import GRID_TOLERANCE, quarters_around
@@ -59,13 +59,9 @@ def exact_grid(grid: IntegerGrid) -> ExactGrid:
     mesh = TriangleMesh(np.asarray(grid.vertices, np.float64), np.asarray(grid.faces, np.int64))
     given = np.ascontiguousarray(grid.corner_grid, np.float64)
     twin = halfedge_twins(mesh)
-    inner = np.flatnonzero(twin >= 0)
     # The motions of a half-edge are those to its twin's triangle, the inverse of the given ones.
-    turns, shifts = np.zeros(len(twin), dtype=np.int64), np.zeros((len(twin), 2))
-    turns[inner], shifts[inner] = (
-        np.asarray(grid.turns)[twin[inner]] % 4,
-        np.asarray(grid.shifts)[twin[inner]],
-    )
+    turns = np.where(twin >= 0, np.asarray(grid.turns)[twin] % 4, 0)
+    shifts = np.where(twin[:, None] >= 0, np.asarray(grid.shifts)[twin], 0.0)
     fans = _fans(mesh, twin)
     most = max(float(np.abs(given).max()), float(np.abs(shifts).max(initial=0.0)), 1.0)
     # Coordinates have two binary digits less than a double, so that sums of coordinates and shifts are exact.
@@ -76,13 +72,12 @@ def exact_grid(grid: IntegerGrid) -> ExactGrid:
     snapped = np.where(np.abs(start - rounded) <= SNAP_DISTANCE, rounded, start)
     exact = ExactGrid(mesh, given, twin, turns, shifts, fans)
     corners, is_off = _transport(exact, snapped)
-    bad = mesh.faces[_signs(corners) <= 0]
+    bad = mesh.faces[orientations(corners) <= 0]
     if bad.size:  # Snapping degenerates very thin triangles: their vertices are rounded, but not snapped.
         snapped[bad] = start[bad]
         corners, is_off = _transport(exact, snapped)
     exact = replace(exact, corners=corners)
     _require_map(exact, given, is_off)
-    _require_cones(exact)
     return exact
 
 
@@ -132,41 +127,26 @@ def turn(quarters: int, x: float, y: float) -> tuple[float, float]:
     return y, -x
 
 
-def _signs(corners: FloatArray) -> IntArray:
-    """Return (m,) the exact orientation signs of triangles."""
+def orientations(corners: FloatArray) -> IntArray:
+    """Return (m,) the exact orientation signs of triangles with corners (m, 3, 2)."""
     signs = np.empty(len(corners), dtype=np.int64)
     fill_orientations(corners.reshape(-1, 6), np.empty(12), signs)
     return signs
 
 
 def _require_map(exact: ExactGrid, given: FloatArray, is_off: BoolArray) -> None:
-    """Raise GridError unless the two sides of all edges match, and all triangles are counterclockwise."""
-    bad = np.flatnonzero(is_off)
-    if len(bad):
-        raise GridError(
-            f"{plural(len(bad), 'vertex', 'vertices')} around which the grid does not close: {list_some(bad)}"
-        )
+    """Raise GridError unless sides of edges match, triangles are counterclockwise, and cones lie on grid points."""
+    mesh, flat = exact.mesh, exact.corners.reshape(-1, 2)
     off = np.abs(exact.corners - given).max(axis=(1, 2))
-    bad = np.flatnonzero(~(off <= GRID_TOLERANCE))
-    if len(bad):
-        raise GridError(
-            f"the two sides of edges of {plural(len(bad), 'face')} are up to {np.max(off):.1e} grid units apart: "
-            f"{list_some(bad)}"
-        )
-    bad = np.flatnonzero(_signs(exact.corners) <= 0)
-    if len(bad):
-        raise GridError(
-            f"{plural(len(bad), 'triangle')} without area or flipped in the grid: {list_some(bad)}"
-        )
-
-
-def _require_cones(exact: ExactGrid) -> None:
-    """Raise GridError unless the inner vertices with angles other than 2 pi lie on grid points."""
-    mesh = exact.mesh
-    place = exact.corners.reshape(-1, 2)[exact.fans[0]]
-    is_off = np.zeros(len(mesh.vertices), dtype=bool)
-    is_off[mesh.faces.ravel()[exact.fans[0]]] = (place != np.round(place)).any(axis=1)
-    is_cone = quarters_around(mesh, sides_between(exact.corners)) != 4
-    bad = np.flatnonzero(is_off & is_cone & ~mesh.is_boundary_vertex)
-    if len(bad):
-        raise GridError(f"{plural(len(bad), 'cone')} off the grid points: {list_some(bad)}")
+    is_cone = ~mesh.is_boundary_vertex & (quarters_around(mesh, sides_between(exact.corners)) != 4)
+    is_between = mask_of(len(mesh.vertices), mesh.faces.ravel()[(flat != np.round(flat)).any(axis=1)])
+    apart = f"the two sides of edges of {{}} are up to {off.max():.1e} grid units apart"
+    for is_bad, nouns, text in (
+        (is_off, ("vertex", "vertices"), "{} around which the grid does not close"),
+        (~(off <= GRID_TOLERANCE), ("face",), apart),
+        (orientations(exact.corners) <= 0, ("triangle",), "{} without area or flipped in the grid"),
+        (is_cone & is_between, ("cone",), "{} off the grid points"),
+    ):
+        bad = np.flatnonzero(is_bad)
+        if len(bad):
+            raise GridError(f"{text.format(plural(len(bad), *nouns))}: {list_some(bad)}")

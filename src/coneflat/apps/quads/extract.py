@@ -19,7 +19,7 @@ from .exact_grid import ExactGrid, exact_grid
 from .features import vertex_graph
 from .grid_points import LOST, GridPoints, Ports, find_points, find_ports, join_ports
 from .integer_map import IntegerGrid
-from .quad_mesh import CoarseGridError, QuadMesh, degenerate_quads
+from .quad_mesh import CoarseGridError, QuadMesh, corner_fans, degenerate_quads, opposite_sides
 
 # Largest number of squares; at about a kilobyte of peak memory for each, many machines have enough.
 MAX_SQUARES = 20_000_000
@@ -129,22 +129,16 @@ def _split_fans(darts: IntArray, mates: IntArray, points: IntArray) -> tuple[Int
     There is one vertex for each fan of quads around a point. Vertices are in the order of points.
     """
     corner = np.arange(darts.size)
-    after = np.roll(corner.reshape(-1, 4), -1, axis=1).ravel()
     corner_of = np.full(len(points), -1, dtype=np.int64)
     corner_of[darts.ravel()] = corner
     # The quad on the other side of the edge has the mate of the port.
     other = corner_of[mates[darts.ravel()]]
-    shared = np.flatnonzero(other >= 0)
-    one, two = shared, other[shared]
-    ends = np.concatenate([one, after[one]]), np.concatenate([after[two], two])
-    count, fan = label_components(darts.size, *ends)
+    count, fan = corner_fans(other)
     point_of = np.empty(count, dtype=np.int64)
     point_of[fan] = points[darts.ravel()]
     rank = np.argsort(point_of, kind="stable")
-    number = np.empty(count, dtype=np.int64)
-    number[rank] = np.arange(count)
     edge = np.where(other >= 0, np.minimum(corner, other), corner)
-    return point_of[rank], number[fan].reshape(-1, 4), edge.reshape(-1, 4)
+    return point_of[rank], np.argsort(rank)[fan].reshape(-1, 4), edge.reshape(-1, 4)
 
 
 def _barycentric(exact: ExactGrid, found: GridPoints, points: IntArray) -> FloatArray:
@@ -176,7 +170,7 @@ def with_borders(quads: QuadMesh) -> QuadMesh:
     graph, border = vertex_graph(mesh), np.flatnonzero(mesh.is_boundary_vertex)
     away, _, source = dijkstra(graph, indices=border, return_predecessors=True, min_only=True)
     tails, heads = quads.quads.ravel(), np.roll(quads.quads, -1, axis=1).ravel()
-    alone = ~np.isin(tails * count + heads, heads * count + tails)
+    alone = opposite_sides(quads.quads) < 0
     layers, faces, weights, taken, missing = [quads.quads], [quads.faces], [quads.barycentric], [-1], 0
     for walk in _walks(tails[alone], heads[alone]):
         points, corners = quads.vertices[walk], mesh.faces[quads.faces[walk]]

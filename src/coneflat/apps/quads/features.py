@@ -68,15 +68,19 @@ def split_chords(mesh: TriangleMesh, ends: IntArray | None = None) -> tuple[Tria
     Straight sides of a boundary would degenerate the triangles at such edges. The same holds for features, given by
     their two vertices (k, 2).
     """
-    mesh, none = TriangleMesh(*_without_pillows(mesh.vertices, mesh.faces)), np.empty(0, dtype=np.int64)
-    chords = _chords(mesh, none if ends is None else edge_indices(mesh, ends))
-    return _split(mesh, chords), int(chords.sum())
+    mesh = _without_pillows(mesh)
+    is_fixed = mesh.is_boundary_edge.copy()
+    if ends is not None:
+        is_fixed[edge_indices(mesh, ends)] = True
+    on = mask_of(len(mesh.vertices), mesh.edges[is_fixed])
+    chords = on[mesh.edges].all(axis=1) & ~is_fixed
+    return split_edges(mesh, chords), int(chords.sum())
 
 
 def split_all(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     """Return a mesh with all edges split at their midpoints, and their number."""
-    mesh = TriangleMesh(*_without_pillows(mesh.vertices, mesh.faces))
-    return _split(mesh, np.ones(len(mesh.edges), dtype=bool)), len(mesh.edges)
+    mesh = _without_pillows(mesh)
+    return split_edges(mesh, np.ones(len(mesh.edges), dtype=bool)), len(mesh.edges)
 
 
 def split_small_components(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
@@ -84,15 +88,14 @@ def split_small_components(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
 
     On a sphere, a grid has at least eight cones.
     """
-    mesh = TriangleMesh(*_without_pillows(mesh.vertices, mesh.faces))
-    small = 0
+    mesh, small = _without_pillows(mesh), 0
     while True:
         count, label = label_faces(mesh.faces, len(mesh.vertices))
         is_small = np.bincount(label, minlength=count) < 60
         small = small or int(is_small.sum())
         if not is_small.any():
             return mesh, small
-        mesh = _split(mesh, is_small[label[mesh.edge_faces[:, 0]]])
+        mesh = split_edges(mesh, is_small[label[mesh.edge_faces[:, 0]]])
 
 
 def edge_indices(mesh: TriangleMesh, pairs: IntArray) -> IntArray:
@@ -104,65 +107,49 @@ def edge_indices(mesh: TriangleMesh, pairs: IntArray) -> IntArray:
     return order[np.searchsorted(keys[order], low * n + high)]
 
 
-def _without_pillows(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+def _without_pillows(mesh: TriangleMesh) -> TriangleMesh:
     """Return a mesh in which faces with the same three vertices are split at their centroids.
 
     Splitting an edge of two such faces would join the new vertex and the third one by two edges.
     """
+    vertices, faces = mesh.vertices, mesh.faces
     _, which, count = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True, return_counts=True)
     paired = count[which.ravel()] > 1
     corners = faces[paired]
     middle = len(vertices) + np.arange(len(corners))
     fans = [np.column_stack([corners[:, [i, (i + 1) % 3]], middle]) for i in range(3)]
     points = np.concatenate([vertices, vertices[corners].mean(axis=1)])
-    return points, np.concatenate([faces[~paired], *fans])
+    return TriangleMesh(points, np.concatenate([faces[~paired], *fans]))
 
 
-def _chords(mesh: TriangleMesh, edges: IntArray) -> BoolArray:
-    """Return (e,) whether each edge joins two vertices on features or the boundary without being such an edge."""
-    is_fixed = mesh.is_boundary_edge.copy()
-    is_fixed[edges] = True
-    on = mask_of(len(mesh.vertices), mesh.edges[is_fixed])
-    return on[mesh.edges].all(axis=1) & ~is_fixed
+def split_edges(mesh: TriangleMesh, marked: BoolArray) -> TriangleMesh:
+    """Return a mesh with marked edges (e,) split at their midpoints.
 
-
-def _longest_sides(mesh: TriangleMesh, among: BoolArray) -> IntArray:
-    """Return (m,) the longest edge of each triangle among the given edges (e,), if it has any.
-
-    The choice among equal edges does not depend on the numbering.
+    The choice among edges of equal length does not depend on the numbering.
     """
     lengths = lengths_along(mesh, np.arange(len(mesh.edges)))
     key = tie_key(mesh.vertices)[mesh.edges].sum(axis=1)
     rounded = np.round(lengths / lengths.max(initial=1e-300), 9)
-    rank = np.empty(len(lengths), dtype=np.int64)
-    rank[np.lexsort((key, rounded))] = np.arange(len(lengths))
-    rank[~among] = -1
-    sides = mesh.halfedge_edges.reshape(-1, 3)
-    return sides[np.arange(len(sides)), np.argmax(rank[sides], axis=1)]
+    rank = np.argsort(np.lexsort((key, rounded)))
+    return split_longest(mesh, marked, rank[mesh.halfedge_edges.reshape(-1, 3)])[0]
 
 
-def _split(mesh: TriangleMesh, marked: BoolArray) -> TriangleMesh:
-    """Return a mesh with marked edges (e,) split at their midpoints."""
-    n = len(mesh.vertices)
+def split_longest(
+    mesh: TriangleMesh, marked: BoolArray, lengths: FloatArray | IntArray
+) -> tuple[TriangleMesh, IntArray, IntArray]:
+    """Return a mesh with marked edges (e,) split at their midpoints, the longest one of each triangle first.
+
+    And (t,) the triangle of each piece into which triangles are divided, and (t, 3) its corners: 0 to 2 are those of
+    the triangle, and 3 + i is the midpoint of the side opposite corner i.
+
+    lengths: (m, 3) at least 0, the lengths of sides or their ranks.
+    """
     middle = np.full(len(marked), -1)
-    middle[marked] = n + np.arange(int(marked.sum()))
+    middle[marked] = len(mesh.vertices) + np.arange(int(marked.sum()))
     points = np.concatenate([mesh.vertices, mesh.vertices[mesh.edges[marked]].mean(axis=1)])
     sides = mesh.halfedge_edges.reshape(-1, 3)
-    first = np.argmax(sides == _longest_sides(mesh, marked)[:, None], axis=1)
-    origin_face, corners = split_pieces(marked[sides], first)
-    six = np.concatenate([mesh.faces, middle[sides]], axis=1)[origin_face]
-    return TriangleMesh(points, np.take_along_axis(six, corners, axis=1))
-
-
-def split_pieces(is_split: BoolArray, first: IntArray) -> tuple[IntArray, IntArray]:
-    """Return (t,) the triangle of each piece into which triangles are divided, and (t, 3) its corners.
-
-    Corners 0 to 2 are those of the triangle, and 3 + i is the midpoint of the side opposite corner i.
-
-    Args:
-        is_split: (m, 3) whether each side is split.
-        first: (m,) the side that is split first, if any is.
-    """
+    is_split = marked[sides]
+    first = np.argmax(np.where(is_split, lengths, -1), axis=1)
     turn = (first[:, None] + np.arange(3)) % 3
     six = np.concatenate([turn, 3 + turn], axis=1)
     one, two, three = np.take_along_axis(is_split, turn, axis=1).T
@@ -171,4 +158,6 @@ def split_pieces(is_split: BoolArray, first: IntArray) -> tuple[IntArray, IntArr
         (one & ~two, (0, 3, 2)), (one & two, (0, 3, 4)), (one & two, (4, 3, 2)),
     )  # fmt: skip
     origin = np.concatenate([np.flatnonzero(chosen) for chosen, _ in pieces])
-    return origin, np.concatenate([six[chosen][:, corners] for chosen, corners in pieces])
+    piece = np.concatenate([six[chosen][:, corners] for chosen, corners in pieces])
+    corners = np.concatenate([mesh.faces, middle[sides]], axis=1)[origin]
+    return TriangleMesh(points, np.take_along_axis(corners, piece, axis=1)), origin, piece

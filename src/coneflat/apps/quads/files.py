@@ -55,18 +55,13 @@ _NAMES = ("vertices", "quads", "faces", "barycentric", "surface_vertices", "surf
 GRID_FORMATS = (".obj", ".npz")
 #: The same check for `write_grid`.
 check_grid_output: Check = partial(checked_target, endings=GRID_FORMATS, what="integer grids are written as")
-#: Names of the arrays of an integer grid, and of its numbers.
-_ARRAYS, _NUMBERS = (
-    [field.name for field in fields(IntegerGrid) if str(field.type).endswith(kind)]
-    for kind in ("Array", "float")
-)
+#: Names of the arrays of an integer grid.
+_ARRAYS = [field.name for field in fields(IntegerGrid) if str(field.type).endswith("Array")]
 #: Arrays from which a grid is restored.
 _RESTORED = ("vertices", "faces", "corner_grid", "corners", "corner_quarters", "features", "report")
 _STATE = re.compile(rb"(?m)^[ \t]*(mtllib|usemtl|g|o)(?![^ \t\r\n])[ \t]*([^\r\n]*?)[ \t]*\r?$")
 _HEAD = (
     "# An integer grid by coneflat. Texture coordinates are in units of the grid, which continues across seams.",
-    "# seam V W TURNS X Y: the point p in the triangle right of the edge from V to W is R p + (X, Y) in the triangle",
-    "# left of it, where R is a rotation by TURNS quarter turns counterclockwise. Other edges are not seams.",
     "# Lines (l) are sharp edges on grid lines.",
 )
 
@@ -276,9 +271,8 @@ def write_grid(path: str | PathLike[str], grid: IntegerGrid) -> Path:
     """Write an integer grid atomically and return the path.
 
     An .obj has the grid coordinates of every triangle corner as texture coordinates, with all digits, as programs that
-    extract quads expect them, for example libQEx. Comments contain the quarter turns and translations of seam edges. An
-    .npz has all arrays of the `IntegerGrid`, its report, and the content of these comments: `seams` (k, 2), pairs of
-    vertices, with `seam_turns` (k,) and `seam_shifts` (k, 2). Errors are those of `IntegerGrid.save`.
+    extract quads expect them, for example libQEx. An .npz has all arrays of the `IntegerGrid` and its report. Errors
+    are those of `IntegerGrid.save`.
     """
     path = check_grid_output(path)
     with atomic_write(path) as stream:
@@ -291,9 +285,6 @@ def _write_grid_obj(grid: IntegerGrid, stream: IO[bytes]) -> None:
     keys = np.concatenate([grid.faces.reshape(-1, 1), grid.corner_grid.reshape(-1, 2)], axis=1)
     points, number_of = np.unique(keys, axis=0, return_inverse=True)
     stream.write(("\n".join(_HEAD) + "\n").encode("ascii"))
-    edges, turns, shifts = _seams(grid)
-    rows = np.concatenate([edges + 1, turns[:, None], shifts], axis=1)
-    stream.writelines(lines_of("# seam", rows, b"\n"))
     stream.writelines(lines_of("v", grid.vertices, b"\n"))
     stream.writelines(lines_of("vt", points[:, 1:], b"\n"))
     corners = np.stack([grid.faces.ravel(), number_of.ravel()], axis=1).reshape(-1, 6) + 1
@@ -301,23 +292,9 @@ def _write_grid_obj(grid: IntegerGrid, stream: IO[bytes]) -> None:
     stream.writelines(lines_of("l", grid.features + 1, b"\n"))
 
 
-def _seams(grid: IntegerGrid) -> tuple[IntArray, IntArray, IntArray]:
-    """Return (k, 2) seam edges, (k,) turns and (k, 2) shifts of the motion from their right to their left triangle.
-
-    An edge is a seam if the motion across it is not the identity.
-    """
-    mesh = TriangleMesh(grid.vertices, grid.faces)
-    here = mesh.edge_halfedges[~mesh.is_boundary_edge, 0]
-    here = here[(grid.turns[here] != 0) | grid.shifts[here].any(axis=1)]
-    edges = np.stack([mesh.tails[here], mesh.heads[here]], axis=1)
-    return edges, grid.turns[here], grid.shifts[here]
-
-
 def _write_grid_npz(grid: IntegerGrid, stream: IO[bytes]) -> None:
-    edges, turns, shifts = _seams(grid)
     arrays: dict[str, Any] = {name: getattr(grid, name) for name in _ARRAYS}
-    arrays |= {"seams": edges, "seam_turns": turns, "seam_shifts": shifts}
-    report = {**grid.report(), "notes": list(grid.notes)}
+    report = {"size": grid.size, "notes": list(grid.notes)}
     np.savez(stream, **arrays, report=np.array(json.dumps(report)))
 
 
@@ -364,14 +341,13 @@ def _grid_of_archive(reading: CheckedArrays) -> IntegerGrid:
     vertices = reading.finite("vertices", (None, 3))
     n = len(vertices)
     faces = reading.indices("faces", (None, 3), n)
-    numbers: dict[str, Any] = {name: float(number(report[name])) for name in _NUMBERS}
     corners = reading.indices("corners", (None,), n)
     _require_mesh(reading.path, vertices, faces)
     grid = grid_of_corners(
         vertices,
         faces,
         reading.finite("corner_grid", (len(faces), 3, 2)),
-        **numbers,
+        size=float(number(report["size"])),
         notes=reading.notes(report),
         corners=corners,
         corner_quarters=reading.indices("corner_quarters", (len(corners),), None),

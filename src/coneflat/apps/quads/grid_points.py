@@ -15,8 +15,8 @@ from typing import TypeAlias
 import numpy as np
 
 from ...base import BoolArray, FloatArray, IntArray, compiled, dots, mask_of
-from ...geometry import fill_orientations, orientation
-from .exact_grid import ExactGrid, turn
+from ...geometry import orientation
+from .exact_grid import ExactGrid, orientations, turn
 from .transitions import rotated
 
 #: Values for a port without a mate: its line ends at the boundary, or the map is invalid.
@@ -84,10 +84,8 @@ def find_points(exact: ExactGrid) -> GridPoints:
     faces, places = _candidates(exact.corners)
     corners = exact.corners[faces]
     each = np.broadcast_to(places[:, None], corners.shape)
-    rows = np.concatenate([corners[:, [1, 2, 0]], corners[:, [2, 0, 1]], each], axis=2)
-    found = np.empty(3 * len(rows), dtype=np.int64)
-    fill_orientations(rows.reshape(-1, 6), np.empty(12), found)
-    signs = found.reshape(-1, 3)
+    rows = np.stack([corners[:, [1, 2, 0]], corners[:, [2, 0, 1]], each], axis=2)
+    signs = orientations(rows.reshape(-1, 3, 2)).reshape(-1, 3)
     within = (signs >= 0).all(axis=1)
     faces, places, on = faces[within], places[within], signs[within] == 0
     # The common corner of two sides is opposite the third side.
@@ -96,9 +94,7 @@ def find_points(exact: ExactGrid) -> GridPoints:
     _, entry, points = np.unique(label, return_index=True, return_inverse=True)
     # Points are numbered in the order of triangles.
     rank = np.argsort(entry)
-    number = np.empty(len(rank), dtype=np.int64)
-    number[rank] = np.arange(len(rank))
-    entry = entry[rank]
+    number, entry = np.argsort(rank), entry[rank]
     start = np.concatenate([[0], np.cumsum(np.bincount(faces, minlength=len(exact.corners)))])
     return GridPoints(start, places, number[points.ravel()], entry, faces[entry], sides[entry])
 
@@ -262,9 +258,8 @@ def _ports_back(
     for i in range(3):
         a, b = exact.corners[face[lost], (i + 1) % 3], exact.corners[face[lost], (i + 2) % 3]
         side, half = b - a, 3 * face[lost] + i
-        signs = np.empty(len(lost), dtype=np.int64)
-        fill_orientations(np.concatenate([a, b, places], axis=1), np.empty(12), signs)
-        is_along = (side[:, 0] * along[:, 1] == side[:, 1] * along[:, 0]) & (dots(side, along) < 0)
+        signs = orientations(np.stack([a, b, places], axis=1))
+        is_along = (_cross(side, along) == 0) & (dots(side, along) < 0)
         is_along &= (signs == 0) & (exact.twin[half] >= 0) & (crossed < 0)
         crossed[is_along] = half[is_along]
     lost, crossed = lost[crossed >= 0], crossed[crossed >= 0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeAlias
 
@@ -150,6 +150,7 @@ class GridSearch:
         boundary: the option of that name of `integer_grid`.
         options: the other options, those of the flattening.
         stages: the stopwatch.
+        missing: components for which no grid was found, in model units.
     """
 
     mesh: Source | Flattening
@@ -161,6 +162,7 @@ class GridSearch:
     boundary: Any
     options: Mapping[str, Any]
     stages: Stopwatch
+    missing: list[TriangleMesh] = field(default_factory=list)
 
     @classmethod
     def of(
@@ -249,20 +251,22 @@ class GridSearch:
         areas = double_areas(edge_lengths(mesh.vertices, mesh.faces))
         of_face = scales[mesh.faces].mean(axis=1)
         size = self.size or grow * float(np.sqrt(areas.sum() / 2 / self.quads))
+        self.missing.clear()
         # Nothing of a component without area can be seen.
         for part, vertices, faces in (each for each in mesh.split_components() if areas[each[2]].any()):
             # The mean of the log scale on the component, relative to that on the whole mesh.
             mean = np.average(of_face[faces], weights=areas[faces]) - np.average(of_face, weights=areas)
             search = replace(
                 self,
-                mesh=Source(as_input(grow * part.vertices, part.faces)),
+                mesh=Source(as_input(whole := part.moved_to(grow * part.vertices))),
                 size=size * float(np.exp(-mean)),
                 sizes=None if self.sizes is None else np.exp(-scales[vertices]),
             )
             try:
                 found.append(search.with_more_cones())
             except (ConvergenceError, CurvatureError, GridError, MetricError, SeamError) as error:
-                why.append(f"Left out a component of {plural(len(part.faces), 'triangle')}: {error}.")
+                self.missing.append(whole)
+                why.append(f"No grid for a component of {plural(len(part.faces), 'triangle')}: {error}.")
         if not found:
             raise GridError(f"no grid was found for any of {mesh.components[0]} components: {why[0]}")
         return joined_grids(found, (*checked.notes, *why))

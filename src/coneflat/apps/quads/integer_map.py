@@ -36,7 +36,6 @@ class IntegerGrid:
         cones: (s,) vertices on grid points whose number of quads is not four.
         quarters: (s,) the number of quads at each cone: its angle in quarter turns.
         size: edge length of a square of the grid in model units: square root of the surface area over the grid's area.
-        qc_mean: mean quasi-conformal distortion, weighted by area.
         notes: one sentence each.
         corners: (k,) further vertices on grid points, where straight sides of the boundary, or sharp edges, meet at an
             angle; these sides and edges lie on grid lines.
@@ -61,7 +60,6 @@ class IntegerGrid:
     cones: IntArray
     quarters: IntArray
     size: float
-    qc_mean: float = np.nan
     notes: tuple[str, ...] = ()
     corners: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     corner_quarters: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
@@ -72,11 +70,6 @@ class IntegerGrid:
     def squares(self) -> float:
         """The area of the grid in squares."""
         return float(signed_double_areas(self.corner_grid).sum()) / 2
-
-    def report(self) -> dict[str, float | None]:
-        """Return the numeric attributes by name, ready for JSON; unknown values are None."""
-        numbers = {name: value for name, value in vars(self).items() if isinstance(value, float)}
-        return {name: float(value) if np.isfinite(value) else None for name, value in numbers.items()}
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the grid as .obj or .npz, atomically, and return the path; see `write_grid`.
@@ -138,6 +131,8 @@ def grid_of_corners(
     vertices: FloatArray,
     faces: IntArray,
     corner_grid: FloatArray,
+    cones: IntArray | None = None,
+    corners: IntArray | None = None,
     **known: float | tuple[str, ...] | IntArray,
 ) -> IntegerGrid:
     """Return the integer grid of given corner coordinates, with the motions and cones that follow from them.
@@ -145,8 +140,9 @@ def grid_of_corners(
     Args:
         vertices, faces: (n, 3), (m, 3) a consistently oriented manifold mesh.
         corner_grid: (m, 3, 2) grid coordinates of every triangle corner.
-        known: measures of the grid, notes, features and corners; missing measures are NaN, except the size and the
-            corners of the boundary, which are computed.
+        cones, corners: None: all inner vertices with another angle than four quarter turns; and all corners of the
+            boundary.
+        known: the size of squares, which else is computed, notes, features, and the angles of corners.
 
     Raises:
         GridError: triangles are flipped, or the sides of seams are not related by quarter turns and integer
@@ -168,28 +164,21 @@ def grid_of_corners(
         )
     quarters = quarters_around(mesh, sides_between(corner_grid))
     is_used = np.bincount(faces.ravel(), minlength=len(vertices)) > 0
-    cones = np.flatnonzero((quarters != 4) & ~mesh.is_boundary_vertex & is_used)
-    corners = np.flatnonzero((quarters != 2) & _between_sides(mesh, corner_grid))
+    if cones is None:
+        cones = np.flatnonzero((quarters != 4) & ~mesh.is_boundary_vertex & is_used)
+    if corners is None:
+        # Both boundary edges at a corner are on grid lines.
+        sides = mesh.edges[mesh.is_boundary_edge & on_lines(mesh, corner_grid)]
+        is_between = np.bincount(sides.ravel(), minlength=len(vertices)) == 2
+        corners = np.flatnonzero((quarters != 2) & is_between)
     area = float(double_areas(edge_lengths(vertices, faces)).sum())
-    return IntegerGrid(
-        vertices=vertices,
-        faces=faces,
-        corner_grid=corner_grid,
-        turns=turns,
-        shifts=shifts,
-        cones=cones,
-        quarters=quarters[cones],
-        **{  # type: ignore[arg-type]
-            "size": float(np.sqrt(area / flat.sum())),
-            "corners": corners,
-            "corner_quarters": quarters[corners],
-            **known,
-        },
-    )
+    known = {"size": float(np.sqrt(area / flat.sum())), "corner_quarters": quarters[corners], **known}
+    arrays = (vertices, faces, corner_grid, turns, shifts, cones, quarters[cones])
+    return IntegerGrid(*arrays, corners=corners, **known)  # type: ignore[arg-type]
 
 
 def joined_grids(grids: Sequence[IntegerGrid], notes: Sequence[str]) -> IntegerGrid:
-    """Return one grid of several surfaces, with means of their measures, and the notes of all after given ones."""
+    """Return one grid of several surfaces, with the mean size of squares, and the notes of all after given ones."""
     first = np.cumsum([0, *(len(grid.vertices) for grid in grids)])
     squares = [grid.squares for grid in grids]
     values: dict[str, Any] = {}
@@ -199,16 +188,9 @@ def joined_grids(grids: Sequence[IntegerGrid], notes: Sequence[str]) -> IntegerG
             values[each.name] = np.concatenate([one + start for one, start in zip(own, first, strict=False)])
         elif str(each.type).endswith("Array"):
             values[each.name] = np.concatenate(own)
-        elif each.type == "float":
-            values[each.name] = float(np.average(own, weights=squares))
+    values["size"] = float(np.average([grid.size for grid in grids], weights=squares))
     values["notes"] = tuple(dict.fromkeys([*notes, *(note for grid in grids for note in grid.notes)]))
     return IntegerGrid(**values)
-
-
-def _between_sides(mesh: TriangleMesh, corner_grid: FloatArray) -> BoolArray:
-    """Return (n,) whether each vertex is on the boundary and both boundary edges there are on grid lines."""
-    sides = mesh.edges[mesh.is_boundary_edge & on_lines(mesh, corner_grid)]
-    return np.bincount(sides.ravel(), minlength=len(mesh.vertices)) == 2
 
 
 def on_lines(mesh: TriangleMesh, corner_grid: FloatArray) -> BoolArray:

@@ -179,27 +179,23 @@ def enumerate_points(
     step = np.zeros(size, dtype=np.int64)
     centre = np.zeros(size)
     beyond = np.zeros(size + 1)  # squared distance in the coordinates from this one on
-    number, bound, depth, visited, worst = 0, np.inf, size - 1, 0, 0
-    centre[depth] = target[depth]
-    here[depth] = int(np.rint(centre[depth]))
-    step[depth] = 1 if centre[depth] >= here[depth] else -1
-    while depth < size:
-        visited += 1
-        if visited > visits:
-            break
+    number, bound, depth, worst, is_new = 0, np.inf, size - 1, 0, True
+    for _ in range(visits):
+        if is_new:
+            pull = 0.0
+            for j in range(depth + 1, size):
+                pull += root[depth, j] * (here[j] - target[j])
+            centre[depth] = target[depth] - pull / root[depth, depth]
+            here[depth] = int(np.rint(centre[depth]))
+            step[depth] = 1 if centre[depth] >= here[depth] else -1
         off = (here[depth] - centre[depth]) * root[depth, depth]
         total = beyond[depth + 1] + off * off
-        if total < bound:
+        is_new = total < bound and depth > 0
+        if is_new:
             beyond[depth] = total
-            if depth > 0:
-                depth -= 1
-                pull = 0.0
-                for j in range(depth + 1, size):
-                    pull += root[depth, j] * (here[j] - target[j])
-                centre[depth] = target[depth] - pull / root[depth, depth]
-                here[depth] = int(np.rint(centre[depth]))
-                step[depth] = 1 if centre[depth] >= here[depth] else -1
-                continue
+            depth -= 1
+            continue
+        if total < bound:
             place = number if number < most else worst
             found[place] = here
             squares[place] = total

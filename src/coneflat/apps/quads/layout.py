@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -22,9 +23,10 @@ from ...geometry import (
     signed_double_areas,
 )  # fmt: skip
 from ...layout import SeamChains, find_chains, rest_sides
+from ...linalg import MultiGraph
 from ...mesh import NEXT, PREVIOUS, label_components, label_faces, point_vertices
-from .cross_field import SHARP_ANGLE, halfedge_angles, preferred_directions
-from .features import split_pieces
+from .cross_field import SHARP_ANGLE, complex_sums, halfedge_angles, preferred_directions
+from .features import split_longest
 
 # Tolerance, in radians or squares, for sides to be straight or parallel up to quarter turns, and for points to
 # coincide: far above rounding, far below relevant differences.
@@ -104,13 +106,12 @@ class GridLayout:
         """The area of the layout in squares."""
         return float(self.double_areas().sum()) / 2
 
-    def graph(self) -> csr_matrix:
-        """Return (n, n) the lengths of edges between vertices in the plane."""
-        starts, ends = self.ends
-        lengths = np.abs(self.points[ends] - self.points[starts])
-        halfedges = csr_matrix(
-            (lengths, (self.mesh.tails, self.mesh.heads)), shape=(len(self.mesh.vertices),) * 2
-        )
+    def graph(self, is_used: BoolArray | slice = slice(None)) -> csr_matrix:
+        """Return (n, n) the lengths of edges between vertices in the plane, of some half-edges (3m,) or all."""
+        mesh, (starts, ends) = self.mesh, self.ends
+        lengths = np.abs(self.points[ends] - self.points[starts])[is_used]
+        at = mesh.tails[is_used], mesh.heads[is_used]
+        halfedges = csr_matrix((lengths, at), shape=(len(mesh.vertices),) * 2)
         return halfedges.maximum(halfedges.T)
 
     def double_areas(self) -> FloatArray:
@@ -179,21 +180,19 @@ def joined_charts(layout: GridLayout) -> tuple[GridLayout, IntArray]:
     chart, component = charts_of(layout, chains)
     _, firsts = np.unique(chains.chain, return_index=True)
     done = mask_of(int(chart.max(initial=-1)) + 1, chart[np.unique(component, return_index=True)[1]])
-    left_over = joining_chains(chains, chart).tolist()
+    left_over = deque(firsts[joining_chains(chains, chart)].tolist())
     while left_over:
-        later = []
-        for chain in left_over:
-            k = firsts[chain]
-            sides = chains.left[k], chains.right[k]
-            if done[chart[sides[0][0]]] == done[chart[sides[1][0]]]:
-                later.append(chain)
-                continue
-            still, moving = sides if done[chart[sides[0][0]]] else sides[::-1]
-            factor = np.diff(points[still])[0] / np.diff(points[moving])[0]
-            with_it = chart == chart[moving[0]]
-            points[with_it] = factor / abs(factor) * (points[with_it] - points[moving[0]]) + points[still[0]]
-            done[chart[moving[0]]] = True
-        left_over = later
+        k = left_over.popleft()
+        still, moving = chains.left[k], chains.right[k]
+        if done[chart[moving[0]]]:
+            still, moving = moving, still
+        if not done[chart[still[0]]]:
+            left_over.append(k)  # until the chart on one of its sides is in place
+            continue
+        factor = np.diff(points[still])[0] / np.diff(points[moving])[0]
+        with_it = chart == chart[moving[0]]
+        points[with_it] = factor / abs(factor) * (points[with_it] - points[moving[0]]) + points[still[0]]
+        done[chart[moving[0]]] = True
     return replace(layout, points=points), component
 
 
@@ -234,8 +233,8 @@ def _directions(
     weights: FloatArray, vectors: ComplexArray, component: IntArray, label: IntArray
 ) -> FloatArray:
     """Return (c,) the mean direction of weighted vectors up to quarter turns; `label` is the component of each."""
-    fourth, count = weights * (vectors / np.abs(vectors)) ** 4, int(component.max(initial=-1)) + 1
-    return np.angle(np.bincount(label, fourth.real, count) + 1j * np.bincount(label, fourth.imag, count)) / 4
+    fourth = weights * (vectors / np.abs(vectors)) ** 4
+    return np.angle(complex_sums(label, fourth, int(component.max(initial=-1)) + 1)) / 4
 
 
 def find_sides(layout: GridLayout, is_straight: BoolArray) -> Sides:
@@ -280,15 +279,10 @@ def charts_of(layout: GridLayout, chains: SeamChains) -> tuple[IntArray, IntArra
 
 def joining_chains(chains: SeamChains, chart: IntArray) -> IntArray:
     """Return the chains of a spanning forest of the charts, connected by seams; `chart` (u,) is that of each point."""
-    joined = np.arange(int(chart.max(initial=-1)) + 1)
-    kept = []
     _, firsts = np.unique(chains.chain, return_index=True)
-    for chain, k in enumerate(firsts.tolist()):
-        one, two = int(joined[chart[chains.left[k, 0]]]), int(joined[chart[chains.right[k, 0]]])
-        if one != two:
-            joined[joined == two] = one
-            kept.append(chain)
-    return np.array(kept, dtype=np.int64)
+    ends = chart[np.stack([chains.left[firsts, 0], chains.right[firsts, 0]], axis=1)]
+    # Of edges of equal cost, a minimum spanning forest has the first ones.
+    return MultiGraph(int(chart.max(initial=-1)) + 1, ends, np.zeros(len(ends))).minimum_spanning_tree()
 
 
 def first_points(vertex: IntArray) -> IntArray:
@@ -309,38 +303,32 @@ def between_nodes(layout: GridLayout) -> BoolArray:
 
 def split_edges(layout: GridLayout, is_split: BoolArray) -> GridLayout:
     """Return a layout of the same surface with the edges `is_split` (e,) split at their midpoints."""
-    mesh, corners, points = layout.mesh, layout.corners, layout.points
-    edge_of = mesh.halfedge_edges.reshape(-1, 3)
-    number = np.full(len(mesh.edges), -1)
-    number[is_split] = len(mesh.vertices) + np.arange(int(is_split.sum()))
-    middle = mesh.vertices[mesh.edges[is_split]].mean(axis=1)
-    own, pairs = _middle_points(corners, is_split[edge_of], len(points))
-    longest = np.argmax(np.where(is_split[edge_of], layout.lengths, -1), axis=1)
-    origin, piece = split_pieces(is_split[edge_of], longest)
-    faces, new_corners = (
-        np.take_along_axis(np.concatenate(both, axis=1)[origin], piece, axis=1)
-        for both in ((mesh.faces, number[edge_of]), (corners, own))
+    points = layout.points
+    mesh, origin, piece = split_longest(layout.mesh, is_split, layout.lengths)
+    own, pairs = _middle_points(layout, is_split)
+    six = np.concatenate([layout.corners, own], axis=1)
+    corners, places = (
+        np.take_along_axis(each[origin], piece, axis=1) for each in (six, _six_places(layout.lengths))
     )
-    places = np.take_along_axis(_six_places(layout.lengths)[origin], piece, axis=1)
-    split_mesh = TriangleMesh(np.concatenate([mesh.vertices, middle]), faces)
     lengths: FloatArray = np.abs(places[:, PREVIOUS] - places[:, NEXT])
-    new_points = np.concatenate([points, points[pairs].mean(axis=1)])
+    points = np.concatenate([points, points[pairs].mean(axis=1)])
     # The order of edges along the seams changes, so charts may be joined at other chains.
     split, component = joined_charts(
-        replace(layout, mesh=split_mesh, lengths=lengths, corners=new_corners, points=new_points)
+        replace(layout, mesh=mesh, lengths=lengths, corners=corners, points=points)
     )
     # Components whose boundary has straight sides still have them.
     sides = find_sides(split, np.isin(component, component[layout.sides.points]))
     return at_origin(replace(split, sides=sides), component)
 
 
-def _middle_points(corners: IntArray, is_split: BoolArray, count: int) -> tuple[IntArray, IntArray]:
-    """Return (m, 3) the midpoints of split sides, numbered from `count`, and (k, 2) the end points of the sides."""
-    ends = np.sort(np.stack([corners[:, NEXT], corners[:, PREVIOUS]], axis=-1), axis=-1)
-    pairs, index = np.unique(ends[is_split], axis=0, return_inverse=True)
-    own = np.full(corners.shape, -1)
-    own[is_split] = count + index.ravel()
-    return own, pairs
+def _middle_points(layout: GridLayout, is_split: BoolArray) -> tuple[IntArray, IntArray]:
+    """Return (m, 3) the midpoints of split sides, numbered after the points, and (k, 2) the end points of the sides."""
+    sides = np.flatnonzero(is_split[layout.mesh.halfedge_edges])
+    ends = np.sort(np.stack(layout.ends, axis=1)[sides], axis=1)
+    pairs, index = np.unique(ends, axis=0, return_inverse=True)
+    own = np.full(layout.corners.size, -1)
+    own[sides] = len(layout.points) + index.ravel()
+    return own.reshape(-1, 3), pairs
 
 
 def _six_places(lengths: FloatArray) -> ComplexArray:

@@ -17,7 +17,7 @@ from ...base import BoolArray, ComplexArray, FloatArray, IntArray, mask_of, plur
 from ...errors import GridError
 from ...geometry import map_factors, signed_angles
 from ...layout import StretchEnergy
-from ...mesh import NEXT, PREVIOUS, open_along
+from ...mesh import NEXT, PREVIOUS, open_along, point_seams, point_vertices
 from .cross_field import sharp_ends
 from .features import edge_indices, lengths_along, sharp_edges, without_stubs
 from .integer_map import IntegerGrid
@@ -138,7 +138,7 @@ def _with_lines(layout: GridLayout, edges: IntArray, off: FloatArray) -> _Lined:
         edges: (k,) inner edges of its mesh.
         off: (e,) the angle of each edge from its axis.
     """
-    mesh, (starts, ends) = layout.mesh, layout.ends
+    mesh = layout.mesh
     places = layout.points[layout.corners]
     angles = signed_angles(places[:, PREVIOUS] - places[:, NEXT]).ravel()
     while True:
@@ -160,21 +160,13 @@ def _with_lines(layout: GridLayout, edges: IntArray, off: FloatArray) -> _Lined:
             break
         # The farther of each two, unless a third one is still farther from the same direction.
         edges = _long_chains(layout, np.setdiff1d(edges, np.setdiff1d(same, edge[is_least])))
-    on, turns, on_side = np.zeros((3, len(mesh.vertices)), dtype=bool)
-    on[mesh.edges[edges]] = True
+    n = len(mesh.vertices)
+    on, on_side = mask_of(n, mesh.edges[edges]), mask_of(n, layout.vertex[layout.sides.points])
+    turns = np.bincount(cut.origin, minlength=n) != np.where(mesh.is_boundary_vertex, 1, 2)
     turns[cut.origin[cut.mesh.is_boundary_vertex & (quarters != 2)]] = True
-    on_side[layout.vertex[layout.sides.points]] = True
-    copies = np.bincount(cut.origin, minlength=len(on))
-    turns |= copies != np.where(mesh.is_boundary_vertex, 1, 2)
     nodes = np.setdiff1d(np.flatnonzero(on & turns & (on_side | ~mesh.is_boundary_vertex)), layout.cones)
-    is_line = mask_of(len(mesh.edges), edges)
-    inner = ~mesh.is_boundary_edge
-    there, back = mesh.edge_halfedges[inner].T
-    is_seam = is_line.copy()
-    is_seam[inner] |= (starts[there] != ends[back]) | (ends[there] != starts[back])
-    opened = open_along(mesh, np.flatnonzero(is_seam))
-    old = np.empty(len(opened.origin), dtype=np.int64)
-    old[opened.mesh.faces.ravel()] = layout.corners.ravel()
+    opened = open_along(mesh, np.union1d(edges, point_seams(mesh, layout.corners)))
+    old = point_vertices(layout.corners, opened.mesh.faces, len(opened.origin))
     sides = Sides(np.union1d(nodes, layout.sides.corners))
     parts, component = joined_charts(
         replace(layout, corners=opened.mesh.faces, points=layout.points[old], sides=sides)

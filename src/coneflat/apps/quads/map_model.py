@@ -19,9 +19,9 @@ from ...geometry import (
     handle_loops,
     mollify,
 )
-from ...linalg import Factor, MultiGraph, factorize
+from ...linalg import MultiGraph, factorize
 from ...mesh import tie_key
-from .cross_field import edge_rotations, halfedge_angles
+from .cross_field import complex_sums, edge_rotations, halfedge_angles
 from .features import vertex_graph
 
 # Numbers of regions over which the log scale and the directions are summed.
@@ -87,14 +87,12 @@ class MapModel:
         self._number = np.searchsorted(of_face[samples], of_face)
         self.places = np.argsort(key, kind="stable")
         self.key, self.curvature = key[self.places], self._defect[self.places] / (np.pi / 2)
-        number = np.empty(count, dtype=np.int64)
-        number[self.places] = np.arange(len(self.places))
-        self.centres = number[centres]
+        self.centres = np.argsort(self.places)[centres]
         self.spacing = float(np.sqrt(areas.sum() / 2 / len(centres)))
-        self._along = self._rotations.loops()
         to_samples = self._rotations.to_frames(samples) + self._rotations.mean_change[samples]
         self.scales = self._functional(self._means)
-        self.turns, self.loops = 4 * self._functional(to_samples), 4 * self._functional(self._along)
+        self.turns = 4 * self._functional(to_samples)
+        self.loops = 4 * self._functional(self._rotations.loops)
         triangles = triangles[self.places]
         border = mesh.is_boundary_vertex[self.places]
         straight = np.where(border, 2, 4)
@@ -104,8 +102,7 @@ class MapModel:
         self.most = np.append(np.where(border, 1, np.where(triangles > 2, most, 0)), 10**9)
 
     def _functional(self, rows: csr_matrix) -> FloatArray:
-        found = self._poisson.functional(rows, self.places)
-        return np.concatenate([found, np.zeros((len(found), 1))], axis=1)
+        return np.pad(self._poisson.functional(rows, self.places), ((0, 0), (0, 1)))
 
     def linearise(self, indices: IntArray) -> None:
         """Linearise the rotations at the cones with given curvatures (p + 1,), in quarter turns."""
@@ -114,10 +111,7 @@ class MapModel:
         self._log_scale = self._poisson.solve(curvature[:, None])[:, 0]
         turned = self._rotations.of_frames(self._log_scale) + self._rotations.mean_change @ self._log_scale
         crosses = self._wanted * np.exp(4j * turned)
-        self._at, count = indices.copy(), len(self.turns)
-        self._base = np.bincount(self._number, crosses.real, count) + 1j * np.bincount(
-            self._number, crosses.imag, count
-        )
+        self._at, self._base = indices.copy(), complex_sums(self._number, crosses, len(self.turns))
         self._excess = self._log_scale - self._wanted_scale
         self._base_scale = self._means @ self._excess
         self._base_loops = np.exp(4j * self._rotations.around_loops(self._log_scale))
@@ -176,10 +170,7 @@ class _Poisson:
     """Solves L x = y on a connected mesh for y without its mean; x has mean 0 by area."""
 
     def __init__(self, laplacian: csc_matrix, share: FloatArray) -> None:
-        self.share = share
-        pinned = csc_matrix(laplacian[1:, 1:])
-        pinned.sort_indices()
-        self.factor: Factor = factorize(pinned)
+        self.share, self.factor = share, factorize(csc_matrix(laplacian[1:, 1:]).sorted_indices())
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return (n, k) the solutions for right-hand sides (n, k)."""
@@ -201,7 +192,6 @@ class _Rotations:
     """Rotations of the first half-edges of triangles in the plane, and along loops, by a tree in the dual graph."""
 
     def __init__(self, mesh: TriangleMesh, angles: FloatArray) -> None:
-        self.mesh, count = mesh, len(mesh.faces)
         self.inner = np.flatnonzero(~mesh.is_boundary_edge)
         one, two = mesh.edge_halfedges[self.inner].T
         self.by_edge = edge_rotations(mesh, halfedge_angles(angles))
@@ -213,19 +203,20 @@ class _Rotations:
         centres = mesh.vertices[mesh.faces].mean(axis=1)
         steps = np.linalg.norm(centres[one // 3] - centres[two // 3], axis=1)
         root = int(np.argmax(tie_key(centres)))
-        dual = MultiGraph(count, np.stack([one, two], axis=1) // 3, steps + 1e-9 * steps.max(initial=1.0))
+        dual = MultiGraph(
+            len(mesh.faces), np.stack([one, two], axis=1) // 3, steps + 1e-9 * steps.max(initial=1.0)
+        )
         paths = dual.shortest_paths(np.array([root]))
         self.root, self.before, self.edge = root, np.where(paths.before < 0, root, paths.before), paths.edge
         self.sign = np.where(self.edge < 0, 0.0, np.where(one[self.edge] // 3 == self.before, 1.0, -1.0))
         # Which inner edges each loop along a handle crosses, and in which direction.
         loops = [np.empty(0, np.int64), *handle_loops(mesh)]
-        crossed, of_loop = (
-            np.concatenate(loops),
-            np.repeat(np.arange(-1, len(loops) - 1), list(map(len, loops))),
-        )
+        crossed, of_loop = np.concatenate(loops), np.arange(-1, len(loops) - 1).repeat([*map(len, loops)])
         edges = np.searchsorted(self.inner, mesh.halfedge_edges[crossed])
         signs = np.where(one[edges] == crossed, 1.0, -1.0)
         self._around = csr_matrix((signs, (of_loop, edges)), shape=(len(loops) - 1, len(one)))
+        # The matrix (l, n) from the log scale to the rotations of loops.
+        self.loops = csr_matrix(self._around @ self.change)
 
     def of_frames(self, log_scale: FloatArray) -> FloatArray:
         """Return (m,) the rotations of first half-edges in the plane for a log scale (n,)."""
@@ -238,21 +229,15 @@ class _Rotations:
 
     def to_frames(self, faces: IntArray) -> csr_matrix:
         """Return (k, n) the matrix from the log scale to the rotation of the first half-edges of triangles."""
-        rows, edges, signs = [faces[:0]], [faces[:0]], [self.sign[:0]]
-        row, here = np.arange(len(faces)), faces
+        row, here, passed = np.arange(len(faces)), faces, list[tuple[IntArray, IntArray]]()
         while len(here):
             kept = here != self.root
             row, here = row[kept], here[kept]
-            rows.append(row)
-            edges.append(self.edge[here])
-            signs.append(self.sign[here])
+            passed.append((row, here))
             here = self.before[here]
-        parts = np.concatenate(signs), (np.concatenate(rows), np.concatenate(edges))
+        rows, on = (np.concatenate(each) for each in zip(*passed, strict=True))
+        parts = self.sign[on], (rows, self.edge[on])
         return csr_matrix(csr_matrix(parts, shape=(len(faces), len(self.inner))) @ self.change)
-
-    def loops(self) -> csr_matrix:
-        """Return (l, n) the matrix from the log scale to the rotations of loops."""
-        return csr_matrix(self._around @ self.change)
 
     def around_loops(self, log_scale: FloatArray) -> FloatArray:
         """Return (l,) the rotations around loops for a log scale (n,), up to half turns."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,9 +30,8 @@ class TriangleTree:
         for level in range(self._levels):
             start = self._starts(level, count)
             sizes = np.diff(start)
-            spread = np.maximum.reduceat(centres[order], start[:-1]) - np.minimum.reduceat(
-                centres[order], start[:-1]
-            )
+            ordered = centres[order]
+            spread = np.maximum.reduceat(ordered, start[:-1]) - np.minimum.reduceat(ordered, start[:-1])
             axis = np.repeat(spread.argmax(axis=1), sizes)
             order = order[np.lexsort((centres[order, axis], np.repeat(np.arange(len(sizes)), sizes)))]
         self._order, self._leaves = order, self._starts(self._levels, count)
@@ -174,13 +173,12 @@ def nearest_in_triangle(
     return best
 
 
-@dataclass(frozen=True, eq=False)
-class Stars:
-    """A triangle mesh with the triangles around each vertex.
+class Stars(NamedTuple):
+    """A mesh of triangles, or of quads, with the faces around each vertex.
 
     Attributes:
-        vertices, faces: (n, 3), (m, 3) the mesh.
-        start, star: (n + 1,), (3m,) vertex v is in the faces star[start[v]:start[v + 1]].
+        vertices, faces: (n, 3), (m, k) the mesh.
+        start, star: (n + 1,), (km,) vertex v is in the faces star[start[v]:start[v + 1]].
     """
 
     vertices: FloatArray
@@ -190,9 +188,9 @@ class Stars:
 
     @classmethod
     def of(cls, vertices: FloatArray, faces: IntArray) -> Stars:
-        """Return a mesh with the triangles around each vertex."""
+        """Return a mesh with the faces around each vertex."""
         degree = np.bincount(faces.ravel(), minlength=len(vertices))
-        star = np.argsort(faces.ravel(), kind="stable") // 3
+        star = np.argsort(faces.ravel(), kind="stable") // faces.shape[1]
         return cls(vertices, faces, np.concatenate([[0], np.cumsum(degree)]), star)
 
     def at(self, on_faces: IntArray, barycentric: FloatArray) -> FloatArray:
@@ -209,6 +207,7 @@ class Stars:
         return np.stack([along, -across / max(float(np.linalg.norm(across)), np.finfo(float).tiny)])
 
 
+@compiled
 def slide_near(surface: Stars, targets: FloatArray, on_faces: IntArray, barycentric: FloatArray) -> None:
     """Move points along a surface to local minima of the distance to their targets.
 
@@ -220,36 +219,18 @@ def slide_near(surface: Stars, targets: FloatArray, on_faces: IntArray, barycent
         targets: (q, 3).
         on_faces, barycentric: (q,), (q, 3) the points, updated in place.
     """
-    _slide(surface.vertices, surface.faces, surface.start, surface.star, targets, on_faces, barycentric)
-
-
-@compiled
-def _slide(
-    vertices: FloatArray,
-    faces: IntArray,
-    start: IntArray,
-    star: IntArray,
-    targets: FloatArray,
-    on_faces: IntArray,
-    barycentric: FloatArray,
-) -> None:
+    vertices, faces, start, star = surface
     weights = np.empty(3)
     for q in range(len(targets)):
-        best, f = np.inf, on_faces[q]
-        moved = True
+        best, f, moved = np.inf, on_faces[q], True
         while moved:
             moved = False
             for i in range(3):
                 v = faces[f, i]
                 for k in range(start[v], start[v + 1]):
                     g = star[k]
-                    square = nearest_in_triangle(
-                        targets[q],
-                        vertices[faces[g, 0]],
-                        vertices[faces[g, 1]],
-                        vertices[faces[g, 2]],
-                        weights,
-                    )
+                    a, b, c = vertices[faces[g, 0]], vertices[faces[g, 1]], vertices[faces[g, 2]]
+                    square = nearest_in_triangle(targets[q], a, b, c, weights)
                     if square < best:
                         best, on_faces[q], moved = square, g, True
                         barycentric[q] = weights

@@ -25,8 +25,8 @@ from ...options import (
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-#: Defaults: the number of quads, and the rounds of smoothing; further rounds change little.
-QUADS, ROUNDS = 10_000, 10
+#: Default number of quads.
+QUADS = 10_000
 #: Default bound of the area distortion of the map before areas are evened: those of 90% of the quads then differ by a
 #: factor of two.
 DISTORTION = 0.13
@@ -78,7 +78,8 @@ class QuadOptions(ConeNumber, ConeBounds, RunOptions):
     quads: int | None = option(None, Number(1, is_integer=True, optional=True))
     size: ArrayLike | None = option(None, Sizes(is_positive=True, optional=True))
     stretch: float = option(0.3, strength(1))
-    smooth: int = option(ROUNDS, Number(0, is_integer=True))
+    # Further rounds change little.
+    smooth: int = option(10, Number(0, is_integer=True))
     sharp_angle: float | None = option(None, ANGLE_OR_NONE)
     cones: str | Mapping[int, float] = option(
         "auto", WordOrVertices(("auto", "sparse"), "cone"), one_mesh=True

@@ -12,7 +12,7 @@ from ...base import BoolArray, IntArray, mask_of, plural
 from ...io import UVMesh
 from ...mesh import label_components
 from ..view import PageText, page_html, uv_flattening
-from .quad_mesh import QuadMesh
+from .quad_mesh import QuadMesh, opposite_sides
 from .quality import measure_quads
 from .transitions import TURNS, rotated
 
@@ -43,7 +43,7 @@ def find_domains(mesh: QuadMesh) -> Domains:
     Lines start at all irregular vertices simultaneously, and each ends where it meets another line or the boundary.
     Pieces that are not rectangles, such as a torus without irregular vertices, are divided by lines from one vertex.
     """
-    twin, starts = _twins(mesh), mesh.quads.ravel()
+    twin, starts = opposite_sides(mesh.quads), mesh.quads.ravel()
     is_cut = twin < 0
     reached = mask_of(len(mesh.vertices), starts[is_cut])
     # Four half-edges leave a regular inner vertex. Two leave a regular boundary vertex: its third edge has none there.
@@ -59,16 +59,6 @@ def find_domains(mesh: QuadMesh) -> Domains:
         first = np.flatnonzero(is_bad[np.repeat(found.domain, 4)] & ~is_cut)
         _, one_of = np.unique(np.repeat(found.domain, 4)[first], return_index=True)
         seeds = np.unique(starts[first[one_of]])
-
-
-def _twins(mesh: QuadMesh) -> IntArray:
-    """Return (4p,) the opposite half-edge of each side; -1 on the boundary."""
-    one, two = mesh.quads.ravel(), np.roll(mesh.quads, -1, axis=1).ravel()
-    count = len(mesh.vertices)
-    keys, back = one * count + two, two * count + one
-    order = np.argsort(keys)
-    at = np.minimum(np.searchsorted(keys[order], back), len(order) - 1)
-    return np.where(keys[order[at]] == back, order[at], -1)
 
 
 def _trace(seeds: IntArray, starts: IntArray, twin: IntArray, is_cut: BoolArray, reached: BoolArray) -> None:

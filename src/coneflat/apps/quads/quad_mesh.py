@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy as np
 from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray, dots, mask_of
 from ...errors import GridError
-from ...mesh import sort_pairs
+from ...mesh import label_components, sort_pairs
 
 if TYPE_CHECKING:
     from ... import MeshFile
@@ -110,6 +110,20 @@ class QuadMesh:
         places, side = arranged(find_domains(self))
         return places / side
 
+    def without(self, is_left_out: BoolArray) -> QuadMesh:
+        """Return a mesh without some quads, (p,); those that then touch only in a point get separate vertices there."""
+        quads = self.quads[~is_left_out]
+        count, fan = corner_fans(opposite_sides(quads))
+        origin = np.empty(count, dtype=np.int64)
+        origin[fan] = quads.ravel()
+        return replace(
+            self,
+            vertices=self.vertices[origin],
+            quads=fan.reshape(-1, 4),
+            faces=self.faces[origin],
+            barycentric=self.barycentric[origin],
+        )
+
     @property
     def irregular(self) -> IntArray:
         """(s,) the inner vertices whose valence is not 4."""
@@ -153,6 +167,28 @@ class QuadMesh:
 
 class CoarseGridError(GridError):
     """A grid is so coarse that its quads are not a mesh."""
+
+
+def opposite_sides(quads: IntArray) -> IntArray:
+    """Return (4p,) the opposite half-edge of each side, 4 q + i, of quads (p, 4); -1 on the boundary."""
+    one, two = quads.ravel(), np.roll(quads, -1, axis=1).ravel()
+    count = int(quads.max(initial=0)) + 1
+    keys, back = one * count + two, two * count + one
+    order = np.argsort(keys)
+    at = np.minimum(np.searchsorted(keys[order], back), len(order) - 1)
+    return np.where(keys[order[at]] == back, order[at], -1)
+
+
+def corner_fans(opposite: IntArray) -> tuple[int, IntArray]:
+    """Return the number of fans of quads around vertices, and (4p,) the fan of each corner.
+
+    opposite: (4p,) the opposite half-edge of each side of the quads; -1 on the boundary.
+    """
+    after = np.roll(np.arange(len(opposite)).reshape(-1, 4), -1, axis=1).ravel()
+    one = np.flatnonzero(opposite >= 0)
+    two = opposite[one]
+    ends = np.concatenate([one, after[one]]), np.concatenate([after[two], two])
+    return label_components(len(opposite), *ends)
 
 
 def degenerate_quads(quads: IntArray, edges: IntArray) -> BoolArray:

@@ -11,20 +11,15 @@ from numpy.typing import ArrayLike
 from ... import Flattening
 from ...base import Stopwatch, plural
 from ...errors import OptionError
-from ...io import as_input
 from ...options import read_options
-from ...source import Source
-from .coarse_input import coarse_input
+from .coarse_input import coarse_input, with_rest
 from .cross_field import sharp_ends
 from .extract import extract_quads, with_borders
 from .integer_grid import GridSearch
 from .integer_map import IntegerGrid
-from .options import DISTORTION, ROUNDS, QuadOptions
+from .options import DISTORTION, QuadOptions
 from .quad_mesh import CoarseGridError, QuadMesh, least_jacobians
 from .smooth import smooth_quads, untangled
-
-# How often more quads are tried where some meet themselves.
-FINER_TRIES = 2
 
 
 def quads(
@@ -35,7 +30,7 @@ def quads(
     size: ArrayLike | None = None,
     stretch: float = QuadOptions.stretch,
     sharp_angle: float | str | None = None,
-    smooth: int = ROUNDS,
+    smooth: int = QuadOptions.smooth,
     **options: Any,
 ) -> QuadMesh:
     """Return a quad mesh of a surface; all faces are quads, and irregular vertices are the cones of a flattening.
@@ -66,7 +61,7 @@ def quads(
         ((9, 4), (16, 3))
     """
     own = {"quads": quads, "size": size, "stretch": stretch, "sharp_angle": sharp_angle, "smooth": smooth}
-    small, search, source, most, coarse = None, None, None, 0, tuple[str, ...]()
+    small, search, source, more, coarse = None, None, None, list[float](), tuple[str, ...]()
     if isinstance(mesh, IntegerGrid):
         if any(one is not None for one in (faces, quads, size, sharp_angle)) or options.keys() - {"progress"}:
             raise OptionError("a grid already has faces, size and options: no others can be given")
@@ -76,30 +71,27 @@ def quads(
         search = GridSearch.of(mesh, faces, own, options)
         is_fixed = isinstance(mesh, Flattening) or bool(options.keys() & {"cones", "distortion"})
         is_fixed |= search.sizes is not None or sharp_angle is not None
-        stages, most = search.stages, FINER_TRIES + (not is_fixed)
+        stages, more = search.stages, [*([] if is_fixed else [1.0]), 1.6, 1.6]
         source = mesh.source if isinstance(mesh, Flattening) else search.source.given.source
         with stages("coarsen"):
-            small = coarse_input(search)
-        if small is not None:
-            search = replace(search, mesh=Source(as_input(small.mesh)), sizes=small.sizes)
+            search, small = coarse_input(search)
         grid = search.grid()
-    # Where the surface is as thin as a square, quads have a vertex twice. Then 1.6 times as many quads are tried, at
-    # most twice. If that does not help, these quads are left out.
-    for retries in range(most, -1, -1):
+    # Where the surface is as thin as a square, quads have a vertex twice. Then the fewest cones are tried, which need
+    # the least room, then more quads. If that does not help, these quads are left out.
+    while True:
         stages.done = 1.0
         try:
             with stages("extract"):
-                found = extract_quads(grid, leave_out=not (search is None or retries))
+                found = extract_quads(grid, leave_out=search is not None and not more)
             break
         except CoarseGridError:
-            if search is None or not retries:
+            if search is None or not more:
                 raise
-            coarse, finer = ("More quads than wanted: with fewer, some have a vertex or an edge twice.",), 1.6
-            if retries == FINER_TRIES + 1:
-                # The fewest cones need the least room.
+            coarse = ("More quads than wanted: with fewer, some have a vertex or an edge twice.",)
+            if more[0] == 1.0:
                 sparse = {"cones": "sparse", "distortion": 2 * DISTORTION}
-                search, finer = replace(search, options={**search.options, **sparse}), 1.0
-            search = replace(search, quads=finer * grid.squares, size=None)
+                search = replace(search, options={**search.options, **sparse})
+            search = replace(search, quads=more.pop(0) * grid.squares, size=None)
             grid = search.grid()
     found = with_borders(found) if found.left_out else found
     features = grid.features
@@ -109,6 +101,8 @@ def quads(
         found = smooth_quads(found, smooth, features)
         if smooth:
             found = untangled(found)
+        rest = () if small is None else small.rest
+        found = with_rest(found, [*rest, *([] if search is None else search.missing)])
     return replace(
         found,
         notes=(*(() if small is None else small.notes), *grid.notes, *coarse, *found.notes, *_notes(found)),

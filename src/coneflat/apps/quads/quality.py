@@ -143,8 +143,7 @@ def hausdorff_distance(quads: QuadMesh) -> float:
     triangles on both sides of the shorter diagonal.
     """
     mesh, corners = quads.surface, quads.vertices[quads.quads]
-    t = np.linspace(0.0, 1.0, 5)
-    u, v = (x.ravel() for x in np.meshgrid(t, t, indexing="ij"))
+    u, v = np.indices((5, 5)).reshape(2, -1) / 4
     patch = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
     # Corners are shared by several quads, so they are sampled once.
     inner = np.einsum("si,pix->psx", patch[patch.max(axis=1) < 1], corners).reshape(-1, 3)
@@ -160,7 +159,7 @@ def _samples(mesh: TriangleMesh, spacing: float) -> FloatArray:
     longest = edge_lengths(mesh.vertices, mesh.faces).max(axis=1)
     rows = np.minimum(np.ceil(longest / spacing), 64).astype(np.int64)
     for count in np.unique(rows[rows > 1]):
-        i, j = (x.ravel() for x in np.meshgrid(np.arange(count), np.arange(count), indexing="ij"))
+        i, j = np.indices((count, count)).reshape(2, -1)
         # Centroids of the small triangles with the orientation of the large one.
         u, v = ((x[i + j < count] + 1 / 3) / count for x in (i, j))
         corners = mesh.vertices[mesh.faces[rows == count]]

@@ -9,10 +9,10 @@ import numpy as np
 
 from ...base import ComplexArray, IntArray, mask_of, plural
 from ...errors import ConvergenceError, GridError, OptionError
-from ...geometry import as_complex, as_pairs, double_areas, map_factors, sides_between
-from ...layout import Lines, PointConstraints, Relaxed, StretchEnergy, relax, rest_sides
-from .integer_map import IntegerGrid, find_motions
-from .layout import GridLayout, between_nodes, quarters_around, split_edges
+from ...geometry import as_complex, as_pairs, double_areas
+from ...layout import Lines, PointConstraints, Relaxed, StretchEnergy, relax
+from .integer_map import IntegerGrid, grid_of_corners
+from .layout import GridLayout, between_nodes, split_edges
 from .rounding import Rounding, find_rounding
 from .transitions import Transitions
 
@@ -91,21 +91,20 @@ def _grid_near(rounding: Rounding, energy: StretchEnergy) -> tuple[IntegerGrid |
         candidates = rounding.candidates()
     except GridError as error:
         return None, str(error)
-    tries, why = 0, "all lattice points nearby merge cones"
-    for values in candidates[:3]:
-        start = _displaced(layout, rounding, values)
+    why = "all lattice points nearby merge cones"
+    for tries, values in enumerate(candidates[:3]):
         try:
-            found = _relaxed(layout, start, transitions, values, energy)
+            found = _relaxed(rounding, values, energy)
         except (ConvergenceError, OptionError) as error:
-            tries, why = tries + 1, str(error)
+            why = str(error)
             continue
         points = _snapped(found, transitions, values)
         if _folds_sides(layout, transitions, points):
-            tries, why = tries + 1, "sides of triangles on grid lines change their direction"
-            continue
-        if (replace(layout, points=points).double_areas() > 0).all():
+            why = "sides of triangles on grid lines change their direction"
+        elif (replace(layout, points=points).double_areas() > 0).all():
             return _make_grid(layout, points, tries), ""
-        tries, why = tries + 1, "rounding flipped a very small triangle"
+        else:
+            why = "rounding flipped a very small triangle"
     return None, why
 
 
@@ -118,28 +117,19 @@ def _folds_sides(layout: GridLayout, transitions: Transitions, points: ComplexAr
     return bool((turned.real <= 0)[on[starts] & on[ends]].any())
 
 
-def _displaced(layout: GridLayout, rounding: Rounding, values: IntArray) -> ComplexArray:
-    """Return the layout with seams and cones at their rounded values, moved by the displacement of least energy.
-
-    If this makes a triangle too small, return the smooth layout itself, from which relaxing may still succeed.
-    """
-    (moved,) = rounding.displaced([values])
-    before, after = (replace(layout, points=points).double_areas() for points in (layout.points, moved))
-    return moved if (after > 0.01 * before).all() else layout.points
-
-
-def _relaxed(
-    layout: GridLayout,
-    smooth: ComplexArray,
-    transitions: Transitions,
-    values: IntArray,
-    energy: StretchEnergy,
-) -> Relaxed:
+def _relaxed(rounding: Rounding, values: IntArray, energy: StretchEnergy) -> Relaxed:
     """Return the relaxed layout with integer translations of seams and cones on grid points.
+
+    Relaxing starts from the displacement of least energy to the rounded values. If this makes a triangle too small, it
+    starts from the smooth layout itself, from which it may still succeed.
 
     Raises:
         ConvergenceError: these constraints were not reached without flipping a triangle.
     """
+    layout, transitions = rounding.layout, rounding.transitions
+    (moved,) = rounding.displaced([values])
+    has_area = replace(layout, points=moved).double_areas() > 0.01 * layout.double_areas()
+    smooth = moved if has_area.all() else layout.points
     chains, count = transitions.chains, 2 * len(transitions.quarters)
     places = transitions.places(smooth, values.astype(np.float64))
     pinned = np.flatnonzero(transitions.fixed.all(axis=1))
@@ -187,31 +177,10 @@ def _snapped(found: Relaxed, transitions: Transitions, values: IntArray) -> Comp
 
 
 def _make_grid(layout: GridLayout, points: ComplexArray, tries: int) -> IntegerGrid:
-    mesh, corner_grid = layout.mesh, as_pairs(points)[layout.corners]
-    quarters = quarters_around(mesh, sides_between(corner_grid))
-    cones, corners = layout.cones, layout.sides.corners
-    note = (
-        f"The {plural(tries, 'nearest lattice point')} could not be reached without flipping triangles; the next "
-        "one was used."
+    missed = plural(tries, "nearest lattice point")
+    note = f"The {missed} could not be reached without flipping triangles; the next one was used."
+    mesh, cones, corners = layout.mesh, layout.cones, layout.sides.corners
+    known = {"size": layout.size, "notes": (note,) if tries else ()}
+    return grid_of_corners(
+        mesh.vertices, mesh.faces, as_pairs(points)[layout.corners], cones, corners, **known
     )
-    arrays = (
-        mesh.vertices,
-        mesh.faces,
-        corner_grid,
-        *find_motions(mesh, corner_grid)[:2],
-        cones,
-        quarters[cones],
-    )
-    notes, qc = (note,) if tries else (), _distortion(layout, points)
-    return IntegerGrid(*arrays, layout.size, qc, notes, corners, quarters[corners])
-
-
-def _distortion(layout: GridLayout, points: ComplexArray) -> float:
-    """Return the mean quasi-conformal distortion weighted by area."""
-    areas = double_areas(layout.lengths) / 2
-    real = areas > 0
-    along, across = map_factors(rest_sides(layout.lengths[real] / layout.size))
-    places = points[layout.corners[real]]
-    places = places - places[:, :1]
-    one, two = np.abs((along * places).sum(axis=1)), np.abs((across * places).sum(axis=1))
-    return float(np.average((one + two) / (one - two), weights=areas[real]))

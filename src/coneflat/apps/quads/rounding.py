@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -37,10 +38,9 @@ class Stiffness:
         self._energy = kron(laplacian, np.eye(2)).tocsr()
         self._turned = _turned_copies(transitions)
         system = (self._turned.T @ self._energy @ self._turned).tocsc()
-        ridge = 1e-10 * float(system.diagonal().mean()) if system.shape[0] else 0.0
+        ridge = 1e-10 * (system.diagonal().sum() / max(system.shape[0], 1))
         ridged = csc_matrix(system + diags(np.full(system.shape[0], ridge)))
-        ridged.sort_indices()
-        self._factor = factorize(ridged)
+        self._factor = factorize(ridged.sorted_indices())
 
     def displacement(self, given: FloatArray) -> FloatArray:
         """Return the displacements (2u, k) of least energy for given ones (2u, k) of fixed coordinates and copies."""
@@ -128,7 +128,6 @@ class Rounding:
         basis: (v, d) basis of the lattice.
         start: (d,) coordinates of the smooth layout.
         metric: (d, d) Gram matrix of the basis.
-        pairs: pairs of cones that must not merge.
         stiffness: the energy that gives the metric.
         layout: the smooth layout.
         transitions: its seams and sides.
@@ -137,7 +136,6 @@ class Rounding:
     basis: IntArray
     start: FloatArray
     metric: FloatArray
-    pairs: ConePairs
     stiffness: Stiffness
     layout: GridLayout
     transitions: Transitions
@@ -149,9 +147,12 @@ class Rounding:
 
     def scaled(self, factor: float) -> Rounding:
         """Return the rounding of the layout with the number of squares multiplied by a factor."""
-        layout, start = self.layout.scaled(factor), np.sqrt(factor) * self.start
-        pairs = _near_pairs(layout, self.transitions, self.basis, start)
-        return replace(self, start=start, pairs=pairs, layout=layout)
+        return replace(self, start=np.sqrt(factor) * self.start, layout=self.layout.scaled(factor))
+
+    @cached_property
+    def pairs(self) -> ConePairs:
+        """Pairs of cones that must not merge."""
+        return _near_pairs(self.layout, self.transitions, self.basis, self.start)
 
     def candidates(self) -> list[IntArray]:
         """Return integer values (v,) of the variables near the smooth ones that merge no two cones.
@@ -164,7 +165,6 @@ class Rounding:
         size = len(self.start)
         every = Lattice(np.zeros(size, dtype=np.int64), np.eye(size, dtype=np.int64), self.metric)
         lattice = every.reduced()
-        found: list[IntArray] = []
         for angle, at_once in SEPARATIONS:
             try:
                 found = self._separated(lattice, angle, at_once)
@@ -243,15 +243,14 @@ def find_rounding(layout: GridLayout) -> Rounding:
     assert solutions is not None
     basis = solutions.basis
     fitted = np.linalg.lstsq(basis.astype(np.float64), transitions.values, rcond=None)[0]
-    start = np.array(fitted, dtype=np.float64)
+    start = fitted.astype(np.float64)
     stiffness = Stiffness(layout, transitions)
     metric = stiffness.gram(basis)
     # The least energy, to which sides that are not straight in the layout contribute.
     given = as_pairs(transitions.places(layout.points, basis @ start) - layout.points).reshape(-1, 1)
     shift = stiffness.displacement(given)
     start -= np.linalg.solve(metric, (stiffness.pulls(basis).T @ shift)[:, 0])
-    pairs = _near_pairs(layout, transitions, basis, start)
-    return Rounding(basis, start, metric, pairs, stiffness, layout, transitions)
+    return Rounding(basis, start, metric, stiffness, layout, transitions)
 
 
 def _near_pairs(
@@ -259,10 +258,9 @@ def _near_pairs(
 ) -> ConePairs:
     """Return the vectors between near cones along the shortest edge paths."""
     mesh, points, cones, (starts, ends) = layout.mesh, layout.points, layout.nodes, layout.ends
-    tails, heads = mesh.tails, mesh.heads
     graph = layout.graph()
     found, before = dijkstra(graph, indices=cones, limit=NEAR_CONE_DISTANCE, return_predecessors=True)
-    halfedge = csr_matrix((np.arange(1, len(tails) + 1), (tails, heads)), shape=graph.shape)
+    halfedge = csr_matrix((np.arange(1, len(starts) + 1), (mesh.tails, mesh.heads)), shape=graph.shape)
     is_cone = mask_of(len(mesh.vertices), cones)
     rows, ends_of = [], []
 
@@ -270,26 +268,32 @@ def _near_pairs(
         sides = [_side(int(halfedge[a, b]), int(halfedge[b, a]), starts, ends) for a, b in pairwise(path)]
         return _vector(sides, transitions, points)
 
-    for i, j in np.argwhere(np.isfinite(found[:, cones])).tolist():
-        if i >= j:
-            continue
-        path = [int(cones[j])]
-        while path[-1] != cones[i]:
-            path.append(int(before[i, path[-1]]))
-        path.reverse()
-        if is_cone[path[1:-1]].any():
-            continue
-        rows.append(joining(path).rows)
-        ends_of.append((i, j))
+    for i, j in np.argwhere(np.triu(np.isfinite(found[:, cones]), 1)).tolist():
+        path = _path_to(int(cones[j]), before[i])
+        if not is_cone[path[1:-1]].any():
+            rows.append(joining(path).rows)
+            ends_of.append((i, j))
     cone_rows = np.array(rows, dtype=np.int64).reshape(len(rows), 2, len(basis))
     side_rows, length = _distances_to_sides([joining(each) for each in _paths_to_sides(layout)], transitions)
-    side_rows = side_rows @ basis
+    # Products of sparse integer matrices are faster than those of dense ones, which no library accelerates.
+    cone_rows, side_rows = (
+        (csr_matrix(each.reshape(2 * len(each), len(basis))) @ basis).reshape(len(each), 2, basis.shape[1])
+        for each in (cone_rows, side_rows)
+    )
     # Keep pairs that face each other and are not collinear: the distance is at least 45% of the length of the vector.
     facing = np.abs(side_rows[:, 0] @ start) > np.maximum(0.45 * length, 1e-6)
-    joined = np.concatenate([cone_rows @ basis, side_rows[facing]])
+    joined = np.concatenate([cone_rows, side_rows[facing]])
     # Pairs with sides get unique indices, so that they count as having no cone in common.
     ends_of += [(len(cones) + k, len(cones) + k) for k in range(int(facing.sum()))]
     return ConePairs(joined, joined @ start, np.array(ends_of, dtype=np.int64).reshape(-1, 2))
+
+
+def _path_to(vertex: int, before: IntArray) -> list[int]:
+    """Return the path to a vertex from the root of a tree of shortest paths, in which `before` (n,) are the parents."""
+    path = [vertex]
+    while before[path[-1]] >= 0:
+        path.append(int(before[path[-1]]))
+    return path[::-1]
 
 
 def _side(forth: int, back: int, starts: IntArray, ends: IntArray) -> tuple[int, int]:
@@ -328,7 +332,7 @@ def _paths_to_sides(layout: GridLayout) -> list[list[int]]:
 
     Only the shortest path between the same two is returned. Paths between cones are found elsewhere.
     """
-    mesh, sides, cones, (starts, ends) = layout.mesh, layout.sides, layout.nodes, layout.ends
+    mesh, sides, cones = layout.mesh, layout.sides, layout.nodes
     side_count = len(sides.axis)
     if not side_count:
         return []
@@ -342,16 +346,9 @@ def _paths_to_sides(layout: GridLayout) -> list[list[int]]:
     both = label[mesh.edges]
     at_end = np.isin(mesh.edges, np.intersect1d(cones, on_side)).any(axis=1)
     along = (both >= 0).all(axis=1) & (at_end | (both[:, 0] == both[:, 1]))
-    lengths = np.abs(layout.points[ends] - layout.points[starts])
-    kept = ~along[mesh.halfedge_edges]
-    graph = csr_matrix((lengths[kept], (mesh.tails[kept], mesh.heads[kept])), shape=(len(label),) * 2)
-    graph = graph.maximum(graph.T)
+    graph, at = layout.graph(~along[mesh.halfedge_edges]), np.flatnonzero(label >= 0)
     distance, before, source = dijkstra(
-        graph,
-        indices=np.flatnonzero(label >= 0),
-        limit=NEAR_CONE_DISTANCE,
-        min_only=True,
-        return_predecessors=True,
+        graph, indices=at, limit=NEAR_CONE_DISTANCE, min_only=True, return_predecessors=True
     )
     one, two = mesh.edges[~along & np.isfinite(distance)[mesh.edges].all(axis=1)].T
     total = distance[one] + distance[two] + np.asarray(graph[one, two]).ravel()
@@ -361,14 +358,7 @@ def _paths_to_sides(layout: GridLayout) -> list[list[int]]:
     )
     near = near[np.lexsort((total[near], pairs[near, 1], pairs[near, 0]))]
     _, first = np.unique(pairs[near], axis=0, return_index=True)
-
-    def to_root(vertex: int) -> list[int]:
-        path = [vertex]
-        while before[path[-1]] >= 0:
-            path.append(int(before[path[-1]]))
-        return path
-
-    return [[*to_root(int(one[k]))[::-1], *to_root(int(two[k]))] for k in near[first]]
+    return [[*_path_to(int(one[k]), before), *_path_to(int(two[k]), before)[::-1]] for k in near[first]]
 
 
 class PathVector(NamedTuple):
@@ -392,13 +382,11 @@ def _distances_to_sides(vectors: list[PathVector], transitions: Transitions) -> 
     """Return (p, 2, v) the coordinate that separates the ends of vectors, with 0 for the other, and (p,) lengths."""
     found, lengths = [], []
     for one in vectors:
-        known = _known_axes(transitions, one.first) & np.roll(
-            _known_axes(transitions, one.last), one.turn % 2
-        )
-        for axis in np.flatnonzero(known).tolist():
-            if one.rows[axis].any():
-                found.append(np.stack([one.rows[axis], np.zeros_like(one.rows[axis])]))
-                lengths.append(one.length)
+        is_known = _known_axes(transitions, one.first)
+        is_known &= np.roll(_known_axes(transitions, one.last), one.turn % 2)
+        for row in one.rows[is_known & one.rows.any(axis=1)]:
+            found.append(np.stack([row, np.zeros_like(row)]))
+            lengths.append(one.length)
     size = transitions.shifts.shape[1]
     return np.array(found, dtype=np.int64).reshape(len(found), 2, size), np.array(lengths)
 

@@ -12,14 +12,14 @@ from ...options import declarations
 from .cross_field import SHARP_ANGLE
 from .features import edge_indices, sharp_edges
 from .nearest import Stars, slide_near
-from .options import ROUNDS, QuadOptions
+from .options import QuadOptions
 from .quad_mesh import QuadMesh, least_jacobians
 
 # Least scaled Jacobian: no quad falls below it, and quads that are below it do not get worse.
 MIN_JACOBIAN = 0.5
 
 
-def smooth_quads(quads: QuadMesh, rounds: int = ROUNDS, features: ArrayLike = ()) -> QuadMesh:
+def smooth_quads(quads: QuadMesh, rounds: int = QuadOptions.smooth, features: ArrayLike = ()) -> QuadMesh:
     """Return a smoothed quad mesh: quads are closer to squares, and vertices remain on the surface.
 
     Each quad is projected to the nearest square. Each vertex moves to the mean of its projected positions, and from
@@ -47,14 +47,11 @@ def smooth_quads(quads: QuadMesh, rounds: int = ROUNDS, features: ArrayLike = ()
     points, faces, barycentric = quads.vertices.copy(), quads.faces.copy(), quads.barycentric.copy()
     for _ in range(rounds):
         wanted = _squared(points, quads.quads)[movable]
-        new_faces, new_barycentric = faces[movable], barycentric[movable]
-        slide_near(surface, wanted, new_faces, new_barycentric)
-        new = points.copy()
-        new[movable] = surface.at(new_faces, new_barycentric)
-        stays = _blocked(points, new, quads.quads)
-        gone = movable & ~stays
-        faces[gone], barycentric[gone] = new_faces[gone[movable]], new_barycentric[gone[movable]]
-        points[gone] = new[gone]
+        on, weights, new = faces[movable], barycentric[movable], points.copy()
+        slide_near(surface, wanted, on, weights)
+        new[movable] = surface.at(on, weights)
+        gone = movable & ~_blocked(points, new, quads.quads)
+        points[gone], faces[gone], barycentric[gone] = new[gone], on[gone[movable]], weights[gone[movable]]
     if rounds:
         improve_worst(points, quads.quads, faces, barycentric, movable, surface)
     return replace(quads, vertices=points, faces=faces, barycentric=barycentric)
@@ -74,9 +71,9 @@ def _squared(points: FloatArray, quads: IntArray) -> FloatArray:
     z = (u - np.cross(normal, w)) / 4
     rotated = np.cross(normal, z)
     targets = centre[:, None] + np.stack([z, rotated, -z, -rotated], axis=1)
-    count = np.maximum(np.bincount(quads.ravel(), minlength=len(points)), 1)
-    sums = [np.bincount(quads.ravel(), targets[..., x].ravel(), len(points)) for x in range(3)]
-    return np.stack(sums, axis=1) / count[:, None]
+    at = quads.ravel()
+    sums = [np.bincount(at, targets[..., x].ravel(), len(points)) for x in range(3)]
+    return np.stack(sums, axis=1) / np.maximum(np.bincount(at, minlength=len(points)), 1)[:, None]
 
 
 def _blocked(old: FloatArray, new: FloatArray, quads: IntArray) -> BoolArray:
@@ -84,8 +81,7 @@ def _blocked(old: FloatArray, new: FloatArray, quads: IntArray) -> BoolArray:
     stays = np.zeros(len(old), dtype=bool)
     bound = np.minimum(least_jacobians(old, quads), MIN_JACOBIAN)
     while True:
-        points = np.where(stays[:, None], old, new)
-        bad = least_jacobians(points, quads) < bound
+        bad = least_jacobians(np.where(stays[:, None], old, new), quads) < bound
         bad &= ~stays[quads].all(axis=1)
         if not bad.any():
             return stays
@@ -124,8 +120,7 @@ def improve_worst(
         surface: the surface that contains them.
         below: bound of the scaled Jacobian, below which a quad is bad.
     """
-    order = np.argsort(quads.ravel(), kind="stable") // 4
-    start = np.concatenate([[0], np.cumsum(np.bincount(quads.ravel(), minlength=len(points)))])
+    _, _, start, star = Stars.of(points, quads)
     for _ in range(8):
         least = least_jacobians(points, quads)
         bad = np.flatnonzero(least < below)
@@ -133,7 +128,7 @@ def improve_worst(
         _, first = np.unique(worst_first, return_index=True)
         tried = worst_first[np.sort(first)]
         gained = [
-            _improve(int(v), order[start[v] : start[v + 1]], points, quads, faces, barycentric, surface)
+            _improve(v, quads[star[start[v] : start[v + 1]]], points, faces, barycentric, surface)
             for v in tried[movable[tried]].tolist()
         ]
         if not any(gained):
@@ -141,29 +136,23 @@ def improve_worst(
 
 
 def _improve(
-    vertex: int,
-    star: IntArray,
-    points: FloatArray,
-    quads: IntArray,
-    faces: IntArray,
-    barycentric: FloatArray,
-    surface: Stars,
+    v: int, around: IntArray, points: FloatArray, faces: IntArray, barycentric: FloatArray, surface: Stars
 ) -> bool:
-    """Move a vertex to the best of several trial positions, and return whether one is better than the current one."""
-    around = quads[star]
+    """Move vertex v of the quads `around` it to the best of several trial positions, if one is better than its own.
+
+    Return whether one is.
+    """
     sides = points[np.roll(around, -1, axis=1)] - points[around]
     length = float(np.sqrt(dots(sides, sides)).mean())
-    axes = surface.axes(int(faces[vertex]))
     angle = 2 * np.pi * np.arange(12) / 12
-    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ axes
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ surface.axes(int(faces[v]))
     offsets = (length * np.array([0.5, 0.25, 0.1, 0.04])[:, None, None] * circle).reshape(-1, 3)
-    on, weights = np.full(len(offsets), faces[vertex]), np.tile(barycentric[vertex], (len(offsets), 1))
-    slide_near(surface, points[vertex] + offsets, on, weights)
-    places = surface.at(on, weights)
+    on, weights = np.full(len(offsets), faces[v]), np.tile(barycentric[v], (len(offsets), 1))
+    slide_near(surface, points[v] + offsets, on, weights)
     # The quads around the vertex for each trial position; the last is the current one.
-    trials = np.concatenate([places, points[vertex][None]])
+    trials = np.concatenate([surface.at(on, weights), points[v][None]])
     corners = np.tile(points[around], (len(trials), 1, 1, 1))
-    corners[:, around == vertex] = trials[:, None]
+    corners[:, around == v] = trials[:, None]
     numbers = np.arange(corners.size // 3).reshape(-1, 4)
     each = least_jacobians(corners.reshape(-1, 3), numbers).reshape(len(trials), -1)
     inverts = ((each <= 0) & (each[-1] > 0)).any(axis=1)
@@ -171,7 +160,7 @@ def _improve(
     best = int(np.argmax(least[:-1]))
     if least[best] <= least[-1]:
         return False
-    points[vertex], faces[vertex], barycentric[vertex] = places[best], on[best], weights[best]
+    points[v], faces[v], barycentric[v] = trials[best], on[best], weights[best]
     return True
 
 

@@ -7,16 +7,18 @@ the motions must have the vertex as a fixed point, which is a linear equation of
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import defaultdict, deque
 from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
-from ...base import BoolArray, ComplexArray, FloatArray, IntArray
+from ...base import BoolArray, ComplexArray, FloatArray, IntArray, mask_of
 from ...errors import GridError
+from ...geometry import as_pairs
 from ...layout import SeamChains
+from .cross_field import complex_sums
 from .layout import GRID_TOLERANCE, GridLayout, charts_of, first_points, joining_chains
 
 Vectors = TypeVar("Vectors", FloatArray, IntArray)
@@ -108,23 +110,16 @@ class _Builder:
         self._fix_charts()
         row, column, value = (np.concatenate(parts) for parts in zip(*self.entries, strict=True))
         shifts = coo_matrix((value, (row, column)), shape=(2 * len(points), self.size)).tocsr()
-        translation = np.zeros(self.chain_count, dtype=np.complex128)
         off = points[chains.right] - UNITS[self.quarters[chains.chain], None] * points[chains.left]
-        np.add.at(translation, chains.chain, off.mean(axis=1))
-        translation /= np.maximum(np.bincount(chains.chain, minlength=self.chain_count), 1)
+        translation = complex_sums(chains.chain, off.mean(axis=1), self.chain_count)
+        translation /= np.bincount(chains.chain)
         both = np.concatenate([translation, points[self.cone_points]])
-        values = np.concatenate([np.stack([both.real, both.imag], axis=1).ravel(), self._side_values()])
+        side = self.sides.side
+        common = as_pairs(points[self.sides.points])[np.arange(len(side)), self.sides.axis[side]]
+        means = np.bincount(side, common) / np.bincount(side)
+        values = np.concatenate([as_pairs(both).ravel(), means])
         equations = np.array(self.equations, dtype=np.int64).reshape(len(self.equations), self.size)
         return Transitions(chains, self.quarters, self.base, self.turn, shifts, self.fixed, equations, values)
-
-    def _side_values(self) -> FloatArray:
-        """Return (l,) the mean of the common coordinate of the points of each side."""
-        at, side, count = self.points[self.sides.points], self.sides.side, len(self.sides.axis)
-        common = np.where(self.sides.axis[side] == 0, at.real, at.imag)
-        mean: FloatArray = np.bincount(side, common, count) / np.maximum(
-            np.bincount(side, minlength=count), 1
-        )
-        return mean
 
     def _add_regular(self, on_side: IntArray) -> None:
         """Express the right points inside chains by the left ones; `on_side` (u,) is the side of a point or -1."""
@@ -149,9 +144,8 @@ class _Builder:
         Return (u,) the side of each such point, else -1.
         """
         chains = self.chains
-        is_end = np.zeros(len(self.points), dtype=bool)
-        for ends in (chains.left, chains.right):
-            is_end[ends[chains.is_node[chains.vertices]]] = True
+        at_node = chains.is_node[chains.vertices]
+        is_end = mask_of(len(self.points), np.stack([chains.left, chains.right])[:, at_node])
         points, side = self.sides.points, self.sides.side
         special = is_end[points] | self.fixed[points, 0]
         for point, one in zip(points[special].tolist(), side[special].tolist(), strict=True):
@@ -190,31 +184,30 @@ class _Builder:
             shift[axis, self.first_side + side] = 1
             self.fixed[start, axis] = True
         known = {start: (0, shift)}
-        left_over = list(relations)
+        left_over, waiting = deque(relations), 0
         while left_over:
-            later = []
-            for left, right, chain in left_over:
-                quarter, across = int(self.quarters[chain]), np.zeros((2, self.size), dtype=np.int64)
-                across[:, 2 * chain : 2 * chain + 2] = np.eye(2)
-                if left in known:
-                    turn, shift = known[left]
-                    turn, shift = (turn + quarter) % 4, TURNS[quarter] @ shift + across
-                    if right not in known:
-                        known[right] = turn, shift
-                        continue
-                    if cone is None and known[right][0] != turn:
-                        raise GridError(
-                            f"vertex {v} has an angle of {4 + known[right][0] - turn} quarter turns but is not a cone"
-                        )
-                    self.equations.extend(row for row in shift - known[right][1] if row.any())
-                elif right in known:
-                    turn, shift = known[right]
-                    known[left] = (turn - quarter) % 4, TURNS[-quarter % 4] @ (shift - across)
-                else:
-                    later.append((left, right, chain))
-            if len(later) == len(left_over):
-                raise GridError(f"the seams at vertex {v} do not connect all its copies")
-            left_over = later
+            left, right, chain = left_over.popleft()
+            quarter, across = int(self.quarters[chain]), np.zeros((2, self.size), dtype=np.int64)
+            across[:, 2 * chain : 2 * chain + 2] = np.eye(2)
+            if left in known:
+                turn, shift = known[left]
+                turn, shift = (turn + quarter) % 4, TURNS[quarter] @ shift + across
+                if right not in known:
+                    known[right] = turn, shift
+                    continue
+                if cone is None and known[right][0] != turn:
+                    raise GridError(
+                        f"vertex {v} has an angle of {4 + known[right][0] - turn} quarter turns but is not a cone"
+                    )
+                self.equations.extend(row for row in shift - known[right][1] if row.any())
+            elif right in known:
+                turn, shift = known[right]
+                known[left] = (turn - quarter) % 4, TURNS[-quarter % 4] @ (shift - across)
+            else:
+                left_over.append((left, right, chain))  # until one of both is known
+                waiting += 1
+                if waiting > len(relations) ** 2:
+                    raise GridError(f"the seams at vertex {v} do not connect all its copies")
         for point, (turn, shift) in known.items():
             if cone is None:
                 self.base[point], self.turn[point] = start, turn
@@ -232,7 +225,7 @@ class _Builder:
         fixed = np.concatenate([joining_chains(self.chains, chart), self.chain_count + firsts])
         straight, firsts = np.unique(component[self.sides.points], return_index=True)
         sides = self.sides.side[firsts[~np.isin(straight, coned)]]
-        for column in (*(2 * fixed[:, None] + [0, 1]).ravel(), *(self.first_side + sides)):
-            row = np.zeros(self.size, dtype=np.int64)
-            row[column] = 1
-            self.equations.append(row)
+        columns = np.concatenate([(2 * fixed[:, None] + [0, 1]).ravel(), self.first_side + sides])
+        rows = np.zeros((len(columns), self.size), dtype=np.int64)
+        rows[np.arange(len(columns)), columns] = 1
+        self.equations.extend(rows)

@@ -11,7 +11,7 @@ import shlex
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from ...base import MAX_CONE_ANGLE, MIN_CONE_ANGLE, list_some, plural
+from ...base import MAX_CONE_ANGLE, MAX_LISTED, MIN_CONE_ANGLE, list_some, plural
 from ...mesh import REPAIR_ADVICE
 from .choices import MORE, Choices
 from .paint import Region
@@ -86,10 +86,6 @@ def with_warnings(result: Flattening, chosen: Choices) -> Flattening:
     return replace(result, notes=(*result.notes, *misplaced_warning(chosen), *angle_warning(chosen, result)))
 
 
-#: Number of values above which lists are written as ranges.
-LISTED_NUMBERS = 12
-
-
 def command_line(mesh: str, project: str, choices: Choices) -> str:
     """Return a command that maps a mesh with these choices; drawn paths and paint need the project file."""
     if choices.cuts or choices.kept or choices.paint:
@@ -121,14 +117,14 @@ def _written(value: Any) -> str:
         return repr(value.tolist())
     if isinstance(value, tuple):
         return f"({', '.join(_written(each) for each in value)})"
-    if isinstance(value, list) and len(value) > LISTED_NUMBERS:
+    if isinstance(value, list) and len(value) > MAX_LISTED:
         return f"[{_ranges(value)}]"
-    if isinstance(value, dict) and len(value) > LISTED_NUMBERS:
+    if isinstance(value, dict) and len(value) > MAX_LISTED:
         # Vertices with the same value are grouped.
         groups: dict[Any, list[int]] = {}
         for vertex, each in value.items():
             groups.setdefault(each, []).append(vertex)
-        if len(groups) <= LISTED_NUMBERS:
+        if len(groups) <= MAX_LISTED:
             parts = (
                 f"**dict.fromkeys([{_ranges(sorted(group))}], {each!r})" for each, group in groups.items()
             )
