@@ -378,7 +378,9 @@ class GridSearch:
                 found, note = self._with_lines(sided)
                 if found is not None:
                     return with_note(found, note)
-            return with_note(self._with_sides(layout, sided, all_sides), note)
+            # Rather than many more squares than wanted, a grid with other cones is searched.
+            most = 1 if sharp_lines and self.sharp_angle is None else 4
+            return with_note(self._with_sides(layout, sided, all_sides, most), note)
 
     @property
     def _angle(self) -> float:
@@ -390,12 +392,15 @@ class GridSearch:
         layout, _ = split_between_nodes(layout)
         return grid_with_lines(layout, self._angle, self.sharp_angle is not None, self.energy)
 
-    def _with_sides(self, layout: GridLayout, sided: GridLayout, all_sides: bool) -> IntegerGrid:
-        """Return a grid with the sides of a layout on grid lines, or without some if these are not required."""
+    def _with_sides(self, layout: GridLayout, sided: GridLayout, all_sides: bool, most: int) -> IntegerGrid:
+        """Return a grid with the sides of a layout on grid lines, or without some if these are not required.
+
+        most: how often the number of squares is doubled.
+        """
         try:
-            return grid_of(sided, self.energy)
+            return grid_of(sided, self.energy, most)
         except GridError:
             if all_sides or len(sided.sides.points) == len(layout.sides.points):
                 raise
         why = "Straight sides of different loops are not parallel up to quarter turns, so not all on grid lines."
-        return with_note(grid_of(layout, self.energy), why)
+        return with_note(grid_of(layout, self.energy, most), why)

@@ -22,17 +22,17 @@ NOTED_SHARE = 0.1
 LINE_STRIDE = 0.1
 
 
-def grid_of(layout: GridLayout, energy: StretchEnergy) -> IntegerGrid:
+def grid_of(layout: GridLayout, energy: StretchEnergy, most: int) -> IntegerGrid:
     """Return the grid of a smooth layout.
 
     If rounding changes the number of squares much, the size is corrected. If there is no grid of this size, a finer one
-    is returned.
+    is returned; `most` is how often the number of squares is doubled.
 
     Raises:
         GridError: no grid was found.
     """
     layout, split = split_between_nodes(layout)
-    found = grid_about(find_rounding(layout), energy)
+    found = grid_about(find_rounding(layout), energy, most)
     if split:
         found = with_note(
             found,
@@ -47,11 +47,8 @@ def split_between_nodes(layout: GridLayout) -> tuple[GridLayout, int]:
     return (split_edges(layout, is_split) if is_split.any() else layout), int(is_split.sum())
 
 
-def grid_about(rounding: Rounding, energy: StretchEnergy, most: int = 4) -> IntegerGrid:
-    """Return the grid of a smooth layout in which no edge between cones needs to be split; see `grid_of`.
-
-    `most` is how often the number of squares is doubled.
-    """
+def grid_about(rounding: Rounding, energy: StretchEnergy, most: int) -> IntegerGrid:
+    """Return the grid of a smooth layout in which no edge between cones needs to be split; see `grid_of`."""
     layout = rounding.layout
     wanted, found, why = layout.area, None, ""
     for finer in (2.0**k for k in range(most + 1)):
