@@ -107,7 +107,7 @@ def test_all_but_the_largest_components_are_divided(monkeypatch):
     parts = [(4.0 * k + size * cube[0], cube[1]) for k, size in enumerate((3, 1, 2, 0.1))]
     found = coneflat.quads(*shapes.join(*parts, (ball - 9, faces)), quads=300)
     assert components_of(found) == (5, 5)
-    assert "of 3 components without a grid" in found.notes[-1]
+    assert any("of 3 components without a grid" in note for note in found.notes)
     on = np.einsum("qi,qix->qx", found.barycentric, found.surface.vertices[found.surface.faces[found.faces]])
     np.testing.assert_allclose(on, found.vertices, atol=1e-12)
     measures = coneflat.measure_quads(found)
@@ -145,30 +145,72 @@ def test_quads_over_filled_holes_are_left_out(monkeypatch):
     assert coneflat.measure_quads(found).jacobian_min > 0
 
 
-def test_a_boundary_with_very_many_corners_is_refused(monkeypatch):
+def test_round_holes_that_are_filled_give_no_flipped_quads(monkeypatch):
+    monkeypatch.setattr(module, "MAX_HOLES", 1)
+    vertices, faces = shapes.grid(60, 60)
+    middle = vertices[faces].mean(axis=1)[:, :2]
+    centres = np.array([[0.2, 0.25], [0.7, 0.3], [0.35, 0.7], [0.75, 0.75]])
+    is_gone = (np.linalg.norm(middle[:, None] - centres, axis=2) < 0.07).any(axis=1)
+    found = coneflat.quads(vertices, faces[~is_gone], quads=1000)
+    assert found.euler_characteristic == found.surface_euler == -3
+    assert coneflat.measure_quads(found).jacobian_min > 0
+
+
+def test_a_boundary_with_very_many_corners_is_free(monkeypatch):
     monkeypatch.setattr(module, "MAX_CORNERS", 3)
-    sheet, ball = shapes.grid(8, 8), shapes.sphere(3)
-    with pytest.raises(GridError, match=r"^the boundary has more than 3 corners"):
-        coneflat.quads(*sheet, quads=50)
-    found = coneflat.quads(*shapes.join(sheet, (ball[0] + 3, ball[1])), quads=200)
-    assert components_of(found) == (2, 2)
-    assert "1 component without a grid" in found.notes[-1]
+    found = coneflat.quads(*shapes.grid(8, 8), quads=50)
+    assert "The boundary cuts squares, because it has more than 3 corners." in found.notes
+    assert found.euler_characteristic == 1
+    asked = coneflat.quads(*shapes.grid(8, 8), quads=50, boundary="straight")
+    assert len(asked.irregular) == 0
+    assert not any("corners" in note for note in asked.notes)
 
 
-def test_components_for_which_no_grid_is_found_are_divided(monkeypatch):
+@pytest.mark.parametrize("name", ["as given", "coarse", "filled", "few"])
+def test_components_for_which_no_grid_is_found_are_divided(monkeypatch, name):
+    """Each triangle of the cube becomes three quads, and the surface is the given one."""
     search = GridSearch._as_given
 
-    def fail_for_few(self):
-        if len(self.checked.mesh.faces) == 12:
+    def fail_for_cubes(self):
+        mesh = self.checked.mesh
+        if mesh.components[0] == 1 and not mesh.is_boundary_edge.any() and len(mesh.faces) <= 12:
             raise GridError("none")
         return search(self)
 
-    monkeypatch.setattr(GridSearch, "_as_given", fail_for_few)
-    ball, cube = shapes.sphere(3), shapes.box(1)
-    found = coneflat.quads(*shapes.join(ball, (cube[0] + 3, cube[1])), quads=200)
+    monkeypatch.setattr(GridSearch, "_as_given", fail_for_cubes)
+    (sheet, faces), cube = with_holes(40, ((20, 20),)), shapes.box(1, (1.0, 1.0, 1.0))
+    parts = [(20 * sheet, faces), (cube[0] + 30, cube[1])]
+    if name == "coarse":
+        monkeypatch.setattr(module, "COARSE", 1000)
+    if name == "few":
+        monkeypatch.setattr(module, "MAX_COMPONENTS", 4)
+        parts += [(0.1 * cube[0] - 5 * k, cube[1]) for k in range(1, 4)]
+    vertices, triangles = shapes.join(*parts)
+    found = coneflat.quads(vertices, triangles, quads=2000 if name == "as given" else 200)
+    assert components_of(found) == (len(parts), len(parts))
+    assert any(note.startswith("No grid for a component of 12 triangles: none.") for note in found.notes)
+    assert any(note.startswith("Made three quads of each triangle") for note in found.notes)
+    assert len(found.surface.faces) == len(triangles)
+    on = np.einsum("qi,qix->qx", found.barycentric, found.surface.vertices[found.surface.faces[found.faces]])
+    np.testing.assert_allclose(on, found.vertices, atol=1e-12)
+    assert any("Filled 1 hole" in note for note in found.notes) == (name != "as given")
+
+
+def test_two_sided_triangles_are_divided(monkeypatch):
+    """Splitting edges of two triangles with the same vertices would join two vertices twice."""
+    monkeypatch.setattr(module, "MAX_COMPONENTS", 1)
+    pillow = np.array([[5.0, 0, 0], [6, 0, 0], [5, 1, 0]]), np.array([[0, 1, 2], [0, 2, 1]])
+    found = coneflat.quads(*shapes.join(shapes.sphere(3), pillow), quads=2000)
     assert components_of(found) == (2, 2)
-    assert "No grid for a component of 12 triangles: none." in found.notes
-    assert "1 component without a grid" in found.notes[-1]
+    assert found.euler_characteristic == 4
+    tails, heads = found.quads.ravel(), np.roll(found.quads, -1, axis=1).ravel()
+    assert len(np.unique(np.stack([tails, heads], axis=1), axis=0)) == len(tails)
+
+
+@pytest.mark.parametrize("size", [1e160, 1e-170])
+def test_extreme_sizes_are_refused(size):
+    with pytest.raises(GridError):
+        coneflat.quads(*shapes.grid(8, 8), size=size)
 
 
 def test_noise_is_not_a_crease():

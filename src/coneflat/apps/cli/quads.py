@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -12,9 +12,6 @@ from ...options import ConeBounds, ConeNumber, declarations, read_options
 from ..quads.options import QuadOptions
 from .options import is_given, keywords, option_flags, path_flag, pop_flags, refuse
 from .shared import GroupedCommand, input_options, verbosity_options
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True, kw_only=True)

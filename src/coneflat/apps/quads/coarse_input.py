@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
 
@@ -13,7 +12,6 @@ from scipy.spatial import cKDTree
 
 from ... import Flattening, TriangleMesh
 from ...base import BoolArray, IntArray, mask_of, plural
-from ...errors import GridError
 from ...geometry import angle_defect, coarse_mesh, corner_angles, double_areas, edge_lengths, mollify
 from ...io import as_input
 from ...mesh import NEXT, PREVIOUS, tie_key
@@ -21,7 +19,8 @@ from ...options import declarations
 from ...source import Source
 from .aligned_cones import COARSE
 from .cross_field import sharp_ends
-from .features import edge_indices, lengths_along, split_edges, vertex_graph
+from .extract import MAX_SQUARES
+from .features import edge_indices, lengths_along, split_edges, vertex_graph, without_pillows
 from .integer_grid import GridSearch
 from .nearest import Stars, TriangleTree, slide_near
 from .options import QUADS, QuadOptions
@@ -41,9 +40,9 @@ class CoarseInput:
     Attributes:
         mesh: the simpler mesh, in model units; vertices in filled holes come last.
         kept: its other vertices in the given mesh.
-        given: the given mesh, checked, without `rest`.
+        given: the given mesh, checked.
         is_filling: (m,) whether each of its triangles is in a filled hole.
-        rest: the other components of the mesh, for which no grid is searched.
+        side: wanted edge length of quads.
         notes: on the given mesh.
     """
 
@@ -51,21 +50,29 @@ class CoarseInput:
     kept: IntArray
     given: TriangleMesh
     is_filling: BoolArray
-    rest: tuple[TriangleMesh, ...]
-    notes: tuple[str, ...]
+    side: float
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, search: GridSearch) -> CoarseInput:
+        """Return the mesh of a search itself."""
+        checked, mesh = search.checked, search.checked.mesh
+        mesh = mesh.moved_to(np.ldexp(mesh.vertices, -checked.exponent))
+        every, none = np.arange(len(mesh.vertices)), np.zeros(len(mesh.faces), dtype=bool)
+        return cls(mesh, every, mesh, none, float(np.ldexp(_side(search), -checked.exponent)))
 
     def moved(self, quads: QuadMesh) -> QuadMesh:
-        """Return quads of the coarse mesh, or of a refinement of it, on the given mesh.
+        """Return quads of the simpler mesh, or of a refinement of it, on the given mesh.
 
         Vertices slide along the surface from a nearby vertex that both meshes have, so that they do not jump to another
-        sheet. Those on the boundary and on sharp edges of the coarse mesh move to the nearest point on the boundary, or
-        on sharp edges within half the mean length of the edges there, of the same component.
+        sheet. Those on the boundary and on sharp edges of the simpler mesh move to the nearest point on the boundary,
+        or on sharp edges within half the mean length of the edges there, of the same component. Quads over filled holes
+        are left out.
         """
+        is_over = np.zeros(len(quads.quads), dtype=bool)
         if self.is_filling.any():
             tree = TriangleTree(self.mesh.vertices, self.mesh.faces)
-            on, _ = tree.nearest(quads.vertices[quads.quads].mean(axis=1))
-            is_over = self.is_filling[on]
-            quads = quads.without(is_over & ~is_over.all())
+            is_over = self.is_filling[tree.nearest(quads.vertices[quads.quads].mean(axis=1))[0]]
         mesh, surface, points = self.given, quads.surface, quads.vertices
         label, part = mesh.components[1], surface.components[1]
         off, which = cKDTree(self.mesh.vertices[: len(self.kept)]).query(surface.vertices)
@@ -103,8 +110,51 @@ class CoarseInput:
             faces[at], weights[at] = halfedge // 3, 0.0
             weights[at, np.take(NEXT, halfedge % 3)] = share
             weights[at, np.take(PREVIOUS, halfedge % 3)] = 1 - share
-        moved = stars.at(faces, weights)
-        return replace(quads, vertices=moved, faces=faces, barycentric=weights, surface=mesh)
+        places = stars.at(faces, weights)
+        moved = replace(quads, vertices=places, faces=faces, barycentric=weights, surface=mesh)
+        return moved.without(is_over & ~is_over.all()) if is_over.any() else moved
+
+    def completed(self, quads: QuadMesh) -> QuadMesh:
+        """Return quads with three more for each triangle of components of the given mesh without any.
+
+        Those of many triangles are simplified before. Long edges are split.
+        """
+        mesh = self.given
+        label = mesh.components[1][mesh.faces[:, 0]]
+        # Nothing of a component without area can be seen.
+        is_bare = np.bincount(label, double_areas(edge_lengths(mesh.vertices, mesh.faces))) > 0
+        is_bare[label[quads.faces]] = False
+        if not is_bare.any():
+            return quads
+        faces, (whole, _) = np.flatnonzero(is_bare[label]), _part(mesh, is_bare[label])
+        side = max(self.side, float(np.sqrt(_area(whole) / MAX_SQUARES)))
+        parts = [_simplified(part, side) for part, _, _ in whole.split_components()]
+        first = np.cumsum([0, *(len(part.vertices) for part in parts)])
+        joined = [part.faces + start for part, start in zip(parts, first, strict=False)]
+        small = TriangleMesh(np.concatenate([part.vertices for part in parts]), np.concatenate(joined))
+        small = without_pillows(small)
+        while (is_long := lengths_along(small, np.arange(len(small.edges))) > 4 * side).any():
+            small = split_edges(small, is_long)
+        n, middles = len(small.vertices), small.halfedge_edges.reshape(-1, 3)
+        points = [small.vertices, *(small.vertices[ends].mean(axis=1) for ends in (small.edges, small.faces))]
+        centres = n + len(small.edges) + np.arange(len(small.faces))
+        corners = [
+            (small.faces[:, i], n + middles[:, i - 1], centres, n + middles[:, (i + 1) % 3]) for i in range(3)
+        ]
+        more = np.concatenate([np.stack(each, axis=1) for each in corners])
+        on, weights = TriangleTree(whole.vertices, whole.faces).nearest(np.concatenate(points))
+        places = np.einsum("qi,qix->qx", weights, whole.vertices[whole.faces[on]])
+        note = (
+            f"Made three quads of each triangle of {plural(int(is_bare.sum()), 'component')} without a grid."
+        )
+        return replace(
+            quads,
+            vertices=np.concatenate([quads.vertices, places]),
+            quads=np.concatenate([quads.quads, len(quads.vertices) + more]),
+            faces=np.concatenate([quads.faces, faces[on]]),
+            barycentric=np.concatenate([quads.barycentric, weights]),
+            notes=(*quads.notes, note),
+        )
 
 
 def coarse_input(search: GridSearch) -> tuple[GridSearch, CoarseInput | None]:
@@ -122,32 +172,48 @@ def coarse_input(search: GridSearch) -> tuple[GridSearch, CoarseInput | None]:
     is_simple &= options.keys() <= declarations(QuadOptions).keys() - {"weights"}
     if not is_simple or search.sharp_angle is not None or isinstance(search.mesh, Flattening):
         return search, None
-    checked, mesh = search.checked, search.checked.mesh
-    area = max(_area(mesh), np.finfo(float).tiny)
-    side = np.sqrt(area / search.quads) if search.size is None else np.ldexp(search.size, checked.exponent)
-    is_kept, walks = _manageable(mesh, 4 * float(side))
+    checked, mesh, side = search.checked, search.checked.mesh, _side(search)
+    is_kept, walks, is_jagged = _manageable(mesh, side)
     walks = walks if search.boundary == "auto" else []
-    (part, kept), *others = [_part(mesh, chosen) for chosen in (is_kept, ~is_kept) if chosen.any()]
+    part, kept = _part(mesh, is_kept)
     loops = [np.searchsorted(kept, mesh.tails[walk]) for walk in walks]
     filled = _filled(part, loops)
-    quads = _area(filled) / max(float(side), np.finfo(float).tiny) ** 2
+    quads = _area(filled) / side**2
     count = COARSE * max(1.0, quads / QUADS)
     simple, some, of = filled, np.arange(len(filled.vertices)), np.arange(len(filled.faces))
+    notes = list(checked.notes)
+    is_freed = is_jagged and search.boundary == "auto"
+    if is_freed:
+        search = replace(search, boundary="free")
+        notes.append(f"The boundary cuts squares, because it has more than {MAX_CORNERS} corners.")
     if len(filled.faces) > 2 * count:
         simple, some, of = coarse_mesh(filled, int(count))
-    elif not (loops or others):
+    elif is_kept.all() and not (loops or is_freed):
         return search, None
-    own = some[some < len(kept)]
-    sizes = None if search.scales is None else np.exp(extended(-search.scales[kept[own]], simple))
-    simple, part, *rest = (
-        one.moved_to(np.ldexp(one.vertices, -checked.exponent))
-        for one in (simple, part, *(other for other, _ in others))
-    )
     if loops:
-        holes = f"Filled {plural(len(loops), 'hole')}, smaller than a quad or beyond the {MAX_HOLES} longest."
-    notes = (*checked.notes, holes) if loops else checked.notes
+        notes.append(
+            f"Filled {plural(len(loops), 'hole')}, smaller than a quad or beyond the {MAX_HOLES} longest."
+        )
+    own, whole = kept[some[some < len(kept)]], CoarseInput.of(search)
+    sizes = None if search.scales is None else np.exp(extended(-search.scales[own], simple))
+    simple = simple.moved_to(np.ldexp(simple.vertices, -checked.exponent))
     search = replace(search, mesh=Source(as_input(simple)), sizes=sizes, quads=quads)
-    return search, CoarseInput(simple, own, part, of >= len(part.faces), tuple(rest), notes)
+    return search, replace(whole, mesh=simple, kept=own, is_filling=of >= len(part.faces), notes=tuple(notes))
+
+
+def _side(search: GridSearch) -> float:
+    """Return the wanted edge length of quads on the checked mesh, within a range that squares do not exceed."""
+    if search.size is None:
+        wanted = np.sqrt(_area(search.checked.mesh) / search.quads)
+    else:
+        wanted = np.ldexp(search.size, search.checked.exponent)
+    return float(np.clip(wanted, 1e-150, 1e150))
+
+
+def _simplified(mesh: TriangleMesh, side: float) -> TriangleMesh:
+    """Return a mesh of 16 triangles or more, for about twice the quads that its area needs: they are less regular."""
+    count = max(16, int(2 * _area(mesh) / side**2 / 3))
+    return coarse_mesh(mesh, count)[0] if len(mesh.faces) > count else mesh
 
 
 def _area(mesh: TriangleMesh) -> float:
@@ -168,19 +234,21 @@ def _filled(mesh: TriangleMesh, loops: list[IntArray]) -> TriangleMesh:
     return TriangleMesh(np.concatenate([mesh.vertices, *centres]), np.concatenate([mesh.faces, *fans]))
 
 
-def _manageable(mesh: TriangleMesh, shortest: float) -> tuple[BoolArray, list[IntArray]]:
-    """Return (m,) the triangles of components to search grids for, and the half-edges of boundaries to fill there.
+def _manageable(mesh: TriangleMesh, side: float) -> tuple[BoolArray, list[IntArray], bool]:
+    """Return (m,) the triangles of components to search grids for, the half-edges of boundaries of theirs to fill, and
+    whether the longest of one has too many corners.
 
-    These are not the longest of a component, and shorter than a length or not among the longest others.
-
-    Raises:
-        GridError: the boundaries of all components have too many corners.
+    The components are the largest that have room for two quads, or a quarter of these. Holes are shorter than four
+    quads, or not among the longest ones.
     """
     (count, label), key, walks = mesh.components, tie_key(mesh.vertices), mesh.boundary_walks()
     areas = np.bincount(label[mesh.faces[:, 0]], double_areas(edge_lengths(mesh.vertices, mesh.faces)))
-    order = np.lexsort((np.bincount(label, key), -np.round(areas / areas.max(), 9)))
-    is_kept = mask_of(count, order[:MAX_COMPONENTS]) & (areas > 0)
-    seen, holes, filled = set[int](), 0, list[IntArray]()
+    rounded = np.round(areas / max(float(areas.max()), np.finfo(float).tiny), 9)
+    order = np.lexsort((np.bincount(label, key), -rounded))[:MAX_COMPONENTS]
+    has_room = (areas > 4 * side**2) | mask_of(count, order[: MAX_COMPONENTS // 4])
+    is_kept = mask_of(count, order) & (areas > 0) & has_room
+    is_kept |= ~is_kept.any()
+    seen, holes, filled, is_jagged = set[int](), 0, list[IntArray](), False
     lengths = np.array([lengths_along(mesh, mesh.halfedge_edges[walk]).sum() for walk in walks])
     keys = [key[mesh.tails[walk]].sum() for walk in walks]
     angles = corner_angles(mollify(edge_lengths(mesh.vertices, mesh.faces))[0])
@@ -189,59 +257,8 @@ def _manageable(mesh: TriangleMesh, shortest: float) -> tuple[BoolArray, list[In
         component = int(label[mesh.tails[walks[k][0]]])
         if component not in seen:
             seen.add(component)
-            is_kept[component] &= np.abs(quarters[mesh.tails[walks[k]]]).sum() <= MAX_CORNERS
+            is_jagged |= bool(np.abs(quarters[mesh.tails[walks[k]]]).sum() > MAX_CORNERS)
         elif is_kept[component]:
             holes += 1
-            filled += [walks[k]] if holes > MAX_HOLES or lengths[k] < shortest else []
-    if not is_kept.any():
-        raise GridError(
-            f"the boundary has more than {MAX_CORNERS} corners, too many for a grid: fill holes, or smooth it"
-        )
-    return is_kept[label[mesh.faces[:, 0]]], filled
-
-
-def with_rest(quads: QuadMesh, pieces: Sequence[TriangleMesh]) -> QuadMesh:
-    """Return quads of a surface, and three for each triangle of further pieces of it.
-
-    Pieces of many triangles are simplified before, to about twice the quads that their area needs, because these are
-    less regular. Long edges are split.
-    """
-    # Nothing of a component without area can be seen.
-    parts = [part for one in pieces for part, _, _ in one.split_components() if _area(part) > 0]
-    if not parts:
-        return quads
-    first = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    faces = np.concatenate([part.faces + start for part, start in zip(parts, first, strict=False)])
-    whole = TriangleMesh(np.concatenate([part.vertices for part in parts]), faces)
-    square = _area(quads.surface) / len(quads.quads)
-    count = int(2 * _area(whole) / square / 3)
-    small = coarse_mesh(whole, count)[0] if len(faces) > count else whole
-    while (is_long := lengths_along(small, np.arange(len(small.edges))) > 4 * np.sqrt(square)).any():
-        small = split_edges(small, is_long)
-    n, middles = len(small.vertices), small.halfedge_edges.reshape(-1, 3)
-    points = np.concatenate(
-        [small.vertices, small.vertices[small.edges].mean(axis=1), small.vertices[small.faces].mean(axis=1)]
-    )
-    centres = n + len(small.edges) + np.arange(len(small.faces))
-    corners = [
-        (small.faces[:, i], n + middles[:, i - 1], centres, n + middles[:, (i + 1) % 3]) for i in range(3)
-    ]
-    on, weights = TriangleTree(whole.vertices, whole.faces).nearest(points)
-    note = f"Made three quads of each triangle of {plural(len(parts), 'component')} without a grid."
-    surface = quads.surface
-    return replace(
-        quads,
-        vertices=np.concatenate(
-            [quads.vertices, np.einsum("qi,qix->qx", weights, whole.vertices[faces[on]])]
-        ),
-        quads=np.concatenate(
-            [quads.quads, *(len(quads.vertices) + np.stack(each, axis=1) for each in corners)]
-        ),
-        faces=np.concatenate([quads.faces, len(surface.faces) + on]),
-        barycentric=np.concatenate([quads.barycentric, weights]),
-        surface=TriangleMesh(
-            np.concatenate([surface.vertices, whole.vertices]),
-            np.concatenate([surface.faces, len(surface.vertices) + faces]),
-        ),
-        notes=(*quads.notes, note),
-    )
+            filled += [walks[k]] if holes > MAX_HOLES or lengths[k] < 4 * side else []
+    return is_kept[label[mesh.faces[:, 0]]], filled, is_jagged

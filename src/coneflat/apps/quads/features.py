@@ -68,7 +68,7 @@ def split_chords(mesh: TriangleMesh, ends: IntArray | None = None) -> tuple[Tria
     Straight sides of a boundary would degenerate the triangles at such edges. The same holds for features, given by
     their two vertices (k, 2).
     """
-    mesh = _without_pillows(mesh)
+    mesh = without_pillows(mesh)
     is_fixed = mesh.is_boundary_edge.copy()
     if ends is not None:
         is_fixed[edge_indices(mesh, ends)] = True
@@ -79,7 +79,7 @@ def split_chords(mesh: TriangleMesh, ends: IntArray | None = None) -> tuple[Tria
 
 def split_all(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     """Return a mesh with all edges split at their midpoints, and their number."""
-    mesh = _without_pillows(mesh)
+    mesh = without_pillows(mesh)
     return split_edges(mesh, np.ones(len(mesh.edges), dtype=bool)), len(mesh.edges)
 
 
@@ -88,7 +88,7 @@ def split_small_components(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
 
     On a sphere, a grid has at least eight cones.
     """
-    mesh, small = _without_pillows(mesh), 0
+    mesh, small = without_pillows(mesh), 0
     while True:
         count, label = label_faces(mesh.faces, len(mesh.vertices))
         is_small = np.bincount(label, minlength=count) < 60
@@ -107,7 +107,7 @@ def edge_indices(mesh: TriangleMesh, pairs: IntArray) -> IntArray:
     return order[np.searchsorted(keys[order], low * n + high)]
 
 
-def _without_pillows(mesh: TriangleMesh) -> TriangleMesh:
+def without_pillows(mesh: TriangleMesh) -> TriangleMesh:
     """Return a mesh in which faces with the same three vertices are split at their centroids.
 
     Splitting an edge of two such faces would join the new vertex and the third one by two edges.

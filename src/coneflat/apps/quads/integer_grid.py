@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeAlias
 
@@ -150,7 +150,6 @@ class GridSearch:
         boundary: the option of that name of `integer_grid`.
         options: the other options, those of the flattening.
         stages: the stopwatch.
-        missing: components for which no grid was found, in model units.
     """
 
     mesh: Source | Flattening
@@ -162,7 +161,6 @@ class GridSearch:
     boundary: Any
     options: Mapping[str, Any]
     stages: Stopwatch
-    missing: list[TriangleMesh] = field(default_factory=list)
 
     @classmethod
     def of(
@@ -175,7 +173,8 @@ class GridSearch:
             MeshError, MeshFileError: the mesh cannot be read.
         """
         o = read_options(own, QuadOptions)
-        length, sizes = (o.size, None) if isinstance(o.size, float) else (None, o.size)
+        # Lengths beyond the range of coordinates, whose squares would overflow, fail as those at its ends.
+        length, sizes = (min(max(o.size, 1e-75), 1e75), None) if isinstance(o.size, float) else (None, o.size)
         if o.quads is not None and length is not None:
             raise OptionError("quads and size must not be given together")
         boundary = options.get("boundary", "auto")
@@ -251,21 +250,19 @@ class GridSearch:
         areas = double_areas(edge_lengths(mesh.vertices, mesh.faces))
         of_face = scales[mesh.faces].mean(axis=1)
         size = self.size or grow * float(np.sqrt(areas.sum() / 2 / self.quads))
-        self.missing.clear()
         # Nothing of a component without area can be seen.
         for part, vertices, faces in (each for each in mesh.split_components() if areas[each[2]].any()):
             # The mean of the log scale on the component, relative to that on the whole mesh.
             mean = np.average(of_face[faces], weights=areas[faces]) - np.average(of_face, weights=areas)
             search = replace(
                 self,
-                mesh=Source(as_input(whole := part.moved_to(grow * part.vertices))),
+                mesh=Source(as_input(part.moved_to(grow * part.vertices))),
                 size=size * float(np.exp(-mean)),
                 sizes=None if self.sizes is None else np.exp(-scales[vertices]),
             )
             try:
                 found.append(search.with_more_cones())
             except (ConvergenceError, CurvatureError, GridError, MetricError, SeamError) as error:
-                self.missing.append(whole)
                 why.append(f"No grid for a component of {plural(len(part.faces), 'triangle')}: {error}.")
         if not found:
             raise GridError(f"no grid was found for any of {mesh.components[0]} components: {why[0]}")

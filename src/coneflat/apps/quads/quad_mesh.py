@@ -35,8 +35,8 @@ class QuadMesh:
         surface: the triangle mesh.
         notes: notes on the computation and on problems, one sentence each.
         seconds: wall time of each stage; not stored in files.
-        grid: the integer grid that the quads are extracted from, on a coarse mesh of a surface of many triangles; not
-            stored in files.
+        grid: the integer grid that the quads are extracted from, on a simpler mesh of a surface of many triangles,
+            holes or components; not stored in files.
         source: the file that the surface was read from, of which an .obj keeps materials and groups; not stored.
 
     Examples:

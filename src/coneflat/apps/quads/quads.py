@@ -12,7 +12,8 @@ from ... import Flattening
 from ...base import Stopwatch, plural
 from ...errors import OptionError
 from ...options import read_options
-from .coarse_input import coarse_input, with_rest
+from ...source import Source
+from .coarse_input import CoarseInput, coarse_input
 from .cross_field import sharp_ends
 from .extract import extract_quads, with_borders
 from .integer_grid import GridSearch
@@ -95,24 +96,32 @@ def quads(
             grid = search.grid()
     found = with_borders(found) if found.left_out else found
     features = grid.features
+    if small is None and search is not None and isinstance(search.mesh, Source):
+        has_all = found.surface.components[0] == search.checked.mesh.components[0]
+        small = None if has_all else CoarseInput.of(search)
     with stages("smooth"):
         if small is not None:
             found, features = small.moved(found), sharp_ends(small.given)
         found = smooth_quads(found, smooth, features)
         if smooth:
             found = untangled(found)
-        rest = () if small is None else small.rest
-        found = with_rest(found, [*rest, *([] if search is None else search.missing)])
+        found = found if small is None else small.completed(found)
     return replace(
         found,
-        notes=(*(() if small is None else small.notes), *grid.notes, *coarse, *found.notes, *_notes(found)),
+        notes=(
+            *(() if small is None else small.notes),
+            *grid.notes,
+            *coarse,
+            *found.notes,
+            *_notes(found, small),
+        ),
         seconds={**grid.seconds, **stages.seconds},
         grid=grid,
         source=source,
     )
 
 
-def _notes(found: QuadMesh) -> Iterator[str]:
+def _notes(found: QuadMesh, small: CoarseInput | None) -> Iterator[str]:
     """Yield a note for each problem of a quad mesh."""
     if found.left_out:
         share = 100 * found.area_left_out / (found.area_left_out + len(found.quads))
@@ -120,7 +129,10 @@ def _notes(found: QuadMesh) -> Iterator[str]:
             f"Left out {plural(found.left_out, 'square')} that the boundary cuts, {share:.1f} % of the area of the "
             "grid."
         )
-    if found.euler_characteristic != found.surface_euler:
+    covered = found.euler_characteristic - found.surface_euler
+    if covered > 0 and small is not None and small.is_filling.any():
+        yield f"Quads cover {plural(covered, 'hole')}."
+    elif covered:
         yield (
             f"The Euler characteristic of the quads is {found.euler_characteristic}, that of the "
             f"surface {found.surface_euler}: leaving out squares has opened or split the mesh."
