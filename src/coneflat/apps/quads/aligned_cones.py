@@ -156,9 +156,10 @@ class _Search:
             while True:
                 self.indices[plus[best]] += 1
                 self.indices[minus[best]] -= 1
+                # Few places are all compared again after each step.
                 change = self._changes(plus, minus, costs)
                 best = int(np.argmin(np.round(change, 6)))
-                if change[best] >= -MIN_GAIN:
+                if change[best] >= -MIN_GAIN or len(two) < SAMPLES // 2:
                     break
 
     def _best_steps(

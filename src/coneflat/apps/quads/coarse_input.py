@@ -14,6 +14,7 @@ from ... import Flattening, TriangleMesh
 from ...base import BoolArray, IntArray, mask_of, plural
 from ...geometry import angle_defect, coarse_mesh, corner_angles, double_areas, edge_lengths, mollify
 from ...io import as_input
+from ...layout import joined
 from ...mesh import NEXT, PREVIOUS, tie_key
 from ...options import declarations
 from ...source import Source
@@ -129,10 +130,7 @@ class CoarseInput:
         faces, (whole, _) = np.flatnonzero(is_bare[label]), _part(mesh, is_bare[label])
         side = max(self.side, float(np.sqrt(_area(whole) / MAX_SQUARES)))
         parts = [_simplified(part, side) for part, _, _ in whole.split_components()]
-        first = np.cumsum([0, *(len(part.vertices) for part in parts)])
-        joined = [part.faces + start for part, start in zip(parts, first, strict=False)]
-        small = TriangleMesh(np.concatenate([part.vertices for part in parts]), np.concatenate(joined))
-        small = without_pillows(small)
+        small = without_pillows(joined(parts, np.cumsum([0, *(len(part.vertices) for part in parts)])))
         while (is_long := lengths_along(small, np.arange(len(small.edges))) > 4 * side).any():
             small = split_edges(small, is_long)
         n, middles = len(small.vertices), small.halfedge_edges.reshape(-1, 3)
@@ -202,12 +200,12 @@ def coarse_input(search: GridSearch) -> tuple[GridSearch, CoarseInput | None]:
 
 
 def _side(search: GridSearch) -> float:
-    """Return the wanted edge length of quads on the checked mesh, within a range that squares do not exceed."""
+    """Return the wanted edge length of quads on the checked mesh; its square does not underflow."""
     if search.size is None:
         wanted = np.sqrt(_area(search.checked.mesh) / search.quads)
     else:
         wanted = np.ldexp(search.size, search.checked.exponent)
-    return float(np.clip(wanted, 1e-150, 1e150))
+    return max(float(wanted), 1e-150)
 
 
 def _simplified(mesh: TriangleMesh, side: float) -> TriangleMesh:

@@ -372,7 +372,9 @@ class GridSearch:
             layout = aligned(result, self.quads, self.size, self._angle)
             sided, note = with_sides(layout) if is_straight else layout, ""
             if sharp_lines or self.sharp_angle is not None:
-                found, note = self._with_lines(sided)
+                found, note = grid_with_lines(
+                    split_between_nodes(sided)[0], self._angle, self.sharp_angle is not None, self.energy
+                )
                 if found is not None:
                     return with_note(found, note)
             # Rather than many more squares than wanted, a grid with other cones is searched.
@@ -383,11 +385,6 @@ class GridSearch:
     def _angle(self) -> float:
         """The dihedral angle above which edges are sharp."""
         return SHARP_ANGLE if self.sharp_angle is None else self.sharp_angle
-
-    def _with_lines(self, layout: GridLayout) -> tuple[IntegerGrid | None, str]:
-        """Return a grid with sharp edges on grid lines, or None, and a note on required ones that are not, or ""."""
-        layout, _ = split_between_nodes(layout)
-        return grid_with_lines(layout, self._angle, self.sharp_angle is not None, self.energy)
 
     def _with_sides(self, layout: GridLayout, sided: GridLayout, all_sides: bool, most: int) -> IntegerGrid:
         """Return a grid with the sides of a layout on grid lines, or without some if these are not required.

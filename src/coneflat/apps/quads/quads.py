@@ -62,7 +62,9 @@ def quads(
         ((9, 4), (16, 3))
     """
     own = {"quads": quads, "size": size, "stretch": stretch, "sharp_angle": sharp_angle, "smooth": smooth}
-    small, search, source, more, coarse = None, None, None, list[float](), tuple[str, ...]()
+    small, search, source, coarse = None, None, None, tuple[str, ...]()
+    # With the fewest cones, which need the least room, and with more quads: options, and the factor of their number.
+    retries: list[tuple[dict[str, Any], float]] = [({}, 1.6), ({}, 1.6)]
     if isinstance(mesh, IntegerGrid):
         if any(one is not None for one in (faces, quads, size, sharp_angle)) or options.keys() - {"progress"}:
             raise OptionError("a grid already has faces, size and options: no others can be given")
@@ -72,27 +74,28 @@ def quads(
         search = GridSearch.of(mesh, faces, own, options)
         is_fixed = isinstance(mesh, Flattening) or bool(options.keys() & {"cones", "distortion"})
         is_fixed |= search.sizes is not None or sharp_angle is not None
-        stages, more = search.stages, [*([] if is_fixed else [1.0]), 1.6, 1.6]
+        if not is_fixed:
+            retries.insert(0, ({"cones": "sparse", "distortion": 2 * DISTORTION}, 1.0))
+        stages = search.stages
         source = mesh.source if isinstance(mesh, Flattening) else search.source.given.source
         with stages("coarsen"):
             search, small = coarse_input(search)
         grid = search.grid()
-    # Where the surface is as thin as a square, quads have a vertex twice. Then the fewest cones are tried, which need
-    # the least room, then more quads. If that does not help, these quads are left out.
+    # Where the surface is as thin as a square, quads have a vertex twice. If no retry helps, they are left out.
     while True:
         stages.done = 1.0
         try:
             with stages("extract"):
-                found = extract_quads(grid, leave_out=search is not None and not more)
+                found = extract_quads(grid, leave_out=search is not None and not retries)
             break
         except CoarseGridError:
-            if search is None or not more:
+            if search is None or not retries:
                 raise
             coarse = ("More quads than wanted: with fewer, some have a vertex or an edge twice.",)
-            if more[0] == 1.0:
-                sparse = {"cones": "sparse", "distortion": 2 * DISTORTION}
-                search = replace(search, options={**search.options, **sparse})
-            search = replace(search, quads=more.pop(0) * grid.squares, size=None)
+            other, finer = retries.pop(0)
+            search = replace(
+                search, options={**search.options, **other}, quads=finer * grid.squares, size=None
+            )
             grid = search.grid()
     found = with_borders(found) if found.left_out else found
     features = grid.features
