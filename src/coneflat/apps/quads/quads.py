@@ -13,13 +13,13 @@ from ...base import Stopwatch, plural
 from ...errors import OptionError
 from ...options import read_options
 from ...source import Source
-from .coarse_input import CoarseInput, coarse_input
 from .cross_field import sharp_ends
 from .extract import extract_quads, with_borders
 from .integer_grid import GridSearch
 from .integer_map import IntegerGrid
 from .options import DISTORTION, QuadOptions
 from .quad_mesh import CoarseGridError, QuadMesh, least_jacobians
+from .simpler_mesh import SimplerMesh, simplified
 from .smooth import smooth_quads, untangled
 
 
@@ -79,7 +79,7 @@ def quads(
         stages = search.stages
         source = mesh.source if isinstance(mesh, Flattening) else search.source.given.source
         with stages("coarsen"):
-            search, small = coarse_input(search)
+            search, small = simplified(search)
         grid = search.grid()
     # Where the surface is as thin as a square, quads have a vertex twice. If no retry helps, they are left out.
     while True:
@@ -101,7 +101,7 @@ def quads(
     features = grid.features
     if small is None and search is not None and isinstance(search.mesh, Source):
         has_all = found.surface.components[0] == search.checked.mesh.components[0]
-        small = None if has_all else CoarseInput.of(search)
+        small = None if has_all else SimplerMesh.of(search)
     with stages("smooth"):
         if small is not None:
             found, features = small.moved(found), sharp_ends(small.given)
@@ -124,7 +124,7 @@ def quads(
     )
 
 
-def _notes(found: QuadMesh, small: CoarseInput | None) -> Iterator[str]:
+def _notes(found: QuadMesh, small: SimplerMesh | None) -> Iterator[str]:
     """Yield a note for each problem of a quad mesh."""
     if found.left_out:
         share = 100 * found.area_left_out / (found.area_left_out + len(found.quads))

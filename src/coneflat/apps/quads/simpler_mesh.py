@@ -35,7 +35,7 @@ MAX_COMPONENTS, MAX_HOLES, MAX_CORNERS = 64, 32, 400
 
 
 @dataclass(frozen=True, eq=False)
-class CoarseInput:
+class SimplerMesh:
     """A simpler mesh of a surface.
 
     Attributes:
@@ -55,7 +55,7 @@ class CoarseInput:
     notes: tuple[str, ...] = ()
 
     @classmethod
-    def of(cls, search: GridSearch) -> CoarseInput:
+    def of(cls, search: GridSearch) -> SimplerMesh:
         """Return the mesh of a search itself."""
         checked, mesh = search.checked, search.checked.mesh
         mesh = mesh.moved_to(np.ldexp(mesh.vertices, -checked.exponent))
@@ -129,7 +129,7 @@ class CoarseInput:
             return quads
         faces, (whole, _) = np.flatnonzero(is_bare[label]), _part(mesh, is_bare[label])
         side = max(self.side, float(np.sqrt(_area(whole) / MAX_SQUARES)))
-        parts = [_simplified(part, side) for part, _, _ in whole.split_components()]
+        parts = [_few_triangles(part, side) for part, _, _ in whole.split_components()]
         small = without_pillows(joined(parts, np.cumsum([0, *(len(part.vertices) for part in parts)])))
         while (is_long := lengths_along(small, np.arange(len(small.edges))) > 4 * side).any():
             small = split_edges(small, is_long)
@@ -155,7 +155,7 @@ class CoarseInput:
         )
 
 
-def coarse_input(search: GridSearch) -> tuple[GridSearch, CoarseInput | None]:
+def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
     """Return the search for the grid of a simpler mesh, and this mesh.
 
     The search is the given one if its options name vertices, or if the mesh has few triangles, holes and components.
@@ -192,7 +192,7 @@ def coarse_input(search: GridSearch) -> tuple[GridSearch, CoarseInput | None]:
         notes.append(
             f"Filled {plural(len(loops), 'hole')}, smaller than a quad or beyond the {MAX_HOLES} longest."
         )
-    own, whole = kept[some[some < len(kept)]], CoarseInput.of(search)
+    own, whole = kept[some[some < len(kept)]], SimplerMesh.of(search)
     sizes = None if search.scales is None else np.exp(extended(-search.scales[own], simple))
     simple = simple.moved_to(np.ldexp(simple.vertices, -checked.exponent))
     search = replace(search, mesh=Source(as_input(simple)), sizes=sizes, quads=quads)
@@ -208,7 +208,7 @@ def _side(search: GridSearch) -> float:
     return max(float(wanted), 1e-150)
 
 
-def _simplified(mesh: TriangleMesh, side: float) -> TriangleMesh:
+def _few_triangles(mesh: TriangleMesh, side: float) -> TriangleMesh:
     """Return a mesh of 16 triangles or more, for about twice the quads that its area needs: they are less regular."""
     count = max(16, int(2 * _area(mesh) / side**2 / 3))
     return coarse_mesh(mesh, count)[0] if len(mesh.faces) > count else mesh

@@ -10,10 +10,10 @@ from scipy.sparse.csgraph import connected_components
 
 import coneflat
 from coneflat import check_mesh
-from coneflat.apps.quads import coarse_input as module
-from coneflat.apps.quads.coarse_input import coarse_input
+from coneflat.apps.quads import simpler_mesh as module
 from coneflat.apps.quads.cross_field import SHARP_ANGLE, sharp_ends
 from coneflat.apps.quads.integer_grid import GridSearch
+from coneflat.apps.quads.simpler_mesh import simplified
 from coneflat.errors import GridError
 
 
@@ -82,15 +82,15 @@ def test_creases_are_kept(coarser):
 def test_options_for_which_the_given_mesh_is_used(coarser, options):
     vertices, faces = MODELS["ball"]()
     own = {"quads": 300, **{name: options.pop(name) for name in ("quads", "sharp_angle") if name in options}}
-    assert coarse_input(GridSearch.of(vertices, faces, {"quads": 300}, {}))[1] is not None
+    assert simplified(GridSearch.of(vertices, faces, {"quads": 300}, {}))[1] is not None
     search = GridSearch.of(vertices, faces, own, options)
-    assert coarse_input(search) == (search, None)
+    assert simplified(search) == (search, None)
 
 
 def test_sizes_are_those_of_the_given_mesh(coarser):
     vertices, faces = MODELS["ball"]()
     sizes = np.linspace(1, 2, len(vertices))
-    search, small = coarse_input(GridSearch.of(vertices, faces, {"quads": 300, "size": sizes}, {}))
+    search, small = simplified(GridSearch.of(vertices, faces, {"quads": 300, "size": sizes}, {}))
     np.testing.assert_allclose(search.sizes, sizes[small.kept])
     np.testing.assert_array_equal(small.mesh.vertices, vertices[small.kept])
 
