@@ -35,10 +35,12 @@ class Effort:
     Attributes:
         columns: minimum number of columns of the grid.
         tries: number of changes that are tried.
+        most: largest side that is of use; the search ends after a third of the tries if it is not reached.
     """
 
     columns: int = 400
     tries: int = 150
+    most: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,21 +251,20 @@ def pack(
                 "them: use less padding, a higher resolution or more tiles"
             )
     last, least, step, work = best, int(longest / masks.cell) + 1, width // 16, 0
-    for _ in range(effort.tries):
-        goal = max(width - step, least)
-        if goal >= width or work > MAX_WORK:
+    wanted = int(min(effort.most / masks.cell, width)) + 1
+    for tried in range(effort.tries):
+        goal = max(min(width - step, wanted), least)
+        if goal >= width or work > MAX_WORK or (width > wanted and tried > effort.tries // 3):
             break
         check_cancelled()
-        limit = goal + goal // 4
-        if last is best:
-            found = fill(best.plan, goal, limit)
-        else:
-            found = fill(_changed(last.plan, start.allowed, rng), goal, min(last.height, limit))
+        limit = goal + goal // 4 if last is best else min(last.height, goal + goal // 4)
+        plan = best.plan if last is best else _changed(last.plan, start.allowed, rng)
+        found = fill(plan, goal, limit)
         work += found.work
         if found.height <= goal:
             best, last, width = found, found, goal
             step = max(1, min((goal - found.height) // 2, goal // 16))
-        elif step > 1:
+        elif step > 1 and width <= wanted:
             step //= 2
         elif last is best or found.height <= last.height:
             last = found

@@ -8,7 +8,7 @@ places of a chart's border that are close to each other, compared with the area 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -30,7 +30,7 @@ MIN_PIECE, MAX_CHARTS = 0.02, 32
 # Points of a border between which cuts are searched. Cuts whose ends are closer than MIN_SEPARATION of it are alike.
 SAMPLES, MIN_SEPARATION = 96, 0.06
 # Cuts tried per set of charts, sets continued per step, and steps without a gain after which the search ends.
-TRIED, CONTINUED, PATIENCE = 10, 2, 2
+TRIED, CONTINUED, PATIENCE = 6, 2, 2
 QUICK = Effort(columns=128, tries=12)
 
 
@@ -300,10 +300,9 @@ def _largest_charts(
 
 def _search(charts: Sequence[_Piece], area: float, budget: float, gap: float) -> _State:
     """Return the pieces of charts with the largest value; their cuts cost at most `budget`."""
-    covered = _covered([one.shape for one in charts], area, gap)
-    best = _State(tuple(charts), 0.0, covered)
+    best = _State(tuple(charts), 0.0, _covered([one.shape for one in charts], area, gap))
     states, without_gain = [best], 0
-    while without_gain < PATIENCE:
+    while states and without_gain < PATIENCE:
         check_cancelled()
         tried: list[tuple[float, float, _State, _Cut]] = []
         for state in states:
@@ -312,24 +311,27 @@ def _search(charts: Sequence[_Piece], area: float, budget: float, gap: float) ->
                 cost = state.cost + cut.cost
                 if any(abs(cost - known) <= 1e-9 * cost for _, known, *_ in tried):  # in another order
                     continue
+                price = PRICE * cost / area**0.5
                 shapes = [one.shape for one in state.pieces if one is not cut.piece]
-                covered = _covered([*shapes, *cut.shapes], area, gap)
-                tried.append((covered - PRICE * cost / area**0.5, cost, state, cut))
-        tried.sort(key=lambda one: -one[0])
+                needed = price + tried[CONTINUED - 1][0] if len(tried) >= CONTINUED else 0.0
+                covered = _covered([*shapes, *cut.shapes], area, gap, needed)
+                tried.append((covered - price, cost, state, cut))
+                tried.sort(key=lambda one: -one[0])
         states = [
             _State((*(one for one in state.pieces if one is not cut.piece), *cut.pieces), cost, value)
             for value, cost, state, cut in tried[:CONTINUED]
         ]
-        if not states:
-            break
         without_gain += 1
-        if states[0].value > best.value:
+        if states and states[0].value > best.value:
             best, without_gain = states[0], 0
     return best
 
 
-def _covered(shapes: Sequence[_Shape], area: float, gap: float) -> float:
-    """Return about the fraction of a square that shapes of a total area cover; 0 if the gap leaves no space."""
+def _covered(shapes: Sequence[_Shape], area: float, gap: float, needed: float = 0.0) -> float:
+    """Return about the fraction of a square that shapes of a total area cover; 0 if the gap leaves no space.
+
+    A fraction that is below the needed one may be too small.
+    """
     if len(shapes) == 1:
         points = shapes[0].sides.ravel()
         points = points * np.exp(1j * square_angle(points, np.empty(0)))
@@ -338,8 +340,9 @@ def _covered(shapes: Sequence[_Shape], area: float, gap: float) -> float:
     start = np.cumsum([0, *(len(one.sides) for one in shapes)])
     outlines = Outlines(np.concatenate([one.sides for one in shapes]), start)
     angles = np.tile(np.arange(0, 2 * np.pi, np.pi / 4), (len(shapes), 1))
+    effort = replace(QUICK, most=(area / max(needed, 1e-9)) ** 0.5)
     try:
-        found = pack(outlines, area, angles, np.ones(angles.shape, dtype=bool), gap, 1, QUICK)
+        found = pack(outlines, area, angles, np.ones(angles.shape, dtype=bool), gap, 1, effort)
     except OptionError:
         return 0.0
     return area / found.side**2
