@@ -162,6 +162,7 @@ def _angles_by_log_lengths(mesh: TriangleMesh, lengths: FloatArray) -> csc_matri
         j, k = (i + 1) % 3, (i + 2) % 3
         rows += [corners[:, i]] * 3
         columns += [edges[:, i], edges[:, j], edges[:, k]]
-        values += [cots[:, j] + cots[:, k], -cots[:, k], -cots[:, j]]
+        with np.errstate(invalid="ignore"):  # triangles without area
+            values += [cots[:, j] + cots[:, k], -cots[:, k], -cots[:, j]]
     shape = (3 * len(mesh.faces), len(mesh.edges))
     return csc_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)

@@ -48,6 +48,9 @@ MAX_CHORDS = 0.05
 # Options that only the search for the fewest cones takes into account.
 SPARSE_OPTIONS = (*SEARCH_OPTIONS, "max_cones", "lengths")
 
+# Errors for which another grid is searched.
+NO_GRID = (ConvergenceError, CurvatureError, GridError, MetricError, SeamError)
+
 Split: TypeAlias = Callable[[TriangleMesh], tuple[TriangleMesh, int]]
 # How a mesh is split where flattening it fails, a note, and the noun for the number of splits.
 FEW_VERTICES = (
@@ -198,7 +201,7 @@ class GridSearch:
         return replace(found, seconds=dict(self.stages.seconds))
 
     def with_more_cones(self) -> IntegerGrid:
-        """Return a grid, with less distortion if there is none as given.
+        """Return a grid, with the fewest cones for less distortion if there is none as given.
 
         Where few cones leave rotations around handles far from quarter turns, more cones help.
         """
@@ -212,7 +215,7 @@ class GridSearch:
         less = 0.7 * given.get("distortion", DISTORTION)
         search = replace(self, options={**given, "distortion": less})
         note = f"With a distortion above {less:.3g}, no grid was found."
-        return with_note(search._as_given(), note)
+        return with_note(search._of_flattening(self._boundary_without_sides), note)
 
     def _as_given(self) -> IntegerGrid:
         """Return a grid for the options as given."""
@@ -224,16 +227,16 @@ class GridSearch:
             return self._with_fewest_cones()
         if self.checked.mesh.components[0] > 1:
             return self._of_components()
-        what = "sharp edges or curvature" if self.sizes is None else "sharp edges, curvature or wanted sizes"
+        what = "boundary, sharp edges or curvature" + ", nor wanted sizes" * (self.sizes is not None)
         for is_finer in (False, True):
             try:
                 return self._of_aligned_cones(is_finer)
-            except (ConvergenceError, CurvatureError, GridError, MetricError, SeamError) as error:
+            except NO_GRID as error:
                 note = f"Quads follow no {what}, because no grid with such cones was found: {error}."
             # Meshes of more triangles have places enough for cones.
             if 2 * len(self.checked.mesh.faces) > COARSE:
                 break
-        return with_note(self._with_fewest_cones(), note)
+        return with_note(self._of_flattening(self._boundary_without_sides), note)
 
     def _of_components(self) -> IntegerGrid:
         """Return the grid of the components, each with a search of its own.
@@ -262,7 +265,7 @@ class GridSearch:
             )
             try:
                 found.append(search.with_more_cones())
-            except (ConvergenceError, CurvatureError, GridError, MetricError, SeamError) as error:
+            except NO_GRID as error:
                 why.append(f"No grid for a component of {plural(len(part.faces), 'triangle')}: {error}.")
         if not found:
             raise GridError(f"no grid was found for any of {mesh.components[0]} components: {why[0]}")
@@ -311,16 +314,18 @@ class GridSearch:
 
     def _with_fewest_cones(self) -> IntegerGrid:
         """Return a grid with the fewest cones."""
-        if self.boundary != "auto":
-            return self._of_flattening(self.boundary)
-        may_be_straight = isinstance(self.options.get("cones", "auto"), str)
+        may_be_straight = self.boundary == "auto" and isinstance(self.options.get("cones", "auto"), str)
         if not (may_be_straight and self.checked.mesh.is_boundary_edge.any()):
-            return self._of_flattening("free")
+            return self._of_flattening(self._boundary_without_sides)
         try:
             return self._of_flattening("straight", all_sides=True)
         except (CurvatureError, MetricError) as error:
             why = f"The boundary cuts squares, because no grid with the boundary on grid lines was found: {error}."
         return with_note(self._of_flattening("free"), why)
+
+    @property
+    def _boundary_without_sides(self) -> Any:
+        return "free" if self.boundary == "auto" else self.boundary
 
     @property
     def checked(self) -> CheckedMesh:

@@ -15,7 +15,7 @@ from ...options import read_options
 from ...source import Source
 from .cross_field import sharp_ends
 from .extract import extract_quads, with_borders
-from .integer_grid import GridSearch
+from .integer_grid import NO_GRID, GridSearch
 from .integer_map import IntegerGrid
 from .options import DISTORTION, QuadOptions
 from .quad_mesh import CoarseGridError, QuadMesh, least_jacobians
@@ -91,12 +91,15 @@ def quads(
         except CoarseGridError:
             if search is None or not retries:
                 raise
-            coarse = ("More quads than wanted: with fewer, some have a vertex or an edge twice.",)
             other, finer = retries.pop(0)
             search = replace(
                 search, options={**search.options, **other}, quads=finer * grid.squares, size=None
             )
-            grid = search.grid()
+            try:
+                grid = search.grid()
+                coarse = ("More quads than wanted: with fewer, some have a vertex or an edge twice.",)
+            except NO_GRID:
+                retries.clear()
     found = with_borders(found) if found.left_out else found
     features = grid.features
     if small is None and search is not None and isinstance(search.mesh, Source):
