@@ -74,13 +74,13 @@ def split_chords(mesh: TriangleMesh, ends: IntArray | None = None) -> tuple[Tria
         is_fixed[edge_indices(mesh, ends)] = True
     on = mask_of(len(mesh.vertices), mesh.edges[is_fixed])
     chords = on[mesh.edges].all(axis=1) & ~is_fixed
-    return split_edges(mesh, chords), int(chords.sum())
+    return split_edges(mesh, chords)[0], int(chords.sum())
 
 
 def split_all(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     """Return a mesh with all edges split at their midpoints, and their number."""
     mesh = without_pillows(mesh)
-    return split_edges(mesh, np.ones(len(mesh.edges), dtype=bool)), len(mesh.edges)
+    return split_edges(mesh, np.ones(len(mesh.edges), dtype=bool))[0], len(mesh.edges)
 
 
 def split_small_components(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
@@ -95,7 +95,7 @@ def split_small_components(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
         small = small or int(is_small.sum())
         if not is_small.any():
             return mesh, small
-        mesh = split_edges(mesh, is_small[label[mesh.edge_faces[:, 0]]])
+        mesh = split_edges(mesh, is_small[label[mesh.edge_faces[:, 0]]])[0]
 
 
 def edge_indices(mesh: TriangleMesh, pairs: IntArray) -> IntArray:
@@ -122,8 +122,8 @@ def without_pillows(mesh: TriangleMesh) -> TriangleMesh:
     return TriangleMesh(points, np.concatenate([faces[~paired], *fans]))
 
 
-def split_edges(mesh: TriangleMesh, marked: BoolArray) -> TriangleMesh:
-    """Return a mesh with marked edges (e,) split at their midpoints.
+def split_edges(mesh: TriangleMesh, marked: BoolArray) -> tuple[TriangleMesh, IntArray]:
+    """Return a mesh with marked edges (e,) split at their midpoints, and (t,) the triangle here of each of its own.
 
     The choice among edges of equal length does not depend on the numbering.
     """
@@ -131,7 +131,7 @@ def split_edges(mesh: TriangleMesh, marked: BoolArray) -> TriangleMesh:
     key = tie_key(mesh.vertices)[mesh.edges].sum(axis=1)
     rounded = np.round(lengths / lengths.max(initial=1e-300), 9)
     rank = np.argsort(np.lexsort((key, rounded)))
-    return split_longest(mesh, marked, rank[mesh.halfedge_edges.reshape(-1, 3)])[0]
+    return split_longest(mesh, marked, rank[mesh.halfedge_edges.reshape(-1, 3)])[:2]
 
 
 def split_longest(

@@ -32,6 +32,10 @@ from .smooth import is_on_feature
 # Largest numbers of components, of holes, and of corners of the longest boundary, for which grids are found in some
 # seconds.
 MAX_COMPONENTS, MAX_HOLES, MAX_CORNERS = 64, 32, 400
+# A triangle is thin if its area is less than THIN times that of one of equal sides. If more than MAX_THIN_SHARE of them are thin, as in
+# files of CAD programs, few grids are found, so the surface is triangulated anew: in ROUNDS, with edges of at most
+# LONGEST times the root of the mean area, and so many triangles per quad, but not fewer than MIN_RESHAPED.
+THIN, MAX_THIN_SHARE, ROUNDS, LONGEST, TRIANGLES_PER_QUAD, MIN_RESHAPED = 0.1, 0.1, 4, 3.0, 4, 4_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +136,7 @@ class SimplerMesh:
         parts = [_few_triangles(part, side) for part, _, _ in whole.split_components()]
         small = without_pillows(joined(parts, np.cumsum([0, *(len(part.vertices) for part in parts)])))
         while (is_long := lengths_along(small, np.arange(len(small.edges))) > 4 * side).any():
-            small = split_edges(small, is_long)
+            small = split_edges(small, is_long)[0]
         n, middles = len(small.vertices), small.halfedge_edges.reshape(-1, 3)
         points = [small.vertices, *(small.vertices[ends].mean(axis=1) for ends in (small.edges, small.faces))]
         centres = n + len(small.edges) + np.arange(len(small.faces))
@@ -184,7 +188,9 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
     if is_freed:
         search = replace(search, boundary="free")
         notes.append(f"The boundary cuts squares, because it has more than {MAX_CORNERS} corners.")
-    if len(filled.faces) > 2 * count:
+    if _is_thin(filled).mean() > MAX_THIN_SHARE and len(without_pillows(filled).faces) == len(of):
+        simple, some, of = _reshaped(filled, int(np.clip(TRIANGLES_PER_QUAD * quads, MIN_RESHAPED, count)))
+    elif len(filled.faces) > 2 * count:
         simple, some, of = coarse_mesh(filled, int(count))
     elif is_kept.all() and not (loops or is_freed):
         return search, None
@@ -197,6 +203,36 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
     simple = simple.moved_to(np.ldexp(simple.vertices, -checked.exponent))
     search = replace(search, mesh=Source(as_input(simple)), sizes=sizes, quads=quads)
     return search, replace(whole, mesh=simple, kept=own, is_filling=of >= len(part.faces), notes=tuple(notes))
+
+
+def _is_thin(mesh: TriangleMesh) -> BoolArray:
+    """Return (m,) whether the areas of triangles are small compared with those of equal sides of this length."""
+    lengths = edge_lengths(mesh.vertices, mesh.faces)
+    return 2 * double_areas(lengths) <= THIN * 3**0.5 * (lengths**2).sum(axis=1)
+
+
+def _reshaped(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntArray, IntArray]:
+    """Return a mesh of about `count` triangles that are less thin, and its vertices (k,) and triangles here.
+
+    Long edges are split, and edges collapse; then so do the longest edges of thin triangles. New vertices come last,
+    with an index beyond those of the mesh. The mesh itself is returned if no round leaves a smaller share of thin ones.
+    """
+    n, longest = len(mesh.vertices), LONGEST * (_area(mesh) / count) ** 0.5
+    new, some, of = best = mesh, np.arange(n), np.arange(len(mesh.faces))
+    for step in range(ROUNDS):
+        thin = np.flatnonzero(_is_thin(new) & (step > 0))
+        sides = lengths_along(new, new.halfedge_edges).reshape(-1, 3)[thin]
+        marked = mask_of(len(new.edges), new.halfedge_edges.reshape(-1, 3)[thin, sides.argmax(axis=1)])
+        while (marked := marked | (lengths_along(new, np.arange(len(new.edges))) > longest)).any():
+            new, own = split_edges(new, marked)
+            of, marked = of[own], np.zeros(len(new.edges), dtype=bool)
+        some = np.append(some, np.full(len(new.vertices) - len(some), n))
+        new, kept, own = coarse_mesh(new, count)
+        some, of = some[kept], of[own]
+        best = min(best, (new, some, of), key=lambda one: _is_thin(one[0]).mean())
+    new, some, of = best
+    order = np.argsort(some, kind="stable")
+    return TriangleMesh(new.vertices[order], np.argsort(order)[new.faces]), some[order], of
 
 
 def _side(search: GridSearch) -> float:
