@@ -154,7 +154,7 @@ def _angles_by_log_lengths(mesh: TriangleMesh, lengths: FloatArray) -> csc_matri
 
     It is cot b + cot c for the opposite side, and minus a cotangent for each of the other sides.
     """
-    cots = cotangents(lengths)
+    cots = np.clip(cotangents(lengths), -1e150, 1e150)  # finite also for triangles without area
     edges = mesh.halfedge_edges.reshape(-1, 3)
     corners = np.arange(3 * len(mesh.faces)).reshape(-1, 3)
     rows, columns, values = [], [], []
@@ -162,7 +162,6 @@ def _angles_by_log_lengths(mesh: TriangleMesh, lengths: FloatArray) -> csc_matri
         j, k = (i + 1) % 3, (i + 2) % 3
         rows += [corners[:, i]] * 3
         columns += [edges[:, i], edges[:, j], edges[:, k]]
-        with np.errstate(invalid="ignore"):  # triangles without area
-            values += [cots[:, j] + cots[:, k], -cots[:, k], -cots[:, j]]
+        values += [cots[:, j] + cots[:, k], -cots[:, k], -cots[:, j]]
     shape = (3 * len(mesh.faces), len(mesh.edges))
     return csc_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape)

@@ -77,24 +77,23 @@ def split_chords(mesh: TriangleMesh, ends: IntArray | None = None) -> tuple[Tria
     return split_edges(mesh, chords)[0], int(chords.sum())
 
 
-def split_all(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
-    """Return a mesh with all edges split at their midpoints, and their number."""
+def split_all(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a mesh with all edges split at their midpoints."""
     mesh = without_pillows(mesh)
-    return split_edges(mesh, np.ones(len(mesh.edges), dtype=bool))[0], len(mesh.edges)
+    return split_edges(mesh, np.ones(len(mesh.edges), dtype=bool))[0]
 
 
-def split_small_components(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
-    """Return a mesh with at least 60 triangles in each component, by splitting edges, and how many were smaller.
+def split_small_components(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a mesh with at least 60 triangles in each component, by splitting edges.
 
     On a sphere, a grid has at least eight cones.
     """
-    mesh, small = without_pillows(mesh), 0
+    mesh = without_pillows(mesh)
     while True:
         count, label = label_faces(mesh.faces, len(mesh.vertices))
         is_small = np.bincount(label, minlength=count) < 60
-        small = small or int(is_small.sum())
         if not is_small.any():
-            return mesh, small
+            return mesh
         mesh = split_edges(mesh, is_small[label[mesh.edge_faces[:, 0]]])[0]
 
 

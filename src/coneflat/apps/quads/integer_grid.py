@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ... import Flattening, TriangleMesh, flatten
+from ... import Flattening, flatten
 from ...base import THREADS, FloatArray, Stopwatch, limit_threads, plural
 from ...errors import ConvergenceError, CurvatureError, GridError, MetricError, OptionError, SeamError
 from ...flatten import flatten_source
@@ -50,20 +50,6 @@ SPARSE_OPTIONS = (*SEARCH_OPTIONS, "max_cones", "lengths")
 
 # Errors for which another grid is searched.
 NO_GRID = (ConvergenceError, CurvatureError, GridError, MetricError, SeamError)
-
-Split: TypeAlias = Callable[[TriangleMesh], tuple[TriangleMesh, int]]
-# How a mesh is split where flattening it fails, a note, and the noun for the number of splits.
-FEW_VERTICES = (
-    split_small_components,
-    "Split the triangles of {} with too few vertices for cones of a grid.",
-    "component",
-)
-EVERY = (split_all, "Split all {}, because no grid was found without.", "edge")
-CHORDS = (
-    split_chords,
-    "Split {} between boundary vertices, whose triangles straight sides degenerate.",
-    "edge",
-)
 
 
 def integer_grid(
@@ -284,10 +270,8 @@ class GridSearch:
         is_finer: split all edges, for more places for cones and smaller triangles between them.
         """
         checked, options = self.checked, read_options(self.options, QuadOptions)
-        mesh, notes = checked.mesh, list(checked.notes)
-        for split, note, noun in (*[EVERY] * is_finer, FEW_VERTICES, CHORDS):
-            mesh, count = split(mesh)
-            notes += [note.format(plural(count, noun))] if count else []
+        mesh = split_all(checked.mesh) if is_finer else checked.mesh
+        mesh, _ = split_chords(split_small_components(mesh))
         finer, count = split_chords(mesh, sharp_ends(mesh, self._angle))
         # On coarse meshes these are most edges, and their triangles would get thin.
         mesh = finer if count < MAX_CHORDS * len(mesh.edges) else mesh
@@ -309,7 +293,7 @@ class GridSearch:
         with self.stages("flatten"):
             vertices = np.ldexp(mesh.vertices, -checked.exponent)
             result = flatten(vertices, mesh.faces, **given)
-        grid = self._with_notes(replace(result, notes=(*notes, *result.notes)), True, True)
+        grid = self._with_notes(replace(result, notes=(*checked.notes, *result.notes)), True, True)
         return grid if self.scales is None else with_note(grid, note_on_sizes(grid, self.scales))
 
     def _with_fewest_cones(self) -> IntegerGrid:
@@ -378,7 +362,7 @@ class GridSearch:
             sided, note = with_sides(layout) if is_straight else layout, ""
             if sharp_lines or self.sharp_angle is not None:
                 found, note = grid_with_lines(
-                    split_between_nodes(sided)[0], self._angle, self.sharp_angle is not None, self.energy
+                    split_between_nodes(sided), self._angle, self.sharp_angle is not None, self.energy
                 )
                 if found is not None:
                     return with_note(found, note)

@@ -31,20 +31,16 @@ def grid_of(layout: GridLayout, energy: StretchEnergy, most: int) -> IntegerGrid
     Raises:
         GridError: no grid was found.
     """
-    layout, split = split_between_nodes(layout)
-    found = grid_about(find_rounding(layout), energy, most)
-    if split:
-        found = with_note(
-            found,
-            f"Split {plural(split, 'edge')} between cones, so that no triangle has grid points at all corners.",
-        )
-    return found
+    return grid_about(find_rounding(split_between_nodes(layout)), energy, most)
 
 
-def split_between_nodes(layout: GridLayout) -> tuple[GridLayout, int]:
-    """Return a layout with the edges between vertices on grid points split, and their number."""
+def split_between_nodes(layout: GridLayout) -> GridLayout:
+    """Return a layout with the edges between vertices on grid points split.
+
+    Otherwise triangles may have grid points at all corners.
+    """
     is_split = between_nodes(layout)
-    return (split_edges(layout, is_split) if is_split.any() else layout), int(is_split.sum())
+    return split_edges(layout, is_split) if is_split.any() else layout
 
 
 def grid_about(rounding: Rounding, energy: StretchEnergy, most: int) -> IntegerGrid:

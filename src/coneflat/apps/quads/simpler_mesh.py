@@ -32,10 +32,9 @@ from .smooth import is_on_feature
 # Largest numbers of components, of holes, and of corners of the longest boundary, for which grids are found in some
 # seconds.
 MAX_COMPONENTS, MAX_HOLES, MAX_CORNERS = 64, 32, 400
-# A triangle is thin if its area is less than THIN times that of one of equal sides. If more than MAX_THIN_SHARE of them are thin, as in
-# files of CAD programs, few grids are found, so the surface is triangulated anew: in ROUNDS, with edges of at most
-# LONGEST times the root of the mean area, and so many triangles per quad, but not fewer than MIN_RESHAPED.
-THIN, MAX_THIN_SHARE, ROUNDS, LONGEST, TRIANGLES_PER_QUAD, MIN_RESHAPED = 0.1, 0.1, 4, 3.0, 4, 4_000
+# A triangle is thin if its area is less than THIN times that of one with equal sides. If more than this share of them
+# is, as in files of CAD programs, few grids are found, so the surface is triangulated anew.
+THIN = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,8 +187,8 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
     if is_freed:
         search = replace(search, boundary="free")
         notes.append(f"The boundary cuts squares, because it has more than {MAX_CORNERS} corners.")
-    if _is_thin(filled).mean() > MAX_THIN_SHARE and len(without_pillows(filled).faces) == len(of):
-        simple, some, of = _reshaped(filled, int(np.clip(TRIANGLES_PER_QUAD * quads, MIN_RESHAPED, count)))
+    if _is_thin(filled).mean() > THIN and len(without_pillows(filled).faces) == len(of):
+        simple, some, of = _reshaped(filled, int(np.clip(4 * quads, COARSE // 6, count)))
     elif len(filled.faces) > 2 * count:
         simple, some, of = coarse_mesh(filled, int(count))
     elif is_kept.all() and not (loops or is_freed):
@@ -214,12 +213,13 @@ def _is_thin(mesh: TriangleMesh) -> BoolArray:
 def _reshaped(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntArray, IntArray]:
     """Return a mesh of about `count` triangles that are less thin, and its vertices (k,) and triangles here.
 
-    Long edges are split, and edges collapse; then so do the longest edges of thin triangles. New vertices come last,
-    with an index beyond those of the mesh. The mesh itself is returned if no round leaves a smaller share of thin ones.
+    Edges longer than three times the root of the mean area are split, and edges collapse; then so do the longest edges
+    of thin triangles, three times. New vertices come last, with an index beyond those of the mesh. Of the mesh and all
+    rounds, that with the smallest share of thin triangles is returned.
     """
-    n, longest = len(mesh.vertices), LONGEST * (_area(mesh) / count) ** 0.5
+    n, longest = len(mesh.vertices), 3 * (_area(mesh) / count) ** 0.5
     new, some, of = best = mesh, np.arange(n), np.arange(len(mesh.faces))
-    for step in range(ROUNDS):
+    for step in range(4):
         thin = np.flatnonzero(_is_thin(new) & (step > 0))
         sides = lengths_along(new, new.halfedge_edges).reshape(-1, 3)[thin]
         marked = mask_of(len(new.edges), new.halfedge_edges.reshape(-1, 3)[thin, sides.argmax(axis=1)])
