@@ -26,6 +26,7 @@ from shapes import grid as rectangle
 
 import coneflat
 from coneflat.apps.quads.extract import extract_quads
+from coneflat.apps.quads.integer_grid import GridSearch
 from coneflat.apps.quads.nearest import surface_distances
 from coneflat.apps.quads.quad_mesh import degenerate_quads, least_jacobians
 from coneflat.apps.quads.quality import measure_quads
@@ -238,6 +239,21 @@ def test_quads_that_meet_themselves_are_made_smaller():
     assert mesh.euler_characteristic == mesh.surface_euler == -4
     assert any("More quads than wanted" in note for note in mesh.notes)
     assert not degenerate_quads(mesh.quads, edges_of(mesh.quads)).any()
+
+
+def test_bad_quads_are_left_out_where_no_finer_grid_is_found(monkeypatch):
+    options = {"quads": 10, "cones": "sparse", "distortion": 0.2}
+    grids = [coneflat.integer_grid(*shapes.genus(3), **options)]
+
+    def fail_again(self):
+        if not grids:
+            raise GridError("none")
+        return grids.pop()
+
+    monkeypatch.setattr(GridSearch, "grid", fail_again)
+    mesh = coneflat.quads(*shapes.genus(3), **options)
+    assert any("Left out" in note for note in mesh.notes)
+    assert not any("More quads than wanted" in note for note in mesh.notes)
 
 
 def test_quads_with_a_vertex_or_an_edge_twice():

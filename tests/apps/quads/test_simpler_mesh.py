@@ -131,7 +131,7 @@ def with_holes(count, corners=((20, 20), (60, 20), (20, 60), (60, 60))):
 def test_holes_smaller_than_quads_are_filled():
     found = coneflat.quads(*with_holes(80), quads=100)
     assert (len(found.quads), found.euler_characteristic, len(found.irregular)) == (100, 1, 0)
-    assert any(note.startswith("Filled 4 holes, smaller than a quad") for note in found.notes)
+    assert any(note.startswith("Filled 4 holes: small ones") for note in found.notes)
     assert found.surface.euler_characteristic == -3
 
 
@@ -246,3 +246,37 @@ def test_edges_of_a_small_part_are_no_noise(cells):
     square = index.reshape(-1, 4)
     mesh = check_mesh(points.astype(float), np.concatenate([square[:, :3], square[:, [0, 2, 3]]])).mesh
     assert len(sharp_ends(mesh)) == 4 + 8 + 4 + 8 * cells + 4
+
+
+def test_meshes_of_thin_triangles_are_triangulated_anew():
+    """As in files of CAD programs: a pipe of strips as long as it, and a cap with a fan around its centre."""
+    count = 60
+    turn = np.arange(count) * 2 * np.pi / count
+    ring = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    vertices = np.concatenate([ring, ring + np.array([0, 0, 5.0]), [[0, 0, 5]]])
+    low, high = np.arange(count), np.arange(count) + count
+    after, above = np.roll(low, -1), np.roll(high, -1)
+    fans = [[low, after, above], [low, above, high], [high, above, 0 * low + 2 * count]]
+    faces = np.concatenate([np.stack(fan, axis=1) for fan in fans])
+    given = check_mesh(vertices, faces).mesh
+    assert module._is_thin(given).all()
+    new, some, of = module._reshaped(given, 4000)
+    common = some[some < len(vertices)]
+    assert (np.diff(some) >= 0).all()
+    np.testing.assert_array_equal(new.vertices[: len(common)], given.vertices[common])
+    assert (new.euler_characteristic, len(new.faces)) == (1, len(of))
+    assert module._is_thin(new).mean() < 0.2
+    found = coneflat.quads(vertices, faces, quads=600)
+    np.testing.assert_array_equal(found.surface.vertices, vertices)
+    assert (found.left_out, found.euler_characteristic) == (0, 1)
+    assert coneflat.measure_quads(found).jacobian_min > 0.2
+    assert not any("Quads follow no" in note for note in found.notes)
+    np.testing.assert_allclose(found.vertices[found.is_boundary_vertex][:, 2], 0, atol=1e-9)
+
+
+def test_meshes_whose_triangles_stay_thin_are_taken_as_given():
+    vertices, faces = shapes.grid(40, 2)
+    mesh = check_mesh(vertices * [0.2, 8, 1], faces).mesh
+    new, some, of = module._reshaped(mesh, 400)
+    np.testing.assert_array_equal(new.faces, mesh.faces)
+    assert (some.tolist(), of.tolist()) == (list(range(len(mesh.vertices))), list(range(len(mesh.faces))))

@@ -90,7 +90,7 @@ def test_sizes_that_are_none(ball, size, message):
 
 @pytest.mark.parametrize("more", [{"cone_count": 8}, {"cones": "sparse"}])
 def test_sizes_need_cones_that_may_be_chosen(ball, more):
-    with pytest.raises(OptionError, match="relative sizes cannot be combined"):
+    with pytest.raises(OptionError, match="sizes cannot be combined"):
         coneflat.quads(*ball, quads=100, size="curvature", **more)
 
 

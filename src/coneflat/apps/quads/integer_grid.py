@@ -43,8 +43,6 @@ OPTIONS = {
 
 # With fewer quads, cones cost more in proportion.
 QUADS_PER_CONE = 2_000
-# Largest fraction of the edges that are split because they join two vertices on sharp edges.
-MAX_CHORDS = 0.05
 # Options that only the search for the fewest cones takes into account.
 SPARSE_OPTIONS = (*SEARCH_OPTIONS, "max_cones", "lengths")
 
@@ -200,16 +198,14 @@ class GridSearch:
                 raise
         less = 0.7 * given.get("distortion", DISTORTION)
         search = replace(self, options={**given, "distortion": less})
-        note = f"With a distortion above {less:.3g}, no grid was found."
-        return with_note(search._of_flattening(self._boundary_without_sides), note)
+        found = search._of_flattening(self._boundary_without_sides)
+        return with_note(found, f"With a distortion above {less:.3g}, no grid was found.")
 
     def _as_given(self) -> IntegerGrid:
         """Return a grid for the options as given."""
         if not self._may_align():
             if self.sizes is not None:
-                raise OptionError(
-                    "relative sizes cannot be combined with options of cones, boundaries or weights"
-                )
+                raise OptionError("sizes cannot be combined with options of cones, boundaries or weights")
             return self._with_fewest_cones()
         if self.checked.mesh.components[0] > 1:
             return self._of_components()
@@ -274,7 +270,7 @@ class GridSearch:
         mesh, _ = split_chords(split_small_components(mesh))
         finer, count = split_chords(mesh, sharp_ends(mesh, self._angle))
         # On coarse meshes these are most edges, and their triangles would get thin.
-        mesh = finer if count < MAX_CHORDS * len(mesh.edges) else mesh
+        mesh = finer if 20 * count < len(mesh.edges) else mesh
         bounds = (
             int(np.ceil((2 * np.pi - (options.max_cone_angle or np.inf)) / (np.pi / 2) - GRID_TOLERANCE)),
             int(np.floor((2 * np.pi - options.min_cone_angle) / (np.pi / 2) + GRID_TOLERANCE)),

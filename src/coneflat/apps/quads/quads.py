@@ -109,8 +109,7 @@ def quads(
         if small is not None:
             found, features = small.moved(found), sharp_ends(small.given)
         found = smooth_quads(found, smooth, features)
-        if smooth:
-            found = untangled(found)
+        found = untangled(found) if smooth else found
         found = found if small is None else small.completed(found)
     return replace(
         found,

@@ -32,9 +32,9 @@ from .smooth import is_on_feature
 # Largest numbers of components, of holes, and of corners of the longest boundary, for which grids are found in some
 # seconds.
 MAX_COMPONENTS, MAX_HOLES, MAX_CORNERS = 64, 32, 400
-# A triangle is thin if its area is less than THIN times that of one with equal sides. If more than this share of them
-# is, as in files of CAD programs, few grids are found, so the surface is triangulated anew.
-THIN = 0.1
+# A triangle is thin if its area is less than THIN times that of one with equal sides. If more than a tenth of them are,
+# as in files of CAD programs, few grids are found, so the surface is triangulated anew.
+THIN = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +175,7 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
         return search, None
     checked, mesh, side = search.checked, search.checked.mesh, _side(search)
     is_kept, walks, is_jagged = _manageable(mesh, side)
-    walks = walks if search.boundary == "auto" else []
+    walks, is_jagged = (walks, is_jagged) if search.boundary == "auto" else ([], False)
     part, kept = _part(mesh, is_kept)
     loops = [np.searchsorted(kept, mesh.tails[walk]) for walk in walks]
     filled = _filled(part, loops)
@@ -183,20 +183,17 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
     count = COARSE * max(1.0, quads / QUADS)
     simple, some, of = filled, np.arange(len(filled.vertices)), np.arange(len(filled.faces))
     notes = list(checked.notes)
-    is_freed = is_jagged and search.boundary == "auto"
-    if is_freed:
+    if is_jagged:
         search = replace(search, boundary="free")
         notes.append(f"The boundary cuts squares, because it has more than {MAX_CORNERS} corners.")
-    if _is_thin(filled).mean() > THIN and len(without_pillows(filled).faces) == len(of):
+    if 10 * _is_thin(filled).sum() > len(of) and len(without_pillows(filled).faces) == len(of):
         simple, some, of = _reshaped(filled, int(np.clip(4 * quads, COARSE // 6, count)))
     elif len(filled.faces) > 2 * count:
         simple, some, of = coarse_mesh(filled, int(count))
-    elif is_kept.all() and not (loops or is_freed):
+    elif is_kept.all() and not (loops or is_jagged):
         return search, None
     if loops:
-        notes.append(
-            f"Filled {plural(len(loops), 'hole')}, smaller than a quad or beyond the {MAX_HOLES} longest."
-        )
+        notes.append(f"Filled {plural(len(loops), 'hole')}: small ones, and all but the {MAX_HOLES} longest.")
     own, whole = kept[some[some < len(kept)]], SimplerMesh.of(search)
     sizes = None if search.scales is None else np.exp(extended(-search.scales[own], simple))
     simple = simple.moved_to(np.ldexp(simple.vertices, -checked.exponent))
@@ -207,7 +204,7 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
 def _is_thin(mesh: TriangleMesh) -> BoolArray:
     """Return (m,) whether the areas of triangles are small compared with those of equal sides of this length."""
     lengths = edge_lengths(mesh.vertices, mesh.faces)
-    return 2 * double_areas(lengths) <= THIN * 3**0.5 * (lengths**2).sum(axis=1)
+    return 6 * double_areas(lengths) <= THIN * 3**0.5 * (lengths**2).sum(axis=1)
 
 
 def _reshaped(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntArray, IntArray]:
@@ -215,11 +212,12 @@ def _reshaped(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntArray, I
 
     Edges longer than three times the root of the mean area are split, and edges collapse; then so do the longest edges
     of thin triangles, three times. New vertices come last, with an index beyond those of the mesh. Of the mesh and all
-    rounds, that with the smallest share of thin triangles is returned.
+    rounds, that with the smallest share of thin triangles is returned; rounds end where it hardly gets smaller.
     """
     n, longest = len(mesh.vertices), 3 * (_area(mesh) / count) ** 0.5
     new, some, of = best = mesh, np.arange(n), np.arange(len(mesh.faces))
-    for step in range(4):
+    share, step = _is_thin(mesh).mean(), 0
+    while step < 4 and (step == 0 or _is_thin(new).mean() < 0.9 * share):
         thin = np.flatnonzero(_is_thin(new) & (step > 0))
         sides = lengths_along(new, new.halfedge_edges).reshape(-1, 3)[thin]
         marked = mask_of(len(new.edges), new.halfedge_edges.reshape(-1, 3)[thin, sides.argmax(axis=1)])
@@ -228,7 +226,7 @@ def _reshaped(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntArray, I
             of, marked = of[own], np.zeros(len(new.edges), dtype=bool)
         some = np.append(some, np.full(len(new.vertices) - len(some), n))
         new, kept, own = coarse_mesh(new, count)
-        some, of = some[kept], of[own]
+        some, of, step = some[kept], of[own], step + 1
         best = min(best, (new, some, of), key=lambda one: _is_thin(one[0]).mean())
     new, some, of = best
     order = np.argsort(some, kind="stable")
