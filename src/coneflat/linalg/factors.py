@@ -92,9 +92,9 @@ class CholespyFactor(Factor):
     def __init__(self, matrix: csc_matrix) -> None:
         from cholespy import CholeskySolverD, MatrixType
 
-        if not (matrix.diagonal() > 0).all():
-            # CHOLMOD would also detect this, but prints a message on standard output.
-            raise NotPositiveDefinite("the diagonal is not positive")
+        if not (matrix.diagonal() > 1e-13 * np.abs(matrix.data).max(initial=0.0)).all():
+            # CHOLMOD prints a message on standard output where it fails, mostly at thin triangles.
+            raise NotPositiveDefinite("the diagonal is not positive, or of very different sizes")
         try:
             self._solver = CholeskySolverD(
                 matrix.shape[0],
