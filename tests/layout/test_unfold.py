@@ -13,7 +13,7 @@ from coneflat.geometry.planar import heights
 from coneflat.geometry.straight import FlatTriangles, straight_triangles
 from coneflat.layout.patches import DEGENERATE_HEIGHT
 from coneflat.layout.relax.relax import rest_sides
-from coneflat.layout.unfold import unfold
+from coneflat.layout.unfold import _close_gaps, unfold
 from coneflat.layout.untangle import untangle
 from coneflat.mesh import cut_open
 from coneflat.metric.exact import exact_metric
@@ -239,3 +239,16 @@ def drag(flat, faces, vertex, amount):
         if h == first:
             return FlatTriangles(sides, flat.turns, flat.twin)
         shift *= flat.turns[h]
+
+
+def test_gaps_whose_squares_underflow_are_left():
+    """Their product with the stiffness would be zero, the divisor of a step."""
+    exact = np.array([0, 1, 1j])
+    sides = exact[[2, 0, 1]] - exact[[1, 2, 0]]
+    points, free = exact + [1e-160, 0, 0], np.zeros(3, dtype=bool)
+    before = points.copy()
+    _close_gaps(sides, np.arange(3), np.ones(1, dtype=complex), points, free)
+    np.testing.assert_array_equal(points, before)
+    points[0] = 0.1
+    _close_gaps(sides, np.arange(3), np.ones(1, dtype=complex), points, free)
+    np.testing.assert_allclose(np.diff(points), np.diff(exact), atol=1e-12)

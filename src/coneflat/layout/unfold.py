@@ -133,7 +133,7 @@ def _close_gaps(
     direction = damping * residual
     product = float(np.vdot(residual, direction).real)
     for _ in range(SWEEPS):
-        if product == 0:
+        if product <= np.finfo(float).tiny ** 0.5:  # Products of smaller numbers would be zero.
             break
         apply_stiffness(corner, weight, direction, pull)
         length = product / float(np.vdot(direction, pull).real)
