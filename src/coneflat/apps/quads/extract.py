@@ -231,7 +231,7 @@ def _places_along(
     lengths = np.sqrt(dots(steps, steps))
     # Along a boundary of few edges, the nearest one need not be next to the nearest vertex.
     both = np.stack([edge, edge - 1]) if len(steps) > 64 else np.arange(len(steps))[:, None] + 0 * edge
-    share = np.clip(dots(points - starts[both], steps[both]) / lengths[both] ** 2, 0, 1)
+    share = np.clip(dots(points - starts[both], steps[both]) / np.maximum(lengths[both] ** 2, 1e-300), 0, 1)
     off = np.linalg.norm(starts[both] + share[..., None] * steps[both] - points, axis=2)
     ends, total = np.cumsum(lengths), lengths.sum()
     at = (ends[both] - lengths[both] * (1 - share))[off.argmin(axis=0), np.arange(len(points))]
@@ -247,7 +247,7 @@ def _places_along(
         if (after - at).min() >= 0.3 * total / len(at):
             break
         at = at / 2 + (before + after) / 4
-    cosines = dots(steps, np.roll(steps, 1, axis=0)) / (lengths * np.roll(lengths, 1))
+    cosines = dots(steps, np.roll(steps, 1, axis=0)) / np.maximum(lengths * np.roll(lengths, 1), 1e-300)
     bends = np.flatnonzero(cosines < np.cos(SHARP_ANGLE))
     for corner in (ends - lengths)[bends[np.argsort(-cosines[bends], kind="stable")]]:  # the sharpest last
         away = (corner - at + total / 2) % total - total / 2
