@@ -33,7 +33,8 @@ from .smooth import is_on_feature
 # seconds.
 MAX_COMPONENTS, MAX_HOLES, MAX_CORNERS = 64, 32, 400
 # A triangle is thin if its area is less than THIN times that of one with equal sides. If more than a tenth of them are,
-# as in files of CAD programs, few grids are found, so the surface is triangulated anew.
+# as in files of CAD programs, few grids are found, so the surface is triangulated anew. Where many are a hundred times
+# thinner, that takes long.
 THIN = 0.3
 
 
@@ -179,14 +180,14 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
     part, kept = _part(mesh, is_kept)
     loops = [np.searchsorted(kept, mesh.tails[walk]) for walk in walks]
     filled = _filled(part, loops)
-    quads = _area(filled) / side**2
+    quads, notes = _area(filled) / side**2, list(checked.notes)
     count = COARSE * max(1.0, quads / QUADS)
     simple, some, of = filled, np.arange(len(filled.vertices)), np.arange(len(filled.faces))
-    notes = list(checked.notes)
     if is_jagged:
         search = replace(search, boundary="free")
         notes.append(f"The boundary cuts squares, because it has more than {MAX_CORNERS} corners.")
-    if 10 * _is_thin(filled).sum() > len(of) and len(without_pillows(filled).faces) == len(of):
+    is_cad = 20 * _is_thin(filled, THIN / 100).sum() < len(of) < 10 * _is_thin(filled).sum()
+    if is_cad and len(without_pillows(filled).faces) == len(of):
         simple, some, of = _reshaped(filled, int(np.clip(4 * quads, COARSE // 6, count)))
     elif len(filled.faces) > 2 * count:
         simple, some, of = coarse_mesh(filled, int(count))
@@ -201,26 +202,27 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
     return search, replace(whole, mesh=simple, kept=own, is_filling=of >= len(part.faces), notes=tuple(notes))
 
 
-def _is_thin(mesh: TriangleMesh) -> BoolArray:
+def _is_thin(mesh: TriangleMesh, share: float = THIN) -> BoolArray:
     """Return (m,) whether the areas of triangles are small compared with those of equal sides of this length."""
     lengths = edge_lengths(mesh.vertices, mesh.faces)
-    return 6 * double_areas(lengths) <= THIN * 3**0.5 * (lengths**2).sum(axis=1)
+    return 6 * double_areas(lengths) <= share * 3**0.5 * (lengths**2).sum(axis=1)
 
 
 def _reshaped(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntArray, IntArray]:
     """Return a mesh of about `count` triangles that are less thin, and its vertices (k,) and triangles here.
 
-    Edges longer than three times the root of the mean area are split, and edges collapse; then so do the longest edges
-    of thin triangles, three times. New vertices come last, with an index beyond those of the mesh. Of the mesh and all
-    rounds, that with the smallest share of thin triangles is returned; rounds end where it hardly gets smaller.
+    Edges longer than three times the root of the mean area are split, and edges collapse; then so do the longest
+    edges of thin triangles, three times. New vertices come last,
+    with an index beyond those of the mesh. Of the mesh and all rounds, that with the smallest share of thin triangles
+    is returned; rounds end where it hardly gets smaller.
     """
     n, longest = len(mesh.vertices), 3 * (_area(mesh) / count) ** 0.5
     new, some, of = best = mesh, np.arange(n), np.arange(len(mesh.faces))
     share, step = _is_thin(mesh).mean(), 0
     while step < 4 and (step == 0 or _is_thin(new).mean() < 0.9 * share):
         thin = np.flatnonzero(_is_thin(new) & (step > 0))
-        sides = lengths_along(new, new.halfedge_edges).reshape(-1, 3)[thin]
-        marked = mask_of(len(new.edges), new.halfedge_edges.reshape(-1, 3)[thin, sides.argmax(axis=1)])
+        own = lengths_along(new, new.halfedge_edges).reshape(-1, 3)[thin].argmax(axis=1)
+        marked = mask_of(len(new.edges), new.halfedge_edges.reshape(-1, 3)[thin, own])
         while (marked := marked | (lengths_along(new, np.arange(len(new.edges))) > longest)).any():
             new, own = split_edges(new, marked)
             of, marked = of[own], np.zeros(len(new.edges), dtype=bool)
