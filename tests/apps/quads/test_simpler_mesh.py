@@ -260,7 +260,7 @@ def test_meshes_of_thin_triangles_are_triangulated_anew():
     faces = np.concatenate([np.stack(fan, axis=1) for fan in fans])
     given = check_mesh(vertices, faces).mesh
     assert module._is_thin(given).all()
-    new, some, of = module._reshaped(given, 4000)
+    new, some, of = module._retriangulated(given, 4000)
     common = some[some < len(vertices)]
     assert (np.diff(some) >= 0).all()
     np.testing.assert_array_equal(new.vertices[: len(common)], given.vertices[common])
@@ -277,6 +277,6 @@ def test_meshes_of_thin_triangles_are_triangulated_anew():
 def test_meshes_whose_triangles_stay_thin_are_taken_as_given():
     vertices, faces = shapes.grid(40, 2)
     mesh = check_mesh(vertices * [0.2, 8, 1], faces).mesh
-    new, some, of = module._reshaped(mesh, 400)
+    new, some, of = module._retriangulated(mesh, 400)
     np.testing.assert_array_equal(new.faces, mesh.faces)
     assert (some.tolist(), of.tolist()) == (list(range(len(mesh.vertices))), list(range(len(mesh.faces))))

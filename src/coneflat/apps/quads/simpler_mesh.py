@@ -188,7 +188,7 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
         notes.append(f"The boundary cuts squares, because it has more than {MAX_CORNERS} corners.")
     is_cad = 20 * _is_thin(filled, THIN / 100).sum() < len(of) < 10 * _is_thin(filled).sum()
     if is_cad and len(without_pillows(filled).faces) == len(of):
-        simple, some, of = _reshaped(filled, int(np.clip(4 * quads, COARSE // 6, count)))
+        simple, some, of = _retriangulated(filled, int(np.clip(4 * quads, COARSE // 6, count)))
     elif len(filled.faces) > 2 * count:
         simple, some, of = coarse_mesh(filled, int(count))
     elif is_kept.all() and not (loops or is_jagged):
@@ -208,13 +208,12 @@ def _is_thin(mesh: TriangleMesh, share: float = THIN) -> BoolArray:
     return 6 * double_areas(lengths) <= share * 3**0.5 * (lengths**2).sum(axis=1)
 
 
-def _reshaped(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntArray, IntArray]:
+def _retriangulated(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntArray, IntArray]:
     """Return a mesh of about `count` triangles that are less thin, and its vertices (k,) and triangles here.
 
     Edges longer than three times the root of the mean area are split, and edges collapse; then so do the longest
-    edges of thin triangles, three times. New vertices come last,
-    with an index beyond those of the mesh. Of the mesh and all rounds, that with the smallest share of thin triangles
-    is returned; rounds end where it hardly gets smaller.
+    edges of thin triangles, three times. Of the mesh and all rounds, that with the smallest share of thin triangles is
+    returned; rounds end where it hardly gets smaller. New vertices come last, with an index beyond those of the mesh.
     """
     n, longest = len(mesh.vertices), 3 * (_area(mesh) / count) ** 0.5
     new, some, of = best = mesh, np.arange(n), np.arange(len(mesh.faces))
