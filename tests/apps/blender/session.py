@@ -456,6 +456,9 @@ class Layout:
     def label(self, **_):
         pass
 
+    def row(self):
+        return self
+
     def panel(self, idname, default_closed=False):
         assert {"idname", "default_closed"} <= set(
             bpy.types.UILayout.bl_rna.functions["panel"].parameters.keys()
@@ -464,7 +467,7 @@ class Layout:
 
 
 def panels():
-    """The panels draw every option once, in the sidebars of both editors."""
+    """The panels draw every option once, in the sidebars of both editors; the preferences have their rows."""
     add("cube", "cube")
     known = module("settings").COMMANDS
     for panel in importlib.import_module(NAME).PANELS:
@@ -474,6 +477,10 @@ def panels():
         command = panel.__name__.rpartition("_")[2]
         expected = {f"coneflat.{command}", *(record["name"] for record in known.get(command, ()))}
         assert command == "coneflat" or expected <= set(drawn) <= expected | {"modifiers"}
+    drawn = []
+    known = {"found": None, "reason": "", "layout": Layout(drawn), "bl_rna": preferences().bl_rna}
+    module("settings").Preferences.draw(type("Shown", (), known)(), bpy.context)
+    assert drawn == ["python", "wheels", "requirement", "coneflat.check", "coneflat.install"]
     properties = settings().unwrap.bl_rna.properties
     assert {"seams", "charts", "area", "stack", "threads"} <= set(properties.keys())
     assert [word.identifier for word in properties["seams"].enum_items] == ["automatic", "none"]

@@ -80,15 +80,18 @@ _WHEELS = "Folder of wheels of coneflat and what it needs, from which Install ma
 _PACKAGE = "What pip installs, for example a wheel. Empty: coneflat, this version or later, from the folder of wheels"
 
 
+_SHOWN = {
+    "python": StringProperty(name="Python", description=_PYTHON, subtype="FILE_PATH"),
+    "wheels": StringProperty(name="Folder of wheels", description=_WHEELS, subtype="DIR_PATH"),
+    "requirement": StringProperty(name="Package", description=_PACKAGE),
+}
+
+
 class Preferences(bpy.types.AddonPreferences):
     """Where coneflat is, and how it is installed."""
 
     bl_idname = __package__
-    __annotations__ = {
-        "python": StringProperty(name="Python", description=_PYTHON, subtype="FILE_PATH"),
-        "wheels": StringProperty(name="Folder of wheels", description=_WHEELS, subtype="DIR_PATH"),
-        "requirement": StringProperty(name="Package", description=_PACKAGE),
-    }
+    __annotations__ = dict(_SHOWN)
     #: The environment that was found last, why there is none, and the Python that was named then.
     found: ClassVar[Environment | None] = None
     reason: ClassVar[str] = "not checked yet"
@@ -99,7 +102,7 @@ class Preferences(bpy.types.AddonPreferences):
         found = type(self).found
         icon = "CHECKMARK" if found else "INFO"
         self.layout.label(text=str(found or type(self).reason), icon=icon)
-        for name in self.__annotations__:
+        for name in _SHOWN:
             self.layout.prop(self, name)
         row = self.layout.row()
         row.operator("coneflat.check")
