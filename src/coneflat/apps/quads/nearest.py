@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...base import FloatArray, IntArray, compiled
+from ...base import FloatArray, IntArray, compiled, dots
 from ...geometry import face_normals
 
 #: A triangle that faces away from the normal of a point counts as farther by this fraction of the model's diagonal,
@@ -197,14 +197,16 @@ class Stars(NamedTuple):
         """Return (q, 3) the positions of points given by triangles (q,) and barycentric coordinates (q, 3)."""
         return np.einsum("qi,qix->qx", barycentric, self.vertices[self.faces[on_faces]])
 
-    def axes(self, face: int) -> FloatArray:
-        """Return (2, 3) orthonormal axes of a triangle's plane, the first along its longest side."""
-        corners = self.vertices[self.faces[face]]
-        sides = np.roll(corners, -1, axis=0) - corners
-        longest = int(np.argmax(np.linalg.norm(sides, axis=1)))
-        along = sides[longest] / np.linalg.norm(sides[longest])
-        across = sides[longest - 1] - (sides[longest - 1] @ along) * along
-        return np.stack([along, -across / max(float(np.linalg.norm(across)), np.finfo(float).tiny)])
+    def axes(self, faces: IntArray) -> FloatArray:
+        """Return (k, 2, 3) orthonormal axes of the planes of triangles (k,), the first along the longest side."""
+        corners, rows = self.vertices[self.faces[faces]], np.arange(len(faces))
+        sides = np.roll(corners, -1, axis=1) - corners
+        longest = np.linalg.norm(sides, axis=2).argmax(axis=1)
+        along, across = sides[rows, longest], -sides[rows, longest - 1]
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+        across -= dots(across, along)[:, None] * along
+        across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
+        return np.stack([along, across], axis=1)
 
 
 @compiled

@@ -274,14 +274,13 @@ def _near_pairs(
             rows.append(joining(path).rows)
             ends_of.append((i, j))
     cone_rows = np.array(rows, dtype=np.int64).reshape(len(rows), 2, len(basis))
-    side_rows, length = _distances_to_sides([joining(each) for each in _paths_to_sides(layout)], transitions)
+    side_rows, least = _distances_to_sides([joining(each) for each in _paths_to_sides(layout)], transitions, layout)
     # Products of sparse integer matrices are faster than those of dense ones, which no library accelerates.
     cone_rows, side_rows = (
         (csr_matrix(each.reshape(2 * len(each), len(basis))) @ basis).reshape(len(each), 2, basis.shape[1])
         for each in (cone_rows, side_rows)
     )
-    # Keep pairs that face each other and are not collinear: the distance is at least 45% of the length of the vector.
-    facing = np.abs(side_rows[:, 0] @ start) > np.maximum(0.45 * length, 1e-6)
+    facing = np.abs(side_rows[:, 0] @ start) > np.maximum(least, 1e-6)
     joined = np.concatenate([cone_rows, side_rows[facing]])
     # Pairs with sides get unique indices, so that they count as having no cone in common.
     ends_of += [(len(cones) + k, len(cones) + k) for k in range(int(facing.sum()))]
@@ -323,8 +322,7 @@ def _vector(sides: list[tuple[int, int]], transitions: Transitions, points: Comp
         place += UNITS[turn] * (points[end] - points[there])
     last = total + TURNS[turn] @ shift(sides[-1][1])
     # A single edge has no other triangles between its ends, so its vector always counts as facing.
-    length = float(abs(place)) if len(sides) > 1 else 0.0
-    return PathVector(last, length, sides[0][0], sides[-1][1], turn)
+    return PathVector(last, place if len(sides) > 1 else 0j, sides[0][0], sides[-1][1], turn)
 
 
 def _paths_to_sides(layout: GridLayout) -> list[list[int]]:
@@ -366,29 +364,40 @@ class PathVector(NamedTuple):
 
     Attributes:
         rows: (2, v) coefficients of the vector in the variables, as far as these determine its ends.
-        length: its length in the layout; 0 for a path of a single edge.
+        place: it in the layout; 0 for a path of a single edge.
         first, last: the points at the ends.
         turn: the rotation of the frame of the last edge, in quarter turns.
     """
 
     rows: IntArray
-    length: float
+    place: complex
     first: int
     last: int
     turn: int
 
 
-def _distances_to_sides(vectors: list[PathVector], transitions: Transitions) -> tuple[IntArray, FloatArray]:
-    """Return (p, 2, v) the coordinate that separates the ends of vectors, with 0 for the other, and (p,) lengths."""
-    found, lengths = [], []
+def _distances_to_sides(
+    vectors: list[PathVector], transitions: Transitions, layout: GridLayout
+) -> tuple[IntArray, FloatArray]:
+    """Return (p, 2, v) the coordinate that separates the ends of vectors, with 0 for the other, and (p,) the least
+    distance at which they face each other: 0 if a line across both exists, else they must not be nearly collinear.
+    """
+    found, least = [], []
     for one in vectors:
         is_known = _known_axes(transitions, one.first)
         is_known &= np.roll(_known_axes(transitions, one.last), one.turn % 2)
-        for row in one.rows[is_known & one.rows.any(axis=1)]:
-            found.append(np.stack([row, np.zeros_like(row)]))
-            lengths.append(one.length)
+        for axis in np.flatnonzero(is_known & one.rows.any(axis=1)).tolist():
+            found.append(np.stack([one.rows[axis], np.zeros_like(one.rows[axis])]))
+            spans = []
+            for point, turn, place in ((one.first, 0, 0j), (one.last, one.turn, one.place)):
+                side = layout.sides.side[layout.sides.points == point]
+                side = side[layout.sides.axis[side] == (axis + turn) % 2]
+                on = np.append(layout.sides.points[np.isin(layout.sides.side, side)], point)
+                spans.append(as_pairs(UNITS[turn] * (layout.points[on] - layout.points[point]) + place)[:, 1 - axis])
+            is_beside = max(each.min() for each in spans) <= min(each.max() for each in spans)
+            least.append(0.0 if is_beside else 0.45 * abs(one.place))
     size = transitions.shifts.shape[1]
-    return np.array(found, dtype=np.int64).reshape(len(found), 2, size), np.array(lengths)
+    return np.array(found, dtype=np.int64).reshape(len(found), 2, size), np.array(least)
 
 
 def _known_axes(transitions: Transitions, point: int) -> BoolArray:

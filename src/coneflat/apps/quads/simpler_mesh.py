@@ -33,8 +33,7 @@ from .smooth import is_on_feature
 # seconds.
 MAX_COMPONENTS, MAX_HOLES, MAX_CORNERS = 64, 32, 400
 # A triangle is thin if its area is less than THIN times that of one with equal sides. If more than a tenth of them are,
-# as in files of CAD programs, few grids are found, so the surface is triangulated anew. Where many are a hundred times
-# thinner, that takes long.
+# as in files of CAD programs, few grids are found, so the surface is triangulated anew.
 THIN = 0.3
 
 
@@ -135,8 +134,7 @@ class SimplerMesh:
         side = max(self.side, float(np.sqrt(_area(whole) / MAX_SQUARES)))
         parts = [_few_triangles(part, side) for part, _, _ in whole.split_components()]
         small = without_pillows(joined(parts, np.cumsum([0, *(len(part.vertices) for part in parts)])))
-        while (is_long := lengths_along(small, np.arange(len(small.edges))) > 4 * side).any():
-            small = split_edges(small, is_long)[0]
+        small = _short_edges(small, 4 * side)[0]
         n, middles = len(small.vertices), small.halfedge_edges.reshape(-1, 3)
         points = [small.vertices, *(small.vertices[ends].mean(axis=1) for ends in (small.edges, small.faces))]
         centres = n + len(small.edges) + np.arange(len(small.faces))
@@ -186,12 +184,11 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
     if is_jagged:
         search = replace(search, boundary="free")
         notes.append(f"The boundary cuts squares, because it has more than {MAX_CORNERS} corners.")
-    is_cad = 20 * _is_thin(filled, THIN / 100).sum() < len(of) < 10 * _is_thin(filled).sum()
-    if is_cad and len(without_pillows(filled).faces) == len(of):
+    if _thin_share(filled) > 0.1 and len(without_pillows(filled).faces) == len(of):
         simple, some, of = _retriangulated(filled, int(np.clip(4 * quads, COARSE // 6, count)))
-    elif len(filled.faces) > 2 * count:
+    if len(simple.faces) > 2 * count:
         simple, some, of = coarse_mesh(filled, int(count))
-    elif is_kept.all() and not (loops or is_jagged):
+    elif simple is filled and is_kept.all() and not (loops or is_jagged):
         return search, None
     if loops:
         notes.append(f"Filled {plural(len(loops), 'hole')}: small ones, and all but the {MAX_HOLES} longest.")
@@ -202,10 +199,26 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
     return search, replace(whole, mesh=simple, kept=own, is_filling=of >= len(part.faces), notes=tuple(notes))
 
 
-def _is_thin(mesh: TriangleMesh, share: float = THIN) -> BoolArray:
+def _is_thin(mesh: TriangleMesh) -> BoolArray:
     """Return (m,) whether the areas of triangles are small compared with those of equal sides of this length."""
     lengths = edge_lengths(mesh.vertices, mesh.faces)
-    return 6 * double_areas(lengths) <= share * 3**0.5 * (lengths**2).sum(axis=1)
+    return 6 * double_areas(lengths) <= THIN * 3**0.5 * (lengths**2).sum(axis=1)
+
+
+def _thin_share(mesh: TriangleMesh) -> float:
+    return float(_is_thin(mesh).mean())
+
+
+def _short_edges(
+    mesh: TriangleMesh, longest: float, marked: BoolArray | None = None
+) -> tuple[TriangleMesh, IntArray]:
+    """Return a mesh with marked edges (e,), and all longer ones, split, and the triangle here of each of its own."""
+    of, is_long = np.arange(len(mesh.faces)), lengths_along(mesh, np.arange(len(mesh.edges))) > longest
+    is_long |= False if marked is None else marked
+    while is_long.any():
+        mesh, own = split_edges(mesh, is_long)
+        of, is_long = of[own], lengths_along(mesh, np.arange(len(mesh.edges))) > longest
+    return mesh, of
 
 
 def _retriangulated(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntArray, IntArray]:
@@ -215,20 +228,20 @@ def _retriangulated(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntAr
     edges of thin triangles, three times. Of the mesh and all rounds, that with the smallest share of thin triangles is
     returned; rounds end where it hardly gets smaller. New vertices come last, with an index beyond those of the mesh.
     """
-    n, longest = len(mesh.vertices), 3 * (_area(mesh) / count) ** 0.5
+    n, total = len(mesh.vertices), lengths_along(mesh, np.arange(len(mesh.edges))).sum()
+    # Where the area is almost none, edges are split into about four times as many pieces as triangles are wanted.
+    longest = max(3 * (_area(mesh) / count) ** 0.5, total / (4 * count))
     new, some, of = best = mesh, np.arange(n), np.arange(len(mesh.faces))
-    share, step = _is_thin(mesh).mean(), 0
-    while step < 4 and (step == 0 or _is_thin(new).mean() < 0.9 * share):
-        thin = np.flatnonzero(_is_thin(new) & (step > 0))
-        own = lengths_along(new, new.halfedge_edges).reshape(-1, 3)[thin].argmax(axis=1)
-        marked = mask_of(len(new.edges), new.halfedge_edges.reshape(-1, 3)[thin, own])
-        while (marked := marked | (lengths_along(new, np.arange(len(new.edges))) > longest)).any():
-            new, own = split_edges(new, marked)
-            of, marked = of[own], np.zeros(len(new.edges), dtype=bool)
-        some = np.append(some, np.full(len(new.vertices) - len(some), n))
+    least, share, step = np.inf, _thin_share(mesh), 0
+    while step < 4 and share < 0.9 * least:
+        least = share
+        sides = new.halfedge_edges.reshape(-1, 3)[np.flatnonzero(_is_thin(new) & (step > 0))]
+        own = lengths_along(new, sides.ravel()).reshape(-1, 3).argmax(axis=1)[:, None]
+        new, own = _short_edges(new, longest, mask_of(len(new.edges), np.take_along_axis(sides, own, axis=1)))
+        of, some = of[own], np.append(some, np.full(len(new.vertices) - len(some), n))
         new, kept, own = coarse_mesh(new, count)
-        some, of, step = some[kept], of[own], step + 1
-        best = min(best, (new, some, of), key=lambda one: _is_thin(one[0]).mean())
+        some, of, step, share = some[kept], of[own], step + 1, _thin_share(new)
+        best = (new, some, of) if share < least else best
     new, some, of = best
     order = np.argsort(some, kind="stable")
     return TriangleMesh(new.vertices[order], np.argsort(order)[new.faces]), some[order], of

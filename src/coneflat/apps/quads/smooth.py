@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import reduce
+from operator import or_
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -127,41 +129,62 @@ def improve_worst(
         worst_first = quads[bad[np.argsort(least[bad], kind="stable")]].ravel()
         _, first = np.unique(worst_first, return_index=True)
         tried = worst_first[np.sort(first)]
-        gained = [
-            _improve(v, quads[star[start[v] : start[v + 1]]], points, faces, barycentric, surface)
-            for v in tried[movable[tried]].tolist()
-        ]
-        if not any(gained):
+        tried = tried[movable[tried]]
+        # Vertices without a common quad move at once: a greedy coloring, whose colors are the bits of integers.
+        color, used = [], [0] * len(quads)
+        for v in tried.tolist():
+            around = star[start[v] : start[v + 1]].tolist()
+            taken = reduce(or_, (used[k] for k in around))
+            color.append(~taken & (taken + 1))
+            for k in around:
+                used[k] |= color[-1]
+        groups = (tried[np.array(color) == one] for one in sorted(set(color)))
+        if not sum(_improve(group, quads, points, faces, barycentric, surface) for group in groups):
             return
 
 
 def _improve(
-    v: int, around: IntArray, points: FloatArray, faces: IntArray, barycentric: FloatArray, surface: Stars
-) -> bool:
-    """Move vertex v of the quads `around` it to the best of several trial positions, if one is better than its own.
+    moves: IntArray,
+    quads: IntArray,
+    points: FloatArray,
+    faces: IntArray,
+    barycentric: FloatArray,
+    surface: Stars,
+) -> int:
+    """Move vertices (k,) without a common quad to the best of several trial positions each, if better than its own.
 
-    Return whether one is.
+    Return how many move.
     """
-    sides = points[np.roll(around, -1, axis=1)] - points[around]
-    length = float(np.sqrt(dots(sides, sides)).mean())
+    number = np.full(len(points), -1)
+    number[moves] = np.arange(len(moves))
+    owner = number[quads].max(axis=1)
+    around = np.argsort(owner, kind="stable")[-int((owner >= 0).sum()) :]
+    around, owner = quads[around], owner[around]
+    sides = np.linalg.norm(points[np.roll(around, -1, axis=1)] - points[around], axis=2).mean(axis=1)
+    length = np.bincount(owner, sides) / np.bincount(owner)
     angle = 2 * np.pi * np.arange(12) / 12
-    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ surface.axes(int(faces[v]))
-    offsets = (length * np.array([0.5, 0.25, 0.1, 0.04])[:, None, None] * circle).reshape(-1, 3)
-    on, weights = np.full(len(offsets), faces[v]), np.tile(barycentric[v], (len(offsets), 1))
-    slide_near(surface, points[v] + offsets, on, weights)
-    # The quads around the vertex for each trial position; the last is the current one.
-    trials = np.concatenate([surface.at(on, weights), points[v][None]])
-    corners = np.tile(points[around], (len(trials), 1, 1, 1))
-    corners[:, around == v] = trials[:, None]
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ surface.axes(faces[moves])
+    radii = length[:, None] * np.array([0.5, 0.25, 0.1, 0.04])
+    offsets = (radii[:, :, None, None] * circle[:, None]).reshape(len(moves), -1, 3)
+    count = offsets.shape[1]
+    on, weights = faces[moves].repeat(count), barycentric[moves].repeat(count, axis=0)
+    slide_near(surface, (points[moves][:, None] + offsets).reshape(-1, 3), on, weights)
+    # The quads around the vertices for each trial position; the last is the current one.
+    places = surface.at(on, weights).reshape(len(moves), count, 3)
+    trials = np.concatenate([places, points[moves][:, None]], axis=1)
+    corners = np.where(
+        (around == moves[owner][:, None])[:, None, :, None], trials[owner][:, :, None], points[around][:, None]
+    )
     numbers = np.arange(corners.size // 3).reshape(-1, 4)
-    each = least_jacobians(corners.reshape(-1, 3), numbers).reshape(len(trials), -1)
-    inverts = ((each <= 0) & (each[-1] > 0)).any(axis=1)
-    least = np.where(inverts, -np.inf, each.min(axis=1))
-    best = int(np.argmax(least[:-1]))
-    if least[best] <= least[-1]:
-        return False
-    points[v], faces[v], barycentric[v] = trials[best], on[best], weights[best]
-    return True
+    each = least_jacobians(corners.reshape(-1, 3), numbers).reshape(len(around), -1)
+    first = np.flatnonzero(np.diff(owner, prepend=-1))
+    inverts = np.logical_or.reduceat((each <= 0) & (each[:, -1:] > 0), first)
+    least = np.where(inverts, -np.inf, np.minimum.reduceat(each, first))
+    best = least[:, :-1].argmax(axis=1)
+    better = np.flatnonzero(least[np.arange(len(moves)), best] > least[:, -1])
+    v, chosen = moves[better], better * count + best[better]
+    points[v], faces[v], barycentric[v] = trials[better, best[better]], on[chosen], weights[chosen]
+    return len(v)
 
 
 def untangled(quads: QuadMesh) -> QuadMesh:

@@ -319,10 +319,10 @@ class CONEFLAT_OT_quads(Command, bpy.types.Operator):
         return exchange.read_quads(folder)
 
     def write(self, context: Any, sources: Sequence[meshes.Source], result: Any) -> None:
-        """Add an object beside that of the mesh, and select it instead."""
+        """Add an object, select it, and hide that of the mesh, which is in the same place."""
         (source,), (found, notes) = sources, result
         added = meshes.add_quads(source, found, context.scene.coneflat.select == "CONES")
-        bpy.data.objects[source.name].select_set(False)
+        bpy.data.objects[source.name].hide_set(True)  # which also deselects it
         added.select_set(True)
         context.view_layer.objects.active = added
         self._say(notes)
