@@ -247,7 +247,12 @@ def quads():
     assert "ring: modifiers fine are applied" in lines, lines
     made = bpy.context.object
     assert made.name == "ring_quads"
-    assert (ring.hide_get(), ring.select_get(), made.hide_get(), made.select_get()) == (True, False, False, True)
+    assert (ring.hide_get(), ring.select_get(), made.hide_get(), made.select_get()) == (
+        True,
+        False,
+        False,
+        True,
+    )
     mesh = made.data
     assert {len(polygon.vertices) for polygon in mesh.polygons} == {4}
     assert len(mesh.vertices) - len(mesh.edges) + len(mesh.polygons) == 0

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
 import pytest
 import shapes
+from scipy.spatial import Delaunay
 
 import coneflat
 from coneflat import errors, flatten, integer_grid
-from coneflat.apps.quads.layout import aligned, between_nodes, split_edges
+from coneflat.apps.quads.layout import aligned
+from coneflat.apps.quads.lines import with_sides
+from coneflat.apps.quads.round_layout import split_between_nodes
+from coneflat.apps.quads.rounding import find_rounding
 from coneflat.apps.quads.transitions import find_transitions
 from coneflat.flatten import flatten_source
 from coneflat.geometry import edge_lengths
@@ -231,10 +236,9 @@ def test_charts_stay_joined_where_edges_between_them_are_split(shared, distortio
     options = {**QUARTER, "charts": "atlas", "correct_handles": True, "distortion": distortion}
     result = flatten(shared("knight.off"), **options)
     layout = aligned(result, 1000, None)
-    is_split = between_nodes(layout)
+    split = split_between_nodes(layout)
     assert result.distortion.charts > 1
-    assert is_split.any()
-    split = split_edges(layout, is_split)
+    assert len(split.mesh.faces) > len(layout.mesh.faces)
     transitions = find_transitions(split)
     np.testing.assert_allclose(transitions.equations @ transitions.values, 0, atol=1e-9)
 
@@ -245,3 +249,36 @@ def test_given_side_lengths_are_those_of_the_grid():
     given = integer_grid(vertices, faces, quads=60, lengths=edge_lengths(vertices, faces))
     assert np.array_equal(given.faces, plain.faces)
     assert given.corner_grid == pytest.approx(plain.corner_grid, abs=1e-9)
+
+
+def layout_of_rectangle(inside, cones):
+    """Return the layout of a rectangle of 10 by 2 with straight sides; cones are vertices without curvature.
+
+    Its long sides are single edges.
+    """
+    border = [[0, 0], [10, 0], [10, 2], [0, 2]]
+    points = np.array([*border, *inside])
+    points = np.column_stack([points, np.zeros(len(points))])
+    triangles = Delaunay(points[:, :2]).simplices
+    corners = dict.fromkeys(range(4), np.pi / 2)
+    options = {"boundary": "straight", "charts": "one", "cones": corners, "repair": True}
+    layout = with_sides(aligned(flatten(points, triangles, **options), None, 1.0))
+    return replace(layout, cones=np.array(cones))
+
+
+def test_a_cone_stays_apart_from_a_side_whose_vertices_are_far():
+    """The vertices of the side are more than ten times as far from the cone as the side is."""
+    layout = split_between_nodes(layout_of_rectangle([[2.5, 0.2], [3.7, 0.12], [5, 1]], [4]))
+    before = np.abs(find_rounding(layout).pairs.before)
+    assert np.isclose(before, [0, 0.2], atol=1e-6).all(axis=1).sum() == 1
+
+
+def test_edges_between_cones_and_lines_are_split():
+    """A triangle of two cones and a vertex where two lines meet degenerates if the three are on one line."""
+    layout = layout_of_rectangle([[4, 1], [6, 1], [5, 1.6]], [4, 5])
+    ends = layout.mesh.edges
+    lines = np.flatnonzero((ends == [2, 6]).all(axis=1) | (ends == [3, 6]).all(axis=1))
+    mesh = split_between_nodes(layout, lines).mesh
+    assert len(lines) == 2
+    assert not np.isin(mesh.edges, [4, 5, 6]).all(axis=1).any()
+    assert np.isin(split_between_nodes(layout).mesh.edges, [4, 5, 6]).all(axis=1).any()

@@ -28,7 +28,7 @@ import coneflat
 from coneflat.apps.quads.extract import extract_quads
 from coneflat.apps.quads.integer_grid import GridSearch
 from coneflat.apps.quads.nearest import surface_distances
-from coneflat.apps.quads.quad_mesh import degenerate_quads, least_jacobians
+from coneflat.apps.quads.quad_mesh import CoarseGridError, degenerate_quads, least_jacobians
 from coneflat.apps.quads.quality import measure_quads
 from coneflat.errors import DegenerateFaceError, GridError
 
@@ -243,17 +243,35 @@ def test_quads_that_meet_themselves_are_made_smaller():
 
 def test_bad_quads_are_left_out_where_no_finer_grid_is_found(monkeypatch):
     options = {"quads": 10, "cones": "sparse", "distortion": 0.2}
-    grids = [coneflat.integer_grid(*shapes.genus(3), **options)]
+    search = GridSearch.of_any_size
 
-    def fail_again(self):
-        if not grids:
-            raise GridError("none")
-        return grids.pop()
+    def fail_if_finer(self):
+        if self.for_quads:
+            raise CoarseGridError("none")
+        return search(self)
 
-    monkeypatch.setattr(GridSearch, "grid", fail_again)
+    monkeypatch.setattr(GridSearch, "of_any_size", fail_if_finer)
     mesh = coneflat.quads(*shapes.genus(3), **options)
     assert any("Left out" in note for note in mesh.notes)
     assert not any("More quads than wanted" in note for note in mesh.notes)
+
+
+def test_a_thin_component_does_not_make_the_others_finer(monkeypatch):
+    sizes = []
+
+    def fail_for_few(grid):
+        sizes.append(grid.squares)
+        if grid.squares < 60:
+            raise CoarseGridError("as thin as a square", grid.squares)
+        return extract_quads(grid)
+
+    monkeypatch.setattr("coneflat.apps.quads.integer_grid.extract_quads", fail_for_few)
+    small, triangles = shapes.sphere(2)
+    mesh = coneflat.quads(*shapes.join(shapes.sphere(3), (small / 3 + 3, triangles)), quads=500)
+    assert max(sizes) == pytest.approx(450, rel=0.1)
+    assert 60 <= len(mesh.quads) - max(sizes) < 160
+    assert sum("More quads than wanted" in note for note in mesh.notes) == 1
+    assert mesh.euler_characteristic == 4
 
 
 def test_quads_with_a_vertex_or_an_edge_twice():

@@ -169,7 +169,7 @@ def test_a_boundary_with_very_many_corners_is_free(monkeypatch):
 @pytest.mark.parametrize("name", ["as given", "coarse", "filled", "few"])
 def test_components_for_which_no_grid_is_found_are_divided(monkeypatch, name):
     """Each triangle of the cube becomes three quads, and the surface is the given one."""
-    search = GridSearch.with_more_cones
+    search = GridSearch.of_any_size
 
     def fail_for_cubes(self):
         mesh = self.checked.mesh
@@ -177,7 +177,7 @@ def test_components_for_which_no_grid_is_found_are_divided(monkeypatch, name):
             raise GridError("none")
         return search(self)
 
-    monkeypatch.setattr(GridSearch, "with_more_cones", fail_for_cubes)
+    monkeypatch.setattr(GridSearch, "of_any_size", fail_for_cubes)
     (sheet, faces), cube = with_holes(40, ((20, 20),)), shapes.box(1, (1.0, 1.0, 1.0))
     parts = [(20 * sheet, faces), (cube[0] + 30, cube[1])]
     if name == "coarse":

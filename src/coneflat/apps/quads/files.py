@@ -152,13 +152,12 @@ def _face_lines(corners: IntArray, at_once: int = 1 << 15) -> Iterator[bytes]:
 def _write_by_meshio(mesh: QuadMesh, stream: IO[bytes], ending: str) -> None:
     meshio = imported("meshio", "meshes of meshio need meshio", "meshio")
     least = least_jacobians(mesh.vertices, mesh.quads)
-    is_bare = ending == ".inp"
-    found = meshio.Mesh(
-        mesh.vertices,
-        [("quad", mesh.quads)],
-        point_data={} if is_bare else {"valence": mesh.valences},
-        cell_data={} if is_bare else {"jacobian": [least]},
+    data = (
+        {}
+        if ending == ".inp"
+        else {"point_data": {"valence": mesh.valences}, "cell_data": {"jacobian": [least]}}
     )
+    found = meshio.Mesh(mesh.vertices, [("quad", mesh.quads)], **data)
     with TemporaryDirectory() as folder:  # not all writers of meshio take streams
         path = Path(folder) / f"quads{ending}"
         meshio.write(path, found, _MESHIO[ending])
@@ -167,18 +166,10 @@ def _write_by_meshio(mesh: QuadMesh, stream: IO[bytes], ending: str) -> None:
 
 def _write_quads_npz(mesh: QuadMesh, stream: IO[bytes]) -> None:
     report = {"left_out": mesh.left_out, "area_left_out": mesh.area_left_out, "notes": list(mesh.notes)}
-    np.savez(
-        stream,
-        vertices=mesh.vertices,
-        quads=mesh.quads,
-        faces=mesh.faces,
-        barycentric=mesh.barycentric,
-        surface_vertices=mesh.surface.vertices,
-        surface_faces=mesh.surface.faces,
-        irregular=mesh.irregular,
-        valences=mesh.valences[mesh.irregular],
-        report=np.array(json.dumps(report)),
-    )
+    arrays = {name: getattr(mesh, name) for name in (*_NAMES[:4], "irregular")}
+    surface: dict[str, Any] = {"surface_vertices": mesh.surface.vertices, "surface_faces": mesh.surface.faces}
+    valences, text = mesh.valences[mesh.irregular], np.array(json.dumps(report))
+    np.savez(stream, **arrays, **surface, valences=valences, report=text)
 
 
 def holds_quads(path: str | PathLike[str]) -> bool:

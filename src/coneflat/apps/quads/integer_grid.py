@@ -23,11 +23,13 @@ from ...options import SEARCH_OPTIONS, Options, WordOrVertices, read_options
 from ...source import Source
 from .aligned_cones import COARSE, aligned_cones
 from .cross_field import SHARP_ANGLE, sharp_ends
-from .features import split_all, split_chords, split_small_components
+from .extract import extract_quads
+from .features import edge_indices, split_all, split_chords, split_small_components
 from .integer_map import IntegerGrid, joined_grids
 from .layout import GRID_TOLERANCE, GridLayout, aligned
 from .lines import grid_with_lines, with_sides
 from .options import DISTORTION, QUADS, QuadOptions
+from .quad_mesh import CoarseGridError
 from .round_layout import grid_of, split_between_nodes, with_note
 from .sizes import extended, note_on_sizes, wanted_scales
 
@@ -137,6 +139,7 @@ class GridSearch:
         boundary: the option of that name of `integer_grid`.
         options: the other options, those of the flattening.
         stages: the stopwatch.
+        for_quads: search until quads can be extracted from the grid.
     """
 
     mesh: Source | Flattening
@@ -148,6 +151,7 @@ class GridSearch:
     boundary: Any
     options: Mapping[str, Any]
     stages: Stopwatch
+    for_quads: bool = False
 
     @classmethod
     def of(
@@ -181,10 +185,28 @@ class GridSearch:
     def grid(self) -> IntegerGrid:
         """Return the grid, with the time of each stage; errors are those of `integer_grid`."""
         self.stages.done = 0.0
-        found = self.of_result(self.mesh) if isinstance(self.mesh, Flattening) else self.with_more_cones()
-        return replace(found, seconds=dict(self.stages.seconds))
+        return replace(self.of_any_size(), seconds=dict(self.stages.seconds))
 
-    def with_more_cones(self) -> IntegerGrid:
+    def of_any_size(self, tries: int = 3) -> IntegerGrid:
+        """Return a grid, with more squares if some quads of one of the wanted size have a vertex or an edge twice.
+
+        This is so where the surface is as thin as a square.
+        """
+        try:
+            return self._of_any_distortion()
+        except CoarseGridError as error:
+            if tries == 1:
+                raise
+            finer = replace(self, quads=1.6 * error.squares, size=None)
+        found, note = finer.of_any_size(tries - 1), "More quads than wanted"
+        is_noted = any(note in one for one in found.notes)
+        return (
+            found
+            if is_noted
+            else with_note(found, f"{note}: with fewer, some have a vertex or an edge twice.")
+        )
+
+    def _of_any_distortion(self) -> IntegerGrid:
         """Return a grid, with the fewest cones for less distortion if there is none as given.
 
         Where few cones leave rotations around handles far from quarter turns, more cones help.
@@ -193,8 +215,8 @@ class GridSearch:
         is_searched = isinstance(given.get("cones", "auto"), str) and not given.get("cone_count")
         try:
             return self._as_given()
-        except (ConvergenceError, GridError):
-            if not is_searched:
+        except (ConvergenceError, GridError) as error:
+            if isinstance(error, CoarseGridError) or isinstance(self.mesh, Flattening) or not is_searched:
                 raise
         less = 0.7 * given.get("distortion", DISTORTION)
         search = replace(self, options={**given, "distortion": less})
@@ -203,6 +225,8 @@ class GridSearch:
 
     def _as_given(self) -> IntegerGrid:
         """Return a grid for the options as given."""
+        if isinstance(self.mesh, Flattening):
+            return self.of_result(self.mesh)
         if not self._may_align():
             if self.sizes is not None:
                 raise OptionError("sizes cannot be combined with options of cones, boundaries or weights")
@@ -246,7 +270,7 @@ class GridSearch:
                 sizes=None if self.sizes is None else np.exp(-scales[vertices]),
             )
             try:
-                found.append(search.with_more_cones())
+                found.append(search.of_any_size())
             except NO_GRID as error:
                 why.append(f"No grid for a component of {plural(len(part.faces), 'triangle')}: {error}.")
         if not found:
@@ -355,16 +379,18 @@ class GridSearch:
         self.stages.done = 1.0
         with self.stages("grid"), limit_threads(result.settings.get("threads", THREADS)):
             layout = aligned(result, self.quads, self.size, self._angle)
-            sided, note = with_sides(layout) if is_straight else layout, ""
+            sided, found, note = with_sides(layout) if is_straight else layout, None, ""
             if sharp_lines or self.sharp_angle is not None:
-                found, note = grid_with_lines(
-                    split_between_nodes(sided), self._angle, self.sharp_angle is not None, self.energy
-                )
-                if found is not None:
-                    return with_note(found, note)
+                lines = edge_indices(sided.mesh, sharp_ends(sided.mesh, self._angle))
+                split = split_between_nodes(sided, lines)
+                found, note = grid_with_lines(split, self._angle, self.sharp_angle is not None, self.energy)
             # Rather than many more squares than wanted, a grid with other cones is searched.
             most = 1 if sharp_lines and self.sharp_angle is None else 4
-            return with_note(self._with_sides(layout, sided, all_sides, most), note)
+            found = with_note(found or self._with_sides(layout, sided, all_sides, most), note)
+        if not self.for_quads:
+            return found
+        with self.stages("extract"):
+            return replace(found, quad_mesh=extract_quads(found))
 
     @property
     def _angle(self) -> float:

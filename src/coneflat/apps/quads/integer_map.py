@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from ...geometry import double_areas, edge_lengths, sides_between, signed_double
 from ...mesh import NEXT, PREVIOUS
 from .layout import GRID_TOLERANCE, quarters_around
 from .transitions import UNITS
+
+if TYPE_CHECKING:
+    from .quad_mesh import QuadMesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +45,7 @@ class IntegerGrid:
         corner_quarters: (k,) their angles in quarter turns.
         features: (f, 2) vertices of sharp edges that lie on grid lines.
         seconds: wall time of each stage; not stored in files.
+        quad_mesh: its quads, if they were extracted; not stored in files.
 
     Examples:
         >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
@@ -65,6 +69,7 @@ class IntegerGrid:
     corner_quarters: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     features: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     seconds: dict[str, float] = field(default_factory=dict)
+    quad_mesh: QuadMesh | None = field(default=None, repr=False)
 
     @property
     def squares(self) -> float:

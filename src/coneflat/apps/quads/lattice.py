@@ -13,7 +13,7 @@ from ...base import FloatArray, IntArray, compiled
 from ...errors import GridError
 
 # Largest number of visited nodes of the search tree.
-MAX_VISITS = 200_000
+MAX_VISITS = 20_000
 
 
 class IntegerSolutions(NamedTuple):
@@ -102,27 +102,23 @@ class Lattice:
         """Return the same lattice with a nearly orthogonal basis."""
         return replace(self, basis=self.basis @ self._reduction()[1])
 
-    def nearest(self, place: FloatArray, count: int, visits: int = MAX_VISITS) -> IntArray:
-        """Return (k, d) the vectors nearest to a real vector (d,), in the order of their distance, at most `count`.
+    def nearest(self, place: FloatArray) -> IntArray:
+        """Return (d,) the vector nearest to a real vector (d,).
 
-        The search starts at Babai's point and stops after the given number of visits of nodes. The result is exact if
-        the search is complete before.
+        The search starts at Babai's point and stops after `MAX_VISITS` nodes. The result is exact if it is complete
+        before.
 
         References:
             C. P. Schnorr, M. Euchner, "Lattice basis reduction: improved practical algorithms", 1994.
         """
         size = self.basis.shape[1]
         if not size:
-            return self.one[None]
+            return self.one
         root, change = self._reduction()
         basis = self.basis @ change
         products = basis.T @ self.gram
         target = np.linalg.solve(products @ basis, products @ (place - self.one))
-        found = np.zeros((count, size), dtype=np.int64)
-        squares: FloatArray = np.full(count, np.inf)
-        number = enumerate_points(root, target, found, squares, visits)
-        order = np.argsort(squares[:number], kind="stable")
-        return self.one + found[order] @ basis.T
+        return self.one + basis @ nearest_point(root, target, MAX_VISITS)
 
     def _reduction(self) -> tuple[FloatArray, csr_matrix]:
         """Return the Cholesky factor of the reduced basis' Gram matrix, and (k, k) the change of basis."""
@@ -166,20 +162,19 @@ def reduce_basis(root: FloatArray, basis: IntArray) -> None:
 
 
 @compiled
-def enumerate_points(
-    root: FloatArray, target: FloatArray, found: IntArray, squares: FloatArray, visits: int
-) -> int:
-    """Fill in the integer vectors nearest to a target, unordered, and their squared distances; return their number.
+def nearest_point(root: FloatArray, target: FloatArray, visits: int) -> IntArray:
+    """Return the integer vector nearest to a target in the metric with a Cholesky factor.
 
     The search is depth first from the last coordinate. At each depth, integers are tried in the order of their
     distance, so that the first leaf is Babai's point.
     """
-    size, most = len(target), len(squares)
+    size = len(target)
     here = np.zeros(size, dtype=np.int64)
     step = np.zeros(size, dtype=np.int64)
+    found = here.copy()
     centre = np.zeros(size)
     beyond = np.zeros(size + 1)  # squared distance in the coordinates from this one on
-    number, bound, depth, worst, is_new = 0, np.inf, size - 1, 0, True
+    least, depth, is_new = np.inf, size - 1, True
     for _ in range(visits):
         if is_new:
             pull = 0.0
@@ -190,19 +185,14 @@ def enumerate_points(
             step[depth] = 1 if centre[depth] >= here[depth] else -1
         off = (here[depth] - centre[depth]) * root[depth, depth]
         total = beyond[depth + 1] + off * off
-        is_new = total < bound and depth > 0
+        is_new = total < least and depth > 0
         if is_new:
             beyond[depth] = total
             depth -= 1
             continue
-        if total < bound:
-            place = number if number < most else worst
-            found[place] = here
-            squares[place] = total
-            number = min(number + 1, most)
-            if number == most:
-                worst = int(np.argmax(squares))
-                bound = squares[worst]
+        if total < least:
+            found[:] = here
+            least = total
         else:
             depth += 1
             if depth == size:
@@ -210,4 +200,4 @@ def enumerate_points(
         # The next nearest integer is on the other side, one further away.
         here[depth] += step[depth]
         step[depth] = -step[depth] - (1 if step[depth] > 0 else -1)
-    return number
+    return found

@@ -292,15 +292,6 @@ def first_points(vertex: IntArray) -> IntArray:
     return first
 
 
-def between_nodes(layout: GridLayout) -> BoolArray:
-    """Return (e,) whether each edge joins two vertices that must lie on grid points.
-
-    A triangle of three such vertices degenerates if they are rounded to collinear points.
-    """
-    is_node = mask_of(len(layout.mesh.vertices), layout.nodes)
-    return np.asarray(is_node[layout.mesh.edges].all(axis=1))
-
-
 def split_edges(layout: GridLayout, is_split: BoolArray) -> GridLayout:
     """Return a layout of the same surface with the edges `is_split` (e,) split at their midpoints."""
     points = layout.points

@@ -55,7 +55,7 @@ def grid_with_lines(
         if not len(lined.edges):
             break
         rounding = find_rounding(lined.layout)
-        costs, is_folded = lined.costs(layout, rounding.displaced([rounding.smooth])[0])
+        costs, is_folded = lined.costs(layout, rounding.displaced(rounding.basis @ rounding.start))
         # Each failure lowers the bound, so that the attempts end soon; those for preferred edges sooner.
         is_bad = costs >= (0.5 ** (1 + attempt / 4) if is_required else 0.1) * costs.max()
         if not is_required and costs.max() > MAX_COST * np.sqrt(layout.area):
@@ -63,7 +63,9 @@ def grid_with_lines(
         elif not is_folded or (is_required and attempt == 0):
             try:
                 found = grid_about(rounding, energy, 0)
-                break
+                if found.squares <= 2 * layout.area:
+                    break
+                found = None
             except GridError as error:
                 why = str(error)
         edges = _long_chains(layout, lined.edges[~is_bad[lined.chain]])

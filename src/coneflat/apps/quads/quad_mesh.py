@@ -166,7 +166,11 @@ class QuadMesh:
 
 
 class CoarseGridError(GridError):
-    """A grid is so coarse that its quads are not a mesh."""
+    """A grid is so coarse that its quads are not a mesh; `squares` is their number."""
+
+    def __init__(self, text: str, squares: float = 0.0) -> None:
+        super().__init__(text)
+        self.squares = squares
 
 
 def opposite_sides(quads: IntArray) -> IntArray:

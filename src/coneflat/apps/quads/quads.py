@@ -15,9 +15,9 @@ from ...options import read_options
 from ...source import Source
 from .cross_field import sharp_ends
 from .extract import extract_quads, with_borders
-from .integer_grid import NO_GRID, GridSearch
+from .integer_grid import GridSearch
 from .integer_map import IntegerGrid
-from .options import DISTORTION, QuadOptions
+from .options import QuadOptions
 from .quad_mesh import CoarseGridError, QuadMesh, least_jacobians
 from .simpler_mesh import SimplerMesh, simplified
 from .smooth import smooth_quads, untangled
@@ -62,44 +62,25 @@ def quads(
         ((9, 4), (16, 3))
     """
     own = {"quads": quads, "size": size, "stretch": stretch, "sharp_angle": sharp_angle, "smooth": smooth}
-    small, search, source, coarse = None, None, None, tuple[str, ...]()
-    # With the fewest cones, which need the least room, and with more quads: options, and the factor of their number.
-    retries: list[tuple[dict[str, Any], float]] = [({}, 1.6), ({}, 1.6)]
+    small, search, source = None, None, None
     if isinstance(mesh, IntegerGrid):
         if any(one is not None for one in (faces, quads, size, sharp_angle)) or options.keys() - {"progress"}:
             raise OptionError("a grid already has faces, size and options: no others can be given")
         read_options(own, QuadOptions)
         grid, stages = mesh, Stopwatch(options.get("progress"))
     else:
-        search = GridSearch.of(mesh, faces, own, options)
-        is_fixed = isinstance(mesh, Flattening) or bool(options.keys() & {"cones", "distortion"})
-        is_fixed |= search.sizes is not None or sharp_angle is not None
-        if not is_fixed:
-            retries.insert(0, ({"cones": "sparse", "distortion": 2 * DISTORTION}, 1.0))
+        search = replace(GridSearch.of(mesh, faces, own, options), for_quads=True)
         stages = search.stages
         source = mesh.source if isinstance(mesh, Flattening) else search.source.given.source
         with stages("coarsen"):
             search, small = simplified(search)
-        grid = search.grid()
-    # Where the surface is as thin as a square, quads have a vertex twice. If no retry helps, they are left out.
-    while True:
-        stages.done = 1.0
         try:
-            with stages("extract"):
-                found = extract_quads(grid, leave_out=search is not None and not retries)
-            break
+            grid = search.grid()
         except CoarseGridError:
-            if search is None or not retries:
-                raise
-            other, finer = retries.pop(0)
-            search = replace(
-                search, options={**search.options, **other}, quads=finer * grid.squares, size=None
-            )
-            try:
-                grid = search.grid()
-                coarse = ("More quads than wanted: with fewer, some have a vertex or an edge twice.",)
-            except NO_GRID:
-                retries.clear()
+            grid = replace(search, for_quads=False).grid()
+    stages.done = 1.0
+    with stages("extract"):
+        found = grid.quad_mesh or extract_quads(grid, leave_out=search is not None)
     found = with_borders(found) if found.left_out else found
     features = grid.features
     if small is None and search is not None and isinstance(search.mesh, Source):
@@ -111,19 +92,9 @@ def quads(
         found = smooth_quads(found, smooth, features)
         found = untangled(found) if smooth else found
         found = found if small is None else small.completed(found)
-    return replace(
-        found,
-        notes=(
-            *(() if small is None else small.notes),
-            *grid.notes,
-            *coarse,
-            *found.notes,
-            *_notes(found, small),
-        ),
-        seconds={**grid.seconds, **stages.seconds},
-        grid=grid,
-        source=source,
-    )
+    notes = (*(() if small is None else small.notes), *grid.notes, *found.notes, *_notes(found, small))
+    seconds = {**grid.seconds, **stages.seconds}
+    return replace(found, notes=notes, seconds=seconds, grid=grid, source=source)
 
 
 def _notes(found: QuadMesh, small: SimplerMesh | None) -> Iterator[str]:

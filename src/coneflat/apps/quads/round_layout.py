@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...base import ComplexArray, IntArray, mask_of, plural
+from ...base import ComplexArray, IntArray, mask_of
 from ...errors import ConvergenceError, GridError, OptionError
 from ...geometry import as_complex, as_pairs, double_areas
 from ...layout import Lines, PointConstraints, Relaxed, StretchEnergy, relax
 from .integer_map import IntegerGrid, grid_of_corners
-from .layout import GridLayout, between_nodes, split_edges
+from .layout import GridLayout, split_edges
 from .rounding import Rounding, find_rounding
 from .transitions import Transitions
 
@@ -34,12 +34,17 @@ def grid_of(layout: GridLayout, energy: StretchEnergy, most: int) -> IntegerGrid
     return grid_about(find_rounding(split_between_nodes(layout)), energy, most)
 
 
-def split_between_nodes(layout: GridLayout) -> GridLayout:
+def split_between_nodes(layout: GridLayout, lines: IntArray | None = None) -> GridLayout:
     """Return a layout with the edges between vertices on grid points split.
 
-    Otherwise triangles may have grid points at all corners.
+    Otherwise triangles may have grid points at all corners, which degenerate if they are collinear. Vertices of edges
+    (k,) that may get on grid lines may become such points.
     """
-    is_split = between_nodes(layout)
+    mesh = layout.mesh
+    is_node = mask_of(len(mesh.vertices), layout.nodes)
+    may_be = is_node if lines is None else is_node | mask_of(len(is_node), mesh.edges[lines])
+    one, two = mesh.edges.T
+    is_split = (is_node[one] & may_be[two]) | (may_be[one] & is_node[two])
     return split_edges(layout, is_split) if is_split.any() else layout
 
 
@@ -78,24 +83,35 @@ def with_note(found: IntegerGrid, note: str) -> IntegerGrid:
 
 
 def _grid_near(rounding: Rounding, energy: StretchEnergy) -> tuple[IntegerGrid | None, str]:
-    """Return a grid for one of the nearest lattice points, or None and the reason why the last one failed."""
+    """Return a grid for the nearest lattice point, or None and the reason why there is none.
+
+    Relaxing starts from the displacement of least energy to the lattice point. If this makes a triangle too small, or
+    does not succeed, it starts from the smooth layout itself, with smaller steps if sides are folded.
+    """
     layout, transitions = rounding.layout, rounding.transitions
     try:
-        candidates = rounding.candidates()
+        values = rounding.nearest()
     except GridError as error:
         return None, str(error)
-    why = "all lattice points nearby merge cones"
-    for tries, values in enumerate(candidates[:3]):
+    moved = rounding.displaced(values)
+    has_area = replace(layout, points=moved).double_areas() > 0.01 * layout.double_areas()
+    for stride in (1.0,) * bool(has_area.all()) + (LINE_STRIDE, LINE_STRIDE / 3):
         try:
-            found = _relaxed(rounding, values, energy)
+            start = moved if stride == 1 else layout.points
+            found = _relaxed(rounding, values, start, energy, stride)
         except (ConvergenceError, OptionError) as error:
             why = str(error)
-            continue
+            if start is moved:
+                continue
+            break
         points = _snapped(found, transitions, values)
         if _folds_sides(layout, transitions, points):
             why = "sides of triangles on grid lines change their direction"
         elif (replace(layout, points=points).double_areas() > 0).all():
-            return _make_grid(layout, points, tries), ""
+            mesh, places, corners = layout.mesh, as_pairs(points)[layout.corners], layout.sides.corners
+            return grid_of_corners(
+                mesh.vertices, mesh.faces, places, layout.cones, corners, size=layout.size
+            ), ""
         else:
             why = "rounding flipped a very small triangle"
     return None, why
@@ -110,21 +126,24 @@ def _folds_sides(layout: GridLayout, transitions: Transitions, points: ComplexAr
     return bool((turned.real <= 0)[on[starts] & on[ends]].any())
 
 
-def _relaxed(rounding: Rounding, values: IntArray, energy: StretchEnergy) -> Relaxed:
+def _relaxed(
+    rounding: Rounding, values: IntArray, start: ComplexArray, energy: StretchEnergy, stride: float
+) -> Relaxed:
     """Return the relaxed layout with integer translations of seams and cones on grid points.
 
-    Relaxing starts from the displacement of least energy to the rounded values. If this makes a triangle too small, it
-    starts from the smooth layout itself, from which it may still succeed.
+    Args:
+        rounding: the smooth layout.
+        values: (v,) the integers.
+        start: (u,) the points from which relaxing starts.
+        energy: what it minimises.
+        stride: largest fraction of the distance to the constraints per step.
 
     Raises:
         ConvergenceError: these constraints were not reached without flipping a triangle.
     """
     layout, transitions = rounding.layout, rounding.transitions
-    (moved,) = rounding.displaced([values])
-    has_area = replace(layout, points=moved).double_areas() > 0.01 * layout.double_areas()
-    smooth = moved if has_area.all() else layout.points
     chains, count = transitions.chains, 2 * len(transitions.quarters)
-    places = transitions.places(smooth, values.astype(np.float64))
+    places = transitions.places(start, values.astype(np.float64))
     pinned = np.flatnonzero(transitions.fixed.all(axis=1))
     _, one_of = np.unique(chains.chain, return_index=True)
     # The signed offset of a line is measured to the left of its direction, so that of a vertical line is -x.
@@ -139,7 +158,7 @@ def _relaxed(rounding: Rounding, values: IntArray, energy: StretchEnergy) -> Rel
         lines=lines,
         tied=chains.halfedges[one_of, 1],
         translations=values[:count].reshape(-1, 2),
-        stride=LINE_STRIDE if lines and smooth is layout.points else 1.0,
+        stride=stride,
     )
     # A thousand times the energy of an isometry occurs if cones merge. Of 60 cases of benchmarks/grids.py the slowest
     # takes 1.7 times as long without this limit.
@@ -148,7 +167,7 @@ def _relaxed(rounding: Rounding, values: IntArray, energy: StretchEnergy) -> Rel
     )
     return relax(
         layout.mesh,
-        as_pairs(smooth),
+        as_pairs(start),
         layout.corners,
         energy,
         constraints,
@@ -167,13 +186,3 @@ def _snapped(found: Relaxed, transitions: Transitions, values: IntArray) -> Comp
     bits = min(40, 50 - int(np.ceil(np.log2(largest))))
     rounded = np.ldexp(np.rint(np.ldexp(found.points, bits)), -bits)
     return transitions.places(as_complex(rounded), values.astype(np.float64))
-
-
-def _make_grid(layout: GridLayout, points: ComplexArray, tries: int) -> IntegerGrid:
-    missed = plural(tries, "nearest lattice point")
-    note = f"The {missed} could not be reached without flipping triangles; the next one was used."
-    mesh, cones, corners = layout.mesh, layout.cones, layout.sides.corners
-    known = {"size": layout.size, "notes": (note,) if tries else ()}
-    return grid_of_corners(
-        mesh.vertices, mesh.faces, as_pairs(points)[layout.corners], cones, corners, **known
-    )

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags, kron
+from scipy.sparse import bmat, coo_matrix, csc_matrix, csr_matrix, diags, kron
 from scipy.sparse.csgraph import dijkstra
 
 from ...base import BoolArray, ComplexArray, FloatArray, IntArray, mask_of
@@ -81,8 +80,6 @@ NEAR_CONE_DISTANCE = 3.0
 # Attempts to separate cones, in this order until one succeeds: largest rotation of the vector between near cones in
 # radians, and number of pairs that are separated at once, None for all.
 SEPARATIONS = ((np.pi / 3, None), (np.pi / 2, None), (np.pi / 3, 1), (np.pi / 2, 1))
-# Visited nodes of the search tree for the nearest point alone, which is only used to detect merged cones.
-QUICK_VISITS = 2_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,11 +137,6 @@ class Rounding:
     layout: GridLayout
     transitions: Transitions
 
-    @property
-    def smooth(self) -> FloatArray:
-        """(v,) the variables of the smooth layout, projected to the solutions of the equations."""
-        return self.basis @ self.start
-
     def scaled(self, factor: float) -> Rounding:
         """Return the rounding of the layout with the number of squares multiplied by a factor."""
         return replace(self, start=np.sqrt(factor) * self.start, layout=self.layout.scaled(factor))
@@ -154,10 +146,8 @@ class Rounding:
         """Pairs of cones that must not merge."""
         return _near_pairs(self.layout, self.transitions, self.basis, self.start)
 
-    def candidates(self) -> list[IntArray]:
-        """Return integer values (v,) of the variables near the smooth ones that merge no two cones.
-
-        They are sorted by the area of triangles that the displacements of least energy flip, then by distance.
+    def nearest(self) -> IntArray:
+        """Return integer values (v,) of the variables nearest to the smooth ones that merge no two cones.
 
         Raises:
             GridError: cones cannot be separated.
@@ -166,49 +156,33 @@ class Rounding:
         every = Lattice(np.zeros(size, dtype=np.int64), np.eye(size, dtype=np.int64), self.metric)
         lattice = every.reduced()
         for angle, at_once in SEPARATIONS:
-            try:
-                found = self._separated(lattice, angle, at_once)
-                break
-            except GridError:
-                if (angle, at_once) == SEPARATIONS[-1]:
-                    raise
-        values = [np.asarray(self.basis @ each) for each in found]
-        areas = [
-            -float(np.minimum(replace(self.layout, points=points).double_areas(), 0.0).sum())
-            for points in self.displaced(values)
-        ]
-        return [values[i] for i in np.argsort(areas, kind="stable")]
+            found = self._separated(lattice, angle, at_once)
+            if found is not None:
+                return np.asarray(self.basis @ found)
+        raise GridError("near cones cannot be separated: use more quads")
 
-    def displaced(self, values: Sequence[FloatArray | IntArray]) -> list[ComplexArray]:
-        """Return (u,) the points moved by the displacement of least energy to each of some values (v,)."""
+    def displaced(self, values: FloatArray | IntArray) -> ComplexArray:
+        """Return (u,) the points moved by the displacement of least energy to some values (v,)."""
         points, places = self.layout.points, self.transitions.places
-        given = [as_pairs(places(points, each) - points).ravel() for each in values]
-        shifts = self.stiffness.displacement(np.stack(given, axis=1)).T
-        return [
-            places(points + as_complex(shift.reshape(-1, 2)), each)
-            for shift, each in zip(shifts, values, strict=True)
-        ]
+        given = as_pairs(places(points, values) - points).reshape(-1, 1)
+        shift = self.stiffness.displacement(given)
+        return places(points + as_complex(shift.reshape(-1, 2)), values)
 
-    def _separated(self, lattice: Lattice, angle: float, at_once: int | None) -> list[IntArray]:
-        """Return near vectors of a lattice that separate all cones, and rotate near pairs by less than `angle`."""
+    def _separated(self, lattice: Lattice, angle: float, at_once: int | None) -> IntArray | None:
+        """Return a near vector of a lattice that separates all cones, and rotates near pairs by less than `angle`.
+
+        None if two cones cannot be separated after others.
+        """
         while True:  # each round reduces the dimension of the lattice
-            bad = self.pairs.collapsed(lattice.nearest(self.start, 1, QUICK_VISITS)[0], angle)
-            if not len(bad):
-                break
+            found = lattice.nearest(self.start)
+            if not len(bad := self.pairs.collapsed(found, angle)):
+                return found
             for pair in self.pairs.disjoint(bad)[:at_once].tolist():
                 part = self._separate(pair, lattice)
                 if part is None and pair == bad[0]:
-                    distance = float(np.hypot(*self.pairs.before[pair]))
-                    raise GridError(
-                        f"two cones {distance:.2g} units from each other cannot be separated: use more quads"
-                    )
+                    return None
                 lattice = lattice if part is None else part
             lattice = lattice.reduced()
-        # The nearest vector may differ from that of the quick search.
-        found = np.concatenate(
-            [lattice.nearest(self.start, 64), lattice.nearest(self.start, 1, QUICK_VISITS)]
-        )
-        return [each for each in found if not len(self.pairs.collapsed(each, angle))][:16]
 
     def _separate(self, pair: int, lattice: Lattice) -> Lattice | None:
         """Return the part of a lattice where two cones keep their distance along an axis, at least a unit.
@@ -258,33 +232,42 @@ def _near_pairs(
 ) -> ConePairs:
     """Return the vectors between near cones along the shortest edge paths."""
     mesh, points, cones, (starts, ends) = layout.mesh, layout.points, layout.nodes, layout.ends
-    graph = layout.graph()
-    found, before = dijkstra(graph, indices=cones, limit=NEAR_CONE_DISTANCE, return_predecessors=True)
+    # Paths start at copies of the cones. None goes on from a cone.
+    n, graph = len(mesh.vertices), layout.graph()
+    through = diags(1.0 - mask_of(n, cones)) @ graph
+    every = csr_matrix(bmat([[through, None], [graph[cones], csr_matrix((len(cones), len(cones)))]]))
+    found, parents = dijkstra(
+        every, indices=n + np.arange(len(cones)), limit=NEAR_CONE_DISTANCE, return_predecessors=True
+    )
     halfedge = csr_matrix((np.arange(1, len(starts) + 1), (mesh.tails, mesh.heads)), shape=graph.shape)
-    is_cone = mask_of(len(mesh.vertices), cones)
-    rows, ends_of = [], []
+    rows, least, ends_of = [], [], []
 
     def joining(path: list[int]) -> PathVector:
         sides = [_side(int(halfedge[a, b]), int(halfedge[b, a]), starts, ends) for a, b in pairwise(path)]
         return _vector(sides, transitions, points)
 
     for i, j in np.argwhere(np.triu(np.isfinite(found[:, cones]), 1)).tolist():
-        path = _path_to(int(cones[j]), before[i])
-        if not is_cone[path[1:-1]].any():
-            rows.append(joining(path).rows)
-            ends_of.append((i, j))
-    cone_rows = np.array(rows, dtype=np.int64).reshape(len(rows), 2, len(basis))
-    side_rows, least = _distances_to_sides([joining(each) for each in _paths_to_sides(layout)], transitions, layout)
+        rows.append(joining([int(cones[i]), *_path_to(int(cones[j]), parents[i])[1:]]).rows)
+        least.append(-1.0)
+        ends_of.append((i, j))
+    # Pairs with sides are kept if they face each other: a line crosses both, or they are not nearly collinear. They get
+    # unique indices, so that they count as having no cone in common.
+    for path in _paths_to_sides(layout):
+        one = joining(path)
+        for axis in np.flatnonzero(_known_axes(transitions, one) & one.rows.any(axis=1)).tolist():
+            rows.append(one.rows * (np.arange(2) == axis)[:, None])
+            is_facing = len(path) == 2 or _is_beside(one, axis, layout)
+            least.append(1e-6 if is_facing else 0.45 * np.hypot(*one.place))
+            ends_of.append((-len(rows), -len(rows)))
     # Products of sparse integer matrices are faster than those of dense ones, which no library accelerates.
-    cone_rows, side_rows = (
-        (csr_matrix(each.reshape(2 * len(each), len(basis))) @ basis).reshape(len(each), 2, basis.shape[1])
-        for each in (cone_rows, side_rows)
+    every = csr_matrix(np.array(rows, dtype=np.int64).reshape(2 * len(rows), len(basis))) @ basis
+    vectors, indices = (
+        every.reshape(len(rows), 2, len(start)),
+        np.array(ends_of, dtype=np.int64).reshape(-1, 2),
     )
-    facing = np.abs(side_rows[:, 0] @ start) > np.maximum(least, 1e-6)
-    joined = np.concatenate([cone_rows, side_rows[facing]])
-    # Pairs with sides get unique indices, so that they count as having no cone in common.
-    ends_of += [(len(cones) + k, len(cones) + k) for k in range(int(facing.sum()))]
-    return ConePairs(joined, joined @ start, np.array(ends_of, dtype=np.int64).reshape(-1, 2))
+    before = vectors @ start
+    kept = np.abs(before).max(axis=1) > least
+    return ConePairs(vectors[kept], before[kept], indices[kept])
 
 
 def _path_to(vertex: int, before: IntArray) -> list[int]:
@@ -321,8 +304,7 @@ def _vector(sides: list[tuple[int, int]], transitions: Transitions, points: Comp
             turn = (turn + across) % 4
         place += UNITS[turn] * (points[end] - points[there])
     last = total + TURNS[turn] @ shift(sides[-1][1])
-    # A single edge has no other triangles between its ends, so its vector always counts as facing.
-    return PathVector(last, place if len(sides) > 1 else 0j, sides[0][0], sides[-1][1], turn)
+    return PathVector(last, np.array([place.real, place.imag]), sides[0][0], sides[-1][1], turn)
 
 
 def _paths_to_sides(layout: GridLayout) -> list[list[int]]:
@@ -364,42 +346,32 @@ class PathVector(NamedTuple):
 
     Attributes:
         rows: (2, v) coefficients of the vector in the variables, as far as these determine its ends.
-        place: it in the layout; 0 for a path of a single edge.
+        place: (2,) the vector in the layout.
         first, last: the points at the ends.
         turn: the rotation of the frame of the last edge, in quarter turns.
     """
 
     rows: IntArray
-    place: complex
+    place: FloatArray
     first: int
     last: int
     turn: int
 
 
-def _distances_to_sides(
-    vectors: list[PathVector], transitions: Transitions, layout: GridLayout
-) -> tuple[IntArray, FloatArray]:
-    """Return (p, 2, v) the coordinate that separates the ends of vectors, with 0 for the other, and (p,) the least
-    distance at which they face each other: 0 if a line across both exists, else they must not be nearly collinear.
-    """
-    found, least = [], []
-    for one in vectors:
-        is_known = _known_axes(transitions, one.first)
-        is_known &= np.roll(_known_axes(transitions, one.last), one.turn % 2)
-        for axis in np.flatnonzero(is_known & one.rows.any(axis=1)).tolist():
-            found.append(np.stack([one.rows[axis], np.zeros_like(one.rows[axis])]))
-            spans = []
-            for point, turn, place in ((one.first, 0, 0j), (one.last, one.turn, one.place)):
-                side = layout.sides.side[layout.sides.points == point]
-                side = side[layout.sides.axis[side] == (axis + turn) % 2]
-                on = np.append(layout.sides.points[np.isin(layout.sides.side, side)], point)
-                spans.append(as_pairs(UNITS[turn] * (layout.points[on] - layout.points[point]) + place)[:, 1 - axis])
-            is_beside = max(each.min() for each in spans) <= min(each.max() for each in spans)
-            least.append(0.0 if is_beside else 0.45 * abs(one.place))
-    size = transitions.shifts.shape[1]
-    return np.array(found, dtype=np.int64).reshape(len(found), 2, size), np.array(least)
+def _is_beside(one: PathVector, axis: int, layout: GridLayout) -> bool:
+    """Return whether a line along an axis crosses both sides, or the side and the cone, at the ends of a vector."""
+    sides, spans = layout.sides, []
+    for point, turn, place in ((one.first, 0, 0 * one.place), (one.last, one.turn, one.place)):
+        side = sides.side[sides.points == point]
+        side = side[sides.axis[side] == (axis + turn) % 2]
+        on = np.append(sides.points[np.isin(sides.side, side)], point)
+        there = as_pairs(UNITS[turn] * (layout.points[on] - layout.points[point])) + place
+        spans.append(there[:, 1 - axis])
+    return bool(max(each.min() for each in spans) <= min(each.max() for each in spans))
 
 
-def _known_axes(transitions: Transitions, point: int) -> BoolArray:
-    """Return (2,) whether the variables determine each coordinate of a point."""
-    return np.roll(transitions.fixed[transitions.base[point]], int(transitions.turn[point]) % 2)
+def _known_axes(transitions: Transitions, one: PathVector) -> BoolArray:
+    """Return (2,) whether the variables determine each coordinate of both ends of a vector."""
+    turn = transitions.turn[[one.first, one.last]] + [0, one.turn]
+    first, last = transitions.fixed[transitions.base[[one.first, one.last]]]
+    return np.roll(first, turn[0] % 2) & np.roll(last, turn[1] % 2)

@@ -184,7 +184,7 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
     if is_jagged:
         search = replace(search, boundary="free")
         notes.append(f"The boundary cuts squares, because it has more than {MAX_CORNERS} corners.")
-    if _thin_share(filled) > 0.1 and len(without_pillows(filled).faces) == len(of):
+    if _is_thin(filled).mean() > 0.1 and len(without_pillows(filled).faces) == len(of):
         simple, some, of = _retriangulated(filled, int(np.clip(4 * quads, COARSE // 6, count)))
     if len(simple.faces) > 2 * count:
         simple, some, of = coarse_mesh(filled, int(count))
@@ -203,10 +203,6 @@ def _is_thin(mesh: TriangleMesh) -> BoolArray:
     """Return (m,) whether the areas of triangles are small compared with those of equal sides of this length."""
     lengths = edge_lengths(mesh.vertices, mesh.faces)
     return 6 * double_areas(lengths) <= THIN * 3**0.5 * (lengths**2).sum(axis=1)
-
-
-def _thin_share(mesh: TriangleMesh) -> float:
-    return float(_is_thin(mesh).mean())
 
 
 def _short_edges(
@@ -232,7 +228,7 @@ def _retriangulated(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntAr
     # Where the area is almost none, edges are split into about four times as many pieces as triangles are wanted.
     longest = max(3 * (_area(mesh) / count) ** 0.5, total / (4 * count))
     new, some, of = best = mesh, np.arange(n), np.arange(len(mesh.faces))
-    least, share, step = np.inf, _thin_share(mesh), 0
+    least, share, step = np.inf, _is_thin(mesh).mean(), 0
     while step < 4 and share < 0.9 * least:
         least = share
         sides = new.halfedge_edges.reshape(-1, 3)[np.flatnonzero(_is_thin(new) & (step > 0))]
@@ -240,7 +236,7 @@ def _retriangulated(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntAr
         new, own = _short_edges(new, longest, mask_of(len(new.edges), np.take_along_axis(sides, own, axis=1)))
         of, some = of[own], np.append(some, np.full(len(new.vertices) - len(some), n))
         new, kept, own = coarse_mesh(new, count)
-        some, of, step, share = some[kept], of[own], step + 1, _thin_share(new)
+        some, of, step, share = some[kept], of[own], step + 1, _is_thin(new).mean()
         best = (new, some, of) if share < least else best
     new, some, of = best
     order = np.argsort(some, kind="stable")

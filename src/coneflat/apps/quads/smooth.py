@@ -173,7 +173,9 @@ def _improve(
     places = surface.at(on, weights).reshape(len(moves), count, 3)
     trials = np.concatenate([places, points[moves][:, None]], axis=1)
     corners = np.where(
-        (around == moves[owner][:, None])[:, None, :, None], trials[owner][:, :, None], points[around][:, None]
+        (around == moves[owner][:, None])[:, None, :, None],
+        trials[owner][:, :, None],
+        points[around][:, None],
     )
     numbers = np.arange(corners.size // 3).reshape(-1, 4)
     each = least_jacobians(corners.reshape(-1, 3), numbers).reshape(len(around), -1)

@@ -140,11 +140,8 @@ def _bake(
     tree, farthest, side = TriangleTree(painted.vertices, painted.faces), 0.0, len(owner)
     images = {channel: np.zeros((side, side, 4), np.uint8) for channel in painted.channels()}
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    if NORMAL in images:
-        axes, old_axes = (
-            _tangents(corners, texels),
-            _tangents(painted.vertices[painted.faces], painted.normal_uv()),
-        )
+    axes = _tangents(corners, texels)
+    old_axes = _tangents(painted.vertices[painted.faces], painted.normal_uv())
     every = np.flatnonzero(owner.reshape(-1) >= 0)
     for begin in range(0, len(every), TEXELS_AT_ONCE):
         check_cancelled()
