@@ -100,8 +100,7 @@ class Preferences(bpy.types.AddonPreferences):
     def draw(self, context: Any) -> None:
         """Draw the environment and how to change it."""
         found = type(self).found
-        icon = "CHECKMARK" if found else "INFO"
-        self.layout.label(text=str(found or type(self).reason), icon=icon)
+        self.layout.label(text=str(found or type(self).reason), icon="CHECKMARK" if found else "INFO")
         for name in _SHOWN:
             self.layout.prop(self, name)
         row = self.layout.row()
