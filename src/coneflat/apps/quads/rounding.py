@@ -76,7 +76,7 @@ def _turned_copies(transitions: Transitions) -> csr_matrix:
 
 
 # Grid units: only cones within this distance along the surface are checked for merging.
-NEAR_CONE_DISTANCE = 3.0
+NEAR_CONE_DISTANCE = 5.0
 # Attempts to separate cones, in this order until one succeeds: largest rotation of the vector between near cones in
 # radians, and number of pairs that are separated at once, None for all.
 SEPARATIONS = ((np.pi / 3, None), (np.pi / 2, None), (np.pi / 3, 1), (np.pi / 2, 1))
@@ -240,34 +240,32 @@ def _near_pairs(
         every, indices=n + np.arange(len(cones)), limit=NEAR_CONE_DISTANCE, return_predecessors=True
     )
     halfedge = csr_matrix((np.arange(1, len(starts) + 1), (mesh.tails, mesh.heads)), shape=graph.shape)
-    rows, least, ends_of = [], [], []
+    entries: list[tuple[IntArray, FloatArray, float, tuple[int, int]]] = []
 
     def joining(path: list[int]) -> PathVector:
         sides = [_side(int(halfedge[a, b]), int(halfedge[b, a]), starts, ends) for a, b in pairwise(path)]
         return _vector(sides, transitions, points)
 
     for i, j in np.argwhere(np.triu(np.isfinite(found[:, cones]), 1)).tolist():
-        rows.append(joining([int(cones[i]), *_path_to(int(cones[j]), parents[i])[1:]]).rows)
-        least.append(-1.0)
-        ends_of.append((i, j))
+        one = joining([int(cones[i]), *_path_to(int(cones[j]), parents[i])[1:]])
+        entries.append((one.rows, one.place, -1.0, (i, j)))
     # Pairs with sides are kept if they face each other: a line crosses both, or they are not nearly collinear. They get
     # unique indices, so that they count as having no cone in common.
     for path in _paths_to_sides(layout):
-        one = joining(path)
+        one, k = joining(path), -len(entries) - 1
         for axis in np.flatnonzero(_known_axes(transitions, one) & one.rows.any(axis=1)).tolist():
-            rows.append(one.rows * (np.arange(2) == axis)[:, None])
-            is_facing = len(path) == 2 or _is_beside(one, axis, layout)
-            least.append(1e-6 if is_facing else 0.45 * np.hypot(*one.place))
-            ends_of.append((-len(rows), -len(rows)))
+            is_facing, own = len(path) == 2 or _is_beside(one, axis, layout), np.arange(2) == axis
+            least_distance = 1e-6 if is_facing else 0.45 * float(np.hypot(*one.place))
+            entries.append((one.rows * own[:, None], one.place * own, least_distance, (k, k)))
+    rows, places, least, indices = ([pair[i] for pair in entries] for i in range(4))
     # Products of sparse integer matrices are faster than those of dense ones, which no library accelerates.
-    every = csr_matrix(np.array(rows, dtype=np.int64).reshape(2 * len(rows), len(basis))) @ basis
-    vectors, indices = (
-        every.reshape(len(rows), 2, len(start)),
-        np.array(ends_of, dtype=np.int64).reshape(-1, 2),
-    )
+    products = csr_matrix(np.array(rows, dtype=np.int64).reshape(2 * len(rows), len(basis))) @ basis
+    vectors, drawn = products.reshape(len(rows), 2, len(start)), np.array(places).reshape(-1, 2)
+    # The nearest solution of the equations may have turned a vector around.
     before = vectors @ start
-    kept = np.abs(before).max(axis=1) > least
-    return ConePairs(vectors[kept], before[kept], indices[kept])
+    before = np.where((before * drawn).sum(axis=1, keepdims=True) >= 0, before, drawn)
+    kept = np.abs(before).max(axis=1) > np.array(least)
+    return ConePairs(vectors[kept], before[kept], np.array(indices, dtype=np.int64).reshape(-1, 2)[kept])
 
 
 def _path_to(vertex: int, before: IntArray) -> list[int]:
