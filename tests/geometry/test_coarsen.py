@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapes
-from scipy.spatial import cKDTree
+from scipy.spatial import Delaunay, cKDTree
 
 from coneflat import TriangleMesh, check_mesh
 from coneflat.geometry import coarse_mesh
@@ -48,3 +48,16 @@ def test_renumbering_changes_nothing(sphere: TriangleMesh):
     shuffled = TriangleMesh(sphere.vertices[order], place[sphere.faces][::-1])
     one, two = (coarse_mesh(each, 500)[0].vertices for each in (sphere, shuffled))
     assert np.array_equal(one[np.lexsort(one.T)], two[np.lexsort(two.T)])
+
+
+@pytest.mark.parametrize(("height", "most"), [(0.1, 800), (0.02, 3000)])
+def test_thin_triangles_are_not_folded_over(height, most):
+    """A flat sheet stays flat, and its triangles keep their orientation."""
+    points = np.random.default_rng(0).uniform(size=(2000, 2))
+    sheet = TriangleMesh(
+        np.column_stack([points * [1, height], 0 * points[:, 0]]), Delaunay(points).simplices
+    )
+    for mesh in (sheet, coarse_mesh(sheet, 800)[0]):
+        sides = mesh.vertices[mesh.faces][:, 1:] - mesh.vertices[mesh.faces][:, :1]
+        assert (np.cross(sides[:, 0], sides[:, 1])[:, 2] >= 0).all()
+    assert len(mesh.faces) <= most < len(sheet.faces)

@@ -12,8 +12,8 @@ from ..mesh.connectivity import TriangleMesh
 from ..mesh.ties import tie_key
 
 # Cosine of the largest rotation of a triangle by a collapse; the double area of a triangle, relative to half the sum of
-# its squared sides, below which its normal is not considered; and the weight of the length of an edge in its cost:
-# lengths decide where the surface is flat.
+# its squared sides, below which it must not get thinner, and to whose fourth power its normal is considered; and the
+# weight of the length of an edge in its cost: lengths decide where the surface is flat.
 MAX_ROTATION, MIN_SHAPE, LENGTH_WEIGHT = 0.2, 0.1, 0.1
 
 
@@ -132,7 +132,7 @@ def collapse_edges(
                     a, b, c, old, shape = normal(tail, one, two)
                     d, e, f, new, new_shape = normal(head, one, two)
                     is_bad |= not new_shape > min(shape, MIN_SHAPE)
-                    is_bad |= shape > MIN_SHAPE and a * d + b * e + c * f < MAX_ROTATION * old * new
+                    is_bad |= shape > MIN_SHAPE**4 and a * d + b * e + c * f < MAX_ROTATION * old * new
                 corner = after[corner]
             corner = first[head]
             while corner >= 0:

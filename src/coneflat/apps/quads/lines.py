@@ -50,7 +50,7 @@ def grid_with_lines(
     sharp = sharp_edges(mesh, angle) if is_required else edge_indices(mesh, sharp_ends(mesh, angle))
     near = sharp if is_required else sharp[np.abs(off[sharp]) < MAX_TURN]
     edges, found = _long_chains(layout, near), None
-    for attempt in count():
+    for attempt in count() if is_required else range(6):
         lined = _with_lines(layout, edges, off)
         if not len(lined.edges):
             break

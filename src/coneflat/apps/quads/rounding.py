@@ -240,7 +240,7 @@ def _near_pairs(
         every, indices=n + np.arange(len(cones)), limit=NEAR_CONE_DISTANCE, return_predecessors=True
     )
     halfedge = csr_matrix((np.arange(1, len(starts) + 1), (mesh.tails, mesh.heads)), shape=graph.shape)
-    entries: list[tuple[IntArray, FloatArray, float, tuple[int, int]]] = []
+    entries: list[tuple[IntArray, float, tuple[int, int]]] = []
 
     def joining(path: list[int]) -> PathVector:
         sides = [_side(int(halfedge[a, b]), int(halfedge[b, a]), starts, ends) for a, b in pairwise(path)]
@@ -248,7 +248,7 @@ def _near_pairs(
 
     for i, j in np.argwhere(np.triu(np.isfinite(found[:, cones]), 1)).tolist():
         one = joining([int(cones[i]), *_path_to(int(cones[j]), parents[i])[1:]])
-        entries.append((one.rows, one.place, -1.0, (i, j)))
+        entries.append((one.rows, -1.0, (i, j)))
     # Pairs with sides are kept if they face each other: a line crosses both, or they are not nearly collinear. They get
     # unique indices, so that they count as having no cone in common.
     for path in _paths_to_sides(layout):
@@ -256,14 +256,12 @@ def _near_pairs(
         for axis in np.flatnonzero(_known_axes(transitions, one) & one.rows.any(axis=1)).tolist():
             is_facing, own = len(path) == 2 or _is_beside(one, axis, layout), np.arange(2) == axis
             least_distance = 1e-6 if is_facing else 0.45 * float(np.hypot(*one.place))
-            entries.append((one.rows * own[:, None], one.place * own, least_distance, (k, k)))
-    rows, places, least, indices = ([pair[i] for pair in entries] for i in range(4))
+            entries.append((one.rows * own[:, None], least_distance, (k, k)))
+    rows, least, indices = ([pair[i] for pair in entries] for i in range(3))
     # Products of sparse integer matrices are faster than those of dense ones, which no library accelerates.
     products = csr_matrix(np.array(rows, dtype=np.int64).reshape(2 * len(rows), len(basis))) @ basis
-    vectors, drawn = products.reshape(len(rows), 2, len(start)), np.array(places).reshape(-1, 2)
-    # The nearest solution of the equations may have turned a vector around.
+    vectors = products.reshape(len(rows), 2, len(start))
     before = vectors @ start
-    before = np.where((before * drawn).sum(axis=1, keepdims=True) >= 0, before, drawn)
     kept = np.abs(before).max(axis=1) > np.array(least)
     return ConePairs(vectors[kept], before[kept], np.array(indices, dtype=np.int64).reshape(-1, 2)[kept])
 
