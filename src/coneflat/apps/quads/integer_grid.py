@@ -197,14 +197,13 @@ class GridSearch:
         except CoarseGridError as error:
             if tries == 1:
                 raise
-            finer = replace(self, quads=1.6 * error.squares, size=None)
-        found, note = finer.of_any_size(tries - 1), "More quads than wanted"
-        is_noted = any(note in one for one in found.notes)
-        return (
-            found
-            if is_noted
-            else with_note(found, f"{note}: with fewer, some have a vertex or an edge twice.")
-        )
+            coarse = error
+        try:
+            found = replace(self, quads=1.6 * coarse.squares, size=None).of_any_size(tries - 1)
+        except NO_GRID:
+            raise coarse from None
+        note = "More quads than wanted: with fewer, some have a vertex or an edge twice."
+        return found if note in found.notes else with_note(found, note)
 
     def _of_any_distortion(self) -> IntegerGrid:
         """Return a grid, with the fewest cones for less distortion if there is none as given.
@@ -219,8 +218,8 @@ class GridSearch:
             if isinstance(error, CoarseGridError) or isinstance(self.mesh, Flattening) or not is_searched:
                 raise
         less = 0.7 * given.get("distortion", DISTORTION)
-        search = replace(self, options={**given, "distortion": less})
-        found = search._of_flattening(self._boundary_without_sides)
+        other = replace(self, options={**given, "distortion": less})
+        found = other._of_flattening(self._boundary_without_sides)
         return with_note(found, f"With a distortion above {less:.3g}, no grid was found.")
 
     def _as_given(self) -> IntegerGrid:
@@ -238,6 +237,8 @@ class GridSearch:
             try:
                 return self._of_aligned_cones(is_finer)
             except NO_GRID as error:
+                if isinstance(error, CoarseGridError) and self.sizes is not None:
+                    raise
                 note = f"Quads follow no {what}, because no grid with such cones was found: {error}."
             # Meshes of more triangles have places enough for cones.
             if 2 * len(self.checked.mesh.faces) > COARSE:
@@ -271,6 +272,8 @@ class GridSearch:
             )
             try:
                 found.append(search.of_any_size())
+            except CoarseGridError:  # its bad quads are left out
+                found.append(replace(search, for_quads=False).of_any_size())
             except NO_GRID as error:
                 why.append(f"No grid for a component of {plural(len(part.faces), 'triangle')}: {error}.")
         if not found:

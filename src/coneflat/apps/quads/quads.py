@@ -80,7 +80,7 @@ def quads(
             grid = replace(search, for_quads=False).grid()
     stages.done = 1.0
     with stages("extract"):
-        found = grid.quad_mesh or extract_quads(grid, leave_out=search is not None)
+        found = (search and grid.quad_mesh) or extract_quads(grid, leave_out=search is not None)
     found = with_borders(found) if found.left_out else found
     features = grid.features
     if small is None and search is not None and isinstance(search.mesh, Source):

@@ -239,11 +239,12 @@ def _near_pairs(
     found, parents = dijkstra(
         every, indices=n + np.arange(len(cones)), limit=NEAR_CONE_DISTANCE, return_predecessors=True
     )
-    halfedge = csr_matrix((np.arange(1, len(starts) + 1), (mesh.tails, mesh.heads)), shape=graph.shape)
+    pairs = zip(mesh.tails.tolist(), mesh.heads.tolist(), strict=True)
+    number = {pair: k for k, pair in enumerate(pairs, 1)}.get
     entries: list[tuple[IntArray, float, tuple[int, int]]] = []
 
     def joining(path: list[int]) -> PathVector:
-        sides = [_side(int(halfedge[a, b]), int(halfedge[b, a]), starts, ends) for a, b in pairwise(path)]
+        sides = [_side(number((a, b), 0), number((b, a), 0), starts, ends) for a, b in pairwise(path)]
         return _vector(sides, transitions, points)
 
     for i, j in np.argwhere(np.triu(np.isfinite(found[:, cones]), 1)).tolist():

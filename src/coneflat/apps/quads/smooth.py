@@ -192,8 +192,9 @@ def _improve(
 def untangled(quads: QuadMesh) -> QuadMesh:
     """Return a quad mesh with fewer flipped quads, if possible none.
 
-    Vertices around flipped quads move one at a time on the surface. Unlike in smoothing, vertices on sharp edges move
-    too, because a flipped quad is worse than an inexact edge. Vertices on the boundary do not move.
+    Vertices around flipped quads move on the surface, those without a common quad at once. Unlike in smoothing,
+    vertices on sharp edges move too, because a flipped quad is worse than an inexact edge. Vertices on the boundary do
+    not move.
     """
     points, faces, barycentric = quads.vertices.copy(), quads.faces.copy(), quads.barycentric.copy()
     surface = None

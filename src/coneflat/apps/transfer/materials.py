@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 
 from ...base import FloatArray, IntArray
 from ...errors import MeshFileError, OptionError
@@ -178,27 +177,15 @@ class Painted:
         shift, uv = slot.get("extensions", {}).get("KHR_texture_transform", {}), self.uv_of(slot)[faces]
         cos, sin = np.cos(shift.get("rotation", 0.0)), np.sin(shift.get("rotation", 0.0))
         uv = np.einsum("qi,qic->qc", weights, uv) * shift.get("scale", (1, 1)) @ [[cos, -sin], [sin, cos]]
-        planes, wraps = self.image(slot.get("index"), is_colour)
-        size = np.array(planes.shape[:0:-1])
-        place = (uv + shift.get("offset", (0, 0))) * size - 0.5
-        place = np.where(np.equal(wraps, CLAMP), np.clip(place, 0, size - 1), place)
-        found = [
-            map_coordinates(plane, place.T[::-1], np.float64, order=1, mode="grid-wrap") for plane in planes
-        ]
-        return np.stack(found, axis=1) / 65535
+        image, wraps = self.image(slot.get("index"))
+        table = np.arange(256) / 255
+        tables = [to_linear(table) if is_colour else table] * 3 + [table]
+        return bilinear(image, uv + shift.get("offset", (0, 0)), np.stack(tables), wraps)
 
-    def _read_image(self, index: int | None, is_colour: bool) -> tuple[NDArray[np.uint16], tuple[Any, Any]]:
-        """Return (4, h, w) the linear values of a texture, up to 65535, and its wrap modes along u and v."""
-        content, name, modes = self._content(index)
-        image, table = decode_image(content, name), np.arange(256) / 255
-        linear = [to_linear(table) if is_colour else table] * 3 + [table]
-        planes = [np.rint(65535 * each).astype(np.uint16)[image[..., k]] for k, each in enumerate(linear)]
-        return np.stack(planes), (modes.get("wrapS"), modes.get("wrapT"))
-
-    def _content(self, index: int | None) -> tuple[bytes, str | Path, dict[str, Any]]:
-        """Return the file of the image of a texture, its name, and the sampler."""
+    def _read_image(self, index: int | None) -> tuple[NDArray[np.uint8], tuple[Any, Any]]:
+        """Return (h, w, 4) the image of a texture, and its wrap modes."""
         if self.picture is not None:
-            return read_bytes(self.picture), self.picture, {}
+            return decode_image(read_bytes(self.picture), self.picture), (None, None)
         assert self.mesh.scene is not None
         data = self.mesh.scene.data
         texture = data.item("textures", index)
@@ -209,4 +196,28 @@ class Painted:
             content = data.decoded(uri, name)
         else:
             content = read_bytes(data.resolve(uri)) if uri else bytes(data.view(item.get("bufferView")))
-        return content, name, {} if sampler is None else data.item("samplers", sampler)
+        modes = {} if sampler is None else data.item("samplers", sampler)
+        return decode_image(content, name), (modes.get("wrapS"), modes.get("wrapT"))
+
+
+def bilinear(
+    image: NDArray[np.uint8], uv: FloatArray, tables: FloatArray, wraps: tuple[Any, Any]
+) -> FloatArray:
+    """Return (q, 4) bilinear values of an image.
+
+    Args:
+        image: (h, w, 4) bytes.
+        uv: (q, 2), v downwards.
+        tables: (4, 256) the values of bytes in each channel.
+        wraps: modes of glTF along u and v.
+    """
+    size = np.array(image.shape[1::-1])
+    place = uv * size - 0.5
+    low = np.floor(place)
+    total = np.zeros((len(uv), 4))
+    for step in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        share = np.abs(1 - np.array(step) - (place - low)).prod(axis=1)
+        at = low + step
+        at = np.where(np.equal(wraps, CLAMP), np.clip(at, 0, size - 1), np.mod(at, size)).astype(np.int64)
+        total += share[:, None] * tables[np.arange(4), image[at[:, 1], at[:, 0]]]
+    return total
