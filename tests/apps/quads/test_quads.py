@@ -247,7 +247,7 @@ def test_bad_quads_are_left_out_where_no_finer_grid_is_found(monkeypatch):
 
     def fail_if_finer(self):
         if self.for_quads:
-            raise CoarseGridError("none")
+            raise CoarseGridError("none", 10.0)
         return search(self)
 
     monkeypatch.setattr(GridSearch, "of_any_size", fail_if_finer)

@@ -152,11 +152,9 @@ def _face_lines(corners: IntArray, at_once: int = 1 << 15) -> Iterator[bytes]:
 def _write_by_meshio(mesh: QuadMesh, stream: IO[bytes], ending: str) -> None:
     meshio = imported("meshio", "meshes of meshio need meshio", "meshio")
     least = least_jacobians(mesh.vertices, mesh.quads)
-    data = (
-        {}
-        if ending == ".inp"
-        else {"point_data": {"valence": mesh.valences}, "cell_data": {"jacobian": [least]}}
-    )
+    data: dict[str, Any] = {}
+    if ending != ".inp":
+        data = {"point_data": {"valence": mesh.valences}, "cell_data": {"jacobian": [least]}}
     found = meshio.Mesh(mesh.vertices, [("quad", mesh.quads)], **data)
     with TemporaryDirectory() as folder:  # not all writers of meshio take streams
         path = Path(folder) / f"quads{ending}"

@@ -166,9 +166,9 @@ class QuadMesh:
 
 
 class CoarseGridError(GridError):
-    """A grid is so coarse that its quads are not a mesh; `squares` is their number."""
+    """A grid is so coarse that its quads are not a mesh; `squares` is the area of the grid."""
 
-    def __init__(self, text: str, squares: float = 0.0) -> None:
+    def __init__(self, text: str, squares: float) -> None:
         super().__init__(text)
         self.squares = squares
 

@@ -81,6 +81,7 @@ def quads(
     stages.done = 1.0
     with stages("extract"):
         found = (search and grid.quad_mesh) or extract_quads(grid, leave_out=search is not None)
+        grid = replace(grid, quad_mesh=None)
     found = with_borders(found) if found.left_out else found
     features = grid.features
     if small is None and search is not None and isinstance(search.mesh, Source):

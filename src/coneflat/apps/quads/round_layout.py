@@ -18,7 +18,7 @@ from .transitions import Transitions
 
 # Relative deviation from the requested number of squares above which a note is added.
 NOTED_SHARE = 0.1
-# Largest fraction of the distance to lines per step of relaxing.
+# Largest fraction of the distance to the constraints per step of relaxing from the smooth layout.
 LINE_STRIDE = 0.1
 
 
@@ -86,7 +86,7 @@ def _grid_near(rounding: Rounding, energy: StretchEnergy) -> tuple[IntegerGrid |
     """Return a grid for the nearest lattice point, or None and the reason why there is none.
 
     Relaxing starts from the displacement of least energy to the lattice point. If this makes a triangle too small, or
-    does not succeed, it starts from the smooth layout itself, with smaller steps if sides are folded.
+    does not succeed, it starts from the smooth layout itself, at last with smaller steps.
     """
     layout, transitions = rounding.layout, rounding.transitions
     try:

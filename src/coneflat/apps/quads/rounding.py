@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -241,11 +242,12 @@ def _near_pairs(
     )
     pairs = zip(mesh.tails.tolist(), mesh.heads.tolist(), strict=True)
     number = {pair: k for k, pair in enumerate(pairs, 1)}.get
+    shift = cache(lambda point: transitions.shifts[2 * point : 2 * point + 2].toarray())
     entries: list[tuple[IntArray, float, tuple[int, int]]] = []
 
     def joining(path: list[int]) -> PathVector:
         sides = [_side(number((a, b), 0), number((b, a), 0), starts, ends) for a, b in pairwise(path)]
-        return _vector(sides, transitions, points)
+        return _vector(sides, transitions.turn, shift, points)
 
     for i, j in np.argwhere(np.triu(np.isfinite(found[:, cones]), 1)).tolist():
         one = joining([int(cones[i]), *_path_to(int(cones[j]), parents[i])[1:]])
@@ -282,21 +284,20 @@ def _side(forth: int, back: int, starts: IntArray, ends: IntArray) -> tuple[int,
     return int(ends[back - 1]), int(starts[back - 1])
 
 
-def _vector(sides: list[tuple[int, int]], transitions: Transitions, points: ComplexArray) -> PathVector:
-    """Return the vector along a path, given by the points at the ends of its edges.
+def _vector(
+    sides: list[tuple[int, int]], turns: IntArray, shift: Callable[[int], IntArray], points: ComplexArray
+) -> PathVector:
+    """Return the vector along a path, given by the points at the ends of its edges; `shift` gives the rows of a point.
 
     The positions of vertices on the path cancel: two copies of a vertex, i^turn base + shift each, leave the difference
     of their shifts in a common frame.
     """
 
-    def shift(point: int) -> IntArray:
-        return transitions.shifts[2 * point : 2 * point + 2].toarray()
-
     turn, total = 0, -shift(sides[0][0])
     place = points[sides[0][1]] - points[sides[0][0]]
     for (_, here), (there, end) in pairwise(sides):
         if here != there:
-            across = int(transitions.turn[here] - transitions.turn[there]) % 4
+            across = int(turns[here] - turns[there]) % 4
             total = total + TURNS[turn] @ (shift(here) - TURNS[across] @ shift(there))
             turn = (turn + across) % 4
         place += UNITS[turn] * (points[end] - points[there])

@@ -238,6 +238,8 @@ def _retriangulated(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntAr
         new, kept, own = coarse_mesh(new, count)
         some, of, step, share = some[kept], of[own], step + 1, _is_thin(new).mean()
         best = (new, some, of) if share < least else best
+    if best[0] is mesh:
+        return best
     new, some, of = best
     order = np.argsort(some, kind="stable")
     return TriangleMesh(new.vertices[order], np.argsort(order)[new.faces]), some[order], of

@@ -172,11 +172,8 @@ def _improve(
     # The quads around the vertices for each trial position; the last is the current one.
     places = surface.at(on, weights).reshape(len(moves), count, 3)
     trials = np.concatenate([places, points[moves][:, None]], axis=1)
-    corners = np.where(
-        (around == moves[owner][:, None])[:, None, :, None],
-        trials[owner][:, :, None],
-        points[around][:, None],
-    )
+    moves_there = (around == moves[owner][:, None])[:, None, :, None]
+    corners = np.where(moves_there, trials[owner][:, :, None], points[around][:, None])
     numbers = np.arange(corners.size // 3).reshape(-1, 4)
     each = least_jacobians(corners.reshape(-1, 3), numbers).reshape(len(around), -1)
     first = np.flatnonzero(np.diff(owner, prepend=-1))

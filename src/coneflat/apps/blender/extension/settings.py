@@ -79,7 +79,7 @@ _PYTHON = "Python or environment that has coneflat. Empty: the extension's own, 
 _WHEELS = "Folder of wheels of coneflat and what it needs, from which Install makes its environment"
 _PACKAGE = "What pip installs, for example a wheel. Empty: coneflat, this version or later, from the folder of wheels"
 
-
+#: The properties of the preferences, in the order in which they are drawn.
 _SHOWN = {
     "python": StringProperty(name="Python", description=_PYTHON, subtype="FILE_PATH"),
     "wheels": StringProperty(name="Folder of wheels", description=_WHEELS, subtype="DIR_PATH"),
