@@ -51,6 +51,16 @@ def test_charts_that_touch_themselves_do_not_overlap_in_single_precision(tmp_pat
     assert run_case("texture", 1_600_249).breaches == []
 
 
+def test_components_keep_their_scale_where_triangles_were_huge(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run_case("mesh", 7_300_406).breaches == []
+
+
+def test_any_finite_distortion_may_be_allowed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run_case("mesh", 7_301_010).breaches == []
+
+
 def test_a_case_is_the_same_whenever_it_is_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     one, two = (run_case("mesh", 2) for _ in range(2))

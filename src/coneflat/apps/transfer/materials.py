@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
 
 from ...base import FloatArray, IntArray
 from ...errors import MeshFileError, OptionError
@@ -49,6 +50,15 @@ def to_linear(values: NDArray[Any]) -> FloatArray:
 def to_srgb(values: FloatArray) -> FloatArray:
     """Return sRGB values of linear ones, both from 0 to 1."""
     return np.where(values <= 0.0031308, values * 12.92, 1.055 * values ** (1 / 2.4) - 0.055)
+
+
+def linear(image: NDArray[np.uint8], is_colour: bool) -> FloatArray:
+    """Return (h, w, 4) the linear values of an image; `is_colour`: it is in sRGB, but for its alpha."""
+    values = np.arange(256) / 255
+    found = values[image]
+    if is_colour:
+        found[..., :3] = to_linear(values)[image[..., :3]]
+    return found
 
 
 class Painted:
@@ -177,15 +187,17 @@ class Painted:
         shift, uv = slot.get("extensions", {}).get("KHR_texture_transform", {}), self.uv_of(slot)[faces]
         cos, sin = np.cos(shift.get("rotation", 0.0)), np.sin(shift.get("rotation", 0.0))
         uv = np.einsum("qi,qic->qc", weights, uv) * shift.get("scale", (1, 1)) @ [[cos, -sin], [sin, cos]]
-        image, wraps = self.image(slot.get("index"))
-        table = np.arange(256) / 255
-        tables = [to_linear(table) if is_colour else table] * 3 + [table]
-        return bilinear(image, uv + shift.get("offset", (0, 0)), np.stack(tables), wraps)
+        image, wraps = self.image(slot.get("index"), is_colour)
+        size = np.array(image.shape[1::-1])
+        place = (uv + shift.get("offset", (0, 0))) * size - 0.5
+        place = np.where(np.equal(wraps, CLAMP), np.clip(place, 0, size - 1), place)[:, ::-1].T
+        bilinear = partial(map_coordinates, coordinates=place, order=1, mode="grid-wrap")
+        return np.stack([bilinear(image[..., i]) for i in range(4)], axis=1)
 
-    def _read_image(self, index: int | None) -> tuple[NDArray[np.uint8], tuple[Any, Any]]:
-        """Return (h, w, 4) the image of a texture, and its wrap modes."""
+    def _read_image(self, index: int | None, is_colour: bool) -> tuple[FloatArray, tuple[Any, Any]]:
+        """Return (h, w, 4) the linear values of the image of a texture, and its wrap modes."""
         if self.picture is not None:
-            return decode_image(read_bytes(self.picture), self.picture), (None, None)
+            return linear(decode_image(read_bytes(self.picture), self.picture), is_colour), (None, None)
         assert self.mesh.scene is not None
         data = self.mesh.scene.data
         texture = data.item("textures", index)
@@ -197,27 +209,4 @@ class Painted:
         else:
             content = read_bytes(data.resolve(uri)) if uri else bytes(data.view(item.get("bufferView")))
         modes = {} if sampler is None else data.item("samplers", sampler)
-        return decode_image(content, name), (modes.get("wrapS"), modes.get("wrapT"))
-
-
-def bilinear(
-    image: NDArray[np.uint8], uv: FloatArray, tables: FloatArray, wraps: tuple[Any, Any]
-) -> FloatArray:
-    """Return (q, 4) bilinear values of an image.
-
-    Args:
-        image: (h, w, 4) bytes.
-        uv: (q, 2), v downwards.
-        tables: (4, 256) the values of bytes in each channel.
-        wraps: modes of glTF along u and v.
-    """
-    size = np.array(image.shape[1::-1])
-    place = uv * size - 0.5
-    low = np.floor(place)
-    total = np.zeros((len(uv), 4))
-    for step in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        share = np.abs(1 - np.array(step) - (place - low)).prod(axis=1)
-        at = low + step
-        at = np.where(np.equal(wraps, CLAMP), np.clip(at, 0, size - 1), np.mod(at, size)).astype(np.int64)
-        total += share[:, None] * tables[np.arange(4), image[at[:, 1], at[:, 0]]]
-    return total
+        return linear(decode_image(content, name), is_colour), (modes.get("wrapS"), modes.get("wrapT"))

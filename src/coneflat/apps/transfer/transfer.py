@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from ... import io
-from ...base import FloatArray, IntArray, check_cancelled, compiled
+from ...base import FloatArray, IntArray, check_cancelled
 from ...errors import OptionError
-from ...geometry import unit_vectors
+from ...geometry import fill_nearest, unit_vectors
 from ...io import UVMesh, as_path
 from ...options import Number
 from ..quads.nearest import TriangleTree
-from ..view import uv_flattening
+from ..view import Barycentrics, uv_flattening
 from .materials import BASE, NORMAL, Channel, Painted, to_srgb
 
 #: Texels that are baked at once, which bounds memory.
@@ -108,9 +108,8 @@ def transfer(
         raise OptionError(
             f"the UVs of {new} must be in the unit square, got {corner_uv.min():.3g} to {corner_uv.max():.3g}"
         )
-    texels = np.ascontiguousarray(corner_uv * [side, -side] + [0, side])
-    owner = np.full((side, side), -1)
-    twice = _rasterize(texels, owner)
+    texels = corner_uv * [side, -side] + [0, side]
+    owner, twice = _owners(texels, side)
     if owner.max() < 0:
         raise OptionError(f"no texel of {side} x {side} is in a triangle of {new}: raise the resolution")
     images, farthest = _bake(painted, target.vertices[target.faces[known]], texels, owner)
@@ -120,7 +119,7 @@ def transfer(
     if any("TANGENT" in one["attributes"] for mesh in meshes for one in mesh["primitives"]):
         notes.append("Tangents are left out of a GLB: viewers compute those of the new UVs.")
     if twice:
-        notes.append(f"UVs overlap: {twice:,} texels are in several triangles, and show one of them.")
+        notes.append(f"UVs overlap: {twice:,} texels are in several triangles, and show the first of them.")
     if farthest > FAR:
         notes.append(f"The models differ: points are up to {farthest:.1%} of the size from the old surface.")
     filled = {channel.name: image[tuple(source)] for channel, image in images.items()}
@@ -140,14 +139,16 @@ def _bake(
     tree, farthest, side = TriangleTree(painted.vertices, painted.faces), 0.0, len(owner)
     images = {channel: np.zeros((side, side, 4), np.uint8) for channel in painted.channels()}
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    axes = _tangents(corners, texels)
-    old_axes = _tangents(painted.vertices[painted.faces], painted.normal_uv())
+    if NORMAL in images:
+        axes = _tangents(corners, texels)
+        old_axes = _tangents(painted.vertices[painted.faces], painted.normal_uv())
+    places = Barycentrics(texels.reshape(-1, 2), np.arange(3 * len(texels)).reshape(-1, 3))
     every = np.flatnonzero(owner.reshape(-1) >= 0)
     for begin in range(0, len(every), TEXELS_AT_ONCE):
         check_cancelled()
         place = every[begin : begin + TEXELS_AT_ONCE]
         faces = owner.reshape(-1)[place]
-        weights = _barycentric(texels[faces], np.stack([place % side, place // side], axis=1) + 0.5)
+        weights = places.of(faces, place % side, place // side)
         points = np.einsum("qi,qix->qx", weights, corners[faces])
         on, at = tree.nearest(points, normals[faces])
         nearest = np.einsum("qi,qix->qx", at, painted.vertices[painted.faces[on]])
@@ -171,35 +172,15 @@ def _tangents(corners: FloatArray, uv: FloatArray) -> FloatArray:
     return np.stack([along, np.cross(along, unit_vectors(np.cross(b, c))) * sign], axis=1)
 
 
-def _barycentric(corners: FloatArray, points: NDArray[Any]) -> FloatArray:
-    """Return (q, 3) the barycentric coordinates of points (q, 2) in triangles (q, 3, 2)."""
-    sides = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
-    to = points[:, None] - np.roll(corners, -1, axis=1)
-    doubles = sides[..., 0] * to[..., 1] - sides[..., 1] * to[..., 0]
-    return np.asarray(doubles / doubles.sum(axis=1, keepdims=True))
-
-
-@compiled
-def _rasterize(texels: FloatArray, owner: IntArray) -> int:
-    """Fill in a triangle (m, 3, 2) at each texel whose centre it covers; return how many texels several ones cover."""
-    twice = 0
-    rows, columns = owner.shape
-    for f in range(len(texels)):
-        t = texels[f]
-        double = (t[1, 0] - t[0, 0]) * (t[2, 1] - t[0, 1]) - (t[1, 1] - t[0, 1]) * (t[2, 0] - t[0, 0])
-        if double == 0:
-            continue
-        for i in range(max(int(t[:, 1].min() - 0.5), 0), min(int(t[:, 1].max() + 0.5) + 1, rows)):
-            for j in range(max(int(t[:, 0].min() - 0.5), 0), min(int(t[:, 0].max() + 0.5) + 1, columns)):
-                least = np.inf
-                for k in range(3):
-                    a, b = t[k], t[(k + 1) % 3]
-                    area = (b[0] - a[0]) * (i + 0.5 - a[1]) - (b[1] - a[1]) * (j + 0.5 - a[0])
-                    least = min(least, area / double)
-                twice += least > 0 and owner[i, j] >= 0
-                if least >= 0:
-                    owner[i, j] = f
-    return twice
+def _owners(texels: FloatArray, side: int) -> tuple[IntArray, int]:
+    """Return (r, r) the triangle (m, 3, 2) at the centre of each texel, -1 for none; and how many have several."""
+    faces = np.arange(3 * len(texels)).reshape(-1, 3)
+    owners = np.full((2, side, side), -1)
+    # Depths are the numbers of the triangles, so that of several triangles the first one is found, and the last one.
+    for sign, owner in zip((1.0, -1.0), owners, strict=True):
+        points = np.column_stack([texels.reshape(-1, 2), sign * np.repeat(np.arange(len(texels)), 3)])
+        fill_nearest(points, faces, np.full((side, side), np.inf), owner)
+    return owners[0], int(np.count_nonzero(owners[0] != owners[1]))
 
 
 def _material(painted: Painted, names: Collection[str]) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from .figures.compose import Panel, Row, check_figure, compose, new_figure, save
 from .figures.cone_marks import DOT_REACH, mark_handles, mark_scale
 from .figures.kinds import Look, demo_figure, make_figure
 from .figures.model import DOTS_PER_INCH, draw_checker, draw_cones, draw_quantity, show_mesh
+from .figures.render import Barycentrics
 from .figures.uv_layout import draw_layout, fill_layout, layout_aspect
 from .from_uv import own_flattening, shown_rows, uv_flattening
 from .page.content import Model, content_of, outline_halfedges
@@ -23,10 +24,10 @@ from .page.webpage import (
 from .quantity import Quantity, conformal_distortion, own_quantity
 
 __all__ = [
-    "DOTS_PER_INCH", "DOT_REACH", "Eye", "Look", "Model", "PageText", "Panel", "Quantity", "Row", "check_figure",
-    "check_page", "compose", "conformal_distortion", "content_of", "demo_figure", "draw_checker", "draw_cones",
-    "draw_layout", "draw_quantity", "eye_direction", "fill_layout", "uv_flattening", "head_and_block",
-    "layout_aspect", "make_figure", "mark_handles", "mark_scale", "new_figure", "notebook_html", "open_address",
-    "open_page", "outline_halfedges", "own_flattening", "own_quantity", "pack", "page_around", "page_html",
-    "save_figure", "show_mesh", "shown_rows", "view_aspect", "write_figure", "write_page",
+    "Barycentrics", "DOTS_PER_INCH", "DOT_REACH", "Eye", "Look", "Model", "PageText", "Panel", "Quantity", "Row",
+    "check_figure", "check_page", "compose", "conformal_distortion", "content_of", "demo_figure", "draw_checker",
+    "draw_cones", "draw_layout", "draw_quantity", "eye_direction", "fill_layout", "head_and_block", "layout_aspect",
+    "make_figure", "mark_handles", "mark_scale", "new_figure", "notebook_html", "open_address", "open_page",
+    "outline_halfedges", "own_flattening", "own_quantity", "pack", "page_around", "page_html", "save_figure",
+    "show_mesh", "shown_rows", "uv_flattening", "view_aspect", "write_figure", "write_page",
 ]  # fmt: skip

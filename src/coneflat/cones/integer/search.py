@@ -90,7 +90,7 @@ def moved_cones(
     before, penalty = (places, off), 1.0
     for _ in range(MAX_MOVES):
         here = search.solution_of(places, curvatures).log_scale[operator.vertices]
-        slack = bound**2 - float(here @ operator.weighted(here))
+        slack = bound * bound - float(here @ operator.weighted(here))
         if slack < 0 and places is not before[0]:
             # The coarse model underestimated E: undo the move and increase its penalty.
             (places, off), penalty = before, 2 * penalty

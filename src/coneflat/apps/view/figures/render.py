@@ -239,8 +239,7 @@ def render_mesh(
     Raises:
         OptionError: `up` or `eye` is not valid.
     """
-    vertices = np.asarray(vertices, dtype=np.float64)
-    faces = np.asarray(faces, dtype=np.int64)
+    vertices, faces = np.asarray(vertices, dtype=np.float64), np.asarray(faces, dtype=np.int64)
     camera = fit_camera(vertices[np.unique(faces)], size, eye, up, margin)
     fine = camera.enlarged(SUPERSAMPLING)
     points = fine.project(vertices)
