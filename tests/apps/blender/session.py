@@ -413,6 +413,7 @@ def vertex_lists():
     lengths = [(polygon.center.z > 0, polygon.area**0.5) for polygon in bpy.context.object.data.polygons]
     upper, lower = ([length for is_upper, length in lengths if is_upper == side] for side in (True, False))
     assert np.median(upper) > 1.5 * np.median(lower)
+    ball.hide_set(False)
     select(ball)
     settings().quads.size = "nose"
     assert "Error: there is no vertex group 'nose' in ball" in run("quads")

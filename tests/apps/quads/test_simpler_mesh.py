@@ -270,7 +270,7 @@ def test_meshes_of_thin_triangles_are_triangulated_anew():
     np.testing.assert_array_equal(found.surface.vertices, vertices)
     assert (found.left_out, found.euler_characteristic) == (0, 1)
     assert coneflat.measure_quads(found).jacobian_min > 0.2
-    assert not any("Quads follow no" in note for note in found.notes)
+    assert not any("Cones are not chosen" in note for note in found.notes)
     np.testing.assert_allclose(found.vertices[found.is_boundary_vertex][:, 2], 0, atol=1e-9)
 
 

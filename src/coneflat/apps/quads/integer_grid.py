@@ -219,8 +219,9 @@ class GridSearch:
                 raise
         less = 0.7 * given.get("distortion", DISTORTION)
         other = replace(self, options={**given, "distortion": less})
-        found = other._of_flattening(self._boundary_without_sides)
-        return with_note(found, f"With a distortion above {less:.3g}, no grid was found.")
+        found, more = other._of_flattening(self._boundary_without_sides), self.sizes is not None
+        note = f"With a distortion above {less:.3g}, no grid was found."
+        return with_note(found, note + " Wanted sizes are not followed." * more)
 
     def _as_given(self) -> IntegerGrid:
         """Return a grid for the options as given."""
@@ -232,14 +233,14 @@ class GridSearch:
             return self._with_fewest_cones()
         if self.checked.mesh.components[0] > 1:
             return self._of_components()
-        what = "boundary, sharp edges or curvature" + ", nor wanted sizes" * (self.sizes is not None)
+        what = "the boundary, sharp edges or curvature" + ", nor for wanted sizes" * (self.sizes is not None)
         for is_finer in (False, True):
             try:
                 return self._of_aligned_cones(is_finer)
             except NO_GRID as error:
                 if isinstance(error, CoarseGridError) and self.sizes is not None:
                     raise
-                note = f"Quads follow no {what}, because no grid with such cones was found: {error}."
+                note = f"Cones are not chosen for {what}, because no grid with such cones was found: {error}."
             # Meshes of more triangles have places enough for cones.
             if 2 * len(self.checked.mesh.faces) > COARSE:
                 break

@@ -31,7 +31,7 @@ class IntegerGrid:
     quarter turns counterclockwise.
 
     Attributes:
-        vertices: (n, 3) positions in model units; where cones need it, edges of the given mesh are split.
+        vertices: (n, 3) positions in model units; edges of the given mesh may be split, for example between cones.
         faces: (m, 3) vertex indices.
         corner_grid: (m, 3, 2) grid coordinates of every triangle corner, in units of the grid; no triangle is flipped.
         turns: (3m,) from 0 to 3; -1 on the boundary.

@@ -65,7 +65,7 @@ def grid_with_lines(
                 found = grid_about(rounding, energy, 0)
                 if found.squares <= 2 * layout.area:
                     break
-                found = None
+                why, found = f"the grid would have {found.squares:,.0f} squares", None
             except GridError as error:
                 why = str(error)
         edges = _long_chains(layout, lined.edges[~is_bad[lined.chain]])

@@ -71,9 +71,8 @@ def grid_about(rounding: Rounding, energy: StretchEnergy, most: int) -> IntegerG
         last = other.squares
         if abs(np.log(last / wanted)) < abs(np.log(found.squares / wanted)):
             found = replace(other, size=layout.size)
-    squares = found.squares
-    if abs(squares - wanted) > NOTED_SHARE * wanted:
-        found = with_note(found, f"The grid has an area of {squares:,.0f} squares, not {wanted:,.0f}.")
+    if abs(found.squares - wanted) > NOTED_SHARE * wanted:
+        found = with_note(found, f"The grid has an area of {found.squares:,.0f} squares, not {wanted:,.0f}.")
     return found
 
 
