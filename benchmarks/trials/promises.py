@@ -415,7 +415,7 @@ def _check_area(trial: Trial) -> None:
     scale = np.log(flat[chosen] / area[chosen]) / 2
     mean = np.average(scale, weights=area[chosen])
     std = np.sqrt(np.average((scale - mean) ** 2, weights=area[chosen]))
-    if std > 1.1 * options.get("distortion", 0.2):
+    if std > max(1.1 * options.get("distortion", 0.2), 1e-12):  # rounding
         trial.broken("area", "area distortion above the one allowed", f"{std:.3g}")
 
 

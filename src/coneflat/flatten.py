@@ -100,6 +100,7 @@ class Method:
         quantum: rotations across seams are multiples of it, radians; None for any rotation.
         watch: the stopwatch.
         surface_of, find_metric: the two steps that a caller can replace.
+        untangles: inverted triangles are flipped where both sides of the seams can stay equal.
     """
 
     relax: RelaxSpec
@@ -108,6 +109,7 @@ class Method:
     watch: Stopwatch
     surface_of: SurfaceOf
     find_metric: FindMetric
+    untangles: bool = True
 
 
 def flatten_source(
@@ -200,7 +202,7 @@ def lay_out_once(surface: Surface, part: Part, wanted: ConeSpec, method: Method)
             disk = cut.result()
     with watch("layout", 1.0):
         areas = weighted_areas(surface.areas, part.cones.weights)
-        layout = lay_out(metric, disk).with_area_distortion(cones.log_scale, areas)
+        layout = lay_out(metric, disk, method.untangles).with_area_distortion(cones.log_scale, areas)
     return layout.with_notes(*cones.notes), cones.is_searched
 
 
@@ -224,8 +226,7 @@ def finish_part(part: Part, layout: Layout, method: Method) -> Layout:
     """Return a relaxed layout without inverted triangles, and without overlaps if the method separates them."""
     if part.is_exact:
         with method.watch("relax", 0.2):
-            names, stretch = part.cones.names, method.relax.stretch
-            layout = untangle_seams(layout, part.cones.weights, names, stretch, method.quantum)
+            layout = untangle_seams(layout, part.cones, method.relax.stretch, method.quantum)
         layout = layout.with_notes(*_infeasible_notes(layout, part))
     if method.separates:
         with method.watch("atlas", 1.0):

@@ -84,8 +84,8 @@ def untangled(request):
     """The result of a wild mesh in one chart, and the patches that were untangled for it."""
     seen = []
 
-    def watched(flat, faces, angles, on_boundary, stays, rest):
-        result = untangle(flat, faces, angles, on_boundary, stays, rest)
+    def watched(flat, faces, angles, on_boundary, stays, rest, rings):
+        result = untangle(flat, faces, angles, on_boundary, stays, rest, rings)
         seen.append((result, faces, angles, flat, on_boundary))
         return result
 

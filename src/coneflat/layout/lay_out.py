@@ -16,24 +16,25 @@ from ..stages import Cut, Embedding, FlatMetric, Layout
 from .least_squares import least_squares_layout
 from .relax.relax import rest_sides
 from .unfold import unfold
-from .untangle import untangle
+from .untangle import MAX_RINGS, untangle
 
 
-def lay_out(metric: FlatMetric, cut: Cut) -> Layout:
+def lay_out(metric: FlatMetric, cut: Cut, untangles: bool = True) -> Layout:
     """Return the layout of a flat metric on a mesh that is cut open (Section 4.3 of the paper).
 
-    An exact metric with straight triangles is unfolded, after inverted triangles are flipped. Lengths of an
+    An exact metric with straight triangles is unfolded, by default after inverted triangles are flipped. Lengths of an
     approximately flat metric are laid out by least squares. Other methods provide a map of the cut mesh.
 
     Args:
         metric: the flat metric.
         cut: the seams and the mesh cut open along them.
+        untangles: flip inverted triangles.
 
     Raises:
         MetricError: the layout has no area.
     """
     if metric.triangles is not None:
-        return _unfolded(metric, metric.triangles, cut)
+        return _unfolded(metric, metric.triangles, cut, MAX_RINGS if untangles else 0)
     if metric.flat_lengths is not None:
         return _least_squares(metric, metric.flat_lengths, cut)
     assert metric.embed is not None
@@ -64,20 +65,15 @@ def _layout(metric: FlatMetric, cut: Cut, points: FloatArray, curvature: FloatAr
     )
 
 
-def _unfolded(metric: FlatMetric, triangles: FlatTriangles, cut: Cut) -> Layout:
+def _unfolded(metric: FlatMetric, triangles: FlatTriangles, cut: Cut, rings: int) -> Layout:
     mesh = metric.mesh
     on_boundary, stays = mesh.is_boundary_vertex, metric.is_fixed.copy()
     stays[metric.cones] = True
     on_seam = mask_of(len(mesh.vertices), mesh.edges[cut.seams])
     angles = np.where(on_boundary, np.pi, 2 * np.pi) - metric.target
-    untangled = untangle(
-        triangles,
-        mesh.faces,
-        angles,
-        on_boundary,
-        (stays | on_seam | on_boundary, stays | on_boundary, stays),
-        rest_sides(metric.lengths),
-    )
+    masks = stays | on_seam | on_boundary, stays | on_boundary, stays
+    rest = rest_sides(metric.lengths)
+    untangled = untangle(triangles, mesh.faces, angles, on_boundary, masks, rest, rings)
     points = unfold(untangled.flat, cut.mesh.faces) * metric.scale
     curvature = layout_curvature(mesh, rows_of(points, cut.mesh.faces))
     statistics = replace(

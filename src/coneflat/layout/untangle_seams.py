@@ -12,7 +12,7 @@ from ..geometry.planar import sides_between, signed_double_areas
 from ..geometry.straight import FlatTriangles
 from ..linalg.factors import factorize
 from ..mesh.connectivity import TriangleMesh
-from ..stages import Layout
+from ..stages import ConeSpec, Layout
 from .relax import StretchEnergy, relax
 from .relax.relax import rest_sides
 from .relax_layouts import LayoutGroup
@@ -20,9 +20,7 @@ from .unfold import unfold
 from .untangle import MAX_RINGS, find_degenerate, untangle
 
 
-def untangle_seams(
-    layout: Layout, weights: FloatArray | None, names: IntArray, stretch: float, quantum: float | None
-) -> Layout:
+def untangle_seams(layout: Layout, spec: ConeSpec, stretch: float, quantum: float | None) -> Layout:
     """Return a layout whose inverted triangles are positively oriented, while seams near them may become unequal.
 
     Points move in the plane, those on the two sides of a seam independently, and are relaxed there. The lengths of the
@@ -32,8 +30,7 @@ def untangle_seams(
 
     Args:
         layout: a layout in one chart.
-        weights: (n,) importance of the vertices, or None.
-        names: (n,) the user's number of each vertex.
+        spec: the weights and the names of the vertices.
         stretch: balance of the relaxation between angles, 0, and areas, 1.
         quantum: angle in radians of whose multiples the seam rotations are, in which case the layout is not changed;
             None for any rotation.
@@ -59,7 +56,7 @@ def untangle_seams(
     caveat = "no seam or cone is exact" if is_embedded else "the sides of seams near them are unequal"
     if not is_free.any():
         return layout
-    group = LayoutGroup([layout], [weights])
+    group = LayoutGroup([layout], [spec.weights])
     points = relax(
         disk,
         points,
@@ -74,7 +71,7 @@ def untangle_seams(
     flipped = np.flatnonzero(was_bad & ~find_degenerate(sides_between(points[disk.faces])))
     if not len(flipped):
         return layout
-    where = list_some(f"vertex {name}" for name in np.unique(names[layout.mesh.faces[flipped, 0]]))
+    where = list_some(f"vertex {name}" for name in np.unique(spec.names[layout.mesh.faces[flipped, 0]]))
     return found.with_notes(
         f"{plural(len(flipped), 'triangle')} had no room between seams with equal sides, next to "
         f"{where}: they are positively oriented, but {caveat}."
@@ -82,7 +79,7 @@ def untangle_seams(
 
 
 def untangled_disk(
-    disk: TriangleMesh, points: FloatArray, lengths: FloatArray, fixed: BoolArray
+    disk: TriangleMesh, points: FloatArray, lengths: FloatArray, fixed: BoolArray, rings: int = 2 * MAX_RINGS
 ) -> tuple[FloatArray, BoolArray, bool]:
     """Return points of a disk whose inverted triangles are positively oriented, except those that cannot be untangled.
 
@@ -91,6 +88,7 @@ def untangled_disk(
         points: (c, 2) its points.
         lengths: (m, 3) side lengths of its triangles on the surface.
         fixed: (c,) points that do not move.
+        rings: see `untangle`.
 
     Returns:
         (c, 2) points, (c,) those that moved, and whether the whole disk was embedded anew.
@@ -107,7 +105,7 @@ def untangled_disk(
         disk.is_boundary_vertex,
         (is_near, fixed),
         rest_sides(lengths),
-        2 * MAX_RINGS,
+        rings,
     )
     found, moved = unfold(untangled.flat, disk.faces), mask_of(len(points), untangled.moved)
     if len(untangled.left) and not fixed.any() and disk.boundary_loops[0] == 1:

@@ -38,6 +38,34 @@ def test_the_energy_is_within_the_bound(shape, bound):
     assert (d.flipped, d.degenerate, d.overlapping_pairs) == (0, 0, 0)
 
 
+def test_the_search_goes_on_where_the_first_candidates_have_the_same_cones(monkeypatch):
+    monkeypatch.setattr("coneflat.apps.unwrap.search.FIRST_DISTORTION", 10.0)
+    assert unwrap(*shapes.hill(), max_energy=4.01).distortion.energy <= 4.01
+
+
+def test_the_exact_metric_need_not_converge(monkeypatch):
+    def diverge(*_):
+        raise errors.ConvergenceError("the exact metric did not converge")
+
+    monkeypatch.setattr(import_module("coneflat.metric.find"), "exact_flat_metric", diverge)
+    with pytest.raises(errors.ConvergenceError):
+        coneflat.flatten(*shapes.sphere(3))
+    d = unwrap(*shapes.sphere(3)).distortion
+    assert (d.flipped, d.overlapping_pairs) == (0, 0)
+    assert d.energy <= 4.1
+
+
+def test_a_triangle_nearly_without_area_is_named_as_the_reason_for_a_large_energy():
+    vertices, faces = shapes.sphere(2)
+    (a, b, c), new = faces[0], len(vertices)
+    for height, is_noted in ((1e-3, False), (1e-9, True)):
+        point = (1 - height) * (vertices[a] + vertices[b]) / 2 + height * vertices[c]
+        split = np.vstack([faces[1:], [[a, b, new], [b, c, new], [c, a, new]]])
+        result = unwrap(np.vstack([vertices, point]), split)
+        assert (result.distortion.energy > 4.1) == is_noted
+        assert any("nearly no area" in note for note in result.notes) == is_noted
+
+
 @pytest.fixture(scope="module")
 def hand():
     path = shapes.SHARED / "hand.obj"

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...base import BoolArray, FloatArray, IntArray, mask_of
 from ...cones import close_search, find_cones
-from ...errors import CurvatureError, MetricError
+from ...errors import ConvergenceError, CurvatureError, MetricError
 from ...flatten import Method, lay_out_once
 from ...geometry import coarse_mesh, double_areas, edge_lengths, find_overlaps, mollify, signed_double_areas
 from ...layout import lay_out
@@ -24,12 +24,13 @@ from ...mesh import label_faces, open_along
 from ...seams import seam_costs, without_loose_ends
 from ...source import Part
 from ...stages import ConeSpec, Cut, Layout, Surface, VertexCurvatures
-from .free import freed, recut, seam_edges, separate_charts, side_by_side, triangle_energies
+from .free import freed, seam_edges, separate_charts, side_by_side, triangle_energies
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .tips import RINGS, find_tips, moved_tips, moves_for
 
-# The area distortion of the first candidate, one that the fewest cones reach, and the maximum number of candidates.
-FIRST_DISTORTION, ANY_DISTORTION, MAX_CANDIDATES = 0.25, 1e3, 5
+# The area distortion of the first candidate, one that the fewest cones reach, the smallest one, and the maximum number
+# of candidates. A few large triangles may hide that the small ones between them are distorted.
+FIRST_DISTORTION, ANY_DISTORTION, LEAST_DISTORTION, MAX_CANDIDATES = 0.25, 1e3, 0.01, 5
 # The search ends where the numbers of cones within and beyond the bound differ by less than this factor or by one. A
 # surface of 50 handles needs about 160 cones, and each search for them seconds.
 SIMILAR_COUNTS = 1.05
@@ -125,12 +126,10 @@ class CutSearch:
             return self._from_coarse()
         found = self._by_distortion()
         near = [one for one in found if one.energy <= self._reach]
-        for _ in range(min(2, len(near))):
+        if near:
             one = self._cheapest(near, self._expected_cost)
             found.append(one if one.energy <= self.max_energy else self.shortened(one))
-            if found[-1].energy <= self.max_energy:
-                near.append(found[-1])
-                break
+            near.append(found[-1])
         close_search(self._surface)
         within = [one for one in near if one.energy <= self.max_energy]
         if within:
@@ -185,7 +184,7 @@ class CutSearch:
     def _with_fewest_seams(self) -> Candidate:
         """Return a candidate cut between the fewest cones, and only along closed curves where there are handles."""
         mesh, spec = self.part.mesh, replace(self.part.cones, distortion=ANY_DISTORTION)
-        layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
+        layout = self._laid_out(spec)
         close_search(self._surface)
         if len(layout.cones) and mesh.euler_characteristic < 2 and not mesh.is_boundary_edge.any():
             is_cut = mask_of(len(mesh.edges), seam_edges(layout))
@@ -198,6 +197,14 @@ class CutSearch:
         layout, energy = self._freed(layout)
         return self.settled(self.separated(Candidate(layout, energy, self.cost_of(layout), ANY_DISTORTION)))
 
+    def _laid_out(self, spec: ConeSpec) -> Layout:
+        """Return a layout for a specification of cones; of a linear metric if the exact one does not converge."""
+        try:
+            return lay_out_once(self._surface, self.part, spec, self._method)[0]
+        except ConvergenceError:
+            part = replace(self.part, metric=replace(self.part.metric, method="linear"))
+            return lay_out_once(self._surface, part, spec, self._method)[0]
+
     def _from_coarse(self) -> Candidate:
         """Return a candidate with the cones that are best on a coarse mesh, for a bound that the mesh itself meets."""
         coarse, kept = coarse_part(self.part, COARSE)
@@ -205,7 +212,7 @@ class CutSearch:
         for _ in range(COARSE_TRIES):
             best = CutSearch(coarse, bound, self._method, True, self._by_area).best()
             spec = self._with_cones(kept[best.layout.cones])
-            layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
+            layout = self._laid_out(spec)
             one = self._candidate(layout, best.distortion)
             if one.energy > self.max_energy:
                 one = self.shortened(one)
@@ -223,11 +230,11 @@ class CutSearch:
         for tried in range(2 * MAX_CANDIDATES):
             spec = replace(self.part.cones, distortion=distortion)
             # Cones that their triangles cannot hold are no problem for free seams.
-            layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
+            layout = self._laid_out(spec)
             same = [i for i, each in enumerate(found) if np.array_equal(each.layout.cones, layout.cones)]
             known = found.pop(same[0]) if same else self._candidate(layout, distortion)
             found.append(replace(known, distortion=distortion))
-            if same and (known.energy <= self.max_energy or distortion < known.distortion / 2):
+            if same and (known.energy <= self.max_energy or distortion < LEAST_DISTORTION):
                 break  # The search finds no others.
             within = [each for each in found if each.energy <= self.max_energy]
             beyond = [each for each in found if each.energy > self.max_energy]
@@ -306,16 +313,12 @@ class CutSearch:
         # For each slack that was requested, the energy above the bound.
         slack, tried, known = wanted, [(0.0, -wanted)], [seams]
         for _ in range(MAX_TRIES // 2 if self._has_coarse and wanted > 0 else MAX_TRIES):
-            # The decrease per length was made equal at all tips on the coarse mesh. Seams that only get longer need no
-            # other metric to start from.
-            most = 0.0 if self._has_coarse and wanted < 0 else np.inf
-            moves = np.minimum(moves_for(start.layout, tips, slack), most)
-            moved = moved_tips(start.layout, seams, tips, moves)
+            moved = moved_tips(start.layout, seams, tips, moves_for(start.layout, tips, slack))
             if any(np.array_equal(moved[0], each) for each in known):
                 # The tips move by whole edges.
                 slack += np.sign(slack) * allowed / 4
                 continue
-            layout = self._with_tips(start.layout, *moved)
+            layout = self._with_tips(*moved)
             if layout is None:
                 break
             known.append(moved[0])
@@ -335,21 +338,14 @@ class CutSearch:
             else:
                 (slack_before, excess_before), (slack, excess) = tried[-2:]
                 change = excess - excess_before
-                if wanted > 0 and len(tried) > 2 and abs(change) < abs(excess) / 5:
-                    break  # The energy hardly depends on the tips.
                 wished = slack - excess * (slack - slack_before) / change if change else np.inf
                 slack *= float(np.clip(wished / slack, 1.25, 3)) if wished * slack > 0 else 3.0
         return found
 
-    def _with_tips(self, start: Layout, seams: IntArray, cones: IntArray) -> Layout | None:
-        """Return the layout with given cones that is cut along given edges; None if there is none.
-
-        start: a layout; if it is cut along some of these edges, and no others, the layout is the same.
-        """
+    def _with_tips(self, seams: IntArray, cones: IntArray) -> Layout | None:
+        """Return the layout with given cones that is cut along given edges; None if there is none."""
         mesh = self.part.mesh
         cones = cones[np.isin(cones, mesh.edges[seams])]
-        if np.isin(seam_edges(start), seams).all():
-            return replace(recut(start, seams), cones=cones)
         spec, cut = self._with_cones(cones), open_along(mesh, seams)
         try:
             solution = find_cones(self._surface, spec, self._method.watch)

@@ -116,13 +116,9 @@ def _walk(
         is_allowed: (e,) the edges of the path.
         passes: (n,) vertices at which the path does not end. With a direction, all its vertices are among them.
     """
-    path, here, length = list[int](), tip, 0.0
+    path, here, length, points = list[int](), tip, 0.0, mesh.vertices
     starts, edges = mesh.incident_edges
-    ahead = (
-        None
-        if before is None
-        else _unit(2 * mesh.vertices[tip] - mesh.vertices[mesh.edges[before]].sum(axis=0))
-    )
+    ahead = None if before is None else _unit(2 * points[tip] - points[mesh.edges[before]].sum(axis=0))
     while length < size and (here == tip or passes[here]):
         around = edges[starts[here] : starts[here + 1]]
         others = mesh.edges[around].sum(axis=1) - here
@@ -132,7 +128,7 @@ def _walk(
         around, others = around[chosen], others[chosen]
         if not len(around):
             break
-        steps = mesh.vertices[others] - mesh.vertices[here]
+        steps = points[others] - points[here]
         sizes = np.maximum(np.sqrt((steps**2).sum(axis=1)), np.finfo(float).tiny)
         best = 0
         if ahead is not None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ... import Flattening
+from ... import Distortion, Flattening
 from ...base import FloatArray, Stopwatch, limit_threads, plural
 from ...errors import OptionError
 from ...evaluate import evaluate
@@ -81,9 +81,8 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         prepared, mirror = source.prepared(shared), None
         if o.stack == "mirrored":
             mirror, prepared = half_of(prepared, source, shared)
-    method = Method(
-        RelaxSpec("off", 0.0), shared.charts == "atlas", None, Stopwatch(), Surface.of, find_metric
-    )
+    relax = RelaxSpec("off", 0.0)
+    method = Method(relax, shared.charts == "atlas", None, Stopwatch(), Surface.of, find_metric, False)
     parts = [along_sharp_edges(part) for part in prepared.parts]
     found = dict[int, Candidate]()
     areas, sizes = np.array([(double_areas(part.lengths).sum(), len(part.faces)) for part in parts]).T
@@ -132,7 +131,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         has_risen |= resolution > shared.resolution
         shared = replace(shared, resolution=resolution)
         result = evaluate(prepared, layouts, shared, watch)
-    notes = (*result.notes, *_notes(o, energies, result.distortion.charts))
+    notes = (*result.notes, *_notes(o, energies, result.distortion))
     own = {name: getattr(o, name) for name in OWN if name != "seams"}
     if o.marked is not o.seams:
         own["seams"] = "none" if o.marked is None else ["none", result.settings["seams"]]
@@ -169,19 +168,21 @@ def _resolution(density: float, side: float, padding: float) -> int:
     return resolution
 
 
-def _notes(o: UnwrapOptions, energies: Sequence[float], charts: int) -> Iterator[str]:
+def _notes(o: UnwrapOptions, energies: Sequence[float], found: Distortion) -> Iterator[str]:
     """Yield a note if the energy of a component is above the bound, or if there is another number of charts."""
-    above = [energy for energy in energies if energy > o.bound]
-    if above and o.area is None:
+    above, charts = [energy for energy in energies if energy > o.bound], found.charts
+    if above:
+        most, reached = o.bound, max(above)
+        if o.area is not None:
+            most, reached = o.area, ((reached - ISOMETRIC) / ENERGY_PER_AREA) ** 0.5
         yield (
-            f"The energy of {plural(len(above), 'component')} is up to {max(above):.6g}, above the {o.bound:.6g} "
-            "allowed: refine the mesh, or allow more."
+            f"The {'energy' if o.area is None else 'area distortion'} of {plural(len(above), 'component')} is up to "
+            f"{reached:.6g}, above the {most:.6g} allowed: refine the mesh, or allow more."
         )
-    elif above:
-        reached = np.sqrt((max(above) - ISOMETRIC) / ENERGY_PER_AREA)
+    elif o.area is None and found.energy > o.bound:
         yield (
-            f"The area distortion of {plural(len(above), 'component')} is up to {reached:.4g}, above the {o.area:.4g} "
-            "allowed: refine the mesh, or allow more."
+            f"The energy is {found.energy:.6g}, above the {o.bound:.6g} allowed, because of triangles that have "
+            "nearly no area: remesh there."
         )
     if isinstance(o.charts, int) and charts != o.charts:
         why = (
