@@ -146,13 +146,9 @@ def fitted_cones(
     prescribed = curvatures[~is_free]
     total = np.nan if euler is None else 2 * np.pi * euler - prescribed.sum()
     count = int(is_free.sum())
-    found, _, _ = fit_curvatures(
-        np.ascontiguousarray(gram[np.ix_(is_free, is_free)]),
-        slope[is_free] + gram[np.ix_(is_free, ~is_free)] @ prescribed,
-        np.full(count, limits.least),
-        np.full(count, limits.most),
-        float(total),
-    )
+    own, rest = np.ascontiguousarray(gram[np.ix_(is_free, is_free)]), gram[np.ix_(is_free, ~is_free)]
+    least, most = np.full(count, limits.least), np.full(count, limits.most)
+    found, _, _ = fit_curvatures(own, slope[is_free] + rest @ prescribed, least, most, float(total))
     filled = curvatures.copy()
     filled[is_free] = found
     return linear.solution_of(cones, checked_sum(filled, euler))

@@ -28,9 +28,8 @@ from .free import freed, seam_edges, separate_charts, side_by_side, triangle_ene
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .tips import RINGS, find_tips, moved_tips, moves_for
 
-# The area distortion of the first candidate, one that the fewest cones reach, the smallest one, and the maximum number
-# of candidates. A few large triangles may hide that the small ones between them are distorted.
-FIRST_DISTORTION, ANY_DISTORTION, LEAST_DISTORTION, MAX_CANDIDATES = 0.25, 1e3, 0.01, 5
+# The area distortion of the first candidate, one that the fewest cones reach, and the maximum number of candidates.
+FIRST_DISTORTION, ANY_DISTORTION, MAX_CANDIDATES = 0.25, 1e3, 5
 # The search ends where the numbers of cones within and beyond the bound differ by less than this factor or by one. A
 # surface of 50 handles needs about 160 cones, and each search for them seconds.
 SIMILAR_COUNTS = 1.05
@@ -69,6 +68,11 @@ class Candidate:
     cost: float
     distortion: float
     is_separated: bool = False
+
+    @property
+    def reached(self) -> float:
+        """The area distortion that its cones reach in the linear model."""
+        return self.layout.statistics.area_distortion_linear
 
 
 class CutSearch:
@@ -218,7 +222,7 @@ class CutSearch:
                 one = self.shortened(one)
             found.append(self.separated(one))
             excess = one.energy - self.max_energy
-            if excess <= 0:
+            if excess <= 0 or best.energy > bound:
                 break
             bound = max(bound - excess, (bound + ISOMETRIC) / 2)
         close_search(self._surface)
@@ -234,7 +238,7 @@ class CutSearch:
             same = [i for i, each in enumerate(found) if np.array_equal(each.layout.cones, layout.cones)]
             known = found.pop(same[0]) if same else self._candidate(layout, distortion)
             found.append(replace(known, distortion=distortion))
-            if same and (known.energy <= self.max_energy or distortion < LEAST_DISTORTION):
+            if same and (known.energy <= self.max_energy or distortion < known.reached):
                 break  # The search finds no others.
             within = [each for each in found if each.energy <= self.max_energy]
             beyond = [each for each in found if each.energy > self.max_energy]

@@ -141,11 +141,11 @@ class DenseModel:
     least: FloatArray
     best: BestSets[ConeSet] = field(default_factory=BestSets)
 
-    def fit(self, members: IntArray) -> Fit:
-        """Return the best curvatures of a set of candidates (s,)."""
+    def fit(self, members: IntArray, near: FloatArray | None = None) -> Fit:
+        """Return the best curvatures of a set of candidates (s,), for which those of a similar set may be given."""
         gram, slope = self.gram[members[:, None], members], self.slope[members]
         most = np.full(len(members), self.limits.most)
-        fitted = fit_curvatures(gram, slope, self.least[members], most, self.limits.total)
+        fitted = fit_curvatures(gram, slope, self.least[members], most, self.limits.total, near)
         curvatures, _, feasible = fitted
         energy = float(self.constant + (2 * slope + gram @ curvatures) @ curvatures) if feasible else math.inf
         return Fit(*fitted, nonnegative(energy))
@@ -269,7 +269,7 @@ class DenseModel:
                 change[place] = np.inf
                 tried = members.copy()
                 tried[place] = which[place]
-                found = self.fit(tried)
+                found = self.fit(tried, fitted.curvatures)
                 if found.energy < fitted.energy * (1 - MIN_RELATIVE_GAIN):
                     members, fitted, improved = tried, found, True
                     break
@@ -285,11 +285,8 @@ class DenseModel:
             found = self.exchanged(members)
             self.best.offer(found)
             size, energy = len(found), self.best.energy(len(found))
-            if (
-                size >= most
-                or energy <= bound
-                or energy >= STALL_FACTOR * self.best.energy(size - STALL_CONES) < math.inf
-            ):
+            is_stalled = energy >= STALL_FACTOR * self.best.energy(size - STALL_CONES) < math.inf
+            if size >= most or energy <= bound or is_stalled:
                 break
             members = self.grown(self.best[size].members if size in self.best else found.members)
 

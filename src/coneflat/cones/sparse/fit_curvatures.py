@@ -20,7 +20,12 @@ MAX_STEPS_AT_ONCE = 20
 
 
 def fit_curvatures(
-    gram: FloatArray, slope: FloatArray, least: FloatArray, most: FloatArray, total: float
+    gram: FloatArray,
+    slope: FloatArray,
+    least: FloatArray,
+    most: FloatArray,
+    total: float,
+    near: FloatArray | None = None,
 ) -> tuple[FloatArray, float, bool]:
     """Return the curvatures k that minimise k gram k / 2 + slope k with bounds and a given sum.
 
@@ -32,6 +37,7 @@ def fit_curvatures(
         slope: (s,) linear term.
         least, most: (s,) bounds, radians.
         total: sum of the curvatures, radians; NaN for none.
+        near: (s,) curvatures that are expected to be at the same bounds, which saves steps; None if unknown.
 
     Returns:
         (s,) the curvatures, the multiplier of the sum, and whether the bounds allow the sum. If they do not, the
@@ -44,7 +50,8 @@ def fit_curvatures(
     feasible = not has_sum or bool(least.sum() - slack <= total <= most.sum() + slack)
     if not feasible:
         least, most = np.full(len(slope), -np.inf), np.full(len(slope), np.inf)
-    curvatures, multiplier, is_optimal = change_at_once(gram, slope, least, most, total)
+    near = np.full(len(slope), np.nan) if near is None else near
+    curvatures, multiplier, is_optimal = change_at_once(gram, slope, least, most, total, near)
     if not is_optimal:
         curvatures, multiplier = change_one_by_one(gram, slope, least, most, total, curvatures)
     return curvatures, multiplier, feasible
@@ -58,12 +65,11 @@ def inverse_with_sum(gram: FloatArray, has_sum: bool) -> FloatArray:
     system = np.zeros((size + has_sum, size + has_sum))
     system[:size, :size] = gram
     system.flat[: size * len(system) : len(system) + 1] += MIN_PIVOT * unit
-    if not has_sum:
-        return np.asarray(np.linalg.inv(system), dtype=np.float64)
-    system[size, :size] = system[:size, size] = unit
+    system[size:, :size] = unit
+    system[:size, size:] = unit
     inverse = np.asarray(np.linalg.inv(system), dtype=np.float64)
-    inverse[size] *= unit
-    inverse[:, size] *= unit
+    inverse[size:] *= unit
+    inverse[:, size:] *= unit
     return inverse
 
 
@@ -176,7 +182,7 @@ def best_free(
 
 @compiled
 def change_at_once(
-    gram: FloatArray, slope: FloatArray, least: FloatArray, most: FloatArray, total: float
+    gram: FloatArray, slope: FloatArray, least: FloatArray, most: FloatArray, total: float, near: FloatArray
 ) -> tuple[FloatArray, float, bool]:
     """Return the optimum (s,) and the multiplier, by updating all active bounds at once, and whether this converged.
 
@@ -185,6 +191,9 @@ def change_at_once(
     """
     size = len(slope)
     state, curvatures, gradient = np.zeros(size, np.int64), np.zeros(size), np.empty(size)
+    for i in range(size):
+        state[i] = int(near[i] >= most[i]) - int(near[i] <= least[i])
+        curvatures[i] = most[i] if state[i] > 0 else least[i]
     for _ in range(MAX_STEPS_AT_ONCE):
         free, best, multiplier = best_free(gram, slope, total, state, curvatures)
         if not len(free):

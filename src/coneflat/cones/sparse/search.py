@@ -280,9 +280,8 @@ class ConeSearch:
             return False
         coarse, exact = self.coarse.best, self.exact.best
         expected = exact.energy(count + 1) * coarse.energy(count)
-        return exact.energy(
-            count
-        ) <= MAX_REFINED_RATIO * goal or expected <= MAX_REFINED_RATIO * goal * coarse.energy(count + 1)
+        allowed = MAX_REFINED_RATIO * goal
+        return exact.energy(count) <= allowed or expected <= allowed * coarse.energy(count + 1)
 
     def _climb(self, bound: float, most: int, count: int) -> None:
         """Find sets of at most `most` cones on the coarse model; raise CurvatureError if none has at most `count`."""
