@@ -47,13 +47,14 @@ SCALING_WEIGHT = 1e-3
 CONE_RINGS = 3
 
 
-def find_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> FlatMetric:
+def find_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec, steps: int = 200) -> FlatMetric:
     """Return the flat metric of a connected mesh for its cones.
 
     Args:
         surface: the mesh with its side lengths.
         solution: cones, target curvatures and the linear log scale.
         spec: the options of the metric.
+        steps: maximum number of Newton steps of each attempt at an exact metric without a quantum.
 
     Raises:
         ConvergenceError: the exact metric was not found.
@@ -77,7 +78,7 @@ def find_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> F
         if mesh.genus():
             return corrected_flat_metric(lengths, solution, solve, loop_holonomy(mesh), quantum)
     delaunay = surface.delaunay if surface.is_reused else surface.known_delaunay
-    return exact_flat_metric(mesh, lengths, solution, spec, boundary, delaunay)
+    return exact_flat_metric(mesh, lengths, solution, spec, boundary, delaunay, steps)
 
 
 def loop_rotations(surface: Surface, spec: MetricSpec) -> Callable[[ConeSolution], FloatArray] | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
@@ -35,6 +37,7 @@ def exact_flat_metric(
     spec: MetricSpec,
     boundary: BoundaryCurvature | None = None,
     flipped: tuple[IntrinsicTriangulation, IntArray] | None = None,
+    steps: int = 200,
 ) -> FlatMetric:
     """Return the exact discrete conformal metric; the solve starts from the linear solution.
 
@@ -45,6 +48,7 @@ def exact_flat_metric(
         spec: the options of the metric.
         boundary: prescribed curvature of the boundary; None for a free boundary with phi = 0.
         flipped: the intrinsic Delaunay triangulation and the half-edges flipped for it, if known.
+        steps: maximum number of Newton steps of each attempt.
 
     Raises:
         ConvergenceError: the solve did not reach its tolerance, and `spec` does not accept it.
@@ -55,7 +59,7 @@ def exact_flat_metric(
     fixed = is_open.copy()
     if spec.scale_at_cones:
         fixed[solution.cones] = True
-    solved, target = _solve(mesh, lengths, solution, boundary, fixed, flipped)
+    solved, target = _solve(mesh, lengths, solution, boundary, fixed, flipped, steps)
     if not solved.converged and not (spec.accepts_failure and np.isfinite(solved.residual)):
         worst = spec.names[solved.worst_vertex]
         raise ConvergenceError(
@@ -65,9 +69,8 @@ def exact_flat_metric(
         )
     triangles, factor = solved.straight(), 1.0
     if spec.keeps_area:
-        flat = solved.triangulation.length.reshape(-1, 3)
-        copies = len(flat) / len(lengths)  # 2 where the surface was doubled
-        factor = float(np.sqrt(copies * double_areas(lengths).sum() / double_areas(flat).sum()))
+        flat = double_areas(solved.triangulation.length.reshape(-1, 3))
+        factor = float(np.sqrt(double_areas(lengths).mean() / flat.mean()))  # the surface may be doubled
     return FlatMetric(
         mesh=mesh,
         lengths=lengths,
@@ -119,25 +122,22 @@ def _solve(
     boundary: BoundaryCurvature | None,
     fixed: BoolArray,
     flipped: tuple[IntrinsicTriangulation, IntArray] | None,
+    steps: int,
 ) -> tuple[ExactMetric, FloatArray]:
     """Return the metric and its target curvature (n,), which for a round boundary depends on the metric."""
-    inverse = solution.inverse
-    if inverse is not None and not np.array_equal(inverse.is_zero, fixed):
-        inverse = None
-
-    def solve(wanted: FloatArray, start: FloatArray) -> ExactMetric:
-        return exact_metric(
-            mesh, lengths, wanted, fixed=fixed, start=start, preconditioner=inverse, flipped=flipped
-        )
-
+    known = solution.inverse
+    inverse = known if known is not None and np.array_equal(known.is_zero, fixed) else None
+    solve = partial(
+        exact_metric, mesh, lengths, fixed=fixed, preconditioner=inverse, flipped=flipped, max_steps=steps
+    )
     inside = np.where(mesh.is_boundary_vertex, 0.0, solution.target)
     if boundary is None:
-        return solve(inside, solution.log_scale), inside
+        return solve(inside, start=solution.log_scale), inside
     wanted = boundary.target(lengths, solution.log_scale)
     if _is_too_sharp(boundary, wanted):
         # With the linear scale, one side makes up nearly all of the boundary, as on a surface of many spikes.
         wanted = boundary.target(lengths, np.zeros_like(solution.log_scale))
-    solved = solve(inside + wanted, solution.log_scale)
+    solved = solve(inside + wanted, start=solution.log_scale)
     step = np.where(wanted < 0, HOLE_STEP, 1.0)
     for _ in range(MAX_ROUNDS if boundary.has_round_loops else 0):
         change = boundary.target(lengths, solved.log_scale) - wanted
@@ -146,7 +146,7 @@ def _solve(
         rounder = wanted + step * change
         if _is_too_sharp(boundary, rounder):
             break
-        again = solve(inside + rounder, solved.log_scale)
+        again = solve(inside + rounder, start=solved.log_scale)
         if not again.converged:
             break
         wanted, solved = rounder, again

@@ -69,11 +69,6 @@ class Candidate:
     distortion: float
     is_separated: bool = False
 
-    @property
-    def reached(self) -> float:
-        """The area distortion that its cones reach in the linear model."""
-        return self.layout.statistics.area_distortion_linear
-
 
 class CutSearch:
     """The search for the cut of a part.
@@ -238,7 +233,8 @@ class CutSearch:
             same = [i for i, each in enumerate(found) if np.array_equal(each.layout.cones, layout.cones)]
             known = found.pop(same[0]) if same else self._candidate(layout, distortion)
             found.append(replace(known, distortion=distortion))
-            if same and (known.energy <= self.max_energy or distortion < known.reached):
+            reached = layout.statistics.area_distortion_linear
+            if same and (known.energy <= self.max_energy or distortion < reached):
                 break  # The search finds no others.
             within = [each for each in found if each.energy <= self.max_energy]
             beyond = [each for each in found if each.energy > self.max_energy]

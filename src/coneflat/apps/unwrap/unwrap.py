@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,8 @@ OWN = (*declarations(TextureOptions), "charts", "seams")
 COVERED, MAX_RESOLUTION = 0.65, 2**16
 # Triangles of a part from which several threads are faster than one.
 PARALLEL = 20_000
+# Newton steps of the exact metric, which only has to be a start: most meshes take 10, bad ones 100 and more.
+MAX_STEPS = 25
 #: The `method` in the settings of a result.
 FREE = "free seams"
 
@@ -81,8 +84,8 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         prepared, mirror = source.prepared(shared), None
         if o.stack == "mirrored":
             mirror, prepared = half_of(prepared, source, shared)
-    relax = RelaxSpec("off", 0.0)
-    method = Method(relax, shared.charts == "atlas", None, Stopwatch(), Surface.of, find_metric, False)
+    relax, quick = RelaxSpec("off", 0.0), partial(find_metric, steps=MAX_STEPS)
+    method = Method(relax, shared.charts == "atlas", None, Stopwatch(), Surface.of, quick, False)
     parts = [along_sharp_edges(part) for part in prepared.parts]
     found = dict[int, Candidate]()
     areas, sizes = np.array([(double_areas(part.lengths).sum(), len(part.faces)) for part in parts]).T
