@@ -92,7 +92,7 @@ def test_a_sound_result_breaks_no_promise(ball):
     assert breaches_of(result, options, *mesh) == []
 
 
-@pytest.mark.parametrize("seed", [1_704_966, 2_906_290])
+@pytest.mark.parametrize("seed", [1_704_966, 7_300_121])
 def test_seams_that_a_note_names_are_noted(seed):
     outcome = run_case("mesh", seed)
     assert outcome.breaches == []

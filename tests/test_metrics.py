@@ -130,7 +130,7 @@ def test_unconverged_metric_is_refused(monkeypatch):
     monkeypatch.setattr(
         method,
         "exact_metric",
-        lambda *args, **options: exact(*args, **options, tolerance=1e-30, max_steps=1),
+        lambda *args, **options: exact(*args, **{**options, "tolerance": 1e-30, "max_steps": 1}),
     )
     with pytest.raises(errors.ConvergenceError, match="did not converge: after .* vertex .* is off by"):
         flatten(*SHAPES["sphere"])

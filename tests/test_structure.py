@@ -40,10 +40,10 @@ CEILINGS = {
     "apps.peers": 438,
     "apps.quads": 3754,
     "apps.studio": 1710,
-    "apps.transfer": 299,
+    "apps.transfer": 300,
     "apps.brains": 259,
     "apps.pyvista": 26,
-    "apps.unwrap": 1388,
+    "apps.unwrap": 1387,
     "apps.view": 1545,
     "atlas": 1355,
     "base": 282,
@@ -54,7 +54,7 @@ CEILINGS = {
     "flattener": 35,
     "geometry": 1542,
     "io": 2823,
-    "layout": 1901,
+    "layout": 1903,
     "linalg": 453,
     "measure": 805,
     "mesh": 540,
@@ -73,7 +73,7 @@ OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 FRONT = ("apps.ahead", "apps.blender", "apps.cli", "apps.studio")
 SHARED = ("apps.quads.nearest",)
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_819, 232, 24_505
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_821, 232, 24_505
 CONSTANTS, KERNELS, NAMES, LEVELS = 293, 84, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

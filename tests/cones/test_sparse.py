@@ -229,6 +229,9 @@ def test_fit_agrees_with_the_optimality_conditions(at_once, monkeypatch):
         assert np.isnan(total) or k.sum() == pytest.approx(total, abs=1e-9)
         assert (gradient[k < most - 1e-9] > -1e-7).all()
         assert (gradient[k > least + 1e-9] < 1e-7).all()
+        guess = rng.choice([least, most, (least + most) / 2, np.nan], size)
+        again = fit(gram, slope, np.full(size, least), np.full(size, most), total, guess)
+        np.testing.assert_allclose(again[0], k, atol=1e-9)
 
 
 def test_changing_bounds_one_by_one_starts_from_the_bounds_found_at_once(monkeypatch):

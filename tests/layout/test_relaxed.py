@@ -9,6 +9,7 @@ import pytest
 import shapes
 
 from coneflat import errors, flatten
+from coneflat.geometry import double_areas, edge_lengths, signed_double_areas
 
 METHOD, STAGE = import_module("coneflat.flatten"), import_module("coneflat.layout.relax_layouts")
 
@@ -31,6 +32,17 @@ def border_lengths(result):
     flat = (uv[:, [2, 0, 1]] - uv[:, [1, 2, 0]]).reshape(-1, 2)[border]
     ends = result.vertices[pairs[border]]
     return np.linalg.norm(flat, axis=1), np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+
+
+def test_components_keep_their_areas_relative_to_each_other():
+    ball, plate = shapes.sphere(3, bumps=0.0), shapes.grid(8, 6)
+    result = flatten(*shapes.join(ball, (plate[0] + [5, 0, 0], plate[1])), stretch=1, distortion=0.5)
+    flat = np.abs(signed_double_areas(result.corner_uv))
+    areas = double_areas(edge_lengths(result.vertices, result.faces))
+    of_ball, of_plate = (
+        flat[own].sum() / areas[own].sum() for own in np.split(np.arange(len(flat)), [len(ball[1])])
+    )
+    assert of_ball == pytest.approx(of_plate, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", SHAPES)

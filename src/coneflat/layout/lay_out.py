@@ -78,7 +78,7 @@ def _unfolded(metric: FlatMetric, triangles: FlatTriangles, cut: Cut, rings: int
     curvature = layout_curvature(mesh, rows_of(points, cut.mesh.faces))
     statistics = replace(
         metric.statistics,
-        untangled_triangles=int(triangles.is_inverted.sum()),
+        untangled_triangles=int(triangles.is_inverted.sum()) if rings else 0,
         untangled_vertices=len(untangled.moved),
         untangled_move=untangled.largest_move,
     )

@@ -239,21 +239,24 @@ class LayoutGroup:
         curvature = np.where(changed, layout_curvature(mesh, corners, changed), old)
         # Areas are relative to those of each layout, as the threshold for zero area is.
         unit = self._sums(self.areas)[self._of_face]
-        after = np.abs(signed_double_areas(corners)) / 2
+        before, after = (np.abs(signed_double_areas(p[self.corners])) / 2 for p in (self.points, points))
+        sums = self._sums(before), self._sums(after)
         old = np.concatenate([one.log_scale for one in self.layouts])
         log_scale = np.where(was_free, vertex_log_scale(mesh, self.areas / unit, after / unit), old)
         found = []
         for i, one in enumerate(self.layouts):
             own = slice(self._vertices[i], self._vertices[i + 1])
             areas = vertex_areas(one.mesh.faces, one.lengths, len(one.mesh.vertices))
-            # The energy of angles does not depend on the scale. Areas may be those of a few triangles that were huge.
-            shift = 0.0 if one.is_fixed.any() else float(np.average(old[own] - log_scale[own], weights=areas))
-            log_scale[own] += shift
+            # The energy of angles does not depend on the scale: components keep their areas relative to each other.
+            # Untangling may have made a few triangles huge, so the area is then that of the metric.
+            area = (areas * np.exp(2 * old[own])).sum() if one.statistics.untangled_vertices else sums[0][i]
+            factor = 1.0 if one.is_fixed.any() else np.sqrt(area / sums[1][i])
+            log_scale[own] += np.log(factor)
             reached = area_distortion(log_scale[own], weighted_areas(areas, self._given_weights[i]))
             found.append(
                 replace(
                     one,
-                    points=np.exp(shift) * points[self._points[i] : self._points[i + 1]],
+                    points=factor * points[self._points[i] : self._points[i + 1]],
                     curvature=curvature[own],
                     # Where the curvature is not prescribed, the target is set to the resulting curvature.
                     target=np.where(one.is_open, curvature[own], one.target),

@@ -12,6 +12,7 @@ from scipy.spatial import Delaunay
 
 import coneflat
 from coneflat import errors, flatten, integer_grid
+from coneflat.apps.quads.integer_grid import GridSearch
 from coneflat.apps.quads.layout import aligned
 from coneflat.apps.quads.lines import with_sides
 from coneflat.apps.quads.round_layout import split_between_nodes
@@ -172,6 +173,15 @@ def test_a_grid_that_is_too_coarse_is_made_finer(shared):
     grid = integer_grid(result, quads=5)
     check_laws(grid)
     assert any("squares, not 5." in note for note in grid.notes)
+
+
+def test_a_note_says_what_cones_are_not_chosen_for(monkeypatch):
+    def failing(*_):
+        raise errors.GridError("no place for them")
+
+    monkeypatch.setattr(GridSearch, "_of_aligned_cones", failing)
+    note = "Cones are not chosen for the boundary, sharp edges or curvature, because no grid with such cones was found"
+    assert f"{note}: no place for them." in integer_grid(*shapes.sphere(3), quads=300).notes
 
 
 def test_more_cones_are_tried_where_a_grid_is_not_found(monkeypatch):

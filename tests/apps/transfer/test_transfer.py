@@ -151,6 +151,49 @@ def test_the_image_of_an_obj_is_given(folder, tmp_path):
     assert coneflat.read_mesh(baked.save(tmp_path / "out.glb")).uv is not None
 
 
+def test_images_are_clamped_or_repeated_as_their_samplers_say(tmp_path):
+    stream, make = BytesIO(), SceneMaker()
+    pixels = np.array([[[0, 0, 0], [255, 0, 0]], [[0, 255, 0], [255, 255, 0]]], np.uint8)
+    Image.fromarray(pixels).save(stream, format="PNG")
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    make.tree |= {
+        "images": [{"bufferView": make.view(stream.getvalue()), "mimeType": "image/png"}],
+        "samplers": [{"wrapS": 33071}],
+        "textures": [{"source": 0, "sampler": 0}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}],
+        "nodes": [{"mesh": 0}],
+        "scenes": [{"nodes": [0]}],
+    }
+    attributes = {
+        "POSITION": make.accessor(corners),
+        "TEXCOORD_0": make.accessor(2 * corners[:, :2] - 0.5),
+    }
+    indices = make.accessor(np.array([0, 1, 2, 0, 2, 3]), 5125)
+    make.tree["meshes"] = [{"primitives": [{"attributes": attributes, "indices": indices, "material": 0}]}]
+    (tmp_path / "old.glb").write_bytes(make.glb())
+    lines = ["v 0 0 0", "v 1 0 0", "v 1 1 0", "v 0 1 0", "vt 0 0", "vt 1 0", "vt 1 1", "vt 0 1"]
+    (tmp_path / "new.obj").write_text("\n".join([*lines, "f 1/1 2/2 3/3", "f 1/1 3/3 4/4"]))
+    red, green = np.moveaxis(
+        transfer(tmp_path / "old.glb", tmp_path / "new.obj", resolution=8).images["baseColorTexture"], 2, 0
+    )[:2]
+    assert (red[:, :3] == 0).all()
+    assert (red[:, 5:] == 255).all()
+    assert np.array_equal(green[:4], green[4:])
+    assert np.ptp(green) > 50
+
+
+def test_triangles_without_area_in_the_texture_have_no_texels(tmp_path):
+    corners = ["v 0 0 0", "v 1 0 0", "v 1 1 0", "v 0 1 0", "v 2 0 0", "v 2 1 0", "v 3 0 0"]
+    points = ["vt 0 0", "vt 1 0", "vt 1 1", "vt 0 1", "vt 0.25 0.25"]
+    faces = ["f 5/1 6/3 7/5", "f 1/1 2/2 3/3", "f 1/1 3/3 4/4"]
+    (tmp_path / "new.obj").write_text("\n".join(corners + points + faces))
+    Image.new("RGB", (1, 1), (9, 9, 9)).save(tmp_path / "image.png")
+    path, image = tmp_path / "new.obj", tmp_path / "image.png"
+    baked = transfer(path, path, resolution=64, texture=image)
+    assert not any("overlap" in note for note in baked.notes)
+    assert (baked.images["baseColorTexture"][..., :3] == 9).all()
+
+
 def test_normal_maps_turn_with_the_uvs(tmp_path):
     """The new UVs are turned by a quarter, so x becomes -y."""
     make = SceneMaker()

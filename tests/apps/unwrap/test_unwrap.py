@@ -41,9 +41,13 @@ def test_the_energy_is_within_the_bound(shape, bound):
 def test_the_search_goes_on_where_the_first_candidates_have_the_same_cones(monkeypatch):
     monkeypatch.setattr("coneflat.apps.unwrap.search.FIRST_DISTORTION", 10.0)
     assert unwrap(*shapes.hill(), max_energy=4.01).distortion.energy <= 4.01
+    vertices, faces = shapes.hill()
+    assert unwrap(vertices * [1, 1, 0.25], faces, max_energy=4.00243).distortion.energy <= 4.00243
 
 
 def test_the_exact_metric_need_not_converge(monkeypatch):
+    exact = unwrap(*shapes.sphere(3)).distortion.seam_length
+
     def diverge(*_):
         raise errors.ConvergenceError("the exact metric did not converge")
 
@@ -53,6 +57,7 @@ def test_the_exact_metric_need_not_converge(monkeypatch):
     d = unwrap(*shapes.sphere(3)).distortion
     assert (d.flipped, d.overlapping_pairs) == (0, 0)
     assert d.energy <= 4.1
+    assert d.seam_length == pytest.approx(exact, rel=0.02)
 
 
 def test_a_triangle_nearly_without_area_is_named_as_the_reason_for_a_large_energy():

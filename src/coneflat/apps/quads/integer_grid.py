@@ -219,9 +219,9 @@ class GridSearch:
                 raise
         less = 0.7 * given.get("distortion", DISTORTION)
         other = replace(self, options={**given, "distortion": less})
-        found, more = other._of_flattening(self._boundary_without_sides), self.sizes is not None
         note = f"With a distortion above {less:.3g}, no grid was found."
-        return with_note(found, note + " Wanted sizes are not followed." * more)
+        note += " Wanted sizes are not followed." if self.sizes is not None else ""
+        return with_note(other._of_flattening(self._boundary_without_sides), note)
 
     def _as_given(self) -> IntegerGrid:
         """Return a grid for the options as given."""

@@ -65,7 +65,7 @@ def grid_with_lines(
                 found = grid_about(rounding, energy, 0)
                 if found.squares <= 2 * layout.area:
                     break
-                why, found = f"the grid would have {found.squares:,.0f} squares", None
+                why, found = f"squares would be {found.squares:,.0f}, not {layout.area:,.0f}", None
             except GridError as error:
                 why = str(error)
         edges = _long_chains(layout, lined.edges[~is_bad[lined.chain]])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache, cached_property, partial
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -52,15 +52,6 @@ def to_srgb(values: FloatArray) -> FloatArray:
     return np.where(values <= 0.0031308, values * 12.92, 1.055 * values ** (1 / 2.4) - 0.055)
 
 
-def linear(image: NDArray[np.uint8], is_colour: bool) -> FloatArray:
-    """Return (h, w, 4) the linear values of an image; `is_colour`: it is in sRGB, but for its alpha."""
-    values = np.arange(256) / 255
-    found = values[image]
-    if is_colour:
-        found[..., :3] = to_linear(values)[image[..., :3]]
-    return found
-
-
 class Painted:
     """A mesh with colours.
 
@@ -90,7 +81,7 @@ class Painted:
             numbers = [one.get("material", len(self.materials) - 1) for one, _ in self.primitives]
             self.material = np.repeat(numbers, [len(corners) // 3 for _, corners in self.primitives])
         self.used: list[int] = np.unique(self.material).tolist()
-        self.uv, self.image = cache(self._read_uv), cache(self._read_image)
+        self.uv, self.image, self.linear = cache(self._read_uv), cache(self._read_image), cache(self._linear)
 
     @cached_property
     def colours(self) -> FloatArray | None:
@@ -187,17 +178,26 @@ class Painted:
         shift, uv = slot.get("extensions", {}).get("KHR_texture_transform", {}), self.uv_of(slot)[faces]
         cos, sin = np.cos(shift.get("rotation", 0.0)), np.sin(shift.get("rotation", 0.0))
         uv = np.einsum("qi,qic->qc", weights, uv) * shift.get("scale", (1, 1)) @ [[cos, -sin], [sin, cos]]
-        image, wraps = self.image(slot.get("index"), is_colour)
+        index = slot.get("index")
+        image, (_, wraps) = self.linear(index, is_colour), self.image(index)
         size = np.array(image.shape[1::-1])
         place = (uv + shift.get("offset", (0, 0))) * size - 0.5
         place = np.where(np.equal(wraps, CLAMP), np.clip(place, 0, size - 1), place)[:, ::-1].T
-        bilinear = partial(map_coordinates, coordinates=place, order=1, mode="grid-wrap")
-        return np.stack([bilinear(image[..., i]) for i in range(4)], axis=1)
+        bands = [map_coordinates(image[..., i], place, float, 1, "grid-wrap") for i in range(4)]
+        return np.stack(bands, axis=1)
 
-    def _read_image(self, index: int | None, is_colour: bool) -> tuple[FloatArray, tuple[Any, Any]]:
-        """Return (h, w, 4) the linear values of the image of a texture, and its wrap modes."""
+    def _linear(self, index: int | None, is_colour: bool) -> NDArray[np.float32]:
+        """Return (h, w, 4) the linear values of an image; `is_colour`: it is in sRGB, but for its alpha."""
+        image, values = self.image(index)[0], np.arange(256) / 255
+        found = values.astype(np.float32)[image]
+        if is_colour:
+            found[..., :3] = to_linear(values).astype(np.float32)[image[..., :3]]
+        return found
+
+    def _read_image(self, index: int | None) -> tuple[NDArray[np.uint8], tuple[Any, Any]]:
+        """Return (h, w, 4) the image of a texture, and its wrap modes."""
         if self.picture is not None:
-            return linear(decode_image(read_bytes(self.picture), self.picture), is_colour), (None, None)
+            return decode_image(read_bytes(self.picture), self.picture), (None, None)
         assert self.mesh.scene is not None
         data = self.mesh.scene.data
         texture = data.item("textures", index)
@@ -209,4 +209,4 @@ class Painted:
         else:
             content = read_bytes(data.resolve(uri)) if uri else bytes(data.view(item.get("bufferView")))
         modes = {} if sampler is None else data.item("samplers", sampler)
-        return linear(decode_image(content, name), is_colour), (modes.get("wrapS"), modes.get("wrapT"))
+        return decode_image(content, name), (modes.get("wrapS"), modes.get("wrapT"))

@@ -17,7 +17,7 @@ from scipy.ndimage import distance_transform_edt
 from ... import io
 from ...base import FloatArray, IntArray, check_cancelled
 from ...errors import OptionError
-from ...geometry import fill_nearest, unit_vectors
+from ...geometry import fill_nearest, signed_double_areas, unit_vectors
 from ...io import UVMesh, as_path
 from ...options import Number
 from ..quads.nearest import TriangleTree
@@ -102,7 +102,7 @@ def transfer(
     painted = Painted(as_path(old), None if texture is None else as_path(texture))
     new = as_path(new)
     target = io.as_uv_mesh(new, weld=False)
-    known = np.flatnonzero(target.has_uv)
+    known = np.flatnonzero(target.has_uv & (signed_double_areas(target.corner_uv) != 0))
     corner_uv = target.corner_uv[known]
     if corner_uv.min(initial=0) < -1 / side or corner_uv.max(initial=1) > 1 + 1 / side:
         raise OptionError(
@@ -173,9 +173,12 @@ def _tangents(corners: FloatArray, uv: FloatArray) -> FloatArray:
 
 
 def _owners(texels: FloatArray, side: int) -> tuple[IntArray, int]:
-    """Return (r, r) the triangle (m, 3, 2) at the centre of each texel, -1 for none; and how many have several."""
+    """Return (r, r) the triangle at the centre of each texel, -1 for none, and the number of texels with several.
+
+    texels, side: (m, 3, 2) corners of triangles with area in the texture, and its r rows.
+    """
     faces = np.arange(3 * len(texels)).reshape(-1, 3)
-    owners = np.full((2, side, side), -1)
+    owners = [np.full((side, side), -1) for _ in range(2)]
     # Depths are the numbers of the triangles, so that of several triangles the first one is found, and the last one.
     for sign, owner in zip((1.0, -1.0), owners, strict=True):
         points = np.column_stack([texels.reshape(-1, 2), sign * np.repeat(np.arange(len(texels)), 3)])

@@ -23,9 +23,9 @@ from ...mesh import label_faces, open_along
 from ...stages import Layout, SeamSpec, SolveStatistics
 from .options import ISOMETRIC
 
-# Rings of triangles around flipped ones whose vertices may move; more hardly ever help, and take half of the time of
-# small CAD parts. Where it helps, the relaxation takes 10 steps instead of the 60 from an embedding of
-# the whole chart (a noisy surface of 52,000 triangles, 6 of which were flipped).
+# Number of rings of triangles around flipped ones whose vertices may move. More rings rarely help and take half of the
+# time on small CAD parts. Where untangling succeeds, relaxing takes 10 steps instead of the 60 from an embedding (a
+# noisy surface of 52,000 triangles, 6 of which were flipped).
 FLIPPED_RINGS = 2
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...base import BoolArray, FloatArray, IntArray, mask_of
 from ...cones import close_search, find_cones
-from ...errors import ConvergenceError, CurvatureError, MetricError
+from ...errors import CurvatureError, MetricError
 from ...flatten import Method, lay_out_once
 from ...geometry import coarse_mesh, double_areas, edge_lengths, find_overlaps, mollify, signed_double_areas
 from ...layout import lay_out
@@ -183,7 +183,7 @@ class CutSearch:
     def _with_fewest_seams(self) -> Candidate:
         """Return a candidate cut between the fewest cones, and only along closed curves where there are handles."""
         mesh, spec = self.part.mesh, replace(self.part.cones, distortion=ANY_DISTORTION)
-        layout = self._laid_out(spec)
+        layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
         close_search(self._surface)
         if len(layout.cones) and mesh.euler_characteristic < 2 and not mesh.is_boundary_edge.any():
             is_cut = mask_of(len(mesh.edges), seam_edges(layout))
@@ -196,14 +196,6 @@ class CutSearch:
         layout, energy = self._freed(layout)
         return self.settled(self.separated(Candidate(layout, energy, self.cost_of(layout), ANY_DISTORTION)))
 
-    def _laid_out(self, spec: ConeSpec) -> Layout:
-        """Return a layout for a specification of cones; of a linear metric if the exact one does not converge."""
-        try:
-            return lay_out_once(self._surface, self.part, spec, self._method)[0]
-        except ConvergenceError:
-            part = replace(self.part, metric=replace(self.part.metric, method="linear"))
-            return lay_out_once(self._surface, part, spec, self._method)[0]
-
     def _from_coarse(self) -> Candidate:
         """Return a candidate with the cones that are best on a coarse mesh, for a bound that the mesh itself meets."""
         coarse, kept = coarse_part(self.part, COARSE)
@@ -211,7 +203,7 @@ class CutSearch:
         for _ in range(COARSE_TRIES):
             best = CutSearch(coarse, bound, self._method, True, self._by_area).best()
             spec = self._with_cones(kept[best.layout.cones])
-            layout = self._laid_out(spec)
+            layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
             one = self._candidate(layout, best.distortion)
             if one.energy > self.max_energy:
                 one = self.shortened(one)
@@ -229,13 +221,14 @@ class CutSearch:
         for tried in range(2 * MAX_CANDIDATES):
             spec = replace(self.part.cones, distortion=distortion)
             # Cones that their triangles cannot hold are no problem for free seams.
-            layout = self._laid_out(spec)
+            layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
             same = [i for i, each in enumerate(found) if np.array_equal(each.layout.cones, layout.cones)]
             known = found.pop(same[0]) if same else self._candidate(layout, distortion)
             found.append(replace(known, distortion=distortion))
             reached = layout.statistics.area_distortion_linear
             if same and (known.energy <= self.max_energy or distortion < reached):
                 break  # The search finds no others.
+            distortion = min(distortion, reached) if same else distortion
             within = [each for each in found if each.energy <= self.max_energy]
             beyond = [each for each in found if each.energy > self.max_energy]
             low = max(within, key=lambda each: each.distortion, default=None)

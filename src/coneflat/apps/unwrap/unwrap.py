@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import Distortion, Flattening
-from ...base import FloatArray, Stopwatch, limit_threads, plural
-from ...errors import OptionError
+from ...base import TYPED_TOLERANCE, FloatArray, Stopwatch, limit_threads, plural
+from ...errors import ConvergenceError, OptionError
 from ...evaluate import evaluate
 from ...flatten import Method, with_copies
 from ...geometry import dihedral_angles, double_areas
@@ -20,7 +19,7 @@ from ...io import as_input
 from ...metric import find_metric
 from ...options import Options, declarations, read_options, takes
 from ...source import Part, Source, find_copies
-from ...stages import RelaxSpec, Surface
+from ...stages import ConeSolution, FlatMetric, MetricSpec, RelaxSpec, Surface
 from .minor import MinorParts
 from .mirror import both_halves, half_of
 from .options import ENERGY_PER_AREA, ISOMETRIC, TextureOptions, UnwrapOptions
@@ -38,8 +37,8 @@ OWN = (*declarations(TextureOptions), "charts", "seams")
 COVERED, MAX_RESOLUTION = 0.65, 2**16
 # Triangles of a part from which several threads are faster than one.
 PARALLEL = 20_000
-# Newton steps of the exact metric, which only has to be a start: most meshes take 10, bad ones 100 and more.
-MAX_STEPS = 25
+# Newton steps of the exact metric: most meshes take 10, bad ones 100 and more.
+MAX_NEWTON_STEPS = 25
 #: The `method` in the settings of a result.
 FREE = "free seams"
 
@@ -84,8 +83,8 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         prepared, mirror = source.prepared(shared), None
         if o.stack == "mirrored":
             mirror, prepared = half_of(prepared, source, shared)
-    relax, quick = RelaxSpec("off", 0.0), partial(find_metric, steps=MAX_STEPS)
-    method = Method(relax, shared.charts == "atlas", None, Stopwatch(), Surface.of, quick, False)
+    relax, separates = RelaxSpec("off", 0.0), shared.charts == "atlas"
+    method = Method(relax, separates, None, Stopwatch(), Surface.of, quick_metric, untangles=False)
     parts = [along_sharp_edges(part) for part in prepared.parts]
     found = dict[int, Candidate]()
     areas, sizes = np.array([(double_areas(part.lengths).sum(), len(part.faces)) for part in parts]).T
@@ -142,6 +141,14 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     return result if mirror is None else both_halves(result, mirror, prepared)
 
 
+def quick_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> FlatMetric:
+    """Return the exact metric if few steps find it, else the linear one: a layout with free seams starts from it."""
+    try:
+        return find_metric(surface, solution, spec, MAX_NEWTON_STEPS)
+    except ConvergenceError:
+        return find_metric(surface, solution, replace(spec, method="linear"))
+
+
 def _groups(chosen: Sequence[int], sizes: FloatArray) -> Iterator[list[int]]:
     """Yield groups of at least two parts with not many triangles."""
     parts = np.array(chosen, dtype=np.int64)
@@ -171,20 +178,20 @@ def _resolution(density: float, side: float, padding: float) -> int:
     return resolution
 
 
-def _notes(o: UnwrapOptions, energies: Sequence[float], found: Distortion) -> Iterator[str]:
-    """Yield a note if the energy of a component is above the bound, or if there is another number of charts."""
-    above, charts = [energy for energy in energies if energy > o.bound], found.charts
+def _notes(o: UnwrapOptions, energies: Sequence[float], measured: Distortion) -> Iterator[str]:
+    """Yield a note if the energy of a component or of all is above the bound, or on another number of charts."""
+    above, charts = [energy for energy in energies if energy > o.bound], measured.charts
     if above:
-        most, reached = o.bound, max(above)
+        name, most, reached = "energy", o.bound, max(above)
         if o.area is not None:
-            most, reached = o.area, ((reached - ISOMETRIC) / ENERGY_PER_AREA) ** 0.5
+            name, most, reached = "area distortion", o.area, ((reached - ISOMETRIC) / ENERGY_PER_AREA) ** 0.5
         yield (
-            f"The {'energy' if o.area is None else 'area distortion'} of {plural(len(above), 'component')} is up to "
-            f"{reached:.6g}, above the {most:.6g} allowed: refine the mesh, or allow more."
+            f"The {name} of {plural(len(above), 'component')} is up to {reached:.6g}, above the {most:.6g} allowed: "
+            "refine the mesh, or allow more."
         )
-    elif o.area is None and found.energy > o.bound:
+    elif o.area is None and measured.energy > (1 + TYPED_TOLERANCE) * o.bound:
         yield (
-            f"The energy is {found.energy:.6g}, above the {o.bound:.6g} allowed, because of triangles that have "
+            f"The energy is {measured.energy:.6g}, above the {o.bound:.6g} allowed, because of triangles that have "
             "nearly no area: remesh there."
         )
     if isinstance(o.charts, int) and charts != o.charts:

@@ -141,11 +141,11 @@ class DenseModel:
     least: FloatArray
     best: BestSets[ConeSet] = field(default_factory=BestSets)
 
-    def fit(self, members: IntArray, near: FloatArray | None = None) -> Fit:
+    def fit(self, members: IntArray, guess: FloatArray | None = None) -> Fit:
         """Return the best curvatures of a set of candidates (s,), for which those of a similar set may be given."""
         gram, slope = self.gram[members[:, None], members], self.slope[members]
         most = np.full(len(members), self.limits.most)
-        fitted = fit_curvatures(gram, slope, self.least[members], most, self.limits.total, near)
+        fitted = fit_curvatures(gram, slope, self.least[members], most, self.limits.total, guess)
         curvatures, _, feasible = fitted
         energy = float(self.constant + (2 * slope + gram @ curvatures) @ curvatures) if feasible else math.inf
         return Fit(*fitted, nonnegative(energy))

@@ -25,7 +25,7 @@ def fit_curvatures(
     least: FloatArray,
     most: FloatArray,
     total: float,
-    near: FloatArray | None = None,
+    guess: FloatArray | None = None,
 ) -> tuple[FloatArray, float, bool]:
     """Return the curvatures k that minimise k gram k / 2 + slope k with bounds and a given sum.
 
@@ -37,7 +37,7 @@ def fit_curvatures(
         slope: (s,) linear term.
         least, most: (s,) bounds, radians.
         total: sum of the curvatures, radians; NaN for none.
-        near: (s,) curvatures that are expected to be at the same bounds, which saves steps; None if unknown.
+        guess: (s,) curvatures that are expected to be at the same bounds, which saves steps; None if unknown.
 
     Returns:
         (s,) the curvatures, the multiplier of the sum, and whether the bounds allow the sum. If they do not, the
@@ -50,8 +50,8 @@ def fit_curvatures(
     feasible = not has_sum or bool(least.sum() - slack <= total <= most.sum() + slack)
     if not feasible:
         least, most = np.full(len(slope), -np.inf), np.full(len(slope), np.inf)
-    near = np.full(len(slope), np.nan) if near is None else near
-    curvatures, multiplier, is_optimal = change_at_once(gram, slope, least, most, total, near)
+    guess = np.full(len(slope), np.nan) if guess is None else guess
+    curvatures, multiplier, is_optimal = change_at_once(gram, slope, least, most, total, guess)
     if not is_optimal:
         curvatures, multiplier = change_one_by_one(gram, slope, least, most, total, curvatures)
     return curvatures, multiplier, feasible
@@ -182,7 +182,7 @@ def best_free(
 
 @compiled
 def change_at_once(
-    gram: FloatArray, slope: FloatArray, least: FloatArray, most: FloatArray, total: float, near: FloatArray
+    gram: FloatArray, slope: FloatArray, least: FloatArray, most: FloatArray, total: float, guess: FloatArray
 ) -> tuple[FloatArray, float, bool]:
     """Return the optimum (s,) and the multiplier, by updating all active bounds at once, and whether this converged.
 
@@ -192,7 +192,7 @@ def change_at_once(
     size = len(slope)
     state, curvatures, gradient = np.zeros(size, np.int64), np.zeros(size), np.empty(size)
     for i in range(size):
-        state[i] = int(near[i] >= most[i]) - int(near[i] <= least[i])
+        state[i] = int(guess[i] >= most[i]) - int(guess[i] <= least[i])
         curvatures[i] = most[i] if state[i] > 0 else least[i]
     for _ in range(MAX_STEPS_AT_ONCE):
         free, best, multiplier = best_free(gram, slope, total, state, curvatures)
