@@ -334,6 +334,7 @@ def test_less_common_options_are_set_by_the_page(visit):
     page.fill("#more-area", "")
     page.keyboard.press("Enter")
     page.select_option("#charts", "atlas")
+    visit.settle()
     page.check("#no-more")
     visit.settle()
     assert "--seams none" in page.text_content("#command")
