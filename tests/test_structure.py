@@ -43,7 +43,7 @@ CEILINGS = {
     "apps.transfer": 300,
     "apps.brains": 259,
     "apps.pyvista": 26,
-    "apps.unwrap": 1387,
+    "apps.unwrap": 1388,
     "apps.view": 1545,
     "atlas": 1355,
     "base": 282,

@@ -45,19 +45,20 @@ def test_the_search_goes_on_where_the_first_candidates_have_the_same_cones(monke
     assert unwrap(vertices * [1, 1, 0.25], faces, max_energy=4.00243).distortion.energy <= 4.00243
 
 
-def test_the_exact_metric_need_not_converge(monkeypatch):
-    exact = unwrap(*shapes.sphere(3)).distortion.seam_length
+@pytest.mark.parametrize("shape", [shapes.sphere(3), shapes.genus(2)], ids=["one chart", "several charts"])
+def test_the_exact_metric_need_not_converge(shape, monkeypatch):
+    exact = unwrap(*shape).distortion.seam_length
 
     def diverge(*_):
         raise errors.ConvergenceError("the exact metric did not converge")
 
     monkeypatch.setattr(import_module("coneflat.metric.find"), "exact_flat_metric", diverge)
     with pytest.raises(errors.ConvergenceError):
-        coneflat.flatten(*shapes.sphere(3))
-    d = unwrap(*shapes.sphere(3)).distortion
+        coneflat.flatten(*shape)
+    d = unwrap(*shape).distortion
     assert (d.flipped, d.overlapping_pairs) == (0, 0)
     assert d.energy <= 4.1
-    assert d.seam_length == pytest.approx(exact, rel=0.02)
+    assert d.seam_length == pytest.approx(exact, rel=0.05)
 
 
 def test_a_triangle_nearly_without_area_is_named_as_the_reason_for_a_large_energy():

@@ -340,15 +340,18 @@ class CutSearch:
         mesh = self.part.mesh
         cones = cones[np.isin(cones, mesh.edges[seams])]
         spec, cut = self._with_cones(cones), open_along(mesh, seams)
+        chart = label_faces(cut.mesh.faces, len(cut.origin))[1]
         try:
             solution = find_cones(self._surface, spec, self._method.watch)
             metric = self._method.find_metric(self._surface, solution, self.part.metric)
-            layout = lay_out(metric, Cut(cut.mesh, seams))
+            # A linear metric can be laid out in one chart only.
+            is_possible = metric.triangles is not None or not chart.any()
+            layout = lay_out(metric, Cut(cut.mesh, seams)) if is_possible else None
         except (CurvatureError, MetricError):
             return None
-        if not (signed_double_areas(layout.points[layout.corners]) > 0).all():
+        if layout is None or not (signed_double_areas(layout.points[layout.corners]) > 0).all():
             return None
-        return replace(layout, chart=label_faces(cut.mesh.faces, len(cut.origin))[1])
+        return replace(layout, chart=chart)
 
     def _with_cones(self, cones: IntArray) -> ConeSpec:
         """Return the specification of given cones, whose curvatures are found."""

@@ -121,7 +121,6 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
                 one = found[i]
                 found[i] = replace(one, layout=layout) if i in joined else search.shortened(one, layout)
     layouts = with_copies({i: one.layout for i, one in found.items()}, parts, copies)
-    energies = [one.energy for one in found.values()]
     shared = replace(shared, method=FREE)
     result = evaluate(prepared, layouts, shared, watch)
     has_risen = False
@@ -133,7 +132,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         has_risen |= resolution > shared.resolution
         shared = replace(shared, resolution=resolution)
         result = evaluate(prepared, layouts, shared, watch)
-    notes = (*result.notes, *_notes(o, energies, result.distortion))
+    notes = (*result.notes, *_notes(o, [one.energy for one in found.values()], result.distortion))
     own = {name: getattr(o, name) for name in OWN if name != "seams"}
     if o.marked is not o.seams:
         own["seams"] = "none" if o.marked is None else ["none", result.settings["seams"]]
