@@ -240,7 +240,7 @@ class LayoutGroup:
         # Areas are relative to those of each layout, as the threshold for zero area is.
         unit = self._sums(self.areas)[self._of_face]
         before, after = (np.abs(signed_double_areas(p[self.corners])) / 2 for p in (self.points, points))
-        sums = self._sums(before), self._sums(after)
+        old_area, new_area = self._sums(before), self._sums(after)
         old = np.concatenate([one.log_scale for one in self.layouts])
         log_scale = np.where(was_free, vertex_log_scale(mesh, self.areas / unit, after / unit), old)
         found = []
@@ -249,8 +249,8 @@ class LayoutGroup:
             areas = vertex_areas(one.mesh.faces, one.lengths, len(one.mesh.vertices))
             # The energy of angles does not depend on the scale: components keep their areas relative to each other.
             # Untangling may have made a few triangles huge, so the area is then that of the metric.
-            area = (areas * np.exp(2 * old[own])).sum() if one.statistics.untangled_vertices else sums[0][i]
-            factor = 1.0 if one.is_fixed.any() else np.sqrt(area / sums[1][i])
+            area = (areas * np.exp(2 * old[own])).sum() if one.statistics.untangled_vertices else old_area[i]
+            factor = 1.0 if one.is_fixed.any() else np.sqrt(area / new_area[i])
             log_scale[own] += np.log(factor)
             reached = area_distortion(log_scale[own], weighted_areas(areas, self._given_weights[i]))
             found.append(
