@@ -9,8 +9,9 @@ from click.testing import CliRunner
 
 import coneflat
 from coneflat.apps.cli.quads import quads as command
-from coneflat.apps.quads.features import split_all
+from coneflat.apps.quads.features import split_around
 from coneflat.apps.quads.integer_grid import GridSearch
+from coneflat.apps.quads.layout import has_area
 from coneflat.apps.quads.sizes import extended
 from coneflat.errors import GridError, MeshFileError, OptionError
 from coneflat.mesh.connectivity import TriangleMesh
@@ -64,7 +65,7 @@ def test_quads_are_smaller_where_the_surface_bends():
 
 def test_new_vertices_get_the_mean_of_their_neighbours():
     mesh = TriangleMesh(np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0]]), np.array([[0, 1, 2]]))
-    finer = split_all(mesh)
+    finer = split_around(mesh, mesh.faces)
     assert (len(finer.faces), len(finer.vertices)) == (4, 6)
     values = extended(np.array([1.0, 2.0, 6.0]), finer)
     np.testing.assert_allclose(values[:3], [1, 2, 6])
@@ -144,10 +145,10 @@ def test_sizes_hold_between_components(two_balls):
 def test_a_coarse_mesh_without_a_grid_is_refined(monkeypatch):
     search = GridSearch._of_aligned_cones
 
-    def fail_at_first(self, is_finer):
-        if not is_finer:
+    def fail_at_first(self, price_factor):
+        if price_factor == 1:
             raise GridError("none")
-        return search(self, is_finer)
+        return search(self, price_factor)
 
     monkeypatch.setattr(GridSearch, "_of_aligned_cones", fail_at_first)
     vertices, faces = shapes.torus()
@@ -155,3 +156,18 @@ def test_a_coarse_mesh_without_a_grid_is_refined(monkeypatch):
     assert len(grid.faces) >= 4 * len(faces)
     assert not any("Cones are not chosen" in note for note in grid.notes)
     assert coneflat.quads(grid).euler_characteristic == 0
+
+
+def test_triangles_around_flipped_ones_are_split(monkeypatch):
+    vertices, faces = shapes.torus()
+
+    def first_is_flipped(result):
+        found = has_area(result)
+        found[0] &= len(result.faces) > len(faces)
+        return found
+
+    monkeypatch.setattr("coneflat.apps.quads.integer_grid.has_area", first_is_flipped)
+    grid = coneflat.integer_grid(vertices, faces, quads=500)
+    # The neighbours of a triangle become four, and those of the neighbours two or more.
+    assert len(faces) + 3 * 13 <= len(grid.faces) <= len(faces) + 100
+    assert not any("Cones are not chosen" in note for note in grid.notes)

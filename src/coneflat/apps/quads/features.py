@@ -77,10 +77,11 @@ def split_chords(mesh: TriangleMesh, ends: IntArray | None = None) -> tuple[Tria
     return split_edges(mesh, chords)[0], int(chords.sum())
 
 
-def split_all(mesh: TriangleMesh) -> TriangleMesh:
-    """Return a mesh with all edges split at their midpoints."""
+def split_around(mesh: TriangleMesh, vertices: IntArray) -> TriangleMesh:
+    """Return a mesh with the edges of triangles at some vertices split at their midpoints."""
     mesh = without_pillows(mesh)
-    return split_edges(mesh, np.ones(len(mesh.edges), dtype=bool))[0]
+    near = mask_of(len(mesh.vertices), vertices)[mesh.faces].any(axis=1)
+    return split_edges(mesh, mask_of(len(mesh.edges), mesh.halfedge_edges.reshape(-1, 3)[near]))[0]
 
 
 def split_small_components(mesh: TriangleMesh) -> TriangleMesh:

@@ -24,9 +24,9 @@ from ...source import Source
 from .aligned_cones import COARSE, aligned_cones
 from .cross_field import SHARP_ANGLE, sharp_ends
 from .extract import extract_quads
-from .features import edge_indices, split_all, split_chords, split_small_components
+from .features import edge_indices, split_around, split_chords, split_small_components
 from .integer_map import IntegerGrid, joined_grids
-from .layout import GRID_TOLERANCE, GridLayout, aligned
+from .layout import GRID_TOLERANCE, GridLayout, aligned, has_area
 from .lines import grid_with_lines, with_sides
 from .options import DISTORTION, QUADS, QuadOptions
 from .quad_mesh import CoarseGridError
@@ -221,7 +221,7 @@ class GridSearch:
         other = replace(self, options={**given, "distortion": less})
         note = f"With a distortion above {less:.3g}, no grid was found."
         note += " Wanted sizes are not followed." if self.sizes is not None else ""
-        return with_note(other._of_flattening(self._boundary_without_sides), note)
+        return with_note(other._of_flattening(), note)
 
     def _as_given(self) -> IntegerGrid:
         """Return a grid for the options as given."""
@@ -234,17 +234,19 @@ class GridSearch:
         if self.checked.mesh.components[0] > 1:
             return self._of_components()
         what = "the boundary, sharp edges or curvature" + ", nor for wanted sizes" * (self.sizes is not None)
-        for is_finer in (False, True):
+        # Where cones cost more, others are found, for which there may be a grid.
+        for price_factor in (1.0, 4.0):
             try:
-                return self._of_aligned_cones(is_finer)
+                return self._of_aligned_cones(price_factor)
             except NO_GRID as error:
                 if isinstance(error, CoarseGridError) and self.sizes is not None:
                     raise
-                note = f"Cones are not chosen for {what}, because no grid with such cones was found: {error}."
-            # Meshes of more triangles have places enough for cones.
-            if 2 * len(self.checked.mesh.faces) > COARSE:
+                why = error
+            # Others hardly ever help then, and each metric takes long.
+            if isinstance(why, ConvergenceError):
                 break
-        return with_note(self._of_flattening(self._boundary_without_sides), note)
+        note = f"Cones are not chosen for {what}, because no grid with such cones was found: {why}."
+        return with_note(self._of_flattening(), note)
 
     def _of_components(self) -> IntegerGrid:
         """Return the grid of the components, each with a search of its own.
@@ -284,17 +286,18 @@ class GridSearch:
     def _may_align(self) -> bool:
         """Return whether the options leave open which cones a grid has."""
         cones = self.options.get("cones", "auto")
-        if not (isinstance(cones, str) and cones == "auto") or any(n in self.options for n in SPARSE_OPTIONS):
-            return False
-        return self.boundary in ("auto", "straight") or not self.checked.mesh.is_boundary_edge.any()
+        is_auto = isinstance(cones, str) and cones == "auto"
+        is_bounded = self.boundary in ("auto", "straight") or not self.checked.mesh.is_boundary_edge.any()
+        return is_auto and is_bounded and not any(name in self.options for name in SPARSE_OPTIONS)
 
-    def _of_aligned_cones(self, is_finer: bool) -> IntegerGrid:
+    def _of_aligned_cones(self, price_factor: float) -> IntegerGrid:
         """Return a grid of a connected mesh whose cones are chosen for even sizes and its directions.
 
-        is_finer: split all edges, for more places for cones and smaller triangles between them.
+        price_factor: factor of the price of cones; if above 1, coarse meshes are split, for more places for cones.
         """
         checked, options = self.checked, read_options(self.options, QuadOptions)
-        mesh = split_all(checked.mesh) if is_finer else checked.mesh
+        is_split = price_factor > 1 and 6 * len(checked.mesh.faces) < COARSE
+        mesh = split_around(checked.mesh, checked.mesh.faces) if is_split else checked.mesh
         mesh, _ = split_chords(split_small_components(mesh))
         finer, count = split_chords(mesh, sharp_ends(mesh, self._angle))
         # On coarse meshes these are most edges, and their triangles would get thin.
@@ -306,7 +309,7 @@ class GridSearch:
         scales = None if self.scales is None else extended(self.scales, mesh)
         area = float(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum()) / 2
         quads = area / np.ldexp(self.size, checked.exponent) ** 2 if self.size else self.quads
-        price = max(1.0, QUADS_PER_CONE / quads)
+        price = price_factor * max(1.0, QUADS_PER_CONE / quads)
         with self.stages("cones"), limit_threads(options.threads):
             found = aligned_cones(mesh, options.distortion, *bounds, price, self.sharp_angle, scales)
         cones = {vertex: quarters * np.pi / 2 for vertex, quarters in found.items()}
@@ -314,9 +317,13 @@ class GridSearch:
         given |= {**_defaults({"cones": cones}), "cones": cones}
         if mesh.is_boundary_edge.any():
             given["boundary"] = "straight"
-        with self.stages("flatten"):
-            vertices = np.ldexp(mesh.vertices, -checked.exponent)
-            result = flatten(vertices, mesh.faces, **given)
+        for splits in range(3):
+            with self.stages("flatten"):
+                result = flatten(np.ldexp(mesh.vertices, -checked.exponent), mesh.faces, **given)
+            # Large cones that are adjacent flip triangles.
+            if has_area(result).all() or splits == 2:
+                break
+            mesh = split_around(mesh, mesh.faces[~has_area(result)])
         grid = self._with_notes(replace(result, notes=(*checked.notes, *result.notes)), True, True)
         return grid if self.scales is None else with_note(grid, note_on_sizes(grid, self.scales))
 
@@ -324,16 +331,12 @@ class GridSearch:
         """Return a grid with the fewest cones."""
         may_be_straight = self.boundary == "auto" and isinstance(self.options.get("cones", "auto"), str)
         if not (may_be_straight and self.checked.mesh.is_boundary_edge.any()):
-            return self._of_flattening(self._boundary_without_sides)
+            return self._of_flattening()
         try:
             return self._of_flattening("straight", all_sides=True)
         except (CurvatureError, MetricError) as error:
             why = f"The boundary cuts squares, because no grid with the boundary on grid lines was found: {error}."
         return with_note(self._of_flattening("free"), why)
-
-    @property
-    def _boundary_without_sides(self) -> Any:
-        return "free" if self.boundary == "auto" else self.boundary
 
     @property
     def checked(self) -> CheckedMesh:
@@ -351,13 +354,16 @@ class GridSearch:
         assert isinstance(self.mesh, Source)
         return self.mesh
 
-    def _of_flattening(self, boundary: Any, all_sides: bool = False) -> IntegerGrid:
-        """Return the grid of a flattening with a boundary; `all_sides` requires all straight sides on grid lines.
+    def _of_flattening(self, boundary: str = "", all_sides: bool = False) -> IntegerGrid:
+        """Return the grid of a flattening with a given boundary, or else the one of the options, by default free.
+
+        all_sides: require all straight sides on grid lines.
 
         Raises:
             GridError: there is no grid, or required sides are not on grid lines.
         """
-        options = {**self.options, "boundary": boundary}
+        own = "free" if self.boundary == "auto" else self.boundary
+        options = {**self.options, "boundary": boundary or own}
         self.stages.done = 0.0
         with self.stages("flatten"):
             result = flatten_source(self.source, read_options({**_defaults(options), **options}))

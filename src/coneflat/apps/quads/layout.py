@@ -151,15 +151,11 @@ def aligned(
         raise GridError(f"the largest coordinate is {largest:.3g}, out of range for quads: scale the mesh")
     own = edge_lengths(mesh.vertices, mesh.faces) if result.lengths is None else result.lengths
     lengths, _ = mollify(own)
-    flat, sides = signed_double_areas(result.corner_uv), np.abs(sides_between(result.corner_uv))
-    has_area = flat > GRID_TOLERANCE**2 * sides.max(axis=1) ** 2
-    if not has_area.all():
-        raise GridError(
-            f"{int((~has_area).sum())} of {len(flat):,} triangles of the layout are flipped or have no area"
-        )
+    flat, bad = signed_double_areas(result.corner_uv), int((~has_area(result)).sum())
+    if bad:
+        raise GridError(f"{bad} of {len(flat):,} triangles of the layout are flipped or have no area")
     area = float(double_areas(lengths).sum()) / 2
-    if size is None:
-        size = float(np.sqrt(area / quads))
+    size = size or float(np.sqrt(area / quads))
     scale = np.sqrt(area / size**2 / (flat.sum() / 2))
     points = scale * as_complex(result.uv)
     cones = np.setdiff1d(result.cones, np.flatnonzero(mesh.is_boundary_vertex))
@@ -169,6 +165,12 @@ def aligned(
     angles = np.where(is_straight, angles, _preferred_angles(layout, component, sharp_angle))
     layout = replace(layout, points=layout.points * np.exp(-1j * angles)[component])
     return at_origin(replace(layout, sides=find_sides(layout, is_straight[component])), component)
+
+
+def has_area(result: Flattening) -> BoolArray:
+    """Return (m,) whether triangles of a flattening have an area and are not flipped."""
+    flat, sides = signed_double_areas(result.corner_uv), np.abs(sides_between(result.corner_uv))
+    return flat > GRID_TOLERANCE**2 * sides.max(axis=1) ** 2
 
 
 def joined_charts(layout: GridLayout) -> tuple[GridLayout, IntArray]:

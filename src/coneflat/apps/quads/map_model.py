@@ -26,8 +26,6 @@ from .features import vertex_graph
 
 # Numbers of regions over which the log scale and the directions are summed.
 REGIONS, SAMPLES = 500, 250
-# Number of right-hand sides that are solved at once.
-BLOCK = 64
 
 
 class MapModel:
@@ -182,8 +180,8 @@ class _Poisson:
     def functional(self, rows: csr_matrix, places: IntArray) -> FloatArray:
         """Return (k, p) the values of linear functionals (k, n) of the log scale for a quarter turn at each place."""
         found = np.empty((rows.shape[0], len(places)))
-        for start in range(0, rows.shape[0], BLOCK):
-            block = slice(start, start + BLOCK)
+        for start in range(0, rows.shape[0], 64):  # not all at once, which would take much memory
+            block = slice(start, start + 64)
             found[block] = np.pi / 2 * self.solve(rows[block].toarray().T)[places].T
         return found
 

@@ -94,8 +94,7 @@ def quads(
         found = untangled(found) if smooth else found
         found = found if small is None else small.completed(found)
     notes = (*(() if small is None else small.notes), *grid.notes, *found.notes, *_notes(found, small))
-    seconds = {**grid.seconds, **stages.seconds}
-    return replace(found, notes=notes, seconds=seconds, grid=grid, source=source)
+    return replace(found, notes=notes, seconds={**grid.seconds, **stages.seconds}, grid=grid, source=source)
 
 
 def _notes(found: QuadMesh, small: SimplerMesh | None) -> Iterator[str]:

@@ -217,8 +217,7 @@ def find_rounding(layout: GridLayout) -> Rounding:
     solutions = integer_solutions(transitions.equations, zeros)
     assert solutions is not None
     basis = solutions.basis
-    fitted = np.linalg.lstsq(basis.astype(np.float64), transitions.values, rcond=None)[0]
-    start = fitted.astype(np.float64)
+    start = np.linalg.lstsq(basis.astype(np.float64), transitions.values, rcond=None)[0].astype(np.float64)
     stiffness = Stiffness(layout, transitions)
     metric = stiffness.gram(basis)
     # The least energy, to which sides that are not straight in the layout contribute.

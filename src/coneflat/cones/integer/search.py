@@ -23,8 +23,9 @@ from ..sparse.search import COARSE_MODEL_ERROR, ConeSearch
 from .lattice import IndexedCones, Lattice
 from .moves import Quanta
 
-# Number of vertices around each cone to which it may move, and largest number of moves of one or two cones.
-MAX_NEIGHBOURS, MAX_MOVES = 60, 30
+# Number of vertices around each cone to which it may move, fewer where there are many cones, since pairs of moves are
+# compared; and largest number of moves of one or two cones.
+MAX_NEIGHBOURS, MAX_COMPARED, MAX_MOVES = 60, 2_000, 30
 # Largest number of comparisons of the linear model with the exact metric.
 MAX_COMPARISONS = 4
 # Error of the rotations, radians, at which moving cones stops.
@@ -128,7 +129,7 @@ def _moves(search: ConeSearch, places: IntArray) -> tuple[IntArray, IntArray]:
     """Return the cone and the target of all moves to usable vertices nearby; required cones are not moved."""
     cones, targets = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     for i in range(len(search.coarse.fixed), len(places)):
-        near = search.exact.near(int(places[i]), MAX_NEIGHBOURS)
+        near = search.exact.near(int(places[i]), min(MAX_NEIGHBOURS, MAX_COMPARED // len(places)))
         near = near[~np.isin(near, places)]
         cones.append(np.full(len(near), i))
         targets.append(near)
