@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import cycle
+
 import numpy as np
 import pytest
 import shapes
@@ -82,6 +84,17 @@ def test_handles(shape):
     assert exact.distortion.qc_mean < plain.distortion.qc_mean + 0.5
     assert len(plain.rotations.handles) == len(exact.rotations.handles)
     assert any("handles were off" in note for note in exact.notes)
+
+
+def test_corrections_end_at_rounding(monkeypatch):
+    """Along many loops, rounding is larger than the tolerance."""
+    noise = cycle([5e-11, -5e-11])
+    monkeypatch.setattr(
+        "coneflat.metric.find.difference_from_multiple",
+        lambda angles, quantum: difference_from_multiple(angles, quantum) + next(noise),
+    )
+    exact = flatten(*shapes.genus(2), quantise=QUARTER, correct_handles=True)
+    assert exact.rotations.worst < 1e-8
 
 
 def test_measured_rotations_of_a_cut_square():

@@ -268,7 +268,8 @@ def search_coarse(search: ConeSearch, lattice: Lattice, goal: float, most: int) 
         stalled = 0 if best.energy(size) < least * (1 - MIN_PROMISED_GAIN) else stalled + 1
         least = min(least, best.energy(size))
     for size in reversed(best.sizes):
-        if best.energy(size) > goal * MAX_ENERGY_RATIO and size < most:
+        # The fewest cones do not matter where none meet the goal.
+        if (best.energy(size) > goal * MAX_ENERGY_RATIO or least > goal * COARSE_MODEL_ERROR) and size < most:
             break
         _offer(lattice, lattice.shrunk(best[size]), most)
 
