@@ -286,9 +286,9 @@ class GridSearch:
     def _may_align(self) -> bool:
         """Return whether the options leave open which cones a grid has."""
         cones = self.options.get("cones", "auto")
-        is_auto = isinstance(cones, str) and cones == "auto"
-        is_bounded = self.boundary in ("auto", "straight") or not self.checked.mesh.is_boundary_edge.any()
-        return is_auto and is_bounded and not any(name in self.options for name in SPARSE_OPTIONS)
+        if not (isinstance(cones, str) and cones == "auto") or any(n in self.options for n in SPARSE_OPTIONS):
+            return False
+        return self.boundary in ("auto", "straight") or not self.checked.mesh.is_boundary_edge.any()
 
     def _of_aligned_cones(self, price_factor: float) -> IntegerGrid:
         """Return a grid of a connected mesh whose cones are chosen for even sizes and its directions.
@@ -321,9 +321,9 @@ class GridSearch:
             with self.stages("flatten"):
                 result = flatten(np.ldexp(mesh.vertices, -checked.exponent), mesh.faces, **given)
             # Large cones that are adjacent flip triangles.
-            if has_area(result).all() or splits == 2:
+            if splits == 2 or (is_flat := has_area(result)).all():
                 break
-            mesh = split_around(mesh, mesh.faces[~has_area(result)])
+            mesh = split_around(mesh, mesh.faces[~is_flat])
         grid = self._with_notes(replace(result, notes=(*checked.notes, *result.notes)), True, True)
         return grid if self.scales is None else with_note(grid, note_on_sizes(grid, self.scales))
 
@@ -354,7 +354,7 @@ class GridSearch:
         assert isinstance(self.mesh, Source)
         return self.mesh
 
-    def _of_flattening(self, boundary: str = "", all_sides: bool = False) -> IntegerGrid:
+    def _of_flattening(self, boundary: str | None = None, all_sides: bool = False) -> IntegerGrid:
         """Return the grid of a flattening with a given boundary, or else the one of the options, by default free.
 
         all_sides: require all straight sides on grid lines.

@@ -129,10 +129,9 @@ def _moves(search: ConeSearch, places: IntArray) -> tuple[IntArray, IntArray]:
     """Return the cone and the target of all moves to usable vertices nearby; required cones are not moved."""
     cones, targets = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     for i in range(len(search.coarse.fixed), len(places)):
-        near = search.exact.near(int(places[i]), min(MAX_NEIGHBOURS, MAX_COMPARED // len(places)))
-        near = near[~np.isin(near, places)]
-        cones.append(np.full(len(near), i))
-        targets.append(near)
+        near = search.exact.near(int(places[i]), min(MAX_NEIGHBOURS, 1 + MAX_COMPARED // len(places)))
+        targets.append(near[~np.isin(near, places)])
+        cones.append(np.full(len(targets[-1]), i))
     return np.concatenate(cones), np.concatenate(targets)
 
 
@@ -267,9 +266,10 @@ def search_coarse(search: ConeSearch, lattice: Lattice, goal: float, most: int) 
         beyond += best.energy(size) <= goal
         stalled = 0 if best.energy(size) < least * (1 - MIN_PROMISED_GAIN) else stalled + 1
         least = min(least, best.energy(size))
+    # The fewest cones do not matter where none meet the goal.
+    ratio = MAX_ENERGY_RATIO if best.fewest(goal).energy <= goal * COARSE_MODEL_ERROR else 0.0
     for size in reversed(best.sizes):
-        # The fewest cones do not matter where none meet the goal.
-        if (best.energy(size) > goal * MAX_ENERGY_RATIO or least > goal * COARSE_MODEL_ERROR) and size < most:
+        if best.energy(size) > goal * ratio and size < most:
             break
         _offer(lattice, lattice.shrunk(best[size]), most)
 
