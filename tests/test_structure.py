@@ -43,7 +43,7 @@ CEILINGS = {
     "apps.transfer": 300,
     "apps.brains": 259,
     "apps.pyvista": 26,
-    "apps.unwrap": 1388,
+    "apps.unwrap": 1386,
     "apps.view": 1545,
     "atlas": 1355,
     "base": 282,
@@ -54,11 +54,11 @@ CEILINGS = {
     "flattener": 35,
     "geometry": 1542,
     "io": 2823,
-    "layout": 1903,
+    "layout": 1901,
     "linalg": 453,
     "measure": 805,
     "mesh": 540,
-    "metric": 918,
+    "metric": 915,
     "options": 519,
     "result": 96,
     "sample": 5,
@@ -73,7 +73,7 @@ OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 FRONT = ("apps.ahead", "apps.blender", "apps.cli", "apps.studio")
 SHARED = ("apps.quads.nearest",)
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_821, 232, 24_499
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_816, 232, 24_494
 CONSTANTS, KERNELS, NAMES, LEVELS = 293, 84, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

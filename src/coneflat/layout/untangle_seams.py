@@ -79,7 +79,7 @@ def untangle_seams(layout: Layout, spec: ConeSpec, stretch: float, quantum: floa
 
 
 def untangled_disk(
-    disk: TriangleMesh, points: FloatArray, lengths: FloatArray, fixed: BoolArray, rings: int = 2 * MAX_RINGS
+    disk: TriangleMesh, points: FloatArray, lengths: FloatArray, fixed: BoolArray, may_wind: bool = False
 ) -> tuple[FloatArray, BoolArray, bool]:
     """Return points of a disk whose inverted triangles are positively oriented, except those that cannot be untangled.
 
@@ -88,7 +88,8 @@ def untangled_disk(
         points: (c, 2) its points.
         lengths: (m, 3) side lengths of its triangles on the surface.
         fixed: (c,) points that do not move.
-        rings: see `untangle`.
+        may_wind: whether triangles may wind around inner vertices several times where nothing else untangles them; the
+            disk is not embedded anew then.
 
     Returns:
         (c, 2) points, (c,) those that moved, and whether the whole disk was embedded anew.
@@ -97,18 +98,17 @@ def untangled_disk(
     border = disk.edges[disk.is_boundary_edge]
     is_near = fixed.copy()
     is_near[border[fixed[border].any(axis=1)]] = True
-    sides = sides_between(points[disk.faces])
-    untangled = untangle(
-        FlatTriangles(sides.ravel(), np.ones(sides.size, dtype=np.complex128), halfedge_twins(disk)),
-        disk.faces,
-        np.where(disk.is_boundary_vertex, np.nan, 2 * np.pi),
-        disk.is_boundary_vertex,
-        (is_near, fixed),
-        rest_sides(lengths),
-        rings,
-    )
+    sides, twins = sides_between(points[disk.faces]), halfedge_twins(disk)
+    flat = FlatTriangles(sides.ravel(), np.ones(sides.size, dtype=np.complex128), twins)
+    given = disk.is_boundary_vertex, (is_near, fixed), rest_sides(lengths)
+    angles = np.where(disk.is_boundary_vertex, np.nan, 2 * np.pi)
+    # More rings rarely help if triangles may wind, and take half of the time on small CAD parts.
+    rings = MAX_RINGS // 2 if may_wind else 2 * MAX_RINGS
+    untangled = untangle(flat, disk.faces, angles, *given, rings)
+    if may_wind:
+        untangled = untangle(untangled.flat, disk.faces, np.full_like(angles, np.nan), *given, rings)
     found, moved = unfold(untangled.flat, disk.faces), mask_of(len(points), untangled.moved)
-    if len(untangled.left) and not fixed.any() and disk.boundary_loops[0] == 1:
+    if len(untangled.left) and not (may_wind or fixed.any()) and disk.boundary_loops[0] == 1:
         areas = np.abs(signed_double_areas(found[disk.faces])) / 2
         embedded = embedded_disks(disk, np.zeros(len(areas), dtype=np.int64), areas)
         if not find_degenerate(sides_between(embedded[disk.faces])).any():

@@ -252,13 +252,6 @@ def sum_angles(
 
 
 @compiled
-def _has_no_weights(cots: FloatArray, h: int) -> bool:
-    """Return whether all cotangents of the triangle of a half-edge are 0, as its triangle inequality is broken."""
-    base = h - h % 3
-    return bool(cots[base] == 0.0 and cots[base + 1] == 0.0 and cots[base + 2] == 0.0)
-
-
-@compiled
 def find_suspects(twin: IntArray, cots: FloatArray, found: IntArray) -> int:
     """Write to `found` one half-edge of each edge that may not be Delaunay; return their number.
 
@@ -267,12 +260,14 @@ def find_suspects(twin: IntArray, cots: FloatArray, found: IntArray) -> int:
     count = 0
     for h in range(len(twin)):
         t = twin[h]
+        if t < h:
+            continue
         # The margin is the rounding error of the cotangents; the test that decides on a flip has its own margin.
-        if t > h and (
-            cots[h] + cots[t] < -1e-13 * (abs(cots[h]) + abs(cots[t]))
-            or (cots[h] == 0.0 and _has_no_weights(cots, h))
-            or (cots[t] == 0.0 and _has_no_weights(cots, t))
-        ):
+        is_suspect = cots[h] + cots[t] < -1e-13 * (abs(cots[h]) + abs(cots[t]))
+        for base in (h - h % 3, t - t % 3):
+            # All cotangents of a triangle whose inequality is broken are 0.
+            is_suspect |= cots[base] == 0.0 and cots[base + 1] == 0.0 and cots[base + 2] == 0.0
+        if is_suspect:
             found[count] = h
             count += 1
     return count

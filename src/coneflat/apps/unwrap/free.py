@@ -15,38 +15,39 @@ from ...geometry import (
     double_areas,
     find_overlaps,
     layout_curvature,
+    sides_between,
+    signed_angles,
     signed_double_areas,
     vertex_log_scale,
 )
 from ...layout import StretchEnergy, embedded_disks, relax, untangled_disk
 from ...mesh import label_faces, open_along
+from ...seams import find_seams
 from ...stages import Layout, SeamSpec, SolveStatistics
 from .options import ISOMETRIC
-
-# Number of rings of triangles around flipped ones whose vertices may move. More rings rarely help and take half of the
-# time on small CAD parts. Where untangling succeeds, relaxing takes 10 steps instead of the 60 from an embedding (a
-# noisy surface of 52,000 triangles, 6 of which were flipped).
-FLIPPED_RINGS = 2
 
 
 def freed(layout: Layout, free: BoolArray | None = None, tolerance: float = 1e-3) -> tuple[Layout, float]:
     """Return a layout with the least symmetric Dirichlet energy, and this energy, averaged by area.
 
-    The sides of seams move independently, and no triangle is flipped. If the given layout has flipped triangles that
-    cannot be untangled in place, the minimisation starts from an embedding of W. T. Tutte, "How to draw a
-    graph", 1963.
+    The sides of seams move independently, and no triangle is flipped. Flipped triangles of the given layout are
+    untangled, which may add seams to vertices around which triangles wind more than once. If this fails, the
+    minimisation starts from an embedding of W. T. Tutte, "How to draw a graph", 1963.
 
     Args:
-        layout: a layout in any number of charts; in one chart if triangles are flipped.
-        free: (c,) the points that move; None for all.
+        layout: a layout in any number of charts.
+        free: (c,) the points that move; None for all, as if triangles are flipped.
     """
     mesh, areas = layout.mesh, double_areas(layout.lengths) / 2
     disk = layout.disk or TriangleMesh(np.zeros((len(layout.points), 3)), layout.corners)
-    points, is_bad = layout.points, ~(signed_double_areas(layout.points[layout.corners]) > 0)
+    is_bad = ~(signed_double_areas(layout.points[layout.corners]) > 0)
     if 0 < is_bad.sum() < len(is_bad):
-        points, *_ = untangled_disk(
-            disk, points, layout.lengths, np.zeros(len(points), dtype=bool), FLIPPED_RINGS
-        )
+        fixed = np.zeros(len(layout.points), dtype=bool)
+        points, *_ = untangled_disk(disk, layout.points, layout.lengths, fixed, may_wind=True)
+        layout = unwound(replace(layout, points=points, disk=disk))
+        assert layout.disk is not None
+        disk = layout.disk
+    points = layout.points
     if not (signed_double_areas(points[layout.corners]) > 0).all():
         points = embedded_disks(disk, np.zeros(len(layout.corners), dtype=np.int64), areas)
     energy, sides = StretchEnergy(1.0), layout.lengths
@@ -59,6 +60,20 @@ def freed(layout: Layout, free: BoolArray | None = None, tolerance: float = 1e-3
     points = found.points * np.sqrt(areas.sum() / start)
     at_vertices = _measured(mesh, areas, points[layout.corners])
     return replace(layout, points=points, **at_vertices), ISOMETRIC * found.energy
+
+
+def unwound(layout: Layout) -> Layout:
+    """Return a layout with seams to the inner vertices of its disk around which triangles wind more than once."""
+    mesh, disk = layout.mesh, layout.disk
+    assert disk is not None
+    angles = signed_angles(sides_between(layout.points[disk.faces]))
+    sums = np.bincount(disk.faces.ravel(), angles.ravel())
+    winding = np.flatnonzero((np.abs(sums - 2 * np.pi) > np.pi) & ~disk.is_boundary_vertex)
+    if not len(winding):
+        return layout
+    sides = disk.edge_halfedges[:, 0]
+    paths = find_seams(disk, winding, layout.lengths.ravel()[sides])
+    return recut(layout, np.union1d(seam_edges(layout), mesh.halfedge_edges[sides[paths]]))
 
 
 def laid_out(
@@ -102,17 +117,18 @@ def _measured(mesh: TriangleMesh, areas: FloatArray, places: FloatArray) -> dict
 
 
 def recut(layout: Layout, seams: IntArray) -> Layout:
-    """Return a layout that is cut along given edges (k,), all its present seams among them."""
+    """Return a layout that is cut along given edges (k,); the two sides of seams that are closed meet in the middle."""
     cut = open_along(layout.mesh, seams)
-    points = np.empty((len(cut.origin), 2))
-    points[cut.mesh.faces] = layout.points[layout.corners]
+    corners, places = cut.mesh.faces, layout.points[layout.corners].reshape(-1, 2)
+    sums = np.stack([np.bincount(corners.ravel(), column) for column in places.T], axis=1)
+    points = sums / np.bincount(corners.ravel())[:, None]
     return replace(
         layout,
         points=points,
-        corners=cut.mesh.faces,
+        corners=corners,
         disk=cut.mesh,
         seams=layout.mesh.edges[seams],
-        chart=label_faces(cut.mesh.faces, len(points))[1],
+        chart=label_faces(corners, len(points))[1],
     )
 
 

@@ -15,16 +15,14 @@ from functools import cached_property
 import numpy as np
 
 from ...base import BoolArray, FloatArray, IntArray, mask_of
-from ...cones import close_search, find_cones
-from ...errors import CurvatureError, MetricError
+from ...cones import close_search
 from ...flatten import Method, lay_out_once
 from ...geometry import coarse_mesh, double_areas, edge_lengths, find_overlaps, mollify, signed_double_areas
-from ...layout import lay_out
-from ...mesh import label_faces, open_along
+from ...mesh import open_along
 from ...seams import seam_costs, without_loose_ends
 from ...source import Part
-from ...stages import ConeSpec, Cut, Layout, Surface, VertexCurvatures
-from .free import freed, seam_edges, separate_charts, side_by_side, triangle_energies
+from ...stages import ConeSpec, Layout, Surface, VertexCurvatures
+from .free import freed, recut, seam_edges, separate_charts, side_by_side, triangle_energies
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .tips import RINGS, find_tips, moved_tips, moves_for
 
@@ -311,11 +309,9 @@ class CutSearch:
                 # The tips move by whole edges.
                 slack += np.sign(slack) * allowed / 4
                 continue
-            layout = self._with_tips(*moved)
-            if layout is None:
-                break
             known.append(moved[0])
-            one = self._candidate(layout, start.distortion)
+            recut_layout = replace(recut(start.layout, moved[0]), cones=moved[1])
+            one = self._candidate(recut_layout, start.distortion)
             excess = one.energy - self.max_energy
             tried.append((slack, excess))
             if one.energy <= self._near:
@@ -334,24 +330,6 @@ class CutSearch:
                 wished = slack - excess * (slack - slack_before) / change if change else np.inf
                 slack *= float(np.clip(wished / slack, 1.25, 3)) if wished * slack > 0 else 3.0
         return found
-
-    def _with_tips(self, seams: IntArray, cones: IntArray) -> Layout | None:
-        """Return the layout with given cones that is cut along given edges; None if there is none."""
-        mesh = self.part.mesh
-        cones = cones[np.isin(cones, mesh.edges[seams])]
-        spec, cut = self._with_cones(cones), open_along(mesh, seams)
-        chart = label_faces(cut.mesh.faces, len(cut.origin))[1]
-        try:
-            solution = find_cones(self._surface, spec, self._method.watch)
-            metric = self._method.find_metric(self._surface, solution, self.part.metric)
-            # A linear metric can be laid out in one chart only.
-            is_possible = metric.triangles is not None or not chart.any()
-            layout = lay_out(metric, Cut(cut.mesh, seams)) if is_possible else None
-        except (CurvatureError, MetricError):
-            return None
-        if layout is None or not (signed_double_areas(layout.points[layout.corners]) > 0).all():
-            return None
-        return replace(layout, chart=chart)
 
     def _with_cones(self, cones: IntArray) -> ConeSpec:
         """Return the specification of given cones, whose curvatures are found."""

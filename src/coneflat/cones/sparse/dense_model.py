@@ -272,7 +272,7 @@ class DenseModel:
                 found = self.fit(tried, fitted.curvatures)
                 if found.energy < fitted.energy * (1 - MIN_RELATIVE_GAIN):
                     members, fitted, improved = tried, found, True
-                    break
+                    change[which == which[place]] = np.inf
         return ConeSet(fitted.energy, members)
 
     def climb(self, bound: float, most: int, start: int | None = None) -> None:

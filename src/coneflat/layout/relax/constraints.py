@@ -40,8 +40,6 @@ class PointConstraints:
         pinned: (p,) indices of pinned points.
         places: (p, 2) final positions of the pinned points; None for their current positions.
         lines: points on lines; None for none.
-        held_seams: (k, 2) edges, as vertices, of seams whose two sides keep the translation between them in addition to
-            the rotation.
         tied: (q,) half-edges of seams with prescribed translations.
         translations: (q, 2) the final translation of each tied half-edge: a point in the frame of its own triangle is
             the corresponding point in the frame of the opposite triangle, rotated by the seam's rotation, plus this.
@@ -51,7 +49,6 @@ class PointConstraints:
     pinned: ArrayLike = ()
     places: ArrayLike | None = None
     lines: Lines | None = None
-    held_seams: ArrayLike = ()
     tied: ArrayLike = ()
     translations: ArrayLike = ()
     stride: float = 1.0
@@ -67,7 +64,6 @@ class CheckedConstraints:
     line: IntArray
     directions: FloatArray
     offsets: FloatArray
-    held_seams: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     tied: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     translations: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
 
@@ -86,7 +82,6 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
         raise OptionError(
             f"places must have shape {(len(pinned), 2)}, one for each pinned point, got {places.shape}"
         )
-    held = np.asarray(constraints.held_seams, dtype=np.int64).reshape(-1, 2)
     tied = np.asarray(constraints.tied, dtype=np.int64).ravel()
     translations = _floats(constraints.translations, "translations").reshape(-1, 2)
     if len(tied) != len(translations):
@@ -94,7 +89,7 @@ def check_constraints(constraints: PointConstraints, points: FloatArray) -> Chec
             f"{plural(len(tied), 'half-edge')} tied, but {plural(len(translations), 'translation')} given for them"
         )
     on_line, line, directions, offsets = _checked_lines(constraints.lines, points)
-    return CheckedConstraints(pinned, places, on_line, line, directions, offsets, held, tied, translations)
+    return CheckedConstraints(pinned, places, on_line, line, directions, offsets, tied, translations)
 
 
 def _checked_lines(

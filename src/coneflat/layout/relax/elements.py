@@ -16,7 +16,7 @@ from scipy.sparse import csc_matrix
 from ...base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
 from ...base.jit import compiled
 from ...geometry.planar import map_factors
-from ...mesh.connectivity import label_components, sort_by_counting
+from ...mesh.connectivity import label_components, sort_by_counting, sort_keys
 from .energies import Energy
 from .motions import Motions
 
@@ -105,7 +105,7 @@ class Elements:
     def of_parts(self, chosen: BoolArray) -> tuple[Elements, IntArray]:
         """Return the elements of chosen parts (parts,), renumbered, and (k',) the indices here of their unknowns."""
         some, is_kept = chosen[self.part], chosen[self.unknown_part]
-        unknowns, renamed = np.flatnonzero(is_kept), np.cumsum(chosen) - 1
+        unknowns = np.flatnonzero(is_kept)
         number = np.append(np.cumsum(is_kept) - 1, len(unknowns))
         found, sizes = copy(self), np.diff(self._start)
         entries = some.repeat(sizes)
@@ -114,47 +114,25 @@ class Elements:
         found._start = np.concatenate([[0], np.cumsum(sizes[some])])
         found._unknown = number[self._unknown[entries]]
         found._alpha, found._beta = self._alpha[entries], self._beta[entries]
-        found.parts, found.part = int(chosen.sum()), renamed[self.part[some]]
-        found.unknown_part = renamed[self.unknown_part[unknowns]]
-        # Columns of the matrix have entries of their own part only.
-        lengths = np.diff(self._indptr)
-        inside = is_kept.repeat(lengths)
-        slots = self._slots[some.repeat(sizes**2)]
-        found._squares = np.concatenate([[0], np.cumsum(sizes[some] ** 2)])
-        found._slots = np.where(slots >= 0, (np.cumsum(inside) - 1)[slots], -1)
-        found._set_matrix(number[self._indices[inside]], np.append(0, np.cumsum(lengths[is_kept])))
+        found._find_pattern()
         return found, unknowns
 
     def _find_pattern(self) -> None:
         k, sizes = self.count, np.diff(self._start)
-        # The ordered pairs of the unknowns of each element, row by row.
-        lengths = sizes.repeat(sizes)
-        run = np.cumsum(lengths) - lengths - self._start[:-1].repeat(sizes)
-        rows = self._unknown.repeat(lengths)
-        columns = self._unknown[np.arange(len(rows)) - run.repeat(lengths)]
         self._squares = np.concatenate([[0], np.cumsum(sizes**2)])
-        # The offset, which has the index k, is not solved for.
-        inside = np.flatnonzero((rows < k) & (columns < k))
-        order = inside[sort_by_counting(rows[inside], k)]
-        order = order[sort_by_counting(columns[order], k)]
-        rows, columns = rows[order], columns[order]
-        is_first = np.append(True, (np.diff(rows) != 0) | (np.diff(columns) != 0))[: len(order)]
         self._slots = np.full(self._squares[-1], -1)
-        self._slots[order] = np.cumsum(is_first) - 1
-        starts = np.searchsorted(columns[is_first], np.arange(k + 1))
-        self._set_matrix(rows[is_first], starts)
+        order = sort_by_counting(self._unknown, k + 1)
+        first = np.searchsorted(self._unknown[order], np.arange(k + 2))
+        rows, starts = find_entries(self._start, self._unknown, self._squares, first, order, self._slots)
+        # One matrix for all steps, so that its pattern is analysed once.
+        self._matrix = csc_matrix((np.zeros(len(rows)), rows, starts), shape=(k, k))
+        self._indices, self._indptr = self._matrix.indices, self._matrix.indptr
+        self._diagonal = np.flatnonzero(self._indices == np.arange(k).repeat(np.diff(self._indptr)))
         self.parts, self.unknown_part = label_components(
             k, self._indices.astype(np.int64), np.arange(k).repeat(np.diff(self._indptr))
         )
         first = self._unknown[self._start[:-1]]
         self.part = np.append(self.unknown_part, 0)[first]  # any part for the offset: all share a step
-
-    def _set_matrix(self, rows: IntArray, starts: IntArray) -> None:
-        # One matrix for all steps, so that its pattern is analysed once.
-        k = self.count
-        self._matrix = csc_matrix((np.zeros(len(rows)), rows, starts), shape=(k, k))
-        self._indices, self._indptr = self._matrix.indices, self._matrix.indptr
-        self._diagonal = np.flatnonzero(self._indices == np.arange(k).repeat(np.diff(self._indptr)))
 
     def maps(self, points: ComplexArray) -> Maps:
         """Return the maps at given positions (u,) of all points."""
@@ -255,6 +233,41 @@ def _polar(
 
 
 @compiled
+def find_entries(
+    start: IntArray, unknown: IntArray, squares: IntArray, first: IntArray, order: IntArray, slots: IntArray
+) -> tuple[IntArray, IntArray]:
+    """Return the rows of the entries of the Hessian by columns, and (k + 1,) the start of each column.
+
+    Args:
+        start, unknown, squares: see `add_elements`.
+        first, order: (k + 2,) the start of each unknown in `order`, which sorts `unknown`; the last one is the offset.
+        slots: the entry of each pair on return; pairs with the offset are left out.
+    """
+    count, end = len(first) - 2, 0
+    owner = np.arange(len(start) - 1).repeat(np.diff(start))
+    rows, starts = np.empty(len(slots), dtype=np.int64), np.zeros(count + 1, dtype=np.int64)
+    entry = np.full(count, -1)
+    for column in range(count):
+        places = order[first[column] : first[column + 1]]
+        for f in owner[places]:
+            for row in unknown[start[f] : start[f + 1]]:
+                if row < count and entry[row] < starts[column]:
+                    entry[row], rows[end] = end, row
+                    end += 1
+        starts[column + 1] = end
+        sort_keys(rows[starts[column] : end])
+        for i in range(starts[column], end):
+            entry[rows[i]] = i
+        for place in places:
+            f = owner[place]
+            for i in range(start[f], start[f + 1]):
+                if unknown[i] < count:
+                    at = squares[f] + (i - start[f]) * (start[f + 1] - start[f]) + place - start[f]
+                    slots[at] = entry[unknown[i]]
+    return rows[:end].copy(), starts
+
+
+@compiled
 def add_elements(
     start: IntArray,
     unknown: IntArray,
@@ -285,11 +298,11 @@ def add_elements(
     """
     last = len(gradient) - 1
     for f in range(len(start) - 1):
-        at = squares[f]
+        begin, size = start[f], start[f + 1] - start[f]
         for i in range(start[f], start[f + 1]):
             p_i, q_i = alpha[i] * unit_a[f].conjugate(), beta[i] * unit_b[f].conjugate()
             gradient[unknown[i]] += slopes[f, 0] * p_i.real + slopes[f, 1] * q_i.real
-            for j in range(start[f], start[f + 1]):
+            for j in range(i, start[f + 1]):
                 p_j, q_j = alpha[j] * unit_a[f].conjugate(), beta[j] * unit_b[f].conjugate()
                 value = (
                     bends[f, 0] * p_i.real * p_j.real
@@ -298,8 +311,10 @@ def add_elements(
                     + bends[f, 3] * p_i.imag * p_j.imag
                     + bends[f, 4] * q_i.imag * q_j.imag
                 )
-                if slots[at] >= 0:
-                    values[slots[at]] += value
-                elif unknown[j] == last:
-                    pull[unknown[i]] += value
-                at += 1
+                for is_swapped in range(1 if i == j else 2):
+                    one, two = (j, i) if is_swapped else (i, j)
+                    slot = slots[squares[f] + (one - begin) * size + two - begin]
+                    if slot >= 0:
+                        values[slot] += value
+                    elif unknown[two] == last:
+                        pull[unknown[one]] += value

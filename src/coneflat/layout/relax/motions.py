@@ -158,14 +158,7 @@ class _Builder:
         """Return the chains whose translations may change."""
         chains = self.chains
         stays = ~self.is_free[chains.left] & ~chains.is_node[chains.vertices]
-        is_loose = np.bincount(chains.chain, stays.any(axis=1), len(chains.rotation)) == 0
-        fixed = np.sort(self.constraints.held_seams, axis=1)
-        if len(fixed):
-            n = int(self.vertex.max()) + 1
-            ends = np.sort(chains.vertices, axis=1)
-            is_fixed = np.isin(ends[:, 0] * n + ends[:, 1], fixed[:, 0] * n + fixed[:, 1])
-            is_loose[chains.chain[is_fixed]] = False
-        return np.flatnonzero(is_loose)
+        return np.flatnonzero(np.bincount(chains.chain, stays.any(axis=1), len(chains.rotation)) == 0)
 
     def _translations(self) -> ComplexArray:
         """Return (c,) the mean translation of each chain from its rotated left side to its right side."""
