@@ -45,7 +45,7 @@ CEILINGS = {
     "apps.pyvista": 26,
     "apps.unwrap": 1386,
     "apps.view": 1545,
-    "atlas": 1355,
+    "atlas": 1352,
     "base": 282,
     "cone_curve": 108,
     "cones": 2045,

@@ -11,10 +11,10 @@ from coneflat.atlas.charts import ChartLayout, Seams
 from coneflat.atlas.glue import glue_charts
 from coneflat.atlas.injective import injective_charts
 from coneflat.atlas.sheet import Sheet
-from coneflat.atlas.split import _label_ordered, _layers, as_disk, largest_layers, split_overlaps
+from coneflat.atlas.split import _layers, _steps, as_disk, largest_layers, split_overlaps
 from coneflat.geometry.overlap import find_overlaps
 from coneflat.mesh.charts import label_charts
-from coneflat.mesh.connectivity import TriangleMesh
+from coneflat.mesh.connectivity import TriangleMesh, label_components
 
 
 def flat_grid(columns=14, rows=9, seed=0):
@@ -202,14 +202,15 @@ class TestSplit:
         """Of crumpled paper, whose overlaps are many, and some of them wound up."""
         disk, _, pairs = crumpled(18, seed)
         areas = np.random.default_rng(seed).uniform(1, 2, len(disk.faces))
-        count, region = _label_ordered(pairs, disk.faces)
+        steps = _steps(pairs, disk.faces)
+        count, region = label_components(2 * len(pairs), *np.hstack([steps, steps ^ 1]))
         # Each region is there twice, its layers in either order.
         every = [_layers(pairs, np.flatnonzero(region == i)) for i in range(count)]
         assert all(not len(np.intersect1d(one, other)) for one, other in every)
         assert len(every) > 2
         sizes = [min(areas[one].sum(), areas[other].sum()) for one, other in every]
         for found, largest in zip(
-            largest_layers(pairs, disk.faces, areas), every[int(np.argmax(sizes))], strict=True
+            largest_layers(pairs, steps, areas), every[int(np.argmax(sizes))], strict=True
         ):
             assert np.array_equal(found, largest)
 

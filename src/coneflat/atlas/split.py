@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import FloatArray, IntArray, mask_of
+from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of
 from ..base.progress import check_cancelled
 from ..mesh.connectivity import NEXT, TriangleMesh, corner_fans, label_components, sort_pairs
 from .sheet import Sheet
@@ -36,18 +36,16 @@ def split_overlaps(
     """
     chart, count = np.zeros(len(areas), dtype=np.int64), 1
     sheets = [_Sheet(disk, costs, areas, np.arange(len(areas)), 0)]
-    # Pieces of sheets, with the pairs in each.
-    waiting = [(sheets[0], 0, pairs)]
+    # Pieces of sheets, with the pairs in each and the steps between them.
+    waiting = [(sheets[0], 0, pairs, _steps(pairs, disk.faces))]
     while waiting and count < most:
         check_cancelled()
-        sheet, own, pairs = waiting.pop()
+        sheet, own, pairs, steps = waiting.pop()
         if len(sheet.chart) > 1 and sheet.is_pinched(own):
             sheet, own, pairs = sheet.opened(own, pairs)
             sheets.append(sheet)
         one, other = np.zeros((2, len(sheet.faces)), dtype=bool)
-        for layer, members in zip(
-            (one, other), largest_layers(pairs, sheet.disk.faces, sheet.areas), strict=True
-        ):
+        for layer, members in zip((one, other), largest_layers(pairs, steps, sheet.areas), strict=True):
             layer[members] = True
         if least > 0:
             one, other = sheet.widened(own, one, other, sheet.areas, least)
@@ -60,9 +58,9 @@ def split_overlaps(
         for i, piece in enumerate(pieces):
             sheet.chart[piece] = number if i == 0 else count
             count += i > 0
-            within = pairs[(sheet.piece[pairs] == piece).all(axis=1)]
-            if len(within):
-                waiting.append((sheet, piece, within))
+            within = (sheet.piece[pairs] == piece).all(axis=1)
+            if within.any():
+                waiting.append((sheet, piece, pairs[within], _steps_between(steps, within)))
     for sheet in sheets:  # an opened sheet comes after the sheet that it is a piece of
         chart[sheet.faces] = np.array(sheet.chart)[sheet.piece]
     return None if waiting else chart
@@ -109,36 +107,34 @@ def unpinched(mesh: TriangleMesh) -> TriangleMesh:
     return TriangleMesh(vertices, fans)
 
 
-def largest_layers(pairs: IntArray, triangles: IntArray, areas: FloatArray) -> tuple[IntArray, IntArray]:
+def _steps_between(steps: IntArray, chosen: BoolArray) -> IntArray:
+    """Return the steps between chosen pairs (k,), renumbered, see `_steps`."""
+    number, kept = np.cumsum(chosen) - 1, chosen[steps // 2].all(axis=0)
+    return np.asarray(2 * number[steps[:, kept] // 2] + steps[:, kept] % 2)
+
+
+def largest_layers(pairs: IntArray, steps: IntArray, areas: FloatArray) -> tuple[IntArray, IntArray]:
     """Return the two layers, as triangle indices, of the overlap region whose smaller layer has the most area.
+
+    The assignment of triangles to layers continues along an overlap. A region therefore has two components, one for
+    each order of its pairs, unless it winds around so that the layers are connected.
 
     Args:
         pairs: (k, 2) overlapping triangles, in lexicographic order.
-        triangles: (m, 3) vertex indices.
+        steps: the steps between them, see `_steps`.
         areas: (m,) areas of the triangles.
     """
-    count, label = _label_ordered(pairs, triangles)
-    kept, moved = pairs.ravel(), pairs[:, ::-1].ravel()
-    layers = [np.unique(label * len(areas) + side) for side in (kept, moved)]
-    sizes = [np.bincount(one // len(areas), areas[one % len(areas)], count) for one in layers]
-    size = np.minimum(*sizes)
+    count, label = label_components(2 * len(pairs), *np.concatenate([steps, steps ^ 1], axis=1))
+    kept, moved, n = pairs.ravel(), pairs[:, ::-1].ravel(), len(areas)
+    layer, swapped = np.unique(label * n + kept), np.empty(count, dtype=np.int64)
+    swapped[label] = label.reshape(-1, 2)[:, ::-1].ravel()
+    size = np.bincount(layer // n, areas[layer % n], count)
+    size = np.minimum(size, size[swapped])
     _, first = np.unique(label, return_index=True)
-    wound = np.unique(layers[0][np.isin(layers[0], layers[1])] // len(areas))
+    wound = np.unique(layer[np.isin(layer, swapped[layer // n] * n + layer % n)] // n)
     size[wound] = np.minimum(areas[kept], areas[moved])[first[wound]]
     size[first % 2 == 1] = -1.0
     return _layers(pairs, np.flatnonzero(label == np.argmax(size)))
-
-
-def _label_ordered(pairs: IntArray, triangles: IntArray) -> tuple[int, IntArray]:
-    """Return the number of components of the pairs in both orders, and the component of each, numbered as in `_steps`.
-
-    The assignment of triangles to layers continues along an overlap. A region therefore has two components, one for
-    each order, unless it winds around so that the layers are connected.
-    """
-    source, place = _steps(pairs, triangles)
-    return label_components(
-        2 * len(pairs), np.concatenate([source, source ^ 1]), np.concatenate([place, place ^ 1])
-    )
 
 
 def _layers(pairs: IntArray, members: IntArray) -> tuple[IntArray, IntArray]:
@@ -148,8 +144,8 @@ def _layers(pairs: IntArray, members: IntArray) -> tuple[IntArray, IntArray]:
     return (kept[:1], moved[:1]) if len(np.intersect1d(one, other)) else (one, other)
 
 
-def _steps(pairs: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
-    """Return (s,), (s,) the pairs of an overlap that are adjacent: the second triangle is replaced by a neighbour.
+def _steps(pairs: IntArray, triangles: IntArray) -> IntArray:
+    """Return (2, s) the pairs of an overlap that are adjacent: the second triangle is replaced by a neighbour.
 
     Pair i has number 2i in its given order and 2i + 1 in the other order.
     """
@@ -170,7 +166,7 @@ def _steps(pairs: IntArray, triangles: IntArray) -> tuple[IntArray, IntArray]:
     wanted = np.minimum(kept, moved) * count + np.maximum(kept, moved)
     place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
     found = keys[place] == wanted
-    return source[found], 2 * place[found] + (kept > moved)[found]
+    return np.stack([source[found], 2 * place[found] + (kept > moved)[found]])
 
 
 def _neighbours(triangles: IntArray) -> tuple[IntArray, IntArray]:
