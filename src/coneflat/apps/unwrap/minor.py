@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import TYPED_TOLERANCE, BoolArray, FloatArray, IntArray, check_cancelled, mask_of
+from ...base import TYPED_TOLERANCE, BoolArray, FloatArray, IntArray, check_cancelled
 from ...cones import MAX_POLYHEDRON_CORNERS
 from ...geometry import double_areas, find_overlaps, signed_double_areas
 from ...layout import StretchEnergy, embedded_disks, joined, relax
@@ -85,13 +85,12 @@ class MinorParts:
 
     def _lay_out(self, disk: TriangleMesh, places: FloatArray, is_open: BoolArray) -> FloatArray:
         """Lay out open parts by changing the corners (m, 3, 2) in the plane, and return the energy of each part."""
-        of, is_moved = self._of_face, is_open[self._of_face]
-        points = embedded_disks(disk, of, self._areas)
-        points[disk.faces[~is_moved]] = places[~is_moved]
-        free = mask_of(len(points), disk.faces[is_moved])
-        energy = StretchEnergy(1.0)
-        found = relax(disk, points, disk.faces, energy, lengths=self._lengths, free=free, tolerance=TOLERANCE)
-        places[:] = found.points[disk.faces]
+        of, moved = self._of_face, np.flatnonzero(is_open[self._of_face])
+        used, corners = np.unique(disk.faces[moved], return_inverse=True)
+        some, lengths = TriangleMesh(disk.vertices[used], corners.reshape(-1, 3)), self._lengths[moved]
+        points = embedded_disks(some, of[moved], self._areas[moved])
+        found = relax(some, points, some.faces, StretchEnergy(1.0), lengths=lengths, tolerance=TOLERANCE)
+        places[moved] = found.points[some.faces]
         with np.errstate(all="ignore"):  # flipped triangles
             energies = self._searches[0].energies_of(self._lengths, places)
         energies[~(signed_double_areas(places) > 0)] = np.inf
