@@ -231,13 +231,13 @@ class TestSession:
         def check():
             nonlocal calls
             calls += 1
-            if calls == 30:
+            if calls == 15:
                 raise Changed
 
         job = {"mesh": str(mesh), "sha256": "", "choices": Choices().with_texture(True).as_plain()}
         with pytest.raises(Changed), cancel_with(check):
             JobRunner().flatten(job, lambda stage, fraction: None, lambda head, body: None)
-        assert calls == 30
+        assert calls == 15
 
 
 HIDDEN = (

@@ -18,7 +18,7 @@ import numpy as np
 from ...base.arrays import BoolArray, FloatArray, IntArray
 from ..solution import TIE_TOLERANCE
 from .fit_curvatures import fit_curvatures, inverse_with_sum
-from .limits import Limits
+from .limits import MAX_SEARCHED, Limits
 
 # Relative decrease of E^2 that a set needs to replace another of the same size, so that rounding does not decide.
 MIN_RELATIVE_GAIN = 1e-6
@@ -272,7 +272,8 @@ class DenseModel:
                 found = self.fit(tried, fitted.curvatures)
                 if found.energy < fitted.energy * (1 - MIN_RELATIVE_GAIN):
                     members, fitted, improved = tried, found, True
-                    change[which == which[place]] = np.inf
+                    # With many cones, scoring takes long: others are replaced before all are scored again.
+                    change[(which == which[place]) | (len(members) < MAX_SEARCHED // 4)] = np.inf
         return ConeSet(fitted.energy, members)
 
     def climb(self, bound: float, most: int, start: int | None = None) -> None:
