@@ -129,8 +129,8 @@ def factorize(
         matrix: (n, n), both triangles, with sorted indices.
         previous: the factor of another matrix of the same size that is not needed any more; its symbolic analysis is
             reused if possible.
-        total_size: number of unknowns of the larger system that the matrix belongs to, if any. The solver is chosen by
-            the larger of both sizes: it is loaded anyway, and reuses its analysis, which takes most of the time.
+        total_size: number of unknowns of the larger system that the matrix belongs to, if any. PARDISO is chosen by the
+            larger of both sizes: it is loaded anyway, and reuses its analysis, which takes most of the time.
         is_scattered: whether the matrix consists of many small, nearly disconnected blocks. SuperLU finds an
             elimination order for these in a fraction of the time of the other solvers.
 
@@ -144,7 +144,7 @@ def factorize(
     try:
         if previous is not None:
             return previous.refactorized(matrix)
-        if size < MAX_SUPERLU_SIZE and (is_scattered or 20 * max(size, total_size) < MAX_SUPERLU_SIZE):
+        if size < MAX_SUPERLU_SIZE and (is_scattered or (20 * size < MAX_SUPERLU_SIZE and not is_by_pardiso)):
             return SuperLUFactor(matrix)
         return _by_pardiso(matrix) if is_by_pardiso else CholespyFactor(matrix)
     except NotPositiveDefinite:

@@ -77,9 +77,8 @@ class PardisoFactor(Factor):
     """A sparse Cholesky factorization by PARDISO; its analysis is reused for matrices of the same pattern.
 
     All calls use the number of threads of the constructor. A solve with fewer threads than the factorization gives
-    wrong results without an error, and another factorization with more threads than the solve ends the process. With
-    the two-level factorization, results are the same bit for bit in every run, but the last digits depend on the
-    number of threads.
+    wrong results without an error, and another factorization with more threads than the solve ends the process.
+    Results are the same bit for bit in every run, but the last digits depend on the number of threads.
     """
 
     break_even = 30

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 from ... import TriangleMesh
 from ...atlas import ChartLayout, separate_overlaps, with_charts
 from ...base import BoolArray, FloatArray, IntArray
+from ...errors import SeamError
 from ...geometry import (
     cotangents,
     double_areas,
@@ -27,27 +29,26 @@ from ...stages import Layout, SeamSpec, SolveStatistics
 from .options import ISOMETRIC
 
 
-def freed(layout: Layout, free: BoolArray | None = None, tolerance: float = 1e-3) -> tuple[Layout, float]:
+def freed(
+    layout: Layout, free: BoolArray | None = None, tolerance: float = 1e-3, spec: SeamSpec | None = None
+) -> tuple[Layout, float]:
     """Return a layout with the least symmetric Dirichlet energy, and this energy, averaged by area.
 
     The sides of seams move independently, and no triangle is flipped. Flipped triangles of the given layout are
-    untangled, which may add seams to vertices around which triangles wind more than once. If this fails, the
-    minimisation starts from an embedding of W. T. Tutte, "How to draw a graph", 1963.
+    untangled. If this fails, the minimisation starts from an embedding of W. T. Tutte, "How to draw a graph", 1963.
 
     Args:
         layout: a layout in any number of charts.
-        free: (c,) the points that move; None for all, as if triangles are flipped.
+        free: (c,) the points that move; None for all. All move if triangles are flipped.
+        tolerance: see `relax`.
+        spec: which edges may be cut where untangling fails without it; None for none.
     """
     mesh, areas = layout.mesh, double_areas(layout.lengths) / 2
     disk = layout.disk or TriangleMesh(np.zeros((len(layout.points), 3)), layout.corners)
     is_bad = ~(signed_double_areas(layout.points[layout.corners]) > 0)
     if 0 < is_bad.sum() < len(is_bad):
-        fixed = np.zeros(len(layout.points), dtype=bool)
-        points, *_ = untangled_disk(disk, layout.points, layout.lengths, fixed, may_wind=True)
-        layout = unwound(replace(layout, points=points, disk=disk))
-        assert layout.disk is not None
-        disk = layout.disk
-    points = layout.points
+        layout, free = _untangled(replace(layout, disk=disk), disk, spec), None
+    points, disk = layout.points, layout.disk or disk
     if not (signed_double_areas(points[layout.corners]) > 0).all():
         points = embedded_disks(disk, np.zeros(len(layout.corners), dtype=np.int64), areas)
     energy, sides = StretchEnergy(1.0), layout.lengths
@@ -62,18 +63,25 @@ def freed(layout: Layout, free: BoolArray | None = None, tolerance: float = 1e-3
     return replace(layout, points=points, **at_vertices), ISOMETRIC * found.energy
 
 
-def unwound(layout: Layout) -> Layout:
-    """Return a layout with seams to the inner vertices of its disk around which triangles wind more than once."""
-    mesh, disk = layout.mesh, layout.disk
-    assert disk is not None
-    angles = signed_angles(sides_between(layout.points[disk.faces]))
-    sums = np.bincount(disk.faces.ravel(), angles.ravel())
-    winding = np.flatnonzero((np.abs(sums - 2 * np.pi) > np.pi) & ~disk.is_boundary_vertex)
-    if not len(winding):
-        return layout
+def _untangled(layout: Layout, disk: TriangleMesh, spec: SeamSpec | None) -> Layout:
+    """Return a layout with fewer flipped triangles or none.
+
+    Vertices around which triangles wind more than once are cut open if nothing else untangles them.
+    """
+    fixed = np.zeros(len(layout.points), dtype=bool)
+    points, *_ = untangled_disk(disk, layout.points, layout.lengths, fixed, may_wind=spec is not None)
+    found, angles = replace(layout, points=points), signed_angles(sides_between(points[disk.faces]))
+    is_winding = np.bincount(disk.faces.ravel(), angles.ravel()) > 3 * np.pi
+    winding = np.flatnonzero(is_winding & ~disk.is_boundary_vertex)
+    if spec is None or not len(winding) or not (signed_double_areas(points[disk.faces]) > 0).all():
+        return found
     sides = disk.edge_halfedges[:, 0]
-    paths = find_seams(disk, winding, layout.lengths.ravel()[sides])
-    return recut(layout, np.union1d(seam_edges(layout), mesh.halfedge_edges[sides[paths]]))
+    edges, lengths = layout.mesh.halfedge_edges[sides], layout.lengths.ravel()[sides]
+    forbidden = np.flatnonzero(spec.is_forbidden[edges])
+    with suppress(SeamError):
+        paths = find_seams(disk, winding, lengths, spec.is_avoided[edges], forbidden=forbidden)
+        return recut(found, np.union1d(seam_edges(layout), edges[paths]))
+    return layout
 
 
 def laid_out(
@@ -154,10 +162,9 @@ def separate_charts(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layout
         disk = TriangleMesh(np.pad(points, ((0, 0), (0, 1))), corners.reshape(-1, 3))
         sides = disk.edge_halfedges[:, 0]
         edges = layout.mesh.halfedge_edges[3 * faces[sides // 3] + sides % 3]
-        avoided, forbidden = spec.is_avoided[edges], spec.is_forbidden[edges]
         one_chart = np.zeros(len(faces), dtype=np.int64)
         alone = replace(layout, mesh=disk, points=points, corners=disk.faces, chart=one_chart, disk=None)
-        own = replace(spec, is_avoided=avoided, is_forbidden=forbidden)
+        own = replace(spec, is_avoided=spec.is_avoided[edges], is_forbidden=spec.is_forbidden[edges])
         separated = separate_overlaps(alone, costs[edges], own)
         layout, pieces = replace(layout, notes=separated.notes), separated.chart
         label[faces] = np.where(pieces > 0, label.max() + pieces, chart)

@@ -61,8 +61,7 @@ class MinorParts:
                 break
             cones, distortion = self._with_more_cones(cones, is_open, distortion)
             seams = find_seams(self._mesh, np.flatnonzero(cones), self._costs, self._is_avoided)
-            disk = open_along(self._mesh, seams).mesh
-            energies = self._lay_out(disk, places, is_open)
+            energies = self._lay_out(open_along(self._mesh, seams).mesh, places, is_open)
             # The energy above that of an isometry is about a multiple of the square of the distortion.
             above = np.maximum(energies, bound) - ISOMETRIC
             distortion *= np.sqrt(np.clip((bound - ISOMETRIC) / above, 0.5, 0.98))

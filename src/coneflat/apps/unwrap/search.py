@@ -21,7 +21,7 @@ from ...geometry import coarse_mesh, double_areas, edge_lengths, find_overlaps, 
 from ...mesh import open_along
 from ...seams import seam_costs, without_loose_ends
 from ...source import Part
-from ...stages import ConeSpec, Layout, Surface, VertexCurvatures
+from ...stages import Layout, Surface, VertexCurvatures
 from .free import freed, recut, seam_edges, separate_charts, side_by_side, triangle_energies
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .tips import RINGS, find_tips, moved_tips, moves_for
@@ -200,11 +200,11 @@ class CutSearch:
         bound, found = self.max_energy + COARSE_EXCESS * (self.max_energy - ISOMETRIC), list[Candidate]()
         for _ in range(COARSE_TRIES):
             best = CutSearch(coarse, bound, self._method, True, self._by_area).best()
-            spec = self._with_cones(kept[best.layout.cones])
+            given = VertexCurvatures(kept[best.layout.cones], np.full(len(best.layout.cones), np.nan))
+            spec = replace(self.part.cones, strategy="given", given=given)
             layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
             one = self._candidate(layout, best.distortion)
-            if one.energy > self.max_energy:
-                one = self.shortened(one)
+            one = self.shortened(one) if one.energy > self.max_energy else one
             found.append(self.separated(one))
             excess = one.energy - self.max_energy
             if excess <= 0 or best.energy > bound:
@@ -252,7 +252,8 @@ class CutSearch:
         self, layout: Layout, free: BoolArray | None = None, tolerance: float = 1e-3
     ) -> tuple[Layout, float]:
         """Return a layout with the least energy, and its energy or the one that belongs to its area distortion."""
-        layout, energy = freed(layout, free, tolerance)
+        spec = self.part.seams if np.isfinite(self.max_energy) else None
+        layout, energy = freed(layout, free, tolerance, spec)
         if self._by_area:
             energies = self.energies_of(layout.lengths, layout.points[layout.corners])
             energy = float(energies.sum() / layout.area)
@@ -284,9 +285,9 @@ class CutSearch:
                 return replace(one, layout=layout, energy=energy)
             # Points where charts would touch themselves stay.
             for _ in range(RINGS):
-                is_near = mask_of(len(is_free), layout.corners[pairs])
-                pairs = np.flatnonzero(is_near[layout.corners].any(axis=1))
-            is_free[layout.corners[pairs]] = False
+                is_near = mask_of(len(is_free), one.layout.corners[pairs])
+                pairs = np.flatnonzero(is_near[one.layout.corners].any(axis=1))
+            is_free[one.layout.corners[pairs]] = False
         return one
 
     def _expected_cost(self, one: Candidate) -> float:
@@ -309,9 +310,10 @@ class CutSearch:
                 # The tips move by whole edges.
                 slack += np.sign(slack) * allowed / 4
                 continue
+            if not (len(moved[0]) or self.part.mesh.is_boundary_edge.any()):
+                break  # not a disk
             known.append(moved[0])
-            recut_layout = replace(recut(start.layout, moved[0]), cones=moved[1])
-            one = self._candidate(recut_layout, start.distortion)
+            one = self._candidate(replace(recut(start.layout, moved[0]), cones=moved[1]), start.distortion)
             excess = one.energy - self.max_energy
             tried.append((slack, excess))
             if one.energy <= self._near:
@@ -330,11 +332,6 @@ class CutSearch:
                 wished = slack - excess * (slack - slack_before) / change if change else np.inf
                 slack *= float(np.clip(wished / slack, 1.25, 3)) if wished * slack > 0 else 3.0
         return found
-
-    def _with_cones(self, cones: IntArray) -> ConeSpec:
-        """Return the specification of given cones, whose curvatures are found."""
-        given = VertexCurvatures(cones, np.full(len(cones), np.nan))
-        return replace(self.part.cones, strategy="given", given=given)
 
 
 def coarse_part(part: Part, count: int) -> tuple[Part, IntArray]:

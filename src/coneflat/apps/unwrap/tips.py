@@ -100,7 +100,7 @@ def moved_tips(layout: Layout, seams: IntArray, tips: Tips, moves: FloatArray) -
     seams = np.setdiff1d(
         np.union1d(seams, np.array(opened, dtype=np.int64)), np.array(closed, dtype=np.int64)
     )
-    return seams, np.unique(cones[cones >= 0])
+    return seams, np.intersect1d(cones, mesh.edges[seams])
 
 
 def _walk(
