@@ -310,3 +310,10 @@ def test_seam_edges_without_length_are_counted(collapsed: float):
     corners, points = np.arange(6).reshape(2, 3), np.full(6, collapsed, dtype=np.complex128)
     with pytest.raises(errors.SeamError, match="1 seam edges have no length"):
         find_chains(mesh, corners, points, np.empty(0, dtype=np.int64))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("stretch", [0.0, 0.5, 1.0])
+def test_triangles_flipped_by_rounding_give_no_warnings(stretch):
+    found = StretchEnergy(stretch).derivatives(np.array([1.0, 1.0]), np.array([-1e-12, 0.0]))
+    assert len(found.value) == 2

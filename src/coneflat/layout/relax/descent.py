@@ -111,8 +111,7 @@ def descend(
         change = elements.change(step)
         farthest = np.full(parts, np.inf)
         np.minimum.at(farthest, part, MAX_STEP_SHARE * maps.largest_steps(change))
-        longest = min(1.0, stride / remaining) if remaining else 1.0
-        length = np.minimum(longest, farthest)
+        length = np.minimum(min(1.0, stride / remaining) if remaining else 1.0, farthest)
         taken += 1
         for _ in range(HALVINGS):
             trial = maps.plus(length[part], change)

@@ -87,6 +87,7 @@ class StretchEnergy:
             result = result * ((area + 1 / area) / 2) ** self.stretch
         return result if self.sharpness == 1 else result**self.sharpness
 
+    @np.errstate(all="ignore")  # triangles that are flipped by rounding; a step is not finite then
     def derivatives(self, one: FloatArray, two: FloatArray) -> Derivatives:
         """Return the energy and its derivatives."""
         ratio, inverse = one / two, two / one
