@@ -24,7 +24,7 @@ def kind(request, monkeypatch):
     name = "coneflat.linalg.factors"
     monkeypatch.setattr(f"{name}.has_pardiso", lambda: request.param is PardisoFactor)
     monkeypatch.setattr(f"{name}.MIN_PARDISO_UNKNOWNS", 1)
-    monkeypatch.setattr(f"{name}.MAX_SUPERLU_SIZE", 0)
+    monkeypatch.setattr(f"{name}.MAX_SMALL_SYSTEM", 0)
     if request.param is SuperLUFactor:
         monkeypatch.setattr(f"{name}.CholespyFactor", SuperLUFactor)
     return request.param
@@ -102,7 +102,7 @@ def test_solutions_are_the_same_every_time(kind, matrix):
 def test_large_systems_are_solved_by_pardiso_where_it_is_installed(matrix, monkeypatch):
     right = np.ones(matrix.shape[0])
     expected = np.linalg.solve(matrix.toarray(), right)
-    monkeypatch.setattr("coneflat.linalg.factors.MAX_SUPERLU_SIZE", 0)
+    monkeypatch.setattr("coneflat.linalg.factors.MAX_SMALL_SYSTEM", 0)
     for is_installed, large in ((True, PardisoFactor), (False, CholespyFactor)):
         monkeypatch.setattr("coneflat.linalg.factors.has_pardiso", lambda: is_installed)  # noqa: B023
         for total_size, kind in ((0, CholespyFactor), (MIN_PARDISO_UNKNOWNS, large)):
@@ -123,7 +123,7 @@ def test_small_systems_are_solved_by_superlu_without_messages(matrix, capfd):
 
 
 def test_scattered_parts_are_solved_by_superlu(matrix, monkeypatch):
-    monkeypatch.setattr("coneflat.linalg.factors.MAX_SUPERLU_SIZE", 10_000)
+    monkeypatch.setattr("coneflat.linalg.factors.MAX_SMALL_SYSTEM", 10_000)
     assert type(factorize(matrix, is_scattered=True)) is SuperLUFactor
     assert type(factorize(matrix)) is CholespyFactor
 

@@ -20,9 +20,10 @@ from ..errors import MetricError
 
 # Number of unknowns below which loading MKL, 0.03 s in each process, takes longer than it saves.
 MIN_PARDISO_UNKNOWNS = 12_000
-# Number of unknowns below which SuperLU is faster for matrices of many nearly disconnected blocks. With a twentieth of
-# them, it is as fast as CHOLMOD, which prints a message on standard output if a matrix is indefinite.
-MAX_SUPERLU_SIZE = 20_000
+# Number of unknowns of a small system. For small matrices of many nearly disconnected blocks SuperLU is faster. With a
+# twentieth of these unknowns, it is as fast as CHOLMOD, which prints a message on standard output if a matrix is
+# indefinite.
+MAX_SMALL_SYSTEM = 20_000
 
 
 class NotPositiveDefinite(ArithmeticError):
@@ -144,7 +145,7 @@ def factorize(
     try:
         if previous is not None:
             return previous.refactorized(matrix)
-        if size < MAX_SUPERLU_SIZE and (is_scattered or (20 * size < MAX_SUPERLU_SIZE and not is_by_pardiso)):
+        if size < MAX_SMALL_SYSTEM and (is_scattered or (20 * size < MAX_SMALL_SYSTEM and not is_by_pardiso)):
             return SuperLUFactor(matrix)
         return _by_pardiso(matrix) if is_by_pardiso else CholespyFactor(matrix)
     except NotPositiveDefinite:

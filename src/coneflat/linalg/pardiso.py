@@ -22,7 +22,7 @@ from scipy.sparse import csc_matrix
 
 from ..base.arrays import FloatArray
 from ..base.threads import threads
-from .factors import MAX_SUPERLU_SIZE, Factor, NotPositiveDefinite, aligned, is_aligned
+from .factors import MAX_SMALL_SYSTEM, Factor, NotPositiveDefinite, aligned, is_aligned
 
 AnyArray: TypeAlias = NDArray[Any]
 
@@ -63,7 +63,7 @@ class Code(IntEnum):
 # the latter.
 SETTINGS = {Parameter.NO_DEFAULTS: 1, Parameter.ORDERING: 3, Parameter.SCHEDULE: 1, Parameter.FROM_ZERO: 1}
 # Minimum degree, and a factorization level by level: on one thread, a third less time for the analysis of up to
-# `MAX_SUPERLU_SIZE` unknowns.
+# `MAX_SMALL_SYSTEM` unknowns.
 SMALL_SETTINGS = {**SETTINGS, Parameter.ORDERING: 0, Parameter.SCHEDULE: 0}
 # File names of MKL on the operating systems, and the environment variable that gives pypardiso another path.
 RUNTIMES = ("libmkl_rt.", "mkl_rt.")
@@ -88,7 +88,7 @@ class PardisoFactor(Factor):
         n, self._kind, self._threads = matrix.shape[0], kind, threads()
         self._handle = np.zeros(64, dtype=np.int64)
         self._table = np.zeros(64, dtype=np.int32)
-        settings = SMALL_SETTINGS if n <= MAX_SUPERLU_SIZE and self._threads == 1 else SETTINGS
+        settings = SMALL_SETTINGS if n <= MAX_SMALL_SYSTEM and self._threads == 1 else SETTINGS
         self._table[list(settings)] = list(settings.values())
         self._order = np.zeros(n, dtype=np.int32)
         # PARDISO allocates its memory itself; it must be released with this object.

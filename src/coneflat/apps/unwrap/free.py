@@ -47,7 +47,7 @@ def freed(
     disk = layout.disk or TriangleMesh(np.zeros((len(layout.points), 3)), layout.corners)
     is_bad = ~(signed_double_areas(layout.points[layout.corners]) > 0)
     if 0 < is_bad.sum() < len(is_bad):
-        layout, free = _untangled(replace(layout, disk=disk), disk, spec), None
+        layout, free = _untangled(layout, disk, spec), None
     points, disk = layout.points, layout.disk or disk
     if not (signed_double_areas(points[layout.corners]) > 0).all():
         points = embedded_disks(disk, np.zeros(len(layout.corners), dtype=np.int64), areas)

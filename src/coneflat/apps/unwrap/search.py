@@ -305,15 +305,15 @@ class CutSearch:
         # For each slack that was requested, the energy above the bound.
         slack, tried, known = wanted, [(0.0, -wanted)], [seams]
         for _ in range(MAX_TRIES // 2 if self._has_coarse and wanted > 0 else MAX_TRIES):
-            moved = moved_tips(start.layout, seams, tips, moves_for(start.layout, tips, slack))
-            if any(np.array_equal(moved[0], each) for each in known):
+            moved, cones = moved_tips(start.layout, seams, tips, moves_for(start.layout, tips, slack))
+            if any(np.array_equal(moved, each) for each in known):
                 # The tips move by whole edges.
                 slack += np.sign(slack) * allowed / 4
                 continue
-            if not (len(moved[0]) or self.part.mesh.is_boundary_edge.any()):
+            if not (len(moved) or self.part.mesh.is_boundary_edge.any()):
                 break  # not a disk
-            known.append(moved[0])
-            one = self._candidate(replace(recut(start.layout, moved[0]), cones=moved[1]), start.distortion)
+            known.append(moved)
+            one = self._candidate(replace(recut(start.layout, moved), cones=cones), start.distortion)
             excess = one.energy - self.max_energy
             tried.append((slack, excess))
             if one.energy <= self._near:

@@ -311,8 +311,8 @@ def add_elements(
                     + bends[f, 3] * p_i.imag * p_j.imag
                     + bends[f, 4] * q_i.imag * q_j.imag
                 )
-                for is_swapped in range(1 if i == j else 2):
-                    one, two = (j, i) if is_swapped else (i, j)
+                for k in range(1 if i == j else 2):
+                    one, two = (i, j) if k == 0 else (j, i)
                     slot = slots[squares[f] + (one - begin) * size + two - begin]
                     if slot >= 0:
                         values[slot] += value
