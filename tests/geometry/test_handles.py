@@ -12,6 +12,7 @@ from coneflat import check_mesh, errors, flatten
 from coneflat.geometry import corner_angles, edge_lengths
 from coneflat.geometry.handles import difference_from_multiple, handle_loops, loop_holonomy
 from coneflat.measure.seam_data import measure_rotations
+from coneflat.metric import find
 
 QUARTER = np.pi / 2
 
@@ -95,6 +96,20 @@ def test_corrections_end_at_rounding(monkeypatch):
     )
     exact = flatten(*shapes.genus(2), quantise=QUARTER, correct_handles=True)
     assert exact.rotations.worst < 1e-8
+
+
+def test_corrections_that_need_more_steps_than_are_left_end_at_once(monkeypatch):
+    solved, solve = [], find.exact_flat_metric
+    monkeypatch.setattr(find, "MAX_CHANGE", 1e-4)
+    monkeypatch.setattr(
+        find, "exact_flat_metric", lambda *given, **more: solved.append(0) or solve(*given, **more)
+    )
+    cones = flatten(*shapes.genus(2), quantise=QUARTER)
+    solved.clear()
+    given = dict(zip(cones.cones.tolist(), cones.curvatures.tolist(), strict=True))
+    with pytest.raises(errors.ConvergenceError, match=r"did not reach multiples of 0\.5 pi: they are off by"):
+        flatten(*shapes.genus(2), cones=given, quantise=QUARTER, correct_handles=True)
+    assert len(solved) == 1
 
 
 def test_measured_rotations_of_a_cut_square():

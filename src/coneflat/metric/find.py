@@ -34,9 +34,9 @@ from .linear import linear_flat_metric
 from .solve import exact_flat_metric
 
 # Largest number of steps, and largest error in radians at the end; about six steps are needed for well-placed cones.
-MAX_STEPS, TOLERANCE = 60, 1e-11
+MAX_STEPS, TOLERANCE = 40, 1e-11
 # Largest change of the log of a length in one step. After a larger change, the derivatives are computed again.
-MAX_CHANGE = 0.2
+MAX_CHANGE = 0.5
 # Smallest fraction of a step that is taken. Below it, triangles are close to degenerate and the search fails.
 MIN_FRACTION = 1e-3
 # Weight of scaling in the norm of a strain, relative to shear: nearly zero, as scaling can be undone conformally.
@@ -130,13 +130,13 @@ def corrected_flat_metric(
     Raises:
         ConvergenceError: the rotations did not converge to multiples of the quantum.
     """
-    mesh, given = holonomy.mesh, lengths
-    metric = solve(lengths, solution)
-    triangles = _triangles(metric)
-    off = difference_from_multiple(holonomy.of_flat(triangles), quantum)
-    changes, errors = None, [float(np.abs(off).max())]
-    # It hardly ever succeeds once the error does not decrease by a tenth in ten steps.
-    while len(errors) <= 10 or (len(errors) <= MAX_STEPS and errors[-1] <= 0.9 * errors[-11]):
+    mesh, given, changes, errors = holonomy.mesh, lengths, None, list[float]()
+    off, inverse, step = np.empty(0), np.empty((0, 0)), np.empty(0)
+    for left in range(MAX_STEPS, -1, -1):
+        metric = solve(lengths, solution)
+        triangles = _triangles(metric)
+        before, off = off, difference_from_multiple(holonomy.of_flat(triangles), quantum)
+        errors.append(float(np.abs(off).max()))
         # With many loops, rounding leaves more: the errors then no longer decrease.
         is_rounding = len(errors) > 1 and errors[-2] < 2 * errors[-1] <= 200 * TOLERANCE
         if errors[-1] <= TOLERANCE or is_rounding:
@@ -148,29 +148,22 @@ def corrected_flat_metric(
             return replace(metric, notes=(*metric.notes, note))
         if changes is None:
             sides = np.abs(triangles.sides).reshape(-1, 3)
-            changes = least_changes(
-                holonomy, sides, shear_norm(mesh, lengths, solution.cones), metric.is_open
-            )
-            inverse = np.eye(len(off))
+            norm = shear_norm(mesh, lengths, solution.cones)
+            changes, inverse = least_changes(holonomy, sides, norm, metric.is_open), np.eye(len(off))
+        else:
+            gained = inverse @ (off - before)
+            inverse += np.outer(step - gained, step @ inverse) / (step @ gained)
         step = -inverse @ off
         fraction = min(1.0, MAX_CHANGE / np.abs(changes @ step).max())
+        is_far = 1 / fraction > left  # more steps are needed, if all change lengths as much
         sheared = _sheared(mesh, lengths, fraction * (changes @ step))
         while fraction > MIN_FRACTION and not slacks(sheared).min() > 0:
             fraction /= 2
             sheared = _sheared(mesh, lengths, fraction * (changes @ step))
-        if fraction <= MIN_FRACTION:
+        if is_far or fraction <= MIN_FRACTION:
             break
-        lengths = sheared
+        lengths, changes = sheared, changes if fraction == 1 else None
         solution = replace(solution, log_scale=metric.log_scale - np.log(metric.scale))
-        metric = solve(lengths, solution)
-        triangles = _triangles(metric)
-        before, off = off, difference_from_multiple(holonomy.of_flat(triangles), quantum)
-        errors.append(float(np.abs(off).max()))
-        if fraction < 1:
-            changes = None
-            continue
-        gained = inverse @ (off - before)
-        inverse += np.outer(step - gained, step @ inverse) / (step @ gained)
     raise ConvergenceError(
         f"rotations around holes and along handles did not reach multiples of {quantum / np.pi:.4g} pi: they are off "
         f"by {errors[-1]:.2g} rad; other cones (--distortion, --cone-count) may help"

@@ -245,7 +245,7 @@ def test_charts_stay_joined_where_edges_between_them_are_split(shared, distortio
     """The first chain between two charts may be another one then."""
     options = {**QUARTER, "charts": "atlas", "correct_handles": True, "distortion": distortion}
     result = flatten(shared("knight.off"), **options)
-    layout = aligned(result, 1000, None)
+    layout = aligned(result, GridSearch.of(result, None, {"quads": 1000}, {}).size)
     split = split_between_nodes(layout)
     assert result.distortion.charts > 1
     assert len(split.mesh.faces) > len(layout.mesh.faces)
@@ -272,7 +272,7 @@ def layout_of_rectangle(inside, cones):
     triangles = Delaunay(points[:, :2]).simplices
     corners = dict.fromkeys(range(4), np.pi / 2)
     options = {"boundary": "straight", "charts": "one", "cones": corners, "repair": True}
-    layout = with_sides(aligned(flatten(points, triangles, **options), None, 1.0))
+    layout = with_sides(aligned(flatten(points, triangles, **options), 1.0))
     return replace(layout, cones=np.array(cones))
 
 

@@ -72,4 +72,4 @@ def test_nearest_points_with_equations_are_those_of_brute_force(seed):
 
 def test_a_lattice_of_one_point():
     alone = whole_space(np.eye(2)).where(np.array([1, 0]), 2).where(np.array([0, 1]), -1)
-    assert alone.nearest(np.array([0.3, 0.4])).tolist() == [2, -1]
+    assert alone.reduced().nearest(np.array([0.3, 0.4])).tolist() == [2, -1]

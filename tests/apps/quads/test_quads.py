@@ -220,6 +220,13 @@ def test_components_without_area_get_no_quads():
     assert len(both.quads) == len(alone.quads)
 
 
+def test_cones_may_be_of_any_angle():
+    without, bounded = (
+        coneflat.quads(*shapes.genus(2), quads=500, max_cone_angle=most) for most in (None, 20.0)
+    )
+    np.testing.assert_array_equal(without.quads, bounded.quads)
+
+
 def test_components_with_few_vertices_get_quads():
     """A tetrahedron has four vertices for the eight cones of a cube: its triangles are split."""
     vertices, faces = shapes.join(shapes.sphere(3), shapes.tetrahedron())
@@ -243,14 +250,15 @@ def test_quads_that_meet_themselves_are_made_smaller():
 
 def test_bad_quads_are_left_out_where_no_finer_grid_is_found(monkeypatch):
     options = {"quads": 10, "cones": "sparse", "distortion": 0.2}
-    search = GridSearch.of_any_size
+    search = GridSearch._as_given
 
     def fail_if_finer(self):
-        if self.for_quads:
-            raise CoarseGridError("none", 10.0)
+        if self.size < wanted:
+            raise GridError("none")
         return search(self)
 
-    monkeypatch.setattr(GridSearch, "of_any_size", fail_if_finer)
+    monkeypatch.setattr(GridSearch, "_as_given", fail_if_finer)
+    wanted = GridSearch.of(*shapes.genus(3), {"quads": 10}, {}).size
     mesh = coneflat.quads(*shapes.genus(3), **options)
     assert any("Left out" in note for note in mesh.notes)
     assert not any("More quads than wanted" in note for note in mesh.notes)
@@ -262,7 +270,7 @@ def test_a_thin_component_does_not_make_the_others_finer(monkeypatch):
     def fail_for_few(grid):
         sizes.append(grid.squares)
         if grid.squares < 60:
-            raise CoarseGridError("as thin as a square", grid.squares)
+            raise CoarseGridError("as thin as a square", grid)
         return extract_quads(grid)
 
     monkeypatch.setattr("coneflat.apps.quads.integer_grid.extract_quads", fail_for_few)

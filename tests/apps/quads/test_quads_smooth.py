@@ -115,7 +115,7 @@ OPTIONS = {"quantise": np.pi / 2, "charts": "one", "min_cone_angle": 1.5 * np.pi
 def test_splitting_keeps_the_surface_and_its_seams(share, boundary):
     shape = shapes.hill() if boundary == "straight" else shapes.sphere(2)
     sharpest = {"min_cone_angle": np.pi / 2} if boundary == "straight" else {}
-    layout = aligned(flatten(*shape, **{**OPTIONS, **sharpest}, boundary=boundary), 100, None)
+    layout = aligned(flatten(*shape, **{**OPTIONS, **sharpest}, boundary=boundary), 0.2)
     is_split = np.random.default_rng(3).random(len(layout.mesh.edges)) < share
     split = split_edges(layout, is_split)
     before, mesh = layout.mesh, split.mesh

@@ -166,7 +166,7 @@ def test_triangles_around_flipped_ones_are_split(monkeypatch):
         found[0] &= len(result.faces) > len(faces)
         return found
 
-    monkeypatch.setattr("coneflat.apps.quads.integer_grid.has_area", first_is_flipped)
+    monkeypatch.setattr("coneflat.apps.quads.aligned_cones.has_area", first_is_flipped)
     grid = coneflat.integer_grid(vertices, faces, quads=500)
     # The neighbours of a triangle become four, and those of the neighbours two or more.
     assert len(faces) + 3 * 13 <= len(grid.faces) <= len(faces) + 100

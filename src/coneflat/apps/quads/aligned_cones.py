@@ -8,19 +8,25 @@ pairs of them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from ... import TriangleMesh
-from ...base import ComplexArray, FloatArray, IntArray
+from ... import Flattening, TriangleMesh, flatten
+from ...base import ComplexArray, FloatArray, IntArray, Stopwatch, limit_threads
 from ...errors import CurvatureError
 from ...geometry import coarse_mesh
+from ...mesh import CheckedMesh
+from ...options import read_options
 from .cross_field import SHARP_ANGLE, directions_and_indices, sharp_ends
-from .features import vertex_graph
+from .features import split_around, split_chords, vertex_graph
+from .layout import has_area
 from .map_model import SAMPLES, MapModel
+from .options import FLATTENING_OPTIONS, GRID_TOLERANCE, QuadOptions, flattening_defaults
+from .sizes import extended
 
 # Cost of an area distortion as large as allowed, at first, and of crosses off by 22.5 degrees, which is larger where
 # sharp edges are required on grid lines; a cone costs 1 for each quarter turn, and a missing one more than all others.
@@ -29,11 +35,72 @@ COST_OF_AREAS, COST_OF_DIRECTIONS, TIMES_REQUIRED, COST_OF_MISSING = 15.0, 200.0
 RADII, PLACES_NEAR = (1.0, 0.6, 0.35, 0.2), 10
 # Number of triangles of a coarse mesh, on which the cones of larger meshes are searched.
 COARSE = 25_000
+# With fewer quads, cones cost more in proportion.
+QUADS_PER_CONE = 2_000
 # Least decrease of the cost by a step of a descent, which thus ends.
 MIN_GAIN = 1e-3
 # How often the cost of areas is doubled to meet the bound, and the bound for a distortion of 1: the log of the ratio of
 # the 95% and 5% quantiles of the areas of quads.
 MAX_DOUBLINGS, SPREAD = 3, 10 * np.log(2.0)
+
+
+def aligned_flattening(
+    checked: CheckedMesh,
+    quads: float,
+    options: Mapping[str, Any],
+    stages: Stopwatch,
+    price_factor: float,
+    sharp_angle: float | None,
+    log_scale: FloatArray | None,
+) -> Flattening:
+    """Return a flattening with cones quantised to quarter turns, and straight boundaries.
+
+    Args:
+        checked: the connected mesh.
+        quads: number of squares that it will have.
+        options: those of `integer_grid`.
+        stages: the stopwatch.
+        price_factor: factor of the price of cones; if above 1, coarse meshes are split, for more places for cones.
+        sharp_angle: dihedral angle of edges that are required on grid lines, or None.
+        log_scale: (n,) the log scale wanted at the vertices, or None for equal sizes.
+
+    Raises:
+        CurvatureError, MetricError, OptionError: as for `coneflat.flatten`.
+    """
+    own = read_options(options, QuadOptions)
+    mesh = _with_places(checked.mesh, price_factor > 1, SHARP_ANGLE if sharp_angle is None else sharp_angle)
+    # The bounds of curvature in quarter turns; without a largest angle, there is none in effect.
+    turns = [4 - angle / (np.pi / 2) for angle in (own.max_cone_angle or 1e6, own.min_cone_angle)]
+    bounds = int(np.ceil(turns[0] - GRID_TOLERANCE)), int(np.floor(turns[1] + GRID_TOLERANCE))
+    wanted = None if log_scale is None else extended(log_scale, mesh)
+    price = price_factor * max(1.0, QUADS_PER_CONE / quads)
+    with stages("cones"), limit_threads(own.threads):
+        found = aligned_cones(mesh, own.distortion, *bounds, price, sharp_angle, wanted)
+    cones = {vertex: quarters * np.pi / 2 for vertex, quarters in found.items()}
+    given = {name: one for name, one in options.items() if name not in FLATTENING_OPTIONS}
+    given |= {**flattening_defaults({"cones": cones}), "cones": cones}
+    if mesh.is_boundary_edge.any():
+        given["boundary"] = "straight"
+    for splits in range(3):
+        with stages("flatten"):
+            result = flatten(np.ldexp(mesh.vertices, -checked.exponent), mesh.faces, **given)
+        # Large cones that are adjacent flip triangles.
+        if splits == 2 or (is_flat := has_area(result)).all():
+            break
+        mesh = split_around(mesh, mesh.faces[~is_flat])
+    return replace(result, notes=(*checked.notes, *result.notes))
+
+
+def _with_places(mesh: TriangleMesh, is_split: bool, sharp_angle: float) -> TriangleMesh:
+    """Return a mesh with vertices where cones may be needed, all edges split if `is_split` and the mesh is coarse."""
+    if is_split and 6 * len(mesh.faces) < COARSE:
+        mesh = split_around(mesh, mesh.faces)
+    while len(mesh.faces) < 60:  # on a sphere, a grid has at least eight cones
+        mesh = split_around(mesh, mesh.faces)
+    mesh, _ = split_chords(mesh)
+    finer, count = split_chords(mesh, sharp_ends(mesh, sharp_angle))
+    # On coarse meshes these are most edges, and their triangles would get thin.
+    return finer if 20 * count < len(mesh.edges) else mesh
 
 
 def aligned_cones(

@@ -134,11 +134,8 @@ def curvature_tensors(mesh: TriangleMesh, areas: FloatArray, radius: float) -> F
     sums = [np.bincount(both, np.tile(column, 2), len(mesh.faces)) for column in inner.T]
     stiffness = _dual_laplacian(mesh, areas, np.zeros(len(one)))
     system = csc_matrix(diags(areas) + radius**2 * stiffness.real)
-    mean = (
-        factorize(system.sorted_indices())
-        .solve(np.ascontiguousarray(np.stack(sums, axis=1)))
-        .reshape(-1, 3, 3)
-    )
+    right = np.ascontiguousarray(np.stack(sums, axis=1), dtype=np.float64)
+    mean = factorize(system.sorted_indices()).solve(right).reshape(-1, 3, 3)
     x = mesh.vertices[mesh.faces[:, 2]] - mesh.vertices[mesh.faces[:, 1]]
     normal = face_normals(mesh.vertices, mesh.faces)
     axes = np.stack([x, np.cross(normal, x)], axis=1)

@@ -16,7 +16,8 @@ from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray, compiled, list_some, mask_of, plural
 from ...errors import GridError
 from ...geometry import fill_orientations, halfedge_twins, sides_between
-from .layout import GRID_TOLERANCE, quarters_around
+from .layout import quarters_around
+from .options import GRID_TOLERANCE
 from .transitions import rotated
 
 if TYPE_CHECKING:

@@ -68,7 +68,7 @@ def extract_quads(grid: IntegerGrid, leave_out: bool = False) -> QuadMesh:
     while (bad := degenerate_quads(quads, edges)).any():
         text = f"{plural(int(bad.sum()), 'quad')} of {len(quads):,} with a vertex or an edge twice"
         if not leave_out or bad.all():
-            raise CoarseGridError(f"{text} ({list_some(np.flatnonzero(bad))}): use more quads", area)
+            raise CoarseGridError(f"{text} ({list_some(np.flatnonzero(bad))}): use more quads", grid)
         darts, notes = darts[~bad], (*notes, f"Left out {text}: the surface is too thin there.")
         origin, quads, edges = _split_fans(darts, mates, ports.points)
     barycentric = _barycentric(exact, found, origin)

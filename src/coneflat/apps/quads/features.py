@@ -8,7 +8,7 @@ from scipy.sparse import csr_matrix
 from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray, mask_of
 from ...geometry import dihedral_angles
-from ...mesh import label_components, label_faces, tie_key
+from ...mesh import label_components, tie_key
 
 
 def sharp_edges(mesh: TriangleMesh, angle: float) -> IntArray:
@@ -82,20 +82,6 @@ def split_around(mesh: TriangleMesh, vertices: IntArray) -> TriangleMesh:
     mesh = without_pillows(mesh)
     near = mask_of(len(mesh.vertices), vertices)[mesh.faces].any(axis=1)
     return split_edges(mesh, mask_of(len(mesh.edges), mesh.halfedge_edges.reshape(-1, 3)[near]))[0]
-
-
-def split_small_components(mesh: TriangleMesh) -> TriangleMesh:
-    """Return a mesh with at least 60 triangles in each component, by splitting edges.
-
-    On a sphere, a grid has at least eight cones.
-    """
-    mesh = without_pillows(mesh)
-    while True:
-        count, label = label_faces(mesh.faces, len(mesh.vertices))
-        is_small = np.bincount(label, minlength=count) < 60
-        if not is_small.any():
-            return mesh
-        mesh = split_edges(mesh, is_small[label[mesh.edge_faces[:, 0]]])[0]
 
 
 def edge_indices(mesh: TriangleMesh, pairs: IntArray) -> IntArray:

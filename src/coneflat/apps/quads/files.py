@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 import re
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import fields
-from functools import partial
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import IO, Any, TypeAlias
+from typing import IO, Any
 
 import numpy as np
 
@@ -43,8 +42,6 @@ from .layout import quarters_around
 from .nearest import TriangleTree
 from .quad_mesh import QuadMesh, least_jacobians
 
-Check: TypeAlias = Callable[["str | PathLike[str]"], Path]
-
 #: Names of the formats that meshio writes, by their extensions.
 _MESHIO = {".vtk": "vtk", ".vtu": "vtu", ".inp": "abaqus", ".msh": "gmsh"}
 #: Extensions of the files that `write_quads` writes.
@@ -53,8 +50,6 @@ QUAD_FORMATS = (".obj", ".ply", ".glb", ".npz", *_MESHIO)
 _NAMES = ("vertices", "quads", "faces", "barycentric", "surface_vertices", "surface_faces", "report")
 #: Extensions of the files that `write_grid` writes.
 GRID_FORMATS = (".obj", ".npz")
-#: The same check for `write_grid`.
-check_grid_output: Check = partial(checked_target, endings=GRID_FORMATS, what="integer grids are written as")
 #: Names of the arrays of an integer grid.
 _ARRAYS = [field.name for field in fields(IntegerGrid) if str(field.type).endswith("Array")]
 #: Arrays from which a grid is restored.
@@ -72,6 +67,11 @@ def check_quads_output(path: str | PathLike[str]) -> Path:
     if found.suffix.lower() in _MESHIO:
         imported("meshio", "meshes of meshio need meshio", "meshio")
     return found
+
+
+def check_grid_output(path: str | PathLike[str]) -> Path:
+    """Return a path that `write_grid` can write, or raise the same errors in advance."""
+    return checked_target(path, endings=GRID_FORMATS, what="integer grids are written as")
 
 
 def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ... import Flattening, flatten
+from ... import Flattening
 from ...base import THREADS, FloatArray, Stopwatch, limit_threads, plural
 from ...errors import ConvergenceError, CurvatureError, GridError, MetricError, OptionError, SeamError
 from ...flatten import flatten_source
@@ -19,32 +19,20 @@ from ...io import as_input
 from ...layout import StretchEnergy
 from ...measure import unmet_guarantees
 from ...mesh import CheckedMesh
-from ...options import SEARCH_OPTIONS, Options, WordOrVertices, read_options
+from ...options import SEARCH_OPTIONS, Options, read_options
 from ...source import Source
-from .aligned_cones import COARSE, aligned_cones
+from .aligned_cones import aligned_flattening
 from .cross_field import SHARP_ANGLE, sharp_ends
 from .extract import extract_quads
-from .features import edge_indices, split_around, split_chords, split_small_components
+from .features import edge_indices
 from .integer_map import IntegerGrid, joined_grids
-from .layout import GRID_TOLERANCE, GridLayout, aligned, has_area
+from .layout import GridLayout, aligned
 from .lines import grid_with_lines, with_sides
-from .options import DISTORTION, QUADS, QuadOptions
+from .options import DISTORTION, QUADS, QuadOptions, flattening_defaults
 from .quad_mesh import CoarseGridError
 from .round_layout import grid_of, split_between_nodes, with_note
-from .sizes import extended, note_on_sizes, wanted_scales
+from .sizes import note_on_sizes, wanted_scales
 
-# Options of the flattening for a grid: three, five or six quads at a cone, and rotations by quarter turns.
-OPTIONS = {
-    "quantise": np.pi / 2,
-    "correct_handles": True,
-    "charts": "one",
-    "distortion": DISTORTION,
-    "min_cone_angle": QuadOptions.min_cone_angle,
-    "max_cone_angle": QuadOptions.max_cone_angle,
-}
-
-# With fewer quads, cones cost more in proportion.
-QUADS_PER_CONE = 2_000
 # Options that only the search for the fewest cones takes into account.
 SPARSE_OPTIONS = (*SEARCH_OPTIONS, "max_cones", "lengths")
 
@@ -104,35 +92,14 @@ def integer_grid(
     return GridSearch.of(mesh, faces, own, options).grid()
 
 
-def _defaults(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the default options of the flattening for a grid; given cones are not searched for.
-
-    Raises:
-        OptionError: curvatures of given cones are not multiples of pi/2.
-    """
-    given = options.get("cones", "auto")
-    # With straight sides, bounds of cone angles apply to the double of the surface, two copies glued along the
-    # boundary, where a corner of pi/2 is a cone of pi.
-    if isinstance(given, str):
-        return OPTIONS if options.get("boundary") != "straight" else {**OPTIONS, "min_cone_angle": np.pi / 2}
-    parsed = WordOrVertices((), "cone").parse("cones", given)
-    for vertex, curvature in parsed.items() if isinstance(parsed, dict) else ():
-        quarters = np.nan if curvature is None else curvature / (np.pi / 2)
-        if not abs(quarters - np.rint(quarters)) <= GRID_TOLERANCE:
-            raise OptionError(
-                f"cones of a grid must have curvatures that are multiples of pi/2; that of vertex {vertex} is "
-                f"{'not given' if curvature is None else f'{curvature:g}'}"
-            )
-    return {"charts": "one", "quantise": np.pi / 2, "correct_handles": True}
-
-
 @dataclass(frozen=True, eq=False)
 class GridSearch:
     """The search for a grid.
 
     Attributes:
-        mesh: the mesh, or a flattening of it.
-        quads, size: the number of squares; or their side in model units, which replaces it.
+        source: the mesh.
+        result: its flattening, if it is given.
+        size: the side of squares in model units.
         sizes: relative sizes of squares, or None.
         energy: the energy of the grid.
         sharp_angle: the dihedral angle of edges required on grid lines, or None.
@@ -142,9 +109,9 @@ class GridSearch:
         for_quads: search until quads can be extracted from the grid.
     """
 
-    mesh: Source | Flattening
-    quads: float
-    size: float | None
+    source: Source
+    result: Flattening | None
+    size: float
     sizes: Any
     energy: StretchEnergy
     sharp_angle: float | None
@@ -172,15 +139,16 @@ class GridSearch:
         is_auto = isinstance(boundary, str) and boundary == "auto"
         rest = {name: one for name, one in options.items() if name != "boundary"}
         shared = {"sharp_angle": o.sharp_angle, "boundary": "free" if is_auto else boundary}
-        parsed = read_options({**_defaults(options), **rest, **shared}, Options)
+        parsed = read_options({**flattening_defaults(options), **rest, **shared}, Options)
         stages = Stopwatch(parsed.progress)
-        if isinstance(mesh, Flattening):
-            if any(one is not None for one in (faces, sizes, o.sharp_angle)) or options.keys() - {"progress"}:
-                raise OptionError("a flattening already has faces and options: no others can be given")
-        else:
-            mesh = Source(as_input(mesh, faces))
+        result = mesh if isinstance(mesh, Flattening) else None
+        given = any(one is not None for one in (faces, sizes, o.sharp_angle)) or options.keys() - {"progress"}
+        if result and given:
+            raise OptionError("a flattening already has faces and options: no others can be given")
+        source = Source(as_input(*((result.vertices, result.faces) if result else (mesh, faces))))
         energy, boundary = StretchEnergy(o.stretch), "auto" if is_auto else parsed.boundary
-        return cls(mesh, o.quads or QUADS, length, sizes, energy, o.sharp_angle, boundary, rest, stages)
+        found = cls(source, result, length or 1.0, sizes, energy, o.sharp_angle, boundary, rest, stages)
+        return found if length else replace(found, size=found.size_for(o.quads or QUADS))
 
     def grid(self) -> IntegerGrid:
         """Return the grid, with the time of each stage; errors are those of `integer_grid`."""
@@ -193,40 +161,23 @@ class GridSearch:
         This is so where the surface is as thin as a square.
         """
         try:
-            return self._of_any_distortion()
+            return self._as_given()
         except CoarseGridError as error:
-            if tries == 1:
-                raise
-            coarse = error
+            coarse, finer = error, self.size_for(1.6 * error.grid.squares)
+        # A grid of four times as many squares as wanted is not refined: each try repeats the search.
+        if tries == 1 or finer < 0.4 * self.size:
+            raise coarse
         try:
-            found = replace(self, quads=1.6 * coarse.squares, size=None).of_any_size(tries - 1)
+            found = replace(self, size=finer).of_any_size(tries - 1)
         except NO_GRID:
             raise coarse from None
         note = "More quads than wanted: with fewer, some have a vertex or an edge twice."
         return found if note in found.notes else with_note(found, note)
 
-    def _of_any_distortion(self) -> IntegerGrid:
-        """Return a grid, with the fewest cones for less distortion if there is none as given.
-
-        Where few cones leave rotations around handles far from quarter turns, more cones help.
-        """
-        given = self.options
-        is_searched = isinstance(given.get("cones", "auto"), str) and not given.get("cone_count")
-        try:
-            return self._as_given()
-        except (ConvergenceError, GridError) as error:
-            if isinstance(error, CoarseGridError) or isinstance(self.mesh, Flattening) or not is_searched:
-                raise
-        less = 0.7 * given.get("distortion", DISTORTION)
-        other = replace(self, options={**given, "distortion": less})
-        note = f"With a distortion above {less:.3g}, no grid was found."
-        note += " Wanted sizes are not followed." if self.sizes is not None else ""
-        return with_note(other._of_flattening(), note)
-
     def _as_given(self) -> IntegerGrid:
         """Return a grid for the options as given."""
-        if isinstance(self.mesh, Flattening):
-            return self.of_result(self.mesh)
+        if self.result:
+            return self.of_result(self.result)
         if not self._may_align():
             if self.sizes is not None:
                 raise OptionError("sizes cannot be combined with options of cones, boundaries or weights")
@@ -262,21 +213,20 @@ class GridSearch:
         scales = np.zeros(len(mesh.vertices)) if self.scales is None else self.scales
         areas = double_areas(edge_lengths(mesh.vertices, mesh.faces))
         of_face = scales[mesh.faces].mean(axis=1)
-        size = self.size or grow * float(np.sqrt(areas.sum() / 2 / self.quads))
         # Nothing of a component without area can be seen.
         for part, vertices, faces in (each for each in mesh.split_components() if areas[each[2]].any()):
             # The mean of the log scale on the component, relative to that on the whole mesh.
             mean = np.average(of_face[faces], weights=areas[faces]) - np.average(of_face, weights=areas)
             search = replace(
                 self,
-                mesh=Source(as_input(part.moved_to(grow * part.vertices))),
-                size=size * float(np.exp(-mean)),
+                source=Source(as_input(part.moved_to(grow * part.vertices))),
+                size=self.size * float(np.exp(-mean)),
                 sizes=None if self.sizes is None else np.exp(-scales[vertices]),
             )
             try:
                 found.append(search.of_any_size())
-            except CoarseGridError:  # its bad quads are left out
-                found.append(replace(search, for_quads=False).of_any_size())
+            except CoarseGridError as error:  # its bad quads are left out
+                found.append(error.grid)
             except NO_GRID as error:
                 why.append(f"No grid for a component of {plural(len(part.faces), 'triangle')}: {error}.")
         if not found:
@@ -293,39 +243,13 @@ class GridSearch:
     def _of_aligned_cones(self, price_factor: float) -> IntegerGrid:
         """Return a grid of a connected mesh whose cones are chosen for even sizes and its directions.
 
-        price_factor: factor of the price of cones; if above 1, coarse meshes are split, for more places for cones.
+        price_factor: factor of the price of cones.
         """
-        checked, options = self.checked, read_options(self.options, QuadOptions)
-        is_split = price_factor > 1 and 6 * len(checked.mesh.faces) < COARSE
-        mesh = split_around(checked.mesh, checked.mesh.faces) if is_split else checked.mesh
-        mesh, _ = split_chords(split_small_components(mesh))
-        finer, count = split_chords(mesh, sharp_ends(mesh, self._angle))
-        # On coarse meshes these are most edges, and their triangles would get thin.
-        mesh = finer if 20 * count < len(mesh.edges) else mesh
-        bounds = (
-            int(np.ceil((2 * np.pi - (options.max_cone_angle or np.inf)) / (np.pi / 2) - GRID_TOLERANCE)),
-            int(np.floor((2 * np.pi - options.min_cone_angle) / (np.pi / 2) + GRID_TOLERANCE)),
-        )
-        scales = None if self.scales is None else extended(self.scales, mesh)
-        area = float(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum()) / 2
-        quads = area / np.ldexp(self.size, checked.exponent) ** 2 if self.size else self.quads
-        price = price_factor * max(1.0, QUADS_PER_CONE / quads)
-        with self.stages("cones"), limit_threads(options.threads):
-            found = aligned_cones(mesh, options.distortion, *bounds, price, self.sharp_angle, scales)
-        cones = {vertex: quarters * np.pi / 2 for vertex, quarters in found.items()}
-        given = {name: one for name, one in self.options.items() if name not in OPTIONS}
-        given |= {**_defaults({"cones": cones}), "cones": cones}
-        if mesh.is_boundary_edge.any():
-            given["boundary"] = "straight"
-        for splits in range(3):
-            with self.stages("flatten"):
-                result = flatten(np.ldexp(mesh.vertices, -checked.exponent), mesh.faces, **given)
-            # Large cones that are adjacent flip triangles.
-            if splits == 2 or (is_flat := has_area(result)).all():
-                break
-            mesh = split_around(mesh, mesh.faces[~is_flat])
-        grid = self._with_notes(replace(result, notes=(*checked.notes, *result.notes)), True, True)
-        return grid if self.scales is None else with_note(grid, note_on_sizes(grid, self.scales))
+        checked, scales, own = self.checked, self.scales, (self.options, self.stages)
+        quads = (self.size_for(1.0) / self.size) ** 2
+        result = aligned_flattening(checked, quads, *own, price_factor, self.sharp_angle, scales)
+        grid = self.of_result(result, True, True)
+        return grid if scales is None else with_note(grid, note_on_sizes(grid, scales))
 
     def _with_fewest_cones(self) -> IntegerGrid:
         """Return a grid with the fewest cones."""
@@ -334,46 +258,53 @@ class GridSearch:
             return self._of_flattening()
         try:
             return self._of_flattening("straight", all_sides=True)
-        except (CurvatureError, MetricError) as error:
+        except NO_GRID as error:
+            if isinstance(error, CoarseGridError):
+                raise
             why = f"The boundary cuts squares, because no grid with the boundary on grid lines was found: {error}."
-        return with_note(self._of_flattening("free"), why)
+        return with_note(self._of_flattening(), why)
 
     @property
     def checked(self) -> CheckedMesh:
         """The checked mesh, at about unit size."""
         return self.source.checked(bool(self.options.get("repair", False)))
 
+    def size_for(self, quads: float) -> float:
+        """Return the side of squares in model units of which this number has the area of the mesh."""
+        mesh, exponent = self.checked.mesh, self.checked.exponent
+        area = float(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum()) / 2
+        return float(np.ldexp(max(np.sqrt(area / quads), 1e-150), -exponent))
+
     @cached_property
     def scales(self) -> FloatArray | None:
         """(n,) the wanted log scale at the vertices of the checked mesh, if relative sizes are given."""
         return None if self.sizes is None else wanted_scales(self.source, self.checked, self.sizes)
 
-    @property
-    def source(self) -> Source:
-        """The mesh, if no flattening is given."""
-        assert isinstance(self.mesh, Source)
-        return self.mesh
-
-    def _of_flattening(self, boundary: str | None = None, all_sides: bool = False) -> IntegerGrid:
+    def _of_flattening(self, boundary: str = "", all_sides: bool = False) -> IntegerGrid:
         """Return the grid of a flattening with a given boundary, or else the one of the options, by default free.
+
+        Where few cones leave rotations around handles far from quarter turns, more of them for less distortion help.
 
         all_sides: require all straight sides on grid lines.
 
         Raises:
             GridError: there is no grid, or required sides are not on grid lines.
         """
-        own = "free" if self.boundary == "auto" else self.boundary
-        options = {**self.options, "boundary": boundary or own}
-        self.stages.done = 0.0
-        with self.stages("flatten"):
-            result = flatten_source(self.source, read_options({**_defaults(options), **options}))
-        return self._with_notes(result, all_sides)
-
-    def _with_notes(self, result: Flattening, all_sides: bool, sharp_lines: bool = False) -> IntegerGrid:
-        found = self.of_result(result, all_sides, sharp_lines)
-        # Unmet guarantees of the map do not apply to the grid.
-        notes = (note for note in result.notes if note not in unmet_guarantees(result))
-        return replace(found, notes=(*notes, *found.notes))
+        own, note = "free" if self.boundary == "auto" else self.boundary, ""
+        given = {**self.options, "boundary": boundary or own}
+        options = {**flattening_defaults(given), **given}
+        while True:
+            self.stages.done = 0.0
+            try:
+                with self.stages("flatten"):
+                    result = flatten_source(self.source, read_options(options))
+                return with_note(self.of_result(result, all_sides), note)
+            except (ConvergenceError, GridError) as error:
+                is_searched = isinstance(given.get("cones", "auto"), str) and not given.get("cone_count")
+                if note or isinstance(error, CoarseGridError) or not is_searched:
+                    raise
+            options["distortion"] = 0.7 * given.get("distortion", DISTORTION)
+            note = f"With a distortion above {options['distortion']:.3g}, no grid was found."
 
     def of_result(
         self, result: Flattening, all_sides: bool = False, sharp_lines: bool = False
@@ -388,7 +319,7 @@ class GridSearch:
         is_straight = result.settings.get("boundary") == "straight"
         self.stages.done = 1.0
         with self.stages("grid"), limit_threads(result.settings.get("threads", THREADS)):
-            layout = aligned(result, self.quads, self.size, self._angle)
+            layout = aligned(result, self.size, self._angle)
             sided, found, note = with_sides(layout) if is_straight else layout, None, ""
             if sharp_lines or self.sharp_angle is not None:
                 lines = edge_indices(sided.mesh, sharp_ends(sided.mesh, self._angle))
@@ -397,6 +328,10 @@ class GridSearch:
             # Rather than many more squares than wanted, a grid with other cones is searched.
             most = 1 if sharp_lines and self.sharp_angle is None else 4
             found = with_note(found or self._with_sides(layout, sided, all_sides, most), note)
+        if result is not self.result:
+            # Unmet guarantees of the map do not apply to the grid.
+            notes = (note for note in result.notes if note not in unmet_guarantees(result))
+            found = replace(found, notes=(*notes, *found.notes))
         if not self.for_quads:
             return found
         with self.stages("extract"):

@@ -15,7 +15,8 @@ from ...base import BoolArray, FloatArray, IntArray, list_some, plural
 from ...errors import GridError
 from ...geometry import double_areas, edge_lengths, sides_between, signed_double_areas
 from ...mesh import NEXT, PREVIOUS
-from .layout import GRID_TOLERANCE, quarters_around
+from .layout import quarters_around
+from .options import GRID_TOLERANCE
 from .transitions import UNITS
 
 if TYPE_CHECKING:
@@ -89,14 +90,13 @@ class IntegerGrid:
 
     @staticmethod
     def load(path: str | PathLike[str]) -> IntegerGrid:
-        """Return the grid in an .npz or .obj file; see `read_grid`.
+        """Return the grid in an .npz file; see `read_grid`.
 
         Raises:
-            UnknownFormatError: the extension is not .obj or .npz.
-            MeshFileError: the file does not exist, cannot be read, or does not contain a manifold triangle mesh with
-                UVs.
-            MeshError: the mesh has no vertices or faces, or indices of vertices that do not exist.
-            GridError: the UVs are not an integer-grid map: triangles are flipped, or sides of seams do not match.
+            UnknownFormatError: the extension is not .npz.
+            MeshFileError: the file does not exist, cannot be read, or does not contain an integer grid of a manifold
+                triangle mesh.
+            GridError: triangles are flipped, or sides of seams do not match.
         """
         from .files import read_grid
 

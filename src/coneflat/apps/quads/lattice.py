@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -96,11 +96,21 @@ class Lattice:
             return None
         # Products of sparse integer matrices are faster than those of dense ones, which no library accelerates.
         basis = self.basis @ csr_matrix(within.basis)
-        return replace(self, one=self.one + self.basis @ within.one, basis=basis)
+        return Lattice(self.one + self.basis @ within.one, basis, self.gram)
 
-    def reduced(self) -> Lattice:
+    def reduced(self) -> ReducedLattice:
         """Return the same lattice with a nearly orthogonal basis."""
-        return replace(self, basis=self.basis @ self._reduction()[1])
+        change = np.eye(self.basis.shape[1], dtype=np.int64)
+        root = np.ascontiguousarray(scipy.linalg.cholesky(self.basis.T @ self.gram @ self.basis))
+        reduce_basis(root, change)
+        return ReducedLattice(self.one, self.basis @ csr_matrix(change), self.gram, root)
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedLattice(Lattice):
+    """A lattice with a nearly orthogonal basis, and (k, k) the Cholesky factor of the Gram matrix of this basis."""
+
+    root: FloatArray
 
     def nearest(self, place: FloatArray) -> IntArray:
         """Return (d,) the vector nearest to a real vector (d,).
@@ -111,21 +121,11 @@ class Lattice:
         References:
             C. P. Schnorr, M. Euchner, "Lattice basis reduction: improved practical algorithms", 1994.
         """
-        size = self.basis.shape[1]
-        if not size:
+        if not self.basis.shape[1]:
             return self.one
-        root, change = self._reduction()
-        basis = self.basis @ change
-        products = basis.T @ self.gram
-        target = np.linalg.solve(products @ basis, products @ (place - self.one))
-        return self.one + basis @ nearest_point(root, target, MAX_VISITS)
-
-    def _reduction(self) -> tuple[FloatArray, csr_matrix]:
-        """Return the Cholesky factor of the reduced basis' Gram matrix, and (k, k) the change of basis."""
-        change = np.eye(self.basis.shape[1], dtype=np.int64)
-        root = np.ascontiguousarray(scipy.linalg.cholesky(self.basis.T @ self.gram @ self.basis))
-        reduce_basis(root, change)
-        return root, csr_matrix(change)
+        right = self.basis.T @ (self.gram @ (place - self.one))
+        target = scipy.linalg.cho_solve((self.root, False), right)
+        return self.one + self.basis @ nearest_point(self.root, target, MAX_VISITS)
 
 
 @compiled

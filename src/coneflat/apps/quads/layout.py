@@ -27,10 +27,7 @@ from ...linalg import MultiGraph
 from ...mesh import NEXT, PREVIOUS, label_components, label_faces, point_vertices
 from .cross_field import SHARP_ANGLE, complex_sums, halfedge_angles, preferred_directions
 from .features import split_longest
-
-# Tolerance, in radians or squares, for sides to be straight or parallel up to quarter turns, and for points to
-# coincide: far above rounding, far below relevant differences.
-GRID_TOLERANCE = 1e-6
+from .options import GRID_TOLERANCE
 
 
 def _none() -> IntArray:
@@ -128,17 +125,14 @@ class GridLayout:
         return find_chains(self.mesh, self.corners, self.points, self.nodes)
 
 
-def aligned(
-    result: Flattening, quads: float, size: float | None, sharp_angle: float = SHARP_ANGLE
-) -> GridLayout:
+def aligned(result: Flattening, size: float, sharp_angle: float = SHARP_ANGLE) -> GridLayout:
     """Return the layout of a flattening, rotated so that the grid is aligned with creases and boundaries.
 
     Charts are joined at some seams, and a cone of each component is at the origin.
 
     Args:
         result: a flattening with quantised cones.
-        quads: number of unit squares that the layout covers.
-        size: edge length of a square in model units; replaces `quads`.
+        size: edge length of a square in model units.
         sharp_angle: dihedral angle of edges that are creases, radians.
 
     Raises:
@@ -155,7 +149,6 @@ def aligned(
     if bad:
         raise GridError(f"{bad} of {len(flat):,} triangles of the layout are flipped or have no area")
     area = float(double_areas(lengths).sum()) / 2
-    size = size or float(np.sqrt(area / quads))
     scale = np.sqrt(area / size**2 / (flat.sum() / 2))
     points = scale * as_complex(result.uv)
     cones = np.setdiff1d(result.cones, np.flatnonzero(mesh.is_boundary_vertex))

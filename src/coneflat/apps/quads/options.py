@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from numbers import Real
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from ...errors import OptionError
 from ...options import (
     ANGLE,
     ANGLE_OR_NONE,
@@ -30,6 +31,9 @@ QUADS = 10_000
 #: Default bound of the area distortion of the map before areas are evened: those of 90% of the quads then differ by a
 #: factor of two.
 DISTORTION = 0.13
+#: Tolerance, in radians or squares, for sides to be straight or parallel up to quarter turns, and for points to
+#: coincide: far above rounding, far below relevant differences.
+GRID_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -50,7 +54,7 @@ class Sizes(Number):
 class QuadOptions(ConeNumber, ConeBounds, RunOptions):
     """Quads.
 
-    Other options of the flattening, and other defaults, are fixed by `OPTIONS` of `integer_grid`.
+    Other options of the flattening, and other defaults, are `FLATTENING_OPTIONS`.
 
     Attributes:
         quads: Approximate number of quads; 10,000 unless size is given.
@@ -88,3 +92,36 @@ class QuadOptions(ConeNumber, ConeBounds, RunOptions):
     min_cone_angle: float = option(1.5 * math.pi, ANGLE)
     max_cone_angle: float | None = option(3 * math.pi, ANGLE_OR_NONE)
     max_cones: int | None = option(None, COUNT)
+
+
+# Options of the flattening for a grid: three, five or six quads at a cone, and rotations by quarter turns.
+FLATTENING_OPTIONS = {
+    "quantise": math.pi / 2,
+    "correct_handles": True,
+    "charts": "one",
+    "distortion": DISTORTION,
+    "min_cone_angle": QuadOptions.min_cone_angle,
+    "max_cone_angle": QuadOptions.max_cone_angle,
+}
+
+
+def flattening_defaults(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the default options of the flattening for a grid; given cones are not searched for.
+
+    Raises:
+        OptionError: curvatures of given cones are not multiples of pi/2.
+    """
+    given = options.get("cones", "auto")
+    # With straight sides, bounds of cone angles apply to the double of the surface, two copies glued along the
+    # boundary, where a corner of pi/2 is a cone of pi.
+    if isinstance(given, str):
+        corners = {"min_cone_angle": math.pi / 2} if options.get("boundary") == "straight" else {}
+        return FLATTENING_OPTIONS | corners
+    parsed = WordOrVertices((), "cone").parse("cones", given)
+    for vertex, curvature in parsed.items() if isinstance(parsed, dict) else ():
+        if curvature is None or not abs(math.remainder(curvature, math.pi / 2)) <= GRID_TOLERANCE:
+            raise OptionError(
+                f"cones of a grid must have curvatures that are multiples of pi/2; that of vertex {vertex} is "
+                f"{'not given' if curvature is None else f'{curvature:g}'}"
+            )
+    return {"charts": "one", "quantise": math.pi / 2, "correct_handles": True}

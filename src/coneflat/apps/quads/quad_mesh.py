@@ -166,11 +166,11 @@ class QuadMesh:
 
 
 class CoarseGridError(GridError):
-    """A grid is so coarse that its quads are not a mesh; `squares` is the area of the grid."""
+    """A grid is so coarse that its quads are not a mesh."""
 
-    def __init__(self, text: str, squares: float) -> None:
+    def __init__(self, text: str, grid: IntegerGrid) -> None:
         super().__init__(text)
-        self.squares = squares
+        self.grid = grid
 
 
 def opposite_sides(quads: IntArray) -> IntArray:

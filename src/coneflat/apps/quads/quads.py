@@ -8,11 +8,9 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ... import Flattening
 from ...base import Stopwatch, plural
 from ...errors import OptionError
 from ...options import read_options
-from ...source import Source
 from .cross_field import sharp_ends
 from .extract import extract_quads, with_borders
 from .integer_grid import GridSearch
@@ -71,20 +69,20 @@ def quads(
     else:
         search = replace(GridSearch.of(mesh, faces, own, options), for_quads=True)
         stages = search.stages
-        source = mesh.source if isinstance(mesh, Flattening) else search.source.given.source
+        source = search.result.source if search.result else search.source.given.source
         with stages("coarsen"):
             search, small = simplified(search)
         try:
             grid = search.grid()
-        except CoarseGridError:
-            grid = replace(search, for_quads=False).grid()
+        except CoarseGridError as error:
+            grid = error.grid
     stages.done = 1.0
     with stages("extract"):
         found = (search and grid.quad_mesh) or extract_quads(grid, leave_out=search is not None)
         grid = replace(grid, quad_mesh=None)
     found = with_borders(found) if found.left_out else found
     features = grid.features
-    if small is None and search is not None and isinstance(search.mesh, Source):
+    if small is None and search and not search.result:
         has_all = found.surface.components[0] == search.checked.mesh.components[0]
         small = None if has_all else SimplerMesh.of(search)
     with stages("smooth"):

@@ -16,7 +16,7 @@ from ...base import BoolArray, ComplexArray, FloatArray, IntArray, mask_of
 from ...errors import GridError
 from ...geometry import as_complex, as_pairs, cotangent_laplacian, cotangents
 from ...linalg import factorize
-from .lattice import Lattice, integer_solutions
+from .lattice import Lattice, ReducedLattice, integer_solutions
 from .layout import GridLayout
 from .transitions import TURNS, UNITS, Transitions, find_transitions
 
@@ -169,21 +169,22 @@ class Rounding:
         shift = self.stiffness.displacement(given)
         return places(points + as_complex(shift.reshape(-1, 2)), values)
 
-    def _separated(self, lattice: Lattice, angle: float, at_once: int | None) -> IntArray | None:
+    def _separated(self, lattice: ReducedLattice, angle: float, at_once: int | None) -> IntArray | None:
         """Return a near vector of a lattice that separates all cones, and rotates near pairs by less than `angle`.
 
         None if two cones cannot be separated after others.
         """
         while True:  # each round reduces the dimension of the lattice
+            rest: Lattice = lattice
             found = lattice.nearest(self.start)
             if not len(bad := self.pairs.collapsed(found, angle)):
                 return found
             for pair in self.pairs.disjoint(bad)[:at_once].tolist():
-                part = self._separate(pair, lattice)
+                part = self._separate(pair, rest)
                 if part is None and pair == bad[0]:
                     return None
-                lattice = lattice if part is None else part
-            lattice = lattice.reduced()
+                rest = rest if part is None else part
+            lattice = rest.reduced()
 
     def _separate(self, pair: int, lattice: Lattice) -> Lattice | None:
         """Return the part of a lattice where two cones keep their distance along an axis, at least a unit.

@@ -10,7 +10,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from ... import Flattening, TriangleMesh
+from ... import TriangleMesh
 from ...base import BoolArray, IntArray, mask_of, plural
 from ...geometry import angle_defect, coarse_mesh, corner_angles, double_areas, edge_lengths, mollify
 from ...io import as_input
@@ -63,7 +63,7 @@ class SimplerMesh:
         checked, mesh = search.checked, search.checked.mesh
         mesh = mesh.moved_to(np.ldexp(mesh.vertices, -checked.exponent))
         every, none = np.arange(len(mesh.vertices)), np.zeros(len(mesh.faces), dtype=bool)
-        return cls(mesh, every, mesh, none, float(np.ldexp(_side(search), -checked.exponent)))
+        return cls(mesh, every, mesh, none, search.size)
 
     def moved(self, quads: QuadMesh) -> QuadMesh:
         """Return quads of the simpler mesh, or of a refinement of it, on the given mesh.
@@ -132,7 +132,11 @@ class SimplerMesh:
             return quads
         faces, (whole, _) = np.flatnonzero(is_bare[label]), _part(mesh, is_bare[label])
         side = max(self.side, float(np.sqrt(_area(whole) / MAX_SQUARES)))
-        parts = [_few_triangles(part, side) for part, _, _ in whole.split_components()]
+        # For about twice the quads that their areas need: these are less regular.
+        count = 2 / 3 / side**2
+        parts = [
+            coarse_mesh(part, max(16, int(count * _area(part))))[0] for part, _, _ in whole.split_components()
+        ]
         small = without_pillows(joined(parts, np.cumsum([0, *(len(part.vertices) for part in parts)])))
         small = _short_edges(small, 4 * side)[0]
         n, middles = len(small.vertices), small.halfedge_edges.reshape(-1, 3)
@@ -170,9 +174,10 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
     options = {**search.options, "boundary": search.boundary}
     is_simple = all(one is None or isinstance(one, (str, Real)) or callable(one) for one in options.values())
     is_simple &= options.keys() <= declarations(QuadOptions).keys() - {"weights"}
-    if not is_simple or search.sharp_angle is not None or isinstance(search.mesh, Flattening):
+    if not is_simple or search.sharp_angle is not None or search.result:
         return search, None
-    checked, mesh, side = search.checked, search.checked.mesh, _side(search)
+    checked, mesh = search.checked, search.checked.mesh
+    side = max(float(np.ldexp(search.size, checked.exponent)), 1e-150)  # its square does not underflow
     is_kept, walks, is_jagged = _manageable(mesh, side)
     walks, is_jagged = (walks, is_jagged) if search.boundary == "auto" else ([], False)
     part, kept = _part(mesh, is_kept)
@@ -195,7 +200,7 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
     own, whole = kept[some[some < len(kept)]], SimplerMesh.of(search)
     sizes = None if search.scales is None else np.exp(extended(-search.scales[own], simple))
     simple = simple.moved_to(np.ldexp(simple.vertices, -checked.exponent))
-    search = replace(search, mesh=Source(as_input(simple)), sizes=sizes, quads=quads)
+    search = replace(search, source=Source(as_input(simple)), sizes=sizes)
     return search, replace(whole, mesh=simple, kept=own, is_filling=of >= len(part.faces), notes=tuple(notes))
 
 
@@ -243,21 +248,6 @@ def _retriangulated(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntAr
     new, some, of = best
     order = np.argsort(some, kind="stable")
     return TriangleMesh(new.vertices[order], np.argsort(order)[new.faces]), some[order], of
-
-
-def _side(search: GridSearch) -> float:
-    """Return the wanted edge length of quads on the checked mesh; its square does not underflow."""
-    if search.size is None:
-        wanted = np.sqrt(_area(search.checked.mesh) / search.quads)
-    else:
-        wanted = np.ldexp(search.size, search.checked.exponent)
-    return max(float(wanted), 1e-150)
-
-
-def _few_triangles(mesh: TriangleMesh, side: float) -> TriangleMesh:
-    """Return a mesh of 16 triangles or more, for about twice the quads that its area needs: they are less regular."""
-    count = max(16, int(2 * _area(mesh) / side**2 / 3))
-    return coarse_mesh(mesh, count)[0] if len(mesh.faces) > count else mesh
 
 
 def _area(mesh: TriangleMesh) -> float:

@@ -42,9 +42,8 @@ def smooth_quads(quads: QuadMesh, rounds: int = QuadOptions.smooth, features: Ar
         projections", 2012, Section 4.
     """
     rounds = declarations(QuadOptions)["smooth"].kind.parse("rounds", rounds)
-    movable = ~(
-        quads.is_boundary_vertex | is_on_feature(quads, np.asarray(features, dtype=np.int64).reshape(-1, 2))
-    )
+    ends = np.asarray(features, dtype=np.int64).reshape(-1, 2)
+    movable = ~(quads.is_boundary_vertex | is_on_feature(quads, ends))
     surface = Stars.of(quads.surface.vertices, quads.surface.faces)
     points, faces, barycentric = quads.vertices.copy(), quads.faces.copy(), quads.barycentric.copy()
     for _ in range(rounds):

@@ -19,7 +19,8 @@ from ...errors import GridError
 from ...geometry import as_pairs
 from ...layout import SeamChains
 from .cross_field import complex_sums
-from .layout import GRID_TOLERANCE, GridLayout, charts_of, first_points, joining_chains
+from .layout import GridLayout, charts_of, first_points, joining_chains
+from .options import GRID_TOLERANCE
 
 Vectors = TypeVar("Vectors", FloatArray, IntArray)
 

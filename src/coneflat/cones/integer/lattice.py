@@ -135,21 +135,20 @@ class Lattice:
         algorithm in a special order. Members that are rounded to 0 are left out unless they are required.
         """
         model, (quantum, least, most, _) = self.model, self.quanta
-        indices = np.zeros(len(members), dtype=np.int64)
-        is_open = np.ones(len(members), dtype=bool)
+        indices, is_open = np.zeros(len(members), dtype=np.int64), np.ones(len(members), dtype=bool)
         gram, slope = model.gram[np.ix_(members, members)], model.slope[members]
+        best = np.full(len(members), np.nan)
         while is_open.any():
             places, done = np.flatnonzero(is_open), np.flatnonzero(~is_open)
             part = slope[places] + gram[np.ix_(places, done)] @ (quantum * indices[done])
             left = np.nan if self.total is None else quantum * (self.total - indices[done].sum())
             low, high = (np.full(len(part), float(bound * quantum)) for bound in (least, most))
-            curvatures, _, feasible = fit_curvatures(
-                gram[np.ix_(places, places)], part, low, high, float(left)
-            )
+            own = gram[np.ix_(places, places)]
+            best[places], _, feasible = fit_curvatures(own, part, low, high, float(left), best[places])
             if not feasible:
                 return None
-            nearest = np.round(curvatures / quantum)
-            closest = int(np.argmin(np.abs(curvatures / quantum - nearest)))
+            nearest = np.round(best[places] / quantum)
+            closest = int(np.argmin(np.abs(best[places] / quantum - nearest)))
             place, value = places[closest], int(np.clip(nearest[closest], least, most))
             is_open[place] = False
             indices[place] = value if value or place >= len(model.fixed) else 1

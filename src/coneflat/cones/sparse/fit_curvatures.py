@@ -87,16 +87,16 @@ def change_one_by_one(
         free, best, multiplier = best_free(gram, slope, total, state, curvatures)
         # Move towards the best values as far as the bounds allow.
         here = curvatures[free]
-        bound = np.where(best > here, most[free], least[free])
-        is_beyond = (best > most[free]) | (best < least[free])
-        parts = np.ones(len(free))
-        parts[is_beyond] = np.maximum((bound - here)[is_beyond] / (best - here)[is_beyond], 0.0)
+        is_above, is_beyond = best > most[free], (best > most[free]) | (best < least[free])
+        bound, parts = np.where(is_above, most[free], least[free]), np.where(is_beyond, 0.0, 1.0)
+        np.divide(bound - here, best - here, out=parts, where=is_beyond & (best != here))
+        parts = np.maximum(parts, 0.0)  # rounding can leave curvatures beyond a bound
         step = float(parts.min(initial=1.0))
         curvatures[free] += step * (best - here)
         if step < 1.0:
             first = int(parts.argmin())
             blocking = free[first]
-            state[blocking] = 1 if best[first] > here[first] else -1
+            state[blocking] = 1 if is_above[first] else -1
             curvatures[blocking] = bound[first]
             continue
         # Find a variable at a bound whose release lowers the objective.
