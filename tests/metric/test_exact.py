@@ -170,6 +170,9 @@ class TestTwoRoutes:
         inner = flat.twin >= 0
         np.testing.assert_allclose(np.abs(flat.sides[inner]), np.abs(flat.sides[flat.twin[inner]]), rtol=1e-9)
         np.testing.assert_array_equal(flat.twin, intrinsic_triangulation(mesh, lengths_of(mesh)).twin)
+        at_once = exact_metric(mesh, lengths_of(mesh), target, doubled=True)
+        np.testing.assert_allclose(at_once.log_scale, metric.log_scale, atol=1e-9)
+        assert at_once.steps < metric.steps
 
 
 class TestInvariance:

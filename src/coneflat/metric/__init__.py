@@ -3,11 +3,9 @@
 from .exact import ExactMetric, exact_metric
 from .find import find_metric, loop_rotations
 from .linear import linear_flat_metric, scaled_lengths
-from .solve import exact_flat_metric
 
 __all__ = [
     "ExactMetric",
-    "exact_flat_metric",
     "exact_metric",
     "find_metric",
     "linear_flat_metric",

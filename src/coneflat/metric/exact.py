@@ -80,6 +80,7 @@ def exact_metric(
     delaunay: bool = True,
     flipped: tuple[IntrinsicTriangulation, IntArray] | None = None,
     max_steps: int = 200,
+    doubled: bool = False,
 ) -> ExactMetric:
     """Return the metric l_ij exp((phi_i + phi_j) / 2) whose curvature is the target.
 
@@ -102,6 +103,7 @@ def exact_metric(
         flipped: this triangulation and the flipped half-edges, from `intrinsic_delaunay`, if known.
         max_steps: Newton steps after which the best metric so far is returned; counted from 0 again if the surface
             is doubled.
+        doubled: glue the surface to its mirror image at once, as if the solution without it had broken triangles.
 
     Raises:
         ArrayShapeError, NonFiniteError: arrays do not fit the mesh, or lengths are not finite.
@@ -131,7 +133,6 @@ def exact_metric(
         log_scale = plain
     flat_angle = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
     copies = np.where(mesh.is_boundary_vertex, 2.0, 1.0)
-    doubled = False
 
     def solved_from(first: FloatArray) -> tuple[ConformalProblem, State, IntArray, int]:
         """Return the problem, its best state, the mesh vertex of each of its vertices, and the number of steps.
@@ -157,7 +158,7 @@ def exact_metric(
         return problem, state, original, steps
 
     problem, state, original, steps = solved_from(log_scale)
-    if not _is_solved(state, tolerance) and mesh.is_boundary_vertex.any():
+    if not _is_solved(state, tolerance) and mesh.is_boundary_vertex.any() and not doubled:
         doubled = True
         problem, state, original, more = solved_from(log_scale)
         steps += more

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from scipy.sparse import csc_matrix
@@ -31,7 +30,7 @@ from ..mesh.connectivity import TriangleMesh, nearby
 from ..stages import ConeSolution, FlatMetric, MetricSpec, Surface
 from .boundary import BoundaryCurvature, prescribed_boundary, straight_boundary
 from .linear import linear_flat_metric
-from .solve import exact_flat_metric
+from .solve import ExactSolver
 
 # Largest number of steps, and largest error in radians at the end; about six steps are needed for well-placed cones.
 MAX_STEPS, TOLERANCE = 40, 1e-11
@@ -64,21 +63,20 @@ def find_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec, step
     mesh, lengths, quantum = surface.mesh, surface.lengths, spec.quantum
     if spec.method == "linear":
         return linear_flat_metric(mesh, lengths, solution)
-    boundary = _boundary(surface, solution, spec)
+    solver = ExactSolver(mesh, spec, _boundary(surface, solution, spec))
     if quantum is not None:
-        solve = partial(exact_flat_metric, mesh, spec=spec, boundary=boundary)
-        if boundary is None and not spec.keeps_length.any():
+        if solver.boundary is None and not spec.keeps_length.any():
             holonomy = loop_holonomy(mesh, holes=True)
             try:
                 if len(holonomy.loops) > 2 * mesh.genus():
-                    return corrected_flat_metric(lengths, solution, solve, holonomy, quantum)
+                    return corrected_flat_metric(lengths, solution, solver.metric, holonomy, quantum)
             except ConvergenceError:
                 # Triangles cannot be sheared enough; correcting the handles alone may succeed.
                 pass
         if mesh.genus():
-            return corrected_flat_metric(lengths, solution, solve, loop_holonomy(mesh), quantum)
+            return corrected_flat_metric(lengths, solution, solver.metric, loop_holonomy(mesh), quantum)
     delaunay = surface.delaunay if surface.is_reused else surface.known_delaunay
-    return exact_flat_metric(mesh, lengths, solution, spec, boundary, delaunay, steps)
+    return solver.metric(lengths, solution, delaunay, steps)
 
 
 def loop_rotations(surface: Surface, spec: MetricSpec) -> Callable[[ConeSolution], FloatArray] | None:

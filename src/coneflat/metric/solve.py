@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -30,64 +31,119 @@ LENGTH_TOLERANCE = 1e-9
 TOO_SHARP = 0.99 * np.pi
 
 
-def exact_flat_metric(
-    mesh: TriangleMesh,
-    lengths: FloatArray,
-    solution: ConeSolution,
-    spec: MetricSpec,
-    boundary: BoundaryCurvature | None = None,
-    flipped: tuple[IntrinsicTriangulation, IntArray] | None = None,
-    steps: int = 200,
-) -> FlatMetric:
-    """Return the exact discrete conformal metric; the solve starts from the linear solution.
+@dataclass(eq=False)
+class ExactSolver:
+    """A solver for exact discrete conformal metrics of a mesh, of the same boundary and several side lengths or cones.
 
-    Args:
-        mesh: connected.
-        lengths: (m, 3) side lengths, model units.
-        solution: cones, target curvatures and the linear log scale.
+    Attributes:
+        mesh: the connected mesh.
         spec: the options of the metric.
         boundary: prescribed curvature of the boundary; None for a free boundary with phi = 0.
-        flipped: the intrinsic Delaunay triangulation and the half-edges flipped for it, if known.
-        steps: maximum number of Newton steps of each attempt.
-
-    Raises:
-        ConvergenceError: the solve did not reach its tolerance, and `spec` does not accept it.
-        CurvatureError: no metric has the curvatures.
+        is_doubled: a solution needs the surface glued to its mirror image, so this is tried first from then on.
     """
-    # Vertices that keep lengths have phi = 0 even on a boundary of prescribed curvature.
-    is_open = mesh.is_boundary_vertex if boundary is None else spec.keeps_length
-    fixed = is_open.copy()
-    if spec.scale_at_cones:
-        fixed[solution.cones] = True
-    solved, target = _solve(mesh, lengths, solution, boundary, fixed, flipped, steps)
-    if not solved.converged and not (spec.accepts_failure and np.isfinite(solved.residual)):
-        worst = spec.names[solved.worst_vertex]
-        raise ConvergenceError(
-            f"the exact metric did not converge: after {solved.steps} steps the curvature at vertex {worst} is "
-            f"{error_text(solved.residual)}; --method linear needs no convergence, and other cones, --repair or "
-            "remeshing may help"
+
+    mesh: TriangleMesh
+    spec: MetricSpec
+    boundary: BoundaryCurvature | None = None
+    is_doubled: bool = False
+
+    def metric(
+        self,
+        lengths: FloatArray,
+        solution: ConeSolution,
+        flipped: tuple[IntrinsicTriangulation, IntArray] | None = None,
+        steps: int = 200,
+    ) -> FlatMetric:
+        """Return the exact discrete conformal metric; the solve starts from the linear solution.
+
+        Args:
+            lengths: (m, 3) side lengths, model units.
+            solution: cones, target curvatures and the linear log scale.
+            flipped: the intrinsic Delaunay triangulation and the half-edges flipped for it, if known.
+            steps: maximum number of Newton steps of each attempt.
+
+        Raises:
+            ConvergenceError: the solve did not reach its tolerance, and `spec` does not accept it.
+            CurvatureError: no metric has the curvatures.
+        """
+        mesh, spec, boundary = self.mesh, self.spec, self.boundary
+        # Vertices that keep lengths have phi = 0 even on a boundary of prescribed curvature.
+        is_open = mesh.is_boundary_vertex if boundary is None else spec.keeps_length
+        fixed = is_open.copy()
+        if spec.scale_at_cones:
+            fixed[solution.cones] = True
+        solved, target = self._solve(lengths, solution, fixed, flipped, steps)
+        if not solved.converged and not (spec.accepts_failure and np.isfinite(solved.residual)):
+            worst = spec.names[solved.worst_vertex]
+            raise ConvergenceError(
+                f"the exact metric did not converge: after {solved.steps} steps the curvature at vertex {worst} is "
+                f"{error_text(solved.residual)}; --method linear needs no convergence, and other cones, --repair or "
+                "remeshing may help"
+            )
+        triangles, factor = solved.straight(), 1.0
+        if spec.keeps_area:
+            flat = double_areas(solved.triangulation.length.reshape(-1, 3))
+            factor = float(np.sqrt(double_areas(lengths).mean() / flat.mean()))  # the surface may be doubled
+        return FlatMetric(
+            mesh=mesh,
+            lengths=lengths,
+            cones=solution.cones,
+            target=np.where(fixed, solved.curvature, target),
+            log_scale=solved.log_scale,
+            is_open=is_open,
+            is_fixed=spec.keeps_length if boundary is None else mesh.is_boundary_vertex,
+            statistics=SolveStatistics(
+                newton_steps=solved.steps,
+                euclidean_flips=solved.euclidean_flips,
+                ptolemy_flips=solved.ptolemy_flips,
+                residual=solved.residual,
+            ),
+            notes=_length_notes(mesh, lengths, solved, triangles, spec.keeps_length),
+            triangles=triangles,
+        ).scaled(factor)
+
+    def _solve(
+        self,
+        lengths: FloatArray,
+        solution: ConeSolution,
+        fixed: BoolArray,
+        flipped: tuple[IntrinsicTriangulation, IntArray] | None,
+        steps: int,
+    ) -> tuple[ExactMetric, FloatArray]:
+        """Return the metric and its target curvature (n,), which for a round boundary depends on the metric."""
+        known = solution.inverse
+        inverse = known if known is not None and np.array_equal(known.is_zero, fixed) else None
+        mesh, boundary = self.mesh, self.boundary
+        solve_once = partial(
+            exact_metric, mesh, lengths, fixed=fixed, preconditioner=inverse, flipped=flipped, max_steps=steps
         )
-    triangles, factor = solved.straight(), 1.0
-    if spec.keeps_area:
-        flat = double_areas(solved.triangulation.length.reshape(-1, 3))
-        factor = float(np.sqrt(double_areas(lengths).mean() / flat.mean()))  # the surface may be doubled
-    return FlatMetric(
-        mesh=mesh,
-        lengths=lengths,
-        cones=solution.cones,
-        target=np.where(fixed, solved.curvature, target),
-        log_scale=solved.log_scale,
-        is_open=is_open,
-        is_fixed=spec.keeps_length if boundary is None else mesh.is_boundary_vertex,
-        statistics=SolveStatistics(
-            newton_steps=solved.steps,
-            euclidean_flips=solved.euclidean_flips,
-            ptolemy_flips=solved.ptolemy_flips,
-            residual=solved.residual,
-        ),
-        notes=_length_notes(mesh, lengths, solved, triangles, spec.keeps_length),
-        triangles=triangles,
-    ).scaled(factor)
+
+        def solve(target: FloatArray, start: FloatArray) -> ExactMetric:
+            found = solve_once(target, start=start, doubled=self.is_doubled)
+            self.is_doubled = found.doubled
+            return found
+
+        inside = np.where(mesh.is_boundary_vertex, 0.0, solution.target)
+        if boundary is None:
+            return solve(inside, start=solution.log_scale), inside
+        wanted = boundary.target(lengths, solution.log_scale)
+        if _is_too_sharp(boundary, wanted):
+            # With the linear scale, one side makes up nearly all of the boundary, as on a surface of many spikes.
+            wanted = boundary.target(lengths, np.zeros_like(solution.log_scale))
+        solved = solve(inside + wanted, start=solution.log_scale)
+        step = np.where(wanted < 0, HOLE_STEP, 1.0)
+        for _ in range(MAX_ROUNDS if boundary.has_round_loops else 0):
+            change = boundary.target(lengths, solved.log_scale) - wanted
+            if not solved.converged or not (np.abs(change) > ROUND_TOLERANCE * np.abs(wanted)).any():
+                break
+            rounder = wanted + step * change
+            if _is_too_sharp(boundary, rounder):
+                break
+            again = solve(inside + rounder, start=solved.log_scale)
+            if not again.converged:
+                break
+            wanted, solved = rounder, again
+        return solved, inside + wanted
 
 
 def _length_notes(
@@ -113,44 +169,6 @@ def _length_notes(
         f"with relative errors of up to {off.max():.2g}: the triangles there are too coarse for the curvature nearby. "
         "Remesh there, or allow more cones.",
     )
-
-
-def _solve(
-    mesh: TriangleMesh,
-    lengths: FloatArray,
-    solution: ConeSolution,
-    boundary: BoundaryCurvature | None,
-    fixed: BoolArray,
-    flipped: tuple[IntrinsicTriangulation, IntArray] | None,
-    steps: int,
-) -> tuple[ExactMetric, FloatArray]:
-    """Return the metric and its target curvature (n,), which for a round boundary depends on the metric."""
-    known = solution.inverse
-    inverse = known if known is not None and np.array_equal(known.is_zero, fixed) else None
-    solve = partial(
-        exact_metric, mesh, lengths, fixed=fixed, preconditioner=inverse, flipped=flipped, max_steps=steps
-    )
-    inside = np.where(mesh.is_boundary_vertex, 0.0, solution.target)
-    if boundary is None:
-        return solve(inside, start=solution.log_scale), inside
-    wanted = boundary.target(lengths, solution.log_scale)
-    if _is_too_sharp(boundary, wanted):
-        # With the linear scale, one side makes up nearly all of the boundary, as on a surface of many spikes.
-        wanted = boundary.target(lengths, np.zeros_like(solution.log_scale))
-    solved = solve(inside + wanted, start=solution.log_scale)
-    step = np.where(wanted < 0, HOLE_STEP, 1.0)
-    for _ in range(MAX_ROUNDS if boundary.has_round_loops else 0):
-        change = boundary.target(lengths, solved.log_scale) - wanted
-        if not solved.converged or not (np.abs(change) > ROUND_TOLERANCE * np.abs(wanted)).any():
-            break
-        rounder = wanted + step * change
-        if _is_too_sharp(boundary, rounder):
-            break
-        again = solve(inside + rounder, start=solved.log_scale)
-        if not again.converged:
-            break
-        wanted, solved = rounder, again
-    return solved, inside + wanted
 
 
 def _is_too_sharp(boundary: BoundaryCurvature, wanted: FloatArray) -> bool:
