@@ -32,7 +32,7 @@ from coneflat.geometry import (
     edge_lengths,
 )
 from coneflat.mesh.connectivity import TriangleMesh
-from coneflat.metric import exact_flat_metric
+from coneflat.metric.solve import ExactSolver
 from coneflat.stages import MetricSpec, VertexCurvatures
 
 # Vertices of the icosahedron that the sphere is split from, and curvatures that sum to 4 pi.
@@ -64,7 +64,7 @@ def flat_lengths(mesh: TriangleMesh) -> list[np.ndarray]:
         quantum=None,
         names=np.arange(len(mesh.vertices)),
     )
-    metrics = circle_patterns(mesh, lengths, solution), exact_flat_metric(mesh, lengths, solution, spec)
+    metrics = circle_patterns(mesh, lengths, solution), ExactSolver(mesh, spec).metric(lengths, solution)
     found = []
     for metric in metrics:
         assert metric.triangles is not None

@@ -73,7 +73,7 @@ OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 FRONT = ("apps.ahead", "apps.blender", "apps.cli", "apps.studio")
 SHARED = ("apps.quads.nearest",)
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_812, 232, 24_481
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_812, 232, 24_487
 CONSTANTS, KERNELS, NAMES, LEVELS = 293, 84, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
