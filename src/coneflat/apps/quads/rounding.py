@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import bmat, coo_matrix, csc_matrix, csr_matrix, diags, kron
@@ -16,6 +14,8 @@ from ...base import BoolArray, ComplexArray, FloatArray, IntArray, mask_of
 from ...errors import GridError
 from ...geometry import as_complex, as_pairs, cotangent_laplacian, cotangents
 from ...linalg import factorize
+from .cross_field import complex_sums
+from .features import edge_indices
 from .lattice import Lattice, ReducedLattice, integer_solutions
 from .layout import GridLayout
 from .transitions import TURNS, UNITS, Transitions, find_transitions
@@ -154,9 +154,8 @@ class Rounding:
         Raises:
             GridError: cones cannot be separated.
         """
-        size = len(self.start)
-        every = Lattice(np.zeros(size, dtype=np.int64), np.eye(size, dtype=np.int64), self.metric)
-        lattice = every.reduced()
+        units = np.eye(len(self.start), dtype=np.int64)
+        lattice = Lattice(np.zeros_like(self.start, dtype=np.int64), units, self.metric).reduced()
         for attempt in SEPARATIONS:
             found = self._separated(lattice, *attempt)
             if found is not None:
@@ -236,41 +235,31 @@ def _near_pairs(
     layout: GridLayout, transitions: Transitions, basis: IntArray, start: FloatArray
 ) -> ConePairs:
     """Return the vectors between near cones along the shortest edge paths."""
-    mesh, points, cones, (starts, ends) = layout.mesh, layout.points, layout.nodes, layout.ends
+    cones, n, graph = layout.nodes, len(layout.mesh.vertices), layout.graph()
     # Paths start at copies of the cones. None goes on from a cone.
-    n, graph = len(mesh.vertices), layout.graph()
     through = diags(1.0 - mask_of(n, cones)) @ graph
     every = csr_matrix(bmat([[through, None], [graph[cones], csr_matrix((len(cones), len(cones)))]]))
-    found, parents = dijkstra(
+    distance, parents = dijkstra(
         every, indices=n + np.arange(len(cones)), limit=NEAR_CONE_DISTANCE, return_predecessors=True
     )
-    pairs = zip(mesh.tails.tolist(), mesh.heads.tolist(), strict=True)
-    number = {pair: k for k, pair in enumerate(pairs, 1)}.get
-    shift = cache(lambda point: transitions.shifts[2 * point : 2 * point + 2].toarray())
-    entries: list[tuple[IntArray, float, tuple[int, int]]] = []
-
-    def joining(path: list[int]) -> PathVector:
-        sides = [_side(number((a, b), 0), number((b, a), 0), starts, ends) for a, b in pairwise(path)]
-        return _vector(sides, transitions.turn, shift, points)
-
-    for i, j in np.argwhere(np.triu(np.isfinite(found[:, cones]), 1)).tolist():
-        one = joining([int(cones[i]), *_path_to(int(cones[j]), parents[i])[1:]])
-        entries.append((one.rows, -1.0, (i, j)))
-    # Pairs with sides are kept if they face each other: a line crosses both, or they are not nearly collinear. They get
-    # unique indices, so that they count as having no cone in common.
-    for path in _paths_to_sides(layout):
-        one, k = joining(path), -len(entries) - 1
-        for axis in np.flatnonzero(_known_axes(transitions, one) & one.rows.any(axis=1)).tolist():
-            is_facing, own = len(path) == 2 or _is_beside(one, axis, layout), np.arange(2) == axis
-            least_distance = 1e-6 if is_facing else 0.45 * float(np.hypot(*one.place))
-            entries.append((one.rows * own[:, None], least_distance, (k, k)))
-    rows, least, indices = ([pair[i] for pair in entries] for i in range(3))
-    # Products of sparse integer matrices are faster than those of dense ones, which no library accelerates.
-    products = csr_matrix(np.array(rows, dtype=np.int64).reshape(2 * len(rows), len(basis))) @ basis
-    vectors = products.reshape(len(rows), 2, len(start))
+    ends = np.argwhere(np.triu(np.isfinite(distance[:, cones]), 1))
+    paths = [[int(cones[i]), *_path_to(int(cones[j]), parents[i])[1:]] for i, j in ends.tolist()]
+    count, sided = len(paths), _paths_to_sides(layout)
+    found = PathVectors.of(layout, transitions, [*paths, *sided])
+    # Pairs with sides are kept if they face each other: a line crosses both, or they are not nearly collinear. Their
+    # negative indices count as having no cone in common with others.
+    which, axis = np.nonzero(found.known_axes(transitions)[count:])
+    both = which.tolist(), axis.tolist()
+    facing = [len(sided[k]) == 2 or found.is_beside(count + k, i, layout) for k, i in zip(*both, strict=True)]
+    least = np.where(facing, 1e-6, 0.45 * np.abs(found.places[count + which]))
+    # Products of sparse matrices of integers are faster than those of dense ones, which no library accelerates.
+    products = (found.rows @ basis)[np.append(np.arange(count), count + which)]
+    vectors = np.stack([products.real, products.imag], axis=1).astype(np.int64)
+    vectors[count:] *= np.eye(2, dtype=np.int64)[axis][:, :, None]
     before = vectors @ start
-    kept = np.abs(before).max(axis=1) > np.array(least)
-    return ConePairs(vectors[kept], before[kept], np.array(indices, dtype=np.int64).reshape(-1, 2)[kept])
+    kept = np.abs(before).max(axis=1) > np.append(np.full(count, -1.0), least)
+    indices = np.concatenate([ends, -1 - np.stack([which, which], axis=1)])
+    return ConePairs(vectors[kept], before[kept], indices[kept])
 
 
 def _path_to(vertex: int, before: IntArray) -> list[int]:
@@ -279,34 +268,6 @@ def _path_to(vertex: int, before: IntArray) -> list[int]:
     while before[path[-1]] >= 0:
         path.append(int(before[path[-1]]))
     return path[::-1]
-
-
-def _side(forth: int, back: int, starts: IntArray, ends: IntArray) -> tuple[int, int]:
-    """Return the points at the ends of an edge in a triangle at it; half-edges are numbered from 1, 0 for none."""
-    if forth:
-        return int(starts[forth - 1]), int(ends[forth - 1])
-    return int(ends[back - 1]), int(starts[back - 1])
-
-
-def _vector(
-    sides: list[tuple[int, int]], turns: IntArray, shift: Callable[[int], IntArray], points: ComplexArray
-) -> PathVector:
-    """Return the vector along a path, given by the points at the ends of its edges; `shift` gives the rows of a point.
-
-    The positions of vertices on the path cancel: two copies of a vertex, i^turn base + shift each, leave the difference
-    of their shifts in a common frame.
-    """
-
-    turn, total = 0, -shift(sides[0][0])
-    place = points[sides[0][1]] - points[sides[0][0]]
-    for (_, here), (there, end) in pairwise(sides):
-        if here != there:
-            across = int(turns[here] - turns[there]) % 4
-            total = total + TURNS[turn] @ (shift(here) - TURNS[across] @ shift(there))
-            turn = (turn + across) % 4
-        place += UNITS[turn] * (points[end] - points[there])
-    last = total + TURNS[turn] @ shift(sides[-1][1])
-    return PathVector(last, np.array([place.real, place.imag]), sides[0][0], sides[-1][1], turn)
 
 
 def _paths_to_sides(layout: GridLayout) -> list[list[int]]:
@@ -343,37 +304,69 @@ def _paths_to_sides(layout: GridLayout) -> list[list[int]]:
     return [[*_path_to(int(one[k]), before), *_path_to(int(two[k]), before)[::-1]] for k in near[first]]
 
 
-class PathVector(NamedTuple):
-    """The vector between the ends of a path, in the frame of its first edge.
+@dataclass(frozen=True, eq=False)
+class PathVectors:
+    """The vectors between the ends of p paths, each in the frame of its first edge.
 
     Attributes:
-        rows: (2, v) coefficients of the vector in the variables, as far as these determine its ends.
-        place: (2,) the vector in the layout.
-        first, last: the points at the ends.
-        turn: the rotation of the frame of the last edge, in quarter turns.
+        rows: (p, v) coefficients of the vectors, as complex numbers, in the variables, as far as these determine their
+            ends.
+        places: (p,) the vectors in the layout.
+        ends: (p, 2) the points at the ends.
+        turns: (p, 2) the rotations of the frames of the first edge, which is 0, and of the last, in quarter turns.
     """
 
-    rows: IntArray
-    place: FloatArray
-    first: int
-    last: int
-    turn: int
+    rows: csr_matrix
+    places: ComplexArray
+    ends: IntArray
+    turns: IntArray
 
+    @classmethod
+    def of(cls, layout: GridLayout, transitions: Transitions, paths: list[list[int]]) -> PathVectors:
+        """Return the vectors along paths of vertices.
 
-def _is_beside(one: PathVector, axis: int, layout: GridLayout) -> bool:
-    """Return whether a line along an axis crosses both sides, or the side and the cone, at the ends of a vector."""
-    sides, spans = layout.sides, []
-    for point, turn, place in ((one.first, 0, 0 * one.place), (one.last, one.turn, one.place)):
-        side = sides.side[sides.points == point]
-        side = side[sides.axis[side] == (axis + turn) % 2]
-        on = np.append(sides.points[np.isin(sides.side, side)], point)
-        there = as_pairs(UNITS[turn] * (layout.points[on] - layout.points[point])) + place
-        spans.append(there[:, 1 - axis])
-    return bool(max(each.min() for each in spans) <= min(each.max() for each in spans))
+        The positions of vertices on a path cancel: two copies of a vertex, i^turn base + shift each, leave the
+        difference of their shifts in a common frame.
+        """
+        mesh, (starts, ends), count = layout.mesh, layout.ends, len(paths)
+        owner = np.repeat(np.arange(count), [len(path) - 1 for path in paths])
+        pairs = np.array([pair for path in paths for pair in pairwise(path)], dtype=np.int64).reshape(-1, 2)
+        # The points at the ends of each edge, in the triangle on its left if there is one.
+        at, other = mesh.edge_halfedges[edge_indices(mesh, pairs)].T
+        at = np.where((other >= 0) & (mesh.tails[other] == pairs[:, 0]), other, at)
+        is_forth = mesh.tails[at] == pairs[:, 0]
+        one, two = np.where(is_forth, [starts[at], ends[at]], [ends[at], starts[at]])
+        firsts, lasts = (
+            np.flatnonzero(np.diff(owner, prepend=-1)),
+            np.flatnonzero(np.diff(owner, append=count)),
+        )
+        before = np.roll(two, 1)
+        before[firsts] = one[firsts]
+        total = np.cumsum(transitions.turn[before] - transitions.turn[one])
+        turn = (total - total[firsts][owner]) % 4
+        joints = np.flatnonzero(before != one)
+        edges = np.concatenate([firsts, joints - 1, joints, lasts])
+        points = np.concatenate([one[firsts], before[joints], one[joints], two[lasts]])
+        signs = np.repeat([-1, 1, -1, 1], [count, len(joints), len(joints), count])
+        rows = csr_matrix((signs * UNITS[turn[edges]], (owner[edges], points)), (count, len(layout.points)))
+        places = complex_sums(owner, UNITS[turn] * (layout.points[two] - layout.points[one]), count)
+        shifts = transitions.shifts[::2] + 1j * transitions.shifts[1::2]
+        turns = np.stack([turn[firsts], turn[lasts]], axis=1)
+        return cls(rows @ shifts, places, np.stack([one[firsts], two[lasts]], axis=1), turns)
 
+    def known_axes(self, transitions: Transitions) -> BoolArray:
+        """Return (p, 2) whether the variables determine each coordinate of both ends."""
+        is_odd = (transitions.turn[self.ends] + self.turns) % 2 == 1
+        fixed = transitions.fixed[transitions.base[self.ends]]
+        return np.asarray(np.where(is_odd[:, :, None], fixed[:, :, ::-1], fixed).all(axis=1))
 
-def _known_axes(transitions: Transitions, one: PathVector) -> BoolArray:
-    """Return (2,) whether the variables determine each coordinate of both ends of a vector."""
-    turn = transitions.turn[[one.first, one.last]] + [0, one.turn]
-    first, last = transitions.fixed[transitions.base[[one.first, one.last]]]
-    return np.roll(first, turn[0] % 2) & np.roll(last, turn[1] % 2)
+    def is_beside(self, k: int, axis: int, layout: GridLayout) -> bool:
+        """Return whether a line along an axis crosses both sides, or the side and the cone, at the ends of path k."""
+        sides, spans = layout.sides, []
+        for point, turn, place in zip(self.ends[k], self.turns[k], (0.0, self.places[k]), strict=True):
+            side = sides.side[sides.points == point]
+            side = side[sides.axis[side] == (axis + turn) % 2]
+            on = np.append(sides.points[np.isin(sides.side, side)], point)
+            there = as_pairs(UNITS[turn] * (layout.points[on] - layout.points[point]) + place)
+            spans.append(there[:, 1 - axis])
+        return bool(max(each.min() for each in spans) <= min(each.max() for each in spans))
