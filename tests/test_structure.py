@@ -48,7 +48,7 @@ CEILINGS = {
     "atlas": 1352,
     "base": 282,
     "cone_curve": 108,
-    "cones": 2044,
+    "cones": 2045,
     "evaluate": 157,
     "flatten": 221,
     "flattener": 35,
@@ -73,7 +73,7 @@ OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 FRONT = ("apps.ahead", "apps.blender", "apps.cli", "apps.studio")
 SHARED = ("apps.quads.nearest",)
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_812, 232, 24_490
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_813, 232, 24_494
 CONSTANTS, KERNELS, NAMES, LEVELS = 293, 84, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

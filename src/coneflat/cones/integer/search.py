@@ -253,7 +253,9 @@ def search_coarse(search: ConeSearch, lattice: Lattice, goal: float, most: int) 
     most = min(most + 1, search.most_cones)
     model.climb(goal / COARSE_MODEL_ERROR, most)
     for found in model.best:
-        _offer(lattice, lattice.rounded(found.members))
+        # Of many sizes, fewer are rounded: growing finds the others.
+        if len(found) % max(1, len(found) // 32) == 0:
+            _offer(lattice, lattice.rounded(found.members))
     if not best.sizes:
         start = lattice.initial_cones(fewest)
         if start is None:
