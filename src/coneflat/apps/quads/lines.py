@@ -54,12 +54,13 @@ def grid_with_lines(
         lined = _with_lines(layout, edges, off)
         if not len(lined.edges):
             break
-        rounding = find_rounding(lined.layout)
+        rounding = find_rounding(lined.layout, None if is_required else 2)
         costs, is_folded = lined.costs(layout, rounding.displaced(rounding.basis @ rounding.start))
         # Each failure lowers the bound, so that the attempts end soon; those for preferred edges sooner.
-        is_bad = costs >= (0.5 ** (1 + attempt / 4) if is_required else 0.1) * costs.max()
-        if not is_required and costs.max() > MAX_COST * np.sqrt(layout.area):
-            is_bad = costs > MAX_COST * np.sqrt(layout.area)
+        bound = 0.5 ** (1 + attempt / 4) * costs.max() if is_required else np.median(costs)
+        most = np.inf if is_required else MAX_COST * np.sqrt(layout.area)
+        if costs.max() > most:
+            bound = 0.7**attempt * most
         elif not is_folded or (is_required and attempt == 0):
             try:
                 found = grid_about(rounding, energy, 0)
@@ -68,9 +69,8 @@ def grid_with_lines(
                 why, found = f"squares would be {found.squares:,.0f}, not {layout.area:,.0f}", None
             except GridError as error:
                 why = str(error)
-        edges = _long_chains(layout, lined.edges[~is_bad[lined.chain]])
-    if found is not None:
-        found = replace(found, features=mesh.edges[lined.edges])
+        edges = _long_chains(layout, lined.edges[costs[lined.chain] < bound])
+    found = found and replace(found, features=mesh.edges[lined.edges])
     left = np.setdiff1d(sharp, lined.edges) if found else sharp
     if not is_required or not len(left):
         return found, "There are no sharp edges." if is_required and not len(sharp) else ""

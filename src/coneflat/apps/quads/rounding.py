@@ -49,14 +49,12 @@ class Stiffness:
 
     def gram(self, basis: IntArray) -> FloatArray:
         """Return (d, d) the Gram matrix of the columns of a basis (v, d) in the energy."""
-        count = basis.shape[1]
-        gram = np.zeros((count, count))
-        pulls = self.pulls(basis)
-        for start in range(0, count, 16):
+        gram, pulls = np.zeros((basis.shape[1],) * 2), self.pulls(basis)
+        for start in range(0, len(gram), 16):
             block = slice(start, start + 16)
             gram[:, block] = pulls.T @ self.displacement(self._shifts @ basis[:, block].astype(np.float64))
         # Changes without energy need a positive value too, so that the energy is a metric.
-        return (gram + gram.T) / 2 + 1e-10 * max(float(np.trace(gram)), 1.0) * np.eye(count)
+        return (gram + gram.T) / 2 + 1e-10 * max(float(np.trace(gram)), 1.0) * np.eye(len(gram))
 
     def pulls(self, basis: IntArray) -> csr_matrix:
         """Return (2u, d) the matrix whose products with displacements are derivatives of the energy by coordinates."""
@@ -130,6 +128,7 @@ class Rounding:
         stiffness: the energy that gives the metric.
         layout: the smooth layout.
         transitions: its seams and sides.
+        attempts: how many attempts to separate cones are made.
     """
 
     basis: IntArray
@@ -138,6 +137,7 @@ class Rounding:
     stiffness: Stiffness
     layout: GridLayout
     transitions: Transitions
+    attempts: int | None
 
     def scaled(self, factor: float) -> Rounding:
         """Return the rounding of the layout with the number of squares multiplied by a factor."""
@@ -156,7 +156,7 @@ class Rounding:
         """
         units = np.eye(len(self.start), dtype=np.int64)
         lattice = Lattice(np.zeros_like(self.start, dtype=np.int64), units, self.metric).reduced()
-        for attempt in SEPARATIONS:
+        for attempt in SEPARATIONS[: self.attempts]:
             found = self._separated(lattice, *attempt)
             if found is not None:
                 return np.asarray(self.basis @ found)
@@ -209,8 +209,10 @@ class Rounding:
         return None
 
 
-def find_rounding(layout: GridLayout) -> Rounding:
+def find_rounding(layout: GridLayout, attempts: int | None = None) -> Rounding:
     """Return the lattice to which the translations and cones of a layout must be rounded.
+
+    attempts: how many attempts to separate cones it makes; None for all.
 
     Raises:
         SeamError: the sides of a seam are not congruent.
@@ -228,7 +230,7 @@ def find_rounding(layout: GridLayout) -> Rounding:
     given = as_pairs(transitions.places(layout.points, basis @ start) - layout.points).reshape(-1, 1)
     shift = stiffness.displacement(given)
     start -= np.linalg.solve(metric, (stiffness.pulls(basis).T @ shift)[:, 0])
-    return Rounding(basis, start, metric, stiffness, layout, transitions)
+    return Rounding(basis, start, metric, stiffness, layout, transitions, attempts)
 
 
 def _near_pairs(
