@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from spheres import cones_on, lengths_of, random_sphere
@@ -84,4 +86,7 @@ def test_conjugate_gradients_tell_what_they_cannot_solve():
     solution = conjugate_gradients(laplacian, right, inverse, 1e-10)
     assert laplacian @ solution == pytest.approx(right, abs=1e-9)
     assert conjugate_gradients(laplacian, np.full(60, np.nan), inverse, 1e-10) is None
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert conjugate_gradients(1e200 * laplacian, 1e300 * right, inverse, 1e-10) is None
     assert conjugate_gradients(laplacian, right, inverse_of(mesh, 5, False)[0], 1e-10) is None

@@ -129,8 +129,7 @@ def exact_metric(
         raise NonFiniteError(f"fixed_log_scale is NaN or infinite at {_at(bad)}")
 
     plain = np.where(fixed, log_scale, 0.0)
-    if not np.ptp(log_scale) <= MAX_RANGE:
-        log_scale = plain
+    log_scale = log_scale if np.ptp(log_scale) <= MAX_RANGE else plain
     flat_angle = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
     copies = np.where(mesh.is_boundary_vertex, 2.0, 1.0)
 

@@ -253,6 +253,7 @@ def corrected(inverse: LaplacianInverse, matrix: csc_matrix, fixed: BoolArray) -
     return replace(inverse, solve=solve)
 
 
+@np.errstate(all="ignore")  # broken triangles can make numbers overflow; the solution is not finite then
 def conjugate_gradients(
     matrix: csc_matrix, right: FloatArray, inverse: LaplacianInverse, accuracy: float
 ) -> FloatArray | None:
