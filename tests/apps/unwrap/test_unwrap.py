@@ -52,7 +52,7 @@ def test_the_exact_metric_need_not_converge(shape, monkeypatch):
     def diverge(*_):
         raise errors.ConvergenceError("the exact metric did not converge")
 
-    monkeypatch.setattr(import_module("coneflat.metric.find"), "exact_flat_metric", diverge)
+    monkeypatch.setattr("coneflat.metric.solve.ExactSolver.metric", diverge)
     with pytest.raises(errors.ConvergenceError):
         coneflat.flatten(*shape)
     d = unwrap(*shape).distortion
