@@ -116,7 +116,8 @@ def corrected_flat_metric(
     """Return a flat metric with the cones of a solution whose holonomy along loops is a multiple of a quantum.
 
     For each loop there is a change of edge lengths of least shear that rotates this loop and no other. Large changes
-    are made in steps. Broyden's method is used for the last steps, on the few rotation angles.
+    are made in steps, unless more are needed than are left. Broyden's method is used for the last steps, on the few
+    rotation angles.
 
     Args:
         lengths: (m, 3) side lengths.
@@ -126,7 +127,7 @@ def corrected_flat_metric(
         quantum: radians.
 
     Raises:
-        ConvergenceError: the rotations did not converge to multiples of the quantum.
+        ConvergenceError: the rotations did not converge to multiples of the quantum, or need too many steps.
     """
     mesh, given, changes, errors = holonomy.mesh, lengths, None, list[float]()
     off, inverse, step = np.empty(0), np.empty((0, 0)), np.empty(0)

@@ -39,7 +39,7 @@ class ExactSolver:
         mesh: the connected mesh.
         spec: the options of the metric.
         boundary: prescribed curvature of the boundary; None for a free boundary with phi = 0.
-        is_doubled: a solution needs the surface glued to its mirror image, so this is tried first from then on.
+        is_doubled: an earlier solve glued the surface to its mirror image, so that later ones begin so.
     """
 
     mesh: TriangleMesh

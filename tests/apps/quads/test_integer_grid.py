@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib import import_module
 
 import numpy as np
 import pytest
@@ -18,7 +17,6 @@ from coneflat.apps.quads.lines import with_sides
 from coneflat.apps.quads.round_layout import split_between_nodes
 from coneflat.apps.quads.rounding import find_rounding
 from coneflat.apps.quads.transitions import find_transitions
-from coneflat.flatten import flatten_source
 from coneflat.geometry import edge_lengths
 from coneflat.mesh.connectivity import TriangleMesh
 
@@ -184,24 +182,6 @@ def test_a_note_says_what_cones_are_not_chosen_for(monkeypatch):
     assert f"{note}: no place for them." in integer_grid(*shapes.sphere(3), quads=300).notes
 
 
-def test_more_cones_are_tried_where_a_grid_is_not_found(monkeypatch):
-    module, tried = import_module("coneflat.apps.quads.integer_grid"), []
-
-    def failing(source, options):
-        tried.append(options.distortion)
-        if len(tried) < 2:
-            raise errors.ConvergenceError("rotations did not reach multiples")
-        return flatten_source(source, options)
-
-    monkeypatch.setattr(module, "flatten_source", failing)
-    grid = integer_grid(*shapes.sphere(3), quads=300, distortion=0.1, cones="sparse")
-    assert tried == pytest.approx([0.1, 0.07])
-    assert "With a distortion above 0.07, no grid was found." in grid.notes
-    tried.clear()
-    with pytest.raises(errors.ConvergenceError):
-        integer_grid(*shapes.sphere(3), quads=300, distortion=0.1, cone_count=8)
-
-
 def test_numbering_changes_nothing():
     vertices, faces = shapes.sphere(3)
     shuffled, turned, new = shapes.renumber(vertices, faces)
@@ -251,6 +231,25 @@ def test_charts_stay_joined_where_edges_between_them_are_split(shared, distortio
     assert len(split.mesh.faces) > len(layout.mesh.faces)
     transitions = find_transitions(split)
     np.testing.assert_allclose(transitions.equations @ transitions.values, 0, atol=1e-9)
+
+
+def test_the_number_of_squares_is_that_in_given_side_lengths():
+    vertices, faces = shapes.grid(8, 8)
+    options = {"lengths": 3 * edge_lengths(vertices, faces), "boundary": "straight"}
+    grid = integer_grid(vertices, faces, quads=64, **options)
+    assert grid.squares == pytest.approx(64)
+    flat = flatten(vertices, faces, charts="one", min_cone_angle=np.pi / 2, quantise=np.pi / 2, **options)
+    assert integer_grid(flat, quads=64).squares == pytest.approx(64)
+    assert integer_grid(flat, size=grid.size).squares == pytest.approx(64)
+
+
+@pytest.mark.parametrize(
+    ("scale", "size"), [(1e100, 1e-60), (1e-150, 1e60), (1e-250, 1e-60), (1e-250, 1e60), (1, 1e300)]
+)
+def test_sizes_far_from_that_of_the_mesh_are_refused(scale, size):
+    vertices, faces = shapes.grid(8, 8)
+    with pytest.raises(errors.GridError):
+        integer_grid(scale * vertices, faces, size=size)
 
 
 def test_given_side_lengths_are_those_of_the_grid():

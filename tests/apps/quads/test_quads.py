@@ -27,6 +27,7 @@ from shapes import grid as rectangle
 import coneflat
 from coneflat.apps.quads.extract import extract_quads
 from coneflat.apps.quads.integer_grid import GridSearch
+from coneflat.apps.quads.layout import aligned
 from coneflat.apps.quads.nearest import surface_distances
 from coneflat.apps.quads.quad_mesh import CoarseGridError, degenerate_quads, least_jacobians
 from coneflat.apps.quads.quality import measure_quads
@@ -250,9 +251,10 @@ def test_quads_that_meet_themselves_are_made_smaller():
 
 def test_bad_quads_are_left_out_where_no_finer_grid_is_found(monkeypatch):
     options = {"quads": 10, "cones": "sparse", "distortion": 0.2}
-    search = GridSearch._as_given
+    search, tried = GridSearch._as_given, []
 
     def fail_if_finer(self):
+        tried.append(self.size)
         if self.size < wanted:
             raise GridError("none")
         return search(self)
@@ -262,6 +264,44 @@ def test_bad_quads_are_left_out_where_no_finer_grid_is_found(monkeypatch):
     mesh = coneflat.quads(*shapes.genus(3), **options)
     assert any("Left out" in note for note in mesh.notes)
     assert not any("More quads than wanted" in note for note in mesh.notes)
+    assert tried[0] == wanted > tried[1]
+    assert mesh.grid.seconds.keys() >= {"flatten", "grid"}
+
+
+def test_a_large_grid_that_is_much_finer_than_wanted_is_not_refined(monkeypatch):
+    tried, extract = [], extract_quads
+
+    def fail_at_first(grid):
+        tried.append(grid.squares)
+        if len(tried) < 3:
+            raise CoarseGridError("too coarse", grid)
+        return extract(grid)
+
+    monkeypatch.setattr("coneflat.apps.quads.integer_grid.extract_quads", fail_at_first)
+    options = {"cones": "sparse", "quads": 2000}
+    assert coneflat.quads(*shapes.sphere(3), **options).left_out == 0
+    assert len(tried) == 3
+    tried.clear()
+    monkeypatch.setattr(
+        "coneflat.apps.quads.integer_grid.aligned", lambda it, size, angle: aligned(it, size / 3, angle)
+    )
+    coneflat.quads(*shapes.sphere(3), **options)
+    assert len(tried) == 1
+
+
+def test_grids_whose_bad_quads_are_left_out_keep_all_notes(monkeypatch):
+    """The first grid, of aligned cones, is taken, not that of the fewest cones."""
+
+    def fail(grid):
+        raise CoarseGridError("too coarse", grid)
+
+    monkeypatch.setattr("coneflat.apps.quads.integer_grid.extract_quads", fail)
+    sizes = np.linspace(1, 2, len(shapes.sphere(3)[0]))
+    aligned_ones, graded = (coneflat.quads(*shapes.sphere(3), quads=200, size=size) for size in (None, sizes))
+    assert not any("Cones are not chosen" in note for note in aligned_ones.notes)
+    assert any("Sizes of quads have a correlation" in note for note in graded.notes)
+    monkeypatch.setattr(GridSearch, "_of_aligned_cones", lambda *_: (_ for _ in ()).throw(GridError("none")))
+    assert any("Cones are not chosen" in note for note in coneflat.quads(*shapes.sphere(3), quads=200).notes)
 
 
 def test_a_thin_component_does_not_make_the_others_finer(monkeypatch):

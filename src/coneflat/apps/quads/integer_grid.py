@@ -28,7 +28,7 @@ from .features import edge_indices
 from .integer_map import IntegerGrid, joined_grids
 from .layout import GridLayout, aligned
 from .lines import grid_with_lines, with_sides
-from .options import DISTORTION, QUADS, QuadOptions, flattening_defaults
+from .options import QUADS, QuadOptions, flattening_defaults
 from .quad_mesh import CoarseGridError
 from .round_layout import grid_of, split_between_nodes, with_note
 from .sizes import note_on_sizes, wanted_scales
@@ -131,14 +131,12 @@ class GridSearch:
             MeshError, MeshFileError: the mesh cannot be read.
         """
         o = read_options(own, QuadOptions)
-        # Lengths beyond the range of coordinates, whose squares would overflow, fail as those at its ends.
-        length, sizes = (min(max(o.size, 1e-75), 1e75), None) if isinstance(o.size, float) else (None, o.size)
+        length, sizes = (o.size, None) if isinstance(o.size, float) else (None, o.size)
         if o.quads is not None and length is not None:
             raise OptionError("quads and size must not be given together")
-        boundary = options.get("boundary", "auto")
-        is_auto = isinstance(boundary, str) and boundary == "auto"
+        is_auto = str(options.get("boundary", "auto")) == "auto"
         rest = {name: one for name, one in options.items() if name != "boundary"}
-        shared = {"sharp_angle": o.sharp_angle, "boundary": "free" if is_auto else boundary}
+        shared = {"sharp_angle": o.sharp_angle, "boundary": "free" if is_auto else options["boundary"]}
         parsed = read_options({**flattening_defaults(options), **rest, **shared}, Options)
         stages = Stopwatch(parsed.progress)
         result = mesh if isinstance(mesh, Flattening) else None
@@ -147,8 +145,10 @@ class GridSearch:
             raise OptionError("a flattening already has faces and options: no others can be given")
         source = Source(as_input(*((result.vertices, result.faces) if result else (mesh, faces))))
         energy, boundary = StretchEnergy(o.stretch), "auto" if is_auto else parsed.boundary
-        found = cls(source, result, length or 1.0, sizes, energy, o.sharp_angle, boundary, rest, stages)
-        return found if length else replace(found, size=found.size_for(o.quads or QUADS))
+        found = cls(source, result, 1.0, sizes, energy, o.sharp_angle, boundary, rest, stages)
+        size = length or found.extent / float(np.sqrt(o.quads or QUADS))
+        # Sizes beyond this range, whose squares could overflow, fail as those at its ends.
+        return replace(found, size=min(max(size, 1e-75 * found.extent), 1e75 * found.extent))
 
     def grid(self) -> IntegerGrid:
         """Return the grid, with the time of each stage; errors are those of `integer_grid`."""
@@ -158,14 +158,18 @@ class GridSearch:
     def of_any_size(self, tries: int = 3) -> IntegerGrid:
         """Return a grid, with more squares if some quads of one of the wanted size have a vertex or an edge twice.
 
-        This is so where the surface is as thin as a square.
+        This is so where the surface is as thin as a square. A grid of more than 1,000 squares, and four times as many
+        as wanted, is not refined, since each try repeats the search.
+
+        Raises:
+            CoarseGridError: none was found, with the grid of the wanted size.
         """
         try:
             return self._as_given()
         except CoarseGridError as error:
-            coarse, finer = error, self.size_for(1.6 * error.grid.squares)
-        # A grid of four times as many squares as wanted is not refined: each try repeats the search.
-        if tries == 1 or finer < 0.4 * self.size:
+            coarse, squares = error, error.grid.squares
+        finer = self.extent / float(np.sqrt(max(1.6 * squares, 32.0)))
+        if tries == 1 or (squares > 1000 and finer < 0.4 * self.size):
             raise coarse
         try:
             found = replace(self, size=finer).of_any_size(tries - 1)
@@ -185,6 +189,7 @@ class GridSearch:
         if self.checked.mesh.components[0] > 1:
             return self._of_components()
         what = "the boundary, sharp edges or curvature" + ", nor for wanted sizes" * (self.sizes is not None)
+        failed = list[Exception]()
         # Where cones cost more, others are found, for which there may be a grid.
         for price_factor in (1.0, 4.0):
             try:
@@ -192,12 +197,15 @@ class GridSearch:
             except NO_GRID as error:
                 if isinstance(error, CoarseGridError) and self.sizes is not None:
                     raise
-                why = error
+                failed.append(error)
             # Others hardly ever help then, and each metric takes long.
-            if isinstance(why, ConvergenceError):
+            if isinstance(failed[-1], ConvergenceError):
                 break
-        note = f"Cones are not chosen for {what}, because no grid with such cones was found: {why}."
-        return with_note(self._of_flattening(), note)
+        note = f"Cones are not chosen for {what}, because no grid with such cones was found: {failed[-1]}."
+        try:
+            return self._of_flattening(note=note)
+        except NO_GRID as error:
+            raise next((one for one in failed if isinstance(one, CoarseGridError)), error) from None
 
     def _of_components(self) -> IntegerGrid:
         """Return the grid of the components, each with a search of its own.
@@ -246,10 +254,9 @@ class GridSearch:
         price_factor: factor of the price of cones.
         """
         checked, scales, own = self.checked, self.scales, (self.options, self.stages)
-        quads = (self.size_for(1.0) / self.size) ** 2
+        quads = (self.extent / self.size) ** 2
         result = aligned_flattening(checked, quads, *own, price_factor, self.sharp_angle, scales)
-        grid = self.of_result(result, True, True)
-        return grid if scales is None else with_note(grid, note_on_sizes(grid, scales))
+        return self.of_result(result, True, True)
 
     def _with_fewest_cones(self) -> IntegerGrid:
         """Return a grid with the fewest cones."""
@@ -262,76 +269,78 @@ class GridSearch:
             if isinstance(error, CoarseGridError):
                 raise
             why = f"The boundary cuts squares, because no grid with the boundary on grid lines was found: {error}."
-        return with_note(self._of_flattening(), why)
+        return self._of_flattening(note=why)
 
     @property
     def checked(self) -> CheckedMesh:
         """The checked mesh, at about unit size."""
         return self.source.checked(bool(self.options.get("repair", False)))
 
-    def size_for(self, quads: float) -> float:
-        """Return the side of squares in model units of which this number has the area of the mesh."""
-        mesh, exponent = self.checked.mesh, self.checked.exponent
-        area = float(double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum()) / 2
-        return float(np.ldexp(max(np.sqrt(area / quads), 1e-150), -exponent))
+    @property
+    def extent(self) -> float:
+        """The root of the area of the mesh, in model units."""
+        checked, given = self.checked, self.result.lengths if self.result else self.options.get("lengths")
+        options = read_options({"lengths": given, "repair": self.options.get("repair", False)}, Options)
+        own = None if given is None else self.source.prepared(options).own_lengths
+        lengths = edge_lengths(checked.mesh.vertices, checked.mesh.faces) if own is None else own
+        return float(np.ldexp(max(np.sqrt(double_areas(lengths).sum() / 2), 1e-150), -checked.exponent))
 
     @cached_property
     def scales(self) -> FloatArray | None:
         """(n,) the wanted log scale at the vertices of the checked mesh, if relative sizes are given."""
         return None if self.sizes is None else wanted_scales(self.source, self.checked, self.sizes)
 
-    def _of_flattening(self, boundary: str = "", all_sides: bool = False) -> IntegerGrid:
+    def _of_flattening(self, boundary: str = "", all_sides: bool = False, note: str = "") -> IntegerGrid:
         """Return the grid of a flattening with a given boundary, or else the one of the options, by default free.
 
-        Where few cones leave rotations around handles far from quarter turns, more of them for less distortion help.
-
-        all_sides: require all straight sides on grid lines.
+        Args:
+            boundary: the boundary, or "".
+            all_sides: require all straight sides on grid lines.
+            note: a further note, or "".
 
         Raises:
             GridError: there is no grid, or required sides are not on grid lines.
         """
-        own, note = "free" if self.boundary == "auto" else self.boundary, ""
+        own = "free" if self.boundary == "auto" else self.boundary
         given = {**self.options, "boundary": boundary or own}
-        options = {**flattening_defaults(given), **given}
-        while True:
-            self.stages.done = 0.0
-            try:
-                with self.stages("flatten"):
-                    result = flatten_source(self.source, read_options(options))
-                return with_note(self.of_result(result, all_sides), note)
-            except (ConvergenceError, GridError) as error:
-                is_searched = isinstance(given.get("cones", "auto"), str) and not given.get("cone_count")
-                if note or isinstance(error, CoarseGridError) or not is_searched:
-                    raise
-            options["distortion"] = 0.7 * given.get("distortion", DISTORTION)
-            note = f"With a distortion above {options['distortion']:.3g}, no grid was found."
+        self.stages.done = 0.0
+        with self.stages("flatten"):
+            result = flatten_source(self.source, read_options({**flattening_defaults(given), **given}))
+        return self.of_result(result, all_sides, note=note)
 
     def of_result(
-        self, result: Flattening, all_sides: bool = False, sharp_lines: bool = False
+        self, result: Flattening, all_sides: bool = False, is_aligned: bool = False, note: str = ""
     ) -> IntegerGrid:
         """Return the grid of a flattening.
 
         Args:
             result: the flattening.
             all_sides: require all straight sides on grid lines.
-            sharp_lines: put sharp edges that are nearly along the axes on grid lines, if possible.
+            is_aligned: its cones were chosen for its directions: sharp edges that are nearly along the axes are put on
+                grid lines, if possible.
+            note: a further note, or "".
+
+        Raises:
+            CoarseGridError: no quads can be extracted, if they are wanted; its grid has all notes.
         """
         is_straight = result.settings.get("boundary") == "straight"
         self.stages.done = 1.0
         with self.stages("grid"), limit_threads(result.settings.get("threads", THREADS)):
             layout = aligned(result, self.size, self._angle)
-            sided, found, note = with_sides(layout) if is_straight else layout, None, ""
-            if sharp_lines or self.sharp_angle is not None:
+            sided, found, left = with_sides(layout) if is_straight else layout, None, ""
+            if is_aligned or self.sharp_angle is not None:
                 lines = edge_indices(sided.mesh, sharp_ends(sided.mesh, self._angle))
                 split = split_between_nodes(sided, lines)
-                found, note = grid_with_lines(split, self._angle, self.sharp_angle is not None, self.energy)
+                found, left = grid_with_lines(split, self._angle, self.sharp_angle is not None, self.energy)
             # Rather than many more squares than wanted, a grid with other cones is searched.
-            most = 1 if sharp_lines and self.sharp_angle is None else 4
-            found = with_note(found or self._with_sides(layout, sided, all_sides, most), note)
+            most = 1 if is_aligned and self.sharp_angle is None else 4
+            found = with_note(found or self._with_sides(layout, sided, all_sides, most), left)
         if result is not self.result:
             # Unmet guarantees of the map do not apply to the grid.
             notes = (note for note in result.notes if note not in unmet_guarantees(result))
-            found = replace(found, notes=(*notes, *found.notes))
+            found = with_note(replace(found, notes=(*notes, *found.notes)), note)
+        if is_aligned and self.scales is not None:
+            found = with_note(found, note_on_sizes(found, self.scales))
         if not self.for_quads:
             return found
         with self.stages("extract"):

@@ -56,7 +56,8 @@ def grid_with_lines(
             break
         rounding = find_rounding(lined.layout, None if is_required else 2)
         costs, is_folded = lined.costs(layout, rounding.displaced(rounding.basis @ rounding.start))
-        # Each failure lowers the bound, so that the attempts end soon; those for preferred edges sooner.
+        # Each failure leaves out the costliest chains: of preferred edges half of them, or those above a bound that
+        # decreases so that the attempts end; of required ones fewer.
         bound = 0.5 ** (1 + attempt / 4) * costs.max() if is_required else np.median(costs)
         most = np.inf if is_required else MAX_COST * np.sqrt(layout.area)
         if costs.max() > most:

@@ -54,7 +54,7 @@ class Sizes(Number):
 class QuadOptions(ConeNumber, ConeBounds, RunOptions):
     """Quads.
 
-    Other options of the flattening, and other defaults, are `FLATTENING_OPTIONS`.
+    Options that are fixed for a grid, and defaults that differ from those of `flatten`, are in `FLATTENING_OPTIONS`.
 
     Attributes:
         quads: Approximate number of quads; 10,000 unless size is given.
@@ -94,7 +94,7 @@ class QuadOptions(ConeNumber, ConeBounds, RunOptions):
     max_cones: int | None = option(None, COUNT)
 
 
-# Options of the flattening for a grid: three, five or six quads at a cone, and rotations by quarter turns.
+#: Options of the flattening for a grid: three, five or six quads at a cone, and rotations by quarter turns.
 FLATTENING_OPTIONS = {
     "quantise": math.pi / 2,
     "correct_handles": True,

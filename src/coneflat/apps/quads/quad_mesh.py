@@ -166,7 +166,7 @@ class QuadMesh:
 
 
 class CoarseGridError(GridError):
-    """A grid is so coarse that its quads are not a mesh."""
+    """A grid is so coarse that its quads are not a mesh; `grid` is this grid, with all notes."""
 
     def __init__(self, text: str, grid: IntegerGrid) -> None:
         super().__init__(text)

@@ -75,7 +75,7 @@ def quads(
         try:
             grid = search.grid()
         except CoarseGridError as error:
-            grid = error.grid
+            grid = replace(error.grid, seconds=dict(stages.seconds))
     stages.done = 1.0
     with stages("extract"):
         found = (search and grid.quad_mesh) or extract_quads(grid, leave_out=search is not None)

@@ -58,7 +58,6 @@ class QuadMeasures:
     def rows(self) -> Iterator[tuple[str, str, str]]:
         """Yield table rows (measure, value, meaning)."""
         valences = ", ".join(f"{count:,} of {valence}" for valence, count in self.irregular_valences.items())
-        distance_in_edges = self.hausdorff / self.edge_mean
         holds = self.euler_characteristic == self.surface_euler
         euler = "same as the surface" if holds else f"the surface has {self.surface_euler}"
         yield "quads", f"{self.quads:,}", f"Euler characteristic {self.euler_characteristic}, {euler}"
@@ -70,7 +69,9 @@ class QuadMeasures:
         yield "edge cv", f"{self.edge_cv:.3f}", spread
         least = f"scaled, mean of each quad's minimum; minimum {self.jacobian_min:.3f}"
         yield "Jacobian", f"{self.jacobian_mean:.3f}", least
-        distance = f"largest between quads and surface, at samples; {distance_in_edges:.2f} edges"
+        distance = (
+            f"largest between quads and surface, at samples; {self.hausdorff / self.edge_mean:.2f} edges"
+        )
         yield "distance", f"{self.hausdorff:.3g}", distance
 
 

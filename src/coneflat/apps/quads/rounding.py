@@ -77,8 +77,8 @@ def _turned_copies(transitions: Transitions) -> csr_matrix:
 # Grid units: only cones within this distance along the surface are checked for merging.
 NEAR_CONE_DISTANCE = 5.0
 # Attempts to separate cones, in this order until one succeeds: largest rotation of the vector between near cones in
-# radians, number of pairs that are separated at once, None for all, and how often. For most surfaces that need more,
-# and all that need the last attempt more often, relaxing fails.
+# radians, number of pairs that are separated at once, None for all, and largest number of rounds. Where more are
+# needed, relaxing nearly always fails afterwards.
 SEPARATIONS = ((np.pi / 3, None, 100), (np.pi / 2, None, 100), (np.pi / 3, 1, 100), (np.pi / 2, 1, 20))
 
 

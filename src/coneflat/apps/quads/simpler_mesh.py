@@ -177,7 +177,7 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
     if not is_simple or search.sharp_angle is not None or search.result:
         return search, None
     checked, mesh = search.checked, search.checked.mesh
-    side = max(float(np.ldexp(search.size, checked.exponent)), 1e-150)  # its square does not underflow
+    side = float(np.ldexp(search.size, checked.exponent))
     is_kept, walks, is_jagged = _manageable(mesh, side)
     walks, is_jagged = (walks, is_jagged) if search.boundary == "auto" else ([], False)
     part, kept = _part(mesh, is_kept)
