@@ -60,7 +60,7 @@ def aligned_flattening(
         quads: number of squares that it will have.
         options: those of `integer_grid`.
         stages: the stopwatch.
-        price_factor: factor of the price of cones; if above 1, coarse meshes are split, for more places for cones.
+        price_factor: factor of the price of cones; if above 1, the mesh is split, for more places for cones.
         sharp_angle: dihedral angle of edges that are required on grid lines, or None.
         log_scale: (n,) the log scale wanted at the vertices, or None for equal sizes.
 
@@ -92,8 +92,8 @@ def aligned_flattening(
 
 
 def _with_places(mesh: TriangleMesh, is_split: bool, sharp_angle: float) -> TriangleMesh:
-    """Return a mesh with vertices where cones may be needed, all edges split if `is_split` and the mesh is coarse."""
-    if is_split and 6 * len(mesh.faces) < COARSE:
+    """Return a mesh with vertices where cones may be needed, with all edges split if `is_split`."""
+    if is_split:
         mesh = split_around(mesh, mesh.faces)
     while len(mesh.faces) < 60:  # on a sphere, a grid has at least eight cones
         mesh = split_around(mesh, mesh.faces)

@@ -21,7 +21,7 @@ from ...measure import unmet_guarantees
 from ...mesh import CheckedMesh
 from ...options import SEARCH_OPTIONS, Options, read_options
 from ...source import Source
-from .aligned_cones import aligned_flattening
+from .aligned_cones import COARSE, aligned_flattening
 from .cross_field import SHARP_ANGLE, sharp_ends
 from .extract import extract_quads
 from .features import edge_indices
@@ -190,8 +190,8 @@ class GridSearch:
             return self._of_components()
         what = "the boundary, sharp edges or curvature" + ", nor for wanted sizes" * (self.sizes is not None)
         failed = list[Exception]()
-        # Where cones cost more, others are found, for which there may be a grid.
-        for price_factor in (1.0, 4.0):
+        # On a coarse mesh that is split, costlier cones are others, for which there may be a grid.
+        for price_factor in (1.0, 4.0)[: 1 + (6 * len(self.checked.mesh.faces) < COARSE)]:
             try:
                 return self._of_aligned_cones(price_factor)
             except NO_GRID as error:
