@@ -191,7 +191,7 @@ class GridSearch:
         what = "the boundary, sharp edges or curvature" + ", nor for wanted sizes" * (self.sizes is not None)
         failed = list[Exception]()
         # On a coarse mesh that is split, costlier cones are others, for which there may be a grid.
-        for price_factor in (1.0, 4.0)[: 1 + (6 * len(self.checked.mesh.faces) < COARSE)]:
+        for price_factor in (1.0, 4.0) if 6 * len(self.checked.mesh.faces) < COARSE else (1.0,):
             try:
                 return self._of_aligned_cones(price_factor)
             except NO_GRID as error:
@@ -253,9 +253,10 @@ class GridSearch:
 
         price_factor: factor of the price of cones.
         """
-        checked, scales, own = self.checked, self.scales, (self.options, self.stages)
         quads = (self.extent / self.size) ** 2
-        result = aligned_flattening(checked, quads, *own, price_factor, self.sharp_angle, scales)
+        result = aligned_flattening(
+            self.checked, quads, self.options, self.stages, price_factor, self.sharp_angle, self.scales
+        )
         return self.of_result(result, True, True)
 
     def _with_fewest_cones(self) -> IntegerGrid:

@@ -123,8 +123,7 @@ class ReducedLattice(Lattice):
         """
         if not self.basis.shape[1]:
             return self.one
-        right = self.basis.T @ (self.gram @ (place - self.one))
-        target = scipy.linalg.cho_solve((self.root, False), right)
+        target = scipy.linalg.cho_solve((self.root, False), self.basis.T @ (self.gram @ (place - self.one)))
         return self.one + self.basis @ nearest_point(self.root, target, MAX_VISITS)
 
 

@@ -250,9 +250,9 @@ def _near_pairs(
     found = PathVectors.of(layout, transitions, [*paths, *sided])
     # Pairs with sides are kept if they face each other: a line crosses both, or they are not nearly collinear. Their
     # negative indices count as having no cone in common with others.
-    which, axis = np.nonzero(found.known_axes(transitions)[count:])
-    both = which.tolist(), axis.tolist()
-    facing = [len(sided[k]) == 2 or found.is_beside(count + k, i, layout) for k, i in zip(*both, strict=True)]
+    known = np.argwhere(found.known_axes(transitions)[count:])
+    which, axis = known.T
+    facing = [len(sided[k]) == 2 or found.is_beside(count + k, i, layout) for k, i in known.tolist()]
     least = np.where(facing, 1e-6, 0.45 * np.abs(found.places[count + which]))
     # Products of sparse matrices of integers are faster than those of dense ones, which no library accelerates.
     products = (found.rows @ basis)[np.append(np.arange(count), count + which)]
