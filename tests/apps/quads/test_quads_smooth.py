@@ -16,7 +16,7 @@ from coneflat.apps.quads.layout import aligned, split_edges
 from coneflat.apps.quads.nearest import Stars, slide_near
 from coneflat.apps.quads.quad_mesh import least_jacobians
 from coneflat.apps.quads.quality import measure_quads
-from coneflat.apps.quads.smooth import improve_worst, smooth_quads, untangled
+from coneflat.apps.quads.smooth import MovingQuads, smooth_quads
 from coneflat.errors import OptionError
 from coneflat.geometry.planar import signed_double_areas
 from coneflat.geometry.triangles import double_areas, edge_lengths
@@ -57,13 +57,14 @@ def test_worst_quads_are_lifted():
     np.testing.assert_allclose(places[at], [4.6, 3.1, 0])
     assert least_jacobians(places, mesh.quads).min() < 0
     others = np.arange(len(places)) != at
-    before = places.copy()
-    improve_worst(places, mesh.quads, on, weights, ~others, surface)
-    assert least_jacobians(places, mesh.quads).min() > 0.5
-    np.testing.assert_array_equal(places[others], before[others])
-    np.testing.assert_allclose(surface.at(on, weights), places, atol=1e-12)
-    improve_worst(before, mesh.quads, on, weights, np.zeros(len(places), dtype=bool), surface)
-    np.testing.assert_allclose(before[at], [4.6, 3.1, 0])
+    moving = MovingQuads.of(replace(mesh, vertices=places, faces=on, barycentric=weights))
+    moving.improve_worst(others & False)
+    np.testing.assert_array_equal(moving.mesh.vertices, places)
+    moving.improve_worst(~others)
+    found = moving.mesh
+    assert least_jacobians(found.vertices, mesh.quads).min() > 0.5
+    np.testing.assert_array_equal(found.vertices[others], places[others])
+    np.testing.assert_allclose(surface.at(found.faces, found.barycentric), found.vertices, atol=1e-12)
 
 
 def test_sliding_stays_on_its_sheet():
@@ -92,7 +93,9 @@ def folded(height):
 def test_a_vertex_on_a_sharp_edge_is_moved_where_it_must():
     mesh = folded(1.0)
     assert least_jacobians(mesh.vertices, mesh.quads).min() < 0
-    back = untangled(mesh)
+    moving = MovingQuads.of(mesh)
+    moving.untangle()
+    back = moving.mesh
     assert least_jacobians(back.vertices, back.quads).min() > 0
     moved = (back.vertices != mesh.vertices).any(axis=1)
     assert 0 < moved.sum() <= 9
@@ -104,7 +107,9 @@ def test_a_vertex_on_a_sharp_edge_is_moved_where_it_must():
 def test_meshes_without_any_stay():
     points, faces = rectangle(12, 12)
     mesh = extract_quads(flat(points[:, :2] * 6, faces))
-    assert untangled(mesh) is mesh
+    moving = MovingQuads.of(mesh)
+    moving.untangle()
+    np.testing.assert_array_equal(moving.mesh.vertices, mesh.vertices)
 
 
 OPTIONS = {"quantise": np.pi / 2, "charts": "one", "min_cone_angle": 1.5 * np.pi, "max_cone_angle": 3 * np.pi}

@@ -9,10 +9,11 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 import coneflat
-from coneflat import check_mesh
+from coneflat import TriangleMesh, check_mesh
 from coneflat.apps.quads import simpler_mesh as module
 from coneflat.apps.quads.cross_field import SHARP_ANGLE, sharp_ends
 from coneflat.apps.quads.integer_grid import GridSearch
+from coneflat.apps.quads.quad_mesh import QuadMesh
 from coneflat.apps.quads.simpler_mesh import simplified
 from coneflat.errors import GridError
 
@@ -59,6 +60,32 @@ def test_vertices_stay_on_their_component_where_borders_touch(coarser):
     of_quads = (found.faces >= len(faces))[found.quads]
     assert (of_quads == of_quads[:, :1]).all()
     assert len(np.unique(of_quads)) == 2
+
+
+def test_vertices_slide_along_the_surface():
+    """In a narrow channel, whose meshes have common vertices on one wall only, those of the other wall stay there."""
+
+    def channel(columns, rows):
+        points, faces = shapes.grid(columns, rows)
+        along = 3 * points[:, 0]
+        depth = np.maximum(1 - along, along - 2).clip(0)
+        return TriangleMesh(np.stack([0.1 * (along - 1).clip(0, 1), points[:, 1], depth], axis=1), faces)
+
+    given, finer = channel(3, 2), channel(12, 8)
+    common, rest = np.array([0, 4, 8]), np.setdiff1d(np.arange(len(finer.vertices)), [0, 4, 8])
+    order = np.append(common, rest)
+    surface = TriangleMesh(finer.vertices[order], np.argsort(order)[finer.faces])
+    one, two = surface.faces.reshape(2, -1, 3)
+    at = np.argsort(surface.faces.ravel())[
+        np.searchsorted(np.sort(surface.faces.ravel()), np.arange(len(order)))
+    ]
+    quads = QuadMesh(
+        surface.vertices, np.column_stack([one, two[:, 2]]), at // 3, np.eye(3)[at % 3], 0, 0.0, surface
+    )
+    is_filling = np.zeros(len(surface.faces), dtype=bool)
+    moved = module.SimplerMesh(surface, np.array([0, 1, 2]), given, is_filling, 0.1).moved(quads)
+    np.testing.assert_array_equal(given.vertices[[0, 1, 2]], surface.vertices[[0, 1, 2]])
+    np.testing.assert_allclose(moved.vertices, quads.vertices, atol=1e-12)
 
 
 def test_creases_are_kept(coarser):

@@ -35,8 +35,6 @@ COST_OF_AREAS, COST_OF_DIRECTIONS, TIMES_REQUIRED, COST_OF_MISSING = 15.0, 200.0
 RADII, PLACES_NEAR = (1.0, 0.6, 0.35, 0.2), 10
 # Number of triangles of a coarse mesh, on which the cones of larger meshes are searched.
 COARSE = 25_000
-# With fewer quads, cones cost more in proportion.
-QUADS_PER_CONE = 2_000
 # Least decrease of the cost by a step of a descent, which thus ends.
 MIN_GAIN = 1e-3
 # How often the cost of areas is doubled to meet the bound, and the bound for a distortion of 1: the log of the ratio of
@@ -46,10 +44,10 @@ MAX_DOUBLINGS, SPREAD = 3, 10 * np.log(2.0)
 
 def aligned_flattening(
     checked: CheckedMesh,
-    quads: float,
+    price: float,
+    is_split: bool,
     options: Mapping[str, Any],
     stages: Stopwatch,
-    price_factor: float,
     sharp_angle: float | None,
     log_scale: FloatArray | None,
 ) -> Flattening:
@@ -57,10 +55,10 @@ def aligned_flattening(
 
     Args:
         checked: the connected mesh.
-        quads: number of squares that it will have.
+        price: cost of a cone; see `aligned_cones`.
+        is_split: split all edges of the mesh, for more places for cones.
         options: those of `integer_grid`.
         stages: the stopwatch.
-        price_factor: factor of the price of cones; if above 1, the mesh is split, for more places for cones.
         sharp_angle: dihedral angle of edges that are required on grid lines, or None.
         log_scale: (n,) the log scale wanted at the vertices, or None for equal sizes.
 
@@ -68,12 +66,11 @@ def aligned_flattening(
         CurvatureError, MetricError, OptionError: as for `coneflat.flatten`.
     """
     own = read_options(options, QuadOptions)
-    mesh = _with_places(checked.mesh, price_factor > 1, SHARP_ANGLE if sharp_angle is None else sharp_angle)
+    mesh = _with_places(checked.mesh, is_split, SHARP_ANGLE if sharp_angle is None else sharp_angle)
     # The bounds of curvature in quarter turns; without a largest angle, there is none in effect.
     turns = [4 - angle / (np.pi / 2) for angle in (own.max_cone_angle or 1e6, own.min_cone_angle)]
     bounds = int(np.ceil(turns[0] - GRID_TOLERANCE)), int(np.floor(turns[1] + GRID_TOLERANCE))
     wanted = None if log_scale is None else extended(log_scale, mesh)
-    price = price_factor * max(1.0, QUADS_PER_CONE / quads)
     with stages("cones"), limit_threads(own.threads):
         found = aligned_cones(mesh, own.distortion, *bounds, price, sharp_angle, wanted)
     cones = {vertex: quarters * np.pi / 2 for vertex, quarters in found.items()}

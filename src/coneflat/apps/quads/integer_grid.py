@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -36,6 +36,8 @@ from .sizes import note_on_sizes, wanted_scales
 # Options that only the search for the fewest cones takes into account.
 SPARSE_OPTIONS = (*SEARCH_OPTIONS, "max_cones", "lengths")
 
+# With fewer quads, cones cost more in proportion.
+QUADS_PER_CONE = 2_000
 # Errors for which another grid is searched.
 NO_GRID = (ConvergenceError, CurvatureError, GridError, MetricError, SeamError)
 
@@ -107,6 +109,7 @@ class GridSearch:
         options: the other options, those of the flattening.
         stages: the stopwatch.
         for_quads: search until quads can be extracted from the grid.
+        known: flattenings with aligned cones, by the price of cones, which are the same for several sizes.
     """
 
     source: Source
@@ -119,6 +122,7 @@ class GridSearch:
     options: Mapping[str, Any]
     stages: Stopwatch
     for_quads: bool = False
+    known: dict[float, Flattening] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -175,8 +179,7 @@ class GridSearch:
             found = replace(self, size=finer).of_any_size(tries - 1)
         except NO_GRID:
             raise coarse from None
-        note = "More quads than wanted: with fewer, some have a vertex or an edge twice."
-        return found if note in found.notes else with_note(found, note)
+        return with_note(found, "More quads than wanted: with fewer, some have a vertex or an edge twice.")
 
     def _as_given(self) -> IntegerGrid:
         """Return a grid for the options as given."""
@@ -230,6 +233,7 @@ class GridSearch:
                 source=Source(as_input(part.moved_to(grow * part.vertices))),
                 size=self.size * float(np.exp(-mean)),
                 sizes=None if self.sizes is None else np.exp(-scales[vertices]),
+                known={},
             )
             try:
                 found.append(search.of_any_size())
@@ -253,11 +257,12 @@ class GridSearch:
 
         price_factor: factor of the price of cones.
         """
-        quads = (self.extent / self.size) ** 2
-        result = aligned_flattening(
-            self.checked, quads, self.options, self.stages, price_factor, self.sharp_angle, self.scales
-        )
-        return self.of_result(result, True, True)
+        price = price_factor * max(1.0, QUADS_PER_CONE * (self.size / self.extent) ** 2)
+        if price not in self.known:
+            # With costlier cones the mesh is split, for more places for them.
+            rest = self.options, self.stages, self.sharp_angle, self.scales
+            self.known[price] = aligned_flattening(self.checked, price, price_factor > 1, *rest)
+        return self.of_result(self.known[price], True, True)
 
     def _with_fewest_cones(self) -> IntegerGrid:
         """Return a grid with the fewest cones."""

@@ -18,7 +18,7 @@ from .integer_map import IntegerGrid
 from .options import QuadOptions
 from .quad_mesh import CoarseGridError, QuadMesh, least_jacobians
 from .simpler_mesh import SimplerMesh, simplified
-from .smooth import smooth_quads, untangled
+from .smooth import smooth_quads
 
 
 def quads(
@@ -89,7 +89,6 @@ def quads(
         if small is not None:
             found, features = small.moved(found), sharp_ends(small.given)
         found = smooth_quads(found, smooth, features)
-        found = untangled(found) if smooth else found
         found = found if small is None else small.completed(found)
     notes = (*(() if small is None else small.notes), *grid.notes, *found.notes, *_notes(found, small))
     return replace(found, notes=notes, seconds={**grid.seconds, **stages.seconds}, grid=grid, source=source)

@@ -69,9 +69,8 @@ class QuadMeasures:
         yield "edge cv", f"{self.edge_cv:.3f}", spread
         least = f"scaled, mean of each quad's minimum; minimum {self.jacobian_min:.3f}"
         yield "Jacobian", f"{self.jacobian_mean:.3f}", least
-        distance = (
-            f"largest between quads and surface, at samples; {self.hausdorff / self.edge_mean:.2f} edges"
-        )
+        edges = self.hausdorff / self.edge_mean
+        distance = f"largest between quads and surface, at samples; {edges:.2f} edges"
         yield "distance", f"{self.hausdorff:.3g}", distance
 
 

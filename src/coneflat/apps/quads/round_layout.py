@@ -77,8 +77,8 @@ def grid_about(rounding: Rounding, energy: StretchEnergy, most: int) -> IntegerG
 
 
 def with_note(found: IntegerGrid, note: str) -> IntegerGrid:
-    """Return a grid with one more note, unless this is empty."""
-    return replace(found, notes=(*found.notes, note)) if note else found
+    """Return a grid with one more note, unless it has this one, or the note is empty."""
+    return found if note in ("", *found.notes) else replace(found, notes=(*found.notes, note))
 
 
 def _grid_near(rounding: Rounding, energy: StretchEnergy) -> tuple[IntegerGrid | None, str]:
@@ -161,9 +161,8 @@ def _relaxed(
     )
     # A thousand times the energy of an isometry occurs if cones merge. Of 60 cases of benchmarks/grids.py the slowest
     # takes 1.7 times as long without this limit.
-    energy_limit = (
-        1e3 * float(energy.values(np.ones(1), np.ones(1))[0]) * float(double_areas(layout.lengths).sum()) / 2
-    )
+    area = float(double_areas(layout.lengths).sum()) / 2
+    energy_limit = 1e3 * float(energy.values(np.ones(1), np.ones(1))[0]) * area
     return relax(
         layout.mesh,
         as_pairs(start),

@@ -68,10 +68,10 @@ class SimplerMesh:
     def moved(self, quads: QuadMesh) -> QuadMesh:
         """Return quads of the simpler mesh, or of a refinement of it, on the given mesh.
 
-        Vertices slide along the surface from a nearby vertex that both meshes have, so that they do not jump to another
-        sheet. Those on the boundary and on sharp edges of the simpler mesh move to the nearest point on the boundary,
-        or on sharp edges within half the mean length of the edges there, of the same component. Quads over filled holes
-        are left out.
+        Vertices slide along the surface, so that they do not jump to another sheet: from a vertex that both meshes have
+        along edges of the simpler mesh, as a long way at once can end at a nearer fold. Those on the boundary and on
+        sharp edges of the simpler mesh move to the nearest point on the boundary, or on sharp edges within half the
+        mean length of the edges there, of the same component. Quads over filled holes are left out.
         """
         is_over = np.zeros(len(quads.quads), dtype=bool)
         if self.is_filling.any():
@@ -85,11 +85,17 @@ class SimplerMesh:
         votes = csr_matrix((is_common.astype(np.int64), (part, there)))
         homes = np.asarray(votes.argmax(axis=1)).ravel()[part]
         graph, common = vertex_graph(surface), np.flatnonzero(is_common & (there == homes))
-        _, _, source = dijkstra(graph, indices=common, return_predecessors=True, min_only=True)
-        corners = surface.faces[quads.faces, quads.barycentric.argmax(axis=1)]
-        stars, start = Stars.of(mesh.vertices, mesh.faces), self.kept[which[source[corners]]]
+        _, before, _ = dijkstra(graph, indices=common, return_predecessors=True, min_only=True)
+        stars, start = Stars.of(mesh.vertices, mesh.faces), self.kept[which]
         faces = stars.star[stars.start[start]]
         weights = (mesh.faces[faces] == start[:, None]).astype(np.float64)
+        known, before = mask_of(len(start), common), np.where(before < 0, np.arange(len(start)), before)
+        while len(ready := np.flatnonzero(~known & known[before])):
+            on, at = faces[before[ready]], weights[before[ready]]
+            slide_near(stars, surface.vertices[ready], on, at)
+            faces[ready], weights[ready], known[ready] = on, at, True
+        corners = surface.faces[quads.faces, quads.barycentric.argmax(axis=1)]
+        faces, weights = faces[corners], weights[corners]
         slide_near(stars, points, faces, weights)
         # Components are moved apart, so that the nearest edge is one of the same, or out of reach.
         apart = np.ptp(mesh.vertices, axis=0)
@@ -148,9 +154,8 @@ class SimplerMesh:
         more = np.concatenate([np.stack(each, axis=1) for each in corners])
         on, weights = TriangleTree(whole.vertices, whole.faces).nearest(np.concatenate(points))
         places = np.einsum("qi,qix->qx", weights, whole.vertices[whole.faces[on]])
-        note = (
-            f"Made three quads of each triangle of {plural(int(is_bare.sum()), 'component')} without a grid."
-        )
+        bare = plural(int(is_bare.sum()), "component")
+        note = f"Made three quads of each triangle of {bare} without a grid."
         return replace(
             quads,
             vertices=np.concatenate([quads.vertices, places]),

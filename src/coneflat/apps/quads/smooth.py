@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import reduce
-from operator import or_
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,13 +19,114 @@ from .quad_mesh import QuadMesh, least_jacobians
 MIN_JACOBIAN = 0.5
 
 
+@dataclass(frozen=True, eq=False)
+class MovingQuads:
+    """Quads whose vertices move on their surface.
+
+    Attributes:
+        mesh: the quads; positions, triangles and barycentric coordinates of vertices are updated in place.
+        surface: the triangles around each vertex of the surface.
+        settled: (q,) whether no position near each vertex was better, and no vertex of a quad around it has moved
+            since; updated in place.
+    """
+
+    mesh: QuadMesh
+    surface: Stars
+    settled: BoolArray
+
+    @classmethod
+    def of(cls, quads: QuadMesh) -> MovingQuads:
+        """Return a copy of a mesh to move."""
+        points, faces, weights = quads.vertices.copy(), quads.faces.copy(), quads.barycentric.copy()
+        mesh = replace(quads, vertices=points, faces=faces, barycentric=weights)
+        surface = Stars.of(quads.surface.vertices, quads.surface.faces)
+        return cls(mesh, surface, np.zeros(len(points), dtype=bool))
+
+    def improve_worst(self, movable: BoolArray, below: float = 0.2) -> None:
+        """Move vertices of bad quads to maximize the least scaled Jacobian of the quads around each.
+
+        The least scaled Jacobian around a vertex never decreases, and no positively oriented quad is flipped.
+
+        Args:
+            movable: (q,) whether each vertex may move.
+            below: bound of the scaled Jacobian, below which a quad is bad.
+        """
+        points, quads = self.mesh.vertices, self.mesh.quads
+        _, _, start, star = Stars.of(points, quads)
+        for _ in range(8):
+            least = least_jacobians(points, quads)
+            bad = np.flatnonzero(least < below)
+            worst_first = quads[bad[np.argsort(least[bad], kind="stable")]].ravel()
+            tried = worst_first[np.sort(np.unique(worst_first, return_index=True)[1])]
+            queue = tried[movable[tried] & ~self.settled[tried]].tolist()
+            while queue:
+                # Vertices without a common quad move at once, the others later.
+                moves, later, taken = list[int](), list[int](), set[int]()
+                for v in queue:
+                    is_free = taken.isdisjoint(around := star[start[v] : start[v + 1]].tolist())
+                    (moves if is_free else later).append(v)
+                    taken.update(around if is_free else ())
+                self._improve(np.array(moves))
+                queue = later
+
+    def untangle(self) -> None:
+        """Move vertices around flipped quads until there are fewer, if possible none.
+
+        Vertices on sharp edges move too, because a flipped quad is worse than an inexact edge. Those on the boundary do
+        not move.
+        """
+        quads = self.mesh.quads
+        for rings in range(6):
+            near = least_jacobians(self.mesh.vertices, quads) <= 0
+            if not near.any():
+                return
+            movable = mask_of(len(self.mesh.vertices), quads[near])
+            for _ in range(rings):
+                movable[quads[movable[quads].any(axis=1)]] = True
+            self.improve_worst(movable & ~self.mesh.is_boundary_vertex, 0.2 + 0.12 * rings)
+
+    def _improve(self, moves: IntArray) -> None:
+        """Move vertices (k,) without a common quad to the best of several trial positions, if better than their own."""
+        mesh, surface, quads = self.mesh, self.surface, self.mesh.quads
+        points, faces, barycentric = mesh.vertices, mesh.faces, mesh.barycentric
+        number = np.full(len(points), -1)
+        number[moves] = np.arange(len(moves))
+        owner = number[quads].max(axis=1)
+        around = np.argsort(owner, kind="stable")[-int((owner >= 0).sum()) :]
+        around, owner = quads[around], owner[around]
+        sides = np.linalg.norm(points[np.roll(around, -1, axis=1)] - points[around], axis=2).mean(axis=1)
+        length = np.bincount(owner, sides) / np.bincount(owner)
+        turns = np.exp(2j * np.pi * np.arange(12) / 12).view(float).reshape(12, 2)
+        circle = turns @ surface.axes(faces[moves])
+        offsets = np.einsum("k,r,kax->krax", length, [0.5, 0.25, 0.1, 0.04], circle)
+        count = offsets[0].size // 3
+        on, weights = faces[moves].repeat(count), barycentric[moves].repeat(count, axis=0)
+        slide_near(surface, (points[moves][:, None, None] + offsets).reshape(-1, 3), on, weights)
+        # The quads around the vertices for each trial position; the last is the current one.
+        places = surface.at(on, weights).reshape(len(moves), count, 3)
+        trials = np.concatenate([places, points[moves][:, None]], axis=1)
+        moves_there = (around == moves[owner][:, None])[:, None, :, None]
+        corners = np.where(moves_there, trials[owner][:, :, None], points[around][:, None])
+        numbers = np.arange(corners.size // 3).reshape(-1, 4)
+        each = least_jacobians(corners.reshape(-1, 3), numbers).reshape(len(around), -1)
+        first = np.flatnonzero(np.diff(owner, prepend=-1))
+        inverts = np.logical_or.reduceat((each <= 0) & (each[:, -1:] > 0), first)
+        least = np.where(inverts, -np.inf, np.minimum.reduceat(each, first))
+        best = least[:, :-1].argmax(axis=1)
+        better = np.flatnonzero(least[np.arange(len(moves)), best] > least[:, -1])
+        v, chosen = moves[better], better * count + best[better]
+        points[v], faces[v], barycentric[v] = trials[better, best[better]], on[chosen], weights[chosen]
+        self.settled[moves] = True
+        self.settled[quads[mask_of(len(points), v)[quads].any(axis=1)]] = False
+
+
 def smooth_quads(quads: QuadMesh, rounds: int = QuadOptions.smooth, features: ArrayLike = ()) -> QuadMesh:
     """Return a smoothed quad mesh: quads are closer to squares, and vertices remain on the surface.
 
     Each quad is projected to the nearest square. Each vertex moves to the mean of its projected positions, and from
     there to the nearest point of the surface nearby. The corners of a quad do not move if its scaled Jacobian would
     become too low. Finally, bad quads are improved by moving single vertices. Vertices on the boundary and on edges of
-    the surface with a dihedral angle above 40 degrees do not move.
+    the surface with a dihedral angle above 40 degrees do not move, except on such edges near flipped quads.
 
     Args:
         quads: the quad mesh.
@@ -42,10 +141,10 @@ def smooth_quads(quads: QuadMesh, rounds: int = QuadOptions.smooth, features: Ar
         projections", 2012, Section 4.
     """
     rounds = declarations(QuadOptions)["smooth"].kind.parse("rounds", rounds)
-    ends = np.asarray(features, dtype=np.int64).reshape(-1, 2)
+    moving, ends = MovingQuads.of(quads), np.asarray(features, dtype=np.int64).reshape(-1, 2)
+    mesh, surface = moving.mesh, moving.surface
+    points, faces, barycentric = mesh.vertices, mesh.faces, mesh.barycentric
     movable = ~(quads.is_boundary_vertex | is_on_feature(quads, ends))
-    surface = Stars.of(quads.surface.vertices, quads.surface.faces)
-    points, faces, barycentric = quads.vertices.copy(), quads.faces.copy(), quads.barycentric.copy()
     for _ in range(rounds):
         wanted = _squared(points, quads.quads)[movable]
         on, weights, new = faces[movable], barycentric[movable], points.copy()
@@ -54,8 +153,9 @@ def smooth_quads(quads: QuadMesh, rounds: int = QuadOptions.smooth, features: Ar
         gone = movable & ~_blocked(points, new, quads.quads)
         points[gone], faces[gone], barycentric[gone] = new[gone], on[gone[movable]], weights[gone[movable]]
     if rounds:
-        improve_worst(points, quads.quads, faces, barycentric, movable, surface)
-    return replace(quads, vertices=points, faces=faces, barycentric=barycentric)
+        moving.improve_worst(movable)
+        moving.untangle()
+    return mesh
 
 
 def _squared(points: FloatArray, quads: IntArray) -> FloatArray:
@@ -98,111 +198,3 @@ def is_on_feature(quads: QuadMesh, features: IntArray) -> BoolArray:
     zero, edges = quads.barycentric <= 0, mesh.halfedge_edges.reshape(-1, 3)[quads.faces]
     at_corner = has_sharp[mesh.faces[quads.faces]] & ~zero & (zero.sum(axis=1) == 2)[:, None]
     return ((zero & sharp[edges]) | at_corner).any(axis=1)
-
-
-def improve_worst(
-    points: FloatArray,
-    quads: IntArray,
-    faces: IntArray,
-    barycentric: FloatArray,
-    movable: BoolArray,
-    surface: Stars,
-    below: float = 0.2,
-) -> None:
-    """Move vertices of bad quads on the surface to maximize the least scaled Jacobian of the quads around each.
-
-    The least scaled Jacobian around a vertex never decreases, and no positively oriented quad is flipped.
-
-    Args:
-        points: (q, 3) the vertices, updated in place.
-        quads: (p, 4) vertex indices.
-        faces, barycentric: (q,), (q, 3) triangle and barycentric coordinates of the vertices, updated in place.
-        movable: (q,) whether each vertex may move.
-        surface: the surface that contains them.
-        below: bound of the scaled Jacobian, below which a quad is bad.
-    """
-    _, _, start, star = Stars.of(points, quads)
-    for _ in range(8):
-        least = least_jacobians(points, quads)
-        bad = np.flatnonzero(least < below)
-        worst_first = quads[bad[np.argsort(least[bad], kind="stable")]].ravel()
-        _, first = np.unique(worst_first, return_index=True)
-        tried = worst_first[np.sort(first)]
-        tried = tried[movable[tried]]
-        # Vertices without a common quad move at once: a greedy coloring, whose colors are the bits of integers.
-        color, used = [], [0] * len(quads)
-        for v in tried.tolist():
-            around = star[start[v] : start[v + 1]].tolist()
-            taken = reduce(or_, (used[k] for k in around))
-            color.append(~taken & (taken + 1))
-            for k in around:
-                used[k] |= color[-1]
-        groups = (tried[np.array(color) == one] for one in sorted(set(color)))
-        if not sum(_improve(group, quads, points, faces, barycentric, surface) for group in groups):
-            return
-
-
-def _improve(
-    moves: IntArray,
-    quads: IntArray,
-    points: FloatArray,
-    faces: IntArray,
-    barycentric: FloatArray,
-    surface: Stars,
-) -> int:
-    """Move vertices (k,) without a common quad to the best of several trial positions each, if better than its own.
-
-    Return how many move.
-    """
-    number = np.full(len(points), -1)
-    number[moves] = np.arange(len(moves))
-    owner = number[quads].max(axis=1)
-    around = np.argsort(owner, kind="stable")[-int((owner >= 0).sum()) :]
-    around, owner = quads[around], owner[around]
-    sides = np.linalg.norm(points[np.roll(around, -1, axis=1)] - points[around], axis=2).mean(axis=1)
-    length = np.bincount(owner, sides) / np.bincount(owner)
-    angle = 2 * np.pi * np.arange(12) / 12
-    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ surface.axes(faces[moves])
-    radii = length[:, None] * np.array([0.5, 0.25, 0.1, 0.04])
-    offsets = (radii[:, :, None, None] * circle[:, None]).reshape(len(moves), -1, 3)
-    count = offsets.shape[1]
-    on, weights = faces[moves].repeat(count), barycentric[moves].repeat(count, axis=0)
-    slide_near(surface, (points[moves][:, None] + offsets).reshape(-1, 3), on, weights)
-    # The quads around the vertices for each trial position; the last is the current one.
-    places = surface.at(on, weights).reshape(len(moves), count, 3)
-    trials = np.concatenate([places, points[moves][:, None]], axis=1)
-    moves_there = (around == moves[owner][:, None])[:, None, :, None]
-    corners = np.where(moves_there, trials[owner][:, :, None], points[around][:, None])
-    numbers = np.arange(corners.size // 3).reshape(-1, 4)
-    each = least_jacobians(corners.reshape(-1, 3), numbers).reshape(len(around), -1)
-    first = np.flatnonzero(np.diff(owner, prepend=-1))
-    inverts = np.logical_or.reduceat((each <= 0) & (each[:, -1:] > 0), first)
-    least = np.where(inverts, -np.inf, np.minimum.reduceat(each, first))
-    best = least[:, :-1].argmax(axis=1)
-    better = np.flatnonzero(least[np.arange(len(moves)), best] > least[:, -1])
-    v, chosen = moves[better], better * count + best[better]
-    points[v], faces[v], barycentric[v] = trials[better, best[better]], on[chosen], weights[chosen]
-    return len(v)
-
-
-def untangled(quads: QuadMesh) -> QuadMesh:
-    """Return a quad mesh with fewer flipped quads, if possible none.
-
-    Vertices around flipped quads move on the surface, those without a common quad at once. Unlike in smoothing,
-    vertices on sharp edges move too, because a flipped quad is worse than an inexact edge. Vertices on the boundary do
-    not move.
-    """
-    points, faces, barycentric = quads.vertices.copy(), quads.faces.copy(), quads.barycentric.copy()
-    surface = None
-    for rings in range(6):
-        near = least_jacobians(points, quads.quads) <= 0
-        if not near.any():
-            break
-        surface = Stars.of(quads.surface.vertices, quads.surface.faces) if surface is None else surface
-        movable = mask_of(len(points), quads.quads[near])
-        for _ in range(rings):
-            movable[quads.quads[movable[quads.quads].any(axis=1)]] = True
-        movable &= ~quads.is_boundary_vertex
-        below = float(np.interp(rings, [0, 5], [0.2, 0.8]))
-        improve_worst(points, quads.quads, faces, barycentric, movable, surface, below)
-    return quads if surface is None else replace(quads, vertices=points, faces=faces, barycentric=barycentric)
