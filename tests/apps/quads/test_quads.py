@@ -25,6 +25,7 @@ from grid_maps import (
 from shapes import grid as rectangle
 
 import coneflat
+from coneflat.apps.quads import integer_grid
 from coneflat.apps.quads.extract import extract_quads
 from coneflat.apps.quads.integer_grid import GridSearch
 from coneflat.apps.quads.layout import aligned
@@ -266,6 +267,29 @@ def test_bad_quads_are_left_out_where_no_finer_grid_is_found(monkeypatch):
     assert not any("More quads than wanted" in note for note in mesh.notes)
     assert tried[0] == wanted > tried[1]
     assert mesh.grid.seconds.keys() >= {"flatten", "grid"}
+
+
+def test_cones_are_chosen_once_for_all_sizes_with_their_price(monkeypatch):
+    chosen, refused, choose, extract = [], [], integer_grid.aligned_flattening, extract_quads
+
+    def count(*arguments):
+        chosen.append(arguments)
+        return choose(*arguments)
+
+    def fail_twice(grid):
+        refused.append(grid.size)
+        if len(refused) < 3:
+            raise CoarseGridError("none", grid)
+        return extract(grid)
+
+    monkeypatch.setattr(integer_grid, "aligned_flattening", count)
+    monkeypatch.setattr(integer_grid, "extract_quads", fail_twice)
+    monkeypatch.setattr(integer_grid, "QUADS_PER_CONE", 1)
+    monkeypatch.setattr(integer_grid, "COARSE", 0)
+    mesh = coneflat.quads(*shapes.sphere(3), quads=200)
+    assert len(chosen) == 1
+    # The second grid is that of the fewest cones.
+    assert refused[0] == refused[1] > refused[2] == mesh.grid.size
 
 
 def test_a_large_grid_that_is_much_finer_than_wanted_is_not_refined(monkeypatch):
