@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import shapes
 
-from . import meshes
+from . import changes, meshes, surfaces
 from .choices import in_short
 from .outcome import Outcome
 from .topology import Topology
@@ -16,28 +16,28 @@ from .topology import Topology
 Random = np.random.Generator
 
 MAKERS = (
-    meshes.sheet,
-    meshes.ball,
-    meshes.hemisphere,
-    meshes.ring,
-    meshes.tube,
-    meshes.handles,
-    meshes.polycube,
-    meshes.crate,
-    meshes.spikes,
-    meshes.random_hull,
-    meshes.patch,
-    meshes.patch,
+    surfaces.sheet,
+    surfaces.ball,
+    surfaces.hemisphere,
+    surfaces.ring,
+    surfaces.tube,
+    surfaces.handles,
+    surfaces.polycube,
+    surfaces.crate,
+    surfaces.spikes,
+    surfaces.random_hull,
+    surfaces.patch,
+    surfaces.patch,
 )
 CHANGES = (
-    (meshes.hole, 0.15),
-    (meshes.jitter, 0.15),
-    (meshes.slivers, 0.05),
-    (meshes.flips, 0.05),
-    (meshes.stretched, 0.15),
-    (meshes.two_parts, 0.05),
-    (meshes.loose_vertices, 0.05),
-    (meshes.shuffled, 0.3),
+    (changes.hole, 0.15),
+    (changes.jitter, 0.15),
+    (changes.slivers, 0.05),
+    (changes.flips, 0.05),
+    (changes.stretched, 0.15),
+    (changes.two_parts, 0.05),
+    (changes.loose_vertices, 0.05),
+    (changes.shuffled, 0.3),
 )
 #: Fraction of cases with meshes as irregular as those of the hostile trial.
 HOSTILE = 0.2
