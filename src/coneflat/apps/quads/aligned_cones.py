@@ -154,15 +154,17 @@ class _Costs(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """The model at some places.
+    """The model at some places, or its changes by steps to them.
 
     Attributes:
         places: (k,) indices of the places.
-        scales: (r, k), waves: (s, k), loops: (l, k), as in the model.
+        scales: (r, k), as in the model, and squares: (k,) their squared norms.
+        waves, loops: (s, k), (l, k) the unit complex numbers of its turns and loops.
     """
 
     places: IntArray
     scales: FloatArray
+    squares: FloatArray
     waves: ComplexArray
     loops: ComplexArray
 
@@ -211,17 +213,17 @@ class _Search:
         """Decrease the cost by steps between a place of `one` and a place of `two`, in both directions."""
         first, second = self._block(one), self._block(two)
         gram = first.scales.T @ second.scales
-        squares = (first.scales**2).sum(axis=0)[:, None] + (second.scales**2).sum(axis=0) - 2 * gram
+        squares = first.squares[:, None] + second.squares - 2 * gram
         while True:
             plus, minus = self._best_steps(first, second, squares, costs)
             if not len(plus):
                 return
-            best = 0
+            best, steps = 0, self._block(plus, minus)
             while True:
                 self.indices[plus[best]] += 1
                 self.indices[minus[best]] -= 1
                 # Few places are all compared again after each step.
-                change = self._changes(plus, minus, costs)
+                change = self._changes(steps, costs) + self._price_of(1)[plus] + self._price_of(-1)[minus]
                 best = int(np.argmin(np.round(change, 6)))
                 if change[best] >= -MIN_GAIN or len(two) < SAMPLES // 2:
                     break
@@ -254,19 +256,13 @@ class _Search:
         order = np.argsort(np.round(change, 6), kind="stable")[: int((change < -MIN_GAIN).sum())]
         return plus[order], minus[order]
 
-    def _changes(self, plus: IntArray, minus: IntArray, costs: _Costs) -> FloatArray:
-        """Return (k,) the changes of the cost by steps from `minus` to `plus`."""
+    def _changes(self, steps: _Block, costs: _Costs) -> FloatArray:
+        """Return (k,) the changes of the cost by steps between places, without the price of cones."""
         model = self.model
         scale, waves, loops = model.state(self.indices)
         now = _direction_cost(waves.sum()[None], loops.sum()[None], model, costs)[0]
-        scales = model.scales[:, plus] - model.scales[:, minus]
-        waves_of, loops_of = (
-            state @ np.exp(1j * (turns[:, plus] - turns[:, minus]))
-            for state, turns in ((waves, model.turns), (loops, model.loops))
-        )
-        change = costs.areas * ((scales**2).sum(axis=0) + 2 * scale @ scales) - now
-        change += _direction_cost(waves_of, loops_of, model, costs)
-        return change + self._price_of(1)[plus] + self._price_of(-1)[minus]
+        directions = _direction_cost(waves @ steps.waves, loops @ steps.loops, model, costs)
+        return costs.areas * (steps.squares + 2 * scale @ steps.scales) + directions - now
 
     def _price_of(self, step: int) -> FloatArray:
         """Return (p + 1,) the change of the price of cones by a quarter turn more (1) or less (-1)."""
@@ -274,14 +270,14 @@ class _Search:
         may = indices < model.most if step > 0 else indices > model.least
         return np.where(may, np.abs(indices + step) - np.abs(indices), np.inf) * self.price
 
-    def _block(self, places: IntArray) -> _Block:
+    def _block(self, places: IntArray, minus: IntArray | None = None) -> _Block:
+        """Return the model at places, or its changes by steps to them from other places (k,)."""
         model = self.model
-        return _Block(
-            places,
-            model.scales[:, places],
-            np.exp(1j * model.turns[:, places]),
-            np.exp(1j * model.loops[:, places]),
+        scales, turns, loops = (
+            each[:, places] if minus is None else each[:, places] - each[:, minus]
+            for each in (model.scales, model.turns, model.loops)
         )
+        return _Block(places, scales, (scales**2).sum(axis=0), np.exp(1j * turns), np.exp(1j * loops))
 
 
 def _direction_cost(waves: ComplexArray, loops: ComplexArray, model: MapModel, costs: _Costs) -> FloatArray:
