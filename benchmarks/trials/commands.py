@@ -132,6 +132,7 @@ def run_command(line: list[str]) -> tuple[int, str, str]:
             main()
         except SystemExit as end:
             code = end.code if isinstance(end.code, int) else 1
+            err.write(end.code if isinstance(end.code, str) else "")  # as Python does at the end of a process
     return code, out.getvalue(), err.getvalue()
 
 

@@ -41,14 +41,15 @@ class BoundaryCurvature:
         mesh = self.mesh
         sides = mesh.edges[mesh.is_boundary_edge]
         flat = lengths.ravel()[mesh.edge_halfedges[mesh.is_boundary_edge, 0]]
-        flat = flat * np.exp(log_scale[sides].sum(axis=1) / 2)
+        # A common factor does not change the target, and steps of a solver can be too large for exp.
+        flat = flat * np.exp((log_scale - log_scale[sides].max(initial=0.0))[sides].sum(axis=1) / 2)
         count, loop = mesh.boundary_loops
         share = np.bincount(sides.ravel(), np.repeat(flat / 2, 2), minlength=len(loop))
         on_round = np.flatnonzero(loop >= 0)
         on_round = on_round[np.isfinite(self.round_total[loop[on_round]])]
         around = np.bincount(loop[on_round], share[on_round], minlength=count)[loop[on_round]]
         target = self.corners.copy()
-        target[on_round] = self.round_total[loop[on_round]] * share[on_round] / around
+        target[on_round] = self.round_total[loop[on_round]] * share[on_round] / np.maximum(around, 1e-300)
         return target
 
 
