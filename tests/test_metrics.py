@@ -7,6 +7,8 @@ import pytest
 import shapes
 
 from coneflat import TriangleMesh, errors, flatten, read_mesh
+from coneflat.geometry.triangles import edge_lengths
+from coneflat.metric.boundary import BoundaryCurvature
 
 SHAPES = {
     "sphere": shapes.sphere(2),
@@ -104,6 +106,17 @@ def test_annulus_with_prescribed_boundary_has_round_loops():
     turning = np.where(mesh.is_boundary_vertex, np.pi - turned_angles(result), 0)
     totals = sorted(turning[loop == k].sum() / np.pi for k in (0, 1))
     np.testing.assert_allclose(totals, [-2, 2], atol=1e-9)
+
+
+def test_the_curvature_of_round_loops_does_not_depend_on_the_scale():
+    """Steps of a solver that diverges scale by factors that are no numbers."""
+    vertices, faces = SHAPES["annulus"]
+    mesh, log_scale = TriangleMesh(vertices, faces), 0.1 * vertices[:, 0]
+    boundary = BoundaryCurvature(mesh, np.zeros(len(vertices)), np.array([2 * np.pi, -2 * np.pi]))
+    lengths = edge_lengths(vertices, faces)
+    expected = boundary.target(lengths, log_scale)
+    np.testing.assert_allclose(boundary.target(lengths, log_scale + 2000), expected, rtol=1e-9)
+    assert len(np.unique(np.round(expected, 9))) > 3
 
 
 @pytest.mark.parametrize(
