@@ -11,9 +11,8 @@ import shapes
 from . import changes, meshes, surfaces
 from .choices import in_short
 from .outcome import Outcome
+from .surfaces import Random
 from .topology import Topology
-
-Random = np.random.Generator
 
 MAKERS = (
     surfaces.sheet,

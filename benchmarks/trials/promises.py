@@ -15,7 +15,7 @@ from .topology import Topology
 TURN = 2 * np.pi
 #: Radians that angles may be off, and, relatively, the sides of a seam; beside what rounding of the points makes.
 ANGLE, SIDES = 1e-6, 1e-8
-#: The latter where triangles had to be opened by a hair or stayed flipped, and at the seams that a note names; above it
+#: The latter if triangles had to be opened by a hair or stayed flipped, and at the seams that a note names; above it
 #: another note says by how much sides differ.
 LOOSE_SIDES = 1e-6
 #: The notes that name seams with unequal sides: those near vertices; so many marked ones, and their largest error.

@@ -98,7 +98,7 @@ def collapse_edges(
         sides = a * a + b * b + c * c + d * d + e * e + f * f - (a * d + b * e + c * f)
         return g, h, i, size, size / sides
 
-    corners, left, before = faces.ravel(), len(faces), len(faces) + 1
+    corners, left, before = faces.ravel(), len(faces), 2 * len(faces)
     # The corners of each vertex are a linked list.
     first, last, after = np.full(len(points), -1), np.full(len(points), -1), np.full(len(corners), -1)
     seen, stamp = np.full(len(points), -1), 0
@@ -106,8 +106,8 @@ def collapse_edges(
         last[vertex] = corner if first[vertex] < 0 else last[vertex]
         after[corner] = first[vertex]
         first[vertex] = corner
-    # Edges that could not collapse are tried again after the others.
-    while count < left < before:
+    # Edges that could not collapse are tried again after the others, unless these were few.
+    while count < left < 0.9 * before:
         before = left
         heap = [
             entry(corners[corner], corners[corner - 2 if corner % 3 == 2 else corner + 1])

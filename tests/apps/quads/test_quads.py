@@ -269,27 +269,37 @@ def test_bad_quads_are_left_out_where_no_finer_grid_is_found(monkeypatch):
     assert mesh.grid.seconds.keys() >= {"flatten", "grid"}
 
 
-def test_cones_are_chosen_once_for_all_sizes_with_their_price(monkeypatch):
-    chosen, refused, choose, extract = [], [], integer_grid.aligned_flattening, extract_quads
+def test_cones_are_chosen_once_for_all_sizes_of_one_price(monkeypatch):
+    chosen, sizes, choose, extract = [], [], integer_grid.aligned_flattening, extract_quads
 
-    def count(*arguments):
+    def count(*arguments, **more):
         chosen.append(arguments)
-        return choose(*arguments)
+        return choose(*arguments, **more)
 
     def fail_twice(grid):
-        refused.append(grid.size)
-        if len(refused) < 3:
+        sizes.append(grid.size)
+        if len(sizes) < 3:
             raise CoarseGridError("none", grid)
         return extract(grid)
 
     monkeypatch.setattr(integer_grid, "aligned_flattening", count)
     monkeypatch.setattr(integer_grid, "extract_quads", fail_twice)
-    monkeypatch.setattr(integer_grid, "QUADS_PER_CONE", 1)
+    monkeypatch.setattr(integer_grid, "QUADS_AT_UNIT_PRICE", 1)
     monkeypatch.setattr(integer_grid, "COARSE", 0)
     mesh = coneflat.quads(*shapes.sphere(3), quads=200)
     assert len(chosen) == 1
     # The second grid is that of the fewest cones.
-    assert refused[0] == refused[1] > refused[2] == mesh.grid.size
+    assert sizes[0] == sizes[1] > sizes[2] == mesh.grid.size
+    monkeypatch.setattr(integer_grid, "QUADS_AT_UNIT_PRICE", 1e6)
+    sizes.clear()
+    coneflat.quads(*shapes.sphere(3), quads=200)
+    assert len(chosen) == 3
+
+
+def test_components_of_equal_price_have_grids_of_their_own():
+    vertices, faces = shapes.sphere(3)
+    mesh = coneflat.quads(*shapes.join((vertices, faces), (vertices + 5, faces)), quads=5000)
+    assert np.ptp(mesh.vertices, axis=0).min() > 5 + 0.9 * np.ptp(vertices, axis=0).min()
 
 
 def test_a_large_grid_that_is_much_finer_than_wanted_is_not_refined(monkeypatch):

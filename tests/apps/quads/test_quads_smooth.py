@@ -45,20 +45,26 @@ def test_smoothing_makes_quads_squarer_and_stays_on_the_surface():
         smooth_quads(mesh, -1)
 
 
-def test_worst_quads_are_lifted():
-    """One corner of a sheet of squares is moved over to the other side of its neighbour."""
+def moved_corner(place):
+    """A sheet of squares, whose corner (3, 3, 0) is moved."""
     points, faces = rectangle(24, 24)
     mesh = extract_quads(flat(points[:, :2] * 6, faces))
     at = int(np.flatnonzero((mesh.vertices == [3, 3, 0]).all(axis=1))[0])
     surface = Stars.of(mesh.surface.vertices, mesh.surface.faces)
     on, weights = mesh.faces.copy(), mesh.barycentric.copy()
-    slide_near(surface, np.array([[4.6, 3.1, 0.0]]), on[at : at + 1], weights[at : at + 1])
-    places = surface.at(on, weights)
-    np.testing.assert_allclose(places[at], [4.6, 3.1, 0])
+    slide_near(surface, np.array([place]), on[at : at + 1], weights[at : at + 1])
+    return replace(mesh, vertices=surface.at(on, weights), faces=on, barycentric=weights)
+
+
+def test_worst_quads_are_lifted():
+    """A corner is on the other side of its neighbour."""
+    mesh = moved_corner([4.6, 3.1, 0.0])
+    surface, places = Stars.of(mesh.surface.vertices, mesh.surface.faces), mesh.vertices
+    others = (places != [4.6, 3.1, 0]).any(axis=1)
+    assert (~others).sum() == 1
     assert least_jacobians(places, mesh.quads).min() < 0
-    others = np.arange(len(places)) != at
-    moving = MovingQuads.of(replace(mesh, vertices=places, faces=on, barycentric=weights))
-    moving.improve_worst(others & False)
+    moving = MovingQuads.of(mesh)
+    moving.improve_worst(np.zeros(len(places), dtype=bool))
     np.testing.assert_array_equal(moving.mesh.vertices, places)
     moving.improve_worst(~others)
     found = moving.mesh
@@ -104,12 +110,29 @@ def test_a_vertex_on_a_sharp_edge_is_moved_where_it_must():
     np.testing.assert_allclose(np.einsum("qi,qix->qx", back.barycentric, corners), back.vertices, atol=1e-12)
 
 
-def test_meshes_without_any_stay():
-    points, faces = rectangle(12, 12)
-    mesh = extract_quads(flat(points[:, :2] * 6, faces))
+def test_untangling_leaves_meshes_without_flipped_quads():
+    """One has a bad quad, which `improve_worst` would lift."""
+    mesh = moved_corner([3.46, 3.46, 0.0])
+    assert 0 < least_jacobians(mesh.vertices, mesh.quads).min() < 0.2
     moving = MovingQuads.of(mesh)
     moving.untangle()
     np.testing.assert_array_equal(moving.mesh.vertices, mesh.vertices)
+
+
+def test_settled_vertices_have_no_better_place():
+    points, faces = rectangle(24, 24)
+    mesh = extract_quads(flat(points[:, :2] * 6, faces))
+    surface, on, weights = Stars.of(mesh.surface.vertices, mesh.surface.faces), mesh.faces, mesh.barycentric
+    inside = ~mesh.is_boundary_vertex
+    noise = np.random.default_rng(0).normal(0, 0.5, mesh.vertices.shape) * [[1, 1, 0]] * inside[:, None]
+    slide_near(surface, mesh.vertices + noise, on, weights)
+    moving = MovingQuads.of(replace(mesh, vertices=surface.at(on, weights)))
+    moving.improve_worst(inside, 0.9)
+    settled, places = np.flatnonzero(moving.settled), moving.mesh.vertices.copy()
+    assert len(settled) >= 3
+    for vertex in settled:
+        moving._improve(np.array([vertex]))
+    np.testing.assert_array_equal(moving.mesh.vertices, places)
 
 
 OPTIONS = {"quantise": np.pi / 2, "charts": "one", "min_cone_angle": 1.5 * np.pi, "max_cone_angle": 3 * np.pi}

@@ -83,8 +83,8 @@ def test_vertices_slide_along_the_surface():
         surface.vertices, np.column_stack([one, two[:, 2]]), at // 3, np.eye(3)[at % 3], 0, 0.0, surface
     )
     is_filling = np.zeros(len(surface.faces), dtype=bool)
-    moved = module.SimplerMesh(surface, np.array([0, 1, 2]), given, is_filling, 0.1).moved(quads)
     np.testing.assert_array_equal(given.vertices[[0, 1, 2]], surface.vertices[[0, 1, 2]])
+    moved = module.SimplerMesh(surface, np.array([0, 1, 2]), given, is_filling, 0.1).moved(quads)
     np.testing.assert_allclose(moved.vertices, quads.vertices, atol=1e-12)
 
 
@@ -307,3 +307,18 @@ def test_meshes_whose_triangles_stay_thin_are_taken_as_given():
     new, some, of = module._retriangulated(mesh, 400)
     np.testing.assert_array_equal(new.faces, mesh.faces)
     assert (some.tolist(), of.tolist()) == (list(range(len(mesh.vertices))), list(range(len(mesh.faces))))
+
+
+def test_triangles_that_stay_thin_are_not_split_without_bound(monkeypatch):
+    """The triangles of a cylinder of many sides are thin at their tips, however often they are split."""
+    most, coarse = [], module.coarse_mesh
+
+    def watched(mesh, count):
+        most.append(len(mesh.faces) / count)
+        return coarse(mesh, count)
+
+    monkeypatch.setattr(module, "coarse_mesh", watched)
+    vertices, faces = shapes.cylinder(300, 1, 9.0, caps=True)
+    found = coneflat.quads(vertices, faces, quads=1000, repair=True)
+    assert 1 < most[0] < 12
+    assert len(found.grid.faces) < 3 * len(faces)

@@ -159,7 +159,7 @@ class _Block:
     Attributes:
         places: (k,) indices of the places.
         scales: (r, k), as in the model, and squares: (k,) their squared norms.
-        waves, loops: (s, k), (l, k) the unit complex numbers of its turns and loops.
+        waves, loops: (s, k), (l, k) the unit complex numbers of the model's turns and loops.
     """
 
     places: IntArray
@@ -270,11 +270,11 @@ class _Search:
         may = indices < model.most if step > 0 else indices > model.least
         return np.where(may, np.abs(indices + step) - np.abs(indices), np.inf) * self.price
 
-    def _block(self, places: IntArray, minus: IntArray | None = None) -> _Block:
-        """Return the model at places, or its changes by steps to them from other places (k,)."""
+    def _block(self, places: IntArray, origins: IntArray | None = None) -> _Block:
+        """Return the model at places, or its changes by steps to them from their origins (k,)."""
         model = self.model
         scales, turns, loops = (
-            each[:, places] if minus is None else each[:, places] - each[:, minus]
+            each[:, places] if origins is None else each[:, places] - each[:, origins]
             for each in (model.scales, model.turns, model.loops)
         )
         return _Block(places, scales, (scales**2).sum(axis=0), np.exp(1j * turns), np.exp(1j * loops))

@@ -36,8 +36,8 @@ from .sizes import note_on_sizes, wanted_scales
 # Options that only the search for the fewest cones takes into account.
 SPARSE_OPTIONS = (*SEARCH_OPTIONS, "max_cones", "lengths")
 
-# With fewer quads, cones cost more in proportion.
-QUADS_PER_CONE = 2_000
+# With fewer quads, a cone costs more than 1, in proportion.
+QUADS_AT_UNIT_PRICE = 2_000
 # Errors for which another grid is searched.
 NO_GRID = (ConvergenceError, CurvatureError, GridError, MetricError, SeamError)
 
@@ -109,7 +109,8 @@ class GridSearch:
         options: the other options, those of the flattening.
         stages: the stopwatch.
         for_quads: search until quads can be extracted from the grid.
-        known: flattenings with aligned cones, by the price of cones, which are the same for several sizes.
+        known: flattenings with aligned cones, by the price of a cone and whether the mesh is split for them; sizes with
+            the same price share one.
     """
 
     source: Source
@@ -122,7 +123,7 @@ class GridSearch:
     options: Mapping[str, Any]
     stages: Stopwatch
     for_quads: bool = False
-    known: dict[float, Flattening] = field(default_factory=dict)
+    known: dict[tuple[float, bool], Flattening] = field(default_factory=dict, init=False)
 
     @classmethod
     def of(
@@ -175,8 +176,10 @@ class GridSearch:
         finer = self.extent / float(np.sqrt(max(1.6 * squares, 32.0)))
         if tries == 1 or (squares > 1000 and finer < 0.4 * self.size):
             raise coarse
+        search = replace(self, size=finer)
+        search.known.update(self.known)
         try:
-            found = replace(self, size=finer).of_any_size(tries - 1)
+            found = search.of_any_size(tries - 1)
         except NO_GRID:
             raise coarse from None
         return with_note(found, "More quads than wanted: with fewer, some have a vertex or an edge twice.")
@@ -233,7 +236,6 @@ class GridSearch:
                 source=Source(as_input(part.moved_to(grow * part.vertices))),
                 size=self.size * float(np.exp(-mean)),
                 sizes=None if self.sizes is None else np.exp(-scales[vertices]),
-                known={},
             )
             try:
                 found.append(search.of_any_size())
@@ -257,12 +259,14 @@ class GridSearch:
 
         price_factor: factor of the price of cones.
         """
-        price = price_factor * max(1.0, QUADS_PER_CONE * (self.size / self.extent) ** 2)
-        if price not in self.known:
-            # With costlier cones the mesh is split, for more places for them.
-            rest = self.options, self.stages, self.sharp_angle, self.scales
-            self.known[price] = aligned_flattening(self.checked, price, price_factor > 1, *rest)
-        return self.of_result(self.known[price], True, True)
+        price = price_factor * max(1.0, QUADS_AT_UNIT_PRICE * (self.size / self.extent) ** 2)
+        # With costlier cones the mesh is split, for more places for them.
+        key = price, price_factor > 1
+        if key not in self.known:
+            self.known[key] = aligned_flattening(
+                self.checked, *key, self.options, self.stages, self.sharp_angle, self.scales
+            )
+        return self.of_result(self.known[key], True, True)
 
     def _with_fewest_cones(self) -> IntegerGrid:
         """Return a grid with the fewest cones."""

@@ -68,10 +68,11 @@ class SimplerMesh:
     def moved(self, quads: QuadMesh) -> QuadMesh:
         """Return quads of the simpler mesh, or of a refinement of it, on the given mesh.
 
-        Vertices slide along the surface, so that they do not jump to another sheet: from a vertex that both meshes have
-        along edges of the simpler mesh, as a long way at once can end at a nearer fold. Those on the boundary and on
-        sharp edges of the simpler mesh move to the nearest point on the boundary, or on sharp edges within half the
-        mean length of the edges there, of the same component. Quads over filled holes are left out.
+        Vertices slide along the surface in short steps, so that they do not jump to another sheet, or end at a nearer
+        fold: each vertex of the simpler mesh starts where the one before it has arrived, on the shortest path from a
+        vertex that both meshes have. Those on the boundary and on sharp edges of the simpler mesh move to the nearest
+        point on the boundary, or on sharp edges within half the mean length of the edges there, of the same component.
+        Quads over filled holes are left out.
         """
         is_over = np.zeros(len(quads.quads), dtype=bool)
         if self.is_filling.any():
@@ -85,15 +86,17 @@ class SimplerMesh:
         votes = csr_matrix((is_common.astype(np.int64), (part, there)))
         homes = np.asarray(votes.argmax(axis=1)).ravel()[part]
         graph, common = vertex_graph(surface), np.flatnonzero(is_common & (there == homes))
-        _, before, _ = dijkstra(graph, indices=common, return_predecessors=True, min_only=True)
+        _, previous, _ = dijkstra(graph, indices=common, return_predecessors=True, min_only=True)
         stars, start = Stars.of(mesh.vertices, mesh.faces), self.kept[which]
         faces = stars.star[stars.start[start]]
         weights = (mesh.faces[faces] == start[:, None]).astype(np.float64)
-        known, before = mask_of(len(start), common), np.where(before < 0, np.arange(len(start)), before)
-        while len(ready := np.flatnonzero(~known & known[before])):
-            on, at = faces[before[ready]], weights[before[ready]]
+        # Common vertices come after themselves.
+        previous = np.where(previous < 0, np.arange(len(start)), previous)
+        is_placed = mask_of(len(start), common)
+        while len(ready := np.flatnonzero(~is_placed & is_placed[previous])):
+            on, at = faces[previous[ready]], weights[previous[ready]]
             slide_near(stars, surface.vertices[ready], on, at)
-            faces[ready], weights[ready], known[ready] = on, at, True
+            faces[ready], weights[ready], is_placed[ready] = on, at, True
         corners = surface.faces[quads.faces, quads.barycentric.argmax(axis=1)]
         faces, weights = faces[corners], weights[corners]
         slide_near(stars, points, faces, weights)
@@ -216,12 +219,15 @@ def _is_thin(mesh: TriangleMesh) -> BoolArray:
 
 
 def _short_edges(
-    mesh: TriangleMesh, longest: float, marked: BoolArray | None = None
+    mesh: TriangleMesh, longest: float, most: float = np.inf, marked: BoolArray | None = None
 ) -> tuple[TriangleMesh, IntArray]:
-    """Return a mesh with marked edges (e,), and all longer ones, split, and the triangle here of each of its own."""
+    """Return a mesh with marked edges (e,), and all longer ones, split, and the triangle here of each of its own.
+
+    Splitting ends with more than `most` triangles.
+    """
     of, is_long = np.arange(len(mesh.faces)), lengths_along(mesh, np.arange(len(mesh.edges))) > longest
     is_long |= False if marked is None else marked
-    while is_long.any():
+    while is_long.any() and len(mesh.faces) <= most:
         mesh, own = split_edges(mesh, is_long)
         of, is_long = of[own], lengths_along(mesh, np.arange(len(mesh.edges))) > longest
     return mesh, of
@@ -243,7 +249,9 @@ def _retriangulated(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntAr
         least = share
         sides = new.halfedge_edges.reshape(-1, 3)[np.flatnonzero(_is_thin(new) & (step > 0))]
         own = lengths_along(new, sides.ravel()).reshape(-1, 3).argmax(axis=1)[:, None]
-        new, own = _short_edges(new, longest, mask_of(len(new.edges), np.take_along_axis(sides, own, axis=1)))
+        marked = mask_of(len(new.edges), np.take_along_axis(sides, own, axis=1))
+        # More are needed only for very thin triangles, which stay so.
+        new, own = _short_edges(new, longest, 3 * count, marked)
         of, some = of[own], np.append(some, np.full(len(new.vertices) - len(some), n))
         new, kept, own = coarse_mesh(new, count)
         some, of, step, share = some[kept], of[own], step + 1, _is_thin(new).mean()

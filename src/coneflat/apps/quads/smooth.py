@@ -24,14 +24,15 @@ class MovingQuads:
     """Quads whose vertices move on their surface.
 
     Attributes:
-        mesh: the quads; positions, triangles and barycentric coordinates of vertices are updated in place.
-        surface: the triangles around each vertex of the surface.
+        mesh: the quads; positions, triangles and barycentric coordinates of vertices are updated in place, so that
+            what it computes from them is right only after all moves.
+        stars: the surface, with the triangles around each vertex.
         settled: (q,) whether no position near each vertex was better, and no vertex of a quad around it has moved
             since; updated in place.
     """
 
     mesh: QuadMesh
-    surface: Stars
+    stars: Stars
     settled: BoolArray
 
     @classmethod
@@ -39,8 +40,8 @@ class MovingQuads:
         """Return a copy of a mesh to move."""
         points, faces, weights = quads.vertices.copy(), quads.faces.copy(), quads.barycentric.copy()
         mesh = replace(quads, vertices=points, faces=faces, barycentric=weights)
-        surface = Stars.of(quads.surface.vertices, quads.surface.faces)
-        return cls(mesh, surface, np.zeros(len(points), dtype=bool))
+        stars = Stars.of(quads.surface.vertices, quads.surface.faces)
+        return cls(mesh, stars, np.zeros(len(points), dtype=bool))
 
     def improve_worst(self, movable: BoolArray, below: float = 0.2) -> None:
         """Move vertices of bad quads to maximize the least scaled Jacobian of the quads around each.
@@ -59,21 +60,25 @@ class MovingQuads:
             worst_first = quads[bad[np.argsort(least[bad], kind="stable")]].ravel()
             tried = worst_first[np.sort(np.unique(worst_first, return_index=True)[1])]
             queue = tried[movable[tried] & ~self.settled[tried]].tolist()
+            if not queue:
+                return
             while queue:
                 # Vertices without a common quad move at once, the others later.
                 moves, later, taken = list[int](), list[int](), set[int]()
                 for v in queue:
-                    is_free = taken.isdisjoint(around := star[start[v] : start[v + 1]].tolist())
-                    (moves if is_free else later).append(v)
-                    taken.update(around if is_free else ())
+                    if taken.isdisjoint(around := star[start[v] : start[v + 1]].tolist()):
+                        moves.append(v)
+                        taken.update(around)
+                    else:
+                        later.append(v)
                 self._improve(np.array(moves))
                 queue = later
 
     def untangle(self) -> None:
-        """Move vertices around flipped quads until there are fewer, if possible none.
+        """Move vertices around flipped quads, and in up to five rings around these, until no quad is flipped.
 
-        Vertices on sharp edges move too, because a flipped quad is worse than an inexact edge. Those on the boundary do
-        not move.
+        It may fail. Vertices on sharp edges move too, because a flipped quad is worse than an inexact edge. Those on
+        the boundary do not move.
         """
         quads = self.mesh.quads
         for rings in range(6):
@@ -87,7 +92,7 @@ class MovingQuads:
 
     def _improve(self, moves: IntArray) -> None:
         """Move vertices (k,) without a common quad to the best of several trial positions, if better than their own."""
-        mesh, surface, quads = self.mesh, self.surface, self.mesh.quads
+        mesh, stars, quads = self.mesh, self.stars, self.mesh.quads
         points, faces, barycentric = mesh.vertices, mesh.faces, mesh.barycentric
         number = np.full(len(points), -1)
         number[moves] = np.arange(len(moves))
@@ -97,13 +102,13 @@ class MovingQuads:
         sides = np.linalg.norm(points[np.roll(around, -1, axis=1)] - points[around], axis=2).mean(axis=1)
         length = np.bincount(owner, sides) / np.bincount(owner)
         turns = np.exp(2j * np.pi * np.arange(12) / 12).view(float).reshape(12, 2)
-        circle = turns @ surface.axes(faces[moves])
+        circle = turns @ stars.axes(faces[moves])
         offsets = np.einsum("k,r,kax->krax", length, [0.5, 0.25, 0.1, 0.04], circle)
         count = offsets[0].size // 3
         on, weights = faces[moves].repeat(count), barycentric[moves].repeat(count, axis=0)
-        slide_near(surface, (points[moves][:, None, None] + offsets).reshape(-1, 3), on, weights)
+        slide_near(stars, (points[moves][:, None, None] + offsets).reshape(-1, 3), on, weights)
         # The quads around the vertices for each trial position; the last is the current one.
-        places = surface.at(on, weights).reshape(len(moves), count, 3)
+        places = stars.at(on, weights).reshape(len(moves), count, 3)
         trials = np.concatenate([places, points[moves][:, None]], axis=1)
         moves_there = (around == moves[owner][:, None])[:, None, :, None]
         corners = np.where(moves_there, trials[owner][:, :, None], points[around][:, None])
@@ -125,13 +130,13 @@ def smooth_quads(quads: QuadMesh, rounds: int = QuadOptions.smooth, features: Ar
 
     Each quad is projected to the nearest square. Each vertex moves to the mean of its projected positions, and from
     there to the nearest point of the surface nearby. The corners of a quad do not move if its scaled Jacobian would
-    become too low. Finally, bad quads are improved by moving single vertices. Vertices on the boundary and on edges of
-    the surface with a dihedral angle above 40 degrees do not move, except on such edges near flipped quads.
+    become too low. Finally, bad quads are improved by moving single vertices. Vertices on the boundary do not move.
+    Those on edges of the surface with a dihedral angle above 35 degrees, and on features, move only near flipped quads.
 
     Args:
         quads: the quad mesh.
         rounds: number of rounds.
-        features: (f, 2) vertices of further edges of the surface on which vertices do not move.
+        features: (f, 2) vertices of further edges of the surface.
 
     Raises:
         OptionError: the number of rounds is not an integer, 0 or more.
@@ -142,14 +147,14 @@ def smooth_quads(quads: QuadMesh, rounds: int = QuadOptions.smooth, features: Ar
     """
     rounds = declarations(QuadOptions)["smooth"].kind.parse("rounds", rounds)
     moving, ends = MovingQuads.of(quads), np.asarray(features, dtype=np.int64).reshape(-1, 2)
-    mesh, surface = moving.mesh, moving.surface
+    mesh, stars = moving.mesh, moving.stars
     points, faces, barycentric = mesh.vertices, mesh.faces, mesh.barycentric
     movable = ~(quads.is_boundary_vertex | is_on_feature(quads, ends))
     for _ in range(rounds):
         wanted = _squared(points, quads.quads)[movable]
         on, weights, new = faces[movable], barycentric[movable], points.copy()
-        slide_near(surface, wanted, on, weights)
-        new[movable] = surface.at(on, weights)
+        slide_near(stars, wanted, on, weights)
+        new[movable] = stars.at(on, weights)
         gone = movable & ~_blocked(points, new, quads.quads)
         points[gone], faces[gone], barycentric[gone] = new[gone], on[gone[movable]], weights[gone[movable]]
     if rounds:
