@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import struct
 from importlib.resources import files
 
@@ -225,6 +226,13 @@ class TestFailedOpening:
         (tmp_path / "mine.obj").write_bytes(b"v 0 0 0\n")
         assert page.post("/mesh?name=mine.obj", content=b"v 0 0 0\n").status_code == 400
         assert (tmp_path / "mine.obj").exists()
+
+    def test_a_folder_that_is_gone(self, page, session, ball):
+        content = ball.read_bytes()
+        shutil.rmtree(session.folder)
+        answer = page.post("/mesh?name=other.obj", content=content)
+        assert answer.status_code == 400
+        assert "other.obj cannot be stored: No such file or directory" in answer.text
 
 
 def test_a_refused_export_replaces_no_reason(page, session, ball):

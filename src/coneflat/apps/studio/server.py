@@ -140,7 +140,7 @@ def studio_app(session: Session, token: str, port: int, **access: bool) -> ASGIA
         path = file_within(safe_name(given.name), session.folder)
         if path.suffix.lower() not in (*INPUT_FORMATS, ".json"):
             raise StudioError(f"{path.name} is not in a format that can be read: {', '.join(INPUT_FORMATS)}")
-        before = set(session.folder.iterdir())
+        before = set(session.folder.glob("*"))  # none if the folder is gone
         stored = await _store(request, path)
         try:
             await run_sync(session.open_named, stored.name)
