@@ -38,7 +38,7 @@ CEILINGS = {
     "apps.controls": 49,
     "apps.measure_uv": 159,
     "apps.peers": 438,
-    "apps.quads": 3749,
+    "apps.quads": 3752,
     "apps.studio": 1710,
     "apps.transfer": 300,
     "apps.brains": 259,
@@ -73,7 +73,7 @@ OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 FRONT = ("apps.ahead", "apps.blender", "apps.cli", "apps.studio")
 SHARED = ("apps.quads.nearest",)
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_813, 232, 24_488
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_813, 232, 24_491
 CONSTANTS, KERNELS, NAMES, LEVELS = 293, 84, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from ... import TriangleMesh
-from ...base import BoolArray, IntArray, mask_of, plural
+from ...base import BoolArray, FloatArray, IntArray, mask_of, plural
 from ...geometry import angle_defect, coarse_mesh, corner_angles, double_areas, edge_lengths, mollify
 from ...io import as_input
 from ...layout import joined
@@ -68,11 +68,9 @@ class SimplerMesh:
     def moved(self, quads: QuadMesh) -> QuadMesh:
         """Return quads of the simpler mesh, or of a refinement of it, on the given mesh.
 
-        Vertices slide along the surface in short steps, so that they do not jump to another sheet, or end at a nearer
-        fold: each vertex of the simpler mesh starts where the one before it has arrived, on the shortest path from a
-        vertex that both meshes have. Those on the boundary and on sharp edges of the simpler mesh move to the nearest
-        point on the boundary, or on sharp edges within half the mean length of the edges there, of the same component.
-        Quads over filled holes are left out.
+        Vertices slide along the surface, so that they do not jump to another sheet. Those on the boundary and on sharp
+        edges of the simpler mesh move to the nearest point on the boundary, or on sharp edges within half the mean
+        length of the edges there, of the same component. Quads over filled holes are left out.
         """
         is_over = np.zeros(len(quads.quads), dtype=bool)
         if self.is_filling.any():
@@ -85,18 +83,8 @@ class SimplerMesh:
         is_common, there = off == 0, label[self.kept[which]]
         votes = csr_matrix((is_common.astype(np.int64), (part, there)))
         homes = np.asarray(votes.argmax(axis=1)).ravel()[part]
-        graph, common = vertex_graph(surface), np.flatnonzero(is_common & (there == homes))
-        _, previous, _ = dijkstra(graph, indices=common, return_predecessors=True, min_only=True)
-        stars, start = Stars.of(mesh.vertices, mesh.faces), self.kept[which]
-        faces = stars.star[stars.start[start]]
-        weights = (mesh.faces[faces] == start[:, None]).astype(np.float64)
-        # Common vertices come after themselves.
-        previous = np.where(previous < 0, np.arange(len(start)), previous)
-        is_placed = mask_of(len(start), common)
-        while len(ready := np.flatnonzero(~is_placed & is_placed[previous])):
-            on, at = faces[previous[ready]], weights[previous[ready]]
-            slide_near(stars, surface.vertices[ready], on, at)
-            faces[ready], weights[ready], is_placed[ready] = on, at, True
+        stars, common = Stars.of(mesh.vertices, mesh.faces), np.flatnonzero(is_common & (there == homes))
+        faces, weights = _placed(surface, common, self.kept[which], stars)
         corners = surface.faces[quads.faces, quads.barycentric.argmax(axis=1)]
         faces, weights = faces[corners], weights[corners]
         slide_near(stars, points, faces, weights)
@@ -210,6 +198,32 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
     simple = simple.moved_to(np.ldexp(simple.vertices, -checked.exponent))
     search = replace(search, source=Source(as_input(simple)), sizes=sizes)
     return search, replace(whole, mesh=simple, kept=own, is_filling=of >= len(part.faces), notes=tuple(notes))
+
+
+def _placed(
+    simple: TriangleMesh, common: IntArray, there: IntArray, given: Stars
+) -> tuple[IntArray, FloatArray]:
+    """Return (n,) the triangles and (n, 3) barycentric coordinates of vertices of a simpler mesh on the given one.
+
+    Each vertex starts where the one before it has arrived, on the shortest path from a vertex that both meshes have:
+    in one long step it could end at a nearer fold.
+
+    Args:
+        simple: the simpler mesh.
+        common: (k,) its vertices that the given mesh has, too.
+        there: (n,) their numbers there; any for the others.
+        given: the given mesh.
+    """
+    previous = dijkstra(vertex_graph(simple), indices=common, return_predecessors=True, min_only=True)[1]
+    # Common vertices come after themselves.
+    previous = np.where(previous < 0, np.arange(len(there)), previous)
+    faces, is_placed = given.star[given.start[there]], mask_of(len(there), common)
+    weights = (given.faces[faces] == there[:, None]).astype(np.float64)
+    while len(ready := np.flatnonzero(~is_placed & is_placed[previous])):
+        on, at = faces[previous[ready]], weights[previous[ready]]
+        slide_near(given, simple.vertices[ready], on, at)
+        faces[ready], weights[ready], is_placed[ready] = on, at, True
+    return faces, weights
 
 
 def _is_thin(mesh: TriangleMesh) -> BoolArray:
