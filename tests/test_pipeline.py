@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import re
+import warnings
 from importlib import import_module
 
 import numpy as np
@@ -376,3 +377,13 @@ def test_no_more_cones_are_searched_for_than_a_search_can_find(monkeypatch):
     result = coneflat.flatten(coneflat.sample_path())
     assert len(searches) == 1
     assert any("above the 0.2 allowed" in note for note in result.notes)
+
+
+def test_a_vertex_without_a_face_may_be_anywhere():
+    """Heights of charts are those of faces: what is left out does not warn."""
+    vertices, faces = shapes.sphere(2)
+    more = np.concatenate([vertices, [[np.nan, np.inf, 0.0]]])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = flatten(more, faces, repair=True, up=(0, 0, 1))
+    np.testing.assert_array_equal(found.uv, flatten(vertices, faces, up=(0, 0, 1)).uv)

@@ -173,7 +173,7 @@ def _pack(layouts: Sequence[Layout], order: IntArray, mesh: TriangleMesh, option
     """Return the packed charts of all components."""
     points, own, chart, component = _all_charts(layouts)
     corners = rows_of(own, order)
-    heights = None if options.up is None else (mesh.vertices @ options.up)[mesh.faces]
+    heights = None if options.up is None else mesh.vertices[mesh.faces] @ options.up
     packed = arrange_charts(
         rows_of(points, corners),
         chart[order],

@@ -145,6 +145,7 @@ class TestGltf:
             ("https://example.org/a.bin", "remote files are not loaded"),
             ("%00", "embedded null|cannot be read|no such file"),
             (".", "is a folder"),
+            (f"{'x' * 3000}.obj", "cannot be read: "),
             ("/dev/zero", "not a file but a device"),
             (17, "is not a string"),
         ],
@@ -322,3 +323,8 @@ def test_large_polygons_are_tiled(count):
     whole = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2
     assert (np.sign(whole) * areas).min() > 0
     assert areas.sum() == pytest.approx(whole, rel=1e-9)
+
+
+def test_a_name_that_is_too_long():
+    with pytest.raises(MeshFileError, match=r"x\.obj cannot be read: "):
+        read_mesh(f"{'x' * 3000}.obj")

@@ -80,7 +80,7 @@ def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
     path = as_path(path)
     if path == PIPE:
         return read_mesh_from(read_input(), path, weld)
-    if path.is_dir():
+    if os.path.isdir(path):  # unlike the method, no error if the name is too long
         raise MeshFileError(
             f"{path} is a folder, not a file; `coneflat batch` flattens all meshes in a folder"
         )

@@ -250,6 +250,7 @@ def test_textures(model, tmp_path):
         assert arrays["uv"].max() <= 1 - 8 / 512 + 1e-12
     for words, message in (
         (("--up", "north"), "not a direction"),
+        (("--up", ""), "not a direction"),
         (("--up", "0,0,0"), "not all 0"),
         (("--padding", "-1"), "padding must be"),
         (("--tiles", "0"), "tiles must be an integer from 1 to 1,000"),

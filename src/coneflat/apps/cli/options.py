@@ -77,7 +77,7 @@ def _direction(value: Any) -> tuple[float, float, float]:
     """Return a (3,) direction from z, -y or 0,0.5,1."""
     text = value.strip().lower()
     axis = "xyz".find(text[-1:])
-    if axis >= 0 and text[:-1] in ("", "+", "-"):
+    if text and axis >= 0 and text[:-1] in ("", "+", "-"):
         length = -1.0 if text[0] == "-" else 1.0
         return (length * (axis == 0), length * (axis == 1), length * (axis == 2))
     try:
