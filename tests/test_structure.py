@@ -34,7 +34,7 @@ CEILINGS = {
     "apps.ahead": 37,
     "apps.batch": 384,
     "apps.blender": 884,
-    "apps.cli": 1575,
+    "apps.cli": 1576,
     "apps.controls": 49,
     "apps.measure_uv": 159,
     "apps.peers": 438,
@@ -73,7 +73,7 @@ OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 FRONT = ("apps.ahead", "apps.blender", "apps.cli", "apps.studio")
 SHARED = ("apps.quads.nearest",)
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_813, 232, 24_491
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_813, 232, 24_492
 CONSTANTS, KERNELS, NAMES, LEVELS = 293, 84, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80

@@ -15,8 +15,8 @@ from .topology import Topology
 TURN = 2 * np.pi
 #: Radians that angles may be off, and, relatively, the sides of a seam; beside what rounding of the points makes.
 ANGLE, SIDES = 1e-6, 1e-8
-#: The latter if triangles had to be opened by a hair or stayed flipped, and at the seams that a note names; above it
-#: another note says by how much sides differ.
+#: The latter where triangles had to be opened by a hair, and at the seams that a note names; above it another note says
+#: by how much sides differ.
 LOOSE_SIDES = 1e-6
 #: The notes that name seams with unequal sides: those near vertices; so many marked ones, and their largest error.
 NO_ROOM = re.compile(r".* had no room .* next to (vertex .*): .* the sides of seams near them are unequal")
@@ -200,11 +200,11 @@ def _check_sides(trial: Trial) -> None:
     if trial.method != "exact":
         return
     one, two = trial.sides.ravel()[trial.topology.sides].T
-    is_loose = any("without area" in note or "flipped triangle" in note for note in trial.result.notes)
+    is_opened = any("without area" in note for note in trial.result.notes)
     off = np.abs(one - two) / np.maximum(np.maximum(one, two), EPS)
     off -= 8 * EPS / np.maximum(np.minimum(one, two), EPS)
     cause = f"sides of seams differ, {_method(trial)}{', marked' if trial.is_marked else ''}"
-    bad = off > (LOOSE_SIDES if is_loose else SIDES)
+    bad = off > (LOOSE_SIDES if is_opened else SIDES)
     is_named = bad & (off <= _named_differences(trial, bad))
     if is_named.any():
         trial.outcome.excuse(cause)

@@ -121,8 +121,9 @@ def batch(
             listener=report,
         )
         before = f", {found.skipped:,} of them before" if found.skipped else ""
+        failed = f"; {found.failed:,} failed" if found.failed else ""
         console.say(f"note: {note}" for note in found.notes)
-        console.say([f"{len(todo) - found.failed:,} of {len(todo):,} meshes are flattened{before}"])
+        console.say([f"{len(todo) - found.failed:,} of {len(todo):,} meshes are flattened{before}{failed}"])
         console.say(_slowest(rows, console.elapsed))
         console.finish([summary := flags.summary or flags.out / "summary.csv"])
     if found.failed:

@@ -82,10 +82,10 @@ class MovingQuads:
         """
         quads = self.mesh.quads
         for rings in range(6):
-            near = least_jacobians(self.mesh.vertices, quads) <= 0
-            if not near.any():
+            is_flipped = least_jacobians(self.mesh.vertices, quads) <= 0
+            if not is_flipped.any():
                 return
-            movable = mask_of(len(self.mesh.vertices), quads[near])
+            movable = mask_of(len(self.mesh.vertices), quads[is_flipped])
             for _ in range(rings):
                 movable[quads[movable[quads].any(axis=1)]] = True
             self.improve_worst(movable & ~self.mesh.is_boundary_vertex, 0.2 + 0.12 * rings)
