@@ -217,8 +217,7 @@ class LayoutGroup:
         count, patch = label_components(len(mesh.vertices), edges[:, 0], edges[:, 1])
         touched = np.flatnonzero(has_any(was_free, faces) & np.isfinite(before))
         after = self.ratios(moved, touched)
-        corner = np.argmax(was_free[faces[touched]], axis=1)
-        of_face = patch[faces[touched, corner]]
+        of_face = patch[faces[touched, np.argmax(was_free[faces[touched]], axis=1)]]
         gain = before[touched] - after[touched]
         areas = self.areas[touched]
         gained = np.bincount(of_face, gain * areas, count)
@@ -240,19 +239,20 @@ class LayoutGroup:
         # Areas are relative to those of each layout, as the threshold for zero area is.
         unit = self._sums(self.areas)[self._of_face]
         before, after = (np.abs(signed_double_areas(p[self.corners])) / 2 for p in (self.points, points))
-        old_area, new_area = self._sums(before), self._sums(after)
+        growth = np.log(self._sums(after) / self._sums(before)) / 2
         old = np.concatenate([one.log_scale for one in self.layouts])
         log_scale = np.where(was_free, vertex_log_scale(mesh, self.areas / unit, after / unit), old)
         found = []
         for i, one in enumerate(self.layouts):
             own = slice(self._vertices[i], self._vertices[i + 1])
             areas = vertex_areas(one.mesh.faces, one.lengths, len(one.mesh.vertices))
+            share = weighted_areas(areas, self._given_weights[i])
             # The energy of angles does not depend on the scale: components keep their areas relative to each other.
-            # Untangling may have made a few triangles huge, so the area is then that of the metric.
-            area = (areas * np.exp(2 * old[own])).sum() if one.statistics.untangled_vertices else old_area[i]
-            factor = 1.0 if one.is_fixed.any() else np.sqrt(area / new_area[i])
+            # Of huge triangles, as untangling may leave, the logs are not huge.
+            grown = share @ log_scale[own] if one.statistics.untangled_vertices else growth[i]
+            factor = 1.0 if one.is_fixed.any() else np.exp(-grown)
             log_scale[own] += np.log(factor)
-            reached = area_distortion(log_scale[own], weighted_areas(areas, self._given_weights[i]))
+            reached = area_distortion(log_scale[own], share)
             found.append(
                 replace(
                     one,

@@ -24,7 +24,7 @@ DOUBLE, SINGLE = (float(np.finfo(kind).epsneg) for kind in (np.float64, np.float
 # Largest error of points, in roundings: of the coordinates, and of the operations that rotate, move and scale them.
 MAX_ROUNDINGS = 8
 # Tolerance of a layout in addition to rounding: radians, or relative to a length. Metrics are solved to about 1e-11.
-EXACT_TOLERANCE = 1e-6
+EXACT_TOLERANCE = 1e-8
 # Radians, for methods without exact angles: a vertex around which triangles wind twice has an error of 2 pi.
 WINDING_TOLERANCE = 1.0
 # Mean QC, and QC exceeded on 5% of the area, above which a layout is unsuitable for most uses even though all triangles
