@@ -62,6 +62,13 @@ def test_any_finite_distortion_may_be_allowed(tmp_path, monkeypatch):
     assert run_case("mesh", 7_301_010).breaches == []
 
 
+def test_triangles_that_are_flat_by_rounding_stay_and_are_named(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    outcome = run_case("tiny", 312_178)
+    assert outcome.breaches == []
+    assert outcome.noted
+
+
 def test_a_case_is_the_same_whenever_it_is_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     one, two = (run_case("mesh", 2) for _ in range(2))

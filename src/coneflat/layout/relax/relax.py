@@ -22,11 +22,11 @@ from ...base.text import plural
 from ...errors import ArrayShapeError, ConvergenceError, OptionError
 from ...geometry import double_areas, edge_lengths
 from ...geometry.intrinsic import check_lengths
-from ...geometry.planar import as_complex, as_pairs, signed_double_areas
+from ...geometry.planar import as_complex, as_pairs, heights, sides_between, signed_double_areas
 from ...geometry.straight import place_triangles
 from ...mesh.connectivity import TriangleMesh
 from .constraints import PointConstraints, check_constraints
-from .descent import descend
+from .descent import RELATIVE_ROUNDING, descend
 from .elements import Elements
 from .energies import Energy, StretchEnergy
 from .motions import find_motions
@@ -128,8 +128,8 @@ def relax(
     near = np.flatnonzero(has_any(is_free, mesh.faces))
     rest = np.empty(own.shape, dtype=np.complex128)
     rest[near] = at_rest = rest_sides(own[near])
-    is_thin = (np.conj(at_rest[:, 0]) * at_rest[:, 1]).imag <= 0  # up to rounding
-    is_free[mesh.faces[near[(doubled[near] <= 0) | (areas[near] <= 0) | is_thin]]] = False
+    height = np.minimum(heights(at_rest), heights(sides_between(rows_of(places, corner[near]))))
+    is_free[mesh.faces[near[(height <= RELATIVE_ROUNDING) | (areas[near] <= 0)]]] = False
     if not is_free.any():
         return Relaxed(places, 0.0, 0.0, 0, is_free)
     unit = float(np.sqrt(np.abs(doubled).sum() / (2 * areas.sum())))
