@@ -69,6 +69,13 @@ def test_triangles_that_are_flat_by_rounding_stay_and_are_named(tmp_path, monkey
     assert outcome.noted
 
 
+def test_components_of_opened_triangles_count_for_the_area_distortion(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    outcome = run_case("file", 316_516)
+    assert outcome.breaches == []
+    assert "area distortion" in outcome.noted
+
+
 def test_a_case_is_the_same_whenever_it_is_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     one, two = (run_case("mesh", 2) for _ in range(2))

@@ -148,7 +148,13 @@ def flatten_source(
         # Notes contain vertex indices, so copies of parts with notes are computed, too.
         noted = {i: prepared.parts[i] for i, copy in enumerate(copies) if copy and finished[copy.first].notes}
         finished |= finish_within_bound(noted, lay_out_parts(noted, method), method)
-    return evaluate(prepared, with_copies(finished, prepared.parts, copies), o, watch)
+    every = with_copies(finished, prepared.parts, copies)
+    if (excess := _excess(prepared.parts, every)) > 1:
+        every[0] = every[0].with_notes(
+            f"The triangles have an area distortion of {excess * TOLERATED_EXCESS * o.distortion:.3g}, above the "
+            f"{o.distortion:g} allowed. Allow more cones, or refine the mesh."
+        )
+    return evaluate(prepared, every, o, watch)
 
 
 def lay_out_parts(parts: Mapping[int, Part], method: Method) -> dict[int, Layout]:
@@ -237,18 +243,18 @@ def finish_part(part: Part, layout: Layout, method: Method) -> Layout:
 def finish_within_bound(
     parts: Mapping[int, Part], layouts: Mapping[int, Layout], method: Method
 ) -> dict[int, Layout]:
-    """Return finished layouts whose area distortion is at most the one allowed, or that have a note.
+    """Return finished layouts whose area distortion is at most the one allowed, as far as possible.
 
     The cone search bounds the distortion of the linear model. On coarse meshes, that of the triangles in the plane may
     be larger. First all triangles of such a part are relaxed with some weight on areas, then more cones are searched.
     """
     finished = finish_parts(parts, layouts, method)
-    left = {i: part for i, part in parts.items() if _excess(part, finished[i]) > 1}
+    left = {i: part for i, part in parts.items() if _excess([part], [finished[i]]) > 1}
     if len(left) > 0 and not method.relax.is_off and method.relax.stretch < CORRECTING_STRETCH:
         method = replace(method, relax=replace(method.relax, stretch=CORRECTING_STRETCH))
         _keep_better(finished, finish_parts(left, layouts, method), parts)
     for _ in range(MAX_CORRECTIONS):
-        excess = {i: min(_excess(parts[i], finished[i]), MAX_TIGHTENING) for i in left}
+        excess = {i: min(_excess([parts[i]], [finished[i]]), MAX_TIGHTENING) for i in left}
         # About that many times as many cones are needed; a search without enough of them takes longest.
         left = {
             i: left[i].with_distortion(1 / excess[i])
@@ -257,14 +263,6 @@ def finish_within_bound(
         }
         better = _keep_better(finished, finish_parts(left, lay_out_parts(left, method), method), parts)
         left = {i: left[i] for i in better}
-    for i in parts:
-        if _excess(parts[i], finished[i]) <= 1:
-            continue
-        bound = parts[i].cones.distortion
-        finished[i] = finished[i].with_notes(
-            f"The triangles of a component have an area distortion of {bound * _excess(parts[i], finished[i]):.3g}, "
-            f"above the {bound:g} allowed. Allow more cones, or refine the mesh."
-        )
     return finished
 
 
@@ -279,19 +277,24 @@ def _keep_better(
 
 def _rank(part: Part, layout: Layout) -> tuple[int, float]:
     """Return what decides between layouts of a part: the smaller is the better."""
-    return len(layout.notes), _excess(part, layout)
+    return len(layout.notes), _excess([part], [layout])
 
 
-def _excess(part: Part, layout: Layout) -> float:
-    """Return the area distortion of the triangles of a layout, divided by the one allowed; 0 without a bound."""
-    spec = part.cones
-    is_bounded = part.is_exact and spec.count is None and spec.weights is None and spec.quantum is None
-    if not (is_bounded and uses_sparse_search(part.mesh, spec)):
+def _excess(parts: Sequence[Part], layouts: Sequence[Layout]) -> float:
+    """Return the area distortion of the triangles of all layouts, divided by the one tolerated; 0 without a bound."""
+    bounded = [(part, one) for part, one in zip(parts, layouts, strict=True) if _is_bounded(part)]
+    if not bounded:
         return 0.0
-    areas, flat = part.double_areas, signed_double_areas(layout.points[layout.corners])
+    areas = np.concatenate([part.double_areas for part, _ in bounded])
+    flat = np.concatenate([signed_double_areas(one.points[one.corners]) for _, one in bounded])
     chosen = (areas > 0) & (flat > 0)
     log_scale = np.log(flat[chosen] / areas[chosen]) / 2
-    return area_distortion(log_scale, areas[chosen]) / (spec.distortion * TOLERATED_EXCESS)
+    return area_distortion(log_scale, areas[chosen]) / (parts[0].cones.distortion * TOLERATED_EXCESS)
+
+
+def _is_bounded(part: Part) -> bool:
+    is_free = all(each is None for each in (part.cones.count, part.cones.weights, part.cones.quantum))
+    return part.is_exact and is_free and uses_sparse_search(part.mesh, part.cones)
 
 
 def infeasible_cones(layout: Layout) -> IntArray:
@@ -327,9 +330,7 @@ def with_copies(
 
 def _groups(parts: Mapping[int, Part], relax: RelaxSpec) -> list[list[int]]:
     """Return groups of part indices; small parts share a group and are relaxed together."""
-    groups: list[list[int]] = []
-    small: list[int] = []
-    capacity = 0
+    groups, small, capacity = list[list[int]](), list[int](), 0
     for i, part in parts.items():
         size = len(part.faces)
         if relax.is_off or size > SMALL_TRIANGLES:
