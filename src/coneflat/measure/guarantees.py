@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 # Relative rounding of a double, and of the 32-bit numbers of GLB files.
 DOUBLE, SINGLE = (float(np.finfo(kind).epsneg) for kind in (np.float64, np.float32))
 # Largest error of points, in roundings: of the coordinates, and of the operations that rotate, move and scale them.
-MAX_ROUNDINGS = 8
+MAX_ROUNDINGS = 4
 # Tolerance of a layout in addition to rounding: radians, or relative to a length. Metrics are solved to about 1e-11.
 EXACT_TOLERANCE = 1e-8
 # Radians, for methods without exact angles: a vertex around which triangles wind twice has an error of 2 pi.
@@ -34,7 +34,7 @@ EXTREME_QC, EXTREME_TAIL = 1.25, 2.0
 NEEDLE_QC = 1e3
 # Tolerance of the turning angle of a round boundary at a vertex: radians, as it is solved iteratively, plus a fraction
 # of the turning angle of a circle, which is not visible.
-NOT_ROUND, NOT_ROUND_SHARE = 1e-5, 0.02
+NOT_ROUND, NOT_ROUND_SHARE = 1e-6, 0.02
 # Tolerated relative difference of the sides of marked seams for methods without a flat metric.
 ROUGH_TOLERANCE = 0.01
 
