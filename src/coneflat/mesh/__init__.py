@@ -11,27 +11,20 @@ from .charts import (
     uv_seams,
 )
 from .check import REPAIR_ADVICE, CheckedMesh, left_out
-from .connectivity import NEXT, PREVIOUS, corner_fans, end_corners, label_components, label_faces, sort_pairs
+from .connectivity import (
+    NEXT,
+    PREVIOUS,
+    corner_fans,
+    end_corners,
+    label_components,
+    label_faces,
+    nearby,
+    sort_pairs,
+)
 from .ties import tie_key
 
 __all__ = [
-    "CheckedMesh",
-    "CutMesh",
-    "NEXT",
-    "PREVIOUS",
-    "REPAIR_ADVICE",
-    "corner_fans",
-    "cut_open",
-    "end_corners",
-    "joined_edges",
-    "label_charts",
-    "label_components",
-    "label_faces",
-    "left_out",
-    "open_along",
-    "point_seams",
-    "point_vertices",
-    "sort_pairs",
-    "tie_key",
-    "uv_seams",
-]
+    "CheckedMesh", "CutMesh", "NEXT", "PREVIOUS", "REPAIR_ADVICE", "corner_fans", "cut_open",
+    "end_corners", "joined_edges", "label_charts", "label_components", "label_faces", "left_out",
+    "nearby", "open_along", "point_seams", "point_vertices", "sort_pairs", "tie_key", "uv_seams",
+]  # fmt: skip

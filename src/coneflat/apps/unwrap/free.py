@@ -39,7 +39,8 @@ def freed(
 
     Args:
         layout: a layout in any number of charts.
-        free: (c,) the points that move; None for all. All move if triangles are flipped.
+        free: (c,) the points that move, next to those that untangling moves; None for all. All move if untangling
+            fails or adds cuts.
         tolerance: see `relax`.
         spec: which edges may be cut where untangling fails without it; None for none.
     """
@@ -47,10 +48,11 @@ def freed(
     disk = layout.disk or TriangleMesh(np.zeros((len(layout.points), 3)), layout.corners)
     is_bad = ~(signed_double_areas(layout.points[layout.corners]) > 0)
     if 0 < is_bad.sum() < len(is_bad):
-        layout, free = _untangled(layout, disk, spec), None
+        layout = _untangled(layout, disk, spec)
     points, disk = layout.points, layout.disk or disk
     if not (signed_double_areas(points[layout.corners]) > 0).all():
-        points = embedded_disks(disk, np.zeros(len(layout.corners), dtype=np.int64), areas)
+        points, free = embedded_disks(disk, np.zeros(len(layout.corners), dtype=np.int64), areas), None
+    free = None if free is None or len(free) != len(points) else free
     energy, sides = StretchEnergy(1.0), layout.lengths
     found = relax(disk, points, layout.corners, energy, lengths=sides, free=free, tolerance=tolerance)
     if free is not None and not free.all():

@@ -8,22 +8,25 @@ coarse mesh, and only the cones found there are taken over.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from ...atlas import ChartLayout, Seams
 from ...base import BoolArray, FloatArray, IntArray, mask_of
 from ...cones import close_search
+from ...errors import MetricError, SeamError
 from ...flatten import Method, lay_out_once
 from ...geometry import coarse_mesh, double_areas, edge_lengths, find_overlaps, mollify, signed_double_areas
-from ...mesh import open_along
+from ...mesh import nearby
 from ...seams import seam_costs, without_loose_ends
 from ...source import Part
 from ...stages import Layout, Surface, VertexCurvatures
 from .free import freed, recut, seam_edges, separate_charts, side_by_side, triangle_energies
 from .options import ENERGY_PER_AREA, ISOMETRIC
+from .pack_cuts import MIN_PIECE
 from .tips import RINGS, find_tips, moved_tips, moves_for
 
 # The area distortion of the first candidate, one that the fewest cones reach, and the maximum number of candidates.
@@ -31,14 +34,16 @@ FIRST_DISTORTION, ANY_DISTORTION, MAX_CANDIDATES = 0.25, 1e3, 5
 # The search ends where the numbers of cones within and beyond the bound differ by less than this factor or by one. A
 # surface of 50 handles needs about 160 cones, and each search for them seconds.
 SIMILAR_COUNTS = 1.05
-# Number of triangles of a coarse mesh; number of coarse searches to meet the bound on the given mesh; and what its
-# energy has more, relative to what is allowed above that of an isometry.
-COARSE, COARSE_TRIES, COARSE_EXCESS = 4_000, 3, 0.15
+# Number of triangles of a coarse mesh; and what its energy has more, relative to what is allowed above that of an
+# isometry.
+COARSE, COARSE_EXCESS = 4_000, 0.15
 # Tips of larger meshes are moved on their coarse meshes only, as each try takes seconds.
 MANY_TRIANGLES = 60_000
-# Number of times that tips are moved to meet the bound, half as often on large meshes, and that a layout is settled to
-# avoid contacts.
+# Number of times that tips are moved to meet the bound, half as often on large meshes, that a coarse mesh is searched
+# for it, and that a layout is settled to avoid contacts.
 MAX_TRIES = 4
+# Number of times at most that small charts are joined to others.
+MAX_JOINS = 8
 # Cost of seams that lowers the energy to that of an isometry, relative to the square root of the area.
 COST_PER_ENERGY = 0.6
 # Tolerance of the energies of candidates, see `relax`. Those above the bound by less than twice as much may be within
@@ -122,31 +127,15 @@ class CutSearch:
         if self._has_coarse:
             return self._from_coarse()
         found = self._by_distortion()
-        near = [one for one in found if one.energy <= self._reach]
-        if near:
-            one = self._cheapest(near, self._expected_cost)
-            found.append(one if one.energy <= self.max_energy else self.shortened(one))
-            near.append(found[-1])
+        near = [self.separated(one) for one in found if one.energy <= self._reach]
+        near.sort(key=self._expected_cost)
+        if near and near[0].energy > self.max_energy:
+            near.append(self.shortened(near[0]))
         close_search(self._surface)
         within = [one for one in near if one.energy <= self.max_energy]
         if within:
-            return self._cheapest(within, self._expected_cost)
-        return self.separated(min(found, key=lambda one: one.energy))
-
-    def _cheapest(self, candidates: list[Candidate], cost: Callable[[Candidate], float]) -> Candidate:
-        """Remove and return the candidate that costs least without overlaps.
-
-        What separating adds to the cost of another candidate is estimated by the least that it has added so far.
-        """
-        least, more = 0.0, list[float]()
-        while True:
-            one = min(candidates, key=lambda one: cost(one) + (0.0 if one.is_separated else least))
-            candidates.remove(one)
-            if one.is_separated:
-                return one
-            candidates.append(self.separated(one))
-            more.append(cost(candidates[-1]) - cost(one))
-            least = min(more)
+            return min(within, key=self._expected_cost)
+        return self.separated(min([*near, *found], key=lambda one: one.energy))
 
     def shortened(self, start: Candidate, layout: Layout | None = None) -> Candidate:
         """Return a candidate with the tips of its seams moved to where its energy is about the largest allowed.
@@ -164,16 +153,47 @@ class CutSearch:
             start = self.settled(start)
         if not np.isfinite(self.max_energy):
             return start
-        slack = self.max_energy - start.energy
-        if self._has_coarse and 0 <= slack <= 10 * TOLERANCE * (self.max_energy - ISOMETRIC):
-            return start
-        moved = self._moved(start)
-        while moved:
-            one = self._cheapest(moved, lambda one: one.cost)
+        for one in sorted(map(self.separated, self._moved(start)), key=lambda one: one.cost):
             one = self.settled(one) if one.energy > self.max_energy else one
             if one.energy <= self.max_energy and (one.cost < start.cost or start.energy > self.max_energy):
                 return one
         return start
+
+    def attached(self, one: Candidate) -> Candidate:
+        """Return a candidate in several charts, the smallest joined to others where they fit once their points move."""
+        seams, sizes = _chart_seams(one.layout), np.bincount(one.layout.chart, self.part.double_areas)
+        stretch = seams.stretches(self.part.mesh)
+        is_small = sizes[seams.charts].min(axis=1) < MIN_PIECE * sizes.sum()
+        is_small &= seams.charts[:, 0] != seams.charts[:, 1]
+        costs = np.bincount(stretch, self.seam_costs[seams.edges] * is_small)
+        for each in np.argsort(-costs, kind="stable")[: min(MAX_JOINS, np.count_nonzero(costs))]:
+            with suppress(MetricError, SeamError):
+                one = self._joined(one, seams.edges[stretch == each])
+        return one
+
+    def _joined(self, one: Candidate, edges: IntArray) -> Candidate:
+        """Return a candidate whose charts are joined across edges of a seam, or the given one if that does not fit."""
+        layout, seams = one.layout, _chart_seams(one.layout)
+        at, sizes = np.isin(seams.edges, edges), np.bincount(layout.chart)
+        charts = np.unique(seams.charts[at])
+        if len(charts) < 2:  # joined by an earlier seam
+            return one
+        small = charts[np.argmin(sizes[charts])]
+        is_own, is_small = (seams.charts[at] == small)[:, :1], layout.chart == small
+        points, sides = layout.points @ [1, 1j], np.stack([seams.here[at], seams.there[at]])
+        here, there = points[np.where(is_own, sides, sides[::-1])]
+        turn, moved = np.vdot(here - here.mean(), there - there.mean()), layout.corners[is_small]
+        points[moved] = (points[moved] - here.mean()) * turn / max(abs(turn), 1e-300) + there.mean()
+        layout = replace(layout, points=np.stack([points.real, points.imag], axis=1))
+        layout = recut(layout, seams.edges[~at])
+        # Of 12 joins that flipped more triangles for each edge, none succeeded.
+        if 3 * (signed_double_areas(layout.points[layout.corners]) <= 0).sum() > len(edges):
+            return one
+        layout, energy = self._freed(layout, nearby(layout.corners, is_small, RINGS), TOLERANCE)
+        overlaps = find_overlaps(side_by_side(layout).points[layout.corners])
+        if len(overlaps.pairs) or energy > max(self.max_energy, one.energy):
+            return one
+        return Candidate(layout, energy, self.cost_of(layout), one.distortion, True)
 
     def cost_of(self, layout: Layout) -> float:
         return float(self.seam_costs[seam_edges(layout)].sum())
@@ -185,12 +205,8 @@ class CutSearch:
         close_search(self._surface)
         if len(layout.cones) and mesh.euler_characteristic < 2 and not mesh.is_boundary_edge.any():
             is_cut = mask_of(len(mesh.edges), seam_edges(layout))
-            seams = np.flatnonzero(without_loose_ends(mesh, is_cut))
-            disk, none = open_along(mesh, seams).mesh, np.empty(0, dtype=np.int64)
-            points = np.zeros((len(disk.vertices), 2))
-            layout = replace(
-                layout, points=points, corners=disk.faces, disk=disk, cones=none, seams=mesh.edges[seams]
-            )
+            layout = replace(layout, points=0 * layout.points, cones=np.empty(0, dtype=np.int64))
+            layout = recut(layout, np.flatnonzero(without_loose_ends(mesh, is_cut)))
         layout, energy = self._freed(layout)
         return self.settled(self.separated(Candidate(layout, energy, self.cost_of(layout), ANY_DISTORTION)))
 
@@ -198,7 +214,7 @@ class CutSearch:
         """Return a candidate with the cones that are best on a coarse mesh, for a bound that the mesh itself meets."""
         coarse, kept = coarse_part(self.part, COARSE)
         bound, found = self.max_energy + COARSE_EXCESS * (self.max_energy - ISOMETRIC), list[Candidate]()
-        for _ in range(COARSE_TRIES):
+        for _ in range(MAX_TRIES):
             best = CutSearch(coarse, bound, self._method, True, self._by_area).best()
             given = VertexCurvatures(kept[best.layout.cones], np.full(len(best.layout.cones), np.nan))
             spec = replace(self.part.cones, strategy="given", given=given)
@@ -284,16 +300,14 @@ class CutSearch:
             if not (len(pairs) and self._method.separates):
                 return replace(one, layout=layout, energy=energy)
             # Points where charts would touch themselves stay.
-            for _ in range(RINGS):
-                is_near = mask_of(len(is_free), one.layout.corners[pairs])
-                pairs = np.flatnonzero(is_near[one.layout.corners].any(axis=1))
-            is_free[one.layout.corners[pairs]] = False
+            corners = one.layout.corners
+            is_free &= ~nearby(corners, mask_of(len(corners), pairs), RINGS)
         return one
 
     def _expected_cost(self, one: Candidate) -> float:
         """Return the cost of the seams at which the energy would be the largest allowed, roughly."""
-        size, allowed = float(np.sqrt(one.layout.area)), self.max_energy - ISOMETRIC
-        return one.cost + (one.energy - self.max_energy) / allowed * COST_PER_ENERGY * size
+        excess = (one.energy - self.max_energy) / (self.max_energy - ISOMETRIC)
+        return one.cost + excess * COST_PER_ENERGY * float(np.sqrt(one.layout.area))
 
     def _moved(self, start: Candidate) -> list[Candidate]:
         """Return candidates with the tips of the seams moved, so that the energy is about the largest allowed."""
@@ -301,10 +315,8 @@ class CutSearch:
         tips = find_tips(start.layout, seams, self.costs)
         if not (tips.rates > 0).any():
             return found
-        wanted, allowed = self.max_energy - start.energy, self.max_energy - ISOMETRIC
-        # For each slack that was requested, the energy above the bound.
-        slack, tried, known = wanted, [(0.0, -wanted)], [seams]
-        for _ in range(MAX_TRIES // 2 if self._has_coarse and wanted > 0 else MAX_TRIES):
+        allowed, slack, known = self.max_energy - ISOMETRIC, self.max_energy - start.energy, [seams]
+        for _ in range(MAX_TRIES // (1 + self._has_coarse)):
             moved, cones = moved_tips(start.layout, seams, tips, moves_for(start.layout, tips, slack))
             if any(np.array_equal(moved, each) for each in known):
                 # The tips move by whole edges.
@@ -315,23 +327,17 @@ class CutSearch:
             known.append(moved)
             one = self._candidate(replace(recut(start.layout, moved), cones=cones), start.distortion)
             excess = one.energy - self.max_energy
-            tried.append((slack, excess))
             if one.energy <= self._near:
                 found.append(one)
             # A start beyond the bound only has to get within it: the tips move again after the cuts for packing.
             if excess <= 0 and (excess >= -2 * TOLERANCE * allowed or start.energy > self.max_energy):
                 break
-            low = max((pair for pair in tried if pair[1] <= 0), default=None)
-            high = min((pair for pair in tried if pair[1] > 0), default=None)
-            if low is not None and high is not None:
-                part = float(np.clip(low[1] / (low[1] - high[1]), 0.2, 0.8))
-                slack = low[0] + part * (high[0] - low[0])
-            else:
-                (slack_before, excess_before), (slack, excess) = tried[-2:]
-                change = excess - excess_before
-                wished = slack - excess * (slack - slack_before) / change if change else np.inf
-                slack *= float(np.clip(wished / slack, 1.25, 3)) if wished * slack > 0 else 3.0
+            slack -= excess
         return found
+
+
+def _chart_seams(layout: Layout) -> Seams:
+    return Seams(layout.mesh, ChartLayout(layout.points, layout.corners, layout.chart))
 
 
 def coarse_part(part: Part, count: int) -> tuple[Part, IntArray]:

@@ -94,14 +94,10 @@ class Atlas:
             FaceIndexError: an index is not that of a vertex.
         """
         vertices, faces = np.asarray(positions, dtype=np.float64), np.asarray(indices)
-        for name, array, columns in (
-            ("positions", vertices, 3),
-            ("indices", faces, 3),
-            ("normals", None if normals is None else np.asarray(normals), 3),
-            ("uvs", None if uvs is None else np.asarray(uvs), 2),
-        ):
-            if array is not None and (array.ndim != 2 or array.shape[1] != columns):
-                raise ArrayShapeError(f"{name} must have the shape (n, {columns}), not {array.shape}")
+        arrays = {"positions": (vertices, 3), "indices": (faces, 3), "normals": (normals, 3), "uvs": (uvs, 2)}
+        for name, (array, columns) in arrays.items():
+            if array is not None and np.shape(array)[1:] != (columns,):
+                raise ArrayShapeError(f"{name} must have the shape (n, {columns}), not {np.shape(array)}")
         faces = faces.astype(np.int64)
         if len(faces) and not (faces.min() >= 0 and faces.max() < len(vertices)):
             raise FaceIndexError(f"indices must be from 0 to {len(vertices) - 1:,}")
@@ -152,10 +148,8 @@ class Atlas:
         """Return the number of meshes."""
         return len(self._given)
 
-    @property
-    def mesh_count(self) -> int:
-        """The number of meshes."""
-        return len(self._given)
+    #: The number of meshes.
+    mesh_count = property(__len__)
 
     @property
     def atlas_count(self) -> int:
