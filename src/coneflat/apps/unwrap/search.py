@@ -3,7 +3,7 @@
 Cones choose the cut. The fewer they are, the shorter are the seams, and the higher is the energy of the layout with
 free seams. The candidates are the cones that the search finds for an area distortion, which is varied. The tips of the
 best candidate's seams are then moved to where the energy is the largest allowed. On large meshes, both are done on a
-coarse mesh, and only the cones found there are taken over. In the end, small charts are joined to others where they fit.
+coarse mesh, and only the cones found there are taken over. At last, small charts are joined to others where they fit.
 """
 
 from __future__ import annotations
