@@ -226,17 +226,17 @@ def test_the_energy_of_a_stretched_square():
 def test_branching_charts_are_cut_to_fill_the_texture(shared, hand, monkeypatch):
     monkeypatch.setattr("coneflat.apps.unwrap.unwrap.cut_for_packing", lambda layouts, *_: layouts)
     whole = unwrap(shared("hand.obj"))
-    assert hand.packing_efficiency > 1.15 * whole.packing_efficiency
+    assert hand.packing_efficiency > 1.2 * whole.packing_efficiency
     assert hand.distortion.seam_length <= 1.3 * whole.distortion.seam_length
     assert max(hand.distortion.energy, whole.distortion.energy) <= 4.1
 
 
 def test_small_charts_are_joined_to_others_where_they_fit(shared, monkeypatch):
-    joined = unwrap(shared("knight.off")).distortion
+    joined = unwrap(shared("plane-holes.obj")).distortion
     monkeypatch.setattr("coneflat.apps.unwrap.search.CutSearch.attached", lambda _, one: one)
-    apart = unwrap(shared("knight.off")).distortion
+    apart = unwrap(shared("plane-holes.obj")).distortion
     assert joined.charts <= apart.charts - 2
-    assert joined.seam_length < 0.97 * apart.seam_length
+    assert joined.seam_length < 0.99 * apart.seam_length
     assert joined.energy <= 4.1
     assert (joined.flipped, joined.overlapping_pairs) == (0, 0)
 

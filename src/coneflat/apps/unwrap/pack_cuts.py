@@ -25,8 +25,8 @@ from ...stages import Layout
 # all cuts together may cost SHARE of the charts' borders, in which a seam counts twice.
 PRICE, SHARE = 0.1, 0.15
 # Smallest area of a piece relative to that of all charts, and the largest number of charts that are considered. Smaller
-# charts, which the separation of overlaps may leave, are joined to others.
-MIN_PIECE, MAX_CHARTS = 0.05, 32
+# charts fit between larger ones.
+MIN_PIECE, MAX_CHARTS = 0.02, 32
 # Points of a border between which cuts are searched. Cuts whose ends are closer than MIN_SEPARATION of it are alike.
 SAMPLES, MIN_SEPARATION = 96, 0.06
 # Cuts tried per set of charts, sets continued per step, and steps without a gain after which the search ends.

@@ -26,7 +26,6 @@ from ...source import Part
 from ...stages import Layout, Surface, VertexCurvatures
 from .free import freed, recut, seam_edges, separate_charts, side_by_side, triangle_energies
 from .options import ENERGY_PER_AREA, ISOMETRIC
-from .pack_cuts import MIN_PIECE
 from .tips import RINGS, find_tips, moved_tips, moves_for
 
 # The area distortion of the first candidate, one that the fewest cones reach, and the maximum number of candidates.
@@ -42,8 +41,9 @@ MANY_TRIANGLES = 60_000
 # Number of times that tips are moved to meet the bound, half as often on large meshes, that a coarse mesh is searched
 # for it, and that a layout is settled to avoid contacts.
 MAX_TRIES = 4
-# Number of times at most that small charts are joined to others.
-MAX_JOINS = 8
+# Charts below this fraction of the area are joined to others, at most so many. With 0.05 instead, 42 models have seams
+# and charts that are 3% and 13% less, but cover 0.02 less of the texture.
+SMALL_AREA, MAX_JOINS = 0.005, 8
 # Cost of seams that lowers the energy to that of an isometry, relative to the square root of the area.
 COST_PER_ENERGY = 0.6
 # Tolerance of the energies of candidates, see `relax`. Those above the bound by less than twice as much may be within
@@ -163,7 +163,7 @@ class CutSearch:
         """Return a candidate in several charts, the smallest joined to others where they fit once their points move."""
         seams, sizes = _chart_seams(one.layout), np.bincount(one.layout.chart, self.part.double_areas)
         stretch = seams.stretches(self.part.mesh)
-        is_small = sizes[seams.charts].min(axis=1) < MIN_PIECE * sizes.sum()
+        is_small = sizes[seams.charts].min(axis=1) < SMALL_AREA * sizes.sum()
         is_small &= seams.charts[:, 0] != seams.charts[:, 1]
         costs = np.bincount(stretch, self.seam_costs[seams.edges] * is_small)
         for each in np.argsort(-costs, kind="stable")[: min(MAX_JOINS, np.count_nonzero(costs))]:
