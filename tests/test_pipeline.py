@@ -358,6 +358,15 @@ def test_the_area_distortion_of_the_result_is_at_most_the_allowed_one_or_noted(a
     assert exceeded <= 4
 
 
+def test_a_small_component_above_the_allowed_area_distortion_is_noted_next_to_a_large_one_within_it():
+    vertices, faces = shapes.sphere(1)
+    vertices = vertices * np.exp(np.random.default_rng(5).normal(0, 0.9, len(vertices)))[:, None]
+    plate = shapes.grid(40, 40)
+    result = coneflat.flatten(*shapes.join((vertices, faces), (plate[0] * 20, plate[1])), distortion=0.05)
+    assert result.distortion.area_std < 0.05
+    assert any("of a component have an area distortion" in note for note in result.notes)
+
+
 def test_components_have_the_same_texel_density():
     rng = np.random.default_rng(9)
     vertices, faces = shapes.sphere(2)

@@ -50,7 +50,7 @@ CEILINGS = {
     "cone_curve": 108,
     "cones": 2045,
     "evaluate": 157,
-    "flatten": 220,
+    "flatten": 221,
     "flattener": 35,
     "geometry": 1542,
     "io": 2823,

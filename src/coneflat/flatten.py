@@ -149,10 +149,11 @@ def flatten_source(
         noted = {i: prepared.parts[i] for i, copy in enumerate(copies) if copy and finished[copy.first].notes}
         finished |= finish_within_bound(noted, lay_out_parts(noted, method), method)
     every = with_copies(finished, prepared.parts, copies)
-    if (excess := _excess(prepared.parts, every)) > 1:
+    own = max(map(_excess, ([part] for part in prepared.parts), ([one] for one in every)))
+    if (excess := max(own, _excess(prepared.parts, every))) > TOLERATED_EXCESS:
         every[0] = every[0].with_notes(
-            f"The triangles have an area distortion of {excess * TOLERATED_EXCESS * o.distortion:.3g}, above the "
-            f"{o.distortion:g} allowed. Allow more cones, or refine the mesh."
+            f"The triangles of {'a component' if own == excess else 'all components'} have an area distortion of "
+            f"{excess * o.distortion:.3g}, above the {o.distortion:g} allowed. Allow more cones, or refine the mesh."
         )
     return evaluate(prepared, every, o, watch)
 
@@ -249,7 +250,7 @@ def finish_within_bound(
     be larger. First all triangles of such a part are relaxed with some weight on areas, then more cones are searched.
     """
     finished = finish_parts(parts, layouts, method)
-    left = {i: part for i, part in parts.items() if _excess([part], [finished[i]]) > 1}
+    left = {i: part for i, part in parts.items() if _excess([part], [finished[i]]) > TOLERATED_EXCESS}
     if len(left) > 0 and not method.relax.is_off and method.relax.stretch < CORRECTING_STRETCH:
         method = replace(method, relax=replace(method.relax, stretch=CORRECTING_STRETCH))
         _keep_better(finished, finish_parts(left, layouts, method), parts)
@@ -257,9 +258,9 @@ def finish_within_bound(
         excess = {i: min(_excess([parts[i]], [finished[i]]), MAX_TIGHTENING) for i in left}
         # About that many times as many cones are needed; a search without enough of them takes longest.
         left = {
-            i: left[i].with_distortion(1 / excess[i])
+            i: left[i].with_distortion(TOLERATED_EXCESS / excess[i])
             for i in left
-            if excess[i] > 1 and excess[i] * len(finished[i].cones) <= MAX_SEARCHED
+            if excess[i] > TOLERATED_EXCESS and excess[i] * len(finished[i].cones) <= MAX_SEARCHED
         }
         better = _keep_better(finished, finish_parts(left, lay_out_parts(left, method), method), parts)
         left = {i: left[i] for i in better}
@@ -281,7 +282,7 @@ def _rank(part: Part, layout: Layout) -> tuple[int, float]:
 
 
 def _excess(parts: Sequence[Part], layouts: Sequence[Layout]) -> float:
-    """Return the area distortion of the triangles of all layouts, divided by the one tolerated; 0 without a bound."""
+    """Return the area distortion of the triangles of all layouts, divided by the one allowed; 0 without a bound."""
     bounded = [(part, one) for part, one in zip(parts, layouts, strict=True) if _is_bounded(part)]
     if not bounded:
         return 0.0
@@ -289,7 +290,7 @@ def _excess(parts: Sequence[Part], layouts: Sequence[Layout]) -> float:
     flat = np.concatenate([signed_double_areas(one.points[one.corners]) for _, one in bounded])
     chosen = (areas > 0) & (flat > 0)
     log_scale = np.log(flat[chosen] / areas[chosen]) / 2
-    return area_distortion(log_scale, areas[chosen]) / (parts[0].cones.distortion * TOLERATED_EXCESS)
+    return area_distortion(log_scale, areas[chosen]) / parts[0].cones.distortion
 
 
 def _is_bounded(part: Part) -> bool:

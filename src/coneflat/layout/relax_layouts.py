@@ -247,8 +247,8 @@ class LayoutGroup:
             own = slice(self._vertices[i], self._vertices[i + 1])
             areas = vertex_areas(one.mesh.faces, one.lengths, len(one.mesh.vertices))
             share = weighted_areas(areas, self._given_weights[i])
-            # The energy of angles does not depend on the scale: components keep their areas relative to each other.
-            # Of huge triangles, as untangling may leave, the logs are not huge.
+            # The energy of angles does not depend on the scale: components keep their areas relative to each other. The
+            # mean log scale is hardly changed by the few huge triangles that untangling may leave.
             grown = share @ log_scale[own] if one.statistics.untangled_vertices else growth[i]
             factor = 1.0 if one.is_fixed.any() else np.exp(-grown)
             log_scale[own] += np.log(factor)

@@ -17,7 +17,7 @@ from coneflat.apps.unwrap.search import coarse_part
 from coneflat.apps.unwrap.unwrap import along_sharp_edges
 from coneflat.base import Stopwatch
 from coneflat.flatten import Method, lay_out_part
-from coneflat.geometry import signed_double_areas
+from coneflat.geometry import corner_angles, signed_double_areas
 from coneflat.io import as_input
 from coneflat.metric import find_metric
 from coneflat.options import Options
@@ -232,13 +232,17 @@ def test_branching_charts_are_cut_to_fill_the_texture(shared, hand, monkeypatch)
 
 
 def test_small_charts_are_joined_to_others_where_they_fit(shared, monkeypatch):
-    joined = unwrap(shared("plane-holes.obj")).distortion
+    result = unwrap(shared("plane-holes.obj"))
     monkeypatch.setattr("coneflat.apps.unwrap.search.CutSearch.attached", lambda _, one: one)
-    apart = unwrap(shared("plane-holes.obj")).distortion
+    joined, apart = result.distortion, unwrap(shared("plane-holes.obj")).distortion
     assert joined.charts <= apart.charts - 2
     assert joined.seam_length < 0.99 * apart.seam_length
     assert joined.energy <= 4.1
     assert (joined.flipped, joined.overlapping_pairs) == (0, 0)
+    # What the result says of the cones is measured after their points have moved.
+    sides = result.corner_uv[:, [2, 0, 1]] - result.corner_uv[:, [1, 2, 0]]
+    angles = np.bincount(result.faces.ravel(), corner_angles(np.linalg.norm(sides, axis=2)).ravel())
+    assert result.curvatures == pytest.approx(2 * np.pi - angles[result.cones], abs=1e-6)
 
 
 def test_the_cut_of_a_large_mesh_is_searched_on_a_coarse_one(monkeypatch):

@@ -51,13 +51,13 @@ def freed(
         layout = _untangled(layout, disk, spec)
     points, disk = layout.points, layout.disk or disk
     if not (signed_double_areas(points[layout.corners]) > 0).all():
-        points, free = embedded_disks(disk, np.zeros(len(layout.corners), dtype=np.int64), areas), None
+        points, free = embedded_disks(disk, layout.chart, areas), None
     free = None if free is None or len(free) != len(points) else free
     energy, sides = StretchEnergy(1.0), layout.lengths
     found = relax(disk, points, layout.corners, energy, lengths=sides, free=free, tolerance=tolerance)
     if free is not None and not free.all():
-        free_layout = replace(layout, points=found.points)
-        return free_layout, float(triangle_energies(sides, found.points[layout.corners]).sum() / areas.sum())
+        moved = replace(layout, points=found.points, **_measured(mesh, areas, found.points[layout.corners]))
+        return moved, float(triangle_energies(sides, moved.points[layout.corners]).sum() / areas.sum())
     # The relaxation keeps the lengths relative to the area at its start.
     start = np.abs(signed_double_areas(points[layout.corners])).sum() / 2
     points = found.points * np.sqrt(areas.sum() / start)

@@ -148,8 +148,10 @@ class Atlas:
         """Return the number of meshes."""
         return len(self._given)
 
-    #: The number of meshes.
-    mesh_count = property(__len__)
+    @property
+    def mesh_count(self) -> int:
+        """The number of meshes."""
+        return len(self._given)
 
     @property
     def atlas_count(self) -> int:

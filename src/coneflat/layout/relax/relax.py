@@ -76,7 +76,8 @@ def relax(
 
     Args:
         mesh: the mesh.
-        points: (u, 2) positions in the plane. Triangles that are flipped there, or have no area, do not move.
+        points: (u, 2) positions in the plane. Triangles that are flipped there, or have no area up to
+            rounding, do not move.
         corners: (m, 3) the point at each triangle corner, from 0.
         energy: the energy of a triangle per area; None for its angle distortion, `StretchEnergy(0)`.
         constraints: constraints on points; None for none.
