@@ -151,6 +151,8 @@ class CutSearch:
             start = replace(start, layout=layout, cost=self.cost_of(layout))
         if layout is not None or self.max_energy < start.energy <= self._near:
             start = self.settled(start)
+        if self._has_coarse and 0 <= self.max_energy - start.energy <= 5 * (self._near - self.max_energy):
+            return start
         for one in sorted(map(self.separated, self._moved(start)), key=lambda one: one.cost):
             one = self.settled(one) if one.energy > self.max_energy else one
             if one.energy <= self.max_energy and (one.cost < start.cost or start.energy > self.max_energy):
@@ -327,8 +329,7 @@ class CutSearch:
             known.append(moved)
             one = self._candidate(replace(recut(start.layout, moved), cones=cones), start.distortion)
             excess = one.energy - self.max_energy
-            if one.energy <= self._near:
-                found.append(one)
+            found += [one] if one.energy <= self._near else []
             # A start beyond the bound only has to get within it: the tips move again after the cuts for packing.
             if excess <= 0 and (excess >= -2 * TOLERANCE * allowed or start.energy > self.max_energy):
                 break
