@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 # Relative rounding of a double, and of the 32-bit numbers of GLB files.
 DOUBLE, SINGLE = (float(np.finfo(kind).epsneg) for kind in (np.float64, np.float32))
-# Largest error of points, in roundings: of the coordinates, and of the operations that rotate, move and scale them.
+# Error of points, in roundings, up to which no note is given: of the coordinates, and of what rotates and moves them.
 MAX_ROUNDINGS = 4
 # Tolerance of a layout in addition to rounding: radians, or relative to a length. Metrics are solved to about 1e-11.
 EXACT_TOLERANCE = 1e-8

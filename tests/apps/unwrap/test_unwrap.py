@@ -233,7 +233,7 @@ def test_branching_charts_are_cut_to_fill_the_texture(shared, hand, monkeypatch)
 
 def test_small_charts_are_joined_to_others_where_they_fit(shared, monkeypatch):
     result = unwrap(shared("plane-holes.obj"))
-    monkeypatch.setattr("coneflat.apps.unwrap.search.CutSearch.attached", lambda _, one: one)
+    monkeypatch.setattr("coneflat.apps.unwrap.search.CutSearch.small_joined", lambda _, one: one)
     joined, apart = result.distortion, unwrap(shared("plane-holes.obj")).distortion
     assert joined.charts <= apart.charts - 2
     assert joined.seam_length < 0.99 * apart.seam_length

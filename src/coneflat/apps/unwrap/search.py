@@ -33,13 +33,13 @@ FIRST_DISTORTION, ANY_DISTORTION, MAX_CANDIDATES = 0.25, 1e3, 5
 # The search ends where the numbers of cones within and beyond the bound differ by less than this factor or by one. A
 # surface of 50 handles needs about 160 cones, and each search for them seconds.
 SIMILAR_COUNTS = 1.05
-# Number of triangles of a coarse mesh; and what its energy has more, relative to what is allowed above that of an
-# isometry.
-COARSE, COARSE_EXCESS = 4_000, 0.15
+# Number of triangles of a coarse mesh; number of coarse searches to meet the bound on the given mesh; and what its
+# energy has more, relative to what is allowed above that of an isometry.
+COARSE, COARSE_TRIES, COARSE_EXCESS = 4_000, 3, 0.15
 # Tips of larger meshes are moved on their coarse meshes only, and small charts are not joined: a try takes seconds.
 MANY_TRIANGLES = 60_000
-# Number of times that tips are moved to meet the bound, half as often on large meshes, that a coarse mesh is searched
-# for it, and that a layout is settled to avoid contacts.
+# Number of times that tips are moved to meet the bound, half as often on large meshes, and that a layout is settled to
+# avoid contacts.
 MAX_TRIES = 4
 # Charts below this fraction of the part's area are joined to others, and the number of seams that are tried. With 0.05
 # instead, 42 models have seams and charts that are 3% and 13% less, but cover 0.02 less of the texture.
@@ -159,7 +159,7 @@ class CutSearch:
                 return one
         return start
 
-    def attached(self, one: Candidate) -> Candidate:
+    def small_joined(self, one: Candidate) -> Candidate:
         """Return a candidate in several charts, the smallest joined to others where they fit once their points move."""
         if len(self.part.faces) > MANY_TRIANGLES:
             return one
@@ -216,7 +216,7 @@ class CutSearch:
         """Return a candidate with the cones that are best on a coarse mesh, for a bound that the mesh itself meets."""
         coarse, kept = coarse_part(self.part, COARSE)
         bound, found = self.max_energy + COARSE_EXCESS * (self.max_energy - ISOMETRIC), list[Candidate]()
-        for _ in range(MAX_TRIES):
+        for _ in range(COARSE_TRIES):
             best = CutSearch(coarse, bound, self._method, True, self._by_area).best()
             given = VertexCurvatures(kept[best.layout.cones], np.full(len(best.layout.cones), np.nan))
             spec = replace(self.part.cones, strategy="given", given=given)

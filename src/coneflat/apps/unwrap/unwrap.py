@@ -119,7 +119,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
             for (i, search), layout in zip(searches.items(), layouts, strict=True):
                 # Joined parts would each need a relaxation of their own.
                 one = replace(found[i], layout=layout) if i in joined else search.shortened(found[i], layout)
-                found[i] = search.attached(one) if o.charts == "atlas" and one.layout.chart.any() else one
+                found[i] = search.small_joined(one) if o.charts == "atlas" and one.layout.chart.any() else one
     layouts = with_copies({i: one.layout for i, one in found.items()}, parts, copies)
     shared = replace(shared, method=FREE)
     result = evaluate(prepared, layouts, shared, watch)
