@@ -33,6 +33,7 @@ def injective_charts(
     corners: IntArray,
     lengths: FloatArray,
     disk: TriangleMesh | None = None,
+    tries: int = len(MIN_CHART_AREAS),
 ) -> ChartLayout:
     """Return a layout of a connected mesh in charts that do not overlap themselves.
 
@@ -45,6 +46,7 @@ def injective_charts(
         corners: (m, 3) point index of each triangle corner; the triangles form one disk.
         lengths: (e,) costs of cutting the edges.
         disk: a mesh whose faces are the corners, with a vertex for each point; None to compute it.
+        tries: how many of the minimum areas of a chart are tried.
     """
     whole = ChartLayout(points, corners, np.zeros(len(corners), dtype=np.int64))
     places = rows_of(points, corners)
@@ -56,9 +58,10 @@ def injective_charts(
         return glue_charts(mesh, whole, lengths).renumbered()
     disk = as_disk(points, corners) if disk is None else unpinched(disk.moved_to(points))
     found: list[tuple[tuple[int, int, float], int, ChartLayout]] = []
-    for share in MIN_CHART_AREAS:
+    shares = MIN_CHART_AREAS[:tries]
+    for share in shares:
         least = share * float(np.abs(areas).sum())
-        most = MAX_SMALL_CHARTS if share < MIN_CHART_AREAS[-1] else np.inf
+        most = MAX_SMALL_CHARTS if share < shares[-1] else np.inf
         chart = split_overlaps(disk, lengths[mesh.halfedge_edges], np.abs(areas), pairs, least, most)
         if chart is None:
             continue
@@ -79,20 +82,23 @@ def _rank(
     return slivers, len(sizes), float(lengths[Seams(mesh, layout).edges].sum())
 
 
-def separate_overlaps(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layout:
+def separate_overlaps(
+    layout: Layout, costs: FloatArray, spec: SeamSpec, tries: int = len(MIN_CHART_AREAS)
+) -> Layout:
     """Return the layout split into few charts that do not overlap themselves.
 
     Args:
         layout: a layout in one chart.
         costs: (e,) costs of cutting the edges.
         spec: which edges to avoid and which are forbidden as cuts.
+        tries: see `injective_charts`; with one, seams are shorter and small charts more.
 
     Returns:
         The split layout, with a note if forbidden edges had to be cut.
     """
     mesh = layout.mesh
     costs = np.where(spec.is_avoided | spec.is_forbidden, costs + costs.sum(), costs)
-    charts = injective_charts(mesh, layout.points, layout.corners, costs, layout.disk)
+    charts = injective_charts(mesh, layout.points, layout.corners, costs, layout.disk, tries)
     separated = with_charts(layout, charts)
     count = int(spec.is_forbidden[Seams(mesh, charts).edges].sum())
     note = f"{plural(count, 'forbidden edge')} had to be cut to separate overlaps."

@@ -151,9 +151,9 @@ def side_by_side(layout: Layout) -> Layout:
 
 
 def separate_charts(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layout:
-    """Return a layout in any number of charts, split so that no chart overlaps itself."""
+    """Return a layout in any number of charts, split by the cheapest cuts so that no chart overlaps itself."""
     if not layout.chart.any():
-        separated = separate_overlaps(layout, costs, spec)
+        separated = separate_overlaps(layout, costs, spec, 1)
         return replace(separated, chart=label_faces(separated.corners, len(separated.points))[1])
     pairs = find_overlaps(side_by_side(layout).points[layout.corners]).pairs
     label = layout.chart.copy()
@@ -167,7 +167,7 @@ def separate_charts(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layout
         one_chart = np.zeros(len(faces), dtype=np.int64)
         alone = replace(layout, mesh=disk, points=points, corners=disk.faces, chart=one_chart, disk=None)
         own = replace(spec, is_avoided=spec.is_avoided[edges], is_forbidden=spec.is_forbidden[edges])
-        separated = separate_overlaps(alone, costs[edges], own)
+        separated = separate_overlaps(alone, costs[edges], own, 1)
         layout, pieces = replace(layout, notes=separated.notes), separated.chart
         label[faces] = np.where(pieces > 0, label.max() + pieces, chart)
     return with_charts(

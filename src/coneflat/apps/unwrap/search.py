@@ -30,9 +30,9 @@ from .tips import RINGS, find_tips, moved_tips, moves_for
 
 # The area distortion of the first candidate, one that the fewest cones reach, and the maximum number of candidates.
 FIRST_DISTORTION, ANY_DISTORTION, MAX_CANDIDATES = 0.25, 1e3, 5
-# The search ends where the numbers of cones within and beyond the bound differ by less than this factor or by one. A
-# surface of 50 handles needs about 160 cones, and each search for them seconds.
-SIMILAR_COUNTS = 1.05
+# The search ends where the costs within and beyond the bound differ by less than this factor, or the numbers of cones
+# by one. A surface of 50 handles needs about 160 cones, and each search for them more than a second.
+SIMILAR_COSTS = 1.06
 # Number of triangles of a coarse mesh; number of coarse searches to meet the bound on the given mesh; and what its
 # energy has more, relative to what is allowed above that of an isometry.
 COARSE, COARSE_TRIES, COARSE_EXCESS = 4_000, 3, 0.15
@@ -88,10 +88,13 @@ class CutSearch:
         self, part: Part, max_energy: float, method: Method, is_coarse: bool = False, by_area: bool = False
     ) -> None:
         self.part, self.max_energy, self._method, self._by_area = part, max_energy, method, by_area
-        # Energies up to which a candidate may be within the bound once it is settled, and above which it is given up.
-        allowed = max_energy - ISOMETRIC
-        self._near, self._reach = max_energy + 2 * TOLERANCE * allowed, max_energy + MAX_EXCESS * allowed
         self._has_coarse = len(part.faces) > 2 * COARSE and not (is_coarse or part.seams.is_forbidden.any())
+        self._found = list[Candidate]()
+
+    @property
+    def _near(self) -> float:
+        """The energy up to which a candidate may be within the bound once it is settled."""
+        return self.max_energy + 2 * TOLERANCE * (self.max_energy - ISOMETRIC)
 
     @cached_property
     def _surface(self) -> Surface:
@@ -126,8 +129,8 @@ class CutSearch:
             return self._with_fewest_seams()
         if self._has_coarse:
             return self._from_coarse()
-        found = self._by_distortion()
-        near = [self.separated(one) for one in found if one.energy <= self._reach]
+        found, reach = self._by_distortion(), self.max_energy + MAX_EXCESS * (self.max_energy - ISOMETRIC)
+        near = [self.separated(one) for one in found if one.energy <= reach]
         near.sort(key=self._expected_cost)
         if near and near[0].energy > self.max_energy:
             near.append(self.shortened(near[0]))
@@ -216,58 +219,67 @@ class CutSearch:
         """Return a candidate with the cones that are best on a coarse mesh, for a bound that the mesh itself meets."""
         coarse, kept = coarse_part(self.part, COARSE)
         bound, found = self.max_energy + COARSE_EXCESS * (self.max_energy - ISOMETRIC), list[Candidate]()
+        search = CutSearch(coarse, bound, self._method, True, self._by_area)
         for _ in range(COARSE_TRIES):
-            best = CutSearch(coarse, bound, self._method, True, self._by_area).best()
+            search.max_energy = bound
+            best = search.best()
             given = VertexCurvatures(kept[best.layout.cones], np.full(len(best.layout.cones), np.nan))
             spec = replace(self.part.cones, strategy="given", given=given)
             layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
             one = self._candidate(layout, best.distortion)
             one = self.shortened(one) if one.energy > self.max_energy else one
-            found.append(self.separated(one))
+            found.append(one)
             excess = one.energy - self.max_energy
             if excess <= 0 or best.energy > bound:
                 break
             bound = max(bound - excess, (bound + ISOMETRIC) / 2)
         close_search(self._surface)
-        return min(found, key=lambda one: one.energy)
+        return self.separated(min(found, key=lambda one: one.energy))
 
     def _by_distortion(self) -> list[Candidate]:
         """Return candidates with energies around the bound."""
-        found, distortion, allowed = list[Candidate](), FIRST_DISTORTION, self.max_energy - ISOMETRIC
+        found = self._found
         for tried in range(2 * MAX_CANDIDATES):
+            distortion = self._next_distortion(tried)
+            if distortion is None:
+                break
             spec = replace(self.part.cones, distortion=distortion)
             # Cones that their triangles cannot hold are no problem for free seams.
             layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
             same = [i for i, each in enumerate(found) if np.array_equal(each.layout.cones, layout.cones)]
             known = found.pop(same[0]) if same else self._candidate(layout, distortion)
-            found.append(replace(known, distortion=distortion))
             reached = layout.statistics.area_distortion_linear
+            found.append(replace(known, distortion=min(distortion, reached) if same else distortion))
             if same and (known.energy <= self.max_energy or distortion < reached):
                 break  # The search finds no others.
-            distortion = min(distortion, reached) if same else distortion
-            within = [each for each in found if each.energy <= self.max_energy]
-            beyond = [each for each in found if each.energy > self.max_energy]
-            low = max(within, key=lambda each: each.distortion, default=None)
-            high = min(beyond, key=lambda each: each.distortion, default=None)
-            if low and (tried >= MAX_CANDIDATES - 1 or not len(low.layout.seams)):
-                break
-            if low and high:
-                if len(low.layout.cones) <= SIMILAR_COUNTS * len(high.layout.cones) + 1:
-                    break
-                distortion = float(np.sqrt(low.distortion * high.distortion))
-            else:
-                # The energy above that of an isometry is about a multiple of the square of the distortion.
-                above = float(np.clip(found[-1].energy - ISOMETRIC, allowed / 16, allowed * 16))
-                distortion *= np.sqrt(allowed / above) * (8 / 7 if low else 7 / 8)
         return found
 
-    def _candidate(self, layout: Layout, distortion: float) -> Candidate:
+    def _next_distortion(self, tried: int) -> float | None:
+        """Return the area distortion of the next candidate, or None if enough are found."""
+        allowed, found = self.max_energy - ISOMETRIC, self._found
+        within = [each for each in found if each.energy <= self.max_energy]
+        beyond = [each for each in found if each.energy > self.max_energy]
+        low = max(within, key=lambda each: each.distortion, default=None)
+        high = min(beyond, key=lambda each: each.distortion, default=None)
+        if low and (tried >= MAX_CANDIDATES or not len(low.layout.seams)):
+            return None
+        if low and high:
+            is_next = len(low.layout.cones) <= len(high.layout.cones) + 1
+            is_similar = is_next or low.cost <= SIMILAR_COSTS * high.cost
+            return None if is_similar else float(np.sqrt(low.distortion * high.distortion))
+        if not found:
+            return FIRST_DISTORTION
+        # The energy above that of an isometry is about a multiple of the square of the distortion.
+        above = float(np.clip(found[-1].energy - ISOMETRIC, allowed / 16, allowed * 16))
+        return float(found[-1].distortion * np.sqrt(allowed / above) * (8 / 7 if low else 7 / 8))
+
+    def _candidate(self, layout: Layout, distortion: float, free: BoolArray | None = None) -> Candidate:
         # What the cones or the metric do not meet does not matter where seams are free.
-        layout, energy = self._freed(replace(layout, notes=()), tolerance=TOLERANCE)
+        layout, energy = self._freed(replace(layout, notes=()), free, TOLERANCE)
         return Candidate(layout, energy, self.cost_of(layout), distortion)
 
     def _freed(
-        self, layout: Layout, free: BoolArray | None = None, tolerance: float = 1e-3
+        self, layout: Layout, free: BoolArray | None = None, tolerance: float = 3e-3
     ) -> tuple[Layout, float]:
         """Return a layout with the least energy, and its energy or the one that belongs to its area distortion."""
         spec = self.part.seams if np.isfinite(self.max_energy) else None
@@ -313,7 +325,7 @@ class CutSearch:
 
     def _moved(self, start: Candidate) -> list[Candidate]:
         """Return candidates with the tips of the seams moved, so that the energy is about the largest allowed."""
-        seams, found = seam_edges(start.layout), list[Candidate]()
+        mesh, seams, found = self.part.mesh, seam_edges(start.layout), list[Candidate]()
         tips = find_tips(start.layout, seams, self.costs)
         if not (np.isfinite(self.max_energy) and (tips.rates > 0).any()):
             return found
@@ -324,10 +336,14 @@ class CutSearch:
                 # The tips move by whole edges.
                 slack += np.sign(slack) * allowed / 4
                 continue
-            if not (len(moved) or self.part.mesh.is_boundary_edge.any()):
+            if not (len(moved) or mesh.is_boundary_edge.any()):
                 break  # not a disk
             known.append(moved)
-            one = self._candidate(replace(recut(start.layout, moved), cones=cones), start.distortion)
+            cut = replace(recut(start.layout, moved), cones=cones)
+            changed = mask_of(len(mesh.vertices), mesh.edges[np.setxor1d(seams, moved)])
+            # Most of what moves is near: more rings change the seams by less than 1%.
+            is_free = nearby(cut.corners, changed[mesh.faces].any(axis=1), 4 * RINGS)
+            one = self._candidate(cut, start.distortion, is_free)
             excess = one.energy - self.max_energy
             found += [one] if one.energy <= self._near else []
             # A start beyond the bound only has to get within it: the tips move again after the cuts for packing.
