@@ -57,7 +57,7 @@ def injective_charts(
     if not len(pairs):
         return glue_charts(mesh, whole, lengths).renumbered()
     disk = as_disk(points, corners) if disk is None else unpinched(disk.moved_to(points))
-    found: list[tuple[tuple[int, int, float], int, ChartLayout]] = []
+    found: list[tuple[int, int, float, int, ChartLayout]] = []
     shares = MIN_CHART_AREAS[:tries]
     for share in shares:
         least = share * float(np.abs(areas).sum())
@@ -66,20 +66,13 @@ def injective_charts(
         if chart is None:
             continue
         layout = glue_charts(mesh, whole.split(chart), lengths).renumbered()
-        rank = _rank(mesh, layout, np.abs(areas), lengths)
-        found.append((rank, len(found), layout))
-        if rank[1] == 1 or (not rank[0] and len(corners) > LARGE_TRIANGLES):
+        sizes = np.bincount(layout.chart, weights=np.abs(areas))
+        slivers = int((sizes < SLIVER_AREA * sizes.sum()).sum())
+        cost = float(lengths[Seams(mesh, layout).edges].sum())
+        found.append((slivers, len(sizes), cost, len(found), layout))
+        if len(sizes) == 1 or (not slivers and len(corners) > LARGE_TRIANGLES):
             break
-    return min(found, key=lambda one: one[:2])[2]
-
-
-def _rank(
-    mesh: TriangleMesh, layout: ChartLayout, areas: FloatArray, lengths: FloatArray
-) -> tuple[int, int, float]:
-    """Return the number of slivers, the number of charts, and the length of seams; smaller is better."""
-    sizes = np.bincount(layout.chart, weights=areas)
-    slivers = int((sizes < SLIVER_AREA * sizes.sum()).sum())
-    return slivers, len(sizes), float(lengths[Seams(mesh, layout).edges].sum())
+    return min(found, key=lambda one: one[:-1])[-1]
 
 
 def separate_overlaps(

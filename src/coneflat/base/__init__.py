@@ -14,14 +14,14 @@ from .text import MAX_LISTED, exit_text, list_some, plural, printable, short_rep
 from .threads import THREADS, limit_threads
 
 if TYPE_CHECKING:
-    from .arrays import BoolArray, ComplexArray, FloatArray, IntArray, dots, mask_of, unit_exponent
+    from .arrays import BoolArray, ComplexArray, FloatArray, IntArray, dots, has_any, mask_of, unit_exponent
     from .jit import compiled
 
 __all__ = [
     "BoolArray", "ComplexArray", "DISTORTION", "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE", "MAX_LISTED",
     "MIN_CONE_ANGLE", "Progress", "Stopwatch", "THREADS", "TYPED_TOLERANCE", "cancel_with", "check_cancelled",
-    "compiled", "dots", "exit_text", "limit_threads", "list_some", "mask_of", "plural", "printable", "short_repr",
-    "unit_exponent",
+    "compiled", "dots", "exit_text", "has_any", "limit_threads", "list_some", "mask_of", "plural", "printable",
+    "short_repr", "unit_exponent",
 ]  # fmt: skip
 
 

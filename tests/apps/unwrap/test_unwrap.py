@@ -226,7 +226,7 @@ def test_the_energy_of_a_stretched_square():
 def test_branching_charts_are_cut_to_fill_the_texture(shared, hand, monkeypatch):
     monkeypatch.setattr("coneflat.apps.unwrap.unwrap.cut_for_packing", lambda layouts, *_: layouts)
     whole = unwrap(shared("hand.obj"))
-    assert hand.packing_efficiency > 1.2 * whole.packing_efficiency
+    assert hand.packing_efficiency > max(0.65, 1.15 * whole.packing_efficiency)
     assert hand.distortion.seam_length <= 1.3 * whole.distortion.seam_length
     assert max(hand.distortion.energy, whole.distortion.energy) <= 4.1
 

@@ -11,11 +11,12 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ...atlas import ChartLayout, Seams
-from ...base import BoolArray, FloatArray, IntArray, mask_of
+from ...base import BoolArray, FloatArray, IntArray, has_any, mask_of
 from ...cones import close_search
 from ...errors import MetricError, SeamError
 from ...flatten import Method, lay_out_once
@@ -342,7 +343,7 @@ class CutSearch:
             cut = replace(recut(start.layout, moved), cones=cones)
             changed = mask_of(len(mesh.vertices), mesh.edges[np.setxor1d(seams, moved)])
             # Most of what moves is near: more rings change the seams by less than 1%.
-            is_free = nearby(cut.corners, changed[mesh.faces].any(axis=1), 4 * RINGS)
+            is_free = nearby(cut.corners, has_any(changed, mesh.faces), 4 * RINGS)
             one = self._candidate(cut, start.distortion, is_free)
             excess = one.energy - self.max_energy
             found += [one] if one.energy <= self._near else []
@@ -360,26 +361,14 @@ def _chart_seams(layout: Layout) -> Seams:
 def coarse_part(part: Part, count: int) -> tuple[Part, IntArray]:
     """Return a part with about `count` triangles, and (k,) the vertices of the given part that it keeps."""
     coarse, kept, faces = coarse_mesh(part.mesh, count)
-    own = edge_lengths(coarse.vertices, coarse.faces)
-    seams, none = part.seams, np.zeros(len(coarse.edges), dtype=bool)
-    return Part(
-        coarse,
-        part.vertices[kept],
-        faces,
-        mollify(own)[0],
-        double_areas(own),
-        replace(
-            part.cones,
-            is_allowed=part.cones.is_allowed[kept],
-            absorbs_curvature=part.cones.absorbs_curvature[kept],
-            names=part.cones.names[kept],
-        ),
-        replace(part.metric, keeps_length=part.metric.keeps_length[kept], names=part.metric.names[kept]),
-        replace(
-            seams,
-            visibility=None if seams.visibility is None else seams.visibility[kept],
-            weights=None if seams.weights is None else seams.weights[kept],
-            is_avoided=none,
-            is_forbidden=none,
-        ),
-    ), kept
+    own, none = edge_lengths(coarse.vertices, coarse.faces), np.zeros(len(coarse.edges), dtype=bool)
+
+    def of_kept(spec: Any, *names: str) -> Any:
+        values = {name: getattr(spec, name) for name in names}
+        return replace(spec, **{name: None if each is None else each[kept] for name, each in values.items()})
+
+    cones = of_kept(part.cones, "is_allowed", "absorbs_curvature", "names")
+    metric = of_kept(part.metric, "keeps_length", "names")
+    seams = replace(of_kept(part.seams, "visibility", "weights"), is_avoided=none, is_forbidden=none)
+    lengths = mollify(own)[0]
+    return Part(coarse, part.vertices[kept], faces, lengths, double_areas(own), cones, metric, seams), kept
