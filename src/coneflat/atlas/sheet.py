@@ -30,17 +30,19 @@ class Sheet:
     def __init__(self, disk: TriangleMesh, costs: FloatArray) -> None:
         self.disk, self.costs = disk, costs
         self.piece = np.zeros(len(disk.faces), dtype=np.int64)
-        self._sides = disk.halfedge_edges, disk.edge_halfedges
+        self._twins = np.full(len(disk.halfedge_edges), -1)
+        one, two = disk.edge_halfedges[~disk.is_boundary_edge].T
+        self._twins[one], self._twins[two] = two, one
         # For each piece a lower bound of its first triangle, and a half-edge on its border.
         self._first, self._start = [0], [int(disk.edge_halfedges[np.argmax(disk.is_boundary_edge), 0])]
         self._owner = np.full(len(disk.faces), -1, dtype=np.int64)
-        self._is_cut = np.zeros(len(disk.edges), dtype=bool)
+        self._is_cut = np.zeros(len(disk.halfedge_edges), dtype=bool)
         self._edge_costs = costs[disk.edge_halfedges[:, 0]]
 
     def border(self, own: int) -> IntArray:
         """Return (b,) the half-edges on the border of a piece in order, with the piece on their left."""
-        around: IntArray = walk_border(*self._sides, self.piece, self._start[own])
-        return np.roll(around, -int(np.argmin(self._sides[0][around])))
+        around: IntArray = walk_border(self._twins, self.piece, self._start[own])
+        return np.roll(around, -int(np.argmin(self.disk.halfedge_edges[around])))
 
     def is_pinched(self, own: int) -> bool:
         """Return True if the border of a piece passes through a vertex more than once."""
@@ -65,9 +67,9 @@ class Sheet:
         one, other = both
         mark = np.where(one[border // 3], 1, np.where(other[border // 3], 2, 0))
         starts, ends = (self.disk.ends_of(sides)[0] for sides in _between(border, mark))
-        cut = self._path(own, one, other, starts, ends)
+        cut = self.disk.edge_halfedges[self._path(own, one, other, starts, ends)]
         ids, first, start = split_piece(
-            *self._sides, self.piece, own, cut, self._owner, self._is_cut, len(self._first), self._first[own]
+            self._twins, self.piece, own, cut, self._owner, self._is_cut, len(self._first), self._first[own]
         )
         if len(ids) < 2:
             return None
@@ -184,15 +186,11 @@ def _between(border: IntArray, mark: IntArray) -> tuple[IntArray, IntArray]:
 
 
 @compiled
-def across(halfedge_edges: IntArray, edge_halfedges: IntArray, h: int) -> int:
-    """Return the twin of a half-edge, -1 on the boundary."""
-    e = halfedge_edges[h]
-    return edge_halfedges[e, 1] if edge_halfedges[e, 0] == h else edge_halfedges[e, 0]
+def walk_border(twins: IntArray, piece: IntArray, start: int) -> IntArray:
+    """Return the half-edges on the border of a piece in order, beginning with `start`.
 
-
-@compiled
-def walk_border(halfedge_edges: IntArray, edge_halfedges: IntArray, piece: IntArray, start: int) -> IntArray:
-    """Return the half-edges on the border of a piece in order, beginning with `start`."""
+    twins: (3m,) the other half-edge of each edge, -1 on the boundary. piece: (m,) the piece of each triangle.
+    """
     own, around = piece[start // 3], np.empty(0, np.int64)
     for is_known in (False, True):  # the first pass counts them, the second stores them
         count, h = 0, start
@@ -201,10 +199,10 @@ def walk_border(halfedge_edges: IntArray, edge_halfedges: IntArray, piece: IntAr
                 around[count] = h
             count += 1
             h = h - h % 3 + (h + 1) % 3
-            t = across(halfedge_edges, edge_halfedges, h)
+            t = twins[h]
             while t >= 0 and piece[t // 3] == own:
                 h = t - t % 3 + (t + 1) % 3
-                t = across(halfedge_edges, edge_halfedges, h)
+                t = twins[h]
         if not is_known:
             around = np.empty(count, np.int64)
     return around
@@ -239,8 +237,7 @@ def append_to(head: IntArray, last: IntArray, after: IntArray, i: int, f: int) -
 
 @compiled
 def split_piece(
-    halfedge_edges: IntArray,
-    edge_halfedges: IntArray,
+    twins: IntArray,
     piece: IntArray,
     own: int,
     cut: IntArray,
@@ -255,11 +252,11 @@ def split_piece(
     When a single set still grows, it is the remainder and keeps the index of the piece, so it is not fully visited.
 
     Args:
-        halfedge_edges, edge_halfedges: connectivity of the mesh, see `TriangleMesh`.
+        twins: (3m,) the other half-edge of each edge, -1 on the boundary.
         piece: (m,) the piece of each triangle, changed in place.
         own: the piece to split.
-        cut: the edges, between triangles of the piece.
-        owner, is_cut: (m,) -1 and (e,) False, work arrays that are reset on return.
+        cut: (k, 2) both half-edges of the edges, between triangles of the piece.
+        owner, is_cut: (m,) -1 and (3m,) False, work arrays that are reset on return.
         following: index of the next new piece.
         first: a lower bound of the first triangle of the piece.
     """
@@ -267,8 +264,8 @@ def split_piece(
     parent, head, last = np.arange(sets), np.full(sets, -1), np.full(sets, -1)
     after, known, count = np.empty(len(piece), np.int64), np.empty(len(piece), np.int64), 0
     for i in range(sets):
-        is_cut[cut[i // 2]] = True
-        f = edge_halfedges[cut[i // 2], i % 2] // 3
+        is_cut[cut[i // 2, i % 2]] = True
+        f = cut[i // 2, i % 2] // 3
         if owner[f] < 0:
             owner[f] = i
             append_to(head, last, after, i, f)
@@ -288,8 +285,8 @@ def split_piece(
             f = head[i]
             head[i] = after[f]
             for h in range(3 * f, 3 * f + 3):
-                t = across(halfedge_edges, edge_halfedges, h)
-                if t < 0 or is_cut[halfedge_edges[h]] or piece[t // 3] != own:
+                t = twins[h]
+                if t < 0 or is_cut[h] or piece[t // 3] != own:
                     continue
                 g = t // 3
                 if owner[g] < 0:
@@ -321,8 +318,8 @@ def split_piece(
     low[0] = first
     start = np.full(found, -1)
     for i in range(sets):
-        is_cut[cut[i // 2]] = False
-        h, t = edge_halfedges[cut[i // 2], i % 2], edge_halfedges[cut[i // 2], 1 - i % 2]
+        h, t = cut[i // 2, i % 2], cut[i // 2, 1 - i % 2]
+        is_cut[h] = False
         if piece[h // 3] != piece[t // 3]:
             start[0 if piece[h // 3] == own else piece[h // 3] - following + 1] = h
     return ids[:found], low[:found], start

@@ -242,14 +242,18 @@ class _Search:
         now = _direction_cost(waves.sum()[None], loops.sum()[None], model, costs)[0]
         found = list[tuple[FloatArray, IntArray, IntArray]]()
         for to, of, square in ((first, second, squares), (second, first, squares.T)):
-            waves_of = (waves[:, None] * to.waves).T @ of.waves.conj()
-            loops_of = (loops[:, None] * to.loops).T @ of.loops.conj()
-            change = square + 2 * ((scale @ to.scales)[:, None] - scale @ of.scales)
-            change = costs.areas * change + _direction_cost(waves_of, loops_of, model, costs) - now
+            change = costs.areas * (square + 2 * ((scale @ to.scales)[:, None] - scale @ of.scales)) - now
             change += self._price_of(1)[to.places][:, None] + self._price_of(-1)[of.places]
             change[to.places[:, None] == of.places] = np.inf
+            # The cost of directions is not negative, and most of the time is for its products.
+            may_gain = change < -MIN_GAIN
+            may_gain[0, 0] = True
+            rows, columns = np.flatnonzero(may_gain.any(axis=1)), np.flatnonzero(may_gain.any(axis=0))
+            waves_of = (waves[:, None] * to.waves[:, rows]).T @ of.waves[:, columns].conj()
+            loops_of = (loops[:, None] * to.loops[:, rows]).T @ of.loops[:, columns].conj()
+            change = change[rows[:, None], columns] + _direction_cost(waves_of, loops_of, model, costs)
             best = np.round(change, 6).argmin(axis=1)
-            found.append((change[np.arange(len(best)), best], to.places, of.places[best]))
+            found.append((change[np.arange(len(best)), best], to.places[rows], of.places[columns[best]]))
             if np.array_equal(to.places, of.places):
                 break
         change, plus, minus = (np.concatenate(each) for each in zip(*found, strict=True))

@@ -197,11 +197,13 @@ class GridSearch:
         what = "the boundary, sharp edges or curvature" + ", nor for wanted sizes" * (self.sizes is not None)
         failed = list[Exception]()
         # On a coarse mesh that is split, costlier cones are others, for which there may be a grid.
-        for price_factor in (1.0, 4.0) if 6 * len(self.checked.mesh.faces) < COARSE else (1.0,):
+        # Other cones hardly ever help where there are so many holes and handles, and each try takes long.
+        mesh, is_last = self.checked.mesh, self.checked.mesh.euler_characteristic < -24
+        for price_factor in (1.0, 4.0) if 6 * len(mesh.faces) < COARSE and not is_last else (1.0,):
             try:
                 return self._of_aligned_cones(price_factor)
             except NO_GRID as error:
-                if isinstance(error, CoarseGridError) and self.sizes is not None:
+                if is_last or (isinstance(error, CoarseGridError) and self.sizes is not None):
                     raise
                 failed.append(error)
             # Others hardly ever help then, and each metric takes long.

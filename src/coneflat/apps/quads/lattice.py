@@ -9,7 +9,7 @@ import numpy as np
 import scipy.linalg
 from scipy.sparse import csr_matrix
 
-from ...base import FloatArray, IntArray, compiled
+from ...base import BoolArray, FloatArray, IntArray, compiled
 from ...errors import GridError
 
 # Largest number of visited nodes of the search tree.
@@ -36,43 +36,52 @@ def integer_solutions(rows: IntArray, right: IntArray) -> IntegerSolutions | Non
         the ones in the sparsest columns, so that entries stay small.
     """
     count = rows.shape[1]
-    work = np.concatenate([rows.astype(np.int64), np.eye(count, dtype=np.int64)])
-    open_columns = np.ones(count, dtype=bool)
-    one = np.zeros(count, dtype=np.int64)
+    columns = np.concatenate([rows.T.astype(np.int64), np.eye(count, dtype=np.int64)], axis=1)
+    rows, one = np.ascontiguousarray(rows, dtype=np.int64), np.zeros(count, dtype=np.int64)
+    is_free, has_solution = eliminate(columns, rows, right.astype(np.int64), one)
+    # This bound protects against overflow of 64 bits; entries for seams stay below a hundred.
+    if np.abs(columns).max(initial=0) > 2**40:
+        raise GridError(f"the equations between {count} translations of seams overflow")
+    return IntegerSolutions(one, columns[is_free, len(rows) :].T.copy()) if has_solution else None
+
+
+@compiled
+def eliminate(columns: IntArray, rows: IntArray, right: IntArray, one: IntArray) -> tuple[BoolArray, bool]:
+    """Bring rows to echelon form by column operations, until all are or entries get very large.
+
+    Args:
+        columns: (n, r + n) the columns of the rows (r, n), and of an identity below them; changed in place.
+        rows, right: the equations.
+        one: (n,) zeros; on return a solution.
+
+    Returns:
+        (n,) True for the columns that are then zero in all rows; and whether there are solutions.
+    """
+    is_free = np.ones(len(columns), dtype=np.bool_)
     for i in range(len(rows)):
-        pivot = _eliminate(work, i, open_columns)
-        missing = int(right[i]) - int(rows[i] @ one)
-        if pivot is None:
-            if missing:
-                return None
-            continue
-        quotient, rest = divmod(missing, int(work[i, pivot]))
-        if rest:
-            return None
-        # The column is zero in all previous rows, so these remain satisfied.
-        one += quotient * work[len(rows) :, pivot]
-        open_columns[pivot] = False
-    return IntegerSolutions(one, work[len(rows) :, open_columns].copy())
-
-
-def _eliminate(work: IntArray, row: int, open_columns: IntArray) -> int | None:
-    """Return the column of a row's only nonzero entry in open columns, after column operations; None if all are 0."""
-    columns = np.flatnonzero(open_columns)
-    while True:
-        entries = np.abs(work[row, columns])
-        filled = np.flatnonzero(entries)
-        if not len(filled):
-            return None
-        least = filled[entries[filled] == entries[filled].min()]
-        pivot = columns[least[np.argmin(np.count_nonzero(work[:, columns[least]], axis=0))]]
-        if len(filled) == 1:
-            return int(pivot)
-        others = columns[filled][columns[filled] != pivot]
-        times = np.rint(work[row, others] / work[row, pivot]).astype(np.int64)
-        work[:, others] -= work[:, [pivot]] * times
-        # This bound protects against overflow of 64 bits; entries for seams stay below a hundred.
-        if np.abs(work[:, others]).max() > 2**40:
-            raise GridError(f"the equations between {work.shape[1]} translations of seams overflow")
+        filled = 2
+        while filled > 1:
+            pivot, least, filled = -1, (0, 0), 0
+            for c in range(len(columns)):
+                if is_free[c] and columns[c, i] != 0:
+                    size, filled = (abs(columns[c, i]), int(np.count_nonzero(columns[c]))), filled + 1
+                    if pivot < 0 or size < least:
+                        pivot, least = c, size
+            for c in range(len(columns)):
+                if filled > 1 and c != pivot and is_free[c] and columns[c, i] != 0:
+                    columns[c] -= int(np.rint(columns[c, i] / columns[pivot, i])) * columns[pivot]
+                    if np.abs(columns[c]).max() > 2**40:
+                        return is_free, False
+        missing = right[i] - (rows[i] * one).sum()
+        if pivot >= 0:
+            # The column is zero in all previous rows, so these remain satisfied.
+            times = missing // columns[pivot, i]
+            one += times * columns[pivot, len(rows) :]
+            missing -= times * columns[pivot, i]
+            is_free[pivot] = False
+        if missing != 0:
+            return is_free, False
+    return is_free, True
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +110,8 @@ class Lattice:
     def reduced(self) -> ReducedLattice:
         """Return the same lattice with a nearly orthogonal basis."""
         change = np.eye(self.basis.shape[1], dtype=np.int64)
-        root = np.ascontiguousarray(scipy.linalg.cholesky(self.basis.T @ self.gram @ self.basis))
+        basis = self.basis.astype(np.float64)  # integers would be multiplied without BLAS
+        root = np.ascontiguousarray(scipy.linalg.cholesky(basis.T @ self.gram @ basis))
         reduce_basis(root, change)
         return ReducedLattice(self.one, self.basis @ csr_matrix(change), self.gram, root)
 
@@ -138,10 +148,8 @@ def reduce_basis(root: FloatArray, basis: IntArray) -> None:
         for j in range(k - 1, -1, -1):
             times = round(root[j, k] / root[j, j])
             if times != 0:
-                for i in range(j + 1):
-                    root[i, k] -= times * root[i, j]
-                for i in range(size):
-                    basis[i, k] -= int(times) * basis[i, j]
+                root[: j + 1, k] -= times * root[: j + 1, j]
+                basis[:, k] -= int(times) * basis[:, j]
         above, below = root[k - 1, k], root[k, k]
         if 0.99 * root[k - 1, k - 1] ** 2 <= above * above + below * below:
             k += 1
@@ -152,10 +160,8 @@ def reduce_basis(root: FloatArray, basis: IntArray) -> None:
         # A rotation of two rows makes the matrix triangular again.
         norm = np.sqrt(above * above + below * below)
         c, s = above / norm, below / norm
-        for i in range(k - 1, size):
-            one, two = root[k - 1, i], root[k, i]
-            root[k - 1, i] = c * one + s * two
-            root[k, i] = c * two - s * one
+        one, two = root[k - 1, k - 1 :].copy(), root[k, k - 1 :].copy()
+        root[k - 1, k - 1 :], root[k, k - 1 :] = c * one + s * two, c * two - s * one
         root[k, k - 1] = 0.0
         k = max(k - 1, 1)
 

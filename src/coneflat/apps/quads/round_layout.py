@@ -50,8 +50,7 @@ def split_between_nodes(layout: GridLayout, lines: IntArray | None = None) -> Gr
 
 def grid_about(rounding: Rounding, energy: StretchEnergy, most: int) -> IntegerGrid:
     """Return the grid of a smooth layout in which no edge between cones needs to be split; see `grid_of`."""
-    layout = rounding.layout
-    wanted, found, why = layout.area, None, ""
+    wanted, found, why = rounding.layout.area, None, ""
     for finer in (2.0**k for k in range(most + 1)):
         found, why = _grid_near(rounding.scaled(finer), energy)
         if found is not None:
@@ -70,7 +69,7 @@ def grid_about(rounding: Rounding, energy: StretchEnergy, most: int) -> IntegerG
             break
         last = other.squares
         if abs(np.log(last / wanted)) < abs(np.log(found.squares / wanted)):
-            found = replace(other, size=layout.size)
+            found = replace(other, size=rounding.layout.size)
     if abs(found.squares - wanted) > NOTED_SHARE * wanted:
         found = with_note(found, f"The grid has an area of {found.squares:,.0f} squares, not {wanted:,.0f}.")
     return found
