@@ -101,13 +101,14 @@ def moved_cones(
         if not len(cones):
             break
         k, old = curvatures[cones], places[cones]
-        turns = k[:, None] * (by_curvature[targets] - by_curvature[old])
         distances = np.concatenate(
             [search.exact.squared_distances(places[c], targets[cones == c]) for c in np.unique(cones)]
         )
         costlier = 2 * k * (score[targets] - score[old]) + penalty * k**2 * distances
-        # The last entry represents no move.
-        cones, turns, costlier = np.append(cones, -1), np.vstack([turns, 0 * off]), np.append(costlier, 0.0)
+        # Moves that no other makes cheap enough are left out. The last entry represents no move.
+        may = np.flatnonzero(costlier + min(costlier.min(), 0.0) <= max(slack, 0.0))
+        turns = np.vstack([(k[:, None] * (by_curvature[targets] - by_curvature[old]))[may], 0 * off])
+        cones, targets, costlier = np.append(cones[may], -1), targets[may], np.append(costlier[may], 0.0)
         missing = ((off + turns) ** 2).sum(axis=1)
         pairs = missing[:, None] + missing - (off**2).sum() + 2 * turns @ turns.T
         pairs[(costlier[:, None] + costlier > max(slack, 0.0)) | (cones[:, None] == cones)] = np.inf
@@ -179,10 +180,9 @@ def quantise_cones(
     exact = Lattice(search.exact, lattice.quanta, lattice.total)
     sizes = [size for size in lattice.best.sizes if size <= most]
     if not sizes:
-        needed = min(lattice.best.sizes, default=lattice.fewest)
         raise CurvatureError(
             f"{most} cones cannot carry the total curvature in multiples of {lattice.quanta.quantum / np.pi:.4g} pi: "
-            f"{needed} or more are needed"
+            f"{min(lattice.best.sizes, default=lattice.fewest)} or more are needed"
         )
     first = next(
         (size for size in sizes if lattice.best.energy(size) <= goal), min(sizes, key=lattice.best.energy)
