@@ -46,7 +46,7 @@ def injective_charts(
         corners: (m, 3) point index of each triangle corner; the triangles form one disk.
         lengths: (e,) costs of cutting the edges.
         disk: a mesh whose faces are the corners, with a vertex for each point; None to compute it.
-        tries: how many of the minimum areas of a chart are tried.
+        tries: how many of the minimum areas of a chart are tried: one for the cheapest cuts, all for few charts.
     """
     whole = ChartLayout(points, corners, np.zeros(len(corners), dtype=np.int64))
     places = rows_of(points, corners)
@@ -84,7 +84,7 @@ def separate_overlaps(
         layout: a layout in one chart.
         costs: (e,) costs of cutting the edges.
         spec: which edges to avoid and which are forbidden as cuts.
-        tries: see `injective_charts`; with one, seams are shorter and small charts more.
+        tries: see `injective_charts`; one is for the cheapest cuts, all for few charts.
 
     Returns:
         The split layout, with a note if forbidden edges had to be cut.

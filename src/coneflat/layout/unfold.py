@@ -133,12 +133,13 @@ def _close_gaps(
     direction = damping * residual
     product = float(np.vdot(residual, direction).real)
     for _ in range(SWEEPS):
-        if product <= np.finfo(float).tiny ** 0.5:  # Products of smaller numbers would be zero.
-            break
         apply_stiffness(corner, weight, direction, pull)
-        length = product / float(np.vdot(direction, pull).real)
-        shift += length * direction
-        residual -= length * pull
+        steepness = float(np.vdot(direction, pull).real)
+        # Products of smaller numbers would be zero, as is the stiffness of a translation, which rounding may leave.
+        if min(product, steepness) <= np.finfo(float).tiny ** 0.5:
+            break
+        shift += product / steepness * direction
+        residual -= product / steepness * pull
         before, product = product, float(np.vdot(residual, damping * residual).real)
         direction = damping * residual + (product / before) * direction
     points += shift

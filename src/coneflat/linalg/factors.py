@@ -23,7 +23,7 @@ MIN_PARDISO_UNKNOWNS = 12_000
 # Number of unknowns of a small system. For small matrices of many nearly disconnected blocks SuperLU is faster. With a
 # twentieth of these unknowns, it is as fast as CHOLMOD, which prints a message on standard output if a matrix is
 # indefinite.
-MAX_SMALL_SYSTEM = 28_000
+MAX_SMALL_SYSTEM = 20_000
 
 
 class NotPositiveDefinite(ArithmeticError):

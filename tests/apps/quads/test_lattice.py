@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from coneflat.apps.quads.lattice import Lattice, integer_solutions, reduce_basis
+from coneflat.errors import GridError
 
 
 def random_gram(rng, size):
@@ -40,6 +41,12 @@ def test_what_has_no_whole_solution():
     assert integer_solutions(np.array([[2, 4]]), np.array([3])) is None
     assert integer_solutions(np.array([[1, 1], [2, 2]]), np.array([1, 3])) is None
     assert integer_solutions(np.zeros((1, 2), dtype=int), np.array([1])) is None
+
+
+def test_entries_that_grow_too_large_are_an_error():
+    rows = np.random.default_rng(0).integers(-(10**6), 10**6, size=(6, 8))
+    with pytest.raises(GridError, match="overflow"):
+        integer_solutions(rows, np.zeros(6, dtype=np.int64))
 
 
 @pytest.mark.parametrize("seed", range(10))

@@ -318,3 +318,18 @@ def test_a_coarse_part_keeps_what_belongs_to_its_vertices():
     ):
         assert np.array_equal(one, every[kept])
         assert len(np.unique(one)) > 1
+
+
+def test_forbidden_edges_that_are_cut_are_counted(shared):
+    mesh = coneflat.read_mesh(shared("spot.obj"))
+    right = np.flatnonzero(mesh.vertices[:, 0] > np.median(mesh.vertices[:, 0]))
+    result = unwrap(mesh, no_seams=right, max_energy=4.35)
+    is_cut = np.isin(result.seams, right).all(axis=1).sum()
+    noted = [note for note in result.notes if "forbidden edges had to be cut" in note]
+    assert len(noted) == 1
+    assert int(noted[0].split()[0]) == is_cut > 0
+
+
+def test_the_second_search_on_a_coarse_mesh_tries_other_cones(shared):
+    """With those of the first one alone, the seams are longer by a third."""
+    assert unwrap(shared("elephant.obj"), max_energy=5.0).distortion.seam_length < 2.6

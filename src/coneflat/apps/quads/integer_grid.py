@@ -197,17 +197,18 @@ class GridSearch:
         what = "the boundary, sharp edges or curvature" + ", nor for wanted sizes" * (self.sizes is not None)
         failed = list[Exception]()
         # On a coarse mesh that is split, costlier cones are others, for which there may be a grid.
-        # Other cones hardly ever help where there are so many holes and handles, and each try takes long.
-        mesh, is_last = self.checked.mesh, self.checked.mesh.euler_characteristic < -24
-        for price_factor in (1.0, 4.0) if 6 * len(mesh.faces) < COARSE and not is_last else (1.0,):
+        # With so many holes and handles, costlier cones hardly ever help, nor others if rotations are not reached.
+        mesh, has_many_loops = self.checked.mesh, self.checked.mesh.euler_characteristic < -24
+        for price_factor in (1.0, 4.0) if 6 * len(mesh.faces) < COARSE and not has_many_loops else (1.0,):
             try:
                 return self._of_aligned_cones(price_factor)
             except NO_GRID as error:
-                if is_last or (isinstance(error, CoarseGridError) and self.sizes is not None):
+                is_coarse, is_far = isinstance(error, CoarseGridError), isinstance(error, ConvergenceError)
+                if (is_coarse and self.sizes is not None) or (is_far and has_many_loops):
                     raise
                 failed.append(error)
             # Others hardly ever help then, and each metric takes long.
-            if isinstance(failed[-1], ConvergenceError):
+            if is_far:
                 break
         note = f"Cones are not chosen for {what}, because no grid with such cones was found: {failed[-1]}."
         try:

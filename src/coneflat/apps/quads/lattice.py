@@ -55,7 +55,8 @@ def eliminate(columns: IntArray, rows: IntArray, right: IntArray, one: IntArray)
         one: (n,) zeros; on return a solution.
 
     Returns:
-        (n,) True for the columns that are then zero in all rows; and whether there are solutions.
+        (n,) True for the columns that are then zero in all rows; and whether there are solutions. Without any, or with
+        very large entries, it ends early.
     """
     is_free = np.ones(len(columns), dtype=np.bool_)
     for i in range(len(rows)):
@@ -110,8 +111,7 @@ class Lattice:
     def reduced(self) -> ReducedLattice:
         """Return the same lattice with a nearly orthogonal basis."""
         change = np.eye(self.basis.shape[1], dtype=np.int64)
-        basis = self.basis.astype(np.float64)  # integers would be multiplied without BLAS
-        root = np.ascontiguousarray(scipy.linalg.cholesky(basis.T @ self.gram @ basis))
+        root = np.ascontiguousarray(scipy.linalg.cholesky(self.basis.T @ self.gram @ self.basis))
         reduce_basis(root, change)
         return ReducedLattice(self.one, self.basis @ csr_matrix(change), self.gram, root)
 

@@ -151,9 +151,12 @@ def side_by_side(layout: Layout) -> Layout:
 
 
 def separate_charts(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layout:
-    """Return a layout in any number of charts, split by the cheapest cuts so that no chart overlaps itself."""
+    """Return a layout in any number of charts, split by the cheapest cuts so that no chart overlaps itself.
+
+    Forbidden edges may be cut, without a note.
+    """
     if not layout.chart.any():
-        separated = separate_overlaps(layout, costs, spec, 1)
+        separated = replace(separate_overlaps(layout, costs, spec, 1), notes=layout.notes)
         return replace(separated, chart=label_faces(separated.corners, len(separated.points))[1])
     pairs = find_overlaps(side_by_side(layout).points[layout.corners]).pairs
     label = layout.chart.copy()
@@ -167,8 +170,7 @@ def separate_charts(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layout
         one_chart = np.zeros(len(faces), dtype=np.int64)
         alone = replace(layout, mesh=disk, points=points, corners=disk.faces, chart=one_chart, disk=None)
         own = replace(spec, is_avoided=spec.is_avoided[edges], is_forbidden=spec.is_forbidden[edges])
-        separated = separate_overlaps(alone, costs[edges], own, 1)
-        layout, pieces = replace(layout, notes=separated.notes), separated.chart
+        pieces = separate_overlaps(alone, costs[edges], own, 1).chart
         label[faces] = np.where(pieces > 0, label.max() + pieces, chart)
     return with_charts(
         layout, ChartLayout(layout.points, layout.corners, layout.chart).split(label).renumbered()

@@ -63,7 +63,7 @@ class Candidate:
         layout: the layout.
         energy: its mean symmetric Dirichlet energy, or the energy that belongs to its area distortion.
         cost: the cost of its seams.
-        distortion: the area distortion for which its cones were searched.
+        distortion: an area distortion for which its cones are found.
         is_separated: whether its overlaps are separated, which may add seams.
     """
 
@@ -79,7 +79,8 @@ class CutSearch:
 
     Args:
         part: a connected part of the input.
-        max_energy: largest symmetric Dirichlet energy; infinite for no seams but those that are necessary.
+        max_energy: largest symmetric Dirichlet energy; infinite for no seams but those that are necessary. It may be
+            changed, and candidates for other bounds are used again.
         method: how the part is laid out.
         is_coarse: whether the part is a coarse mesh already.
         by_area: whether the bound is the energy that belongs to an area distortion, see `ENERGY_PER_AREA`.
@@ -137,9 +138,8 @@ class CutSearch:
             near.append(self.shortened(near[0]))
         close_search(self._surface)
         within = [one for one in near if one.energy <= self.max_energy]
-        if within:
-            return min(within, key=self._expected_cost)
-        return self.separated(min([*near, *found], key=lambda one: one.energy))
+        least = min([*near, *found], key=lambda one: one.energy)
+        return self.separated(min(within, key=self._expected_cost, default=least))
 
     def shortened(self, start: Candidate, layout: Layout | None = None) -> Candidate:
         """Return a candidate with the tips of its seams moved to where its energy is about the largest allowed.
@@ -228,9 +228,8 @@ class CutSearch:
             spec = replace(self.part.cones, strategy="given", given=given)
             layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
             one = self._candidate(layout, best.distortion)
-            one = self.shortened(one) if one.energy > self.max_energy else one
-            found.append(one)
-            excess = one.energy - self.max_energy
+            found.append(self.shortened(one) if one.energy > self.max_energy else one)
+            excess = found[-1].energy - self.max_energy
             if excess <= 0 or best.energy > bound:
                 break
             bound = max(bound - excess, (bound + ISOMETRIC) / 2)
@@ -238,7 +237,7 @@ class CutSearch:
         return self.separated(min(found, key=lambda one: one.energy))
 
     def _by_distortion(self) -> list[Candidate]:
-        """Return candidates with energies around the bound."""
+        """Return candidates, with energies around the bound among them, and those for earlier bounds."""
         found = self._found
         for tried in range(2 * MAX_CANDIDATES):
             distortion = self._next_distortion(tried)
@@ -249,22 +248,23 @@ class CutSearch:
             layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
             same = [i for i, each in enumerate(found) if np.array_equal(each.layout.cones, layout.cones)]
             known = found.pop(same[0]) if same else self._candidate(layout, distortion)
-            reached = layout.statistics.area_distortion_linear
-            found.append(replace(known, distortion=min(distortion, reached) if same else distortion))
-            if same and (known.energy <= self.max_energy or distortion < reached):
+            reached, is_within = layout.statistics.area_distortion_linear, known.energy <= self.max_energy
+            distortion = min(distortion, reached) if same and not is_within else distortion
+            found.append(replace(known, distortion=distortion))
+            if same and (is_within or distortion < reached):
                 break  # The search finds no others.
         return found
 
     def _next_distortion(self, tried: int) -> float | None:
         """Return the area distortion of the next candidate, or None if enough are found."""
         allowed, found = self.max_energy - ISOMETRIC, self._found
-        within = [each for each in found if each.energy <= self.max_energy]
-        beyond = [each for each in found if each.energy > self.max_energy]
-        low = max(within, key=lambda each: each.distortion, default=None)
-        high = min(beyond, key=lambda each: each.distortion, default=None)
-        if low and (tried >= MAX_CANDIDATES or not len(low.layout.seams)):
+        rising = sorted(found, key=lambda each: each.distortion)
+        low = next((each for each in rising[::-1] if each.energy <= self.max_energy), None)
+        high = next((each for each in rising if each.energy > self.max_energy), None)
+        # For another bound, at least one more is tried.
+        if low and tried and (tried >= MAX_CANDIDATES or not len(low.layout.seams)):
             return None
-        if low and high:
+        if low and high and tried:
             is_next = len(low.layout.cones) <= len(high.layout.cones) + 1
             is_similar = is_next or low.cost <= SIMILAR_COSTS * high.cost
             return None if is_similar else float(np.sqrt(low.distortion * high.distortion))
@@ -272,7 +272,7 @@ class CutSearch:
             return FIRST_DISTORTION
         # The energy above that of an isometry is about a multiple of the square of the distortion.
         above = float(np.clip(found[-1].energy - ISOMETRIC, allowed / 16, allowed * 16))
-        return float(found[-1].distortion * np.sqrt(allowed / above) * (8 / 7 if low else 7 / 8))
+        return float(found[-1].distortion * np.sqrt(allowed / above) * (8 / 7 if low and not high else 7 / 8))
 
     def _candidate(self, layout: Layout, distortion: float, free: BoolArray | None = None) -> Candidate:
         # What the cones or the metric do not meet does not matter where seams are free.
@@ -286,8 +286,8 @@ class CutSearch:
         spec = self.part.seams if np.isfinite(self.max_energy) else None
         layout, energy = freed(layout, free, tolerance, spec)
         if self._by_area:
-            energies = self.energies_of(layout.lengths, layout.points[layout.corners])
-            energy = float(energies.sum() / layout.area)
+            places = layout.points[layout.corners]
+            energy = float(self.energies_of(layout.lengths, places).sum() / layout.area)
         return layout, energy
 
     def energies_of(self, lengths: FloatArray, places: FloatArray) -> FloatArray:
@@ -299,11 +299,9 @@ class CutSearch:
 
     def separated(self, one: Candidate) -> Candidate:
         """Return a candidate whose overlaps are separated."""
-        if one.is_separated:
+        if one.is_separated or not self._method.separates:
             return one
-        layout = one.layout
-        if self._method.separates:
-            layout = separate_charts(layout, self.seam_costs, self.part.seams)
+        layout = separate_charts(one.layout, self.seam_costs, self.part.seams)
         return replace(one, layout=layout, cost=self.cost_of(layout), is_separated=True)
 
     def settled(self, one: Candidate) -> Candidate:
@@ -364,11 +362,11 @@ def coarse_part(part: Part, count: int) -> tuple[Part, IntArray]:
     own, none = edge_lengths(coarse.vertices, coarse.faces), np.zeros(len(coarse.edges), dtype=bool)
 
     def of_kept(spec: Any, *names: str) -> Any:
-        values = {name: getattr(spec, name) for name in names}
-        return replace(spec, **{name: None if each is None else each[kept] for name, each in values.items()})
+        given = [name for name in names if getattr(spec, name) is not None]
+        return replace(spec, **{name: getattr(spec, name)[kept] for name in given})
 
     cones = of_kept(part.cones, "is_allowed", "absorbs_curvature", "names")
     metric = of_kept(part.metric, "keeps_length", "names")
     seams = replace(of_kept(part.seams, "visibility", "weights"), is_avoided=none, is_forbidden=none)
-    lengths = mollify(own)[0]
-    return Part(coarse, part.vertices[kept], faces, lengths, double_areas(own), cones, metric, seams), kept
+    near = coarse, part.vertices[kept], faces, mollify(own)[0], double_areas(own)
+    return Part(*near, cones, metric, seams), kept

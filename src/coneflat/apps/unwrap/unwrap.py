@@ -20,6 +20,7 @@ from ...metric import find_metric
 from ...options import Options, declarations, read_options, takes
 from ...source import Part, Source, find_copies
 from ...stages import ConeSolution, FlatMetric, MetricSpec, RelaxSpec, Surface
+from .free import seam_edges
 from .minor import MinorParts
 from .mirror import both_halves, half_of
 from .options import ENERGY_PER_AREA, ISOMETRIC, TextureOptions, UnwrapOptions
@@ -121,6 +122,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
                 one = replace(found[i], layout=layout) if i in joined else search.shortened(found[i], layout)
                 found[i] = search.small_joined(one) if o.charts == "atlas" and one.layout.chart.any() else one
     layouts = with_copies({i: one.layout for i, one in found.items()}, parts, copies)
+    cut = [part.seams.is_forbidden[seam_edges(one)].sum() for part, one in zip(parts, layouts, strict=True)]
     shared = replace(shared, method=FREE)
     result = evaluate(prepared, layouts, shared, watch)
     has_risen = False
@@ -132,7 +134,8 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         has_risen |= resolution > shared.resolution
         shared = replace(shared, resolution=resolution)
         result = evaluate(prepared, layouts, shared, watch)
-    notes = (*result.notes, *_notes(o, [one.energy for one in found.values()], result.distortion))
+    energies = [one.energy for one in found.values()]
+    notes = (*result.notes, *_notes(o, energies, int(sum(cut)), result.distortion))
     own = {name: getattr(o, name) for name in OWN if name != "seams"}
     if o.marked is not o.seams:
         own["seams"] = "none" if o.marked is None else ["none", result.settings["seams"]]
@@ -177,8 +180,10 @@ def _resolution(density: float, side: float, padding: float) -> int:
     return resolution
 
 
-def _notes(o: UnwrapOptions, energies: Sequence[float], measured: Distortion) -> Iterator[str]:
-    """Yield a note if the energy of a component or of all is above the bound, or on another number of charts."""
+def _notes(o: UnwrapOptions, energies: Sequence[float], cut: int, measured: Distortion) -> Iterator[str]:
+    """Yield notes on energies above the bound, the number of forbidden edges that are cut, and that of charts."""
+    if cut:
+        yield f"{plural(cut, 'forbidden edge')} had to be cut to separate overlaps."
     above, charts = [energy for energy in energies if energy > o.bound], measured.charts
     if above:
         name, most, reached = "energy", o.bound, max(above)
