@@ -17,10 +17,14 @@ MAX_VISITS = 20_000
 
 
 class IntegerSolutions(NamedTuple):
-    """All integer solutions of linear equations: one solution (n,), and a basis (n, d) of the homogeneous solutions."""
+    """All integer solutions of linear equations: one solution (n,), and a basis (n, d) of the homogeneous solutions.
+
+    Column k of the basis belongs to the k-th of the variables that are free, (n,) True.
+    """
 
     one: IntArray
     basis: IntArray
+    is_free: BoolArray
 
 
 def integer_solutions(rows: IntArray, right: IntArray) -> IntegerSolutions | None:
@@ -35,14 +39,13 @@ def integer_solutions(rows: IntArray, right: IntArray) -> IntegerSolutions | Non
         computational algebraic number theory", 1993, Section 2.4). Pivots are the smallest entries, and among these
         the ones in the sparsest columns, so that entries stay small.
     """
-    count = rows.shape[1]
-    columns = np.concatenate([rows.T.astype(np.int64), np.eye(count, dtype=np.int64)], axis=1)
-    rows, one = np.ascontiguousarray(rows, dtype=np.int64), np.zeros(count, dtype=np.int64)
+    columns = np.concatenate([rows.T.astype(np.int64), np.eye(rows.shape[1], dtype=np.int64)], axis=1)
+    rows, one = np.ascontiguousarray(rows, dtype=np.int64), np.zeros(len(columns), dtype=np.int64)
     is_free, has_solution = eliminate(columns, rows, right.astype(np.int64), one)
     # This bound protects against overflow of 64 bits; entries for seams stay below a hundred.
     if np.abs(columns).max(initial=0) > 2**40:
-        raise GridError(f"the equations between {count} translations of seams overflow")
-    return IntegerSolutions(one, columns[is_free, len(rows) :].T.copy()) if has_solution else None
+        raise GridError(f"the equations between {len(columns)} translations of seams overflow")
+    return IntegerSolutions(one, columns[is_free, len(rows) :].T.copy(), is_free) if has_solution else None
 
 
 @compiled
@@ -76,9 +79,8 @@ def eliminate(columns: IntArray, rows: IntArray, right: IntArray, one: IntArray)
         missing = right[i] - (rows[i] * one).sum()
         if pivot >= 0:
             # The column is zero in all previous rows, so these remain satisfied.
-            times = missing // columns[pivot, i]
-            one += times * columns[pivot, len(rows) :]
-            missing -= times * columns[pivot, i]
+            one += missing // columns[pivot, i] * columns[pivot, len(rows) :]
+            missing %= columns[pivot, i]
             is_free[pivot] = False
         if missing != 0:
             return is_free, False
@@ -101,12 +103,15 @@ class Lattice:
 
     def where(self, row: IntArray, value: int) -> Lattice | None:
         """Return the vectors whose product with `row` (d,) is `value`, as a lattice; None if there are none."""
-        within = integer_solutions((row @ self.basis)[None], np.array([value - int(row @ self.one)]))
+        # Only basis vectors with a product that is not zero change, which are few.
+        filled = np.flatnonzero(products := row @ self.basis)
+        within = integer_solutions(products[None, filled], np.array([value - int(row @ self.one)]))
         if within is None:
             return None
-        # Products of sparse integer matrices are faster than those of dense ones, which no library accelerates.
-        basis = self.basis @ csr_matrix(within.basis)
-        return Lattice(self.one + self.basis @ within.one, basis, self.gram)
+        basis, some = self.basis.copy(), self.basis[:, filled]
+        basis[:, filled[within.is_free]] = some @ within.basis
+        basis = np.delete(basis, filled[~within.is_free], axis=1)
+        return Lattice(self.one + some @ within.one, basis, self.gram)
 
     def reduced(self) -> ReducedLattice:
         """Return the same lattice with a nearly orthogonal basis."""
@@ -196,8 +201,7 @@ def nearest_point(root: FloatArray, target: FloatArray, visits: int) -> IntArray
             depth -= 1
             continue
         if total < least:
-            found[:] = here
-            least = total
+            found[:], least = here, total
         else:
             depth += 1
             if depth == size:

@@ -98,8 +98,7 @@ class ConePairs:
 
     def disjoint(self, pairs: IntArray) -> IntArray:
         """Return the pairs that have no cone in common with previously selected pairs."""
-        seen: set[int] = set()
-        kept = []
+        seen, kept = set[int](), list[int]()
         for pair in pairs.tolist():
             ends = set(self.ends[pair].tolist())
             if not ends & seen:
