@@ -14,6 +14,7 @@ import numpy as np
 from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..base.jit import compiled
 from ..base.sets import find_root, unite
+from ..geometry.intrinsic import halfedge_twins
 from ..linalg.shortest_paths import MultiGraph, Paths
 from ..mesh.connectivity import TriangleMesh
 
@@ -30,9 +31,7 @@ class Sheet:
     def __init__(self, disk: TriangleMesh, costs: FloatArray) -> None:
         self.disk, self.costs = disk, costs
         self.piece = np.zeros(len(disk.faces), dtype=np.int64)
-        self._twins = np.full(len(disk.halfedge_edges), -1)
-        one, two = disk.edge_halfedges[~disk.is_boundary_edge].T
-        self._twins[one], self._twins[two] = two, one
+        self._twins = halfedge_twins(disk)
         # For each piece a lower bound of its first triangle, and a half-edge on its border.
         self._first, self._start = [0], [int(disk.edge_halfedges[np.argmax(disk.is_boundary_edge), 0])]
         self._owner = np.full(len(disk.faces), -1, dtype=np.int64)

@@ -207,7 +207,7 @@ class GridSearch:
                 if (is_coarse and self.sizes is not None) or (is_far and has_many_loops):
                     raise
                 failed.append(error)
-            # Others hardly ever help then, and each metric takes long.
+            # Where rotations are not reached, others hardly ever help, and each metric takes long.
             if is_far:
                 break
         note = f"Cones are not chosen for {what}, because no grid with such cones was found: {failed[-1]}."
