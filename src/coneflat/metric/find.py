@@ -154,7 +154,10 @@ def corrected_flat_metric(
             inverse += np.outer(step - gained, step @ inverse) / (step @ gained)
         step = -inverse @ off
         fraction = min(1.0, MAX_CHANGE / np.abs(changes @ step).max())
-        is_far = 1 / fraction > left  # more steps are needed, if all change lengths as much
+        # More steps are needed, if all change lengths as much, or the error decreases as slowly as in the last eight.
+        is_far = 1 / fraction > left or (
+            len(errors) > 8 and 8 * errors[-1] > left * (errors[-9] - errors[-1])
+        )
         sheared = _sheared(mesh, lengths, fraction * (changes @ step))
         while fraction > MIN_FRACTION and not slacks(sheared).min() > 0:
             fraction /= 2

@@ -30,7 +30,8 @@ from .layout import GridLayout, aligned
 from .lines import grid_with_lines, with_sides
 from .options import QUADS, QuadOptions, flattening_defaults
 from .quad_mesh import CoarseGridError
-from .round_layout import grid_of, split_between_nodes, with_note
+from .round_layout import grid_about, split_between_nodes, with_note
+from .rounding import find_rounding
 from .sizes import note_on_sizes, wanted_scales
 
 # Options that only the search for the fewest cones takes into account.
@@ -370,9 +371,9 @@ class GridSearch:
         most: how often the number of squares is doubled.
         """
         try:
-            return grid_of(sided, self.energy, most)
+            return grid_about(find_rounding(split_between_nodes(sided)), self.energy, most)
         except GridError:
             if all_sides or len(sided.sides.points) == len(layout.sides.points):
                 raise
         why = "Straight sides of different loops are not parallel up to quarter turns, so not all on grid lines."
-        return with_note(grid_of(layout, self.energy, most), why)
+        return with_note(grid_about(find_rounding(split_between_nodes(layout)), self.energy, most), why)

@@ -102,23 +102,27 @@ class Lattice:
     gram: FloatArray
 
     def where(self, row: IntArray, value: int) -> Lattice | None:
-        """Return the vectors whose product with `row` (d,) is `value`, as a lattice; None if there are none."""
+        """Return the vectors whose product with `row` (d,) is `value`, as a lattice; None if these are none or all."""
         # Only basis vectors with a product that is not zero change, which are few.
-        filled = np.flatnonzero(products := row @ self.basis)
+        entries = np.flatnonzero(row)
+        filled = np.flatnonzero(products := row[entries] @ self.basis[entries])
         within = integer_solutions(products[None, filled], np.array([value - int(row @ self.one)]))
-        if within is None:
+        if within is None or not len(filled):
             return None
-        basis, some = self.basis.copy(), self.basis[:, filled]
-        basis[:, filled[within.is_free]] = some @ within.basis
-        basis = np.delete(basis, filled[~within.is_free], axis=1)
+        some, basis = self.basis[:, filled], np.delete(self.basis, filled[~within.is_free], axis=1)
+        left = (filled - np.cumsum(~within.is_free))[within.is_free]
+        basis[:, left] = some @ csr_matrix(within.basis)
         return Lattice(self.one + some @ within.one, basis, self.gram)
 
     def reduced(self) -> ReducedLattice:
         """Return the same lattice with a nearly orthogonal basis."""
-        change = np.eye(self.basis.shape[1], dtype=np.int64)
-        root = np.ascontiguousarray(scipy.linalg.cholesky(self.basis.T @ self.gram @ self.basis))
+        change = np.eye(self.basis.shape[1], dtype=np.int64, order="F")
+        transposed = csr_matrix(self.basis.T, dtype=np.float64)
+        root = scipy.linalg.cholesky(transposed @ (transposed @ self.gram).T)
         reduce_basis(root, change)
-        return ReducedLattice(self.one, self.basis @ csr_matrix(change), self.gram, root)
+        return ReducedLattice(
+            self.one, self.basis @ csr_matrix(change), self.gram, np.ascontiguousarray(root)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,26 +151,27 @@ def reduce_basis(root: FloatArray, basis: IntArray) -> None:
     """Reduce the columns of an upper triangular matrix in place (LLL), and apply the same operations to `basis`."""
     size = len(root)
     k, steps = 1, 0
-    # The limit of steps covers endless exchanges caused by rounding; the basis is then less reduced.
-    while k < size and steps < 200 * size:
+    # A limit of steps, for endless exchanges caused by rounding and large lattices: the basis is then less reduced.
+    while k < size and steps < min(200 * size, 40_000):
         steps += 1
         for j in range(k - 1, -1, -1):
             times = round(root[j, k] / root[j, j])
             if times != 0:
-                root[: j + 1, k] -= times * root[: j + 1, j]
-                basis[:, k] -= int(times) * basis[:, j]
+                for i in range(size):
+                    root[i, k] -= times * root[i, j]
+                    basis[i, k] -= int(times) * basis[i, j]
         above, below = root[k - 1, k], root[k, k]
         if 0.99 * root[k - 1, k - 1] ** 2 <= above * above + below * below:
             k += 1
             continue
-        for i in range(size):
-            root[i, k - 1], root[i, k] = root[i, k], root[i, k - 1]
-            basis[i, k - 1], basis[i, k] = basis[i, k], basis[i, k - 1]
+        root[:, k - 1], root[:, k] = root[:, k].copy(), root[:, k - 1].copy()
+        basis[:, k - 1], basis[:, k] = basis[:, k].copy(), basis[:, k - 1].copy()
         # A rotation of two rows makes the matrix triangular again.
         norm = np.sqrt(above * above + below * below)
         c, s = above / norm, below / norm
-        one, two = root[k - 1, k - 1 :].copy(), root[k, k - 1 :].copy()
-        root[k - 1, k - 1 :], root[k, k - 1 :] = c * one + s * two, c * two - s * one
+        for i in range(k - 1, size):
+            one, two = root[k - 1, i], root[k, i]
+            root[k - 1, i], root[k, i] = c * one + s * two, c * two - s * one
         root[k, k - 1] = 0.0
         k = max(k - 1, 1)
 

@@ -54,8 +54,7 @@ def grid_with_lines(
         lined = _with_lines(layout, edges, off)
         if not len(lined.edges):
             break
-        # For preferred edges, cones are separated all at once only: one at a time takes long.
-        rounding = find_rounding(lined.layout, None if is_required else 2)
+        rounding = find_rounding(lined.layout)
         costs, is_folded = lined.costs(layout, rounding.displaced(rounding.basis @ rounding.start))
         # Each failure leaves out the costliest chains: of preferred edges half of them, or those above a bound that
         # decreases so that the attempts end; of required ones fewer.

@@ -13,25 +13,13 @@ from ...geometry import as_complex, as_pairs, double_areas
 from ...layout import Lines, PointConstraints, Relaxed, StretchEnergy, relax
 from .integer_map import IntegerGrid, grid_of_corners
 from .layout import GridLayout, split_edges
-from .rounding import Rounding, find_rounding
+from .rounding import Rounding
 from .transitions import Transitions
 
 # Relative deviation from the requested number of squares above which a note is added.
 NOTED_SHARE = 0.1
 # Largest fraction of the distance to the constraints per step of relaxing from the smooth layout.
 LINE_STRIDE = 0.1
-
-
-def grid_of(layout: GridLayout, energy: StretchEnergy, most: int) -> IntegerGrid:
-    """Return the grid of a smooth layout.
-
-    If rounding changes the number of squares much, the size is corrected. If there is no grid of this size, a finer one
-    is returned; `most` is how often the number of squares is doubled.
-
-    Raises:
-        GridError: no grid was found.
-    """
-    return grid_about(find_rounding(split_between_nodes(layout)), energy, most)
 
 
 def split_between_nodes(layout: GridLayout, lines: IntArray | None = None) -> GridLayout:
@@ -49,7 +37,14 @@ def split_between_nodes(layout: GridLayout, lines: IntArray | None = None) -> Gr
 
 
 def grid_about(rounding: Rounding, energy: StretchEnergy, most: int) -> IntegerGrid:
-    """Return the grid of a smooth layout in which no edge between cones needs to be split; see `grid_of`."""
+    """Return the grid of a smooth layout in which no edge between cones needs to be split.
+
+    If rounding changes the number of squares much, the size is corrected. If there is no grid of this size, a finer one
+    is returned; `most` is how often the number of squares is doubled.
+
+    Raises:
+        GridError: no grid was found.
+    """
     wanted, found, why = rounding.layout.area, None, ""
     for finer in (2.0**k for k in range(most + 1)):
         found, why = _grid_near(rounding.scaled(finer), energy)

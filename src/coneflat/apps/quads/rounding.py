@@ -7,7 +7,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.sparse import bmat, coo_matrix, csc_matrix, csr_matrix, diags, kron
+from scipy.sparse import bmat, coo_matrix, csc_matrix, csr_matrix, diags, kron, vstack
 from scipy.sparse.csgraph import dijkstra
 
 from ...base import BoolArray, ComplexArray, FloatArray, IntArray, mask_of
@@ -87,12 +87,13 @@ class ConePairs:
     """Vectors along the surface between cones that are near each other.
 
     Attributes:
-        rows: (p, 2, d) coefficients of the vector from one cone to the other in the coordinates of the lattice.
+        rows: (2p, d) coefficients of the vector from one cone to the other in the coordinates of the lattice, of all x
+            before those of all y.
         before: (p, 2) the vector in the smooth layout.
         ends: (p, 2) the indices of the two cones.
     """
 
-    rows: IntArray
+    rows: csr_matrix
     before: FloatArray
     ends: IntArray
 
@@ -108,7 +109,7 @@ class ConePairs:
 
     def collapsed(self, coordinates: IntArray, angle: float) -> IntArray:
         """Return the pairs that a lattice point merges or rotates by at least `angle`, the nearest pairs first."""
-        after = self.rows @ coordinates
+        after = (self.rows @ coordinates).reshape(2, -1).T
         along = (after * self.before).sum(axis=1)
         sizes = np.linalg.norm(after, axis=1) * np.linalg.norm(self.before, axis=1)
         is_bad = along <= np.cos(angle) * sizes + np.finfo(float).eps
@@ -127,7 +128,6 @@ class Rounding:
         stiffness: the energy that gives the metric.
         layout: the smooth layout.
         transitions: its seams and sides.
-        attempts: how many attempts to separate cones are made.
     """
 
     basis: IntArray
@@ -136,7 +136,6 @@ class Rounding:
     stiffness: Stiffness
     layout: GridLayout
     transitions: Transitions
-    attempts: int | None
 
     def scaled(self, factor: float) -> Rounding:
         """Return the rounding of the layout with the number of squares multiplied by a factor."""
@@ -155,7 +154,7 @@ class Rounding:
         """
         units = np.eye(len(self.start), dtype=np.int64)
         lattice = Lattice(np.zeros_like(self.start, dtype=np.int64), units, self.metric).reduced()
-        for attempt in SEPARATIONS[: self.attempts]:
+        for attempt in SEPARATIONS:
             found = self._separated(lattice, *attempt)
             if found is not None:
                 return np.asarray(self.basis @ found)
@@ -175,12 +174,15 @@ class Rounding:
 
         None if two cones cannot be separated after others, or not in this number of rounds.
         """
-        for _ in range(rounds):  # each reduces the dimension of the lattice
+        for left in range(rounds, 0, -1):  # each reduces the dimension of the lattice
             rest: Lattice = lattice
             found = lattice.nearest(self.start)
             if not len(bad := self.pairs.collapsed(found, angle)):
                 return found
-            for pair in self.pairs.disjoint(bad)[:at_once].tolist():
+            pairs = self.pairs.disjoint(bad)
+            if len(pairs) > left * (at_once or len(pairs)):
+                break
+            for pair in pairs[:at_once].tolist():
                 part = self._separate(pair, rest)
                 if part is None and pair == bad[0]:
                     return None
@@ -194,32 +196,26 @@ class Rounding:
         If this coordinate is fixed already, the other one is chosen to preserve the direction of their vector as well
         as possible. None if both are fixed.
         """
-        before, rows = self.pairs.before[pair], self.pairs.rows[pair]
+        before, rows = self.pairs.before[pair], self.pairs.rows[pair :: len(self.pairs.ends)].toarray()
         main = int(np.argmax(np.abs(before)))
-        distance = max(1, round(abs(before[main])))
-        ratio = distance / max(abs(before[main]), np.finfo(float).tiny)
-        away = [round(ratio * before[0]), round(ratio * before[1])]
-        is_free = (rows @ lattice.basis).any(axis=1)
+        length = abs(before[main])
+        away = np.rint(max(1, round(length)) / max(length, np.finfo(float).tiny) * before).astype(np.int64)
         aside = 1 if before[1 - main] >= 0 else -1
         for axis, value in ((main, away[main]), (1 - main, away[1 - main]), (1 - main, aside)):
-            part = lattice.where(rows[axis], value) if is_free[axis] else None
-            if part is not None:
+            if (part := lattice.where(rows[axis], value)) is not None:
                 return part
         return None
 
 
-def find_rounding(layout: GridLayout, attempts: int | None = None) -> Rounding:
+def find_rounding(layout: GridLayout) -> Rounding:
     """Return the lattice to which the translations and cones of a layout must be rounded.
-
-    attempts: how many attempts to separate cones it makes; None for all.
 
     Raises:
         SeamError: the sides of a seam are not congruent.
         GridError: the sides of a seam are not related by quarter turns, or the equations between them overflow.
     """
     transitions = find_transitions(layout)
-    zeros = np.zeros(len(transitions.equations), dtype=np.int64)
-    solutions = integer_solutions(transitions.equations, zeros)
+    solutions = integer_solutions(transitions.equations, np.zeros(len(transitions.equations), np.int64))
     assert solutions is not None
     basis = solutions.basis
     start = np.linalg.lstsq(basis.astype(np.float64), transitions.values, rcond=None)[0].astype(np.float64)
@@ -229,7 +225,7 @@ def find_rounding(layout: GridLayout, attempts: int | None = None) -> Rounding:
     given = as_pairs(transitions.places(layout.points, basis @ start) - layout.points).reshape(-1, 1)
     shift = stiffness.displacement(given)
     start -= np.linalg.solve(metric, (stiffness.pulls(basis).T @ shift)[:, 0])
-    return Rounding(basis, start, metric, stiffness, layout, transitions, attempts)
+    return Rounding(basis, start, metric, stiffness, layout, transitions)
 
 
 def _near_pairs(
@@ -254,13 +250,13 @@ def _near_pairs(
     facing = [len(sided[k]) == 2 or found.is_beside(count + k, i, layout) for k, i in known.tolist()]
     least = np.where(facing, 1e-6, 0.45 * np.abs(found.places[count + which]))
     # Products of sparse matrices of integers are faster than those of dense ones, which no library accelerates.
-    products = (found.rows @ basis)[np.append(np.arange(count), count + which)]
-    vectors = np.stack([products.real, products.imag], axis=1).astype(np.int64)
-    vectors[count:] *= np.eye(2, dtype=np.int64)[axis][:, :, None]
-    before = vectors @ start
+    products = (found.rows @ csr_matrix(basis))[np.append(np.arange(count), count + which)]
+    is_known = np.concatenate([np.ones((count, 2)), np.eye(2)[axis]]).T.reshape(-1, 1).astype(np.int64)
+    vectors = vstack([products.real, products.imag]).astype(np.int64).multiply(is_known)
+    before = (vectors @ start).reshape(2, -1).T
     kept = np.abs(before).max(axis=1) > np.append(np.full(count, -1.0), least)
     indices = np.concatenate([ends, -1 - np.stack([which, which], axis=1)])
-    return ConePairs(vectors[kept], before[kept], indices[kept])
+    return ConePairs(csr_matrix(vectors)[np.tile(kept, 2)], before[kept], indices[kept])
 
 
 def _path_to(vertex: int, before: IntArray) -> list[int]:
@@ -337,10 +333,8 @@ class PathVectors:
         at = np.where((other >= 0) & (mesh.tails[other] == pairs[:, 0]), other, at)
         is_forth = mesh.tails[at] == pairs[:, 0]
         one, two = np.where(is_forth, [starts[at], ends[at]], [ends[at], starts[at]])
-        firsts, lasts = (
-            np.flatnonzero(np.diff(owner, prepend=-1)),
-            np.flatnonzero(np.diff(owner, append=count)),
-        )
+        firsts = np.flatnonzero(np.diff(owner, prepend=-1))
+        lasts = np.flatnonzero(np.diff(owner, append=count))
         before = np.roll(two, 1)
         before[firsts] = one[firsts]
         total = np.cumsum(transitions.turn[before] - transitions.turn[one])

@@ -1,95 +1,93 @@
-"""Solutions of small systems of linear equations, some of which may be linearly dependent."""
+"""Solutions of systems of linear equations, some of which may be linearly dependent."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from scipy.linalg import lapack
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, hstack, vstack
 
-from ...base.arrays import FloatArray, IntArray
-from ...mesh.connectivity import label_components
+from ...base.arrays import FloatArray, IntArray, mask_of
 
 # Relative size below which the residual of an eliminated equation, or an eliminated integer coefficient, is rounding.
 RELATIVE_ROUNDING = 1e-10
-# Coefficients of an orthogonal basis below this value are set to zero; the sides of seams differ by the dropped part.
+# Coefficients of a basis below this value are set to zero; the sides of seams differ by the dropped part.
 ZERO_COEFFICIENT = 1e-15
 # Block size of LAPACK, in columns.
 PANEL_COLUMNS = 32
 
 
-def orthogonal_solutions(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, FloatArray]:
-    """Return the solutions of linear equations by QR factorization, and the residuals of dependent equations.
+def solutions_of(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, FloatArray]:
+    """Return the solutions of linear equations, and the residuals of dependent equations.
 
-    Each set of variables that equations connect is solved for separately.
+    Many equations are eliminated before the QR factorization: each gives a variable that no other of them contains, and
+    few of the rest.
 
     Args:
-        rows: (r, v) coefficients; equations may be linearly dependent.
+        rows: (r, v) coefficients, about 1 in size; equations may be linearly dependent.
         right: (r,) right-hand sides.
 
     Returns:
         (v, k + 1) a basis of the k-dimensional space of homogeneous solutions, with a particular solution in the last
         column; and (d,) the remaining transformed right-hand sides, rounding errors if the equations are consistent.
     """
-    variables = rows.shape[1]
-    residuals, at, columns, values, count = [np.empty(0)], [], [], [], 0
-    for own, rights, matrix in _blocks(rows):
-        basis, last, left = _solutions_of_block(matrix, right[rights])
-        extended = np.concatenate([last[:, None], basis], axis=1)
-        row, column = np.nonzero(extended)
-        at.append(own[row])
-        columns.append(np.where(column == 0, -1, count + column - 1))
-        values.append(extended[row, column])
-        residuals.append(left)
-        count += basis.shape[1]
-    column = np.concatenate(columns)
-    column[column < 0] = count
-    solutions = csr_matrix(
-        (np.concatenate(values), (np.concatenate(at), column)), shape=(variables, count + 1)
-    )
-    return solutions, np.concatenate(residuals)
+    # Up to a hundred equations are solved faster as a dense system.
+    equations, variables = _independent_pivots(rows) if len(right) > 100 else (np.empty(0, np.int64),) * 2
+    if len(equations) <= len(right) // 50:
+        return _solutions_of_dense(rows.toarray(), right)
+    is_used, is_given = mask_of(rows.shape[0], equations), mask_of(rows.shape[1], variables)
+    divisors = np.asarray(rows[equations, variables]).ravel()
+    # The given variables are `values` minus `factors` times the others.
+    values = right[equations] / divisors
+    factors = csr_matrix(rows[equations].multiply(1 / divisors[:, None]))[:, ~is_given]
+    others = rows[~is_used]
+    given = others[:, variables]
+    left = csr_matrix(others[:, ~is_given] - given @ factors)
+    left.data[np.abs(left.data) <= ZERO_COEFFICIENT] = 0.0
+    left.eliminate_zeros()
+    solutions, residuals = solutions_of(left, right[~is_used] - given @ values)
+    last = csr_matrix((len(values), solutions.shape[1] - 1))
+    own = hstack([last, values[:, None]]) - factors @ solutions
+    order = np.argsort(np.concatenate([np.flatnonzero(~is_given), variables]))
+    return csr_matrix(vstack([solutions, own], format="csr")[order]), residuals
 
 
-def _blocks(rows: csr_matrix) -> Iterator[tuple[IntArray, IntArray, FloatArray]]:
-    """Yield sets of variables, (w,), the equations that connect these, (h,), and their coefficients, (h, w)."""
-    equations, variables = rows.shape
-    entries = rows.tocoo()
-    count, block = label_components(variables + equations, entries.col, variables + entries.row)
-    order = np.argsort(block, kind="stable")  # the variables of each come before its equations
-    bounds = np.searchsorted(block[order], np.arange(count + 1))
-    place = np.empty(len(block), dtype=np.int64)
-    place[order] = np.arange(len(block)) - bounds[block[order]]
-    widths = np.bincount(block[:variables], minlength=count)
-    starts = np.concatenate([[0], np.cumsum(widths * (np.diff(bounds) - widths))])
-    of_entry = block[entries.col]
-    row = place[variables + entries.row] - widths[of_entry]
-    dense = np.zeros(starts[-1])
-    dense[starts[of_entry] + row * widths[of_entry] + place[entries.col]] = entries.data
-    for b, width in enumerate(widths.tolist()):
-        members = order[bounds[b] : bounds[b + 1]]
-        yield (
-            members[:width],
-            members[width:] - variables,
-            dense[starts[b] : starts[b + 1]].reshape(-1, width),
-        )
+def _independent_pivots(rows: csr_matrix) -> tuple[IntArray, IntArray]:
+    """Return (p,) equations and the variables, (p,), that they give; no other of these equations has these variables.
+
+    The coefficients are at least half of the largest of their equations. Variables of few equations with few variables
+    are first, so that few entries are filled.
+    """
+    by_variable, entries = rows.tocsc(), rows.tocoo()
+    sizes, widths, heights = np.abs(entries.data), np.diff(rows.indptr), np.diff(by_variable.indptr)
+    least = np.full(rows.shape[0], RELATIVE_ROUNDING)
+    np.maximum.at(least, entries.row, sizes / 2)
+    found = np.flatnonzero(sizes >= least[entries.row])
+    cost = (widths[entries.row] - 1) * (heights[entries.col] - 1)
+    found = found[np.argsort(cost[found], kind="stable")]
+    has_given, is_contained = np.zeros(rows.shape[0], dtype=bool), np.zeros(rows.shape[1], dtype=bool)
+    pivots = []
+    for equation, variable in zip(entries.row[found].tolist(), entries.col[found].tolist(), strict=True):
+        if not has_given[equation] and not is_contained[variable]:
+            pivots.append((equation, variable))
+            is_contained[rows.indices[rows.indptr[equation] : rows.indptr[equation + 1]]] = True
+            column = slice(by_variable.indptr[variable], by_variable.indptr[variable + 1])
+            has_given[by_variable.indices[column]] = True
+    equations, variables = np.array(pivots, dtype=np.int64).reshape(-1, 2).T
+    return equations, variables
 
 
-def _solutions_of_block(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return (w, f) a basis of the null space of equations (h, w), (w,) a solution, and the transformed residuals."""
+def _solutions_of_dense(rows: FloatArray, right: FloatArray) -> tuple[csr_matrix, FloatArray]:
+    """Return the solutions and residuals of dense equations (h, w) by QR factorization with pivoting."""
     height, width = rows.shape
-    if not height:
-        return np.eye(width), np.zeros(width), right
-    # LAPACK is called directly: there may be thousands of blocks, and SciPy's checks take longer than the computation.
+    if not height or not width:
+        return csr_matrix(np.eye(width, width + 1)), right
+    # SciPy's own functions check their arguments, which for most layouts takes longer than the computation.
     r, pivots, scales, _, _ = lapack.dgeqp3(rows, lwork=(width + 1) * PANEL_COLUMNS)
     turned = lapack.dormqr("L", "T", r[:, : len(scales)], scales, right[:, None], PANEL_COLUMNS)[0][:, 0]
     diagonal = np.abs(np.diag(r))
-    rank = int((diagonal > RELATIVE_ROUNDING * max(diagonal[0], 1e-300)).sum())
+    rank = int((diagonal > RELATIVE_ROUNDING * max(diagonal[0], 1.0)).sum())
     wanted = np.concatenate([-r[:rank, rank:], turned[:rank, None]], axis=1)
     solved = lapack.dtrtrs(r[:rank, :rank], wanted)[0] if rank else wanted
-    solved = np.where(np.abs(solved) > ZERO_COEFFICIENT, solved, 0.0)
-    pivots -= 1  # LAPACK counts from 1
-    basis, last = np.zeros((width, width - rank)), np.zeros(width)
-    basis[pivots[:rank]], last[pivots[:rank]] = solved[:, :-1], solved[:, -1]
-    basis[pivots[rank:], np.arange(width - rank)] = 1.0
-    return basis, last, turned[rank:]
+    solutions = np.eye(width, width - rank + 1, k=-rank)
+    solutions[:rank] = np.where(np.abs(solved) > ZERO_COEFFICIENT, solved, 0.0)
+    return csr_matrix(solutions[np.argsort(pivots)]), turned[rank:]

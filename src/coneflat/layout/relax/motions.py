@@ -14,7 +14,7 @@ from ...geometry.planar import as_complex
 from ...mesh.charts import point_vertices
 from ...mesh.connectivity import TriangleMesh
 from .constraints import CheckedConstraints
-from .elimination import RELATIVE_ROUNDING, orthogonal_solutions
+from .elimination import RELATIVE_ROUNDING, solutions_of
 from .seam_chains import SeamChains, constrained_chains
 
 # Unit of the rounding gaps between the sides of seams. In this unit they are large enough not to be treated as zero.
@@ -307,7 +307,7 @@ class _Builder:
         rows, right = self._equations()
         if not len(right):
             return eye(self.size, self.size + 1, format="csr")
-        basis, left = orthogonal_solutions(rows, right)
+        basis, left = solutions_of(rows, right)
         if not self.is_closing:  # rounding gaps between fixed points may be inconsistent
             _require_solved(float(np.abs(left).max(initial=0.0)), right)
         return basis
