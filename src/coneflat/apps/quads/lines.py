@@ -54,7 +54,8 @@ def grid_with_lines(
         lined = _with_lines(layout, edges, off)
         if not len(lined.edges):
             break
-        rounding = find_rounding(lined.layout)
+        # For preferred edges, cones are separated all at once only: one at a time takes long.
+        rounding = replace(find_rounding(lined.layout), attempts=None if is_required else 2)
         costs, is_folded = lined.costs(layout, rounding.displaced(rounding.basis @ rounding.start))
         # Each failure leaves out the costliest chains: of preferred edges half of them, or those above a bound that
         # decreases so that the attempts end; of required ones fewer.

@@ -128,6 +128,7 @@ class Rounding:
         stiffness: the energy that gives the metric.
         layout: the smooth layout.
         transitions: its seams and sides.
+        attempts: how many attempts to separate cones are made; None for all.
     """
 
     basis: IntArray
@@ -136,6 +137,7 @@ class Rounding:
     stiffness: Stiffness
     layout: GridLayout
     transitions: Transitions
+    attempts: int | None = None
 
     def scaled(self, factor: float) -> Rounding:
         """Return the rounding of the layout with the number of squares multiplied by a factor."""
@@ -154,7 +156,7 @@ class Rounding:
         """
         units = np.eye(len(self.start), dtype=np.int64)
         lattice = Lattice(np.zeros_like(self.start, dtype=np.int64), units, self.metric).reduced()
-        for attempt in SEPARATIONS:
+        for attempt in SEPARATIONS[: self.attempts]:
             found = self._separated(lattice, *attempt)
             if found is not None:
                 return np.asarray(self.basis @ found)
@@ -179,10 +181,9 @@ class Rounding:
             found = lattice.nearest(self.start)
             if not len(bad := self.pairs.collapsed(found, angle)):
                 return found
-            pairs = self.pairs.disjoint(bad)
-            if len(pairs) > left * (at_once or len(pairs)):
-                break
-            for pair in pairs[:at_once].tolist():
+            if at_once and len(self.pairs.disjoint(bad)) > left * at_once:
+                return None
+            for pair in self.pairs.disjoint(bad)[:at_once].tolist():
                 part = self._separate(pair, rest)
                 if part is None and pair == bad[0]:
                     return None
