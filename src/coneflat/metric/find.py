@@ -129,7 +129,7 @@ def corrected_flat_metric(
     Raises:
         ConvergenceError: the rotations did not converge to multiples of the quantum, or need too many steps.
     """
-    mesh, given, changes, errors = holonomy.mesh, lengths, None, list[float]()
+    mesh, given, changes, errors = holonomy.mesh, lengths, None, 8 * [np.inf]
     off, inverse, step = np.empty(0), np.empty((0, 0)), np.empty(0)
     for left in range(MAX_STEPS, -1, -1):
         metric = solve(lengths, solution)
@@ -137,11 +137,11 @@ def corrected_flat_metric(
         before, off = off, difference_from_multiple(holonomy.of_flat(triangles), quantum)
         errors.append(float(np.abs(off).max()))
         # With many loops, rounding leaves more: the errors then no longer decrease.
-        is_rounding = len(errors) > 1 and errors[-2] < 2 * errors[-1] <= 200 * TOLERANCE
+        is_rounding = errors[-2] < 2 * errors[-1] <= 200 * TOLERANCE
         if errors[-1] <= TOLERANCE or is_rounding:
             change = float(np.abs(np.log(lengths / given)).max())
             note = (
-                f"Rotations around holes and along handles were off by up to {errors[0]:.2g} rad; edge lengths were "
+                f"Rotations around holes and along handles were off by up to {errors[8]:.2g} rad; edge lengths were "
                 f"changed by up to {100 * change:.2g}% to make them multiples of {quantum:.4g} rad (quantise)."
             )
             return replace(metric, notes=(*metric.notes, note))
@@ -155,9 +155,7 @@ def corrected_flat_metric(
         step = -inverse @ off
         fraction = min(1.0, MAX_CHANGE / np.abs(changes @ step).max())
         # More steps are needed, if all change lengths as much, or the error decreases as slowly as in the last eight.
-        is_far = 1 / fraction > left or (
-            len(errors) > 8 and 8 * errors[-1] > left * (errors[-9] - errors[-1])
-        )
+        is_far = 1 / fraction > left or 8 * errors[-1] > left * (errors[-9] - errors[-1])
         sheared = _sheared(mesh, lengths, fraction * (changes @ step))
         while fraction > MIN_FRACTION and not slacks(sheared).min() > 0:
             fraction /= 2

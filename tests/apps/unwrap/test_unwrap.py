@@ -47,6 +47,8 @@ def test_the_search_goes_on_where_the_first_candidates_have_the_same_cones(monke
 
 @pytest.mark.parametrize("shape", [shapes.sphere(3), shapes.genus(2)], ids=["one chart", "several charts"])
 def test_the_exact_metric_need_not_converge(shape, monkeypatch):
+    # Whether a cut pays for packing may depend on small differences.
+    monkeypatch.setattr("coneflat.apps.unwrap.unwrap.cut_for_packing", lambda layouts, *_: layouts)
     exact = unwrap(*shape).distortion.seam_length
 
     def diverge(*_):
@@ -84,7 +86,7 @@ def test_models_have_short_seams_within_the_bound(shared, hand):
     for result, most in (
         (unwrap(shared("spot.obj")), 4.5),
         (hand, 4.5),
-        (unwrap(shared("fandisk.obj")), 2.8),
+        (unwrap(shared("fandisk.obj")), 3.4),
     ):
         d = result.distortion
         assert d.energy <= 4.1
@@ -231,6 +233,17 @@ def test_branching_charts_are_cut_to_fill_the_texture(shared, hand, monkeypatch)
     assert max(hand.distortion.energy, whole.distortion.energy) <= 4.1
 
 
+def test_a_chart_with_short_seams_is_cut_as_well(shared, monkeypatch):
+    """Cuts may cost as much as the root of the area, even if the seams are hardly longer; sharp edges cost less."""
+    found = unwrap(shared("fandisk.obj"))
+    monkeypatch.setattr("coneflat.apps.unwrap.unwrap.cut_for_packing", lambda layouts, *_: layouts)
+    whole = unwrap(shared("fandisk.obj"))
+    assert whole.distortion.charts == 1
+    assert found.distortion.charts <= 4
+    assert found.packing_efficiency > max(0.7, 1.2 * whole.packing_efficiency)
+    assert found.distortion.seam_length <= whole.distortion.seam_length + 1.5
+
+
 def test_small_charts_are_joined_to_others_where_they_fit(shared, monkeypatch):
     result = unwrap(shared("plane-holes.obj"))
     monkeypatch.setattr("coneflat.apps.unwrap.search.CutSearch.small_joined", lambda _, one: one)
@@ -330,6 +343,7 @@ def test_forbidden_edges_that_are_cut_are_counted(shared):
     assert int(noted[0].split()[0]) == is_cut > 0
 
 
-def test_the_second_search_on_a_coarse_mesh_tries_other_cones(shared):
+def test_the_second_search_on_a_coarse_mesh_tries_other_cones(shared, monkeypatch):
     """With those of the first one alone, the seams are longer by a third."""
+    monkeypatch.setattr("coneflat.apps.unwrap.unwrap.cut_for_packing", lambda layouts, *_: layouts)
     assert unwrap(shared("elephant.obj"), max_energy=5.0).distortion.seam_length < 2.6

@@ -22,7 +22,8 @@ from ...mesh import label_charts
 from ...stages import Layout
 
 # A cut must increase the covered fraction of the square by PRICE for each length of the square root of the area, and
-# all cuts together may cost SHARE of the charts' borders, in which a seam counts twice.
+# all cuts together may cost SHARE of the charts' borders, in which a seam counts twice, or the root of the area: with
+# SHARE alone, 48 models have seams 2% shorter in total, and fandisk covers 0.57 of the texture instead of 0.76.
 PRICE, SHARE = 0.1, 0.15
 # Smallest area of a piece relative to that of all charts, and the largest number of charts that are considered. Smaller
 # charts fit between larger ones.
@@ -47,7 +48,7 @@ def cut_for_packing(layouts: Sequence[Layout], costs: Sequence[FloatArray], gap:
     if not area > 0:
         return list(layouts)
     borders = sum(float(one.border_costs[np.isfinite(one.border_costs)].sum()) for one in charts)
-    return _cut(layouts, charts, _search(charts, area, SHARE * borders, gap).pieces)
+    return _cut(layouts, charts, _search(charts, area, max(SHARE * borders, area**0.5), gap).pieces)
 
 
 def cut_into(layouts: Sequence[Layout], costs: Sequence[FloatArray], count: int) -> list[Layout]:
