@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapes
 from grid_maps import L_SHAPE, polycube
-from scipy.sparse import csr_matrix
+from scipy.sparse import block_diag, csr_matrix
 from test_integer_grid import check_laws
 
 from coneflat import errors, integer_grid, quads
@@ -158,6 +158,22 @@ def test_elimination_spans_all_solutions(size, seed):
     # At least as long as what least squares leave.
     nearest = rows @ np.linalg.lstsq(rows, right)[0]
     assert np.linalg.norm(missed) >= np.linalg.norm(right - nearest) - 1e-9
+
+
+@pytest.mark.parametrize(("equations", "variables"), [(3, 0), (3, 4), (0, 4), (200, 4)])
+def test_elimination_without_coefficients(equations, variables):
+    found, left = solutions_of(csr_matrix((equations, variables)), np.ones(equations))
+    np.testing.assert_array_equal(found.toarray(), np.eye(variables, variables + 1))
+    np.testing.assert_array_equal(left, np.ones(equations))
+
+
+def test_elimination_of_many_separate_equations_stays_sparse():
+    """The basis has 20,000 vectors, of two entries each: as an array it would need 6 GB."""
+    blocks = block_diag([csr_matrix([[1.0, -1.0]])] * 20_000, format="csr")
+    found, left = solutions_of(blocks, np.zeros(20_000))
+    assert found.shape == (40_000, 20_001)
+    assert found.nnz == 40_000
+    assert not np.abs(left).any()
 
 
 @pytest.mark.parametrize("count", [10, 300])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import lapack
-from scipy.sparse import csr_matrix, hstack, vstack
+from scipy.sparse import block_diag, csr_matrix, eye, hstack, vstack
 
 from ...base.arrays import FloatArray, IntArray, mask_of
 
@@ -33,7 +33,12 @@ def solutions_of(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, Float
     # Up to a hundred equations are solved faster as a dense system.
     equations, variables = _independent_pivots(rows) if len(right) > 100 else (np.empty(0, np.int64),) * 2
     if len(equations) <= len(right) // 50:
-        return _solutions_of_dense(rows.toarray(), right)
+        filled = rows.getnnz(axis=0) > 0
+        solutions, residuals = _solutions_of_dense(rows[:, filled].toarray(), right)
+        order = np.argsort(np.concatenate([np.flatnonzero(~filled), np.flatnonzero(filled)]))
+        return csr_matrix(
+            block_diag((eye((~filled).sum()), csr_matrix(solutions)), format="csr")[order]
+        ), residuals
     is_used, is_given = mask_of(rows.shape[0], equations), mask_of(rows.shape[1], variables)
     divisors = np.asarray(rows[equations, variables]).ravel()
     # The given variables are `values` minus `factors` times the others.
@@ -76,11 +81,11 @@ def _independent_pivots(rows: csr_matrix) -> tuple[IntArray, IntArray]:
     return equations, variables
 
 
-def _solutions_of_dense(rows: FloatArray, right: FloatArray) -> tuple[csr_matrix, FloatArray]:
+def _solutions_of_dense(rows: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the solutions and residuals of dense equations (h, w) by QR factorization with pivoting."""
     height, width = rows.shape
     if not height or not width:
-        return csr_matrix(np.eye(width, width + 1)), right
+        return np.eye(width, width + 1), right
     # SciPy's own functions check their arguments, which for most layouts takes longer than the computation.
     r, pivots, scales, _, _ = lapack.dgeqp3(rows, lwork=(width + 1) * PANEL_COLUMNS)
     turned = lapack.dormqr("L", "T", r[:, : len(scales)], scales, right[:, None], PANEL_COLUMNS)[0][:, 0]
@@ -90,4 +95,4 @@ def _solutions_of_dense(rows: FloatArray, right: FloatArray) -> tuple[csr_matrix
     solved = lapack.dtrtrs(r[:rank, :rank], wanted)[0] if rank else wanted
     solutions = np.eye(width, width - rank + 1, k=-rank)
     solutions[:rank] = np.where(np.abs(solved) > ZERO_COEFFICIENT, solved, 0.0)
-    return csr_matrix(solutions[np.argsort(pivots)]), turned[rank:]
+    return solutions[np.argsort(pivots)], turned[rank:]
