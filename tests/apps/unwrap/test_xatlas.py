@@ -74,10 +74,13 @@ def test_an_atlas_of_several_meshes():
     atlas.generate(ours.ChartOptions(max_cost=1.0), pack_options=options, verbose=False)
     assert (len(atlas), atlas.mesh_count, atlas.atlas_count) == (2, 2, 1)
     assert (atlas.width, atlas.height) == (256, 256)
-    assert len(atlas.utilization) == 1
-    assert (
-        0 < atlas.utilization[0] == pytest.approx(sum(areas(*atlas[i][1:]).sum() for i in range(2)), rel=1e-5)
-    )
+    covered = sum(areas(*atlas[i][1:]).sum() for i in range(2))
+    assert 0 < atlas.utilization == pytest.approx(covered, rel=1e-5)
+    assert f"{atlas.utilization:.4f}" == f"{covered:.4f}"
+    assert list(atlas.utilization) == [atlas.utilization] == [atlas.get_utilization(0)]
+    np.testing.assert_array_equal(atlas.get_chart_image(0), atlas.chart_image)
+    with pytest.raises(IndexError):
+        atlas.get_utilization(1)
     colored = (atlas.chart_image > 0).any(axis=2).mean()
     assert colored == pytest.approx(atlas.utilization[0], abs=0.02)
     assert len(np.unique(atlas.chart_image.reshape(-1, 3), axis=0)) == atlas.chart_count + 1
@@ -95,6 +98,8 @@ def test_an_atlas_of_several_meshes():
         ((SQUARE, FACES.ravel()), "indices must have the shape"),
         ((SQUARE, FACES + 2), "indices must be from 0 to 3"),
         ((SQUARE, FACES, SQUARE[:, :2]), "normals must have the shape"),
+        ((SQUARE, FACES, SQUARE[:3]), "normals must have the shape"),
+        ((SQUARE, FACES, None, SQUARE[:3, :2]), "uvs must have the shape"),
     ],
 )
 def test_wrong_arrays_are_refused(arguments, message):
@@ -128,7 +133,6 @@ def test_the_types_of_xatlas(shared):
     missing = {key for key in dir(theirs.Atlas) if not key.startswith("_")} - set(dir(ours.Atlas))
     assert missing <= {
         "add_uv_mesh",
-        "get_chart_image",
         "get_mesh_chart",
         "get_mesh_chart_count",
         "get_mesh_vertex_assignment",

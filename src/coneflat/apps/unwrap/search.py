@@ -37,7 +37,7 @@ SIMILAR_COSTS = 1.06
 # Number of triangles of a coarse mesh; number of coarse searches to meet the bound on the given mesh; and what its
 # energy has more, relative to what is allowed above that of an isometry.
 COARSE, COARSE_TRIES, COARSE_EXCESS = 4_000, 3, 0.15
-# Tips of larger meshes are moved on their coarse meshes only, and small charts are not joined: a try takes seconds.
+# Tips of larger meshes are moved on their coarse meshes only: a try takes seconds.
 MANY_TRIANGLES = 60_000
 # Number of times that tips are moved to meet the bound, half as often on large meshes, and that a layout is settled to
 # avoid contacts.
@@ -165,8 +165,6 @@ class CutSearch:
 
     def small_joined(self, one: Candidate) -> Candidate:
         """Return a candidate in several charts, the smallest joined to others where they fit once their points move."""
-        if len(self.part.faces) > MANY_TRIANGLES:
-            return one
         seams, sizes = _chart_seams(one.layout), np.bincount(one.layout.chart, self.part.double_areas)
         stretch = seams.stretches(self.part.mesh)
         is_small = sizes[seams.charts].min(axis=1) < SMALL_AREA * sizes.sum()

@@ -134,8 +134,10 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         has_risen |= resolution > shared.resolution
         shared = replace(shared, resolution=resolution)
         result = evaluate(prepared, layouts, shared, watch)
-    energies = [one.energy for one in found.values()]
-    notes = (*result.notes, *_notes(o, energies, int(sum(cut)), result.distortion))
+    notes = (
+        *result.notes,
+        *_notes(o, [one.energy for one in found.values()], int(sum(cut)), result.distortion),
+    )
     own = {name: getattr(o, name) for name in OWN if name != "seams"}
     if o.marked is not o.seams:
         own["seams"] = "none" if o.marked is None else ["none", result.settings["seams"]]

@@ -44,7 +44,7 @@ class PackOptions:
     Attributes:
         padding: texels between charts; 0 for the default.
         resolution: texels along a side of the texture; 0 for that of `texels_per_unit`, or else 1024.
-        texels_per_unit: texels per unit of length; 0 for the size of the texture.
+        texels_per_unit: texels per unit of length, without a resolution: there is one texture, of one size.
         create_image: make `Atlas.chart_image`. The other options have no effect.
     """
 
@@ -60,6 +60,14 @@ class PackOptions:
     rotate_charts: bool = True
 
 
+class Utilization(float):
+    """The covered fraction of the first texture; by an index that of another, as if this were a list of all."""
+
+    def __getitem__(self, index: int) -> float:
+        """Return the covered fraction of a texture."""
+        return [float(self)][index]
+
+
 @dataclass
 class Atlas:
     """Meshes that share a square texture.
@@ -68,6 +76,7 @@ class Atlas:
         width, height: texels along a side; 0 before `generate`.
         texels_per_unit: texels per unit of length.
         chart_count: number of charts.
+        utilization: covered fraction of the texture.
         chart_image: (height, width, 3) colours of the charts.
     """
 
@@ -75,7 +84,7 @@ class Atlas:
     height: int = 0
     texels_per_unit: float = 0.0
     chart_count: int = 0
-    utilization: list[float] = field(default_factory=list)
+    utilization: Utilization = field(default_factory=Utilization)
     _given: list[tuple[FloatArray, IntArray]] = field(default_factory=list, repr=False)
     _mapped: list[Mapped] = field(default_factory=list, repr=False)
     _image: NDArray[np.uint8] | None = field(default=None, repr=False)
@@ -94,10 +103,11 @@ class Atlas:
             FaceIndexError: an index is not that of a vertex.
         """
         vertices, faces = np.asarray(positions, dtype=np.float64), np.asarray(indices)
-        arrays = {"positions": (vertices, 3), "indices": (faces, 3), "normals": (normals, 3), "uvs": (uvs, 2)}
-        for name, (array, columns) in arrays.items():
-            if array is not None and np.shape(array)[1:] != (columns,):
-                raise ArrayShapeError(f"{name} must have the shape (n, {columns}), not {np.shape(array)}")
+        own = {"normals": (normals, (*vertices.shape[:1], 3)), "uvs": (uvs, (*vertices.shape[:1], 2))}
+        given = {"positions": (vertices, (*vertices.shape[:1], 3)), "indices": (faces, (*faces.shape[:1], 3))}
+        for name, (array, shape) in (given | own).items():
+            if array is not None and np.shape(array) != shape:
+                raise ArrayShapeError(f"{name} must have the shape {shape}, not {np.shape(array)}")
         faces = faces.astype(np.int64)
         if len(faces) and not (faces.min() >= 0 and faces.max() < len(vertices)):
             raise FaceIndexError(f"indices must be from 0 to {len(vertices) - 1:,}")
@@ -123,13 +133,10 @@ class Atlas:
         if pack.texels_per_unit and not pack.resolution and found.scale:
             side = int(np.ceil(pack.texels_per_unit / found.scale))
         self.width = self.height = side
-        self.texels_per_unit, self.utilization = side * found.scale, [found.efficiency]
+        self.texels_per_unit, self.utilization = side * found.scale, Utilization(found.efficiency)
         self.chart_count = int(found.chart.max(initial=-1)) + 1
-        ends = np.cumsum([0, *(len(each) for each in every)])
-        self._mapped = [
-            _mapped(given, found.corner_uv[start:end])
-            for (_, given), start, end in zip(self._given, ends[:-1], ends[1:], strict=True)
-        ]
+        parts = np.split(found.corner_uv, np.cumsum([len(each) for each in every], dtype=np.int64)[:-1])
+        self._mapped = [_mapped(given, part) for (_, given), part in zip(self._given, parts, strict=False)]
         self._image = _image(found, side) if pack.create_image else None
 
     def get_mesh(self, index: int) -> Mapped:
@@ -148,15 +155,12 @@ class Atlas:
         """Return the number of meshes."""
         return len(self._given)
 
-    @property
-    def mesh_count(self) -> int:
-        """The number of meshes."""
-        return len(self._given)
+    mesh_count = property(__len__)
 
     @property
     def atlas_count(self) -> int:
         """The number of textures."""
-        return len(self.utilization)
+        return int(self.width > 0)
 
     @property
     def chart_image(self) -> NDArray[np.uint8]:
@@ -172,6 +176,10 @@ class Atlas:
     def get_utilization(self, index: int) -> float:
         """Return the covered fraction of a texture."""
         return self.utilization[index]
+
+    def get_chart_image(self, index: int) -> NDArray[np.uint8]:
+        """Return the image of a texture, see `chart_image`."""
+        return [self.chart_image][index]
 
 
 def parametrize(
@@ -207,8 +215,7 @@ def _mapped(faces: IntArray, corner_uv: FloatArray) -> Mapped:
     uv = corner_uv.reshape(-1, 2).astype(np.float32)
     rows = np.column_stack([faces.ravel(), uv.view(np.int32)])
     _, first, label = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    mapping = faces.ravel()[first].astype(np.uint32)
-    return mapping, label.reshape(faces.shape).astype(np.uint32), uv[first]
+    return faces.ravel()[first].astype(np.uint32), label.reshape(faces.shape).astype(np.uint32), uv[first]
 
 
 def _image(found: UnwrappedSoup, side: int) -> NDArray[np.uint8]:
