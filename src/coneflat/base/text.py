@@ -27,9 +27,12 @@ def list_some(items: Iterable[object], total: int | None = None) -> str:
     return ", ".join(str(item) for item in shown[:MAX_LISTED]) + (", ..." if more else "")
 
 
-def printable(text: str) -> str:
-    """Return a text that can be encoded as UTF-8; invalid bytes of file names are escaped, such as \\udcff."""
-    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+def printable(text: object) -> str:
+    """Return a text of one line that can be encoded as UTF-8.
+
+    Invalid bytes of file names are escaped, such as \\udcff, and line breaks become spaces.
+    """
+    return " ".join(str(text).splitlines()).encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def short_repr(value: object) -> str:

@@ -121,7 +121,7 @@ def _of_result(result: Flattening) -> UVMesh:
 
 def _of_arrays(vertices: ArrayLike, faces: ArrayLike, corner_uv: ArrayLike | None) -> UVMesh:
     given = as_input(vertices, faces)
-    points = as_floats("vertices", given.vertices)
+    points = np.atleast_1d(as_floats("vertices", given.vertices))
     triangles = as_faces(given.faces, len(points))
     if corner_uv is None:
         raise MissingUVError("vertices and faces alone have no UV coordinates: give corner_uv as well")

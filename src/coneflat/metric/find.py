@@ -116,8 +116,8 @@ def corrected_flat_metric(
     """Return a flat metric with the cones of a solution whose holonomy along loops is a multiple of a quantum.
 
     For each loop there is a change of edge lengths of least shear that rotates this loop and no other. Large changes
-    are made in steps, unless more are needed than are left. Broyden's method is used for the last steps, on the few
-    rotation angles.
+    are made in steps, unless more are needed than are left, or seem to be by how much the error has decreased in the
+    last eight. Broyden's method is used for the last steps, on the few rotation angles.
 
     Args:
         lengths: (m, 3) side lengths.
@@ -129,6 +129,7 @@ def corrected_flat_metric(
     Raises:
         ConvergenceError: the rotations did not converge to multiples of the quantum, or need too many steps.
     """
+    # The first error is the ninth.
     mesh, given, changes, errors = holonomy.mesh, lengths, None, 8 * [np.inf]
     off, inverse, step = np.empty(0), np.empty((0, 0)), np.empty(0)
     for left in range(MAX_STEPS, -1, -1):
@@ -154,7 +155,7 @@ def corrected_flat_metric(
             inverse += np.outer(step - gained, step @ inverse) / (step @ gained)
         step = -inverse @ off
         fraction = min(1.0, MAX_CHANGE / np.abs(changes @ step).max())
-        # More steps are needed, if all change lengths as much, or the error decreases as slowly as in the last eight.
+        # More steps are needed, if all change lengths as much, or the error decreases as slowly as before.
         is_far = 1 / fraction > left or 8 * errors[-1] > left * (errors[-9] - errors[-1])
         sheared = _sheared(mesh, lengths, fraction * (changes @ step))
         while fraction > MIN_FRACTION and not slacks(sheared).min() > 0:

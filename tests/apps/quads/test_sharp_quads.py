@@ -160,6 +160,28 @@ def test_elimination_spans_all_solutions(size, seed):
     assert np.linalg.norm(missed) >= np.linalg.norm(right - nearest) - 1e-9
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-12, 5e-12])
+def test_elimination_does_not_divide_by_rounding(noise):
+    """Rings of points whose rotations add up to a full turn: the last equation of each is dependent up to rounding."""
+    rng = np.random.default_rng(0)
+    rings, size = 60, 6
+    turns = rng.uniform(-np.pi, np.pi, (rings, size))
+    turns[:, -1] = -turns[:, :-1].sum(axis=1)
+    one = np.arange(rings * size)
+    other = (one.reshape(rings, size)[:, [*range(1, size), 0]]).ravel()
+    factor = np.exp(1j * (turns.ravel() + noise * rng.normal(size=one.size)))
+    rows = np.zeros((2 * one.size, 2 * one.size))
+    for axis, unit in enumerate((1.0, 1j)):
+        image = -factor * unit
+        rows[2 * one, 2 * one + axis], rows[2 * one + 1, 2 * one + axis] = image.real, image.imag
+        rows[2 * one + axis, 2 * other + axis] += 1.0
+    found, _ = solutions_of(csr_matrix(rows), np.zeros(len(rows)))
+    basis = found[:, :-1].toarray()
+    assert basis.shape[1] == 2 * rings
+    assert np.abs(rows @ basis).max() <= 50 * noise + 1e-12
+    assert np.abs(basis).max() < 10
+
+
 @pytest.mark.parametrize(("equations", "variables"), [(3, 0), (3, 4), (0, 4), (200, 4)])
 def test_elimination_without_coefficients(equations, variables):
     found, left = solutions_of(csr_matrix((equations, variables)), np.ones(equations))
@@ -174,6 +196,13 @@ def test_elimination_of_many_separate_equations_stays_sparse():
     assert found.shape == (40_000, 20_001)
     assert found.nnz == 40_000
     assert not np.abs(left).any()
+
+
+@pytest.mark.parametrize("boundary", [np.array([]), np.array([0, 2])], ids=["none", "two"])
+def test_corners_in_an_array_are_read_or_refused(boundary):
+    square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
+    with pytest.raises(errors.ConeflatError, match=r"corner|curvature"):
+        integer_grid(*square, quads=16, boundary=boundary)
 
 
 @pytest.mark.parametrize("count", [10, 300])

@@ -108,7 +108,7 @@ def batch(
             )
             console.progress(f"{done} of {plural(count, 'mesh', 'meshes')}", done / count)
 
-        console.say([f"flattening {plural(len(todo), 'mesh', 'meshes')} into {flags.out}"])
+        console.say([f"flattening {plural(len(todo), 'mesh', 'meshes')} into {printable(flags.out)}"])
         console.progress("flatten", 0.0)
         found = run_batch(
             todo,
@@ -125,9 +125,9 @@ def batch(
         console.say(f"note: {note}" for note in found.notes)
         console.say([f"{len(todo) - found.failed:,} of {len(todo):,} meshes are flattened{before}{failed}"])
         console.say(_slowest(rows, console.elapsed))
-        console.finish([summary := flags.summary or flags.out / "summary.csv"])
+        console.finish([table := flags.summary or flags.out / "summary.csv"])
     if found.failed:
-        sys.exit(f"coneflat: error: {found.failed:,} of {len(todo):,} meshes failed, see {summary}")
+        sys.exit(f"coneflat: error: {found.failed:,} of {len(todo):,} meshes failed, see {printable(table)}")
 
 
 def _lines(row: dict[str, Any], verbose: bool) -> Iterator[str]:

@@ -79,13 +79,13 @@ def main() -> NoReturn:
         code = _fail(str(error), ExitCode.USER_ERROR)
     except (KeyboardInterrupt, click.exceptions.Abort):
         code = _fail_interrupted(received)
-    except BrokenPipeError:
-        # The reader of the output has ended, as in `coneflat ... | head`. The shutdown must not print an error.
+    except OSError as error:
+        # Errors of files are raised as ConeflatError, so this one is from the terminal, a full device, or a pipe whose
+        # reader has ended as in `coneflat ... | head`. The shutdown must not print another error.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = ExitCode.INTERNAL_ERROR
-    except OSError as error:
-        # Errors of files are raised as ConeflatError, so this one is from the terminal or a pipe.
-        code = _fail(f"cannot print: {error.strerror or error}", ExitCode.INTERNAL_ERROR)
+        if not isinstance(error, BrokenPipeError):
+            _fail(f"cannot print: {error.strerror or error}", code)
     except MemoryError:
         code = _fail("not enough memory for this mesh", ExitCode.INTERNAL_ERROR)
     except Exception as error:

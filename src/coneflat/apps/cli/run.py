@@ -20,7 +20,7 @@ import click
 
 from ... import Flattening, flatten, read_flattening
 from ...base import Progress as Listener
-from ...base import Stopwatch
+from ...base import Stopwatch, printable
 from ...errors import OptionError
 from ...io import PIPE, Joined, as_written, atomic_write, has_uv, read_joined, write_measured, write_stream
 from .shared import QUIET, VERBOSE, repair_keywords
@@ -138,7 +138,7 @@ class Console:
             self._bar = None
         if result is not None:
             self.say(f"note: {note}" for note in result.notes)
-        self.say(f"wrote {path}" for path in written)
+        self.say(f"wrote {printable(path)}" for path in written)
         if result is not None:
             self.table(self._result_rows(result))
         if self.seconds:

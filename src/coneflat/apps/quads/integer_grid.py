@@ -150,7 +150,8 @@ class GridSearch:
         if result and given:
             raise OptionError("a flattening already has faces and options: no others can be given")
         source = Source(as_input(*((result.vertices, result.faces) if result else (mesh, faces))))
-        energy, boundary = StretchEnergy(o.stretch), "auto" if is_auto else parsed.boundary
+        boundary = parsed.boundary.tolist() if isinstance(parsed.boundary, np.ndarray) else parsed.boundary
+        energy, boundary = StretchEnergy(o.stretch), "auto" if is_auto else boundary
         found = cls(source, result, 1.0, sizes, energy, o.sharp_angle, boundary, rest, stages)
         size = length or found.extent / float(np.sqrt(o.quads or QUADS))
         # Sizes beyond this range, whose squares could overflow, fail as those at its ends.
@@ -173,7 +174,7 @@ class GridSearch:
         try:
             return self._as_given()
         except CoarseGridError as error:
-            coarse, squares = error, error.grid.squares
+            coarse, squares = error.with_traceback(None), error.grid.squares
         finer = self.extent / float(np.sqrt(max(1.6 * squares, 32.0)))
         if tries == 1 or (squares > 1000 and finer < 0.4 * self.size):
             raise coarse
@@ -207,7 +208,8 @@ class GridSearch:
                 is_coarse, is_far = isinstance(error, CoarseGridError), isinstance(error, ConvergenceError)
                 if (is_coarse and self.sizes is not None) or (is_far and has_many_loops):
                     raise
-                failed.append(error)
+                # With its traceback, it would keep this frame, and all arrays, in memory.
+                failed.append(error.with_traceback(None))
             # Where rotations are not reached, others hardly ever help, and each metric takes long.
             if is_far:
                 break

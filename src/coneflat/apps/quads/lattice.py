@@ -110,8 +110,7 @@ class Lattice:
         if within is None or not len(filled):
             return None
         some, basis = self.basis[:, filled], np.delete(self.basis, filled[~within.is_free], axis=1)
-        left = (filled - np.cumsum(~within.is_free))[within.is_free]
-        basis[:, left] = some @ csr_matrix(within.basis)
+        basis[:, (filled - np.cumsum(~within.is_free))[within.is_free]] = some @ csr_matrix(within.basis)
         return Lattice(self.one + some @ within.one, basis, self.gram)
 
     def reduced(self) -> ReducedLattice:

@@ -115,7 +115,7 @@ def flattening_defaults(options: Mapping[str, Any]) -> dict[str, Any]:
     # With straight sides, bounds of cone angles apply to the double of the surface, two copies glued along the
     # boundary, where a corner of pi/2 is a cone of pi.
     if isinstance(given, str):
-        corners = {"min_cone_angle": math.pi / 2} if options.get("boundary") == "straight" else {}
+        corners = {"min_cone_angle": math.pi / 2} if str(options.get("boundary")) == "straight" else {}
         return FLATTENING_OPTIONS | corners
     parsed = WordOrVertices((), "cone").parse("cones", given)
     for vertex, curvature in parsed.items() if isinstance(parsed, dict) else ():

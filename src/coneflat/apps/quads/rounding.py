@@ -157,8 +157,7 @@ class Rounding:
         units = np.eye(len(self.start), dtype=np.int64)
         lattice = Lattice(np.zeros_like(self.start, dtype=np.int64), units, self.metric).reduced()
         for attempt in SEPARATIONS[: self.attempts]:
-            found = self._separated(lattice, *attempt)
-            if found is not None:
+            if (found := self._separated(lattice, *attempt)) is not None:
                 return np.asarray(self.basis @ found)
         raise GridError("near cones cannot be separated: use more quads")
 
@@ -174,16 +173,17 @@ class Rounding:
     ) -> IntArray | None:
         """Return a near vector of a lattice that separates all cones, and rotates near pairs by less than `angle`.
 
-        None if two cones cannot be separated after others, or not in this number of rounds.
+        None if two cones cannot be separated after others, or more pairs are left than this number of rounds.
         """
         for left in range(rounds, 0, -1):  # each reduces the dimension of the lattice
             rest: Lattice = lattice
             found = lattice.nearest(self.start)
             if not len(bad := self.pairs.collapsed(found, angle)):
                 return found
-            if at_once and len(self.pairs.disjoint(bad)) > left * at_once:
+            pairs = self.pairs.disjoint(bad)
+            if at_once and len(pairs) >= left * at_once:
                 return None
-            for pair in self.pairs.disjoint(bad)[:at_once].tolist():
+            for pair in pairs[:at_once].tolist():
                 part = self._separate(pair, rest)
                 if part is None and pair == bad[0]:
                     return None

@@ -61,7 +61,7 @@ class PackOptions:
 
 
 class Utilization(float):
-    """The covered fraction of the first texture; by an index that of another, as if this were a list of all."""
+    """The covered fraction of the only texture; it may also be taken by index, as from a list of one for each."""
 
     def __getitem__(self, index: int) -> float:
         """Return the covered fraction of a texture."""
@@ -103,11 +103,11 @@ class Atlas:
             FaceIndexError: an index is not that of a vertex.
         """
         vertices, faces = np.asarray(positions, dtype=np.float64), np.asarray(indices)
-        own = {"normals": (normals, (*vertices.shape[:1], 3)), "uvs": (uvs, (*vertices.shape[:1], 2))}
-        given = {"positions": (vertices, (*vertices.shape[:1], 3)), "indices": (faces, (*faces.shape[:1], 3))}
-        for name, (array, shape) in (given | own).items():
-            if array is not None and np.shape(array) != shape:
-                raise ArrayShapeError(f"{name} must have the shape {shape}, not {np.shape(array)}")
+        given = {"positions": vertices, "indices": faces, "normals": normals, "uvs": uvs}
+        for name, shape in [(name, np.shape(array)) for name, array in given.items() if array is not None]:
+            rows, count = len(vertices) if name in ("normals", "uvs") else "n", 2 if name == "uvs" else 3
+            if shape[1:] != (count,) or rows not in ("n", shape[0]):
+                raise ArrayShapeError(f"{name} must have the shape ({rows}, {count}), not {shape}")
         faces = faces.astype(np.int64)
         if len(faces) and not (faces.min() >= 0 and faces.max() < len(vertices)):
             raise FaceIndexError(f"indices must be from 0 to {len(vertices) - 1:,}")

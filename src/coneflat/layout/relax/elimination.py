@@ -28,9 +28,11 @@ def solutions_of(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, Float
 
     Returns:
         (v, k + 1) a basis of the k-dimensional space of homogeneous solutions, with a particular solution in the last
-        column; and (d,) the remaining transformed right-hand sides, rounding errors if the equations are consistent.
+        column; and (d,) the remaining transformed right-hand sides, rounding errors if the equations are consistent,
+        else about as large as their contradictions.
     """
-    # Up to a hundred equations are solved faster as a dense system.
+    # Up to a hundred equations are solved faster as a dense system, and so are those that connect most variables, of
+    # which few can be eliminated at once.
     equations, variables = _independent_pivots(rows) if len(right) > 100 else (np.empty(0, np.int64),) * 2
     if len(equations) <= len(right) // 50:
         filled = rows.getnnz(axis=0) > 0
@@ -60,11 +62,11 @@ def _independent_pivots(rows: csr_matrix) -> tuple[IntArray, IntArray]:
     """Return (p,) equations and the variables, (p,), that they give; no other of these equations has these variables.
 
     The coefficients are at least half of the largest of their equations. Variables of few equations with few variables
-    are first, so that few entries are filled.
+    are first, so that few entries are filled. Small coefficients, which may be rounding, are left to the factorization.
     """
     by_variable, entries = rows.tocsc(), rows.tocoo()
     sizes, widths, heights = np.abs(entries.data), np.diff(rows.indptr), np.diff(by_variable.indptr)
-    least = np.full(rows.shape[0], RELATIVE_ROUNDING)
+    least = np.full(rows.shape[0], 0.01)
     np.maximum.at(least, entries.row, sizes / 2)
     found = np.flatnonzero(sizes >= least[entries.row])
     cost = (widths[entries.row] - 1) * (heights[entries.col] - 1)

@@ -102,7 +102,7 @@ def find_motions(
 def _require_solved(residual: float, right: FloatArray) -> None:
     # The rotations of seams are exact up to rounding, and points are many units from their centres.
     if residual > 100 * RELATIVE_ROUNDING * max(1.0, float(np.abs(right).max())):
-        raise OptionError(f"constraints contradict each other, or the seams, by at least {residual:.2g}")
+        raise OptionError(f"constraints contradict each other, or the seams, by about {residual:.2g}")
 
 
 class _Builder:
