@@ -62,7 +62,7 @@ def may_overlap(corners: FloatArray, signs: IntArray, is_open: BoolArray) -> Int
     if not 0 < scale < np.inf or np.abs(np.diff(ends[..., 1])).sum() * scale > MAX_ROWS_PER_SIDE * len(every):
         return every
     grid = float(low[0]), float(low[1]), scale
-    marks, steps = np.zeros((2, count + 1, count + 1), dtype=np.int32)
+    marks, steps = np.zeros((2, count + 2, count + 2), dtype=np.int32)
     trace_sides(ends.reshape(-1, 4), *grid, marks, steps)
     sum_cells(marks, steps)
     return np.flatnonzero(find_suspected(flat, signs, *grid, marks))
@@ -77,7 +77,8 @@ def trace_sides(
     The column of a crossing may be wrong by rounding; both columns are then in the box of the side, which is marked.
 
     x, y, scale: the corner of the grid of square cells, and the number of cells per unit of length.
-    marks, steps: (c + 1, c + 1) zeros on entry; differences between consecutive cells on return, see `sum_cells`.
+    marks, steps: (c + 1, c + 1) or larger, zeros on entry; differences between consecutive cells on return, see
+        `sum_cells`.
     """
     for i in range(len(sides)):
         x0, y0, x1, y1 = sides[i]
@@ -100,22 +101,22 @@ def trace_sides(
 def sum_cells(marks: Int32Array, steps: Int32Array) -> None:
     """Sum the differences; on return, `marks` has the number of suspected cells up to each row and column.
 
-    A cell is suspected if it is in the box of a side or is covered more than once.
+    A cell is suspected if it is in the box of a side or is covered more than once. The last row and column are zeros.
     """
-    rows, columns = marks.shape
+    rows, columns = marks.shape[0] - 1, marks.shape[1] - 1
     for row in range(rows):
         marked, layers = 0, 0
         for column in range(columns):
             marked += marks[row, column]
             layers += steps[row, column]
-            marks[row, column] = marked + (marks[row - 1, column] if row else 0)
+            marks[row, column] = marked + marks[row - 1, column]
             steps[row, column] = layers
     for row in range(rows):
         along = 0
         for column in range(columns):
             along += 1 if marks[row, column] > 0 or abs(steps[row, column]) > 1 else 0
             # This cell now has a two-dimensional prefix sum; the rows that follow still have their marks.
-            marks[row, column] = along + (marks[row - 1, column] if row else 0)
+            marks[row, column] = along + marks[row - 1, column]
 
 
 @compiled
@@ -128,12 +129,7 @@ def find_suspected(
         c = corners[t]
         left, right = int((min(c[0], c[2], c[4]) - x) * scale), int((max(c[0], c[2], c[4]) - x) * scale)
         bottom, top = int((min(c[1], c[3], c[5]) - y) * scale), int((max(c[1], c[3], c[5]) - y) * scale)
-        inside = sums[top, right]
-        if left > 0:
-            inside -= sums[top, left - 1]
-        if bottom > 0:
-            inside -= sums[bottom - 1, right]
-        if left > 0 and bottom > 0:
-            inside += sums[bottom - 1, left - 1]
+        # The last row and column are zeros, at the index -1.
+        inside = sums[top, right] - sums[top, left - 1] - sums[bottom - 1, right] + sums[bottom - 1, left - 1]
         found[t] = signs[t] != 0 and inside > 0
     return found

@@ -74,12 +74,11 @@ def map_factors(rest: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
     """
     r0, r1 = rest[:, 0], rest[:, 1]
     area = r0 * np.conj(r1) - np.conj(r0) * r1
-    found = []
     with np.errstate(divide="ignore", invalid="ignore"):
-        for c0, c1 in ((np.conj(r1) / area, -np.conj(r0) / area), (-r1 / area, r0 / area)):
-            # Side 0 runs from corner 1 to corner 2, side 1 from corner 2 to corner 0.
-            found.append(np.stack([c1, -c0, c0 - c1], axis=1))
-    return found[0], found[1]
+        sides = (np.conj(r1) / area, -np.conj(r0) / area), (-r1 / area, r0 / area)
+        # Side 0 runs from corner 1 to corner 2, side 1 from corner 2 to corner 0.
+        by_a, by_b = (np.stack([c1, -c0, c0 - c1], axis=1) for c0, c1 in sides)
+    return by_a, by_b
 
 
 def layout_curvature(mesh: TriangleMesh, corners: FloatArray, at: BoolArray | None = None) -> FloatArray:
@@ -109,8 +108,7 @@ def vertex_log_scale(mesh: TriangleMesh, before: FloatArray, after: FloatArray) 
         mesh: triangle mesh with n vertices and m faces.
         before, after: (m,) areas, in any unit.
     """
-    ratio = []
-    for areas in (before, after):
-        around = np.bincount(mesh.faces.ravel(), np.repeat(areas, 3), minlength=len(mesh.vertices))
-        ratio.append(np.maximum(around, MIN_AREA * around.mean()))
-    return np.log(ratio[1] / ratio[0]) / 2
+    corner, count = mesh.faces.ravel(), len(mesh.vertices)
+    around = [np.bincount(corner, np.repeat(areas, 3), count) for areas in (before, after)]
+    one, two = (np.maximum(each, MIN_AREA * each.mean()) for each in around)
+    return np.log(two / one) / 2

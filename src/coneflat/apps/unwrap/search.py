@@ -186,16 +186,18 @@ class CutSearch:
         is_own, is_small = (seams.charts[at] == small)[:, :1], layout.chart == small
         # The small chart is turned and moved so that its side of the seam is as close as possible to the other one.
         points, sides = layout.points @ [1, 1j], np.stack([seams.here[at], seams.there[at]])
-        here, there = points[np.where(is_own, sides, sides[::-1])]
+        here, there = points[(ends := np.where(is_own, sides, sides[::-1]))]
         turn, moved = np.vdot(here - here.mean(), there - there.mean()), layout.corners[is_small]
         points[moved] = (points[moved] - here.mean()) * turn / max(abs(turn), 1e-300) + there.mean()
+        # Sides that fit were separated because charts overlapped.
+        fits = np.abs(np.subtract(*points[ends])).max() < 1e-9 * np.abs(there).max()
         layout = recut(replace(layout, points=np.stack([points.real, points.imag], axis=1)), seams.edges[~at])
         # Of 12 joins that flipped more triangles for each edge, none succeeded.
-        if 3 * (signed_double_areas(layout.points[layout.corners]) <= 0).sum() > len(edges):
+        if fits or 3 * (signed_double_areas(layout.points[layout.corners]) <= 0).sum() > len(edges):
             return one
         layout, energy = self._freed(layout, nearby(layout.corners, is_small, RINGS), TOLERANCE)
-        overlaps = find_overlaps(side_by_side(layout).points[layout.corners])
-        if len(overlaps.pairs) or not energy <= max(self.max_energy, one.energy):
+        places = side_by_side(layout).points[layout.corners]
+        if not energy <= max(self.max_energy, one.energy) or len(find_overlaps(places, limit=1).pairs):
             return one
         return Candidate(layout, energy, self.cost_of(layout), one.distortion, True)
 
@@ -274,11 +276,11 @@ class CutSearch:
 
     def _candidate(self, layout: Layout, distortion: float, free: BoolArray | None = None) -> Candidate:
         # What the cones or the metric do not meet does not matter where seams are free.
-        layout, energy = self._freed(replace(layout, notes=()), free, TOLERANCE)
+        layout, energy = self._freed(replace(layout, notes=()), free, 5 * TOLERANCE)
         return Candidate(layout, energy, self.cost_of(layout), distortion)
 
     def _freed(
-        self, layout: Layout, free: BoolArray | None = None, tolerance: float = 3e-3
+        self, layout: Layout, free: BoolArray | None = None, tolerance: float = 2 * TOLERANCE
     ) -> tuple[Layout, float]:
         """Return a layout with the least energy, and its energy or the one that belongs to its area distortion."""
         spec = self.part.seams if np.isfinite(self.max_energy) else None

@@ -64,8 +64,8 @@ def descend(
         motions: the motions of the points as functions of the unknowns.
         elements: the triangles that move.
         energy: the energy that is minimised.
-        tolerance: a part is continued if the predicted decrease of a step is above this fraction of its energy minus
-            the lower bound.
+        tolerance: the last step of a part is the first one whose predicted decrease is at most this fraction of its
+            energy minus the lower bound.
         steps: maximum number of steps.
         progress: called with the number of steps and the energy; a return value of True ends the iteration.
         stride: maximum fraction of the distance to the constraints per step.
@@ -102,12 +102,13 @@ def descend(
         step = np.append(factor.solve(-gradient - pull), remaining)
         if not np.isfinite(step).all():
             raise MetricError(f"relaxation found no finite step of its {elements.count:,} unknowns")
-        slope = np.bincount(unknown_part, gradient * step[:-1], parts)
+        slope, is_last = np.bincount(unknown_part, gradient * step[:-1], parts), np.zeros(parts, dtype=bool)
         if not remaining:
-            active &= -slope > np.maximum(tolerance * (here - least), RELATIVE_ROUNDING * here)
+            active &= -slope > RELATIVE_ROUNDING * here
             step[:-1][~active[unknown_part]] = 0.0
             if not active.any():
                 break
+            is_last = -slope <= tolerance * (here - least)
         change = elements.change(step)
         farthest = np.full(parts, np.inf)
         np.minimum.at(farthest, part, MAX_STEP_SHARE * maps.largest_steps(change))
@@ -123,12 +124,12 @@ def descend(
                 break
             length[~good] /= 2
         length[~good] = 0.0
-        active &= length > 0
+        active &= (length > 0) & ~is_last
         # Without the negative eigenvalues of the Hessians, steps are too short.
         for times in () if remaining else (1.5, 1.5):
             longer = np.minimum(times * length, farthest)
             beyond = sums(elements.energies(energy, maps.plus(longer[part], change)))
-            better = active & (beyond < there)
+            better = (length > 0) & (beyond < there)
             if not better.any():
                 break
             length[better], there[better] = longer[better], beyond[better]

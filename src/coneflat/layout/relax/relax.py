@@ -31,8 +31,8 @@ from .elements import Elements
 from .energies import Energy, StretchEnergy
 from .motions import find_motions
 
-# A step is taken if its predicted decrease is above this fraction of the energy minus its lower bound; and the maximum
-# number of steps.
+# The last step is the first one whose predicted decrease is at most this fraction of the energy minus its lower bound;
+# and the maximum number of steps.
 TOLERANCE, STEPS = 1e-3, 100
 
 
@@ -84,7 +84,8 @@ def relax(
         lengths: (m, 3) target side lengths of the triangles, column i opposite corner i; None for those of the mesh.
         weights: (m,) weights of the triangles in addition to their areas; None for equal weights.
         free: (n,) True for vertices that may move; None for all.
-        tolerance: a step is taken if its predicted decrease is above this fraction of the energy minus its lower bound.
+        tolerance: the last step is the first one whose predicted decrease is at most this fraction of the energy minus
+            its lower bound.
         steps: maximum number of Newton steps.
         progress: called after each step with its number and the energy; if it returns True, the iteration ends with
             the current result.
