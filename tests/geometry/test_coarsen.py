@@ -22,6 +22,12 @@ def test_the_number_of_triangles_is_reached(sphere: TriangleMesh):
     assert np.array_equal(coarse.vertices, sphere.vertices[kept])
 
 
+def test_the_order_and_type_of_faces_in_memory_change_nothing(sphere: TriangleMesh):
+    faces = np.asfortranarray(sphere.faces.astype(np.int32))
+    one, two = (coarse_mesh(each, 500)[0].faces for each in (sphere, TriangleMesh(sphere.vertices, faces)))
+    assert np.array_equal(one, two)
+
+
 def test_the_topology_stays():
     for vertices, faces in (shapes.torus(48, 24), shapes.grid(30, 30)):
         mesh = check_mesh(vertices, faces).mesh

@@ -23,7 +23,7 @@ def coarse_mesh(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntArray,
     References:
         M. Garland, P. Heckbert, "Surface simplification using quadric error metrics", 1997.
     """
-    faces = mesh.faces.astype(np.int64)
+    faces = mesh.faces.astype(np.int64, order="C")
     points, key = mesh.vertices - mesh.vertices.mean(axis=0), tie_key(mesh.vertices)
     collapse_edges(points, faces, _quadrics(mesh, points), mesh.is_boundary_vertex, key, count)
     kept, corners = np.unique(faces[faces[:, 0] >= 0], return_inverse=True)

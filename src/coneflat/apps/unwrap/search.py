@@ -148,14 +148,13 @@ class CutSearch:
             start: a candidate.
             layout: its layout, if that was cut further.
         """
-        start = self.separated(start)
-        if len(self.part.faces) > MANY_TRIANGLES:
-            return start if layout is None else replace(start, layout=layout)
+        start, is_large = self.separated(start), len(self.part.faces) > MANY_TRIANGLES
         if layout is not None:
             start = replace(start, layout=layout, cost=self.cost_of(layout))
-        if layout is not None or self.max_energy < start.energy <= self._near:
+        if (layout is not None and not is_large) or self.max_energy < start.energy <= self._near:
             start = self.settled(start)
-        if self._has_coarse and 0 <= self.max_energy - start.energy <= 5 * (self._near - self.max_energy):
+        slack = self.max_energy - start.energy
+        if is_large or (self._has_coarse and 0 <= slack <= 5 * (self._near - self.max_energy)):
             return start
         for one in sorted(map(self.separated, self._moved(start)), key=lambda one: one.cost):
             one = self.settled(one) if one.energy > self.max_energy else one
@@ -232,7 +231,8 @@ class CutSearch:
             excess = found[-1].energy - self.max_energy
             if excess <= 0 or best.energy > bound:
                 break
-            bound = max(bound - excess, (bound + ISOMETRIC) / 2)
+            # The same cones would have the same energy again.
+            bound = max(min(bound, best.energy) - excess, (bound + ISOMETRIC) / 2)
         close_search(self._surface)
         return self.separated(min(found, key=lambda one: one.energy))
 
