@@ -25,6 +25,7 @@ def test_the_number_of_triangles_is_reached(sphere: TriangleMesh):
 def test_the_order_and_type_of_faces_in_memory_change_nothing(sphere: TriangleMesh):
     faces = np.asfortranarray(sphere.faces.astype(np.int32))
     one, two = (coarse_mesh(each, 500)[0].faces for each in (sphere, TriangleMesh(sphere.vertices, faces)))
+    assert len(one) == 500
     assert np.array_equal(one, two)
 
 

@@ -23,7 +23,8 @@ from .relax.relax import rest_sides
 # with a twentieth of the vertices of a fine mesh and three quarters of a coarse one free, the mean comes within 0.0025
 # of its value with all vertices free.
 RELAXED_QC, RELAXED_RINGS = 1.35, 3
-# A further Newton step is taken if its predicted decrease is above this fraction of the energy minus its lower bound.
+# The last Newton step is the first one whose predicted decrease is at most this fraction of the energy minus its lower
+# bound.
 # Most relaxations take 6 to 10 steps, those with triangles distorted by a factor of a thousand 20 to 30.
 TOLERANCE = 1e-2
 # Fraction of the mean area that is added to the weight of every triangle. Without it, slivers are distorted without

@@ -47,8 +47,8 @@ MAX_TRIES = 4
 SMALL_AREA, MAX_JOINS = 0.005, 8
 # Cost of seams that lowers the energy to that of an isometry, relative to the square root of the area.
 COST_PER_ENERGY = 0.6
-# Tolerance of the energies of candidates, see `relax`. Those above the bound by less than twice as much may be within
-# it once they are settled.
+# Tolerance of energies, see `relax`: candidates are relaxed with five times as much and settled with twice as much, as
+# the step that meets it is taken. Candidates above the bound by less than twice as much may be within it once settled.
 TOLERANCE = 1e-2
 # Energy above the bound, relative to what is allowed above that of an isometry, from which a candidate is given up.
 # Moving the tips of those hardly ever succeeds: trying it takes a tenth more time for seams shorter by 0.5%.
@@ -188,8 +188,8 @@ class CutSearch:
         here, there = points[(ends := np.where(is_own, sides, sides[::-1]))]
         turn, moved = np.vdot(here - here.mean(), there - there.mean()), layout.corners[is_small]
         points[moved] = (points[moved] - here.mean()) * turn / max(abs(turn), 1e-300) + there.mean()
-        # Sides that fit were separated because charts overlapped.
-        fits = np.abs(np.subtract(*points[ends])).max() < 1e-9 * np.abs(there).max()
+        # Sides that fit, other than single edges, were mostly separated because charts overlapped.
+        fits = len(edges) > 1 and np.abs(np.subtract(*points[ends])).max() < 1e-9 * np.abs(there).max()
         layout = recut(replace(layout, points=np.stack([points.real, points.imag], axis=1)), seams.edges[~at])
         # Of 12 joins that flipped more triangles for each edge, none succeeded.
         if fits or 3 * (signed_double_areas(layout.points[layout.corners]) <= 0).sum() > len(edges):
@@ -231,7 +231,7 @@ class CutSearch:
             excess = found[-1].energy - self.max_energy
             if excess <= 0 or best.energy > bound:
                 break
-            # The same cones would have the same energy again.
+            # Below the energy of these cones, which would have the same energy here again.
             bound = max(min(bound, best.energy) - excess, (bound + ISOMETRIC) / 2)
         close_search(self._surface)
         return self.separated(min(found, key=lambda one: one.energy))
