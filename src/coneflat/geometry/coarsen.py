@@ -41,9 +41,8 @@ def _quadrics(mesh: TriangleMesh, points: FloatArray) -> FloatArray:
     sides = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
     (tails, heads), near = mesh.ends_of(sides), normals[sides // 3]
     along = points[heads] - points[tails]
-    across = (
-        np.cross(along, near) * np.sqrt(dots(along, along) / np.maximum(dots(near, near), 1e-300))[:, None]
-    )
+    size = np.sqrt(dots(along, along) / np.maximum(dots(near, near), 1e-300))
+    across = np.cross(along, near) * size[:, None]
     found, (row, column) = np.zeros((len(points), 10)), np.tril_indices(4)
     planes = (normals, one, mesh.faces.T), (across, points[tails], np.stack([tails, heads]))
     for normal, place, vertices in planes:
@@ -124,7 +123,8 @@ def collapse_edges(
         heapq.heapify(heap)
         while left > count and len(heap):
             cost, _, tail, head = heapq.heappop(heap)
-            if first[tail] < 0 or cost == np.inf:
+            # The entry of a vertex that was pushed last counts.
+            if first[tail] < 0 or cost == np.inf or cost != known[tail]:
                 continue
             # Costs only rise, as vertices do not move.
             if first[head] < 0 or cost_of(tail, head) > cost:

@@ -24,8 +24,7 @@ from .relax.relax import rest_sides
 # of its value with all vertices free.
 RELAXED_QC, RELAXED_RINGS = 1.35, 3
 # The last Newton step is the first one whose predicted decrease is at most this fraction of the energy minus its lower
-# bound.
-# Most relaxations take 6 to 10 steps, those with triangles distorted by a factor of a thousand 20 to 30.
+# bound. Most relaxations take 6 to 10 steps, those with triangles distorted by a factor of a thousand 20 to 30.
 TOLERANCE = 1e-2
 # Fraction of the mean area that is added to the weight of every triangle. Without it, slivers are distorted without
 # bound, 60 to 1 on a decimated face instead of 11; with it, means rise by 0.0005.

@@ -246,23 +246,17 @@ def test_a_chart_with_short_seams_is_cut_as_well(shared, monkeypatch):
 
 
 def test_small_charts_are_joined_to_others_where_they_fit(shared, monkeypatch):
-    names = "hand.obj", "plane-holes.obj"
-    results = [unwrap(shared(name)) for name in names]
+    result = unwrap(shared("hand.obj"))
     monkeypatch.setattr("coneflat.apps.unwrap.search.CutSearch.small_joined", lambda _, one: one)
-    pairs = [
-        (result.distortion, unwrap(shared(name)).distortion)
-        for result, name in zip(results, names, strict=True)
-    ]
-    assert sum(apart.charts - joined.charts for joined, apart in pairs) >= 3
-    for result, (joined, apart) in zip(results, pairs, strict=True):
-        assert joined.charts < apart.charts
-        assert joined.seam_length < apart.seam_length
-        assert joined.energy <= 4.1
-        assert (joined.flipped, joined.overlapping_pairs) == (0, 0)
-        # What the result says of the cones is measured after their points have moved.
-        sides = result.corner_uv[:, [2, 0, 1]] - result.corner_uv[:, [1, 2, 0]]
-        angles = np.bincount(result.faces.ravel(), corner_angles(np.linalg.norm(sides, axis=2)).ravel())
-        assert result.curvatures == pytest.approx(2 * np.pi - angles[result.cones], abs=1e-6)
+    joined, apart = result.distortion, unwrap(shared("hand.obj")).distortion
+    assert joined.charts <= apart.charts - 2
+    assert joined.seam_length < 0.99 * apart.seam_length
+    assert joined.energy <= 4.1
+    assert (joined.flipped, joined.overlapping_pairs) == (0, 0)
+    # What the result says of the cones is measured after their points have moved.
+    sides = result.corner_uv[:, [2, 0, 1]] - result.corner_uv[:, [1, 2, 0]]
+    angles = np.bincount(result.faces.ravel(), corner_angles(np.linalg.norm(sides, axis=2)).ravel())
+    assert result.curvatures == pytest.approx(2 * np.pi - angles[result.cones], abs=1e-6)
 
 
 def test_the_cut_of_a_large_mesh_is_searched_on_a_coarse_one(monkeypatch):

@@ -185,7 +185,8 @@ class CutSearch:
         is_own, is_small = (seams.charts[at] == small)[:, :1], layout.chart == small
         # The small chart is turned and moved so that its side of the seam is as close as possible to the other one.
         points, sides = layout.points @ [1, 1j], np.stack([seams.here[at], seams.there[at]])
-        here, there = points[(ends := np.where(is_own, sides, sides[::-1]))]
+        ends = np.where(is_own, sides, sides[::-1])
+        here, there = points[ends]
         turn, moved = np.vdot(here - here.mean(), there - there.mean()), layout.corners[is_small]
         points[moved] = (points[moved] - here.mean()) * turn / max(abs(turn), 1e-300) + there.mean()
         # Sides that fit, other than single edges, were mostly separated because charts overlapped.

@@ -102,13 +102,13 @@ def descend(
         step = np.append(factor.solve(-gradient - pull), remaining)
         if not np.isfinite(step).all():
             raise MetricError(f"relaxation found no finite step of its {elements.count:,} unknowns")
-        slope, is_last = np.bincount(unknown_part, gradient * step[:-1], parts), np.zeros(parts, dtype=bool)
+        slope = np.bincount(unknown_part, gradient * step[:-1], parts)
+        is_last = (-slope <= tolerance * (here - least)) & (not remaining)
         if not remaining:
             active &= -slope > RELATIVE_ROUNDING * here
             step[:-1][~active[unknown_part]] = 0.0
             if not active.any():
                 break
-            is_last = -slope <= tolerance * (here - least)
         change = elements.change(step)
         farthest = np.full(parts, np.inf)
         np.minimum.at(farthest, part, MAX_STEP_SHARE * maps.largest_steps(change))
