@@ -17,8 +17,6 @@ from ...geometry import (
     double_areas,
     find_overlaps,
     layout_curvature,
-    sides_between,
-    signed_angles,
     signed_double_areas,
     vertex_log_scale,
 )
@@ -56,12 +54,12 @@ def freed(
     energy, sides = StretchEnergy(1.0), layout.lengths
     found = relax(disk, points, layout.corners, energy, lengths=sides, free=free, tolerance=tolerance)
     if free is not None and not free.all():
-        moved = replace(layout, points=found.points, **_measured(mesh, areas, found.points[layout.corners]))
+        moved = replace(layout, points=found.points, **measured(mesh, areas, found.points[layout.corners]))
         return moved, float(triangle_energies(sides, moved.points[layout.corners]).sum() / areas.sum())
     # The relaxation keeps the lengths relative to the area at its start.
     start = np.abs(signed_double_areas(points[layout.corners])).sum() / 2
     points = found.points * np.sqrt(areas.sum() / start)
-    at_vertices = _measured(mesh, areas, points[layout.corners])
+    at_vertices = measured(mesh, areas, points[layout.corners])
     return replace(layout, points=points, **at_vertices), ISOMETRIC * found.energy
 
 
@@ -72,10 +70,9 @@ def _untangled(layout: Layout, disk: TriangleMesh, spec: SeamSpec | None) -> Lay
     """
     fixed = np.zeros(len(layout.points), dtype=bool)
     points, *_ = untangled_disk(disk, layout.points, layout.lengths, fixed, may_wind=spec is not None)
-    found, angles = replace(layout, points=points), signed_angles(sides_between(points[disk.faces]))
-    is_winding = np.bincount(disk.faces.ravel(), angles.ravel()) > 3 * np.pi
-    winding = np.flatnonzero(is_winding & ~disk.is_boundary_vertex)
-    if spec is None or not len(winding) or not (signed_double_areas(points[disk.faces]) > 0).all():
+    found, places = replace(layout, points=points), points[disk.faces]
+    winding = np.flatnonzero((layout_curvature(disk, places) < -np.pi) & ~disk.is_boundary_vertex)
+    if spec is None or not len(winding) or not (signed_double_areas(places) > 0).all():
         return found
     sides = disk.edge_halfedges[:, 0]
     edges, lengths = layout.mesh.halfedge_edges[sides], layout.lengths.ravel()[sides]
@@ -110,11 +107,11 @@ def laid_out(
         seams=mesh.edges[seams],
         statistics=SolveStatistics(),
         disk=disk,
-        **_measured(mesh, double_areas(lengths) / 2, places),
+        **measured(mesh, double_areas(lengths) / 2, places),
     )
 
 
-def _measured(mesh: TriangleMesh, areas: FloatArray, places: FloatArray) -> dict[str, Any]:
+def measured(mesh: TriangleMesh, areas: FloatArray, places: FloatArray) -> dict[str, Any]:
     """Return what a layout with free seams says of the vertices, for (m,) areas and (m, 3, 2) corners of triangles."""
     count, curvature = len(mesh.vertices), layout_curvature(mesh, places)
     return {
@@ -128,18 +125,11 @@ def _measured(mesh: TriangleMesh, areas: FloatArray, places: FloatArray) -> dict
 
 def recut(layout: Layout, seams: IntArray) -> Layout:
     """Return a layout that is cut along given edges (k,); the two sides of seams that are closed meet in the middle."""
-    cut = open_along(layout.mesh, seams)
-    corners, places = cut.mesh.faces, layout.points[layout.corners].reshape(-1, 2)
+    mesh, disk = layout.mesh, open_along(layout.mesh, seams).mesh
+    corners, places = disk.faces, layout.points[layout.corners].reshape(-1, 2)
     sums = np.stack([np.bincount(corners.ravel(), column) for column in places.T], axis=1)
-    points = sums / np.bincount(corners.ravel())[:, None]
-    return replace(
-        layout,
-        points=points,
-        corners=corners,
-        disk=cut.mesh,
-        seams=layout.mesh.edges[seams],
-        chart=label_faces(corners, len(points))[1],
-    )
+    points, chart = sums / np.bincount(corners.ravel())[:, None], label_faces(corners, len(sums))[1]
+    return replace(layout, points=points, corners=corners, disk=disk, seams=mesh.edges[seams], chart=chart)
 
 
 def side_by_side(layout: Layout) -> Layout:
@@ -162,19 +152,23 @@ def separate_charts(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layout
     label = layout.chart.copy()
     for chart in np.unique(layout.chart[pairs[:, 0]]).tolist():
         faces = np.flatnonzero(layout.chart == chart)
-        used, corners = np.unique(layout.corners[faces], return_inverse=True)
-        points = layout.points[used]
-        disk = TriangleMesh(np.pad(points, ((0, 0), (0, 1))), corners.reshape(-1, 3))
-        sides = disk.edge_halfedges[:, 0]
+        one = alone(layout, faces)
+        sides = one.mesh.edge_halfedges[:, 0]
         edges = layout.mesh.halfedge_edges[3 * faces[sides // 3] + sides % 3]
-        one_chart = np.zeros(len(faces), dtype=np.int64)
-        alone = replace(layout, mesh=disk, points=points, corners=disk.faces, chart=one_chart, disk=None)
         own = replace(spec, is_avoided=spec.is_avoided[edges], is_forbidden=spec.is_forbidden[edges])
-        pieces = separate_overlaps(alone, costs[edges], own, 1).chart
+        pieces = separate_overlaps(one, costs[edges], own, 1).chart
         label[faces] = np.where(pieces > 0, label.max() + pieces, chart)
-    return with_charts(
-        layout, ChartLayout(layout.points, layout.corners, layout.chart).split(label).renumbered()
-    )
+    charts = ChartLayout(layout.points, layout.corners, layout.chart)
+    return with_charts(layout, charts.split(label).renumbered())
+
+
+def alone(layout: Layout, faces: IntArray) -> Layout:
+    """Return some triangles (k,) of a layout as one chart, on a mesh whose vertices are their points."""
+    used, corners = np.unique(layout.corners[faces], return_inverse=True)
+    points, lengths, chart = layout.points[used], layout.lengths[faces], np.zeros(len(faces), dtype=np.int64)
+    mesh = TriangleMesh(np.pad(points, ((0, 0), (0, 1))), corners.reshape(-1, 3))
+    own = replace(layout, mesh=mesh, points=points, corners=mesh.faces, disk=None)
+    return replace(own, lengths=lengths, chart=chart)
 
 
 def seam_edges(layout: Layout) -> IntArray:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ...atlas import ChartLayout, Seams
+from ...atlas import ChartLayout, Seams, with_charts
 from ...base import BoolArray, FloatArray, IntArray, has_any, mask_of
 from ...cones import close_search
 from ...errors import MetricError, SeamError
@@ -25,7 +25,7 @@ from ...mesh import nearby
 from ...seams import seam_costs, without_loose_ends
 from ...source import Part
 from ...stages import Layout, Surface, VertexCurvatures
-from .free import freed, recut, seam_edges, separate_charts, side_by_side, triangle_energies
+from .free import alone, freed, measured, recut, seam_edges, separate_charts, side_by_side, triangle_energies
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .tips import RINGS, find_tips, moved_tips, moves_for
 
@@ -169,36 +169,51 @@ class CutSearch:
         is_small = sizes[seams.charts].min(axis=1) < SMALL_AREA * sizes.sum()
         is_small &= seams.charts[:, 0] != seams.charts[:, 1]
         costs = np.bincount(stretch, self.seam_costs[seams.edges] * is_small)
-        for each in np.argsort(-costs, kind="stable")[: min(MAX_JOINS, np.count_nonzero(costs))]:
+        order = np.argsort(-costs, kind="stable")[: min(MAX_JOINS, np.count_nonzero(costs))]
+        for edges in [seams.edges[stretch == each] for each in order]:
             with suppress(MetricError, SeamError):
-                one = self._joined(one, seams.edges[stretch == each])
+                joined = self._joined(one, seams, np.isin(seams.edges, edges))
+                one, seams = (one, seams) if joined is None else (joined, _chart_seams(joined.layout))
         return one
 
-    def _joined(self, one: Candidate, edges: IntArray) -> Candidate:
-        """Return a candidate whose charts are joined across edges of a seam, or the given one if that does not fit."""
-        layout, seams = one.layout, _chart_seams(one.layout)
-        at, sizes = np.isin(seams.edges, edges), np.bincount(layout.chart, self.part.double_areas)
+    def _joined(self, one: Candidate, seams: Seams, at: BoolArray) -> Candidate | None:
+        """Return a candidate joined across seam edges that are flagged (k,), or None if its triangles do not fit."""
+        layout, sizes = one.layout, np.bincount(one.layout.chart, self.part.double_areas)
         charts = np.unique(seams.charts[at])
-        if len(charts) < 2:  # joined by an earlier seam
-            return one
         small = charts[np.argmin(sizes[charts])]
+        if len(charts) < 2 or sizes[small] >= SMALL_AREA * sizes.sum():  # joined by an earlier seam
+            return None
         is_own, is_small = (seams.charts[at] == small)[:, :1], layout.chart == small
         # The small chart is turned and moved so that its side of the seam is as close as possible to the other one.
-        points, sides = layout.points @ [1, 1j], np.stack([seams.here[at], seams.there[at]])
+        points, sides = layout.points @ np.array([1, 1j]), np.stack([seams.here[at], seams.there[at]])
         ends = np.where(is_own, sides, sides[::-1])
         here, there = points[ends]
         turn, moved = np.vdot(here - here.mean(), there - there.mean()), layout.corners[is_small]
         points[moved] = (points[moved] - here.mean()) * turn / max(abs(turn), 1e-300) + there.mean()
-        # Sides that fit, other than single edges, were mostly separated because charts overlapped.
-        fits = len(edges) > 1 and np.abs(np.subtract(*points[ends])).max() < 1e-9 * np.abs(there).max()
-        layout = recut(replace(layout, points=np.stack([points.real, points.imag], axis=1)), seams.edges[~at])
-        # Of 12 joins that flipped more triangles for each edge, none succeeded.
-        if fits or 3 * (signed_double_areas(layout.points[layout.corners]) <= 0).sum() > len(edges):
-            return one
-        layout, energy = self._freed(layout, nearby(layout.corners, is_small, RINGS), TOLERANCE)
-        places = side_by_side(layout).points[layout.corners]
-        if not energy <= max(self.max_energy, one.energy) or len(find_overlaps(places, limit=1).pairs):
-            return one
+        points[ends] = points[ends].mean(axis=0)
+        chart = np.where(is_small, charts[charts != small], layout.chart)
+        whole = ChartLayout(points.view(np.float64).reshape(-1, 2), layout.corners, chart)
+        whole = whole.joined(ends.reshape(2, -1).T)
+        is_near, places = nearby(whole.corners, is_small, RINGS), whole.points[whole.corners]
+        near = np.flatnonzero(has_any(is_near, whole.corners))
+        # Only the triangles near the small chart are laid out anew.
+        patch = alone(replace(layout, points=whole.points, corners=whole.corners), near)
+        free = mask_of(len(patch.points), patch.corners[is_near[whole.corners[near]]])
+        after, _ = freed(patch, free, TOLERANCE)
+        places[near] = after.points[patch.corners]
+        known = layout.points[layout.corners[near]]
+        rise = np.subtract(*(self.energies_of(patch.lengths, each) for each in (places[near], known))).sum()
+        energy = one.energy + float(rise) / layout.area
+        low, high = places[near].min(axis=(0, 1)), places[near].max(axis=(0, 1))
+        meets = ((places.min(axis=1) < high) & (places.max(axis=1) > low)).all(axis=1)
+        meets &= chart == charts[charts != small]
+        fits = np.array_equal(after.points[~free], patch.points[~free])
+        fits &= energy <= max(self.max_energy, one.energy)
+        if not fits or len(find_overlaps(places[meets], limit=1).pairs):
+            return None
+        whole.points[whole.corners[near]] = places[near]
+        layout = with_charts(layout, whole.renumbered())
+        layout = replace(layout, **measured(layout.mesh, double_areas(layout.lengths) / 2, places))
         return Candidate(layout, energy, self.cost_of(layout), one.distortion, True)
 
     def cost_of(self, layout: Layout) -> float:

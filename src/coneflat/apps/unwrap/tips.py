@@ -47,10 +47,8 @@ def find_tips(layout: Layout, seams: IntArray, costs: FloatArray) -> Tips:
     vertices = np.flatnonzero((degree == 1) & ~mesh.is_boundary_vertex)
     inside = ~mesh.is_boundary_vertex
     behind = [_walk(mesh, tip, None, np.inf, is_seam, (degree == 2) & inside) for tip in vertices.tolist()]
-    ahead = [
-        _walk(mesh, tip, path[0], MAX_MOVE * size, np.isfinite(costs), (degree == 0) & inside)
-        for tip, path in zip(vertices.tolist(), behind, strict=True)
-    ]
+    limits = MAX_MOVE * size, np.isfinite(costs), (degree == 0) & inside
+    ahead = [_walk(mesh, tip, path[0], *limits) for tip, path in zip(vertices.tolist(), behind, strict=True)]
     probes = [path[: _steps(mesh, path, PROBE * size)] for path in ahead]
     gains = _gains(layout, seams, probes)
     length = np.array([max(costs[path].sum(), 1e-300) for path in probes])
@@ -87,19 +85,16 @@ def moved_tips(layout: Layout, seams: IntArray, tips: Tips, moves: FloatArray) -
         moves: (t,) the lengths by which seams become shorter.
     """
     mesh = layout.mesh
-    closed, opened, ends = list[int](), list[int](), dict[int, int]()
-    for tip, behind, ahead, move in zip(
-        tips.vertices.tolist(), tips.behind, tips.ahead, moves.tolist(), strict=True
-    ):
+    closed, opened, ends = [seams[:0]], [seams], dict[int, int]()
+    each = zip(tips.vertices.tolist(), tips.behind, tips.ahead, moves.tolist(), strict=True)
+    for tip, behind, ahead, move in each:
         path = behind if move > 0 else ahead
         part = path[: _steps(mesh, path, abs(move))]
-        (closed if move > 0 else opened).extend(part.tolist())
+        (closed if move > 0 else opened).append(part)
         # A seam that is closed as a whole needs no cone.
         ends[tip] = -1 if move > 0 and len(part) == len(behind) else _end(mesh, tip, part)
     cones = np.array([ends.get(cone, cone) for cone in layout.cones.tolist()], dtype=np.int64)
-    seams = np.setdiff1d(
-        np.union1d(seams, np.array(opened, dtype=np.int64)), np.array(closed, dtype=np.int64)
-    )
+    seams = np.setdiff1d(np.concatenate(opened), np.concatenate(closed))
     return seams, np.intersect1d(cones, mesh.edges[seams])
 
 

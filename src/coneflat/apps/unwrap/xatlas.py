@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...base import FloatArray, IntArray
 from ...errors import ArrayShapeError, FaceIndexError
+from ...geometry import fill_nearest
 from ...io import atomic_write
 from .options import UnwrapOptions
 from .soup import UnwrappedSoup, unwrap_soup
@@ -220,14 +221,8 @@ def _mapped(faces: IntArray, corner_uv: FloatArray) -> Mapped:
 
 def _image(found: UnwrappedSoup, side: int) -> NDArray[np.uint8]:
     """Return (side, side, 3) an image of charts; a texel has the colour of a triangle that contains its centre."""
-    image = np.zeros((side, side, 3), dtype=np.uint8)
+    face, depth = np.full((side, side), -1), np.full((side, side), np.inf)
+    points = np.pad(found.corner_uv.reshape(-1, 2) * side, ((0, 0), (0, 1)))
+    fill_nearest(points, np.arange(len(points)).reshape(-1, 3), depth, face)
     colors = np.random.default_rng(0).integers(64, 256, (int(found.chart.max(initial=0)) + 1, 3))
-    for corners, chart in zip(found.corner_uv * side - 0.5, found.chart.tolist(), strict=True):
-        low = np.maximum(np.ceil(corners.min(axis=0)), 0).astype(int)
-        high = np.floor(corners.max(axis=0)).astype(int) + 1
-        x, y = np.meshgrid(np.arange(low[0], high[0]), np.arange(low[1], high[1]))
-        inside = np.ones(x.shape, dtype=bool)
-        for (ax, ay), (bx, by) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-            inside &= (bx - ax) * (y - ay) >= (by - ay) * (x - ax)
-        image[y[inside], x[inside]] = colors[chart]
-    return image
+    return np.where(face[..., None] >= 0, colors[found.chart[face]], 0).astype(np.uint8)
