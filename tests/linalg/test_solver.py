@@ -122,9 +122,8 @@ def test_small_systems_are_solved_by_superlu_without_messages(matrix, capfd):
     assert capfd.readouterr().out == ""
 
 
-def test_scattered_parts_are_solved_by_superlu(matrix, monkeypatch):
+def test_larger_systems_are_solved_by_cholmod(matrix, monkeypatch):
     monkeypatch.setattr("coneflat.linalg.factors.MAX_SMALL_SYSTEM", 10_000)
-    assert type(factorize(matrix, is_scattered=True)) is SuperLUFactor
     assert type(factorize(matrix)) is CholespyFactor
 
 

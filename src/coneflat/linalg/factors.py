@@ -20,9 +20,8 @@ from ..errors import MetricError
 
 # Number of unknowns below which loading MKL, 0.03 s in each process, takes longer than it saves.
 MIN_PARDISO_UNKNOWNS = 12_000
-# Number of unknowns of a small system. For small matrices of many nearly disconnected blocks SuperLU is faster. With a
-# twentieth of these unknowns, it is as fast as CHOLMOD, which prints a message on standard output if a matrix is
-# indefinite.
+# Number of unknowns of a small system. With a twentieth of them, SuperLU is as fast as CHOLMOD, which prints a message
+# on standard output if a matrix is indefinite.
 MAX_SMALL_SYSTEM = 20_000
 
 
@@ -121,9 +120,7 @@ def has_pardiso() -> bool:
     return find_spec("pypardiso") is not None
 
 
-def factorize(
-    matrix: csc_matrix, previous: Factor | None = None, total_size: int = 0, is_scattered: bool = False
-) -> Factor:
+def factorize(matrix: csc_matrix, previous: Factor | None = None, total_size: int = 0) -> Factor:
     """Return the factorization of a sparse symmetric positive definite matrix.
 
     Args:
@@ -132,8 +129,6 @@ def factorize(
             reused if possible.
         total_size: number of unknowns of the larger system that the matrix belongs to, if any. PARDISO is chosen by the
             larger of both sizes: it is loaded anyway, and reuses its analysis, which takes most of the time.
-        is_scattered: whether the matrix consists of many small, nearly disconnected blocks. SuperLU finds an
-            elimination order for these in a fraction of the time of the other solvers.
 
     Raises:
         MetricError: the matrix is singular in double precision.
@@ -145,7 +140,7 @@ def factorize(
     try:
         if previous is not None:
             return previous.refactorized(matrix)
-        if size < MAX_SMALL_SYSTEM and (is_scattered or (20 * size < MAX_SMALL_SYSTEM and not is_by_pardiso)):
+        if 20 * size < MAX_SMALL_SYSTEM and not is_by_pardiso:
             return SuperLUFactor(matrix)
         return _by_pardiso(matrix) if is_by_pardiso else CholespyFactor(matrix)
     except NotPositiveDefinite:

@@ -239,7 +239,7 @@ def corrected(inverse: LaplacianInverse, matrix: csc_matrix, fixed: BoolArray) -
     columns = matrix[:, chosen]
     block = csc_matrix(columns.T.tocsc()[:, chosen].T)
     try:
-        factor = factorize(block, is_scattered=True)
+        factor = factorize(block)
     except MetricError:  # broken triangles there make the block singular
         return inverse
 

@@ -98,7 +98,7 @@ def descend(
             maps, active, factor = elements.maps(places), np.ones(parts, dtype=bool), None
         check_cancelled()
         gradient, pull, matrix = elements.newton_system(energy, maps, remaining)
-        factor = factorize(matrix, factor, REPEATED * len(points), is_scattered=parts > 8)
+        factor = factorize(matrix, factor, REPEATED * len(points))
         step = np.append(factor.solve(-gradient - pull), remaining)
         if not np.isfinite(step).all():
             raise MetricError(f"relaxation found no finite step of its {elements.count:,} unknowns")
