@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -34,6 +33,7 @@ def freed(
 
     The sides of seams move independently, and no triangle is flipped. Flipped triangles of the given layout are
     untangled. If this fails, the minimisation starts from an embedding of W. T. Tutte, "How to draw a graph", 1963.
+    Scales and curvatures at vertices remain those of the given layout, see `measured`.
 
     Args:
         layout: a layout in any number of charts.
@@ -42,7 +42,7 @@ def freed(
         tolerance: see `relax`.
         spec: which edges may be cut where untangling fails without it; None for none.
     """
-    mesh, areas = layout.mesh, double_areas(layout.lengths) / 2
+    areas = double_areas(layout.lengths) / 2
     disk = layout.disk or TriangleMesh(np.zeros((len(layout.points), 3)), layout.corners)
     is_bad = ~(signed_double_areas(layout.points[layout.corners]) > 0)
     if 0 < is_bad.sum() < len(is_bad):
@@ -54,13 +54,11 @@ def freed(
     energy, sides = StretchEnergy(1.0), layout.lengths
     found = relax(disk, points, layout.corners, energy, lengths=sides, free=free, tolerance=tolerance)
     if free is not None and not free.all():
-        moved = replace(layout, points=found.points, **measured(mesh, areas, found.points[layout.corners]))
-        return moved, float(triangle_energies(sides, moved.points[layout.corners]).sum() / areas.sum())
+        energies = triangle_energies(sides, found.points[layout.corners])
+        return replace(layout, points=found.points), float(energies.sum() / areas.sum())
     # The relaxation keeps the lengths relative to the area at its start.
     start = np.abs(signed_double_areas(points[layout.corners])).sum() / 2
-    points = found.points * np.sqrt(areas.sum() / start)
-    at_vertices = measured(mesh, areas, points[layout.corners])
-    return replace(layout, points=points, **at_vertices), ISOMETRIC * found.energy
+    return replace(layout, points=found.points * np.sqrt(areas.sum() / start)), ISOMETRIC * found.energy
 
 
 def _untangled(layout: Layout, disk: TriangleMesh, spec: SeamSpec | None) -> Layout:
@@ -94,8 +92,8 @@ def laid_out(
         seams: (k,) the edges across which they do not fit.
         cones: (s,) vertices at which seams may end.
     """
-    disk = open_along(mesh, seams).mesh
-    points = np.empty((len(disk.vertices), 2))
+    disk, unknown = open_along(mesh, seams).mesh, np.full(len(mesh.vertices), np.nan)
+    points, is_open = np.empty((len(disk.vertices), 2)), np.ones(len(unknown), dtype=bool)
     points[disk.faces] = places
     return Layout(
         mesh=mesh,
@@ -105,22 +103,23 @@ def laid_out(
         chart=np.zeros(len(disk.faces), dtype=np.int64),
         cones=cones,
         seams=mesh.edges[seams],
+        log_scale=unknown,
+        target=unknown,
+        curvature=unknown,
+        is_open=is_open,
+        is_fixed=~is_open,
         statistics=SolveStatistics(),
         disk=disk,
-        **measured(mesh, double_areas(lengths) / 2, places),
     )
 
 
-def measured(mesh: TriangleMesh, areas: FloatArray, places: FloatArray) -> dict[str, Any]:
-    """Return what a layout with free seams says of the vertices, for (m,) areas and (m, 3, 2) corners of triangles."""
-    count, curvature = len(mesh.vertices), layout_curvature(mesh, places)
-    return {
-        "log_scale": vertex_log_scale(mesh, areas, np.abs(signed_double_areas(places)) / 2),
-        "target": curvature,
-        "curvature": curvature,
-        "is_open": np.ones(count, dtype=bool),
-        "is_fixed": np.zeros(count, dtype=bool),
-    }
+def measured(layout: Layout) -> Layout:
+    """Return a layout with free seams with the scales and curvatures that it has."""
+    mesh, places = layout.mesh, layout.points[layout.corners]
+    areas, flat = double_areas(layout.lengths) / 2, np.abs(signed_double_areas(places)) / 2
+    curvature, is_open = layout_curvature(mesh, places), np.ones(len(mesh.vertices), dtype=bool)
+    found = replace(layout, log_scale=vertex_log_scale(mesh, areas, flat), curvature=curvature)
+    return replace(found, target=curvature, is_open=is_open, is_fixed=~is_open)
 
 
 def recut(layout: Layout, seams: IntArray) -> Layout:

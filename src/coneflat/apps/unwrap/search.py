@@ -25,7 +25,7 @@ from ...mesh import nearby
 from ...seams import seam_costs, without_loose_ends
 from ...source import Part
 from ...stages import Layout, Surface, VertexCurvatures
-from .free import alone, freed, measured, recut, seam_edges, separate_charts, side_by_side, triangle_energies
+from .free import alone, freed, recut, seam_edges, separate_charts, side_by_side, triangle_energies
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .tips import RINGS, find_tips, moved_tips, moves_for
 
@@ -213,7 +213,6 @@ class CutSearch:
             return None
         whole.points[whole.corners[near]] = places[near]
         layout = with_charts(layout, whole.renumbered())
-        layout = replace(layout, **measured(layout.mesh, double_areas(layout.lengths) / 2, places))
         return Candidate(layout, energy, self.cost_of(layout), one.distortion, True)
 
     def cost_of(self, layout: Layout) -> float:

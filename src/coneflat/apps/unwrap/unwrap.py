@@ -20,7 +20,7 @@ from ...metric import find_metric
 from ...options import Options, declarations, read_options, takes
 from ...source import Part, Source, find_copies
 from ...stages import ConeSolution, FlatMetric, MetricSpec, RelaxSpec, Surface
-from .free import seam_edges
+from .free import measured, seam_edges
 from .minor import MinorParts
 from .mirror import both_halves, half_of
 from .options import ENERGY_PER_AREA, ISOMETRIC, TextureOptions, UnwrapOptions
@@ -121,7 +121,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
                 # Joined parts would each need a relaxation of their own.
                 one = replace(found[i], layout=layout) if i in joined else search.shortened(found[i], layout)
                 found[i] = search.small_joined(one) if o.charts == "atlas" and one.layout.chart.any() else one
-    layouts = with_copies({i: one.layout for i, one in found.items()}, parts, copies)
+    layouts = with_copies({i: measured(one.layout) for i, one in found.items()}, parts, copies)
     cut = [part.seams.is_forbidden[seam_edges(one)].sum() for part, one in zip(parts, layouts, strict=True)]
     shared = replace(shared, method=FREE)
     result = evaluate(prepared, layouts, shared, watch)
