@@ -13,8 +13,9 @@ from command import command
 import coneflat
 from coneflat import errors, measure_uv, unwrap
 from coneflat.apps.unwrap.free import freed
-from coneflat.apps.unwrap.search import coarse_part
+from coneflat.apps.unwrap.search import CutSearch, coarse_part
 from coneflat.apps.unwrap.unwrap import along_sharp_edges
+from coneflat.atlas import ChartLayout, with_charts
 from coneflat.base import Stopwatch
 from coneflat.flatten import Method, lay_out_part
 from coneflat.geometry import corner_angles, signed_double_areas
@@ -348,3 +349,23 @@ def test_the_second_search_on_a_coarse_mesh_tries_other_cones(shared, monkeypatc
     """With those of the first one alone, the seams are longer by a third."""
     monkeypatch.setattr("coneflat.apps.unwrap.unwrap.cut_for_packing", lambda layouts, *_: layouts)
     assert unwrap(shared("elephant.obj"), max_energy=5.0).distortion.seam_length < 2.6
+
+
+def test_small_charts_inside_another_one_are_joined(monkeypatch):
+    """The second join closes edges of the third seam as well."""
+    found = []
+    best = CutSearch.best
+    monkeypatch.setattr(CutSearch, "best", lambda self: found.append((self, best(self))) or found[-1][1])
+    vertices, faces = shapes.grid(40, 40)
+    unwrap(vertices, faces)
+    ((search, one),) = found
+    layout = one.layout
+    inner = np.flatnonzero(~layout.mesh.is_boundary_vertex)
+    middle = inner[np.argmin(np.abs(layout.mesh.vertices - vertices.mean(axis=0)).sum(axis=1)[inner])]
+    around = np.flatnonzero((layout.mesh.faces == middle).any(axis=1))
+    chart = layout.chart.copy()
+    chart[around], chart[around[0]] = 1, 2
+    charts = ChartLayout(layout.points, layout.corners, layout.chart).split(chart).renumbered()
+    joined = search.small_joined(replace(one, layout=with_charts(layout, charts)))
+    assert joined.layout.chart.max() == 0
+    assert joined.energy == pytest.approx(4)

@@ -113,6 +113,14 @@ def test_an_image_that_was_not_requested():
         _ = atlas.chart_image
 
 
+def test_the_image_without_faces_is_black():
+    atlas = ours.Atlas()
+    atlas.add_mesh(np.zeros((3, 3)), np.empty((0, 3), dtype=np.uint32))
+    atlas.generate(pack_options=ours.PackOptions(create_image=True, resolution=64))
+    assert atlas.chart_image.shape == (64, 64, 3)
+    assert not atlas.chart_image.any()
+
+
 def test_export(tmp_path):
     mapping, indices, uvs = ours.parametrize(SQUARE, FACES)
     ours.export(tmp_path / "square.obj", SQUARE[mapping], indices, uvs, SQUARE[mapping])

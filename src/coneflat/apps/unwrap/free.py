@@ -52,8 +52,11 @@ def freed(
         points, free = embedded_disks(disk, layout.chart, areas), None
     free = None if free is None or len(free) != len(points) else free
     energy, sides = StretchEnergy(1.0), layout.lengths
-    found = relax(disk, points, layout.corners, energy, lengths=sides, free=free, tolerance=tolerance)
-    if free is not None and not free.all():
+    is_part = free is not None and not free.all()
+    found = relax(
+        disk, points, layout.corners, energy, lengths=sides, free=free, tolerance=tolerance, to_scale=is_part
+    )
+    if is_part:
         energies = triangle_energies(sides, found.points[layout.corners])
         return replace(layout, points=found.points), float(energies.sum() / areas.sum())
     # The relaxation keeps the lengths relative to the area at its start.
@@ -84,7 +87,7 @@ def _untangled(layout: Layout, disk: TriangleMesh, spec: SeamSpec | None) -> Lay
 def laid_out(
     mesh: TriangleMesh, lengths: FloatArray, places: FloatArray, seams: IntArray, cones: IntArray
 ) -> Layout:
-    """Return the layout that consists of triangles in the plane.
+    """Return the layout that consists of triangles in the plane; scales and curvatures are NaN, see `measured`.
 
     Args:
         mesh, lengths: the mesh, and (m, 3) its side lengths.
@@ -162,7 +165,10 @@ def separate_charts(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layout
 
 
 def alone(layout: Layout, faces: IntArray) -> Layout:
-    """Return some triangles (k,) of a layout as one chart, on a mesh whose vertices are their points."""
+    """Return some triangles (k,) of a layout as one chart, on a mesh whose vertices are their points.
+
+    What the layout says of vertices, cones and seams remains that of the whole mesh.
+    """
     used, corners = np.unique(layout.corners[faces], return_inverse=True)
     points, lengths, chart = layout.points[used], layout.lengths[faces], np.zeros(len(faces), dtype=np.int64)
     mesh = TriangleMesh(np.pad(points, ((0, 0), (0, 1))), corners.reshape(-1, 3))

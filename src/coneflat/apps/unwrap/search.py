@@ -180,9 +180,10 @@ class CutSearch:
         """Return a candidate joined across seam edges that are flagged (k,), or None if its triangles do not fit."""
         layout, sizes = one.layout, np.bincount(one.layout.chart, self.part.double_areas)
         charts = np.unique(seams.charts[at])
-        small = charts[np.argmin(sizes[charts])]
-        if len(charts) < 2 or sizes[small] >= SMALL_AREA * sizes.sum():  # joined by an earlier seam
+        # Charts joined by an earlier seam: the edges are within one, closed from both ends, or beside a large one.
+        if len(charts) < 2 or sizes[charts].min() >= SMALL_AREA * sizes.sum():
             return None
+        small = charts[np.argmin(sizes[charts])]
         is_own, is_small = (seams.charts[at] == small)[:, :1], layout.chart == small
         # The small chart is turned and moved so that its side of the seam is as close as possible to the other one.
         points, sides = layout.points @ np.array([1, 1j]), np.stack([seams.here[at], seams.there[at]])

@@ -225,4 +225,6 @@ def _image(found: UnwrappedSoup, side: int) -> NDArray[np.uint8]:
     points = np.pad(found.corner_uv.reshape(-1, 2) * side, ((0, 0), (0, 1)))
     fill_nearest(points, np.arange(len(points)).reshape(-1, 3), depth, face)
     colors = np.random.default_rng(0).integers(64, 256, (int(found.chart.max(initial=0)) + 1, 3))
-    return np.where(face[..., None] >= 0, colors[found.chart[face]], 0).astype(np.uint8)
+    image, shown = np.zeros((side, side, 3), dtype=np.uint8), face >= 0
+    image[shown] = colors[found.chart[face[shown]]]
+    return image

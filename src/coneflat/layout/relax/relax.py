@@ -64,6 +64,7 @@ def relax(
     lengths: ArrayLike | None = None,
     weights: ArrayLike | None = None,
     free: ArrayLike | None = None,
+    to_scale: bool = False,
     tolerance: float = TOLERANCE,
     steps: int = STEPS,
     progress: Callable[[int, float], bool | None] | None = None,
@@ -84,6 +85,7 @@ def relax(
         lengths: (m, 3) target side lengths of the triangles, column i opposite corner i; None for those of the mesh.
         weights: (m,) weights of the triangles in addition to their areas; None for equal weights.
         free: (n,) True for vertices that may move; None for all.
+        to_scale: whether the lengths are those to reach; else they are scaled to the area of the given layout.
         tolerance: the last step is the first one whose predicted decrease is at most this fraction of the energy minus
             its lower bound.
         steps: maximum number of Newton steps.
@@ -134,7 +136,7 @@ def relax(
     is_free[mesh.faces[near[(height <= RELATIVE_ROUNDING) | (areas[near] <= 0)]]] = False
     if not is_free.any():
         return Relaxed(places, 0.0, 0.0, 0, is_free)
-    unit = float(np.sqrt(np.abs(doubled).sum() / (2 * areas.sum())))
+    unit = 1.0 if to_scale else float(np.sqrt(np.abs(doubled).sum() / (2 * areas.sum())))
     z = as_complex(places)
     motions = find_motions(mesh, corner, z, is_free, checked)
     elements = Elements(motions, corner, rest, unit, share)
