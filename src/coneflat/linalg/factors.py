@@ -1,6 +1,6 @@
 """Sparse factorizations: MKL PARDISO (pypardiso) for large systems if it is installed, else CHOLMOD (cholespy).
 
-A matrix is factorized once and used for many solves. SuperLU factorizes small, scattered and indefinite matrices.
+A matrix is factorized once and used for many solves. SuperLU factorizes small and indefinite matrices.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from ..base.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from ..base.jit import compiled
 from ..errors import MetricError
 from ..geometry.intrinsic import IntrinsicTriangulation
-from ..linalg.factors import MAX_SMALL_SYSTEM, SuperLUFactor, factorize
+from ..linalg import factorize
 from ..mesh.connectivity import sort_keys
 from ..stages import LaplacianInverse
 
@@ -239,8 +239,7 @@ def corrected(inverse: LaplacianInverse, matrix: csc_matrix, fixed: BoolArray) -
     columns = matrix[:, chosen]
     block = csc_matrix(columns.T.tocsc()[:, chosen].T)
     try:
-        # For scattered rows SuperLU takes half the time of other factorizations.
-        factor = (SuperLUFactor if len(chosen) < MAX_SMALL_SYSTEM else factorize)(block)
+        factor = factorize(block)
     except MetricError:  # broken triangles there make the block singular
         return inverse
 

@@ -154,7 +154,7 @@ def separate_charts(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layout
     label = layout.chart.copy()
     for chart in np.unique(layout.chart[pairs[:, 0]]).tolist():
         faces = np.flatnonzero(layout.chart == chart)
-        one = alone(layout, faces)
+        one = as_one_chart(layout, faces)
         sides = one.mesh.edge_halfedges[:, 0]
         edges = layout.mesh.halfedge_edges[3 * faces[sides // 3] + sides % 3]
         own = replace(spec, is_avoided=spec.is_avoided[edges], is_forbidden=spec.is_forbidden[edges])
@@ -164,7 +164,7 @@ def separate_charts(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layout
     return with_charts(layout, charts.split(label).renumbered())
 
 
-def alone(layout: Layout, faces: IntArray) -> Layout:
+def as_one_chart(layout: Layout, faces: IntArray) -> Layout:
     """Return some triangles (k,) of a layout as one chart, on a mesh whose vertices are their points.
 
     What the layout says of vertices, cones and seams remains that of the whole mesh.

@@ -25,7 +25,7 @@ from ...mesh import nearby
 from ...seams import seam_costs, without_loose_ends
 from ...source import Part
 from ...stages import Layout, Surface, VertexCurvatures
-from .free import alone, freed, recut, seam_edges, separate_charts, side_by_side, triangle_energies
+from .free import as_one_chart, freed, recut, seam_edges, separate_charts, side_by_side, triangle_energies
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .tips import RINGS, find_tips, moved_tips, moves_for
 
@@ -183,7 +183,7 @@ class CutSearch:
         # Charts joined by an earlier seam: the edges are within one, closed from both ends, or beside a large one.
         if len(charts) < 2 or sizes[charts].min() >= SMALL_AREA * sizes.sum():
             return None
-        small = charts[np.argmin(sizes[charts])]
+        small, other = charts[np.argsort(sizes[charts], kind="stable")]
         is_own, is_small = (seams.charts[at] == small)[:, :1], layout.chart == small
         # The small chart is turned and moved so that its side of the seam is as close as possible to the other one.
         points, sides = layout.points @ np.array([1, 1j]), np.stack([seams.here[at], seams.there[at]])
@@ -192,22 +192,22 @@ class CutSearch:
         turn, moved = np.vdot(here - here.mean(), there - there.mean()), layout.corners[is_small]
         points[moved] = (points[moved] - here.mean()) * turn / max(abs(turn), 1e-300) + there.mean()
         points[ends] = points[ends].mean(axis=0)
-        chart = np.where(is_small, charts[charts != small], layout.chart)
+        chart = np.where(is_small, other, layout.chart)
         whole = ChartLayout(points.view(np.float64).reshape(-1, 2), layout.corners, chart)
         whole = whole.joined(ends.reshape(2, -1).T)
         is_near, places = nearby(whole.corners, is_small, RINGS), whole.points[whole.corners]
         near = np.flatnonzero(has_any(is_near, whole.corners))
         # Only the triangles near the small chart are laid out anew.
-        patch = alone(replace(layout, points=whole.points, corners=whole.corners), near)
+        patch = as_one_chart(replace(layout, points=whole.points, corners=whole.corners), near)
         free = mask_of(len(patch.points), patch.corners[is_near[whole.corners[near]]])
         after, _ = freed(patch, free, TOLERANCE)
         places[near] = after.points[patch.corners]
-        known = layout.points[layout.corners[near]]
-        rise = np.subtract(*(self.energies_of(patch.lengths, each) for each in (places[near], known))).sum()
+        before = self.energies_of(patch.lengths, layout.points[layout.corners[near]])
+        rise = (self.energies_of(patch.lengths, places[near]) - before).sum()
         energy = one.energy + float(rise) / layout.area
         low, high = places[near].min(axis=(0, 1)), places[near].max(axis=(0, 1))
         meets = ((places.min(axis=1) < high) & (places.max(axis=1) > low)).all(axis=1)
-        meets &= chart == charts[charts != small]
+        meets &= chart == other
         fits = np.array_equal(after.points[~free], patch.points[~free])
         fits &= energy <= max(self.max_energy, one.energy)
         if not fits or len(find_overlaps(places[meets], limit=1).pairs):
