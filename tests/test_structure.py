@@ -43,7 +43,7 @@ CEILINGS = {
     "apps.transfer": 300,
     "apps.brains": 259,
     "apps.pyvista": 26,
-    "apps.unwrap": 1385,
+    "apps.unwrap": 1380,
     "apps.view": 1545,
     "atlas": 1352,
     "base": 282,

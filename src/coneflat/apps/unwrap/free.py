@@ -23,7 +23,6 @@ from ...layout import StretchEnergy, embedded_disks, relax, untangled_disk
 from ...mesh import label_faces, open_along
 from ...seams import find_seams
 from ...stages import Layout, SeamSpec, SolveStatistics
-from .options import ISOMETRIC
 
 
 def freed(
@@ -52,16 +51,11 @@ def freed(
         points, free = embedded_disks(disk, layout.chart, areas), None
     free = None if free is None or len(free) != len(points) else free
     energy, sides = StretchEnergy(1.0), layout.lengths
-    is_part = free is not None and not free.all()
     found = relax(
-        disk, points, layout.corners, energy, lengths=sides, free=free, tolerance=tolerance, to_scale=is_part
+        disk, points, layout.corners, energy, lengths=sides, free=free, tolerance=tolerance, to_scale=True
     )
-    if is_part:
-        energies = triangle_energies(sides, found.points[layout.corners])
-        return replace(layout, points=found.points), float(energies.sum() / areas.sum())
-    # The relaxation keeps the lengths relative to the area at its start.
-    start = np.abs(signed_double_areas(points[layout.corners])).sum() / 2
-    return replace(layout, points=found.points * np.sqrt(areas.sum() / start)), ISOMETRIC * found.energy
+    energies = triangle_energies(sides, found.points[layout.corners])
+    return replace(layout, points=found.points), float(energies.sum() / areas.sum())
 
 
 def _untangled(layout: Layout, disk: TriangleMesh, spec: SeamSpec | None) -> Layout:
