@@ -317,3 +317,16 @@ def test_seam_edges_without_length_are_counted(collapsed: float):
 def test_triangles_flipped_by_rounding_give_no_warnings(stretch):
     found = StretchEnergy(stretch).derivatives(np.array([1.0, 1.0]), np.array([-1e-12, 0.0]))
     assert len(found.value) == 2
+
+
+def test_lengths_are_reached_whatever_the_area_of_the_layout():
+    mesh = TriangleMesh(*shapes.grid(8, 4))
+    flat = mesh.vertices[:, :2]
+    middle, left = np.median(flat[:, 0]), flat[:, 0].min()
+    stretched = flat.copy()
+    stretched[:, 0] += 0.6 * np.maximum(flat[:, 0] - middle, 0)
+    given = mesh, stretched, mesh.faces, StretchEnergy(1)
+    free, tolerance = flat[:, 0] > left, 1e-9
+    reached = relax(*given, free=free, to_scale=True, tolerance=tolerance).points
+    assert reached == pytest.approx(flat, abs=1e-8)
+    assert np.ptp(relax(*given, free=free, tolerance=tolerance).points) > 1.1 * np.ptp(flat)
