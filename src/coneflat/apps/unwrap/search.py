@@ -3,7 +3,8 @@
 Cones choose the cut. The fewer they are, the shorter are the seams, and the higher is the energy of the layout with
 free seams. The candidates are the cones that the search finds for an area distortion, which is varied. The tips of the
 best candidate's seams are then moved to where the energy is the largest allowed. On large meshes, both are done on a
-coarse mesh, and only the cones found there are taken over. At last, small charts are joined to others where they fit.
+coarse mesh, and only the cones found there are taken over, unless the mesh is noisy and needs others. At last, small
+charts are joined to others where they fit.
 """
 
 from __future__ import annotations
@@ -34,9 +35,9 @@ FIRST_DISTORTION, ANY_DISTORTION, MAX_CANDIDATES = 0.25, 1e3, 5
 # The search ends where the costs within and beyond the bound differ by less than this factor, or the numbers of cones
 # by one. A surface of 50 handles needs about 160 cones, and each search for them more than a second.
 SIMILAR_COSTS = 1.06
-# Number of triangles of a coarse mesh; number of coarse searches to meet the bound on the given mesh; and what its
-# energy has more, relative to what is allowed above that of an isometry.
-COARSE, COARSE_TRIES, COARSE_EXCESS = 4_000, 3, 0.15
+# Number of triangles of a coarse mesh; and what its energy has more, relative to what is allowed above that of an
+# isometry.
+COARSE, COARSE_EXCESS = 4_000, 0.15
 # Tips of larger meshes are moved on their coarse meshes only: a try takes seconds.
 MANY_TRIANGLES = 60_000
 # Number of times that tips are moved to meet the bound, half as often on large meshes, and that a layout is settled to
@@ -98,6 +99,11 @@ class CutSearch:
         """The energy up to which a candidate may be within the bound once it is settled."""
         return self.max_energy + 2 * TOLERANCE * (self.max_energy - ISOMETRIC)
 
+    @property
+    def _reach(self) -> float:
+        """The energy up to which a candidate is tried."""
+        return self.max_energy + MAX_EXCESS * (self.max_energy - ISOMETRIC)
+
     @cached_property
     def _surface(self) -> Surface:
         surface = Surface.of(self.part.mesh, self.part.lengths, self.part.is_exact)
@@ -131,8 +137,8 @@ class CutSearch:
             return self._with_fewest_seams()
         if self._has_coarse:
             return self._from_coarse()
-        found, reach = self._by_distortion(), self.max_energy + MAX_EXCESS * (self.max_energy - ISOMETRIC)
-        near = [self.separated(one) for one in found if one.energy <= reach]
+        found = self._by_distortion()
+        near = [self.separated(one) for one in found if one.energy <= self._reach]
         near.sort(key=self._expected_cost)
         if near and near[0].energy > self.max_energy:
             near.append(self.shortened(near[0]))
@@ -232,25 +238,22 @@ class CutSearch:
         return self.settled(self.separated(Candidate(layout, energy, self.cost_of(layout), ANY_DISTORTION)))
 
     def _from_coarse(self) -> Candidate:
-        """Return a candidate with the cones that are best on a coarse mesh, for a bound that the mesh itself meets."""
+        """Return a candidate with the cones that are best on a coarse mesh, unless the mesh itself needs others."""
         coarse, kept = coarse_part(self.part, COARSE)
-        bound, found = self.max_energy + COARSE_EXCESS * (self.max_energy - ISOMETRIC), list[Candidate]()
-        search = CutSearch(coarse, bound, self._method, True, self._by_area)
-        for _ in range(COARSE_TRIES):
-            search.max_energy = bound
-            best = search.best()
-            given = VertexCurvatures(kept[best.layout.cones], np.full(len(best.layout.cones), np.nan))
-            spec = replace(self.part.cones, strategy="given", given=given)
-            layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
-            one = self._candidate(layout, best.distortion)
-            found.append(self.shortened(one) if one.energy > self.max_energy else one)
-            excess = found[-1].energy - self.max_energy
-            if excess <= 0 or best.energy > bound:
-                break
-            # Below the energy of these cones, which would have the same energy here again.
-            bound = max(min(bound, best.energy) - excess, (bound + ISOMETRIC) / 2)
+        bound = self.max_energy + COARSE_EXCESS * (self.max_energy - ISOMETRIC)
+        best = CutSearch(coarse, bound, self._method, True, self._by_area).best()
+        given = VertexCurvatures(kept[best.layout.cones], np.full(len(best.layout.cones), np.nan))
+        spec = replace(self.part.cones, strategy="given", given=given)
+        layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
+        one = self._candidate(layout, layout.statistics.area_distortion_linear)
+        if self.max_energy < one.energy <= self._reach:
+            one = self.shortened(one)
+        if one.energy > self.max_energy:
+            # The coarse mesh is smoother than a noisy one.
+            self._has_coarse, self._found = False, [one]
+            return self.best()
         close_search(self._surface)
-        return self.separated(min(found, key=lambda one: one.energy))
+        return self.separated(one)
 
     def _by_distortion(self) -> list[Candidate]:
         """Return candidates, with energies around the bound among them, and those for earlier bounds."""

@@ -129,6 +129,20 @@ class ExactModel(DenseModel):
                 targets.append(int(near[best]))
         return np.unique(np.array(targets, dtype=np.int64))
 
+    def extended(self, members: IntArray, goal: float, most: int) -> IntArray:
+        """Return members with up to half as many added where the score is a local maximum, until E^2 <= goal."""
+        fitted, grown = self.fit(members), members
+        score = np.abs(self._score(members, fitted.curvatures) + fitted.multiplier)
+        highest = np.maximum.reduceat(score[self._indices], self._indptr[:-1])
+        peaks = np.flatnonzero((score >= highest) & self._usable)
+        self.insert(peaks[np.argsort(-score[peaks], kind="stable")][: 2 * len(members)])
+        for _ in range(min(most - len(members), len(members) // 2 + 1)):
+            larger = self.grown(grown)
+            if larger is None or self.energy(grown) <= goal:
+                break
+            grown = larger
+        return grown
+
     def _score(self, members: IntArray, curvatures: FloatArray) -> FloatArray:
         """Return (f,) half the derivative of E^2 by the curvature of a cone at each vertex."""
         log_scale = self._log_scale.copy()

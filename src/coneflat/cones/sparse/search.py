@@ -30,15 +30,13 @@ from ...mesh.ties import tie_key
 from ...stages import ConeSolution
 from ..solution import TIE_TOLERANCE
 from .coarse_model import candidates
-from .dense_model import ConeSet, DenseModel
+from .dense_model import STALL_FACTOR, ConeSet, DenseModel
 from .exact_model import ExactModel
 from .limits import MAX_SEARCHED, Limits
 from .linear_model import LinearModel
 
 # Error of the coarse model as a factor of E^2; sets within this factor of the goal are evaluated on the mesh.
 COARSE_MODEL_ERROR = 1.35
-# Factor of the goal for E^2 up to which moves on the mesh may bring a set below the goal.
-MAX_REFINED_RATIO = 1.15
 
 
 @dataclass(frozen=True)
@@ -196,7 +194,7 @@ class ConeSearch:
         goal = distortion * distortion
         count = self._search_coarse(goal, most)
         count = self._find_sufficient(count, goal, most)
-        self._reduce(count, goal, most)
+        self._reduce(count, goal)
         return self._cones(self.exact.best.fewest(goal, most))
 
     def best_of(self, count: int) -> SparseCones:
@@ -244,44 +242,21 @@ class ConeSearch:
         return len(self.coarse.best.fewest(goal, most))
 
     def _find_sufficient(self, count: int, goal: float, most: int) -> int:
-        """Return a number of cones, at least `count`, with E^2 <= goal on the mesh, or above which there is no gain.
-
-        The error factor of the coarse model is nearly the same for more cones. So the next number tried is the first
-        for which the coarse model, multiplied by this factor, reaches the goal.
-        """
-        coarse = self.coarse.best
-        # If E is 0 on the coarse model, more cones gain nothing.
-        while self._refine(count) > goal and count < most and coarse.energy(count) > 0:
-            off = max(self.exact.best.energy(count) / coarse.energy(count), 1.0)
-            self.coarse.climb(goal / off, most, count)
-            larger = [size for size in coarse.sizes if size > count]
-            if not larger:
-                break
-            count = next((size for size in larger if coarse.energy(size) * off <= goal), larger[-1])
-            if coarse.energy(count) * off > goal:  # more cones gain nothing
+        """Return a number of cones, at least `count`, with E^2 <= goal on the mesh, or above which there is no gain."""
+        exact, best = self.exact, self.exact.best
+        self._refine(count)
+        while goal < best.energy(count) < math.inf:
+            start = max(size for size in best.sizes if size <= most and best.energy(size) > goal)
+            count = len(added := exact.extended(best[start].members, goal, most))
+            if not exact.refine(added) < STALL_FACTOR * best.energy(start):
                 break
         return count
 
-    def _reduce(self, count: int, goal: float, most: int) -> None:
-        """Try sets with more cones until the goal is reached, then sets with fewer as long as they reach it."""
-        most = min(most, max(self.coarse.best.sizes))
-        while self.exact.best.energy(count) > goal and count < most:
-            count += 1
-            self._refine(count)
-        while self._may_suffice(count - 1, goal) and self._refine(count - 1) <= goal:
+    def _reduce(self, count: int, goal: float) -> None:
+        """Try sets with fewer cones as long as they reach the goal."""
+        least = max(self.limits.fewest, len(self._required))
+        while count > least and self._refine(count - 1) <= goal:
             count -= 1
-
-    def _may_suffice(self, count: int, goal: float) -> bool:
-        """Return whether `count` cones may reach the goal.
-
-        This is estimated from the sets tried, and from the coarse model with its error factor for one cone more.
-        """
-        if count < max(self.limits.fewest, len(self._required)):
-            return False
-        coarse, exact = self.coarse.best, self.exact.best
-        expected = exact.energy(count + 1) * coarse.energy(count)
-        allowed = MAX_REFINED_RATIO * goal
-        return exact.energy(count) <= allowed or expected <= allowed * coarse.energy(count + 1)
 
     def _climb(self, bound: float, most: int, count: int) -> None:
         """Find sets of at most `most` cones on the coarse model; raise CurvatureError if none has at most `count`."""
