@@ -1,9 +1,9 @@
 """Textures compared with other packages: `python benchmarks/unwrap.py` prints two Markdown tables.
 
 Models: those of `../shared/meshes`, decimated to 1,000, 5,000 and 20,000 triangles, and generated ones: a noisy surface
-with 50 handles, 3,000 components, extruded letters, and an assembly of 30 parts. Packages: `coneflat.unwrap` with its
-defaults, xatlas with 2 texels of padding at 1,024 texels, and uvunwrap with its defaults. All results are measured by
-`coneflat.measure` on the UVs that the packages return. Needs the extra `bench`.
+with 50 handles, a noisy figure, 3,000 components, extruded letters, and an assembly of 30 parts. Packages:
+`coneflat.unwrap` with its defaults, xatlas with 2 texels of padding at 1,024 texels, and uvunwrap with its defaults.
+All results are measured by `coneflat.measure` on the UVs that the packages return. Needs the extra `bench`.
 
 Options: --only NAME,... (models), --largest 120000 (triangles), --sizes 1000,5000,20000, --save FOLDER (the results).
 """
@@ -99,6 +99,8 @@ def cases(sizes: list[int], largest: int) -> Iterator[tuple[str, TriangleMesh]]:
         for size in sizes:
             if size < len(mesh.faces):
                 yield f"{name}-{size}", decimated(mesh, size)
+        if name == "human":
+            yield f"{name}-noisy", noisy(decimated(mesh, 10_000))
     yield "handles", check_mesh(*noisy_handles(), repair=True).mesh
     yield "crumbs", check_mesh(*crumbs()).mesh
     yield "letters", check_mesh(*letters(), repair=True).mesh
@@ -113,6 +115,14 @@ def decimated(mesh: TriangleMesh, count: int) -> TriangleMesh:
         mesh.vertices.astype(np.float32), mesh.faces, 1 - count / len(mesh.faces)
     )
     return check_mesh(vertices.astype(np.float64), faces, repair=True).mesh
+
+
+def noisy(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a mesh with four times as many triangles and normal noise of a fifth of their median edge length."""
+    vertices, faces = shapes.subdivide(mesh.vertices, mesh.faces)
+    noise = np.random.default_rng(4).standard_normal(vertices.shape)
+    size = 0.2 * np.median(edge_lengths(vertices, faces))
+    return check_mesh(vertices + size * noise, faces, repair=True).mesh
 
 
 def noisy_handles() -> tuple[np.ndarray, np.ndarray]:

@@ -185,5 +185,6 @@ def triangle_energies(lengths: FloatArray, places: FloatArray) -> FloatArray:
     sides = places[:, [2, 0, 1]] - places[:, [1, 2, 0]]
     areas = double_areas(lengths) / 2
     squares = (cotangents(lengths) * (sides**2).sum(axis=2)).sum(axis=1) / (2 * areas)
-    ratio = signed_double_areas(places) / (2 * areas)
+    # Flipped triangles count as compressed to nearly nothing.
+    ratio = np.maximum(signed_double_areas(places) / (2 * areas), 1e-100)
     return np.asarray(squares * (1 + ratio**-2) * areas)

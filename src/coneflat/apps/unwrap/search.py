@@ -270,7 +270,7 @@ class CutSearch:
             reached, is_within = layout.statistics.area_distortion_linear, known.energy <= self.max_energy
             distortion = min(distortion, reached) if same and not is_within else distortion
             found.append(replace(known, distortion=distortion))
-            if same and (is_within or distortion < reached):
+            if same if is_within else distortion < reached:
                 break  # The search finds no others.
         return found
 
