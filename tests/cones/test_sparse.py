@@ -107,6 +107,15 @@ def test_no_cone_can_be_left_out(name):
         assert search.exact.energy(np.delete(members, place)) > 0.01
 
 
+def test_noise_needs_cones_beyond_those_of_the_coarse_model():
+    """With sets of the coarse model only, 103 cones are needed."""
+    vertices, faces = shapes.sphere(4)
+    noise = np.random.default_rng(1).standard_normal(vertices.shape)
+    found = sparse(vertices + 0.2 * edge_lengths(vertices, faces).mean() * noise, faces, distortion=0.06)
+    assert found.distortion <= 0.06
+    assert len(found.solution.cones) < 90
+
+
 @pytest.mark.parametrize("name", SHAPES)
 def test_renumbering_changes_nothing(name):
     vertices, faces = SHAPES[name]
