@@ -6,8 +6,8 @@ small norm of phi is a sparse approximation. The literature has relaxations (Y. 
 sparse cones with bounded distortion for conformal parameterizations", 2021) and moves of given cones (M. Li, Q. Fang,
 Z. Zhang, L. Liu, X.-M. Fu, "Efficient cone singularity construction for conformal parameterizations", 2023). Here,
 positions are exchanged as in subset selection, first on a dense coarse model, where this is cheap, and then with exact
-energies. Cones that the mesh needs beyond those of the coarse model, as noisy ones do, are added where the derivative of
-E^2 is largest.
+energies. Cones that the mesh needs beyond those of the coarse model, as noisy ones do, are added where the derivative
+of E^2 is largest.
 """
 
 from __future__ import annotations
