@@ -348,7 +348,7 @@ class CutSearch:
         if not (np.isfinite(self.max_energy) and (tips.rates > 0).any()):
             return found
         allowed, slack, known = self.max_energy - ISOMETRIC, self.max_energy - start.energy, [seams]
-        for _ in range(MAX_TRIES // 2 if self._has_coarse and slack > 0 else MAX_TRIES):
+        for _ in range(MAX_TRIES // 2 if slack > 0 else MAX_TRIES):
             moved, cones = moved_tips(start.layout, seams, tips, moves_for(start.layout, tips, slack))
             if any(np.array_equal(moved, each) for each in known):
                 # The tips move by whole edges.
