@@ -107,13 +107,38 @@ def test_no_cone_can_be_left_out(name):
         assert search.exact.energy(np.delete(members, place)) > 0.01
 
 
-def test_noise_needs_cones_beyond_those_of_the_coarse_model():
-    """With sets of the coarse model only, 103 cones are needed."""
+def noisy_sphere():
     vertices, faces = shapes.sphere(4)
     noise = np.random.default_rng(1).standard_normal(vertices.shape)
-    found = sparse(vertices + 0.2 * edge_lengths(vertices, faces).mean() * noise, faces, distortion=0.06)
+    return vertices + 0.2 * edge_lengths(vertices, faces).mean() * noise, faces
+
+
+def test_noise_needs_cones_beyond_those_of_the_coarse_model():
+    """With sets of the coarse model only, 102 cones are needed."""
+    search = search_on(*noisy_sphere())
+    found = search.fewest(0.06)
+    count = len(found.solution.cones)
     assert found.distortion <= 0.06
-    assert len(found.solution.cones) < 90
+    assert count < 90
+    assert search.best_of(count).distortion <= found.distortion
+
+
+def test_noise_where_few_vertices_may_be_cones():
+    """The vertices around which the gain is largest are mostly not allowed."""
+    vertices, faces = noisy_sphere()
+    allowed = np.random.default_rng(1).random(len(vertices)) < 0.1
+    found = search_on(vertices, faces, allowed=allowed).fewest(0.08)
+    assert found.distortion <= 0.08
+    assert allowed[found.solution.cones].all()
+
+
+def test_a_distortion_out_of_reach_has_the_same_answer_again():
+    """And has not many cones that gain nothing."""
+    search = search_on(*noisy_sphere(), positive_only=True)
+    one, two = (search.fewest(0.06) for _ in range(2))
+    assert one.distortion > 0.06
+    assert one.distortion == two.distortion
+    assert len(one.solution.cones) == len(two.solution.cones) < 90
 
 
 @pytest.mark.parametrize("name", SHAPES)

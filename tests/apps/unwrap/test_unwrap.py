@@ -257,10 +257,10 @@ def test_a_chart_with_short_seams_is_cut_as_well(shared, monkeypatch):
 
 
 def test_small_charts_are_joined_to_others_where_they_fit(shared, monkeypatch):
-    result = unwrap(shared("hand.obj"))
+    result = unwrap(shared("stanford-bunny.obj"))
     monkeypatch.setattr("coneflat.apps.unwrap.search.CutSearch.small_joined", lambda _, one: one)
-    joined, apart = result.distortion, unwrap(shared("hand.obj")).distortion
-    assert joined.charts <= apart.charts - 2
+    joined, apart = result.distortion, unwrap(shared("stanford-bunny.obj")).distortion
+    assert joined.charts <= apart.charts - 1
     assert joined.seam_length < 0.99 * apart.seam_length
     assert joined.energy <= 4.1
     assert (joined.flipped, joined.overlapping_pairs) == (0, 0)

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...atlas import ChartLayout, Seams, with_charts
 from ...base import BoolArray, FloatArray, IntArray, has_any, mask_of
-from ...cones import close_search
+from ...cones import MAX_SEARCHED, close_search
 from ...errors import MetricError, SeamError
 from ...flatten import Method, lay_out_once
 from ...geometry import coarse_mesh, double_areas, edge_lengths, find_overlaps, mollify, signed_double_areas
@@ -40,8 +40,8 @@ SIMILAR_COSTS = 1.06
 COARSE, COARSE_EXCESS = 4_000, 0.15
 # Tips of larger meshes are moved on their coarse meshes only: a try takes seconds.
 MANY_TRIANGLES = 60_000
-# Number of times that tips are moved to meet the bound, half as often if it is met already, and that a layout is settled
-# to avoid contacts.
+# Number of times that tips are moved to meet the bound, half as often if it is met already, and that a layout is
+# settled to avoid contacts.
 MAX_TRIES = 4
 # Charts below this fraction of the part's area are joined to others, and the number of seams that are tried. With 0.05
 # instead, 42 models have seams and charts that are 3% and 13% less, but cover 0.02 less of the texture.
@@ -99,11 +99,6 @@ class CutSearch:
         """The energy up to which a candidate may be within the bound once it is settled."""
         return self.max_energy + 2 * TOLERANCE * (self.max_energy - ISOMETRIC)
 
-    @property
-    def _reach(self) -> float:
-        """The energy up to which a candidate is tried."""
-        return self.max_energy + MAX_EXCESS * (self.max_energy - ISOMETRIC)
-
     @cached_property
     def _surface(self) -> Surface:
         surface = Surface.of(self.part.mesh, self.part.lengths, self.part.is_exact)
@@ -137,8 +132,8 @@ class CutSearch:
             return self._with_fewest_seams()
         if self._has_coarse:
             return self._from_coarse()
-        found = self._by_distortion()
-        near = [self.separated(one) for one in found if one.energy <= self._reach]
+        found, reach = self._by_distortion(), self.max_energy + MAX_EXCESS * (self.max_energy - ISOMETRIC)
+        near = [self.separated(one) for one in found if one.energy <= reach]
         near.sort(key=self._expected_cost)
         if near and near[0].energy > self.max_energy:
             near.append(self.shortened(near[0]))
@@ -215,7 +210,9 @@ class CutSearch:
         meets = ((places.min(axis=1) < high) & (places.max(axis=1) > low)).all(axis=1)
         meets &= chart == other
         fits = np.array_equal(after.points[~free], patch.points[~free])
-        fits &= energy <= max(self.max_energy, one.energy)
+        fits &= bool(
+            (signed_double_areas(places[near]) > 0).all() and energy <= max(self.max_energy, one.energy)
+        )
         if not fits or len(find_overlaps(places[meets], limit=1).pairs):
             return None
         whole.points[whole.corners[near]] = places[near]
@@ -239,17 +236,17 @@ class CutSearch:
 
     def _from_coarse(self) -> Candidate:
         """Return a candidate with the cones that are best on a coarse mesh, unless the mesh itself needs others."""
-        coarse, kept = coarse_part(self.part, COARSE)
-        bound = self.max_energy + COARSE_EXCESS * (self.max_energy - ISOMETRIC)
+        (coarse, kept), allowed = coarse_part(self.part, COARSE), self.max_energy - ISOMETRIC
+        bound = self.max_energy + COARSE_EXCESS * allowed
         best = CutSearch(coarse, bound, self._method, True, self._by_area).best()
         given = VertexCurvatures(kept[best.layout.cones], np.full(len(best.layout.cones), np.nan))
         spec = replace(self.part.cones, strategy="given", given=given)
         layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
         one = self._candidate(layout, layout.statistics.area_distortion_linear)
-        if self.max_energy < one.energy <= self._reach:
+        if 0 < one.energy - self.max_energy <= MAX_EXCESS * allowed:
             one = self.shortened(one)
         if one.energy > self.max_energy:
-            # The coarse mesh is smoother than a noisy one.
+            # The bound is too low, or the surface too noisy, for the cones of a coarse mesh.
             self._has_coarse, self._found = False, [one]
             return self.best()
         close_search(self._surface)
@@ -270,7 +267,7 @@ class CutSearch:
             reached, is_within = layout.statistics.area_distortion_linear, known.energy <= self.max_energy
             distortion = min(distortion, reached) if same and not is_within else distortion
             found.append(replace(known, distortion=distortion))
-            if same if is_within else distortion < reached:
+            if same if is_within else (same or len(layout.cones) >= MAX_SEARCHED) and distortion < reached:
                 break  # The search finds no others.
         return found
 
@@ -314,7 +311,7 @@ class CutSearch:
         if not self._by_area:
             return triangle_energies(lengths, places)
         areas, flat = double_areas(lengths), signed_double_areas(places)
-        return (ISOMETRIC + ENERGY_PER_AREA * np.log(flat / areas) ** 2 / 4) * areas / 2
+        return (ISOMETRIC + ENERGY_PER_AREA * np.log(np.maximum(flat / areas, 1e-100)) ** 2 / 4) * areas / 2
 
     def separated(self, one: Candidate) -> Candidate:
         """Return a candidate whose overlaps are separated."""

@@ -131,17 +131,16 @@ class ExactModel(DenseModel):
 
     def extended(self, members: IntArray, goal: float, most: int) -> IntArray:
         """Return members with up to half as many added where the score is a local maximum, until E^2 <= goal."""
-        fitted, grown = self.fit(members), members
+        room, fitted = min(most - len(members), len(members) // 2 + 1), self.fit(members)
         score = np.abs(self._score(members, fitted.curvatures) + fitted.multiplier)
-        highest = np.maximum.reduceat(score[self._indices], self._indptr[:-1])
-        peaks = np.flatnonzero((score >= highest) & self._usable)
-        self.insert(peaks[np.argsort(-score[peaks], kind="stable")][: 2 * len(members)])
-        for _ in range(min(most - len(members), len(members) // 2 + 1)):
-            larger = self.grown(grown)
-            if larger is None or self.energy(grown) <= goal:
+        score[~self._usable] = -1.0
+        peaks = np.flatnonzero(score >= np.maximum.reduceat(score[self._indices], self._indptr[:-1]))
+        self.insert(peaks[np.argsort(-score[peaks], kind="stable")][: 4 * room])
+        for _ in range(room):
+            if self.energy(members) <= goal or (larger := self.grown(members)) is None:
                 break
-            grown = larger
-        return grown
+            members = larger
+        return members
 
     def _score(self, members: IntArray, curvatures: FloatArray) -> FloatArray:
         """Return (f,) half the derivative of E^2 by the curvature of a cone at each vertex."""

@@ -168,7 +168,7 @@ class ConeSearch:
             self._least[self.places],
         )
         self.exact.restrict(is_usable)
-        self._usable, self._refined = usable.copy(), dict[int, tuple[float, float]]()
+        self._usable, self._refined, self._stalled = usable.copy(), dict[int, tuple[float, ...]](), set[int]()
 
     @property
     def most_cones(self) -> int:
@@ -193,10 +193,12 @@ class ConeSearch:
             self.limits.check_count(most, len(self._required))
         most = self.most_cones if most is None else min(most, self.most_cones)
         goal = distortion * distortion
-        count = self._search_coarse(goal, most)
-        count = self._find_sufficient(count, goal, most)
-        self._reduce(count, goal)
-        return self._cones(self.exact.best.fewest(goal, most))
+        count = self._find_sufficient(self._search_coarse(goal, most), goal, most)
+        while count > max(self.limits.fewest, len(self._required)) and self._refine(count - 1) <= goal:
+            count -= 1
+        # If it is not reached, few cones that are nearly as good as more.
+        least = self.exact.best.fewest(goal, most).energy
+        return self._cones(self.exact.best.fewest(goal if least <= goal else least / STALL_FACTOR, most))
 
     def best_of(self, count: int) -> SparseCones:
         """Return the cones of smallest E that were found, at most `count` of them.
@@ -212,8 +214,10 @@ class ConeSearch:
         count = min(count, self.most_cones)
         self._climb(0.0, count + 1, count)
         self.coarse.descend(count - 2, count + 1)
-        for size in [size for size in self.coarse.best.sizes if size <= count][-2:]:
-            self._refine(size)
+        self._refine(max(size for size in self.coarse.best.sizes if size <= count))
+        some = 2 * count // 3
+        if self._refine(some) < math.inf:
+            self.exact.refine(self.exact.extended(self.exact.best[some].members, 0.0, count))
         return self._cones(self.exact.best.fewest(-1.0, count))
 
     def curve(self, most: int) -> list[SparseCones]:
@@ -243,21 +247,20 @@ class ConeSearch:
         return len(self.coarse.best.fewest(goal, most))
 
     def _find_sufficient(self, count: int, goal: float, most: int) -> int:
-        """Return a number of cones, at least `count`, with E^2 <= goal on the mesh, or above which there is no gain."""
+        """Return a number of cones with E^2 <= goal on the mesh, or above which more gain nothing.
+
+        The search starts from `count` cones.
+        """
         exact, best = self.exact, self.exact.best
         self._refine(count)
-        while goal < best.energy(count) < math.inf:
-            start = max(size for size in best.sizes if size <= most and best.energy(size) > goal)
-            count = len(added := exact.extended(best[start].members, goal, most))
-            if not exact.refine(added) < STALL_FACTOR * best.energy(start):
+        while best.fewest(goal, most).energy > goal:
+            start = max(size for size in best.sizes if size <= most)
+            if start in {most, *self._stalled}:
                 break
-        return count
-
-    def _reduce(self, count: int, goal: float) -> None:
-        """Try sets with fewer cones as long as they reach the goal."""
-        least = max(self.limits.fewest, len(self._required))
-        while count > least and self._refine(count - 1) <= goal:
-            count -= 1
+            added = exact.extended(best[start].members, goal, most)
+            if not exact.refine(added) < STALL_FACTOR * best.energy(start):
+                self._stalled |= {start, len(added)}
+        return len(best.fewest(goal, most))
 
     def _climb(self, bound: float, most: int, count: int) -> None:
         """Find sets of at most `most` cones on the coarse model; raise CurvatureError if none has at most `count`."""
@@ -275,11 +278,12 @@ class ConeSearch:
     def _refine(self, count: int) -> float:
         """Refine the best set of a size on the mesh; return its E^2, infinite if there is none.
 
-        It starts from the set of the coarse model, or from the next larger set without one cone if that is better.
+        It starts from the best of the set of the coarse model, the next larger set without one cone, and the next
+        smaller set with one more.
         """
         self.progress(plural(count, "cone"))
         exact, starts = self.exact, []
-        state = (self.coarse.best.energy(count), exact.best.energy(count + 1))
+        state = (self.coarse.best.energy(count), exact.best.energy(count + 1), exact.best.energy(count - 1))
         if self._refined.get(count) == state:
             return exact.best.energy(count)
         self._refined[count] = state
@@ -288,6 +292,8 @@ class ConeSearch:
         if count + 1 in exact.best:
             shrunk = exact.shrunk(exact.best[count + 1].members)
             starts += [] if shrunk is None else [shrunk]
+        if count - 1 in exact.best:
+            starts.append(exact.extended(exact.best[count - 1].members, 0.0, count))
         if starts:
             exact.refine(min(starts, key=exact.energy))
         return exact.best.energy(count)
