@@ -43,7 +43,7 @@ CEILINGS = {
     "apps.transfer": 300,
     "apps.brains": 259,
     "apps.pyvista": 26,
-    "apps.unwrap": 1380,
+    "apps.unwrap": 1379,
     "apps.view": 1545,
     "atlas": 1352,
     "base": 282,
@@ -74,7 +74,7 @@ FRONT = ("apps.ahead", "apps.blender", "apps.cli", "apps.studio")
 SHARED = ("apps.quads.nearest",)
 #: The largest size of the core, and of everything else.
 CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_798, 232, 24_492
-CONSTANTS, KERNELS, NAMES, LEVELS = 293, 84, 30, 8
+CONSTANTS, KERNELS, NAMES, LEVELS = 292, 84, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
 
