@@ -3,7 +3,7 @@
 Cones choose the cut. The fewer they are, the shorter are the seams, and the higher is the energy of the layout with
 free seams. The candidates are the cones that the search finds for an area distortion, which is varied. The tips of the
 best candidate's seams are then moved to where the energy is the largest allowed. On large meshes, both are done on a
-coarse mesh, and only the cones found there are taken over, unless the mesh is noisy and needs others. At last, small
+coarse mesh, and only the cones found there are taken over, unless the mesh itself needs others. At last, small
 charts are joined to others where they fit.
 """
 
@@ -203,6 +203,8 @@ class CutSearch:
         free = mask_of(len(patch.points), patch.corners[is_near[whole.corners[near]]])
         after, _ = freed(patch, free, TOLERANCE)
         places[near] = after.points[patch.corners]
+        if not (signed_double_areas(places[near]) > 0).all():
+            return None
         before = self.energies_of(patch.lengths, layout.points[layout.corners[near]])
         rise = (self.energies_of(patch.lengths, places[near]) - before).sum()
         energy = one.energy + float(rise) / layout.area
@@ -210,9 +212,7 @@ class CutSearch:
         meets = ((places.min(axis=1) < high) & (places.max(axis=1) > low)).all(axis=1)
         meets &= chart == other
         fits = np.array_equal(after.points[~free], patch.points[~free])
-        fits &= bool(
-            (signed_double_areas(places[near]) > 0).all() and energy <= max(self.max_energy, one.energy)
-        )
+        fits &= energy <= max(self.max_energy, one.energy)
         if not fits or len(find_overlaps(places[meets], limit=1).pairs):
             return None
         whole.points[whole.corners[near]] = places[near]
@@ -311,7 +311,7 @@ class CutSearch:
         if not self._by_area:
             return triangle_energies(lengths, places)
         areas, flat = double_areas(lengths), signed_double_areas(places)
-        return (ISOMETRIC + ENERGY_PER_AREA * np.log(np.maximum(flat / areas, 1e-100)) ** 2 / 4) * areas / 2
+        return (ISOMETRIC + ENERGY_PER_AREA * np.log(flat / areas) ** 2 / 4) * areas / 2
 
     def separated(self, one: Candidate) -> Candidate:
         """Return a candidate whose overlaps are separated."""

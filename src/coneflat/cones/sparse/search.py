@@ -247,10 +247,7 @@ class ConeSearch:
         return len(self.coarse.best.fewest(goal, most))
 
     def _find_sufficient(self, count: int, goal: float, most: int) -> int:
-        """Return a number of cones with E^2 <= goal on the mesh, or above which more gain nothing.
-
-        The search starts from `count` cones.
-        """
+        """Return how many cones reach E^2 <= goal on the mesh, or gain as much as more; `count` are tried first."""
         exact, best = self.exact, self.exact.best
         self._refine(count)
         while best.fewest(goal, most).energy > goal:
