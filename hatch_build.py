@@ -1,13 +1,12 @@
-"""Build hook: kernels compiled ahead, so that the first flattening after an installation does not wait for them.
+"""Build hook: on request, a wheel with compiled kernels for one platform, as for a container image.
 
-numba keeps what it compiled beside the sources, stamped with their content and the processor; what fits neither is
-compiled anew. A build for others' machines goes without: CONEFLAT_NO_KERNELS=1 hatch build.
+A wheel is pure Python otherwise, and kernels are compiled at the first use. CONEFLAT_KERNELS=1 compiles them now, for
+the processor and the Python of the build; the wheel gets the tag of that platform.
 """
 
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -16,56 +15,57 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-# What flattening arrays imports.
-NEEDED = ("numpy", "scipy", "cholespy", "numba", "threadpoolctl")
-TIME_LIMIT = 300
+#: Environment variable that requests compiled kernels.
+REQUEST = "CONEFLAT_KERNELS"
+#: Folder of the package for them, see `coneflat.base.kernel_cache`.
+FOLDER = "coneflat/kernels"
+TIME_LIMIT = 600
 
 
 class KernelHook(BuildHookInterface):
-    """Adds the compiled kernels to a wheel, or leaves them beside the sources of an editable installation."""
+    """Adds the compiled kernels to a wheel that requests them."""
 
     PLUGIN_NAME = "custom"
 
     def dependencies(self) -> list[str]:
-        """Return what the build needs for this, at the versions that the package will run with."""
-        if self._skipped():
-            return []
-        return [line for line in self.metadata.core.dependencies if line.startswith(NEEDED)]
+        """Return what the package needs to run, at the versions that it will run with."""
+        return self.metadata.core.dependencies if self._is_requested() else []
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Compile; a failure is reported and leaves the kernels to the first run."""
-        if self._skipped():
+        """Compile the kernels, and give the wheel the tag of the platform.
+
+        Raises:
+            RuntimeError: the kernels cannot be compiled.
+        """
+        if not self._is_requested() or version == "editable":
             return
-        sources = Path(self.root) / "src"
-        if version != "editable":
-            self._scratch = tempfile.TemporaryDirectory(
-                prefix="coneflat-kernels-", ignore_cleanup_errors=True
-            )
-            copy = Path(self._scratch.name) / "src"
-            shutil.copytree(sources, copy, ignore=shutil.ignore_patterns("__pycache__"))
-            sources = copy
+        self._scratch = tempfile.TemporaryDirectory(prefix="coneflat-kernels-", ignore_cleanup_errors=True)
         self.app.display_info("compiling the kernels")
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(sources), *sys.path])}
-        environment.pop("NUMBA_CACHE_DIR", None)
-        try:
-            subprocess.run(
-                [sys.executable, "-m", "coneflat.apps.ahead"],
-                env=environment,
-                cwd=sources,
-                check=True,
-                timeout=TIME_LIMIT,
-                capture_output=True,
+        paths = [str(Path(self.root) / "src"), *sys.path]
+        environment = {
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join(paths),
+            "PYTHONDONTWRITEBYTECODE": "1",
+            "CONEFLAT_CACHE_DIR": self._scratch.name,
+        }
+        command = [sys.executable, "-m", "coneflat.apps.warm_up"]
+        done = subprocess.run(
+            command, env=environment, check=False, timeout=TIME_LIMIT, capture_output=True, text=True
+        )
+        kernels = sorted(Path(self._scratch.name).glob("*.kernel"))
+        if done.returncode or not kernels:
+            raise RuntimeError(
+                f"the kernels requested by {REQUEST} cannot be compiled: {done.stderr[-2000:]}"
             )
-        except (OSError, subprocess.SubprocessError) as error:
-            self.app.display_warning(f"kernels are compiled at the first run instead: {error}")
-        if version != "editable":
-            for file in sources.rglob("*.nb[ci]"):
-                build_data["force_include"][str(file)] = str(file.relative_to(sources))
+        for file in kernels:
+            build_data["force_include"][str(file)] = f"{FOLDER}/{file.name}"
+        build_data["pure_python"] = False
+        build_data["infer_tag"] = True
 
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
-        """Remove the scratch copy."""
+        """Remove the scratch folder."""
         if hasattr(self, "_scratch"):
             self._scratch.cleanup()
 
-    def _skipped(self) -> bool:
-        return self.target_name != "wheel" or bool(os.environ.get("CONEFLAT_NO_KERNELS"))
+    def _is_requested(self) -> bool:
+        return self.target_name == "wheel" and os.environ.get(REQUEST, "0") not in ("", "0")

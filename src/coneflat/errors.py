@@ -105,6 +105,10 @@ class UnknownFormatError(MeshFileError):
     """The file extension does not belong to a supported format."""
 
 
+class CacheError(ConeflatError, OSError):
+    """Compiled kernels cannot be cached."""
+
+
 class ProjectError(ConeflatError, ValueError):
     """A studio project cannot be read, or its mesh has changed since it was saved."""
 

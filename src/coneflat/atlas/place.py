@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -125,9 +126,8 @@ def cover(
     runs, found, first = np.empty((1024, 3), np.int64), 0, np.zeros(angles.size + 1, np.int64)
     for j in range(angles.size):
         chart, t = j // angles.shape[1], j % angles.shape[1]
-        turn = np.exp(1j * angles[chart, t])
         left, below = low[chart, t].real / cell, low[chart, t].imag / cell
-        cosine, sine = turn.real / cell, turn.imag / cell
+        cosine, sine = math.cos(angles[chart, t]) / cell, math.sin(angles[chart, t]) / cell
         columns, rows = size[j]
         winding = np.zeros((rows, columns + 1), np.int32)
         touched = np.zeros((rows, columns + 1), np.int32)
@@ -148,7 +148,7 @@ def cover(
                 touched[row, min(max(int(min(a, b)), 0), columns - 1)] += 1
                 touched[row, min(max(int(max(a, b)), 0), columns - 1) + 1] -= 1
                 if y0 <= row + 0.5 < y1:
-                    column = int(np.ceil(x0 + (row + 0.5 - y0) * slope - 0.5))
+                    column = math.ceil(x0 + (row + 0.5 - y0) * slope - 0.5)
                     winding[row, min(max(column, 0), columns)] += sign
         for row in range(rows):
             around, on, inside = 0, 0, False

@@ -260,8 +260,11 @@ def split_piece(
         first: a lower bound of the first triangle of the piece.
     """
     sets = 2 * len(cut)
-    parent, head, last = np.arange(sets), np.full(sets, -1), np.full(sets, -1)
+    parent, head, last = np.empty(sets, np.int64), np.empty(sets, np.int64), np.empty(sets, np.int64)
     after, known, count = np.empty(len(piece), np.int64), np.empty(len(piece), np.int64), 0
+    growing, number, left = np.empty(sets, np.int64), np.empty(sets, np.int64), sets
+    for i in range(sets):
+        parent[i], head[i], last[i], growing[i], number[i] = i, -1, -1, i, -1
     for i in range(sets):
         is_cut[cut[i // 2, i % 2]] = True
         f = cut[i // 2, i % 2] // 3
@@ -272,7 +275,6 @@ def split_piece(
             count += 1
         else:
             join_lists(parent, head, last, after, i, owner[f])
-    growing, left = np.arange(sets), sets
     while left > 1:
         still = 0
         for at in range(left):
@@ -297,8 +299,9 @@ def split_piece(
                     join_lists(parent, head, last, after, i, owner[g])
         left = still
     rest = find_root(parent, growing[0]) if sets > 0 else -1
-    number = np.full(sets, -1)
-    ids, low = np.full(sets + 1, own), np.full(sets + 1, len(piece))
+    ids, low, start = np.empty(sets + 1, np.int64), np.empty(sets + 1, np.int64), np.empty(sets + 1, np.int64)
+    for i in range(sets + 1):
+        ids[i], low[i], start[i] = own, len(piece), -1
     found = 1
     for i in range(count):
         f = known[i]
@@ -315,10 +318,9 @@ def split_piece(
     while piece[first] != own:
         first += 1
     low[0] = first
-    start = np.full(found, -1)
     for i in range(sets):
         h, t = cut[i // 2, i % 2], cut[i // 2, 1 - i % 2]
         is_cut[h] = False
         if piece[h // 3] != piece[t // 3]:
             start[0 if piece[h // 3] == own else piece[h // 3] - following + 1] = h
-    return ids[:found], low[:found], start
+    return ids[:found], low[:found], start[:found]

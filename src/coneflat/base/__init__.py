@@ -16,16 +16,21 @@ from .threads import THREADS, limit_threads
 if TYPE_CHECKING:
     from .arrays import BoolArray, ComplexArray, FloatArray, IntArray, dots, has_any, mask_of, unit_exponent
     from .jit import compiled
+    from .kernel_cache import cache_folder, compilation
 
 __all__ = [
     "BoolArray", "ComplexArray", "DISTORTION", "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE", "MAX_LISTED",
-    "MIN_CONE_ANGLE", "Progress", "Stopwatch", "THREADS", "TYPED_TOLERANCE", "cancel_with", "check_cancelled",
-    "compiled", "dots", "exit_text", "has_any", "limit_threads", "list_some", "mask_of", "plural", "printable",
-    "short_repr", "unit_exponent",
+    "MIN_CONE_ANGLE", "Progress", "Stopwatch", "THREADS", "TYPED_TOLERANCE", "cache_folder", "cancel_with",
+    "check_cancelled", "compilation", "compiled", "dots", "exit_text", "has_any", "limit_threads", "list_some",
+    "mask_of", "plural", "printable", "short_repr", "unit_exponent",
 ]  # fmt: skip
+
+
+# Modules that need numba, by name; the other names that are imported on first use are those of arrays.
+_HOMES = {"compiled": "jit", "cache_folder": "kernel_cache", "compilation": "kernel_cache"}
 
 
 def __getattr__(name: str) -> Any:
     if name in __all__:
-        return getattr(import_module("." + ("jit" if name == "compiled" else "arrays"), __name__), name)
+        return getattr(import_module(f".{_HOMES.get(name, 'arrays')}", __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -13,6 +13,7 @@ from ..errors import OptionError
 Progress = Callable[[str, float], None]
 
 _ask: ContextVar[Callable[[], None] | None] = ContextVar("coneflat_ask", default=None)
+_stage: ContextVar[Stopwatch | None] = ContextVar("coneflat_stage", default=None)
 
 
 @contextmanager
@@ -33,6 +34,13 @@ def check_cancelled() -> None:
     ask = _ask.get()
     if ask is not None:
         ask()
+
+
+def report_detail(detail: str) -> None:
+    """Report a detail of the stage that is running, if its progress is reported at all."""
+    watch = _stage.get()
+    if watch is not None:
+        watch.report(detail)
 
 
 class Stopwatch:
@@ -66,9 +74,11 @@ class Stopwatch:
         self._name = name
         self.report()
         start = time.perf_counter()
+        token = _stage.set(self)
         try:
             yield
         finally:
+            _stage.reset(token)
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
         self._within = until
 

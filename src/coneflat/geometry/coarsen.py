@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import heapq
+import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,7 +27,12 @@ def coarse_mesh(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntArray,
     """
     faces = mesh.faces.astype(np.int64, order="C")
     points, key = mesh.vertices - mesh.vertices.mean(axis=0), tie_key(mesh.vertices)
-    collapse_edges(points, faces, _quadrics(mesh, points), mesh.is_boundary_vertex, key, count)
+    first, last, seen = np.full((3, len(points)), -1)
+    links = first, last, np.full(faces.size, -1), np.full(len(points), np.inf)
+    quadrics = _quadrics(mesh, points)
+    collapse_edges(
+        Collapses(points, quadrics, key, mesh.is_boundary_vertex, faces.reshape(-1), *links), seen, count
+    )
     kept, corners = np.unique(faces[faces[:, 0] >= 0], return_inverse=True)
     return TriangleMesh(mesh.vertices[kept], corners.reshape(-1, 3)), kept, np.flatnonzero(faces[:, 0] >= 0)
 
@@ -55,123 +62,166 @@ def _quadrics(mesh: TriangleMesh, points: FloatArray) -> FloatArray:
     return found
 
 
+class Collapses(NamedTuple):
+    """A mesh whose edges collapse.
+
+    Attributes:
+        points: (n, 3) vertices.
+        quadrics: (n, 10) of the vertices; a vertex gets those of the vertices that collapse to it.
+        key: (n,) keys that break ties, see `tie_key`.
+        is_boundary: (n,) the vertices of the boundary, which collapse only along it.
+        corners: (3m,) vertices of the triangles, -1 in those that are removed.
+        first, last: (n,) the first and the last corner at each vertex, -1 for none.
+        after: (3m,) the next corner at the vertex of each.
+        cost: (n,) cost of the cheapest edge from each vertex.
+    """
+
+    points: FloatArray
+    quadrics: FloatArray
+    key: FloatArray
+    is_boundary: BoolArray
+    corners: IntArray
+    first: IntArray
+    last: IntArray
+    after: IntArray
+    cost: FloatArray
+
+
 @compiled
-def collapse_edges(
-    points: FloatArray,
-    faces: IntArray,
-    quadrics: FloatArray,
-    is_boundary: BoolArray,
-    key: FloatArray,
-    count: int,
-) -> None:
-    """Collapse edges, the cheapest first, until at most `count` triangles are left; those removed become -1.
+def edge_cost(points: FloatArray, quadrics: FloatArray, tail: int, head: int) -> float:
+    """Return the cost of the collapse of a vertex to another one."""
+    cost, square, k = 0.0, 0.0, 0
+    for i in range(4):
+        x = 1.0 if i == 3 else points[head, i]
+        square += 0.0 if i == 3 else (x - points[tail, i]) ** 2
+        for j in range(i + 1):
+            y = 1.0 if j == 3 else points[head, j]
+            cost += (1.0 if i == j else 2.0) * x * y * (quadrics[tail, k] + quadrics[head, k])
+            k += 1
+    return cost + LENGTH_WEIGHT * square**2
+
+
+@compiled
+def cheapest_edge(mesh: Collapses, tail: int, passed: float, last_head: int) -> tuple[float, float, int, int]:
+    """Return the cheapest edge from a vertex that comes after one with a given cost and head: cost, key, ends."""
+    least, to, corner = np.inf, tail, mesh.first[tail]
+    while corner >= 0:
+        # Around an inner vertex, the next corners are all its neighbours.
+        for step in range(1, 3 if mesh.is_boundary[tail] else 2):
+            head = mesh.corners[corner - corner % 3 + (corner + step) % 3]
+            cost = edge_cost(mesh.points, mesh.quadrics, tail, head) if head >= 0 else np.inf
+            if (passed, mesh.key[last_head]) < (cost, mesh.key[head]) < (least, mesh.key[to]):
+                least, to = cost, head
+        corner = mesh.after[corner]
+    mesh.cost[tail] = least
+    return least, mesh.key[tail], tail, to
+
+
+@compiled
+def normal_and_shape(
+    points: FloatArray, one: int, two: int, three: int
+) -> tuple[float, float, float, float, float]:
+    """Return the normal of a triangle, its length, and that relative to half the sum of the squared sides."""
+    x, y, z = points[one, 0], points[one, 1], points[one, 2]
+    a, b, c = points[two, 0] - x, points[two, 1] - y, points[two, 2] - z
+    d, e, f = points[three, 0] - x, points[three, 1] - y, points[three, 2] - z
+    g, h, i = b * f - c * e, c * d - a * f, a * e - b * d
+    size = math.sqrt(g * g + h * h + i * i)
+    sides = a * a + b * b + c * c + d * d + e * e + f * f - (a * d + b * e + c * f)
+    return g, h, i, size, size / sides
+
+
+@compiled
+def can_collapse(mesh: Collapses, seen: IntArray, stamp: int, tail: int, head: int) -> bool:
+    """Return whether an edge can collapse: topology and boundary stay, and no triangle turns or gets thin.
+
+    seen: (n,) marks of vertices; those that are equal to `stamp` are in use.
+    """
+    corner, shared, common = mesh.first[tail], 0, 0
+    while corner >= 0:
+        face = corner - corner % 3
+        one, two = mesh.corners[face + (corner + 1) % 3], mesh.corners[face + (corner + 2) % 3]
+        if one >= 0:
+            seen[one] = seen[two] = stamp
+        if head in (one, two):
+            shared += 1
+        elif one >= 0:
+            a, b, c, size, shape = normal_and_shape(mesh.points, tail, one, two)
+            d, e, f, new_size, new_shape = normal_and_shape(mesh.points, head, one, two)
+            if not new_shape > min(shape, MIN_SHAPE):
+                return False
+            if shape > MIN_SHAPE**4 and a * d + b * e + c * f < MAX_ROTATION * size * new_size:
+                return False
+        corner = mesh.after[corner]
+    corner = mesh.first[head]
+    while corner >= 0:
+        face = corner - corner % 3
+        for step in range(1, 3):
+            vertex = mesh.corners[face + (corner + step) % 3]
+            if vertex >= 0 and seen[vertex] == stamp:
+                common += 1
+                seen[vertex] = -1
+        corner = mesh.after[corner]
+    # The topology stays if the ends have no common neighbours but those in their common triangles.
+    return common == shared and not (mesh.is_boundary[tail] and shared != 1)
+
+
+@compiled
+def link_corner(mesh: Collapses, corner: int, vertex: int) -> None:
+    """Add a corner to the list of a vertex."""
+    if mesh.first[vertex] < 0:
+        mesh.last[vertex] = corner
+    mesh.after[corner] = mesh.first[vertex]
+    mesh.first[vertex] = corner
+
+
+@compiled
+def collapse_edges(mesh: Collapses, seen: IntArray, count: int) -> None:
+    """Collapse edges, the cheapest first, until at most `count` triangles are left.
 
     Args:
-        points: (n, 3) vertices.
-        faces: (m, 3) vertex indices, modified.
-        quadrics: (n, 10), modified: a vertex gets those of the vertices that collapse to it.
-        is_boundary: (n,) the vertices of the boundary, which collapse only along it.
-        key: (n,) keys that break ties, see `tie_key`.
+        mesh: the mesh, modified; `first` is -1 on entry.
+        seen: (n,) -1 on entry, a work array.
         count: the number of triangles.
     """
-    corners, left, before = faces.ravel(), len(faces), 2 * len(faces)
-    # The corners of each vertex are a linked list.
-    first, last, after = np.full(len(points), -1), np.full(len(points), -1), np.full(len(corners), -1)
-    seen, stamp, known = np.full(len(points), -1), 0, np.full(len(points), np.inf)
-    for corner, vertex in enumerate(corners):
-        last[vertex] = corner if first[vertex] < 0 else last[vertex]
-        after[corner], first[vertex] = first[vertex], corner
-
-    def cost_of(tail: int, head: int) -> float:
-        cost, square, k = 0.0, 0.0, 0
-        for i in range(4):
-            x = 1.0 if i == 3 else points[head, i]
-            square += 0.0 if i == 3 else (x - points[tail, i]) ** 2
-            for j in range(i + 1):
-                y = 1.0 if j == 3 else points[head, j]
-                cost += (1.0 if i == j else 2.0) * x * y * (quadrics[tail, k] + quadrics[head, k])
-                k += 1
-        return cost + LENGTH_WEIGHT * square**2
-
-    def entry(tail: int, passed: float, last_head: int) -> tuple[float, float, int, int]:
-        """Return the cheapest edge from a vertex that comes after one with a given cost and head."""
-        least, to, corner = np.inf, tail, first[tail]
-        while corner >= 0:
-            # Around an inner vertex, the next corners are all its neighbours.
-            for step in range(1, 3 if is_boundary[tail] else 2):
-                head = corners[corner - corner % 3 + (corner + step) % 3]
-                cost = cost_of(tail, head) if head >= 0 else np.inf
-                if (passed, key[last_head]) < (cost, key[head]) < (least, key[to]):
-                    least, to = cost, head
-            corner = after[corner]
-        known[tail] = least
-        return least, key[tail], tail, to
-
-    def normal(one: int, two: int, three: int) -> tuple[float, float, float, float, float]:
-        x, y, z = points[one, 0], points[one, 1], points[one, 2]
-        a, b, c = points[two, 0] - x, points[two, 1] - y, points[two, 2] - z
-        d, e, f = points[three, 0] - x, points[three, 1] - y, points[three, 2] - z
-        g, h, i = b * f - c * e, c * d - a * f, a * e - b * d
-        size = np.sqrt(g * g + h * h + i * i)
-        sides = a * a + b * b + c * c + d * d + e * e + f * f - (a * d + b * e + c * f)
-        return g, h, i, size, size / sides
-
+    points, quadrics, corners, first, after = mesh.points, mesh.quadrics, mesh.corners, mesh.first, mesh.after
+    left, before, stamp = len(corners) // 3, len(corners), 0
+    for corner in range(len(corners)):
+        link_corner(mesh, corner, corners[corner])
     # Edges that could not collapse are tried again after the others, unless these were few.
     while count < left < 0.9 * before:
         before = left
-        heap = [entry(tail, -np.inf, tail) for tail in range(len(points)) if first[tail] >= 0]
+        heap = [cheapest_edge(mesh, tail, -np.inf, tail) for tail in range(len(points)) if first[tail] >= 0]
         heapq.heapify(heap)
         while left > count and len(heap):
             cost, _, tail, head = heapq.heappop(heap)
             # The entry of a vertex that was pushed last counts.
-            if first[tail] < 0 or cost == np.inf or cost != known[tail]:
+            if first[tail] < 0 or cost == np.inf or cost != mesh.cost[tail]:
                 continue
             # Costs only rise, as vertices do not move.
-            if first[head] < 0 or cost_of(tail, head) > cost:
-                heapq.heappush(heap, entry(tail, -np.inf, tail))
+            if first[head] < 0 or edge_cost(points, quadrics, tail, head) > cost:
+                heapq.heappush(heap, cheapest_edge(mesh, tail, -np.inf, tail))
                 continue
-            corner, shared, common, is_bad, stamp = first[tail], 0, 0, False, stamp + 1
-            while corner >= 0:
-                face = corner - corner % 3
-                one, two = corners[face + (corner + 1) % 3], corners[face + (corner + 2) % 3]
-                if one >= 0:
-                    seen[one] = seen[two] = stamp
-                if head in (one, two):
-                    shared += 1
-                elif one >= 0:
-                    a, b, c, old, shape = normal(tail, one, two)
-                    d, e, f, new, new_shape = normal(head, one, two)
-                    is_bad |= not new_shape > min(shape, MIN_SHAPE)
-                    is_bad |= shape > MIN_SHAPE**4 and a * d + b * e + c * f < MAX_ROTATION * old * new
-                corner = after[corner]
-            corner = first[head]
-            while corner >= 0:
-                face = corner - corner % 3
-                for step in range(1, 3):
-                    vertex = corners[face + (corner + step) % 3]
-                    if vertex >= 0 and seen[vertex] == stamp:
-                        common += 1
-                        seen[vertex] = -1
-                corner = after[corner]
-            # The topology stays if the ends have no common neighbours but those in their common triangles.
-            if is_bad or common != shared or (is_boundary[tail] and shared != 1):
-                heapq.heappush(heap, entry(tail, cost, head))
+            stamp += 1
+            if not can_collapse(mesh, seen, stamp, tail, head):
+                heapq.heappush(heap, cheapest_edge(mesh, tail, cost, head))
                 continue
-            after[last[tail]], chain = first[head], first[tail]
+            after[mesh.last[tail]], chain = first[head], first[tail]
             first[tail] = first[head] = -1
-            quadrics[head] += quadrics[tail]
+            for k in range(10):
+                quadrics[head, k] += quadrics[tail, k]
             while chain >= 0:
                 corner, chain = chain, after[chain]
                 face = corner - corner % 3
                 one, two = corners[face + (corner + 1) % 3], corners[face + (corner + 2) % 3]
                 if corners[corner] == tail and head in (one, two):
-                    corners[face : face + 3] = -1
+                    for k in range(face, face + 3):
+                        corners[k] = -1
                     left -= 1
                 elif corners[corner] >= 0:
                     corners[corner] = head
-                    last[head] = corner if first[head] < 0 else last[head]
-                    after[corner], first[head] = first[head], corner
+                    link_corner(mesh, corner, head)
                     for vertex in (one, two):
-                        if cost_of(vertex, head) < known[vertex]:
-                            heapq.heappush(heap, entry(vertex, -np.inf, vertex))
-            heapq.heappush(heap, entry(head, -np.inf, head))
+                        if edge_cost(points, quadrics, vertex, head) < mesh.cost[vertex]:
+                            heapq.heappush(heap, cheapest_edge(mesh, vertex, -np.inf, vertex))
+            heapq.heappush(heap, cheapest_edge(mesh, head, -np.inf, head))

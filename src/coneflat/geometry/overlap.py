@@ -208,7 +208,12 @@ def fill_boxes(
             u, v = c[(i + 2) % 6] - c[i], c[(i + 3) % 6] - c[i + 1]
             real += u * u - v * v
             imaginary += 2 * u * v
-        boxes[t] = x0 - margin, y0 - margin, x1 - margin, y1 - margin
+        boxes[t, 0], boxes[t, 1], boxes[t, 2], boxes[t, 3] = (
+            x0 - margin,
+            y0 - margin,
+            x1 - margin,
+            y1 - margin,
+        )
         area += (x0 + x1) * (y0 + y1)
     return area, real, imaginary
 
@@ -305,11 +310,11 @@ def join(
     count = 0
     while top > 0 and count < len(found):
         top -= 1
-        i, j = stack[top]
+        i, j = stack[top, 0], stack[top, 1]
         if i >= first_leaf:
             one, two = i - first_leaf, j - first_leaf
             if not _lies_outside(corners, one, two, parts) and not _lies_outside(corners, two, one, parts):
-                found[count] = one, two
+                found[count, 0], found[count, 1] = one, two
                 count += 1
             continue
         for a in range(2 * i + 1, 2 * i + 3):
@@ -317,6 +322,6 @@ def join(
                 if (a == b and a < first_leaf) or (
                     a < b and _boxes_meet(tree, a, b) and not (len(fans) and are_disjoint(fans, angles, a, b))
                 ):
-                    stack[top] = a, b
+                    stack[top, 0], stack[top, 1] = a, b
                     top += 1
     return top, count

@@ -291,16 +291,18 @@ MAX_INSERTION_SORT = 64
 
 @compiled
 def sort_keys(keys: IntArray) -> None:
-    """Sort distinct integers (k,) in place; fast if there are few."""
-    if len(keys) > MAX_INSERTION_SORT:
-        keys[:] = keys[np.argsort(keys, kind="mergesort")]
-        return
-    for at in range(1, len(keys)):
-        key, before = keys[at], at - 1
-        while before >= 0 and keys[before] > key:
-            keys[before + 1] = keys[before]
-            before -= 1
-        keys[before + 1] = key
+    """Sort distinct integers (k,) in place; fast if there are few (insertion sort, with gaps if there are more)."""
+    gap = 1
+    while MAX_INSERTION_SORT * gap < len(keys):
+        gap = 3 * gap + 1
+    while gap > 0:
+        for at in range(gap, len(keys)):
+            key, before = keys[at], at - gap
+            while before >= 0 and keys[before] > key:
+                keys[before + gap] = keys[before]
+                before -= gap
+            keys[before + gap] = key
+        gap //= 3
 
 
 @compiled

@@ -24,6 +24,7 @@ from .peers import compare
 from .quads import quads
 from .shared import ExitCode
 from .view import studio, view
+from .warm_up import warm_up
 
 
 class Interrupted(KeyboardInterrupt):
@@ -37,7 +38,8 @@ def cli() -> None:
 
 
 for command in (
-    flatten, unwrap, transfer, batch, brain, quads, measure, cones, figure, view, studio, blender, compare, demo
+    flatten, unwrap, transfer, batch, brain, quads, measure, cones, figure, view, studio, blender, compare, demo,
+    warm_up,
 ):  # fmt: skip
     cli.add_command(command)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -61,25 +62,38 @@ def eliminate(columns: IntArray, rows: IntArray, right: IntArray, one: IntArray)
         (n,) True for the columns that are then zero in all rows; and whether there are solutions. Without any, or with
         very large entries, it ends early.
     """
-    is_free = np.ones(len(columns), dtype=np.bool_)
+    # Loops compile several times as fast as array expressions.
+    size = columns.shape[1]
+    is_free = np.empty(len(columns), dtype=np.bool_)
+    for c in range(len(columns)):
+        is_free[c] = True
     for i in range(len(rows)):
         filled = 2
         while filled > 1:
             pivot, least, filled = -1, (0, 0), 0
             for c in range(len(columns)):
                 if is_free[c] and columns[c, i] != 0:
-                    size, filled = (abs(columns[c, i]), int(np.count_nonzero(columns[c]))), filled + 1
-                    if pivot < 0 or size < least:
-                        pivot, least = c, size
+                    entries = 0
+                    for k in range(size):
+                        entries += columns[c, k] != 0
+                    filled += 1
+                    if pivot < 0 or (abs(columns[c, i]), entries) < least:
+                        pivot, least = c, (abs(columns[c, i]), entries)
             for c in range(len(columns)):
                 if filled > 1 and c != pivot and is_free[c] and columns[c, i] != 0:
-                    columns[c] -= int(np.rint(columns[c, i] / columns[pivot, i])) * columns[pivot]
-                    if np.abs(columns[c]).max() > 2**40:
-                        return is_free, False
-        missing = right[i] - (rows[i] * one).sum()
+                    times = round(columns[c, i] / columns[pivot, i])
+                    for k in range(size):
+                        columns[c, k] -= times * columns[pivot, k]
+                        if abs(columns[c, k]) > 2**40:
+                            return is_free, False
+        missing = right[i]
+        for k in range(len(one)):
+            missing -= rows[i, k] * one[k]
         if pivot >= 0:
             # The column is zero in all previous rows, so these remain satisfied.
-            one += missing // columns[pivot, i] * columns[pivot, len(rows) :]
+            times = missing // columns[pivot, i]
+            for k in range(len(one)):
+                one[k] += times * columns[pivot, len(rows) + k]
             missing %= columns[pivot, i]
             is_free[pivot] = False
         if missing != 0:
@@ -163,10 +177,11 @@ def reduce_basis(root: FloatArray, basis: IntArray) -> None:
         if 0.99 * root[k - 1, k - 1] ** 2 <= above * above + below * below:
             k += 1
             continue
-        root[:, k - 1], root[:, k] = root[:, k].copy(), root[:, k - 1].copy()
-        basis[:, k - 1], basis[:, k] = basis[:, k].copy(), basis[:, k - 1].copy()
+        for i in range(size):
+            root[i, k - 1], root[i, k] = root[i, k], root[i, k - 1]
+            basis[i, k - 1], basis[i, k] = basis[i, k], basis[i, k - 1]
         # A rotation of two rows makes the matrix triangular again.
-        norm = np.sqrt(above * above + below * below)
+        norm = math.sqrt(above * above + below * below)
         c, s = above / norm, below / norm
         for i in range(k - 1, size):
             one, two = root[k - 1, i], root[k, i]
@@ -183,9 +198,7 @@ def nearest_point(root: FloatArray, target: FloatArray, visits: int) -> IntArray
     distance, so that the first leaf is Babai's point.
     """
     size = len(target)
-    here = np.zeros(size, dtype=np.int64)
-    step = np.zeros(size, dtype=np.int64)
-    found = here.copy()
+    here, step, found = np.zeros(size, np.int64), np.zeros(size, np.int64), np.zeros(size, np.int64)
     centre = np.zeros(size)
     beyond = np.zeros(size + 1)  # squared distance in the coordinates from this one on
     least, depth, is_new = np.inf, size - 1, True
@@ -195,7 +208,7 @@ def nearest_point(root: FloatArray, target: FloatArray, visits: int) -> IntArray
             for j in range(depth + 1, size):
                 pull += root[depth, j] * (here[j] - target[j])
             centre[depth] = target[depth] - pull / root[depth, depth]
-            here[depth] = int(np.rint(centre[depth]))
+            here[depth] = round(centre[depth])
             step[depth] = 1 if centre[depth] >= here[depth] else -1
         off = (here[depth] - centre[depth]) * root[depth, depth]
         total = beyond[depth + 1] + off * off
@@ -205,7 +218,9 @@ def nearest_point(root: FloatArray, target: FloatArray, visits: int) -> IntArray
             depth -= 1
             continue
         if total < least:
-            found[:], least = here, total
+            least = total
+            for j in range(size):
+                found[j] = here[j]
         else:
             depth += 1
             if depth == size:

@@ -6,6 +6,8 @@ order elliptic problems", Computing 56, 1996.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags, eye
 
@@ -136,7 +138,7 @@ def aggregate(
         taken = 0
         for e in range(indptr[vertex], indptr[vertex + 1]):
             other = indices[e]
-            if other != vertex and -weights[e] > min_coupling * np.sqrt(diagonal[vertex] * diagonal[other]):
+            if other != vertex and -weights[e] > min_coupling * math.sqrt(diagonal[vertex] * diagonal[other]):
                 if labels[other] < 0:
                     free += 1
                 else:
@@ -146,13 +148,13 @@ def aggregate(
         labels[vertex] = number
         space = size - 1 if free + 1 > size else free
         # A fractional size is attained on average, by rounding the cumulative size.
-        space = np.floor((number + 1) * space) - np.floor(number * space) if space != free else free
+        space = math.floor((number + 1) * space) - math.floor(number * space) if space != free else free
         while space >= 1:
             strongest, best = -1, min_coupling
             for e in range(indptr[vertex], indptr[vertex + 1]):
                 other = indices[e]
                 if other != vertex and labels[other] < 0:
-                    strength = -weights[e] / np.sqrt(diagonal[vertex] * diagonal[other])
+                    strength = -weights[e] / math.sqrt(diagonal[vertex] * diagonal[other])
                     if strength > best * (1 + TIE_TOLERANCE):
                         strongest, best = other, strength
             if strongest < 0:

@@ -37,6 +37,10 @@ class ExactModel(DenseModel):
         self._usable = np.ones(len(log_scale), dtype=bool)
         self._indptr = operator.laplacian.indptr.astype(np.int64)
         self._indices = operator.laplacian.indices.astype(np.int64)
+        self._is_reached, self._reached = (
+            np.zeros(len(log_scale), dtype=bool),
+            np.empty(len(log_scale), np.int64),
+        )
         self._linear, self._least = linear, least
         # The Green's functions of the unknowns and their means, in blocks in the order in which they were added.
         self._responses: list[FloatArray] = []
@@ -119,7 +123,7 @@ class ExactModel(DenseModel):
         targets = []
         for place in range(len(self.fixed), len(members)):
             s, k = int(taken[place]), curvatures[place]
-            near = ball(self._indptr, self._indices, s, size)
+            near = self._ball(s, size)
             near = near[is_free[near]]
             if not len(near) or k == 0:
                 continue
@@ -154,8 +158,13 @@ class ExactModel(DenseModel):
 
     def near(self, unknown: int, size: int) -> IntArray:
         """Return the usable unknowns among the `size` nearest to an unknown."""
-        found = ball(self._indptr, self._indices, unknown, size)
-        return found[self._usable[found]]
+        near = self._ball(unknown, size)
+        return near[self._usable[near]]
+
+    def _ball(self, centre: int, size: int) -> IntArray:
+        """Return the unknowns nearest to one in steps along edges, in complete rings until `size` are reached."""
+        count = fill_ball(self._indptr, self._indices, centre, size, self._is_reached, self._reached)
+        return self._reached[:count].copy()
 
     def squared_distances(self, one: int, others: IntArray) -> FloatArray:
         """Return (p,) approximate squared norms of the differences of one Green's function and each of the others."""
@@ -163,22 +172,32 @@ class ExactModel(DenseModel):
 
 
 @compiled
-def ball(indptr: IntArray, indices: IntArray, centre: int, size: int) -> IntArray:
-    """Return the vertices nearest to a vertex in steps along edges, in complete rings until `size` are found.
+def fill_ball(
+    indptr: IntArray, indices: IntArray, centre: int, size: int, is_reached: BoolArray, reached: IntArray
+) -> int:
+    """Write the vertices nearest to a vertex in steps along edges, in complete rings until `size` are reached.
 
     The vertex itself comes first. With array operations, a complete search for 20 to 50 cones takes 20% longer.
+
+    Args:
+        indptr, indices: the neighbours of the vertices.
+        centre, size: the vertex, and the number of vertices.
+        is_reached: (n,) False, and again on return.
+        reached: (n,) buffer for the vertices.
+
+    Returns:
+        The number of vertices written.
     """
-    seen = {centre}
-    found = [centre]
-    start = 0
-    while len(found) < size and start < len(found):
-        end = len(found)
+    reached[0], is_reached[centre], start, count = centre, True, 0, 1
+    while count < size and start < count:
+        end = count
         for i in range(start, end):
-            vertex = found[i]
-            for e in range(indptr[vertex], indptr[vertex + 1]):
-                other = indices[e]
-                if other not in seen:
-                    seen.add(other)
-                    found.append(other)
+            for e in range(indptr[reached[i]], indptr[reached[i] + 1]):
+                if not is_reached[indices[e]]:
+                    is_reached[indices[e]] = True
+                    reached[count] = indices[e]
+                    count += 1
         start = end
-    return np.array(found)
+    for i in range(count):
+        is_reached[reached[i]] = False
+    return count

@@ -143,9 +143,16 @@ def best_free(
 
     Hundreds of sets of cones are fitted; with array operations, a flattening takes up to a third longer.
     """
-    free = np.flatnonzero(state == 0)
-    count, largest, left = len(free), 0.0, total
-    best, ones, lower = -slope[free], np.ones(count), np.empty((count, count))
+    # Compiling array expressions takes as long as all the rest of the function.
+    variables, count = np.empty(len(state), np.int64), 0
+    for j in range(len(state)):
+        if state[j] == 0:
+            variables[count] = j
+            count += 1
+    free, largest, left = variables[:count], 0.0, total
+    best, ones, lower = np.empty(count), np.empty(count), np.empty((count, count))
+    for i in range(count):
+        best[i], ones[i] = -slope[free[i]], 1.0
     for j in range(len(state)):
         if state[j] != 0:
             left -= curvatures[j]
@@ -177,7 +184,9 @@ def best_free(
     if math.isnan(total) or count == 0:
         return free, best, 0.0
     multiplier = (sum_best - left) / sum_ones
-    return free, best - multiplier * ones, multiplier
+    for i in range(count):
+        best[i] -= multiplier * ones[i]
+    return free, best, multiplier
 
 
 @compiled
@@ -198,7 +207,8 @@ def change_at_once(
         free, best, multiplier = best_free(gram, slope, total, state, curvatures)
         if not len(free):
             break
-        curvatures[free] = best
+        for i in range(len(free)):
+            curvatures[free[i]] = best[i]
         nothing, is_same = 0.0, True
         for i in range(size):
             gradient[i] = slope[i]

@@ -123,7 +123,10 @@ class Elements:
         self._slots = np.full(self._squares[-1], -1)
         order = sort_by_counting(self._unknown, k + 1)
         first = np.searchsorted(self._unknown[order], np.arange(k + 2))
-        rows, starts = find_entries(self._start, self._unknown, self._squares, first, order, self._slots)
+        owner = np.arange(len(sizes)).repeat(sizes)
+        rows, starts = find_entries(
+            self._start, self._unknown, owner, self._squares, first, order, self._slots
+        )
         # One matrix for all steps, so that its pattern is analysed once.
         self._matrix = csc_matrix((np.zeros(len(rows)), rows, starts), shape=(k, k))
         self._indices, self._indptr = self._matrix.indices, self._matrix.indptr
@@ -234,23 +237,32 @@ def _polar(
 
 @compiled
 def find_entries(
-    start: IntArray, unknown: IntArray, squares: IntArray, first: IntArray, order: IntArray, slots: IntArray
+    start: IntArray,
+    unknown: IntArray,
+    owner: IntArray,
+    squares: IntArray,
+    first: IntArray,
+    order: IntArray,
+    slots: IntArray,
 ) -> tuple[IntArray, IntArray]:
     """Return the rows of the entries of the Hessian by columns, and (k + 1,) the start of each column.
 
     Args:
         start, unknown, squares: see `add_elements`.
+        owner: the element of each entry of `unknown`.
         first, order: (k + 2,) the start of each unknown in `order`, which sorts `unknown`; the last one is the offset.
         slots: the entry of each pair on return; pairs with the offset are left out.
     """
     count, end = len(first) - 2, 0
-    owner = np.arange(len(start) - 1).repeat(np.diff(start))
     rows, starts = np.empty(len(slots), dtype=np.int64), np.zeros(count + 1, dtype=np.int64)
-    entry = np.full(count, -1)
+    entry = np.empty(count, dtype=np.int64)
+    for row in range(count):
+        entry[row] = -1
     for column in range(count):
-        places = order[first[column] : first[column + 1]]
-        for f in owner[places]:
-            for row in unknown[start[f] : start[f + 1]]:
+        for at in range(first[column], first[column + 1]):
+            f = owner[order[at]]
+            for i in range(start[f], start[f + 1]):
+                row = unknown[i]
                 if row < count and entry[row] < starts[column]:
                     entry[row], rows[end] = end, row
                     end += 1
@@ -258,13 +270,14 @@ def find_entries(
         sort_keys(rows[starts[column] : end])
         for i in range(starts[column], end):
             entry[rows[i]] = i
-        for place in places:
+        for at in range(first[column], first[column + 1]):
+            place = order[at]
             f = owner[place]
             for i in range(start[f], start[f + 1]):
                 if unknown[i] < count:
-                    at = squares[f] + (i - start[f]) * (start[f + 1] - start[f]) + place - start[f]
-                    slots[at] = entry[unknown[i]]
-    return rows[:end].copy(), starts
+                    pair = squares[f] + (i - start[f]) * (start[f + 1] - start[f]) + place - start[f]
+                    slots[pair] = entry[unknown[i]]
+    return rows[:end], starts
 
 
 @compiled

@@ -131,7 +131,7 @@ def install_commands(own: Path, requirement: str, wheels: str, online: bool) -> 
         ("make environment", [_base_python(), "-m", "venv", "--clear", str(own)]),
         ("install coneflat", [python, "-m", "pip", "install", *quiet, *source, needed]),
         # Else the first unwrapping would take half a minute longer.
-        ("compile coneflat", [python, "-m", "coneflat.apps.ahead"]),
+        ("compile coneflat", [python, "-m", "coneflat", "warm-up", "-q"]),
     ]
 
 

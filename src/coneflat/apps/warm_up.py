@@ -1,0 +1,69 @@
+"""Compilation of all kernels before they are needed: `coneflat warm-up`.
+
+Otherwise kernels are compiled in the first call that needs them, and cached (`coneflat.base.kernel_cache`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+
+import numpy as np
+
+from .. import flatten, sample_path, unwrap
+from ..base import FloatArray, IntArray
+from ..geometry import visible_share
+from .quads.quads import quads
+from .quads.quality import measure_quads
+
+
+def steps() -> Iterator[tuple[str, Callable[[], object]]]:
+    """Yield computations, each with a name, on small meshes of several types: together they need every kernel."""
+    sample, torus, disk = sample_path(), _tube(closed=True), _tube(closed=False)
+    points, faces = torus
+    yield "flatten", partial(flatten, sample, charts="atlas")
+    yield "the method of the paper", partial(flatten, sample, cones="greedy", method="linear")
+    for mesh in (torus, disk):
+        yield "given topologies", partial(flatten, *mesh)
+        yield "given topologies", partial(flatten, *mesh, cones="greedy")
+    yield "edge flips", partial(flatten, points * [10, 1, 1], faces)
+    # Six triangles cannot hold an angle of 7 pi, so they are split.
+    cones = {0: -5 * np.pi, **dict.fromkeys(range(100, 600, 100), np.pi)}
+    yield "split triangles", partial(flatten, points, faces, cones=cones)
+    # This is large enough for the kernels of fine meshes.
+    fine = _tube(closed=True, around=120, across=60)
+    yield "fine meshes", partial(flatten, *fine, cones={0: np.pi / 2, 3630: -np.pi / 2})
+    yield "quantised cones", partial(flatten, *torus, quantise=np.pi / 2)
+    yield "boundaries", partial(flatten, *disk, boundary="disk")
+    yield "unwrap", partial(unwrap, sample)
+    yield "quads", lambda: measure_quads(quads(*torus, quads=300))
+    yield "visibility", partial(visible_share, *torus)
+
+
+def compile_kernels(report: Callable[[str, float], object] = lambda name, done: None) -> None:
+    """Compile all kernels that are not cached; `report` is called with the name of a step and the fraction done."""
+    todo = list(steps())
+    for i, (name, compute) in enumerate(todo):
+        report(name, i / len(todo))
+        compute()
+
+
+def _tube(closed: bool, around: int = 40, across: int = 24) -> tuple[FloatArray, IntArray]:
+    """Return a torus with bumps, or the part of it over a rectangle of its parameters, which is a disk."""
+    u, v = np.meshgrid(np.arange(around), np.arange(across), indexing="ij")
+    a, b = 2 * np.pi * u / around, 2 * np.pi * v / across
+    radius = 0.4 + 0.05 * np.sin(3 * a) * np.cos(2 * b)
+    ring = 1 + radius * np.cos(b)
+    points = np.stack([ring * np.cos(a), ring * np.sin(a), radius * np.sin(b)], axis=-1).reshape(-1, 3)
+    if not closed:
+        u, v = u[:-1, : across // 2], v[:-1, : across // 2]
+    corners = [
+        ((u + i) % around * across + (v + j) % across).ravel() for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))
+    ]
+    faces = np.concatenate([np.stack(corners[:3], 1), np.stack([corners[0], corners[2], corners[3]], 1)])
+    used, faces = np.unique(faces, return_inverse=True)
+    return points[used], faces.reshape(-1, 3)
+
+
+if __name__ == "__main__":
+    compile_kernels()
