@@ -256,7 +256,7 @@ def _describe_code(code: types.CodeType, documentation: str | None = None) -> An
     constants = [
         _describe_code(constant) if isinstance(constant, types.CodeType) else repr(constant)
         for constant in code.co_consts
-        if not (isinstance(constant, str) and constant == documentation)
+        if constant is None or constant != documentation
     ]
     return code.co_code.hex(), code.co_names, code.co_varnames, constants
 

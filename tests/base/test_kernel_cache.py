@@ -1,0 +1,220 @@
+"""Kernels are compiled once, whatever can be written to; a cached kernel is that of its code."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import stat
+import subprocess
+import sys
+import types
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import coneflat
+from coneflat.base import kernel_cache
+from coneflat.base.jit import compiled
+from coneflat.base.kernel_cache import CACHE_VARIABLE, kernel_digest, read_kernel, write_kernel
+from coneflat.errors import CacheError
+
+
+def product(values, factor):
+    """Return the sum of values times a factor."""
+    total = 0.0
+    for value in values:
+        total += value * factor
+    return total
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Return the cache folder of a test."""
+    chosen = tmp_path / "cache"
+    monkeypatch.setenv(CACHE_VARIABLE, str(chosen))
+    kernel_cache.writable_folder.cache_clear()
+    monkeypatch.setattr(kernel_cache, "compilation", kernel_cache.Compilation())
+    yield chosen
+    kernel_cache.writable_folder.cache_clear()
+
+
+def copy_of(function):
+    """Return another function of the same code, as a new process would have it."""
+    return types.FunctionType(function.__code__, function.__globals__, function.__name__)
+
+
+def test_a_kernel_is_compiled_once(folder):
+    values = np.arange(4.0)
+    assert compiled(copy_of(product))(values, 2.0) == 12.0
+    assert kernel_cache.compilation.count == 1
+    [file] = folder.iterdir()
+    assert compiled(copy_of(product))(values, 3.0) == 18.0
+    assert kernel_cache.compilation.count == 1
+    assert list(folder.iterdir()) == [file]
+    assert compiled(copy_of(product))(values.astype(np.float32), 1.0) == 6.0  # other types of arguments
+    assert kernel_cache.compilation.count == 2
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [lambda content: b"", lambda content: content[:-1], lambda content: content[:90] + b"x" + content[91:]],
+)
+def test_a_damaged_kernel_is_compiled_again(folder, damage, caplog):
+    compiled(copy_of(product))(np.arange(4.0), 2.0)
+    [file] = folder.iterdir()
+    whole = file.read_bytes()
+    file.write_bytes(damage(whole))
+    caplog.clear()
+    assert compiled(copy_of(product))(np.arange(4.0), 2.0) == 12.0
+    assert [record.getMessage() for record in caplog.records] == [
+        f"coneflat: {file} is damaged and is compiled again"
+    ]
+    assert read_kernel(file) is not None
+
+
+def test_a_full_folder_is_one_line(folder, caplog, monkeypatch):
+    def write(path, payload):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(kernel_cache, "write_kernel", write)
+    kernel = compiled(copy_of(product))
+    assert kernel(np.arange(4.0), 2.0) == 12.0
+    assert kernel(np.arange(4), 2.0) == 12.0
+    lines = [record.getMessage() for record in caplog.records if "No space" in record.getMessage()]
+    assert len(lines) == 1
+    assert CACHE_VARIABLE in lines[0]
+    assert list(folder.iterdir()) == []
+
+
+def test_without_a_folder_kernels_are_compiled_in_memory(tmp_path, folder, monkeypatch, caplog):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "file" / "below"))
+    kernel_cache.writable_folder.cache_clear()
+    assert compiled(copy_of(product))(np.arange(4.0), 2.0) == 12.0
+    [line] = [record.getMessage() for record in caplog.records]
+    assert "in memory" in line
+    assert CACHE_VARIABLE in line
+    with pytest.raises(
+        CacheError, match=r"no cache folder is writable \(tried: .*below\); set CONEFLAT_CACHE_DIR"
+    ):
+        kernel_cache.cache_folder()
+
+
+def test_writing_leaves_no_incomplete_file(tmp_path, monkeypatch):
+    def replace(source, target):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", replace)
+    with pytest.raises(OSError, match="No space"):
+        write_kernel(tmp_path / "a.kernel", b"content")
+    assert list(tmp_path.iterdir()) == []
+
+
+class TestDigest:
+    """It changes with the code of a kernel, its constants and the kernels that it calls, and with nothing else."""
+
+    @staticmethod
+    def digest(source, **values):
+        names = dict(values)
+        exec(source, names)
+        return kernel_digest(names["f"])
+
+    def test_code_and_constants(self):
+        documented = self.digest('def f(x):\n    """Other text."""\n    return x * a', a=2.0)
+        assert documented == self.digest('\n\ndef f(x: float):\n    """Text."""  # why\n    return x * a', a=2.0)
+        digest = self.digest("def f(x):\n    return x * a", a=2.0)
+        others = [
+            self.digest("def f(x):\n    return x * a", a=3.0),
+            self.digest("def f(x):\n    return x + a", a=2.0),
+            self.digest("def f(x):\n    return x * a * 2", a=2.0),
+            self.digest("def f(x):\n    return x * b", b=2.0),
+        ]
+        assert len({digest, *others}) == 5
+
+    def test_called_kernels(self):
+        def caller(source):
+            names = {}
+            exec(source, names)
+            return self.digest("def f(x):\n    return g(x)", g=compiled(names["g"]))
+
+        first = caller("def g(x):\n    return x + 1")
+        assert first == caller("\ndef g(x):\n    return x + 1")
+        assert first != caller("def g(x):\n    return x + 2")
+
+    def test_objects_without_a_digest_are_refused(self):
+        with pytest.raises(TypeError, match="has no digest"):
+            self.digest("def f(x):\n    return x + a", a=object())
+
+    def test_every_kernel_has_one(self):
+        package = Path(coneflat.__file__).parent
+        count = 0
+        for path in sorted(package.rglob("*.py")):
+            if "@compiled" not in path.read_text(encoding="utf-8"):
+                continue
+            module = import_module(".".join(["coneflat", *path.relative_to(package).with_suffix("").parts]))
+            for value in vars(module).values():
+                if isinstance(getattr(value, "_cache", None), kernel_cache.KernelCache):
+                    kernel_digest(value.py_func)
+                    count += 1
+        assert count > 50
+
+
+class TestFolders:
+    """Where kernels are cached, in a process of its own with another environment."""
+
+    SCRIPT = "import json; from coneflat.base.kernel_cache import writable_folder as w; print(json.dumps(str(w())))"
+
+    def folder(self, tmp_path, **environment):
+        kept = {
+            name: value
+            for name, value in os.environ.items()
+            if name not in (CACHE_VARIABLE, "XDG_CACHE_HOME")
+        }
+        done = subprocess.run(
+            [sys.executable, "-c", self.SCRIPT],
+            env={**kept, "TMPDIR": str(tmp_path), **environment},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return json.loads(done.stdout)
+
+    def test_the_variable_comes_first(self, tmp_path):
+        assert self.folder(tmp_path, **{CACHE_VARIABLE: str(tmp_path / "mine")}) == str(tmp_path / "mine")
+
+    @pytest.mark.skipif(sys.platform != "linux", reason="other folders")
+    def test_the_home(self, tmp_path):
+        home = tmp_path / "home"
+        home.mkdir()
+        assert self.folder(tmp_path, HOME=str(home)) == str(home / ".cache" / "coneflat")
+
+    @pytest.mark.skipif(sys.platform != "linux", reason="other folders")
+    def test_without_a_home_it_is_temporary_and_private(self, tmp_path):
+        folder = Path(self.folder(tmp_path, HOME="/nonexistent"))
+        assert folder == tmp_path / f"coneflat-{os.getuid()}"
+        assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+        assert not Path("/nonexistent").exists()
+
+    @pytest.mark.skipif(not hasattr(os, "getuid"), reason="no modes of files")
+    def test_a_temporary_folder_of_somebody_else_is_not_used(self, tmp_path):
+        target = tmp_path / "theirs"
+        target.mkdir()
+        (tmp_path / f"coneflat-{os.getuid()}").symlink_to(target)
+        assert self.folder(tmp_path, HOME="/nonexistent") == "None"
+
+
+def test_the_first_compilation_is_announced_and_reported(folder, caplog):
+    """One line, and the count of kernels in the progress of the stage."""
+    reported = []
+    watch = coneflat.base.Stopwatch(lambda text, fraction: reported.append(text))
+    with caplog.at_level(logging.WARNING), watch("stage"):
+        kernel = compiled(copy_of(product))
+        kernel(np.arange(4.0), 2.0)
+        kernel(np.arange(4), 2.0)
+    assert [record.getMessage() for record in caplog.records] == [
+        f"coneflat: compiling, once: about {kernel_cache.SECONDS_TO_COMPILE} s"
+    ]
+    assert reported == ["stage", "stage: compiling, once (1: product)", "stage: compiling, once (2: product)"]
