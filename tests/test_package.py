@@ -21,6 +21,13 @@ def test_every_public_name_is_there():
         _ = coneflat.nothing
 
 
+def test_packages_for_experts_are_there_and_not_public():
+    assert {"cones", "stages", "peers"} <= set(coneflat._PACKAGES)
+    assert not set(coneflat._PACKAGES) & set(coneflat.__all__)
+    for name, home in coneflat._PACKAGES.items():
+        assert getattr(coneflat, name) is import_module(f"coneflat.{home}")
+
+
 def test_import_and_help_load_nothing_heavy():
     script = "import sys, coneflat, coneflat.apps.cli.main; print(*sys.modules)"
     loaded = subprocess.run(
@@ -84,7 +91,7 @@ print(*sys.modules)
     assert not unused & set(printed[-2].split())
 
 
-@pytest.mark.parametrize("name", coneflat.__all__)
+@pytest.mark.parametrize("name", [*coneflat.__all__, "peers"])
 def test_examples_of_public_names_run(name, tmp_path, monkeypatch):
     """Those of its own docstring; plain values have none, and theirs are in the docstring of the package."""
     documented = getattr(coneflat, name)

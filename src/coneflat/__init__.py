@@ -65,12 +65,13 @@ _HOMES = {
     "ConeflatError": "errors",
 }
 
-#: Modules by name: first those in `__all__`, then the packages whose functions can be called directly.
-_MODULES = {"errors": "errors", "peers": "apps.peers"}
-_PACKAGES = (
+#: Modules by name: first those in `__all__`, then the packages for experts, whose functions can be called directly
+#: and may change.
+_MODULES = {"errors": "errors"}
+_PACKAGES = {"peers": "apps.peers"} | {name: name for name in (
     "atlas", "cones", "geometry", "io", "layout", "linalg",
     "mesh", "metric", "options", "seams", "stages",
-)  # fmt: skip
+)}  # fmt: skip
 
 __all__ = [
     "ConeCurve",
@@ -95,7 +96,6 @@ __all__ = [
     "measure",
     "measure_quads",
     "measure_uv",
-    "peers",
     "quads",
     "read_flattening",
     "read_mesh",
@@ -107,7 +107,7 @@ __all__ = [
 
 if TYPE_CHECKING:
     from . import atlas, cones, errors, geometry, io, layout, linalg, mesh, metric, options, seams, stages  # noqa: F401
-    from .apps import peers
+    from .apps import peers  # noqa: F401
     from .apps.measure_uv import measure_uv
     from .apps.quads.integer_grid import integer_grid
     from .apps.quads.integer_map import IntegerGrid
@@ -147,7 +147,7 @@ def __getattr__(name: str) -> Any:
     if name in _MODULES:
         return import_module("." + _MODULES[name], __name__)
     if name in _PACKAGES:
-        return import_module(f".{name}", __name__)
+        return import_module("." + _PACKAGES[name], __name__)
     if name in _HOMES:
         return getattr(import_module("." + _HOMES[name], __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
