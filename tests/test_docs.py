@@ -136,8 +136,3 @@ def test_private_words_are_replaced():
         for match in re.finditer("|".join(REPLACED_WORDS), line)
     ]
     assert not found, "\n".join(found)
-
-
-def test_documentation_is_short():
-    words = sum(len(path.read_text(encoding="utf-8").split()) for path in (ROOT / "docs").rglob("*.md"))
-    assert words <= 20_000
