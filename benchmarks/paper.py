@@ -1,6 +1,7 @@
-"""Section 5 of the paper on given meshes: its tables and figures, with the paper's numbers for comparison.
+"""Section 5 of the paper: its tables and figures, with the paper's numbers for comparison.
 
-    python benchmarks/paper.py fandisk.obj rocker-arm.obj -o paper
+    python benchmarks/paper.py                               # fandisk and rocker-arm, from tests/data
+    python benchmarks/paper.py foot.ply gargoyle.ply -o paper
 
 Models are recognised by their file names: fandisk, rocker-arm, foot, gargoyle, elephant, horse, hand, torso, isi-horse.
 """
@@ -16,6 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from common import MODELS as MODEL_FOLDER
 from methods import compare_all
 
 from coneflat import PAPER, ConeflatError, read_mesh
@@ -91,6 +93,10 @@ MODELS = {
     "torso": Published(284, 1.4e-6, _by_method(1.004, 1.005), _by_method(86, 24)),
     "isi-horse": Published(358, 8.4e-7, _by_method(1.009), _by_method(32)),
 }
+
+
+#: Models of the paper in its resolution that are in `tests/data`.
+STORED = ("fandisk.obj", "rocker-arm.obj")
 
 
 def model_of(path: Path) -> str | None:
@@ -332,7 +338,10 @@ def _cells(rows: Sequence[Sequence[object]], forms: Sequence[str]) -> list[list[
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("meshes", nargs="+", type=Path, help="files or folders")
+    parser.add_argument(
+        "meshes", nargs="*", type=Path, default=[MODEL_FOLDER / name for name in STORED],
+        help="files or folders; fandisk and rocker-arm by default",
+    )  # fmt: skip
     parser.add_argument(
         "-o", "--output", type=Path, default=Path("paper"), help="folder for tables and figures"
     )

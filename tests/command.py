@@ -1,9 +1,10 @@
-"""The command, run in this process: what it prints, and its exit code."""
+"""The command, run in this process: what it prints, and its exit code; signals of a process of its own."""
 
 from __future__ import annotations
 
 import gc
 import os
+import signal
 import sys
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
@@ -13,6 +14,16 @@ from unittest.mock import patch
 import pytest
 
 from coneflat.apps.cli.main import main
+
+
+def reset_signals():
+    """Handle signals by default: `nohup` and `&` of a shell ignore SIGHUP and SIGINT, and so does what they start."""
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
+#: Arguments of `subprocess.Popen` for a process that signals interrupt.
+INTERRUPTIBLE = {} if os.name == "nt" else {"preexec_fn": reset_signals}
 
 
 def command(*words, cwd="."):

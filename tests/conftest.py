@@ -2,17 +2,11 @@ from __future__ import annotations
 
 import pytest
 from browsing import browser, open_visit, viewed, viewed_page, visit  # noqa: F401
-from shapes import SHARED
+from stored import find_model
 
 
-@pytest.fixture
-def shared():
-    """Return the path of a real model; skip where there are none."""
-
-    def find(name: str):
-        path = SHARED / name
-        if not path.exists():
-            pytest.skip(f"the model {name} is not here")
-        return path
-
-    return find
+@pytest.fixture(scope="session")
+def shared(tmp_path_factory):
+    """Return the path of a real model by its name."""
+    folder = tmp_path_factory.mktemp("models")
+    return lambda name: find_model(name, folder)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,8 +14,6 @@ from coneflat.layout import lay_out
 from coneflat.mesh import cut_open
 from coneflat.seams import find_seams
 from coneflat.stages import Cut
-
-SHARED = Path(__file__).resolve().parents[2] / "shared" / "meshes"
 
 
 def tetrahedron():

@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 import shapes
+from stored import at_hand
 
 import coneflat
 from coneflat import errors
@@ -146,13 +147,11 @@ def test_the_length_of_up_means_nothing():
         assert np.array_equal(again.uv, plain.uv)
 
 
-@pytest.mark.parametrize("name", ["face.obj", "stanford-bunny.obj"])
+@pytest.mark.parametrize("name", ["rocker-arm.obj", *at_hand("face.obj", "stanford-bunny.obj")])
 @pytest.mark.parametrize("size", [51, 301])
-def test_a_number_of_cones_on_a_piece_of_a_scan(name, size):
-    path = shapes.SHARED / name
-    if not path.exists():
-        pytest.skip("the shared meshes are not here")
-    vertices, faces = as_input(path).vertices, np.asarray(as_input(path).faces)[:size]
+def test_a_number_of_cones_on_a_piece_of_a_scan(shared, name, size):
+    model = as_input(shared(name))
+    vertices, faces = model.vertices, np.asarray(model.faces)[:size]
     for count in (0, 1, 4):
         result = coneflat.flatten(vertices, faces, cone_count=count, repair=True)
         assert np.isfinite(result.uv).all()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapes
+from stored import at_hand
 
 from coneflat import TriangleMesh, errors, flatten, read_mesh
 from coneflat.geometry.triangles import edge_lengths
@@ -149,7 +150,7 @@ def test_unconverged_metric_is_refused(monkeypatch):
         flatten(*SHAPES["sphere"])
 
 
-@pytest.mark.parametrize("name", ["3holes.off", "knight.off", "spot.obj"])
+@pytest.mark.parametrize("name", ["rocker-arm.obj", "spot.obj", *at_hand("3holes.off", "knight.off")])
 def test_real_models_flatten_exactly(shared, name):
     result = flatten(read_mesh(shared(name)))
     d = result.distortion

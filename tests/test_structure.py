@@ -1,16 +1,13 @@
-"""The structure of the package: sizes that only go down, stages side by side, imports without circles."""
+"""The structure of the package: stages side by side, imports without circles."""
 
 from __future__ import annotations
 
 import ast
 import sys
-from collections import defaultdict
 from graphlib import CycleError
 from pathlib import Path
 
 import pytest
-
-import coneflat
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 from structure import (
@@ -20,86 +17,18 @@ from structure import (
     levels,
     package_of,
     read_modules,
-    size_of,
-    sizes,
-    total,
 )
 
 MODULES = read_modules()
-#: Lines of code per package, which only go down.
-CEILINGS = {
-    "": 112,
-    "__main__": 3,
-    "apps": 0,
-    "apps.ahead": 37,
-    "apps.batch": 384,
-    "apps.blender": 884,
-    "apps.cli": 1576,
-    "apps.controls": 49,
-    "apps.measure_uv": 159,
-    "apps.peers": 438,
-    "apps.quads": 3752,
-    "apps.studio": 1710,
-    "apps.transfer": 300,
-    "apps.brains": 259,
-    "apps.pyvista": 26,
-    "apps.unwrap": 1379,
-    "apps.view": 1545,
-    "atlas": 1352,
-    "base": 282,
-    "cone_curve": 108,
-    "cones": 2045,
-    "evaluate": 157,
-    "flatten": 221,
-    "flattener": 35,
-    "geometry": 1542,
-    "io": 2823,
-    "layout": 1901,
-    "linalg": 451,
-    "measure": 805,
-    "mesh": 533,
-    "metric": 915,
-    "options": 519,
-    "result": 96,
-    "sample": 5,
-    "seams": 169,
-    "source": 509,
-    "stages": 219,
-    "xatlas": 2,
-}
-#: Applications with a ceiling of their own, which the ceilings of everything else leave out.
-OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 #: Applications that set up the others, and modules of applications that others may import, beside options.
 FRONT = ("apps.ahead", "apps.blender", "apps.cli", "apps.studio")
 SHARED = ("apps.quads.nearest",)
-#: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_798, 232, 24_492
-CONSTANTS, KERNELS, NAMES, LEVELS = 292, 84, 30, 8
-#: Lines from which on a file may serve one other file alone.
-OWN_FILE = 80
+#: The most levels of the packages of the core.
+LEVELS = 8
 
 
 def is_core(name: str) -> bool:
     return name.split(".")[0] not in ("apps", "xatlas", "__main__")
-
-
-@pytest.fixture(scope="module")
-def found():
-    return sizes()
-
-
-def test_packages_are_within_their_ceilings(found):
-    lines = {name: size.lines for name, size in found.items()}
-    assert {name: count for name, count in lines.items() if count > CEILINGS.get(name, 0)} == {}
-
-
-def test_the_whole_is_within_its_ceilings(found):
-    rest = {name: size for name, size in found.items() if name not in OWN_CEILING}
-    core, everything = total(rest, core=True), total(rest, core=False)
-    assert (core.files <= CORE_FILES, core.lines <= CORE_LINES) == (True, True), core
-    assert (everything.files <= ALL_FILES, everything.lines <= ALL_LINES) == (True, True), everything
-    assert (everything.constants <= CONSTANTS, everything.kernels <= KERNELS) == (True, True), everything
-    assert len(coneflat.__all__) <= NAMES
 
 
 def test_packages_do_not_import_each_other_in_circles():
@@ -141,23 +70,6 @@ def test_the_core_imports_no_application(name: str):
     allowed = name in ("", "result", "__main__")
     imported = set() if allowed else module.imports | module.late_imports
     assert [other for other in imported if not is_core(other)] == []
-
-
-def test_a_file_for_one_other_is_large():
-    """But for formats, which have a file each."""
-    users = defaultdict(set)
-    for name, module in MODULES.items():
-        for other in module.imports | module.late_imports:
-            users[other].add(name)
-    small = {
-        name: size_of(module.path).lines
-        for name, module in MODULES.items()
-        if module.path.name != "__init__.py"
-        and len(users[name]) == 1
-        and not name.startswith("io.")
-        and len(module.path.read_text().split("\n")) <= OWN_FILE
-    }
-    assert small == {}
 
 
 def test_tests_mirror_the_packages():

@@ -59,22 +59,13 @@ class Size:
     Attributes:
         files: how many.
         lines: of code, without docstrings, comments and blank lines.
-        kernels: compiled functions.
-        constants: numeric constants of modules.
     """
 
     files: int
     lines: int
-    kernels: int
-    constants: int
 
     def __add__(self, other: Size) -> Size:
-        return Size(
-            self.files + other.files,
-            self.lines + other.lines,
-            self.kernels + other.kernels,
-            self.constants + other.constants,
-        )
+        return Size(self.files + other.files, self.lines + other.lines)
 
 
 def size_of(path: Path) -> Size:
@@ -87,14 +78,11 @@ def _size_of(path: Path, _: int) -> Size:
     text = path.read_text(encoding="utf-8")
     tree = ast.parse(text)
     documented = set[int]()
-    kernels = 0
     for node in ast.walk(tree):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)):
             first = node.body[0] if node.body else None
             if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
                 documented.update(range(first.lineno, (first.end_lineno or first.lineno) + 1))
-        if isinstance(node, ast.FunctionDef):
-            kernels += any(ast.unparse(each) == "compiled" for each in node.decorator_list)
     silent = (
         tokenize.COMMENT,
         tokenize.NL,
@@ -107,22 +95,7 @@ def _size_of(path: Path, _: int) -> Size:
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
         if token.type not in silent:
             lines.update(range(token.start[0], token.end[0] + 1))
-    return Size(1, len(lines - documented), kernels, sum(map(_numbers_of, tree.body)))
-
-
-def _numbers_of(node: ast.stmt) -> int:
-    """Return how many numeric constants a statement of a module defines."""
-    value = node.value if isinstance(node, (ast.Assign, ast.AnnAssign)) else None
-    several = value.elts if isinstance(value, ast.Tuple) else [value]
-    return sum(map(_is_number, several))
-
-
-def _is_number(node: ast.expr | None) -> bool:
-    if isinstance(node, ast.BinOp):
-        return _is_number(node.left) or _is_number(node.right)
-    if isinstance(node, ast.UnaryOp):
-        return _is_number(node.operand)
-    return isinstance(node, ast.Constant) and type(node.value) in (int, float)
+    return Size(1, len(lines - documented))
 
 
 def package_of(name: str) -> str:
@@ -138,14 +111,8 @@ def sizes(package: Path = PACKAGE) -> dict[str, Size]:
     found: dict[str, Size] = {}
     for name, module in read_modules(package).items():
         key = package_of(name)
-        found[key] = found.get(key, Size(0, 0, 0, 0)) + size_of(module.path)
+        found[key] = found.get(key, Size(0, 0)) + size_of(module.path)
     return found
-
-
-def total(found: dict[str, Size], core: bool) -> Size:
-    """Return the size of the core, or of everything."""
-    chosen = [size for name, size in found.items() if not (core and name.split(".")[0] == "apps")]
-    return sum(chosen, Size(0, 0, 0, 0))
 
 
 def imported_packages(modules: dict[str, Module]) -> dict[str, frozenset[str]]:
@@ -267,7 +234,7 @@ def packages_by_level(package: Path = PACKAGE) -> list[list[Package]]:
 
     def describe(name: str) -> Package:
         below = {merged(other) for each in imported if merged(each) == name for other in imported[each]}
-        size = sum((size for each, size in sized.items() if merged(each) == name), Size(0, 0, 0, 0))
+        size = sum((size for each, size in sized.items() if merged(each) == name), Size(0, 0))
         return Package(name, HOLDS.get(name, name), size, frozenset(below - {name}))
 
     heights = sorted(set(own_level.values()))
@@ -371,11 +338,9 @@ def _box(one: Package, row: int, x: float, top: float, width: float) -> str:
 def main() -> None:
     """Print the sizes of the packages and their levels."""
     found, heights = sizes(), levels(read_modules())
-    print(f"{'package':16}{'level':>6}{'files':>7}{'lines':>8}{'kernels':>9}{'constants':>11}")
-    rows = [*found.items(), ("core", total(found, core=True)), ("all", total(found, core=False))]
-    for name, size in rows:
-        level = heights.get(name, "") if name else ""
-        print(f"{name:16}{level:>6}{size.files:>7}{size.lines:>8}{size.kernels:>9}{size.constants:>11}")
+    print(f"{'package':16}{'level':>6}{'files':>7}{'lines':>8}")
+    for name, size in [*found.items(), ("all", sum(found.values(), Size(0, 0)))]:
+        print(f"{name:16}{heights.get(name, '') if name else '':>6}{size.files:>7}{size.lines:>8}")
 
 
 if __name__ == "__main__":

@@ -25,7 +25,7 @@ def texture_case(rng: Random, outcome: Outcome) -> None:
     """Unwrap a random mesh with random options; in one case of four as xatlas does."""
     vertices, faces, made = (make_mesh if rng.random() < 0.7 else make_tiny)(rng)
     if rng.random() < 0.25:
-        _like_xatlas(outcome, vertices, faces, made)
+        check_xatlas(outcome, vertices, faces, made)
         return
     import coneflat
     from coneflat.apps.unwrap.options import UnwrapOptions
@@ -74,7 +74,7 @@ def check_energy(outcome: Outcome, result: Any, bound: float) -> None:
         outcome.breach("energy above the bound", f"{mean.max():.5g}; notes {list(result.notes)}")
 
 
-def _like_xatlas(outcome: Outcome, vertices: np.ndarray, faces: np.ndarray, made: str) -> None:
+def check_xatlas(outcome: Outcome, vertices: np.ndarray, faces: np.ndarray, made: str) -> None:
     """Parametrize a mesh by `coneflat.xatlas`; wrong indices alone are refused."""
     import coneflat.xatlas
     from coneflat.geometry import find_overlaps

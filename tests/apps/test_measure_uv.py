@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import math
 
 import numpy as np
 import pytest
+import reference
 import shapes
 from click.testing import CliRunner
 
@@ -20,34 +20,6 @@ from coneflat.mesh.polygons import fan_corners
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 UNIT = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
 
-#: Our names of what the independent tool measures, and its own.
-THEIRS = {
-    "qc_mean": "qc_mean",
-    "qc_p95": "qc_p95",
-    "qc_max": "qc_max",
-    "area_std": "area_std",
-    "flipped": "flipped",
-    "mirrored_charts": "mirrored",
-    "triangles_without_uv": "n_nan",
-    "degenerate": "n_zero_uv",
-    "degenerate_input": "n_zero_3d",
-    "charts": "charts",
-    "seam_length": "seam_len",
-    "seam_mismatch": "seam_mismatch",
-    "box_efficiency": "packing",
-}
-
-
-@pytest.fixture
-def independent(shared):
-    path = shared("rocker-arm.obj").parents[1] / "tools" / "measure.py"
-    if not path.exists():
-        pytest.skip("the independent tool is not here")
-    spec = importlib.util.spec_from_file_location("independent_measure", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
 
 def written(folder, text, name="a.obj"):
     path = folder / name
@@ -55,38 +27,38 @@ def written(folder, text, name="a.obj"):
     return path
 
 
-def agree(path, independent, resolution=1024):
-    ours, theirs = measure_uv(path).report(), independent.measure(*independent.read_obj(path), res=resolution)
-    for name, other in THEIRS.items():
-        assert ours[name] == pytest.approx(theirs[other], rel=1e-9, abs=1e-12), name
-    # Theirs counts pixels.
-    assert ours["overlap"] == pytest.approx(theirs["overlap"], abs=0.01)
+def agree(path):
+    """Compare the report with measures by their definitions, and return it."""
+    ours, theirs = measure_uv(path).report(), reference.measures(*reference.read_obj(path))
+    for name, value in theirs.items():
+        # Overlap by definition counts pixels.
+        tolerance = {"abs": 0.01} if name == "overlap" else {"rel": 1e-9, "abs": 1e-12}
+        assert ours[name] == pytest.approx(value, **tolerance), name
     return ours
 
 
-class TestAgainstAnIndependentTool:
-    @pytest.mark.parametrize("name", ["spot.obj"])
-    def test_uvs_of_artists(self, name, independent, shared):
-        found = agree(shared(name), independent)
+class TestAgainstDefinitions:
+    def test_uvs_of_artists(self, shared):
+        found = agree(shared("spot.obj"))
         assert found["charts"] > 10
         assert found["flipped"] > 0
         assert found["overlapping_pairs"] > 0
 
-    def test_what_flatten_writes(self, independent, tmp_path):
+    def test_what_flatten_writes(self, tmp_path):
         result = coneflat.flatten(*shapes.genus(2), charts="atlas")
-        found = agree(result.save(tmp_path / "out.obj"), independent)
+        found = agree(result.save(tmp_path / "out.obj"))
         for measure in ("qc_mean", "area_std", "flipped", "seam_length", "overlapping_pairs"):
             assert found[measure] == pytest.approx(getattr(result.distortion, measure), rel=1e-9)
 
-    def test_polygons_as_fans(self, independent, tmp_path):
+    def test_polygons_as_fans(self, tmp_path):
         """A quad and a pentagon that are not convex in the plane: one half of each fan is flipped."""
         text = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 4 0 0\nv 5 1 0\nv 4 2 0\n"
         text += "vt 0 0\nvt .5 0\nvt .1 .1\nvt 0 .5\nvt 1 0\nvt .6 .1\nvt 1 .5\nvt .5 .5\n"
         text += "f 1/1 2/2 3/3 4/4\nf 2/2 5/5 6/6 7/7 3/8\n"
-        found = agree(written(tmp_path, text), independent)
+        found = agree(written(tmp_path, text))
         assert (found["polygons"], found["triangles"]) == (2, 5)
         turned = "f 2/2 3/3 4/4 1/1\n"
-        other = agree(written(tmp_path, text.replace("f 1/1 2/2 3/3 4/4\n", turned)), independent)
+        other = agree(written(tmp_path, text.replace("f 1/1 2/2 3/3 4/4\n", turned)))
         assert found["flipped"] != other["flipped"]
 
 

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapes
+from stored import stored_heights
 
 import coneflat
 from coneflat import TriangleMesh
@@ -24,21 +25,21 @@ def fan(rim, noise, seed):
     """A hub in the middle of a circle, moved up and down at random."""
     turn = 2 * np.pi * np.arange(rim) / rim
     points = np.concatenate([np.column_stack([np.cos(turn), np.sin(turn), 0 * turn]), [[0, 0, 0]]])
-    points[:, 2] = noise * np.random.default_rng(seed).normal(size=rim + 1)
+    points[:, 2] = noise * stored_heights(seed, rim + 1)
     around = np.arange(rim)
     return points, np.column_stack([around, np.roll(around, -1), np.full(rim, rim)])
 
 
 def spikes(cells, noise, seed):
     points, faces = shapes.grid(cells, cells)
-    points[:, 2] = noise * np.random.default_rng(seed).normal(size=len(points))
+    points[:, 2] = noise * stored_heights(seed, len(points))
     return points, faces
 
 
 def folded(noise, cells=16):
     """A curved sheet, moved up and down at random."""
     points, faces = shapes.hill(cells, cells)
-    points[:, 2] += noise * np.random.default_rng(5).normal(size=len(points))
+    points[:, 2] += noise * stored_heights("5", len(points))
     return points, faces
 
 
@@ -74,8 +75,8 @@ def inside(result):
 
 
 WILD = {
-    **{f"fan {noise} {seed}": fan(24, noise, seed) for noise in (6, 30) for seed in (3, 5)},
-    **{f"spikes {noise} {seed}": spikes(12, noise, seed) for noise in (0.3, 1.0) for seed in (0, 2)},
+    **{f"fan {noise} {seed}": fan(24, noise, seed) for noise in (6, 30) for seed in "35"},
+    **{f"spikes {noise} {seed}": spikes(12, noise, seed) for noise in (0.3, 1.0) for seed in "02"},
 }
 
 
@@ -116,7 +117,7 @@ class TestWinding:
 
     def test_a_vertex_that_is_wound_around_shows(self):
         """Six triangles of 120 degrees at the hub: all upright, 4 pi in all."""
-        _, faces = fan(6, 0, 0)
+        _, faces = fan(6, 0, "0")
         turn = 2 * np.pi * np.arange(7) / 3
         points = np.append(np.column_stack([np.cos(turn[:6]), np.sin(turn[:6])]), [[0, 0]], axis=0)
         from coneflat.geometry.planar import layout_curvature
@@ -140,7 +141,7 @@ class TestWinding:
 
 class TestFreeSeams:
     @pytest.mark.parametrize(
-        "mesh", [spikes(11, 1.0, 2), stretched(shapes.torus(30, 12), 60), stretched(shapes.sphere(3), 100)]
+        "mesh", [spikes(11, 1.0, "2"), stretched(shapes.torus(30, 12), 60), stretched(shapes.sphere(3), 100)]
     )
     def test_what_has_no_room_is_upright_at_the_expense_of_seams(self, mesh):
         result = coneflat.flatten(*mesh, charts="one")
@@ -156,7 +157,7 @@ class TestFreeSeams:
         assert result.distortion.seam_mismatch_max < 1e-6
 
     def test_an_embedded_disk_is_upright(self):
-        mesh = TriangleMesh(*spikes(9, 1.0, 0))
+        mesh = TriangleMesh(*spikes(9, 1.0, "0"))
         count = len(mesh.faces)
         points = embedded_disks(mesh, np.zeros(count, dtype=int), np.full(count, 1.5 / count))
         assert signed_double_areas(points[mesh.faces]).min() > 0
@@ -210,7 +211,7 @@ class TestPrescribed:
         np.testing.assert_allclose(flat, edge_lengths(mesh.vertices, mesh.faces).ravel()[sides], rtol=1e-9)
 
     def test_on_a_free_boundary_what_comes_out_is_what_was_wanted(self):
-        result = coneflat.flatten(*fan(12, 6, 2))
+        result = coneflat.flatten(*fan(12, 6, "2"))
         assert result.solve.untangled_vertices
         assert np.abs(result.curvature_residual).max() < 1e-9
 
@@ -283,7 +284,7 @@ class TestPatches:
         """A vertex whose six neighbours are held in an order around it that no place of it makes upright."""
         points = np.exp(1j * np.pi / 3 * np.array([0, 2, 1, 3, 4, 5]))
         points = np.append(points, 0)
-        _, faces = fan(6, 0, 0)
+        _, faces = fan(6, 0, "0")
         place = points[faces]
         sides = place[:, [2, 0, 1]] - place[:, [1, 2, 0]]
         twin = coneflat.geometry.intrinsic.halfedge_twins(TriangleMesh(np.zeros((7, 3)), faces))

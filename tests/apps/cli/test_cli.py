@@ -15,6 +15,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 import shapes
+from command import INTERRUPTIBLE
 from command import command as run
 
 import coneflat
@@ -178,7 +179,7 @@ def test_a_command_that_hangs_after_a_signal_is_ended():
         command.cli.main = hang
         command.main()"""
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=30, check=False
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=30, check=False, **INTERRUPTIBLE
     )
     assert done.returncode == 128 + signal.SIGTERM
     assert done.stderr == "coneflat: error: interrupted, and ended by force\n"
@@ -212,9 +213,13 @@ def test_messages_are_one_line(tmp_path):
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 @pytest.mark.parametrize("step", ["cones", "write"])
 def test_interrupt_leaves_no_incomplete_file(tmp_path, step, name):
-    shapes.write_obj(tmp_path / "big.obj", *shapes.sphere(5))
-    command = [sys.executable, "-m", "coneflat", "flatten", "-v", "big.obj", "-o", "out.obj"]
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+    shapes.write_obj(tmp_path / "big.obj", *shapes.sphere(4))
+    # A file that is written waits for the signal before it gets its name.
+    waiting = "import os, time; from coneflat.apps.cli.main import main; os.replace = lambda *_: time.sleep(60); main()"
+    command = [sys.executable, "-c", waiting, "flatten", "-v", "big.obj", "-o", "out.obj"]
+    with subprocess.Popen(
+        command, cwd=tmp_path, stderr=subprocess.PIPE, text=True, **INTERRUPTIBLE
+    ) as process:
         assert process.stderr is not None
         hanging = threading.Timer(60, process.kill)
         hanging.start()

@@ -16,6 +16,7 @@ import psutil
 import pytest
 import shapes
 from click.testing import CliRunner
+from command import INTERRUPTIBLE
 
 import coneflat
 from coneflat.apps.cli.main import cli
@@ -180,7 +181,9 @@ def test_the_command_prints_its_address_first_and_lives_on_this_machine(tmp_path
     pytest.importorskip("uvicorn")
     httpx = pytest.importorskip("httpx2")
     command = [sys.executable, "-m", "coneflat", "studio", "ball.obj", "--no-open"]
-    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.PIPE, text=True, **INTERRUPTIBLE
+    ) as process:
         try:
             address = process.stdout.readline().strip()
             base, token = address.split("/?token=")

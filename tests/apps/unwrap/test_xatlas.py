@@ -129,7 +129,7 @@ def test_export(tmp_path):
     assert "f 1/1/1 2/2/2" in text
 
 
-def test_the_types_of_xatlas(shared):
+def test_the_types_of_xatlas():
     theirs = pytest.importorskip("xatlas")
     vertices, faces = (np.asarray(each) for each in shapes.sphere(2))
     for one, two in zip(theirs.parametrize(vertices, faces), ours.parametrize(vertices, faces), strict=True):
