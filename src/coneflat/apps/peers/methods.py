@@ -9,7 +9,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ... import Flattening, TriangleMesh
-from ...base import FloatArray
+from ...base import FloatArray, warns
 from ...flatten import flatten_source
 from ...io import as_input
 from ...metric import find_metric
@@ -39,6 +39,7 @@ class PeerOptions(Options):
     method: str = option("exact", Choice(METHODS))
 
 
+@warns()
 def flatten_by(name: str, mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flattening:
     """Flatten a triangle mesh by a given method; the default is one chart per component, which all methods support.
 

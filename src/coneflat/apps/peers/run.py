@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import ConeflatError, Flattening
-from ...base import Progress
+from ...base import Progress, Unmet, warns
 from ...errors import OptionError
 from .methods import METHODS, flatten_by
 from .packages import PEERS, installed_peers, run_peer
@@ -69,6 +69,12 @@ class Comparison:
         return {entry.method: entry for entry in self.entries}[method]
 
 
+def _unmet_by_methods(comparison: Comparison, *_: Any) -> Iterator[Unmet]:
+    for name, result in comparison.drawn:
+        yield from (Unmet(f"{name}: {note}") for note in result.notes if isinstance(note, Unmet))
+
+
+@warns("`notes` of this warning", _unmet_by_methods)
 def compare_methods(
     mesh: Any,
     faces: ArrayLike | None = None,
