@@ -28,6 +28,11 @@ PEERS: Mapping[str, Callable[[TriangleMesh, FloatArray, ConeSolution], FlatMetri
 METHODS = ("exact", "linear", *PEERS)
 
 
+def label_of(method: str) -> str:
+    """Return the label of a method in tables, which says that a method of others is not the program of its authors."""
+    return f"{method} (reimplemented here)" if method in PEERS else method
+
+
 @dataclass(frozen=True, kw_only=True)
 class PeerOptions(Options):
     """Options of `coneflat.flatten`, with all methods.

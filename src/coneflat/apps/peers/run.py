@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from ... import ConeflatError, Flattening
 from ...base import Progress, Unmet, warns
 from ...errors import OptionError
-from .methods import METHODS, flatten_by
+from .methods import METHODS, flatten_by, label_of
 from .packages import PEERS, installed_peers, run_peer
 
 # Options that affect neither the cones nor the method from cones to a layout.
@@ -217,7 +217,7 @@ def markdown(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def comparison_rows(comparison: Comparison) -> list[list[str]]:
     """Return a row of cell texts for each method, without its note."""
     forms = [form for _, form in COLUMNS.values()]
-    return [[entry.method, *map(as_cell, numbers(entry), forms)] for entry in comparison.entries]
+    return [[label_of(entry.method), *map(as_cell, numbers(entry), forms)] for entry in comparison.entries]
 
 
 def comparison_markdown(comparison: Comparison) -> str:
