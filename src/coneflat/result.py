@@ -30,8 +30,7 @@ class Flattening:
 
     Attributes:
         vertices: (n, 3) positions in model units: those of the input or of the repaired mesh.
-        faces: (m, 3) vertex indices, consistently oriented, in the order of the input's faces. The triangles of a
-            refinement are in the order of the faces that contain them.
+        faces: (m, 3) vertex indices, consistently oriented, in the order of the input's faces.
         uv: (u, 2) points of the layout, in [0, 1]^2, all charts at one scale. With several UDIM tiles, tile i is the
             square [i % 10, i % 10 + 1] x [i // 10, i // 10 + 1].
         uv_faces: (m, 3) index into `uv` of every triangle corner.
