@@ -3,9 +3,9 @@
 The first table has a row for each model and package, the second one, that of the README, a row for each package. The
 models are those of `../shared/meshes` that are manifolds, and a bumpy sphere. The packages are coneflat with its
 default cones, with more of them, and its maps for textures; boundary first flattening (BFF) as `coneflat.peers`
-implements it, with the default cones and one chart; xatlas and uvunwrap with their defaults, where they are installed.
-All results are measured by
-`coneflat.measure` on the UV points that the packages return; seam lengths are divided by the square root of the area.
+implements it, not the program of its authors, with the default cones and one chart; xatlas and uvunwrap with their
+defaults, where they are installed. All results are measured by `coneflat.measure` on the UV points that the packages
+return; seam lengths are divided by the square root of the area.
 
 With `--matched`, the results of coneflat have the area distortion of the others: by `stretch` with the fewest cones
 that reach it, and by cones alone.
@@ -94,7 +94,7 @@ def flattened(mesh: TriangleMesh, more: float) -> Iterator[tuple[str, Flattening
     yield "coneflat unwrap", texture, time.perf_counter() - start
     start = time.perf_counter()
     boundary_first = flatten_by("bff", mesh.vertices, mesh.faces)
-    yield "BFF", boundary_first, time.perf_counter() - start
+    yield "BFF (reimplemented here), on coneflat's cones and cut", boundary_first, time.perf_counter() - start
     for name in ("xatlas", "uvunwrap"):
         if name in installed_peers():
             yield name, *run_peer(name, ours)

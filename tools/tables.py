@@ -20,6 +20,7 @@ from paper import MODELS as PUBLISHED
 
 import coneflat
 from coneflat.apps.peers import METHODS, Entry
+from coneflat.apps.peers.methods import label_of
 from coneflat.options import PAPER
 
 GALLERY = (
@@ -197,14 +198,14 @@ def methods_table(measured: Measured, body: str) -> str:
         qc, std, overlap = found[:, [1, 2, 4]].mean(axis=0)
         rows.append(
             [
-                name,
+                label_of(name),
                 _brief(error.max()),
                 f"{qc:.4f}",
                 f"{std:.3f}",
                 f"{flipped.sum():.0f}",
                 f"{overlap:.1%}",
                 _brief(np.median(mismatch)),
-                was[name][-1] if name in was else "",
+                was[label_of(name)][-1] if label_of(name) in was else "",
             ]
         )
     return _table(

@@ -81,12 +81,15 @@ def check_xatlas(outcome: Outcome, vertices: np.ndarray, faces: np.ndarray, made
 
     outcome.recipe = f"xatlas {made}"
     found = None
-    with warnings.catch_warnings(record=True) as caught, outcome.guarded(expects_nan=True):
+    with outcome.guarded(expects_nan=True), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         found = coneflat.xatlas.parametrize(vertices.astype(np.float32), faces)
-    notes = " ".join(str(each.message) for each in caught if each.category is UserWarning)
+    unmet = [each.message for each in caught if isinstance(each.message, coneflat.GuaranteeWarning)]
+    notes = " ".join(note for warning in unmet for note in warning.notes)
+    if len(unmet) > 1 or any(each.filename != __file__ for each in caught):
+        outcome.breach("xatlas: warnings", [str(each) for each in caught])
     for each in caught:
-        if each.category is not UserWarning:
+        if each.category is not coneflat.GuaranteeWarning:
             outcome.breach(f"xatlas: warning {each.message}", each.filename)
     if found is None:
         if len(faces) and faces.min() >= 0 and faces.max() < len(vertices):

@@ -63,6 +63,7 @@ _HOMES = {
     "save_figure": "apps.view",
     "studio": "apps.studio.notebook",
     "ConeflatError": "errors",
+    "GuaranteeWarning": "errors",
 }
 
 #: Modules by name: first those in `__all__`, then the packages for experts, whose functions can be called directly
@@ -79,6 +80,7 @@ __all__ = [
     "Distortion",
     "Flattener",
     "Flattening",
+    "GuaranteeWarning",
     "IntegerGrid",
     "MeshFile",
     "PAPER",
@@ -118,7 +120,7 @@ if TYPE_CHECKING:
     from .apps.unwrap.unwrap import unwrap
     from .apps.view import make_figure, save_figure
     from .cone_curve import ConeCurve, cone_curve, find_cones
-    from .errors import ConeflatError
+    from .errors import ConeflatError, GuaranteeWarning
     from .flatten import flatten
     from .flattener import Flattener
     from .io import read_flattening, read_mesh

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .base.arrays import FloatArray, IntArray
+from .base.notes import warns
 from .base.progress import Stopwatch
 from .base.threads import limit_threads
-from .cones import coneless_solution, open_search
+from .cones import coneless_solution, open_search, unmet_requests
 from .errors import OptionError
 from .geometry import double_areas
 from .geometry.operators import area_distortion, weighted_areas
@@ -32,11 +33,13 @@ class FoundCones:
         vertices: (s,) in the input's numbering.
         curvatures: (s,) radians.
         distortion: area distortion E of the linear model: standard deviation of the log scale, weighted by area.
+        notes: unmet requests, one sentence each.
     """
 
     vertices: IntArray
     curvatures: FloatArray
     distortion: float
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +103,7 @@ def _knee(counts: IntArray, distortions: FloatArray) -> int:
 
 
 @takes(FindOptions)
+@warns("found.notes")
 def find_cones(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> FoundCones:
     """Find the cones of the largest component of a mesh, without flattening it.
 
@@ -135,11 +139,13 @@ def find_cones(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Fou
         part = _largest(mesh, faces, chosen, stages)
         search = _open(part, stages)
         if isinstance(search, FoundCones):
-            return search
+            notes = unmet_requests(part.mesh, np.empty(0, np.int64), search.distortion, part.cones)
+            return replace(search, notes=notes)
         with stages("cones"):
             count = chosen.cone_count
             found = search.fewest(chosen.distortion) if count is None else search.best_of(count)
-    return _found_cones(found.solution, found.distortion, part)
+    notes = unmet_requests(part.mesh, found.solution.cones, found.distortion, part.cones)
+    return replace(_found_cones(found.solution, found.distortion, part), notes=notes)
 
 
 @takes(CurveOptions)

@@ -1,6 +1,6 @@
-"""Exceptions of the package; every failure that a user can cause raises one of these.
+"""Exceptions of the package; every failure that a user can cause raises one of these. And its one warning.
 
-All derive from `ConeflatError`. A message is one line: what is wrong, where, and what to do about it.
+All exceptions derive from `ConeflatError`. A message is one line: what is wrong, where, and what to do about it.
 
 Examples:
     >>> try:
@@ -115,3 +115,29 @@ class ProjectError(ConeflatError, ValueError):
 
 class StudioError(ConeflatError, ValueError):
     """The studio cannot perform a request."""
+
+
+class GuaranteeWarning(UserWarning):
+    """A result does not meet a guarantee, or a request; its text is that of the first notes.
+
+    A call of a public function gives one warning at most. `warnings.filterwarnings` ignores it or makes it an error;
+    the command line prints notes instead.
+
+    Attributes:
+        notes: the notes on all unmet guarantees of the call, one sentence each.
+
+    Examples:
+        >>> import warnings
+        >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
+        >>> with warnings.catch_warnings():
+        ...     warnings.simplefilter("error", coneflat.GuaranteeWarning)
+        ...     try:
+        ...         coneflat.flatten(*square, cone_count=5)
+        ...     except coneflat.GuaranteeWarning as warning:
+        ...         print(len(warning.notes), warning.notes[0].partition(":")[0])
+        1 0 cones instead of the 5 asked for
+    """
+
+    def __init__(self, text: str, notes: tuple[str, ...] = ()) -> None:
+        super().__init__(text)
+        self.notes = notes

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from .atlas import separate_overlaps
 from .base.arrays import FloatArray, IntArray
+from .base.notes import Unmet, warns
 from .base.progress import Stopwatch
 from .base.text import list_some, plural
 from .base.threads import concurrently, limit_threads
@@ -57,6 +58,7 @@ LAYING_OUT = 0.8
 
 
 @takes(Options)
+@warns()
 def flatten(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flattening:
     """Flatten a triangle mesh of any topology conformally, one disk or a few charts per connected component.
 
@@ -77,6 +79,9 @@ def flatten(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatte
         SeamError: every set of seams needs forbidden edges.
         MetricError: the computation found no finite result.
         TooLargeError: the mesh does not fit into the free memory.
+
+    Warns:
+        GuaranteeWarning: a guarantee, or a request, is not met; notes of the result say which.
 
     Examples:
         >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
@@ -152,8 +157,11 @@ def flatten_source(
     own = max(map(_excess, ([part] for part in prepared.parts), ([one] for one in every)))
     if (excess := max(own, _excess(prepared.parts, every))) > TOLERATED_EXCESS:
         every[0] = every[0].with_notes(
-            f"The triangles of {'a component' if own == excess else 'all components'} have an area distortion of "
-            f"{excess * o.distortion:.3g}, above the {o.distortion:g} allowed. Allow more cones, or refine the mesh."
+            Unmet(
+                f"The triangles of {'a component' if own == excess else 'all components'} have an area distortion of "
+                f"{excess * o.distortion:.3g}, above the {o.distortion:g} allowed. Allow more cones, or refine the "
+                "mesh."
+            )
         )
     return evaluate(prepared, every, o, watch)
 
@@ -309,11 +317,11 @@ def _failures(layout: Layout) -> tuple[int, int]:
     return len(layout.notes), len(infeasible_cones(layout))
 
 
-def _infeasible_notes(layout: Layout, part: Part) -> Iterator[str]:
+def _infeasible_notes(layout: Layout, part: Part) -> Iterator[Unmet]:
     infeasible = sorted(infeasible_cones(layout), key=layout.target.item)
     if infeasible:
         shown = [f"vertex {part.cones.names[v]} ({2 - layout.target[v] / np.pi:.3g} pi)" for v in infeasible]
-        yield (
+        yield Unmet(
             f"{plural(len(infeasible), 'cone')} with an angle that the surrounding triangles cannot form: "
             f"{list_some(shown)}; choose others, or refine the mesh."
         )

@@ -7,6 +7,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from .base.arrays import FloatArray
+from .base.notes import warns
 from .cones import close_search
 from .flatten import Preview, flatten_source
 from .io.packages import as_input
@@ -48,6 +49,7 @@ class Flattener:
         self._surfaces: dict[tuple[int, bool], Surface] = {}
         self._threads: int | None = None
 
+    @warns()
     def flatten(self, *, on_preview: Preview | None = None, **options: Any) -> Flattening:
         """Return the flattening for the given options.
 
@@ -61,6 +63,7 @@ class Flattener:
         """
         return self.flatten_as(read_options(options), on_preview)
 
+    @warns()
     def flatten_as(self, options: Options, on_preview: Preview | None = None) -> Flattening:
         """Return the flattening for parsed options; see `flatten`.
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .base.arrays import FloatArray, IntArray, rows_of
+from .base.notes import new_notes, warn_of, warns
 from .base.text import plural
 from .stages import SolveStatistics
 
@@ -29,8 +30,7 @@ class Flattening:
 
     Attributes:
         vertices: (n, 3) positions in model units: those of the input or of the repaired mesh.
-        faces: (m, 3) vertex indices, consistently oriented, in the order of the input's faces. The triangles of a
-            refinement are in the order of the faces that contain them.
+        faces: (m, 3) vertex indices, consistently oriented, in the order of the input's faces.
         uv: (u, 2) points of the layout, in [0, 1]^2, all charts at one scale. With several UDIM tiles, tile i is the
             square [i % 10, i % 10 + 1] x [i // 10, i // 10 + 1].
         uv_faces: (m, 3) index into `uv` of every triangle corner.
@@ -46,7 +46,8 @@ class Flattening:
         packing_efficiency: area of the layout over the area of the texture or textures.
         distortion: the measures of Section 5 of the paper and others.
         seconds: wall time of each stage.
-        notes: repairs of the input, unmet requests and unmet guarantees, one sentence each.
+        notes: repairs of the input, unmet requests and unmet guarantees, one sentence each. The unmet ones are also
+            a `GuaranteeWarning`.
         settings: the options of the flattening.
         solve: statistics of the metric and the layout: Newton steps, flips, untangled triangles.
         rotations: deviation of seam rotations from multiples of the cones' quantum; None without a quantum.
@@ -121,10 +122,14 @@ class Flattening:
             MeshFileError: the file cannot be written, or the texture cannot be read.
             OptionError: the format cannot contain a texture, or Pillow is not installed.
         """
-        from .io import write_flattening
+        from .io.write import write_stored
 
-        return write_flattening(self, path, texture)
+        written, stored = write_stored(self, path, texture)
+        # Rounding to the numbers of the format can break guarantees.
+        warn_of(new_notes(stored, self), f"result.as_written('{written.suffix.lower()}').notes")
+        return written
 
+    @warns()
     def as_written(self, ending: str) -> Flattening:
         """Return the result as a file of the given format stores it, measured again.
 

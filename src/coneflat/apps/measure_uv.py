@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import Distortion, TriangleMesh, check_mesh
-from ..base import FloatArray, IntArray, mask_of, plural, unit_exponent
+from ..base import FloatArray, IntArray, Unmet, mask_of, plural, unit_exponent, warns
 from ..errors import MissingUVError
 from ..geometry import MAX_CELLS, approximate_overlap_areas, find_overlaps, signed_double_areas
 from ..io import UVMesh, as_uv_mesh
@@ -96,6 +96,7 @@ class UVMeasures:
         )
 
 
+@warns("measures.notes")
 def measure_uv(
     mesh: Any,
     faces: ArrayLike | None = None,
@@ -260,7 +261,7 @@ def _cover(corner_uv: FloatArray) -> _Cover:
         if found.complete
         else f"More than {limit:,} pairs of triangles overlap; the rest was not counted. "
     )
-    note = f"{more}The overlap was counted in {MAX_CELLS:,} x {MAX_CELLS:,} pixels."
+    note = Unmet(f"{more}The overlap was counted in {MAX_CELLS:,} x {MAX_CELLS:,} pixels.")
     return _Cover(len(found.pairs), twice / area if area > 0 else 0.0, area, box_efficiency, (note,))
 
 

@@ -8,6 +8,10 @@ import numpy as np
 import pyvista
 
 from .. import Flattening, flatten, quads, unwrap
+from ..base import inner_calls, warn_of
+
+#: Where all notes are: PyVista's surfaces have no room for them.
+NOTES = "`notes` of this warning"
 
 
 @pyvista.register_dataset_accessor("coneflat", pyvista.PolyData)
@@ -30,7 +34,10 @@ class ConeflatAccessor:
         Raises:
             ConeflatError: as of `coneflat.flatten`.
         """
-        return self._with_data(flatten(self._mesh, **options))
+        with inner_calls():
+            result = flatten(self._mesh, **options)
+        warn_of(result.notes, NOTES)
+        return self._with_data(result)
 
     def unwrap(self, **options: Any) -> pyvista.PolyData:
         """Return the surface with texture coordinates, by `coneflat.unwrap`; points are repeated at seams.
@@ -38,7 +45,10 @@ class ConeflatAccessor:
         Raises:
             ConeflatError: as of `coneflat.unwrap`.
         """
-        return self._with_data(unwrap(self._mesh, **options))
+        with inner_calls():
+            result = unwrap(self._mesh, **options)
+        warn_of(result.notes, NOTES)
+        return self._with_data(result)
 
     def quads(self, **options: Any) -> pyvista.PolyData:
         """Return a quad mesh of the surface, by `coneflat.quads`, without its data: points and faces are others.
@@ -46,7 +56,9 @@ class ConeflatAccessor:
         Raises:
             ConeflatError: as of `coneflat.quads`.
         """
-        found = quads(self._mesh, **options)
+        with inner_calls():
+            found = quads(self._mesh, **options)
+        warn_of(found.notes, NOTES)
         return pyvista.PolyData(found.vertices, np.insert(found.quads, 0, 4, axis=1).ravel())
 
     def _with_data(self, result: Flattening) -> pyvista.PolyData:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.arrays import FloatArray, IntArray, rows_of
+from ..base.notes import Unmet
 from ..base.text import plural
 from ..geometry.overlap import overlaps_of_mesh
 from ..geometry.planar import signed_double_areas
@@ -95,7 +96,7 @@ def separate_overlaps(
     separated = with_charts(layout, charts)
     count = int(spec.is_forbidden[Seams(mesh, charts).edges].sum())
     note = f"{plural(count, 'forbidden edge')} had to be cut to separate overlaps."
-    return separated.with_notes(note) if count else separated
+    return separated.with_notes(Unmet(note)) if count else separated
 
 
 def with_charts(layout: Layout, charts: ChartLayout) -> Layout:

@@ -7,6 +7,7 @@ from .find import (
     coneless_solution,
     find_cones,
     open_search,
+    unmet_requests,
     uses_sparse_search,
 )
 from .given import cones_at, cones_with_curvature
@@ -19,5 +20,5 @@ from .sparse.search import ConeSearch
 __all__ = [
     "ConeSearch", "GroundedLaplacian", "CONE_ANGLE_PER_TRIANGLE", "MAX_POLYHEDRON_CORNERS", "MAX_SEARCHED",
     "SparseCones", "close_search", "cones_at", "cones_with_curvature", "find_cones", "greedy_cones",
-    "coneless_solution", "open_search", "uses_sparse_search",
+    "coneless_solution", "open_search", "unmet_requests", "uses_sparse_search",
 ]  # fmt: skip

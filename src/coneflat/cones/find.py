@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from ..base.arrays import FloatArray
+from ..base.arrays import FloatArray, IntArray
 from ..base.defaults import TYPED_TOLERANCE
+from ..base.notes import Unmet
 from ..base.progress import Stopwatch
 from ..base.text import plural
 from ..base.threads import MEMORY_BOUND_TRIANGLES
@@ -212,7 +213,7 @@ def _search(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holono
     mesh = surface.mesh
     only = coneless_solution(surface, spec)
     if only is not None:
-        return replace(only, notes=_unmet(mesh.genus(), len(only.cones), 0.0, spec))
+        return replace(only, notes=unmet_requests(mesh, only.cones, 0.0, spec))
     search = open_search(surface, spec, watch)
     distortion, count, most = spec.distortion, spec.count, spec.max_count
     found: SparseCones | QuantisedCones
@@ -231,25 +232,37 @@ def _search(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holono
             found = align_handles(search, quantised, by_scale, holonomy, bound)
     solution = found.solution
     cones = solution.cones[~mesh.is_boundary_vertex[solution.cones]]
-    notes = _unmet(mesh.genus(), len(cones), found.distortion, spec)
+    notes = unmet_requests(mesh, cones, found.distortion, spec)
     return replace(solution, cones=cones, is_searched=True, notes=notes)
 
 
-def _unmet(genus: int, cone_count: int, distortion: float, spec: ConeSpec) -> tuple[str, ...]:
-    """Return notes if the requested number of cones or distortion is not met, one sentence each."""
+def unmet_requests(
+    mesh: TriangleMesh, cones: IntArray, distortion: float, spec: ConeSpec
+) -> tuple[Unmet, ...]:
+    """Return notes if the requested number of cones or distortion is not met, one sentence each.
+
+    Args:
+        mesh: connected mesh.
+        cones: (s,) those that were found; on the boundary they do not count.
+        distortion: the area distortion that remains.
+        spec: what is required of the cones.
+    """
+    cone_count, genus = int((~mesh.is_boundary_vertex[cones]).sum()), mesh.genus()
     if spec.count is not None:
         if cone_count == spec.count:
             return ()
-        return (
+        note = (
             f"{plural(cone_count, 'cone')} instead of the {spec.count:,} asked for: within the given bounds, more "
-            "cones would not reduce the distortion, or there is no inner vertex for them.",
+            "cones would not reduce the distortion, or there is no inner vertex for them."
         )
+        return (Unmet(note),)
     if distortion <= spec.distortion * (1 + RELATIVE_TOLERANCE):
         return ()
     why = "no better cones were found within the given bounds"
     if spec.quantum is not None and genus and distortion <= spec.distortion * HOLONOMY_FACTOR:
         why = "cones were moved to align the rotations along handles"
-    return (
+    note = (
         f"The area distortion is {distortion:.3g} with {plural(cone_count, 'cone')}, above the "
-        f"{spec.distortion:g} allowed: {why}.",
+        f"{spec.distortion:g} allowed: {why}."
     )
+    return (Unmet(note),)

@@ -74,16 +74,16 @@ def write_flattening(result: Flattening, path: PathName, texture: PathName | Non
         MeshFileError: the file cannot be written, or the texture cannot be read.
         OptionError: the format does not support textures, or Pillow is not installed.
     """
-    return _write(result, path, texture)[0]
+    return write_stored(result, path, texture)[0]
 
 
 def write_measured(result: Flattening, path: PathName, texture: PathName | None = None) -> Flattening:
     """Write a flattened mesh as `write_flattening` does, and return it as the file stores it; see `as_written`."""
-    written, stored = _write(result, path, texture)
+    written, stored = write_stored(result, path, texture)
     return as_written(stored, written.suffix.lower())
 
 
-def _write(result: Flattening, path: PathName, texture: PathName | None) -> tuple[Path, Flattening]:
+def write_stored(result: Flattening, path: PathName, texture: PathName | None) -> tuple[Path, Flattening]:
     """Write a flattened mesh, and return the path and the arrays that were written."""
     path = check_output(path, texture)
     with atomic_write(path) as stream:

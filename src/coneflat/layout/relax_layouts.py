@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, mask_of, rows_of
+from ..base.notes import Unmet
 from ..errors import LengthError, MetricError, SeamError
 from ..geometry import double_areas
 from ..geometry.operators import MIN_WEIGHT, area_distortion, at_unit_scale, vertex_areas, weighted_areas
@@ -69,7 +70,7 @@ def relax_layouts(
             ]
         if isinstance(error, MetricError):
             raise
-        return [layouts[0].with_notes(f"Not relaxed: {error}.") if spec.relaxes_all else layouts[0]]
+        return [layouts[0].with_notes(Unmet(f"Not relaxed: {error}.")) if spec.relaxes_all else layouts[0]]
 
 
 def _relaxed(group: LayoutGroup, spec: RelaxSpec, report: Callable[[str], None]) -> list[Layout]:

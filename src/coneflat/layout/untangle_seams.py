@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of
+from ..base.notes import Unmet
 from ..base.text import list_some, plural
 from ..geometry.intrinsic import halfedge_twins
 from ..geometry.operators import cotangent_laplacian
@@ -72,10 +73,11 @@ def untangle_seams(layout: Layout, spec: ConeSpec, stretch: float, quantum: floa
     if not len(flipped):
         return layout
     where = list_some(f"vertex {name}" for name in np.unique(spec.names[layout.mesh.faces[flipped, 0]]))
-    return found.with_notes(
+    note = (
         f"{plural(len(flipped), 'triangle')} had no room between seams with equal sides, next to "
         f"{where}: they are positively oriented, but {caveat}."
     )
+    return found.with_notes(Unmet(note))
 
 
 def untangled_disk(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.arrays import unit_exponent
+from ..base.notes import Unmet
 from ..base.text import list_some, plural
 from ..geometry.overlap import Overlaps
 from ..geometry.planar import sides_between
@@ -39,14 +40,14 @@ NOT_ROUND, NOT_ROUND_SHARE = 1e-6, 0.02
 ROUGH_TOLERANCE = 0.01
 
 
-def unmet_guarantees(result: Flattening, unit: float = DOUBLE) -> tuple[str, ...]:
+def unmet_guarantees(result: Flattening, unit: float = DOUBLE) -> tuple[Unmet, ...]:
     """Return a note, one sentence, for each guarantee of the options that a result does not meet.
 
     Args:
         result: the result with its measures.
         unit: relative rounding of the coordinates.
     """
-    return (
+    notes = (
         *_orientation(result),
         *_overlaps(result),
         *_angle_sums(result, unit),
@@ -56,6 +57,7 @@ def unmet_guarantees(result: Flattening, unit: float = DOUBLE) -> tuple[str, ...
         *_seam_rotations(result, unit),
         *_distortion(result),
     )
+    return tuple(map(Unmet, notes))
 
 
 def remeasured(

@@ -45,7 +45,7 @@ def as_dict(result: Flattening) -> dict[str, Any]:
         "cone_vertices": result.cones.tolist(),
         "cone_curvatures": result.curvatures.tolist(),
         "seconds": dict(result.seconds),
-        "notes": list(result.notes),
+        "notes": list(map(str, result.notes)),
         "settings": dict(result.settings),
     }
     return {name: _plain(value) for name, value in report.items()}

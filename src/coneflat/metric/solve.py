@@ -1,4 +1,7 @@
-"""The exact method: the curvature is exact, both sides of a seam have equal lengths, no triangle is flipped."""
+"""The exact method: the curvature is exact, and both sides of a seam have equal lengths.
+
+Its straight triangles may be flipped in the plane, where `layout` untangles them.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from functools import partial
 import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..base.notes import Unmet
 from ..base.text import error_text, plural
 from ..errors import ConvergenceError
 from ..geometry import double_areas
@@ -164,11 +168,12 @@ def _length_notes(
     missed = int(np.count_nonzero(off > LENGTH_TOLERANCE))
     if not missed:
         return ()
-    return (
+    note = (
         f"{plural(missed, 'edge')} of {len(sides):,} on the boundary or on marked seams could not keep their lengths, "
         f"with relative errors of up to {off.max():.2g}: the triangles there are too coarse for the curvature nearby. "
-        "Remesh there, or allow more cones.",
+        "Remesh there, or allow more cones."
     )
+    return (Unmet(note),)
 
 
 def _is_too_sharp(boundary: BoundaryCurvature, wanted: FloatArray) -> bool:

@@ -199,8 +199,8 @@ class MetricOptions:
     """Metric.
 
     Attributes:
-        method: exact: no curvature error and no flipped triangles. linear: the linear system and least squares layout
-            of the paper.
+        method: exact: no curvature error; flipped triangles are untangled, and those that remain are reported with
+            their number. linear: the linear system and least squares layout of the paper.
         boundary: Shape of the boundary, with the exact metric. free: the least area distortion. lengths: preserve the
             edge lengths of the boundary. disk: a circle. straight: straight sides between corners that the search
             finds together with the cones. Or the corners of a polygon: vertices with curvatures, or all without for

@@ -9,6 +9,7 @@ from typing import Generic, TypeAlias, TypeVar
 import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of
+from ..base.notes import Unmet
 from ..base.text import list_some, plural
 from ..errors import OptionError
 from ..geometry import double_areas, edge_lengths, mollify
@@ -212,9 +213,11 @@ def _own_lengths(given: InputMesh, checked: CheckedMesh, options: Options) -> Fl
     return lengths_of_input(checked, options.lengths, len(np.asarray(given.faces)))
 
 
-def _isolated_note(pairs: IntArray) -> str:
+def _isolated_note(pairs: IntArray) -> Unmet:
     names = list_some([f"{a}-{b}" for a, b in pairs[:5].tolist()], len(pairs))
-    return f"Not cut: {plural(len(pairs), 'edge')} ({names}) marked as seams that touch no other seam and no boundary."
+    return Unmet(
+        f"Not cut: {plural(len(pairs), 'edge')} ({names}) marked as seams that touch no other seam and no boundary."
+    )
 
 
 def _part(

@@ -61,6 +61,8 @@ def test_tables_hold_what_was_measured(compared):
     table = comparison_markdown(compared)
     assert table.count("| ") >= (len(METHODS) + 2) * len(COLUMNS)
     assert "- lscm: " in table
+    assert "| bff (reimplemented here) |" in table
+    assert "| exact |" in table
     rows = list(csv.DictReader(io.StringIO(comparison_csv(compared))))
     assert [row["method"] for row in rows] == list(METHODS)
     assert set(COLUMNS) < set(rows[0])

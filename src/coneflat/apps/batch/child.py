@@ -8,6 +8,7 @@ import sys
 import time
 from typing import IO, Any
 
+from ...base import inner_calls
 from .jobs import COLUMNS
 
 
@@ -50,7 +51,8 @@ def main() -> None:
     """Serve over standard input and output; what libraries print is redirected to standard error."""
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
-    serve(sys.stdin, answers)
+    with inner_calls():  # The rows have the notes.
+        serve(sys.stdin, answers)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ... import Flattening, MeshFile, check_mesh, flatten
-from ...base import BoolArray, FloatArray, IntArray, mask_of, plural
+from ...base import BoolArray, FloatArray, IntArray, mask_of, plural, warns
 from ...errors import OptionError
 from ...geometry import signed_double_areas
 from ...io import UVMesh, as_path, checked_target, read_label, read_mesh
@@ -67,6 +67,7 @@ class FlatCortex:
         return path
 
 
+@warns("flat.result.notes", lambda flat, *_: flat.result.notes)
 def flatten_cortex(
     surface: str | PathLike[str],
     *,

@@ -79,14 +79,15 @@ def cones(
             )
         console.say(f"note: {note}" for note in joined.notes())
         wanted = options.pop("distortion", DISTORTION)
-        count = options.pop("cone_count", None)
+        options.pop("cone_count", None)
         if flags.curve:
             with console.stage("curve", 0.5):
                 most = max(flags.most, len(found_cones.vertices))
                 found = cone_curve(source, most=most, progress=console.part(0.5), **options)
             console.say(_curve_lines(found, wanted))
         else:
-            console.say(_cone_lines(found_cones, wanted if count is None else None))
+            console.say(_cone_lines(found_cones))
+            console.say(f"note: {note}" for note in found_cones.notes)
         if picture is not None:
             with console.stage("draw"):
                 save_figure(make_figure(found, "curve", distortion=wanted, title=mesh.name), picture)
@@ -105,13 +106,8 @@ def _curve_lines(curve: ConeCurve, wanted: float) -> Iterator[str]:
         yield f"{number:5d}  {each.distortion:.4f}  {', '.join(marks)}".rstrip()
 
 
-def _cone_lines(cones: FoundCones, allowed: float | None) -> Iterator[str]:
-    """Yield a line for each cone, and the distortion.
-
-    allowed: largest area distortion allowed; None if the number of cones was given.
-    """
+def _cone_lines(cones: FoundCones) -> Iterator[str]:
+    """Yield a line for each cone, and the distortion."""
     for vertex, curvature in zip(cones.vertices, cones.curvatures, strict=True):
         yield f"vertex {vertex:8d}  curvature {curvature / math.pi:+.4f} pi"
     yield f"{plural(len(cones.vertices), 'cone')}, area distortion {cones.distortion:.4f}"
-    if allowed is not None and cones.distortion > allowed * (1 + 1e-9):
-        yield f"note: the area distortion is above {allowed:g}: no better cones were found within the bounds"

@@ -14,6 +14,7 @@ from typing import NoReturn
 import click
 
 from ... import ConeflatError, __version__
+from ...base import inner_calls
 from .batch import batch
 from .cones import cones
 from .figure import demo, figure
@@ -33,8 +34,10 @@ class Interrupted(KeyboardInterrupt):
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="coneflat")
-def cli() -> None:
+@click.pass_context
+def cli(context: click.Context) -> None:
     """Flatten triangle meshes into the plane: conformal UV maps with automatic cones and seams."""
+    context.with_resource(inner_calls())  # Notes are printed, so they are not warnings as well.
 
 
 for command in (

@@ -9,7 +9,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from ... import Flattening, TriangleMesh
-from ...base import FloatArray
+from ...base import FloatArray, warns
 from ...flatten import flatten_source
 from ...io import as_input
 from ...metric import find_metric
@@ -28,6 +28,11 @@ PEERS: Mapping[str, Callable[[TriangleMesh, FloatArray, ConeSolution], FlatMetri
 METHODS = ("exact", "linear", *PEERS)
 
 
+def label_of(method: str) -> str:
+    """Return the label of a method in tables, which says that a method of others is not the program of its authors."""
+    return f"{method} (reimplemented here)" if method in PEERS else method
+
+
 @dataclass(frozen=True, kw_only=True)
 class PeerOptions(Options):
     """Options of `coneflat.flatten`, with all methods.
@@ -39,6 +44,7 @@ class PeerOptions(Options):
     method: str = option("exact", Choice(METHODS))
 
 
+@warns()
 def flatten_by(name: str, mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flattening:
     """Flatten a triangle mesh by a given method; the default is one chart per component, which all methods support.
 

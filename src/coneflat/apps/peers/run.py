@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import ConeflatError, Flattening
-from ...base import Progress
+from ...base import Progress, Unmet, warns
 from ...errors import OptionError
-from .methods import METHODS, flatten_by
+from .methods import METHODS, flatten_by, label_of
 from .packages import PEERS, installed_peers, run_peer
 
 # Options that affect neither the cones nor the method from cones to a layout.
@@ -69,6 +69,12 @@ class Comparison:
         return {entry.method: entry for entry in self.entries}[method]
 
 
+def _unmet_by_methods(comparison: Comparison, *_: Any) -> Iterator[Unmet]:
+    for name, result in comparison.drawn:
+        yield from (Unmet(f"{name}: {note}") for note in result.notes if isinstance(note, Unmet))
+
+
+@warns("`notes` of this warning", _unmet_by_methods)
 def compare_methods(
     mesh: Any,
     faces: ArrayLike | None = None,
@@ -211,7 +217,7 @@ def markdown(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def comparison_rows(comparison: Comparison) -> list[list[str]]:
     """Return a row of cell texts for each method, without its note."""
     forms = [form for _, form in COLUMNS.values()]
-    return [[entry.method, *map(as_cell, numbers(entry), forms)] for entry in comparison.entries]
+    return [[label_of(entry.method), *map(as_cell, numbers(entry), forms)] for entry in comparison.entries]
 
 
 def comparison_markdown(comparison: Comparison) -> str:

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from ...base import FloatArray, IntArray, dots, list_some, plural
+from ...base import FloatArray, IntArray, Unmet, dots, list_some, plural
 from ...errors import GridError
 from ...geometry import signed_double_areas
 from ...mesh import NEXT, PREVIOUS, label_components
@@ -69,7 +69,7 @@ def extract_quads(grid: IntegerGrid, leave_out: bool = False) -> QuadMesh:
         text = f"{plural(int(bad.sum()), 'quad')} of {len(quads):,} with a vertex or an edge twice"
         if not leave_out or bad.all():
             raise CoarseGridError(f"{text} ({list_some(np.flatnonzero(bad))}): use more quads", grid)
-        darts, notes = darts[~bad], (*notes, f"Left out {text}: the surface is too thin there.")
+        darts, notes = darts[~bad], (*notes, Unmet(f"Left out {text}: the surface is too thin there."))
         origin, quads, edges = _split_fans(darts, mates, ports.points)
     barycentric = _barycentric(exact, found, origin)
     corners = exact.mesh.vertices[exact.mesh.faces[found.faces[origin]]]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import Flattening
-from ...base import THREADS, FloatArray, Stopwatch, limit_threads, plural
+from ...base import THREADS, FloatArray, Stopwatch, Unmet, limit_threads, plural, warns
 from ...errors import ConvergenceError, CurvatureError, GridError, MetricError, OptionError, SeamError
 from ...flatten import flatten_source
 from ...geometry import double_areas, edge_lengths
@@ -43,6 +43,7 @@ QUADS_AT_UNIT_PRICE = 2_000
 NO_GRID = (ConvergenceError, CurvatureError, GridError, MetricError, SeamError)
 
 
+@warns("grid.notes")
 def integer_grid(
     mesh: Any,
     faces: ArrayLike | None = None,
@@ -75,6 +76,9 @@ def integer_grid(
     Raises:
         GridError: no grid of this size without flipped triangles was found.
         MeshError, CurvatureError, OptionError, SeamError, MetricError: as for `coneflat.flatten`.
+
+    Warns:
+        GuaranteeWarning: a guarantee, or a request, is not met; notes of the result say which.
 
     Notes:
         A smooth layout with quantised cones (Kaelberer, Nieser, Polthier, "QuadCover", 2007) is scaled. Translations of
@@ -184,7 +188,9 @@ class GridSearch:
             found = search.of_any_size(tries - 1)
         except NO_GRID:
             raise coarse from None
-        return with_note(found, "More quads than wanted: with fewer, some have a vertex or an edge twice.")
+        return with_note(
+            found, Unmet("More quads than wanted: with fewer, some have a vertex or an edge twice.")
+        )
 
     def _as_given(self) -> IntegerGrid:
         """Return a grid for the options as given."""
@@ -213,7 +219,9 @@ class GridSearch:
             # Where rotations are not reached, others hardly ever help, and each metric takes long.
             if is_far:
                 break
-        note = f"Cones are not chosen for {what}, because no grid with such cones was found: {failed[-1]}."
+        note = Unmet(
+            f"Cones are not chosen for {what}, because no grid with such cones was found: {failed[-1]}."
+        )
         try:
             return self._of_flattening(note=note)
         except NO_GRID as error:
@@ -248,7 +256,9 @@ class GridSearch:
             except CoarseGridError as error:  # its bad quads are left out
                 found.append(error.grid)
             except NO_GRID as error:
-                why.append(f"No grid for a component of {plural(len(part.faces), 'triangle')}: {error}.")
+                why.append(
+                    Unmet(f"No grid for a component of {plural(len(part.faces), 'triangle')}: {error}.")
+                )
         if not found:
             raise GridError(f"no grid was found for any of {mesh.components[0]} components: {why[0]}")
         return joined_grids(found, (*checked.notes, *why))
@@ -284,7 +294,9 @@ class GridSearch:
         except NO_GRID as error:
             if isinstance(error, CoarseGridError):
                 raise
-            why = f"The boundary cuts squares, because no grid with the boundary on grid lines was found: {error}."
+            why = Unmet(
+                f"The boundary cuts squares, because no grid with the boundary on grid lines was found: {error}."
+            )
         return self._of_flattening(note=why)
 
     @property
@@ -377,5 +389,7 @@ class GridSearch:
         except GridError:
             if all_sides or len(sided.sides.points) == len(layout.sides.points):
                 raise
-        why = "Straight sides of different loops are not parallel up to quarter turns, so not all on grid lines."
+        why = Unmet(
+            "Straight sides of different loops are not parallel up to quarter turns, so not all on grid lines."
+        )
         return with_note(grid_about(find_rounding(split_between_nodes(layout)), self.energy, most), why)

@@ -13,7 +13,7 @@ from itertools import count
 import numpy as np
 from scipy.sparse.csgraph import dijkstra
 
-from ...base import BoolArray, ComplexArray, FloatArray, IntArray, mask_of, plural
+from ...base import BoolArray, ComplexArray, FloatArray, IntArray, Unmet, mask_of, plural
 from ...errors import GridError
 from ...geometry import map_factors, signed_angles
 from ...layout import StretchEnergy
@@ -77,7 +77,7 @@ def grid_with_lines(
     if not is_required or not len(left):
         return found, "There are no sharp edges." if is_required and not len(sharp) else ""
     share = 100 * lengths_along(mesh, left).sum() / lengths_along(mesh, sharp).sum()
-    return found, (
+    return found, Unmet(
         f"{plural(len(left), 'sharp edge')} of {len(sharp):,}, {share:.1f} % of their length, not on grid lines: {why}."
     )
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ...base import Stopwatch, plural
+from ...base import Stopwatch, Unmet, plural, warns
 from ...errors import OptionError
 from ...options import read_options
 from .cross_field import sharp_ends
@@ -21,6 +21,7 @@ from .simpler_mesh import SimplerMesh, simplified
 from .smooth import smooth_quads
 
 
+@warns()
 def quads(
     mesh: Any,
     faces: ArrayLike | None = None,
@@ -52,6 +53,9 @@ def quads(
         GridError: no grid of this size, or somewhat finer, without flipped triangles was found.
         OptionError: an option is unknown or invalid.
         MeshError, CurvatureError, SeamError, MetricError: as for `coneflat.flatten`.
+
+    Warns:
+        GuaranteeWarning: a guarantee, or a request, is not met; notes of the result say which.
 
     Examples:
         >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
@@ -90,7 +94,12 @@ def quads(
             found, features = small.moved(found), sharp_ends(small.given)
         found = smooth_quads(found, smooth, features)
         found = found if small is None else small.completed(found)
-    notes = (*(() if small is None else small.notes), *grid.notes, *found.notes, *_notes(found, small))
+    notes = (
+        *(() if small is None else small.notes),
+        *grid.notes,
+        *found.notes,
+        *map(Unmet, _notes(found, small)),
+    )
     return replace(found, notes=notes, seconds={**grid.seconds, **stages.seconds}, grid=grid, source=source)
 
 

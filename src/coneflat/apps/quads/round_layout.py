@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...base import ComplexArray, IntArray, mask_of
+from ...base import ComplexArray, IntArray, Unmet, mask_of
 from ...errors import ConvergenceError, GridError, OptionError
 from ...geometry import as_complex, as_pairs, double_areas
 from ...layout import Lines, PointConstraints, Relaxed, StretchEnergy, relax
@@ -66,7 +66,8 @@ def grid_about(rounding: Rounding, energy: StretchEnergy, most: int) -> IntegerG
         if abs(np.log(last / wanted)) < abs(np.log(found.squares / wanted)):
             found = replace(other, size=rounding.layout.size)
     if abs(found.squares - wanted) > NOTED_SHARE * wanted:
-        found = with_note(found, f"The grid has an area of {found.squares:,.0f} squares, not {wanted:,.0f}.")
+        note = Unmet(f"The grid has an area of {found.squares:,.0f} squares, not {wanted:,.0f}.")
+        found = with_note(found, note)
     return found
 
 

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
 from ... import TriangleMesh
-from ...base import BoolArray, FloatArray, IntArray, mask_of, plural
+from ...base import BoolArray, FloatArray, IntArray, Unmet, mask_of, plural
 from ...geometry import angle_defect, coarse_mesh, corner_angles, double_areas, edge_lengths, mollify
 from ...io import as_input
 from ...layout import joined
@@ -146,7 +146,7 @@ class SimplerMesh:
         on, weights = TriangleTree(whole.vertices, whole.faces).nearest(np.concatenate(points))
         places = np.einsum("qi,qix->qx", weights, whole.vertices[whole.faces[on]])
         bare = plural(int(is_bare.sum()), "component")
-        note = f"Made three quads of each triangle of {bare} without a grid."
+        note = Unmet(f"Made three quads of each triangle of {bare} without a grid.")
         return replace(
             quads,
             vertices=np.concatenate([quads.vertices, places]),
@@ -184,7 +184,7 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
     simple, some, of = filled, np.arange(len(filled.vertices)), np.arange(len(filled.faces))
     if is_jagged:
         search = replace(search, boundary="free")
-        notes.append(f"The boundary cuts squares, because it has more than {MAX_CORNERS} corners.")
+        notes.append(Unmet(f"The boundary cuts squares, because it has more than {MAX_CORNERS} corners."))
     if _is_thin(filled).mean() > 0.1 and len(without_pillows(filled).faces) == len(of):
         simple, some, of = _retriangulated(filled, int(np.clip(4 * quads, COARSE // 6, count)))
     if len(simple.faces) > 2 * count:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import ConeflatError, Flattener, Flattening, unwrap
-from ...base import FloatArray, cancel_with
+from ...base import FloatArray, cancel_with, inner_calls
 from ...errors import DegenerateFaceError, NonManifoldError, NonOrientableError
 from ...io import Joined, Texture, read_joined
 from ...options import MAX_SHOWN_TRIANGLES
@@ -271,7 +271,8 @@ def main() -> None:
     """Serve over standard input and output; what libraries print is redirected to standard error."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    serve(Jobs(sys.stdin.buffer), answers)
+    with inner_calls():  # The page shows the notes.
+        serve(Jobs(sys.stdin.buffer), answers)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from ... import io
-from ...base import FloatArray, IntArray, check_cancelled
+from ...base import FloatArray, IntArray, Unmet, check_cancelled, warns
 from ...errors import OptionError
 from ...geometry import fill_nearest, signed_double_areas, unit_vectors
 from ...io import UVMesh, as_path
@@ -71,6 +71,7 @@ class Baked:
         return path
 
 
+@warns("baked.notes")
 def transfer(
     old: str | PathLike[str],
     new: str | PathLike[str],
@@ -119,9 +120,13 @@ def transfer(
     if any("TANGENT" in one["attributes"] for mesh in meshes for one in mesh["primitives"]):
         notes.append("Tangents are left out of a GLB: viewers compute those of the new UVs.")
     if twice:
-        notes.append(f"UVs overlap: {twice:,} texels are in several triangles, and show the first of them.")
+        notes.append(
+            Unmet(f"UVs overlap: {twice:,} texels are in several triangles, and show the first of them.")
+        )
     if farthest > FAR:
-        notes.append(f"The models differ: points are up to {farthest:.1%} of the size from the old surface.")
+        notes.append(
+            Unmet(f"The models differ: points are up to {farthest:.1%} of the size from the old surface.")
+        )
     filled = {channel.name: image[tuple(source)] for channel, image in images.items()}
     return Baked(filled, _material(painted, filled), tuple(notes), new, target)
 

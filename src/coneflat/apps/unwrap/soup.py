@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...atlas import pack_charts, round_safely
-from ...base import FloatArray, IntArray
+from ...base import FloatArray, IntArray, Unmet, plural
 from ...errors import ConeflatError
 from ...geometry import as_pairs, edge_lengths
 from ...io import stored_in_glb
@@ -51,7 +51,9 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
     one, two, three = place.ravel()[faces].T
     is_face = (one != two) & (two != three) & (three != one) & np.isfinite(vertices[faces]).all(axis=(1, 2))
     chosen = np.flatnonzero(is_face)
-    notes = [f"{len(faces) - len(chosen):,} faces without area."] if len(chosen) < len(faces) else []
+    left_out, notes = len(faces) - len(chosen), list[str]()
+    if left_out:
+        notes.append(Unmet(f"{plural(left_out, 'face')} without area: the UVs of each are one point."))
     if not len(chosen):
         return UnwrappedSoup(corner_uv, chart, 0.0, 0.0, tuple(notes))
     corner = _oriented(place.ravel()[faces[chosen]])
@@ -60,7 +62,7 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
     try:
         result = unwrap(points, corner, repair=True, **options)
     except ConeflatError as error:
-        notes.append(f"Each face is a chart of its own: {error}.")
+        notes.append(Unmet(f"Each face is a chart of its own: {error}."))
         sides = rest_sides(edge_lengths(points, corner))
         flat = np.stack([np.zeros(len(sides)), sides[:, 2], -sides[:, 1]], axis=1)
         packed = pack_charts(as_pairs(flat.ravel()).reshape(-1, 3, 2), np.arange(len(chosen)))
@@ -72,7 +74,8 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
     uv, overlaps = round_safely(result.uv, result.uv_faces, stored_in_glb)
     notes.extend(result.notes)
     if len(overlaps.pairs) > result.distortion.overlapping_pairs:
-        notes.append("Triangles overlap in single precision.")
+        count = plural(len(overlaps.pairs), "pair")
+        notes.append(Unmet(f"{count} of triangles overlap in single precision."))
     corner_uv[known], chart[known] = uv[result.uv_faces], label_faces(result.uv_faces, len(uv))[1]
     return UnwrappedSoup(corner_uv, chart, result.packing_efficiency, result.uv_scale, tuple(notes))
 

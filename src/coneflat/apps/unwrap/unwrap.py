@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import Distortion, Flattening
-from ...base import TYPED_TOLERANCE, FloatArray, Stopwatch, limit_threads, plural
+from ...base import TYPED_TOLERANCE, FloatArray, Stopwatch, Unmet, limit_threads, plural, warns
 from ...errors import ConvergenceError, OptionError
 from ...evaluate import evaluate
 from ...flatten import Method, with_copies
@@ -46,6 +46,7 @@ FREE = "free seams"
 
 
 @takes(UnwrapOptions)
+@warns()
 def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flattening:
     """Return UVs for a texture: the shortest seams for which the layout is nearly isometric.
 
@@ -63,6 +64,9 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     Raises:
         OptionError: the bound is not above 4, or an option is unknown or invalid.
         MeshError, MeshFileError, CurvatureError, SeamError, MetricError, TooLargeError: as for `coneflat.flatten`.
+
+    Warns:
+        GuaranteeWarning: a guarantee, or a request, is not met; notes of the result say which.
 
     References:
         M. Li, D. Kaufman, V. Kim, J. Solomon, A. Sheffer, "OptCuts: joint optimization of surface cuts and
@@ -137,7 +141,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         result = evaluate(prepared, layouts, shared, watch)
     notes = (
         *result.notes,
-        *_notes(o, [one.energy for one in found.values()], int(sum(cut)), result.distortion),
+        *map(Unmet, _notes(o, [one.energy for one in found.values()], int(sum(cut)), result.distortion)),
     )
     own = {name: getattr(o, name) for name in OWN if name != "seams"}
     if o.marked is not o.seams:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, field
 from os import PathLike
 from typing import TypeAlias
@@ -10,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...base import FloatArray, IntArray
+from ...base import FloatArray, IntArray, inner_calls, warn_of
 from ...errors import ArrayShapeError, FaceIndexError
 from ...geometry import fill_nearest
 from ...io import atomic_write
@@ -79,6 +78,7 @@ class Atlas:
         chart_count: number of charts.
         utilization: covered fraction of the texture.
         chart_image: (height, width, 3) colours of the charts.
+        notes: what was done to the faces, and unmet guarantees, one sentence each; xatlas has none.
     """
 
     width: int = 0
@@ -86,6 +86,7 @@ class Atlas:
     texels_per_unit: float = 0.0
     chart_count: int = 0
     utilization: Utilization = field(default_factory=Utilization)
+    notes: tuple[str, ...] = ()
     _given: list[tuple[FloatArray, IntArray]] = field(default_factory=list, repr=False)
     _mapped: list[Mapped] = field(default_factory=list, repr=False)
     _image: NDArray[np.uint8] | None = field(default=None, repr=False)
@@ -120,16 +121,22 @@ class Atlas:
         pack_options: PackOptions | None = None,
         verbose: bool = False,
     ) -> None:
-        """Compute the UVs of all meshes; problems of their faces are warnings."""
+        """Compute the UVs of all meshes; unmet guarantees are a `GuaranteeWarning`."""
+        self._generate(pack_options)
+        warn_of(self.notes, "atlas.notes")
+
+    def _generate(self, pack_options: PackOptions | None = None) -> None:
         pack = PackOptions() if pack_options is None else pack_options
         starts = np.cumsum([0, *(len(vertices) for vertices, _ in self._given)])
         vertices = np.concatenate([np.empty((0, 3)), *(each for each, _ in self._given)])
         every = [faces + start for (_, faces), start in zip(self._given, starts, strict=False)]
         faces = np.concatenate([np.empty((0, 3), dtype=np.int64), *every])
         size = {"resolution": pack.resolution} if pack.resolution else {}
-        found = unwrap_soup(vertices, faces, **({"padding": pack.padding} if pack.padding else {}), **size)
-        for note in found.notes:
-            warnings.warn(note, stacklevel=2)
+        with inner_calls():
+            found = unwrap_soup(
+                vertices, faces, **({"padding": pack.padding} if pack.padding else {}), **size
+            )
+        self.notes = found.notes
         side = pack.resolution or UnwrapOptions().resolution
         if pack.texels_per_unit and not pack.resolution and found.scale:
             side = int(np.ceil(pack.texels_per_unit / found.scale))
@@ -186,10 +193,14 @@ class Atlas:
 def parametrize(
     positions: ArrayLike, indices: ArrayLike, normals: ArrayLike | None = None, uvs: ArrayLike | None = None
 ) -> Mapped:
-    """Return the UVs of a mesh as `Atlas.get_mesh` does; arguments and errors are those of `Atlas.add_mesh`."""
+    """Return the UVs of a mesh as `Atlas.get_mesh` does; arguments and errors are those of `Atlas.add_mesh`.
+
+    Unmet guarantees are a `GuaranteeWarning`.
+    """
     atlas = Atlas()
     atlas.add_mesh(positions, indices, normals, uvs)
-    atlas.generate()
+    atlas._generate()
+    warn_of(atlas.notes, "`notes` of this warning")
     return atlas[0]
 
 

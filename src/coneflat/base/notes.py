@@ -1,0 +1,97 @@
+"""Notes on guarantees and requests that are not met, and the one warning that a public function gives for them.
+
+Notes are sentences in `result.notes`. Those that are `Unmet` are warnings as well; the others inform, for example of
+repairs of the input.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
+
+from ..errors import GuaranteeWarning
+from .text import plural
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+# Notes in the text of a warning; the others are counted.
+MAX_QUOTED = 3
+# Frames from `warnings.warn` to the caller of the function that calls `warn_of`.
+CALLER = 3
+
+# Whether a public function of the package is running, which alone warns.
+_is_inside: ContextVar[bool] = ContextVar("coneflat_is_inside", default=False)
+
+
+class Unmet(str):
+    """A note on a guarantee, or on a request of the user, that is not met."""
+
+    __slots__ = ()
+
+
+@contextmanager
+def inner_calls() -> Iterator[None]:
+    """Give no warnings of unmet guarantees in the block, in this thread and in those that `concurrently` starts."""
+    token = _is_inside.set(True)
+    try:
+        yield
+    finally:
+        _is_inside.reset(token)
+
+
+def warn_of(notes: Iterable[str], where: str) -> None:
+    """Warn of unmet guarantees, once for all of them, at the line that called the function that calls this one.
+
+    There is no warning within `inner_calls`.
+
+    Args:
+        notes: notes of any kind.
+        where: the expression in which the caller finds all of them.
+
+    Raises:
+        GuaranteeWarning: there are unmet guarantees, and warnings are errors.
+    """
+    unmet = tuple(dict.fromkeys(note for note in notes if isinstance(note, Unmet)))
+    if not unmet or _is_inside.get():
+        return
+    left = len(unmet) - MAX_QUOTED
+    rest = f"{plural(left, 'more unmet guarantee')}; all are in {where}" if left > 0 else f"see {where}"
+    text = f"{' '.join(unmet[:MAX_QUOTED])} ({rest})"
+    warnings.warn(GuaranteeWarning(text, tuple(map(str, unmet))), stacklevel=CALLER)
+
+
+def new_notes(result: Any, *given: Any) -> Iterator[str]:
+    """Yield the notes of a result that none of the arguments has: of those, another call has warned."""
+    notes = (getattr(one, "notes", ()) for one in given)
+    known = {note for each in notes if isinstance(each, tuple) for note in each if isinstance(note, str)}
+    return (note for note in result.notes if note not in known)
+
+
+def warns(
+    where: str = "result.notes", notes: Callable[..., Iterable[str]] = new_notes
+) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Return a decorator of a public function that warns of unmet guarantees, once for each call of it.
+
+    Calls of such functions within others give no warning.
+
+    Args:
+        where: the expression in which the caller finds all notes.
+        notes: returns the notes for a result and the arguments of the function.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        @wraps(function)
+        def call(*args: P.args, **kwargs: P.kwargs) -> R:
+            with inner_calls():
+                result = function(*args, **kwargs)
+            warn_of(notes(result, *args, *kwargs.values()), where)
+            return result
+
+        return call
+
+    return decorate

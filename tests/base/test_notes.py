@@ -1,0 +1,133 @@
+"""The warning of unmet guarantees: one for a call, at the caller's line, by every public function."""
+
+from __future__ import annotations
+
+import pickle
+import threading
+import warnings
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
+
+import pytest
+
+from coneflat import GuaranteeWarning
+from coneflat.base import Unmet, inner_calls, warn_of, warns
+from coneflat.base.notes import MAX_QUOTED
+
+
+def result_with(*notes):
+    return SimpleNamespace(notes=notes)
+
+
+@warns()
+def inner(*notes):
+    return result_with(*notes)
+
+
+@warns("map.notes")
+def outer(*notes):
+    inner(Unmet("An inner note."))
+    return result_with(*notes)
+
+
+def caught(call, *args):
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        call(*args)
+    return found
+
+
+def test_information_is_no_warning():
+    assert caught(inner, "Dropped 2 faces.") == []
+    assert caught(inner) == []
+
+
+def test_a_call_warns_once_and_inner_calls_do_not():
+    (found,) = caught(outer, Unmet("One is unmet."), "Dropped 2 faces.", Unmet("Two are unmet."))
+    assert found.category is GuaranteeWarning
+    assert str(found.message) == "One is unmet. Two are unmet. (see map.notes)"
+    assert found.message.notes == ("One is unmet.", "Two are unmet.")
+    assert {type(note) for note in found.message.notes} == {str}
+    assert caught(outer, "Dropped 2 faces.") == []
+
+
+def test_further_notes_are_counted():
+    notes = [Unmet(f"Note {i}.") for i in range(MAX_QUOTED + 2)]
+    (found,) = caught(inner, *notes)
+    quoted = " ".join(notes[:MAX_QUOTED])
+    assert str(found.message) == f"{quoted} (2 more unmet guarantees; all are in result.notes)"
+    (found,) = caught(inner, *notes[: MAX_QUOTED + 1])
+    assert str(found.message).endswith("(1 more unmet guarantee; all are in result.notes)")
+
+
+def test_the_warning_is_at_the_callers_line():
+    def explicit():
+        warn_of([Unmet("One is unmet.")], "result.notes")
+
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        outer(Unmet("One is unmet."))
+        explicit()
+    lines = open(__file__, encoding="utf-8").read().splitlines()  # noqa: SIM115
+    assert [lines[each.lineno - 1].strip() for each in found] == [
+        'outer(Unmet("One is unmet."))',
+        "explicit()",
+    ]
+    assert {each.filename for each in found} == {__file__}
+
+
+def test_notes_that_an_argument_has_are_not_repeated():
+    grid = result_with(Unmet("One is unmet."), "Dropped 2 faces.")
+
+    @warns()
+    def extracted(grid):
+        return result_with(*grid.notes, Unmet("Two are unmet."))
+
+    for found in (caught(extracted, grid), caught(lambda: extracted(grid=grid))):
+        assert [each.message.notes for each in found] == [("Two are unmet.",)]
+
+
+def test_as_an_error_it_leaves_the_state_clean():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", GuaranteeWarning)
+        for _ in range(2):
+            with pytest.raises(GuaranteeWarning, match="One is unmet"):
+                outer(Unmet("One is unmet."))
+    assert len(caught(inner, Unmet("One is unmet."))) == 1
+
+
+def test_errors_leave_the_state_clean():
+    @warns()
+    def fails():
+        raise ValueError("no")
+
+    with pytest.raises(ValueError, match="no"):
+        fails()
+    assert len(caught(inner, Unmet("One is unmet."))) == 1
+
+
+def test_threads_do_not_silence_each_other():
+    """While one thread is inside a call, another warns."""
+    is_inside, may_end = threading.Event(), threading.Event()
+
+    def stay():
+        with inner_calls():
+            is_inside.set()
+            may_end.wait(60)
+
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(stay)
+        is_inside.wait(60)
+        try:
+            assert len(caught(inner, Unmet("One is unmet."))) == 1
+        finally:
+            may_end.set()
+
+
+def test_notes_are_strings_and_the_warning_survives_pickling():
+    note = Unmet("One is unmet.")
+    assert note == "One is unmet."
+    assert repr((note,)) == "('One is unmet.',)"
+    assert isinstance(pickle.loads(pickle.dumps(note)), Unmet)
+    again = pickle.loads(pickle.dumps(GuaranteeWarning("text", ("one",))))
+    assert (str(again), again.notes) == ("text", ("one",))
