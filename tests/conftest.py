@@ -1,8 +1,22 @@
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pytest
 from browsing import browser, open_visit, viewed, viewed_page, visit  # noqa: F401
 from stored import find_model
+
+
+def pytest_configure(config):
+    """Compile the kernels before a run of all tests; otherwise each worker would compile them."""
+    is_worker = hasattr(config, "workerinput")
+    if (
+        config.args_source is pytest.Config.ArgsSource.TESTPATHS
+        and not is_worker
+        and not config.option.collectonly
+    ):
+        subprocess.run([sys.executable, "-m", "coneflat.apps.warm_up"], check=True)
 
 
 @pytest.fixture(scope="session")

@@ -22,6 +22,8 @@ def flags(command: click.Command) -> set[str]:
     return HELP | {flag for p in command.params for flag in (*p.opts, *p.secondary_opts)}
 
 
+#: Other programs whose flags are their own.
+FOREIGN = ("pip ", "docker ", "python -m build")
 ALL_FLAGS = set().union(*map(flags, cli.commands.values()))
 
 
@@ -55,6 +57,8 @@ def unknown_flags(text: str) -> list[str]:
             script = re.search(r"python (\S+\.py)", part)
             command = re.search(r"coneflat ([a-z]+)", part)
             known = ALL_FLAGS | HELP
+            if part.removeprefix("RUN ").lstrip().startswith(FOREIGN):
+                continue
             if script:
                 known = set(FLAG.findall((ROOT / script[1]).read_text(encoding="utf-8")))
             elif command and command[1] in cli.commands:

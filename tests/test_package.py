@@ -43,8 +43,8 @@ def test_errors_have_one_root():
     assert all(issubclass(kind, coneflat.ConeflatError) for kind in errors)
 
 
-def test_kernels_compiled_ahead_are_all_that_flattening_needs(tmp_path):
-    """What compiles after `coneflat.apps.ahead` in a new process was missed: other kernels or other types."""
+def test_warming_up_compiles_all_that_flattening_needs(tmp_path):
+    """What compiles after `coneflat.apps.warm_up` in a new process was missed: other kernels or other types."""
     vertices, faces = sphere(5)
     np.savez(tmp_path / "mesh.npz", vertices=vertices, faces=faces)
     script = """
@@ -68,8 +68,9 @@ flat = coneflat.flatten(vertices, faces, charts="atlas")
 coneflat.flatten(coneflat.read_mesh(flat.save(sys.argv[1] + ".obj"), weld=True))
 coneflat.flatten(vertices, faces[5:], min_cone_angle=0.3, max_cones=6)
 coneflat.flatten(coneflat.sample_path(), method="linear")
+coneflat.unwrap(vertices, faces[5:])
 """
-    subprocess.run([sys.executable, "-m", "coneflat.apps.ahead"], check=True)
+    subprocess.run([sys.executable, "-m", "coneflat.apps.warm_up"], check=True)
     compiled = subprocess.run(
         [sys.executable, "-c", script, tmp_path / "mesh.npz"], capture_output=True, text=True, check=True
     )

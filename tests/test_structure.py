@@ -21,7 +21,7 @@ from structure import (
 
 MODULES = read_modules()
 #: Applications that set up the others, and modules of applications that others may import, beside options.
-FRONT = ("apps.ahead", "apps.blender", "apps.cli", "apps.studio")
+FRONT = ("apps.warm_up", "apps.blender", "apps.cli", "apps.studio")
 SHARED = ("apps.quads.nearest",)
 #: The most levels of the packages of the core.
 LEVELS = 8

@@ -45,7 +45,7 @@ HOLDS = {
     "apps.measure_uv": "measures of any mesh's UVs",
     "from_uv": "a file's own UVs as a flattening",
     "sample": "the model that ships",
-    "ahead": "kernels compiled at the build",
+    "warm_up": "compilation of all kernels",
     "apps": "commands, page, studio, quads, peers",
     "xatlas": "the interface of xatlas",
     "__main__": "python -m coneflat",

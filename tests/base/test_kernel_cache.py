@@ -8,6 +8,7 @@ import os
 import stat
 import subprocess
 import sys
+import tempfile
 import types
 from importlib import import_module
 from pathlib import Path
@@ -32,9 +33,12 @@ def product(values, factor):
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """Return the cache folder of a test."""
+    """Return the cache folder of a test, beside which there is no other."""
     chosen = tmp_path / "cache"
     monkeypatch.setenv(CACHE_VARIABLE, str(chosen))
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    monkeypatch.setattr(tempfile, "gettempdir", lambda: str(tmp_path / "file"))
     kernel_cache.writable_folder.cache_clear()
     monkeypatch.setattr(kernel_cache, "compilation", kernel_cache.Compilation())
     yield chosen
@@ -90,15 +94,14 @@ def test_a_full_folder_is_one_line(folder, caplog, monkeypatch):
 
 
 def test_without_a_folder_kernels_are_compiled_in_memory(tmp_path, folder, monkeypatch, caplog):
-    (tmp_path / "file").write_text("")
     monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "file" / "below"))
     kernel_cache.writable_folder.cache_clear()
     assert compiled(copy_of(product))(np.arange(4.0), 2.0) == 12.0
     [line] = [record.getMessage() for record in caplog.records]
-    assert "in memory" in line
+    assert "in every process, as no cache folder is writable" in line
     assert CACHE_VARIABLE in line
     with pytest.raises(
-        CacheError, match=r"no cache folder is writable \(tried: .*below\); set CONEFLAT_CACHE_DIR"
+        CacheError, match=r"no cache folder is writable \(tried: .*below\); set CONEFLAT_CACHE_DIR to one"
     ):
         kernel_cache.cache_folder()
 
@@ -124,7 +127,9 @@ class TestDigest:
 
     def test_code_and_constants(self):
         documented = self.digest('def f(x):\n    """Other text."""\n    return x * a', a=2.0)
-        assert documented == self.digest('\n\ndef f(x: float):\n    """Text."""  # why\n    return x * a', a=2.0)
+        assert documented == self.digest(
+            '\n\ndef f(x: float):\n    """Text."""  # why\n    return x * a', a=2.0
+        )
         digest = self.digest("def f(x):\n    return x * a", a=2.0)
         others = [
             self.digest("def f(x):\n    return x * a", a=3.0),
@@ -183,7 +188,20 @@ class TestFolders:
         return json.loads(done.stdout)
 
     def test_the_variable_comes_first(self, tmp_path):
-        assert self.folder(tmp_path, **{CACHE_VARIABLE: str(tmp_path / "mine")}) == str(tmp_path / "mine")
+        chosen = tmp_path / "chosen"
+        assert self.folder(tmp_path, **{CACHE_VARIABLE: str(chosen)}) == str(chosen)
+
+    def test_a_chosen_folder_that_is_not_writable_is_an_error_only_where_it_was_asked_for(self, tmp_path):
+        (tmp_path / "file").write_text("")
+        chosen = {CACHE_VARIABLE: str(tmp_path / "file" / "below")}
+        assert self.folder(tmp_path, **chosen) != chosen[CACHE_VARIABLE]
+        command = [sys.executable, "-m", "coneflat", "warm-up"]
+        done = subprocess.run(
+            command, env={**os.environ, **chosen}, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 2
+        assert done.stderr.startswith("coneflat: error: no cache folder is writable (tried: ")
+        assert len(done.stderr.splitlines()) == 1
 
     @pytest.mark.skipif(sys.platform != "linux", reason="other folders")
     def test_the_home(self, tmp_path):
@@ -215,6 +233,6 @@ def test_the_first_compilation_is_announced_and_reported(folder, caplog):
         kernel(np.arange(4.0), 2.0)
         kernel(np.arange(4), 2.0)
     assert [record.getMessage() for record in caplog.records] == [
-        f"coneflat: compiling, once: about {kernel_cache.SECONDS_TO_COMPILE} s"
+        f"coneflat: compiling, once: about {kernel_cache.SECONDS_TO_COMPILE} s (cached in {folder})"
     ]
     assert reported == ["stage", "stage: compiling, once (1: product)", "stage: compiling, once (2: product)"]

@@ -111,14 +111,7 @@ class Compilation:
         """Report that a kernel is compiled."""
         if not self._is_announced:
             self._is_announced = True
-            if writable_folder() is not None:
-                log.warning("coneflat: compiling, once: about %d s", SECONDS_TO_COMPILE)
-            else:
-                log.warning(
-                    "coneflat: compiling in memory, about %d s in every process: no cache folder is writable; set %s",
-                    SECONDS_TO_COMPILE,
-                    CACHE_VARIABLE,
-                )
+            log.warning("coneflat: compiling, once: about %d s (%s)", SECONDS_TO_COMPILE, _where())
         report_detail(f"compiling, once ({self.count + 1}: {name})")
 
     def report_unwritten(self, folder: Path, error: OSError) -> None:
@@ -152,32 +145,42 @@ def writable_folder() -> Path | None:
             # os.access does not know of read-only and full file systems.
             with tempfile.TemporaryFile(dir=folder) as file:
                 file.write(HEADER)
-            if _is_trusted(folder):
-                return folder
+            return folder
     return None
 
 
 def cache_folder() -> Path:
-    """Return the folder in which kernels are cached.
+    """Return the folder in which kernels are cached: that of the environment variable, if it is set.
 
     Raises:
-        CacheError: no folder is writable.
+        CacheError: it is not writable.
     """
-    folder = writable_folder()
-    if folder is None:
-        tried = ", ".join(map(str, _user_folders())) or "none"
+    folder, chosen = writable_folder(), _chosen_folder()
+    if folder is None or (chosen is not None and folder != chosen):
+        tried = list(_user_folders()) if chosen is None else [chosen]
         raise CacheError(
-            f"no cache folder is writable (tried: {tried}); set {CACHE_VARIABLE} to a folder that is"
+            f"no cache folder is writable (tried: {', '.join(map(str, tried))}); set {CACHE_VARIABLE} to one that is"
         )
     return folder
 
 
-def _user_folders() -> Iterator[Path]:
-    """Yield the folder of the environment variable, or else the user's cache folder and a temporary one."""
+def _where() -> str:
+    folder = writable_folder()
+    if folder is not None:
+        return f"cached in {folder}"
+    return f"in every process, as no cache folder is writable; set {CACHE_VARIABLE} to one that is"
+
+
+def _chosen_folder() -> Path | None:
     chosen = os.environ.get(CACHE_VARIABLE)
-    if chosen:
-        yield Path(chosen).absolute()
-        return
+    return Path(chosen).absolute() if chosen else None
+
+
+def _user_folders() -> Iterator[Path]:
+    """Yield the folder of the environment variable, the user's cache folder, and a temporary one."""
+    chosen = _chosen_folder()
+    if chosen is not None:
+        yield chosen
     from platformdirs import user_cache_path
 
     folder = user_cache_path("coneflat", appauthor=False)
@@ -187,17 +190,17 @@ def _user_folders() -> Iterator[Path]:
         yield folder
     user = f"-{os.getuid()}" if hasattr(os, "getuid") else ""
     temporary = Path(tempfile.gettempdir()) / f"coneflat{user}"
-    if not temporary.exists() or _is_trusted(temporary):
+    if not os.path.lexists(temporary) or _is_private(temporary):
         yield temporary
 
 
-def _is_trusted(folder: Path) -> bool:
-    """Return whether nobody else can write to a folder; machine code is loaded from it."""
-    if not hasattr(os, "getuid") or CACHE_VARIABLE in os.environ:
-        return True
+def _is_private(folder: Path) -> bool:
+    """Return whether nobody else can have written to a folder for all users; machine code is loaded from it."""
     status = folder.lstat()
-    is_shared = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and status.st_uid != os.getuid()
-    return stat.S_ISDIR(status.st_mode) and status.st_uid in (0, os.getuid()) and not is_shared
+    is_shared = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    return not hasattr(os, "getuid") or (
+        stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not is_shared
+    )
 
 
 def read_kernel(path: Path) -> bytes | None:
