@@ -16,6 +16,7 @@ from markers import ROOT
 from measured import Measured
 from palette import IMAGES, save_figure_small, save_small
 from PIL import Image
+from quad_edges import draw_quads
 from quad_pictures import BOARDS, SUBDIVIDED, boards_figure, quads_figure, subdivided_figure
 from scipy.sparse import csr_matrix, identity
 from tables import ALLOWED, GALLERY, TRADED, TRADEOFF, tradeoff
@@ -49,6 +50,7 @@ from chromium import browser_path
 DPI = 170.0
 GALLERY_DPI = 110.0
 SIDE = 2.6  # Inches of a panel of an atlas.
+FUNCTION_WIDTH = 4.0  # Inches of the pictures of functions, three of which stand side by side.
 
 #: How to look at the models that all kinds of figures are shown of.
 LOOKS: dict[str, dict[str, Any]] = {
@@ -225,6 +227,28 @@ def steps_figure(measured: Measured) -> Any:
     return compose([Row(panels[:3]), Row(panels[3:])], dpi=DPI, marks=mark_handles(result))
 
 
+def map_figure(function: Callable[..., coneflat.Flattening], measured: Measured) -> Any:
+    """Return a small figure of what a function does to a model: its checkerboard and its layout."""
+    result = function(measured.path("spot"))
+    checker = partial(draw_checker, result, eye="left-front", dpi=DPI)
+    layout = partial(draw_layout, result, edges=False, color_charts=True, crop=True)
+    panels = [
+        Panel(view_aspect(result.vertices, "left-front"), checker),
+        Panel(layout_aspect(result, crop=True), layout),
+    ]
+    return compose([Row(panels)], dpi=DPI, width=FUNCTION_WIDTH)
+
+
+def quad_figure(measured: Measured) -> Any:
+    """Return a small figure of the quads of a model from two sides."""
+    quads = coneflat.quads(measured.path("spot"), quads=2000)
+    panels = [
+        Panel(view_aspect(quads.vertices, eye), partial(draw_quads, quads, eye=eye, irregular=False, dpi=DPI))
+        for eye in ("left-front", "right-back")
+    ]
+    return compose([Row(panels)], dpi=DPI, width=FUNCTION_WIDTH)
+
+
 def gallery_figure(model: str, measured: Measured) -> Any:
     """Return a figure of a model with a checkerboard from two sides, and of its layout."""
     result, (up, *eyes) = measured.flattening(model), SIGHTS[model]
@@ -360,6 +384,9 @@ def dial_figure(measured: Measured) -> Any:
 #: Name of each picture, the models that it needs, and the function that draws it.
 PICTURES: dict[str, tuple[tuple[str, ...], Callable[[Measured], Any]]] = {
     "sample": ((), lambda measured: demo_figure(measured.flattening("sample"))),
+    "function-flatten": (("spot",), partial(map_figure, coneflat.flatten)),
+    "function-unwrap": (("spot",), partial(map_figure, coneflat.unwrap)),
+    "function-quads": (("spot",), quad_figure),
     "atlas-shapes": ((), shapes_figure),
     "curvature": (("bunny",), curvature_figure),
     "quarters": (("bunny",), quarters_figure),
