@@ -112,6 +112,7 @@ class Compilation:
         if not self._is_announced:
             self._is_announced = True
             log.warning("coneflat: compiling, once: about %d s (%s)", SECONDS_TO_COMPILE, _where())
+        log.info("coneflat: compiling %s", name)
         report_detail(f"compiling, once ({self.count + 1}: {name})")
 
     def report_unwritten(self, folder: Path, error: OSError) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import sys
 import time
@@ -47,10 +48,27 @@ def serve(requests: IO[str], answers: IO[str]) -> None:
         answers.flush()
 
 
+class LogLines(logging.Handler):
+    """Writes log messages between the rows, so that the batch knows of compilations."""
+
+    def __init__(self, answers: IO[str]) -> None:
+        super().__init__()
+        self._answers = answers
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a message as a line."""
+        self._answers.write(json.dumps({"level": record.levelno, "message": record.getMessage()}) + "\n")
+        self._answers.flush()
+
+
 def main() -> None:
     """Serve over standard input and output; what libraries print is redirected to standard error."""
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
+    log = logging.getLogger("coneflat")
+    log.setLevel(logging.INFO)
+    log.propagate = False
+    log.addHandler(LogLines(answers))
     with inner_calls():  # The rows have the notes.
         serve(sys.stdin, answers)
 

@@ -7,6 +7,7 @@ that dies breaks the whole pool, and they import the script of the caller again.
 from __future__ import annotations
 
 import json
+import logging
 import os
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
+from functools import cache
 from queue import SimpleQueue
 from typing import Any
 
@@ -90,20 +92,21 @@ class Child:
             process = self._started()
         except OSError as error:  # For example, there is no memory for another process.
             return failed(job, f"no process could be started: {error.strerror or error}")
-        timer = threading.Timer(threading.TIMEOUT_MAX if limit is None else limit, process.kill)
-        line = ""
-        timer.start()
         assert process.stdin is not None
         assert process.stdout is not None
-        with suppress(OSError):  # It may die before it reads the job.
+        row: dict[str, Any] = {}
+        with suppress(OSError, ValueError):  # It may die before it reads the job, or while it writes.
             process.stdin.write(job.as_json() + "\n")
             process.stdin.flush()
-            line = process.stdout.readline()
-        timer.cancel()
+            row = _answer(process, limit)
+            while "message" in row:
+                # Compilation, once for all meshes, does not count.
+                start = time.perf_counter()
+                log_once(row["level"], row["message"])
+                row = _answer(process, limit)
         seconds = time.perf_counter() - start
-        if line.endswith("\n"):
-            with suppress(ValueError):
-                return json.loads(line)
+        if row:
+            return row
         self.end()
         remove_unfinished(job.output)
         if limit is not None and seconds >= limit:
@@ -139,6 +142,27 @@ class Child:
                 env={**os.environ, **ONE_THREAD},
             )
         return self._process
+
+
+def _answer(process: subprocess.Popen[str], limit: float | None) -> dict[str, Any]:
+    """Return the next line of a worker process, which is ended if it takes longer than the limit in seconds.
+
+    Raises:
+        ValueError: the line is not complete.
+    """
+    assert process.stdout is not None
+    timer = threading.Timer(threading.TIMEOUT_MAX if limit is None else limit, process.kill)
+    timer.start()
+    try:
+        return json.loads(process.stdout.readline())
+    finally:
+        timer.cancel()
+
+
+@cache
+def log_once(level: int, message: str) -> None:
+    """Log a message; all workers send the same ones."""
+    logging.getLogger("coneflat").log(level, message)
 
 
 # Number of times that a mesh is tried again after its worker was lost; the mesh may be the cause of the loss.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import shutil
 import sys
@@ -53,6 +54,8 @@ class Console:
 
     def __init__(self, verbosity: str | None = None) -> None:
         self.quiet, self.verbose = verbosity == QUIET, verbosity == VERBOSE
+        if self.quiet:
+            logging.getLogger("coneflat").setLevel(logging.ERROR)
         self._stages = Stopwatch(self.progress)
         self.seconds = self._stages.seconds
         self._start = time.perf_counter()

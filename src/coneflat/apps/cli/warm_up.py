@@ -17,14 +17,11 @@ def warm_up(verbosity: str | None) -> None:
     The folder is that of the environment variable CONEFLAT_CACHE_DIR, or else the user's cache folder. A container
     image that runs this command starts fast.
     """
-    import logging
-
     from ...base import cache_folder, compilation
     from ..warm_up import compile_kernels
     from .run import Console
 
     folder = cache_folder()
-    logging.getLogger("coneflat").setLevel(logging.ERROR)
     with Console(verbosity) as console:
         compile_kernels(console.progress)
         if compilation.count:
