@@ -5,6 +5,13 @@ from browsing import browser, open_visit, viewed, viewed_page, visit  # noqa: F4
 from stored import find_model
 
 
+def pytest_collection_modifyitems(items):
+    """Mark the tests that open a page in a browser as slow."""
+    for item in items:
+        if "browser" in item.fixturenames:
+            item.add_marker(pytest.mark.slow)
+
+
 @pytest.fixture(scope="session")
 def shared(tmp_path_factory):
     """Return the path of a real model by its name."""

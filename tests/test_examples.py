@@ -27,6 +27,7 @@ def executed(tmp_path_factory):
     return notebook, folder
 
 
+@pytest.mark.slow
 def test_results_show_themselves(executed):
     notebook, folder = executed
     pages = [

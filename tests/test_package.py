@@ -35,6 +35,7 @@ def test_errors_have_one_root():
     assert all(issubclass(kind, coneflat.ConeflatError) for kind in kinds)
 
 
+@pytest.mark.slow
 def test_kernels_compiled_ahead_are_all_that_flattening_needs(tmp_path):
     """What compiles after `coneflat.apps.ahead` in a new process was missed: other kernels or other types."""
     vertices, faces = sphere(5)

@@ -46,6 +46,7 @@ def test_components_keep_their_scale_where_triangles_were_huge(name, ending, tmp
     assert outcome_of(name, ending, tmp_path).breaches == []
 
 
+@pytest.mark.slow
 def test_any_finite_distortion_may_be_allowed():
     assert outcome_of("any-distortion").breaches == []
 

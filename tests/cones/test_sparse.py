@@ -108,6 +108,7 @@ def test_no_cone_can_be_left_out(name):
         assert search.exact.energy(np.delete(members, place)) > 0.01
 
 
+@pytest.mark.slow
 def test_noise_needs_cones_beyond_those_of_the_coarse_model():
     """With sets of the coarse model only, 102 cones are needed."""
     search = search_on(*noisy("noisy-sphere"))
@@ -127,6 +128,7 @@ def test_noise_where_few_vertices_may_be_cones():
     assert allowed[found.solution.cones].all()
 
 
+@pytest.mark.slow
 def test_a_distortion_out_of_reach_has_the_same_answer_again():
     """And has not many cones that gain nothing."""
     search = search_on(*noisy("noisy-sphere"), positive_only=True)
@@ -353,6 +355,7 @@ def test_hubs_leave_vertices_to_choose_from():
     assert len(sparse(np.concatenate([ring, [[0, 0, 0.3], [0, 0, -0.3]]]), faces).solution.cones) >= 3
 
 
+@pytest.mark.slow
 def test_more_cones_than_are_searched_for_is_an_error():
     with pytest.raises(CurvatureError, match="400 cones or more"):
         sparse(*SHAPES["sphere"], min_cone_angle=1.99 * np.pi)

@@ -80,7 +80,10 @@ WILD = {
 }
 
 
-@pytest.fixture(scope="module", params=WILD)
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=[pytest.mark.slow] * ("spikes 1.0" in name)) for name in WILD],
+)
 def untangled(request):
     """The result of a wild mesh in one chart, and the patches that were untangled for it."""
     seen = []
@@ -218,7 +221,7 @@ class TestPrescribed:
 
 class TestMarkedSeams:
     @pytest.mark.parametrize("boundary", RULES)
-    @pytest.mark.parametrize("noise", [0.0, 0.1, 0.2])
+    @pytest.mark.parametrize("noise", [0.0, 0.1, pytest.param(0.2, marks=pytest.mark.slow)])
     def test_both_sides_are_equal_whatever_the_boundary(self, boundary, noise):
         result = coneflat.flatten(*folded(noise), boundary=boundary, seams=self.seams(), charts="one")
         assert result.distortion.charts == 3

@@ -40,6 +40,7 @@ def limbs():
     return vertices * stretch[:, None], faces
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("parts", "up"), [(4, None), (6, (0.0, 0.3, 1.0))])
 def test_seams_of_an_atlas_turn_by_whole_quanta(limbs, parts, up):
     quantum = 2 * np.pi / parts

@@ -139,7 +139,9 @@ def test_what_is_no_curvature(text):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="sh closes the streams")
-@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize(
+    "closed", [*(pytest.param(one, marks=pytest.mark.slow) for one in (">&-", "2>&-")), "<&- >&- 2>&-"]
+)
 def test_closed_standard_streams_do_not_prevent_the_output(tmp_path, closed):
     shapes.write_obj(tmp_path / "in.obj", *shapes.sphere(2))
     command = f'"{sys.executable}" -m coneflat flatten in.obj -o out.obj {closed}'
@@ -211,7 +213,7 @@ def test_messages_are_one_line(tmp_path):
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has other signals")
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
-@pytest.mark.parametrize("step", ["cones", "write"])
+@pytest.mark.parametrize("step", [pytest.param("cones", marks=pytest.mark.slow), "write"])
 def test_interrupt_leaves_no_incomplete_file(tmp_path, step, name):
     shapes.write_obj(tmp_path / "big.obj", *shapes.sphere(4))
     # A file that is written waits for the signal before it gets its name.
@@ -234,6 +236,7 @@ def test_interrupt_leaves_no_incomplete_file(tmp_path, step, name):
     assert [path.name for path in tmp_path.iterdir()] == ["big.obj"]
 
 
+@pytest.mark.slow
 def test_demo(tmp_path):
     pytest.importorskip("matplotlib")
     done = run("demo", cwd=tmp_path)

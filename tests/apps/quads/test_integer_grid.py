@@ -227,7 +227,10 @@ def test_cones_that_are_no_quarter_turns_are_refused():
         integer_grid(free, charts="one")
 
 
-@pytest.mark.parametrize(("every", "height"), [(7, 1.5), (9, 1.5), (13, 0.8)])
+@pytest.mark.parametrize(
+    ("every", "height"),
+    [(7, 1.5), *(pytest.param(*spikes, marks=pytest.mark.slow) for spikes in ((9, 1.5), (13, 0.8)))],
+)
 def test_charts_stay_joined_where_edges_between_them_are_split(every, height):
     """The first chain between two charts is another one then."""
     options = {**QUARTER, "charts": "atlas", "correct_handles": True, "distortion": 0.1}

@@ -196,6 +196,7 @@ def test_quads_are_flattened_again(tmp_path):
     assert len(again.offsets) == len(coneflat.read_mesh(path).offsets)
 
 
+@pytest.mark.slow
 def test_the_command_tries_a_finer_grid_as_the_function_does(tmp_path):
     """Around each hole of a surface with three handles there are too few squares."""
     vertices, faces = shapes.genus(3)

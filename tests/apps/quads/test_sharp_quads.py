@@ -133,6 +133,7 @@ def test_impossible_angles(angle):
         integer_grid(*SHAPES["cube"], quads=100, sharp_angle=angle)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("size", [12, 150])
 def test_elimination_spans_all_solutions(size, seed):

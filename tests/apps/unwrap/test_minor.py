@@ -45,6 +45,7 @@ def every_part_is_minor(monkeypatch):
     monkeypatch.setattr(CutSearch, "best", lambda self: pytest.fail("a part is searched alone"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KINDS)
 def test_promises_hold_for_every_kind_of_component(name, every_part_is_minor):
     vertices, faces = crumbs([KINDS[name]], 6)
@@ -63,6 +64,7 @@ def test_promises_hold_for_every_kind_of_component(name, every_part_is_minor):
         assert d.energy == pytest.approx(4)
 
 
+@pytest.mark.slow
 def test_seams_are_as_short_as_when_components_are_cut_alone(monkeypatch):
     vertices, faces = crumbs([KINDS["icosphere"], KINDS["hill"]], 12)
 

@@ -47,6 +47,7 @@ def test_the_search_goes_on_where_the_first_candidates_have_the_same_cones(monke
     assert unwrap(vertices * [1, 1, 0.25], faces, max_energy=4.00243).distortion.energy <= 4.00243
 
 
+@pytest.mark.slow
 def test_noise_that_a_coarse_mesh_does_not_show():
     """The cones of the coarse mesh leave an energy of 4.116, and with sets of the coarse model only, seams are 10.8."""
     result = unwrap(*noisy("noisy-torus"))
@@ -95,6 +96,7 @@ def fandisk(shared):
     return unwrap(shared("fandisk.obj"))
 
 
+@pytest.mark.slow
 def test_models_have_short_seams_within_the_bound(shared, cow, fandisk):
     for result, most in (
         (cow, 4.5),
@@ -239,6 +241,7 @@ def test_the_energy_of_a_stretched_square():
         assert coneflat.measure(mesh, stretched).energy == pytest.approx(5.0)
 
 
+@pytest.mark.slow
 def test_branching_charts_are_cut_to_fill_the_texture(shared, cow, monkeypatch):
     monkeypatch.setattr("coneflat.apps.unwrap.unwrap.cut_for_packing", lambda layouts, *_: layouts)
     whole = unwrap(shared("spot.obj"))
@@ -247,6 +250,7 @@ def test_branching_charts_are_cut_to_fill_the_texture(shared, cow, monkeypatch):
     assert max(cow.distortion.energy, whole.distortion.energy) <= 4.1
 
 
+@pytest.mark.slow
 def test_a_chart_with_short_seams_is_cut_as_well(shared, fandisk, monkeypatch):
     """Cuts may cost as much as the root of the area, even if the seams are hardly longer; sharp edges cost less."""
     found = fandisk
@@ -258,6 +262,7 @@ def test_a_chart_with_short_seams_is_cut_as_well(shared, fandisk, monkeypatch):
     assert found.distortion.seam_length <= whole.distortion.seam_length + 1.5
 
 
+@pytest.mark.slow
 def test_small_charts_are_joined_to_others_where_they_fit(shared, monkeypatch):
     path, bound = shared("spot.obj"), 4.02
     result = unwrap(path, max_energy=bound)
@@ -273,6 +278,7 @@ def test_small_charts_are_joined_to_others_where_they_fit(shared, monkeypatch):
     assert result.curvatures == pytest.approx(2 * np.pi - angles[result.cones], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_cut_of_a_large_mesh_is_searched_on_a_coarse_one(monkeypatch):
     """The seams are hardly longer than those found on the mesh itself."""
     shape = shapes.torus(120, 40)
@@ -358,6 +364,7 @@ def test_forbidden_edges_that_are_cut_are_counted(shared):
     assert int(noted[0].split()[0]) == is_cut > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "most"),
     [("rocker-arm.obj", 1.85), ("fandisk.obj", 1.5), *((name, 2.6) for name in at_hand("elephant.obj"))],
