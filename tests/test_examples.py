@@ -87,6 +87,7 @@ def test_linear_functions_are_kept():
     np.testing.assert_allclose(np.cross(one, two)[:, 2], 0.25)
 
 
+@pytest.mark.slow
 def test_the_script(tmp_path):
     lines = [f"v {x} {y} {z}" for x, y, z in CUBE] + ["f " + " ".join(map(str, side + 1)) for side in SIDES]
     (tmp_path / "cube.obj").write_text("\n".join(lines) + "\n")

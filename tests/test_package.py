@@ -85,6 +85,7 @@ print(*sys.modules)
     assert not unused & set(printed[-2].split())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", coneflat.__all__)
 def test_examples_of_public_names_run(name, tmp_path, monkeypatch):
     """Those of its own docstring; plain values have none, and theirs are in the docstring of the package."""

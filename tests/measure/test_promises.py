@@ -122,6 +122,7 @@ def test_sides_of_seams_that_differ_are_told():
     assert any("sides of seams differ" in note for note in unmet_guarantees(spoiled(result, uv)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["linear", "bff", "lscm"])
 def test_overlaps_in_an_atlas_are_told_whatever_the_method(method):
     vertices, faces = shapes.sphere(3)

@@ -212,7 +212,9 @@ def test_messages_are_one_line(tmp_path):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has other signals")
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize(
+    "name", ["SIGINT", *(pytest.param(name, marks=pytest.mark.slow) for name in ("SIGTERM", "SIGHUP"))]
+)
 @pytest.mark.parametrize("step", [pytest.param("cones", marks=pytest.mark.slow), "write"])
 def test_interrupt_leaves_no_incomplete_file(tmp_path, step, name):
     shapes.write_obj(tmp_path / "big.obj", *shapes.sphere(4))
@@ -294,6 +296,7 @@ def test_marked_seams(tmp_path):
     assert "no UV coordinates" in done.stderr
 
 
+@pytest.mark.slow
 def test_no_seams_takes_vertices_and_pairs(tmp_path):
     vertices, faces = shapes.sphere(3, bumps=0.4, seed=5)
     shapes.write_obj(tmp_path / "ball.obj", vertices, faces)

@@ -67,6 +67,7 @@ def test_short_sharp_edges_are_noise():
     assert len(sharp_or_boundary(mesh, 100.0)) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["box", "torus", "genus 2", "hill"])
 def test_the_linear_model_agrees_with_an_exact_map(name):
     """Between two sets of cones that differ a little, log scale and rotation change by nearly the same."""

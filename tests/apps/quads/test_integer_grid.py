@@ -88,7 +88,7 @@ def check_laws(grid):
 
 
 @pytest.mark.parametrize("quads", [40, 1000])
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", ["sphere", "torus", "hill", pytest.param("two", marks=pytest.mark.slow)])
 def test_laws_on_shapes(name, quads):
     grid = integer_grid(*SHAPES[name], quads=quads)
     check_laws(grid)
@@ -149,6 +149,7 @@ def askew():
     return vertices[used], faces.reshape(-1, 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quads", [300, 2000])
 def test_loops_that_are_askew_come_to_lie_on_grid_lines(quads):
     grid = integer_grid(*askew(), quads=quads, repair=True)

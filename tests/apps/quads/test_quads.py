@@ -140,6 +140,7 @@ def test_quads_that_touch_in_a_point_have_a_vertex_each():
     assert mesh.area_left_out == pytest.approx(0.4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["hill", "annulus", "rotated square"])
 def test_open_borders_are_covered_to_the_last_quad(name):
     if name == "rotated square":  # its corners are kept, though the grid is not aligned with its sides
@@ -298,6 +299,7 @@ def test_cones_are_chosen_once_for_all_sizes_of_one_price(monkeypatch):
     assert len(chosen) == 3
 
 
+@pytest.mark.slow
 def test_components_of_equal_price_have_grids_of_their_own():
     vertices, faces = shapes.sphere(3)
     mesh = coneflat.quads(*shapes.join((vertices, faces), (vertices + 5, faces)), quads=5000)
@@ -342,6 +344,7 @@ def test_grids_whose_bad_quads_are_left_out_keep_all_notes(monkeypatch):
     assert any("Cones are not chosen" in note for note in coneflat.quads(*shapes.sphere(3), quads=200).notes)
 
 
+@pytest.mark.slow
 def test_a_thin_component_does_not_make_the_others_finer(monkeypatch):
     sizes = []
 

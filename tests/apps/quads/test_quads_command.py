@@ -172,6 +172,7 @@ def test_cones_that_are_given(tmp_path):
             coneflat.quads(vertices, faces, cones=cones)
 
 
+@pytest.mark.slow
 def test_quads_are_more_alike_where_weights_are():
     vertices, faces = shapes.sphere(4, bumps=0.5)
     matters = vertices[:, 2] > np.quantile(vertices[:, 2], 0.7)

@@ -27,6 +27,7 @@ def into_ball(places):
     return centred / np.linalg.norm(centred, axis=1).max()
 
 
+@pytest.mark.slow
 def test_the_whole_mesh_goes_beside_what_is_shown(ball):
     bench = JobRunner()
     job = {"mesh": str(ball), "sha256": file_hash(ball), "choices": Choices().as_plain()}

@@ -61,6 +61,7 @@ def test_a_sphere_needs_one_seam_whatever_the_energy():
     assert len(np.unique(result.seams)) == len(result.seams) + 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", CLOSED.values(), ids=CLOSED)
 def test_handles_need_closed_curves_only(shape):
     result = unwrap(*shape, seams="none", charts="one")
@@ -149,6 +150,7 @@ def test_the_area_distortion_is_within_its_bound(shape, bound):
     assert not any("allowed" in note for note in result.notes)
 
 
+@pytest.mark.slow
 def test_a_smaller_area_distortion_needs_longer_seams():
     lengths = [unwrap(*shapes.sphere(3), area=bound).distortion.seam_length for bound in (0.02, 0.06, 0.15)]
     assert lengths[0] > lengths[1] > lengths[2]

@@ -97,6 +97,7 @@ def test_a_large_bound_needs_fewer_cones(every_part_is_minor):
     assert len(unwrap(*parts, max_energy=50).cones) < len(unwrap(*parts).cones)
 
 
+@pytest.mark.slow
 def test_the_numbering_of_components_changes_nothing(every_part_is_minor):
     vertices, faces = crumbs(list(KINDS.values()), 9)
     component = label_faces(faces, len(vertices))[1]

@@ -30,7 +30,7 @@ CLOSED = {"sphere": shapes.sphere(3), "two handles": shapes.genus(2), "box": sha
 OPEN = {"hill": shapes.hill(), "annulus": shapes.annulus(), "cylinder": shapes.cylinder()}
 
 
-@pytest.mark.parametrize("bound", [4.02, 4.1, 4.5])
+@pytest.mark.parametrize("bound", [pytest.param(4.02, marks=pytest.mark.slow), 4.1, 4.5])
 @pytest.mark.parametrize("shape", [*CLOSED.values(), *OPEN.values()], ids=[*CLOSED, *OPEN])
 def test_the_energy_is_within_the_bound(shape, bound):
     result = unwrap(*shape, max_energy=bound)
@@ -56,6 +56,7 @@ def test_noise_that_a_coarse_mesh_does_not_show():
     assert d.seam_length < 9.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [shapes.sphere(3), shapes.genus(2)], ids=["one chart", "several charts"])
 def test_the_exact_metric_need_not_converge(shape, monkeypatch):
     # Whether a cut pays for packing may depend on small differences.
@@ -130,6 +131,7 @@ def test_freed_seams_lower_the_energy():
     assert 4 < energy < tied.distortion.energy - 1e-3
 
 
+@pytest.mark.slow
 def test_a_flipped_start_is_replaced():
     part = Source(as_input(*shapes.hill())).prepared(Options()).parts[0]
     method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
@@ -290,6 +292,7 @@ def test_the_cut_of_a_large_mesh_is_searched_on_a_coarse_one(monkeypatch):
     assert coarse.seam_length <= 1.25 * fine.seam_length
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tiles", [1, 3])
 def test_the_resolution_follows_from_the_texel_density(tiles):
     result = unwrap(*shapes.torus(), texel_density=200.0, tiles=tiles)
@@ -354,6 +357,7 @@ def test_a_coarse_part_keeps_what_belongs_to_its_vertices():
         assert len(np.unique(one)) > 1
 
 
+@pytest.mark.slow
 def test_forbidden_edges_that_are_cut_are_counted(shared):
     mesh = coneflat.read_mesh(shared("spot.obj"))
     right = np.flatnonzero(mesh.vertices[:, 0] > np.median(mesh.vertices[:, 0]))
