@@ -1,7 +1,7 @@
 """Compare atlases with those of other packages: `python benchmarks/atlas.py` prints two Markdown tables.
 
 The first table has a row for each model and package, the second one, that of the README, a row for each package. The
-models are those of `../shared/meshes` that are manifolds, and a bumpy sphere. The packages are coneflat with its
+models are the ten of the gallery, as far as they are here (`common.MODELS`). The packages are coneflat with its
 default cones, with more of them, and its maps for textures; boundary first flattening (BFF) as `coneflat.peers`
 implements it, not the program of its authors, with the default cones and one chart; xatlas and uvunwrap with their
 defaults, where they are installed. All results are measured by `coneflat.measure` on the UV points that the packages
@@ -29,12 +29,16 @@ from coneflat.mesh.connectivity import TriangleMesh
 # Area distortions to try in this order, and the number of bisections of the interval of the stretch.
 ALLOWED = (0.2, 0.14, 0.1, 0.07, 0.05, 0.035, 0.025)
 ROUNDS = 4
+#: The models of `docs/gallery.md`.
+GALLERY = "3holes,bunny,camelhead,elephant,face,fandisk,hand,horse,kitten,rocker-arm"
 HEADINGS = "| package | flipped | with overlaps | QC distortion | area std | charts | seam length | covered | seconds |"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--models", default="", help="of all, those whose names are given; with commas")
+    parser.add_argument(
+        "--models", default=GALLERY, help='names with commas, or "" for all models and a bumpy sphere'
+    )
     parser.add_argument("--more", type=float, default=0.05, help="distortion allowed with more cones")
     parser.add_argument("--largest", type=int, default=120_000, help="triangles")
     parser.add_argument(

@@ -1,8 +1,9 @@
-"""The viewer's page in a headless Chromium; its fixtures skip where there is none."""
+"""The viewer's page in a headless Chromium; modules of tests that need it skip where there is none."""
 
 from __future__ import annotations
 
 import io
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -29,14 +30,21 @@ coneflat.panes.forEach((pane) => pane.camera.fit());
 """
 
 
+def need_browser():
+    """Skip a module of tests where there is no browser."""
+    if find_spec("playwright") is None:
+        pytest.skip("playwright is not installed", allow_module_level=True)
+    if browser_path() is None:
+        missing = "there is no Chromium here; CHROMIUM=/path/to/it says where it is"
+        pytest.skip(missing, allow_module_level=True)
+
+
 @pytest.fixture(scope="module")
 def browser():
-    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    path = browser_path()
-    if path is None:
-        pytest.skip("there is no Chromium here; CHROMIUM=/path/to/it says where it is")
-    with playwright.sync_playwright() as driver:
-        opened = driver.chromium.launch(executable_path=path, args=ARGUMENTS)
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=browser_path(), args=ARGUMENTS)
         yield opened
         opened.close()
 

@@ -19,6 +19,13 @@ def pytest_configure(config):
         subprocess.run([sys.executable, "-m", "coneflat.apps.warm_up"], check=True)
 
 
+def pytest_collection_modifyitems(items):
+    """Mark the tests that open a page in a browser as slow."""
+    for item in items:
+        if "browser" in item.fixturenames:
+            item.add_marker(pytest.mark.slow)
+
+
 @pytest.fixture(scope="session")
 def shared(tmp_path_factory):
     """Return the path of a real model by its name."""

@@ -168,6 +168,7 @@ def test_scale_motion_and_numbering():
     np.testing.assert_array_equal(other.cones, new[base.cones])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "free", "held"), [("fandisk.obj", 1.0070, 1.0116), ("rocker-arm.obj", 1.0259, 1.0279)]
 )

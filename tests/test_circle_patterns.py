@@ -188,6 +188,7 @@ class TestRefusals:
             circle_patterns(surface, lengths_of(surface), solution_of(surface, cones), delaunay=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "published", "with_flips"), [("fandisk.obj", 1.013, 1.0118), ("rocker-arm.obj", 1.045, 1.0288)]
 )

@@ -27,7 +27,11 @@ FOREIGN = ("pip ", "docker ", "python -m build")
 ALL_FLAGS = set().union(*map(flags, cli.commands.values()))
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize(
+    "page",
+    [PAGES[0], *(pytest.param(page, marks=pytest.mark.slow) for page in PAGES[1:])],
+    ids=[page.name for page in PAGES],
+)
 def test_examples_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names: dict = {}

@@ -27,6 +27,7 @@ def executed(tmp_path_factory):
     return notebook, folder
 
 
+@pytest.mark.slow
 def test_results_show_themselves(executed):
     notebook, folder = executed
     pages = [
@@ -86,6 +87,7 @@ def test_linear_functions_are_kept():
     np.testing.assert_allclose(np.cross(one, two)[:, 2], 0.25)
 
 
+@pytest.mark.slow
 def test_the_script(tmp_path):
     lines = [f"v {x} {y} {z}" for x, y, z in CUBE] + ["f " + " ".join(map(str, side + 1)) for side in SIDES]
     (tmp_path / "cube.obj").write_text("\n".join(lines) + "\n")

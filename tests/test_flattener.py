@@ -61,6 +61,7 @@ def test_the_same_as_each_time_anew():
         assert_same(flattener.flatten(**asked), coneflat.flatten(*mesh, **asked))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mesh", "asked"),
     [

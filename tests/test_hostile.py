@@ -35,6 +35,7 @@ def breaches_of(result, options, vertices, faces):
     return [cause for cause, _ in outcome.breaches]
 
 
+@pytest.mark.slow
 def test_hostile_cases_break_no_promise():
     outcomes = outcomes_of(cases(SLICE, 0))
     assert len(outcomes) == SLICE
@@ -53,6 +54,7 @@ def test_a_case_is_the_same_whenever_it_is_run(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_crashes_hangs_and_swollen_memory_are_told_and_survived():
     kinds = ("crash", "swell", "mesh")
     told = {one.kind: one for one in outcomes_of([(kind, 2) for kind in kinds])}
@@ -206,6 +208,7 @@ def elsewhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(1, 8))
 def test_no_case_is_a_breach(seed):
     outcome = run_case("grid", seed)

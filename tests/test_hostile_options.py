@@ -51,6 +51,7 @@ def test_an_option_of_the_wrong_kind_is_refused_by_name(name):
         assert len(str(caught.value)) < 400
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_extreme_values_lead_to_a_result_or_to_one_of_our_errors(name):
     vertices, faces = shapes.hill(5, 4)
@@ -147,6 +148,7 @@ def test_the_length_of_up_means_nothing():
         assert np.array_equal(again.uv, plain.uv)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["rocker-arm.obj", *at_hand("face.obj", "stanford-bunny.obj")])
 @pytest.mark.parametrize("size", [51, 301])
 def test_a_number_of_cones_on_a_piece_of_a_scan(shared, name, size):

@@ -43,6 +43,7 @@ def test_errors_have_one_root():
     assert all(issubclass(kind, coneflat.ConeflatError) for kind in errors)
 
 
+@pytest.mark.slow
 def test_warming_up_compiles_all_that_flattening_needs(tmp_path):
     """What compiles after `coneflat.apps.warm_up` in a new process was missed: other kernels or other types."""
     vertices, faces = sphere(5)
@@ -93,6 +94,7 @@ print(*sys.modules)
     assert not unused & set(printed[-2].split())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*coneflat.__all__, "peers"])
 def test_examples_of_public_names_run(name, tmp_path, monkeypatch):
     """Those of its own docstring; plain values have none, and theirs are in the docstring of the package."""

@@ -341,6 +341,7 @@ def test_vertices_of_no_triangle_stay_where_they_are(first):
     assert np.array_equal(result.distortion.qc, plain.distortion.qc)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("allowed", [0.1, 0.2])
 def test_the_area_distortion_of_the_result_is_at_most_the_allowed_one_or_noted(allowed):
     """Also of coarse meshes and several components, whose relaxed triangles may exceed that of the model."""

@@ -40,12 +40,14 @@ def test_charts_that_touch_themselves_do_not_overlap_in_single_precision():
 
 
 @pytest.mark.parametrize(
-    ("name", "ending"), [("huge-triangles-tube", None), ("huge-triangles-crate", ".obj")]
+    ("name", "ending"),
+    [("huge-triangles-tube", None), pytest.param("huge-triangles-crate", ".obj", marks=pytest.mark.slow)],
 )
 def test_components_keep_their_scale_where_triangles_were_huge(name, ending, tmp_path):
     assert outcome_of(name, ending, tmp_path).breaches == []
 
 
+@pytest.mark.slow
 def test_any_finite_distortion_may_be_allowed():
     assert outcome_of("any-distortion").breaches == []
 

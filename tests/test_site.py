@@ -55,11 +55,13 @@ class Loads(HTMLParser):
             self.loads += [given[name] for name in ("src", "href") if given.get(name)]
 
 
+@pytest.mark.slow
 def test_every_page_is_there(site):
     for page in (ROOT / "docs").glob("**/*.md"):
         assert (site / page.relative_to(ROOT / "docs")).with_suffix(".html").exists()
 
 
+@pytest.mark.slow
 def test_nothing_is_loaded_from_elsewhere(site):
     for page in site.glob("**/*.html"):
         for target in Loads(page).loads:
@@ -70,6 +72,7 @@ def test_nothing_is_loaded_from_elsewhere(site):
         assert not re.search(r"(?:@import|url\()\s*[\"']?(?:https?:)?//", style.read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_all_public_names_are_described(site):
     parts = Loads(site / "reference" / "api.html").parts
     missing = [

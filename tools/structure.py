@@ -221,24 +221,29 @@ def _read(name: str, path: Path, paths: dict[str, Path]) -> Module:
 
 def packages_by_level(package: Path = PACKAGE) -> list[list[Package]]:
     """Return the packages of each level, from the lowest one up; the applications count as one."""
-    modules = read_modules(package)
-    found = levels(modules)
-    imported, sized = imported_packages(modules), sizes(package)
-
-    def merged(name: str) -> str:
-        return name.split(".")[0]
-
-    names = sorted({merged(name) for name in found if name})
-    own_level = {name: max(found[each] for each in found if merged(each) == name) for name in names}
-    own_level |= {name: max(own_level.values()) for name in ("apps",) if name in own_level}
+    imported, sized = imported_packages(read_modules(package)), sizes(package)
 
     def describe(name: str) -> Package:
-        below = {merged(other) for each in imported if merged(each) == name for other in imported[each]}
-        size = sum((size for each, size in sized.items() if merged(each) == name), Size(0, 0))
+        below = {_merged(other) for each in imported if _merged(each) == name for other in imported[each]}
+        size = sum((size for each, size in sized.items() if _merged(each) == name), Size(0, 0))
         return Package(name, HOLDS.get(name, name), size, frozenset(below - {name}))
 
+    return [[describe(name) for name in row] for row in names_by_level(package)]
+
+
+def names_by_level(package: Path = PACKAGE) -> list[list[str]]:
+    """Return the names of the packages of each level, from the lowest one up; the applications count as one."""
+    found = levels(read_modules(package))
+    names = sorted({_merged(name) for name in found if name})
+    own_level = {name: max(found[each] for each in found if _merged(each) == name) for name in names}
+    own_level |= {name: max(own_level.values()) for name in ("apps",) if name in own_level}
     heights = sorted(set(own_level.values()))
-    return [[describe(name) for name in names if own_level[name] == height] for height in heights]
+    return [[name for name in names if own_level[name] == height] for height in heights]
+
+
+def _merged(name: str) -> str:
+    """Return the name of the package in the drawing: that of all applications is one."""
+    return name.split(".")[0]
 
 
 # Points of the drawing: height of a row, gap between two, width of a letter of a name and of small print.

@@ -214,6 +214,7 @@ class TestSplit:
         ):
             assert np.array_equal(found, largest)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("seed", range(2))
     def test_charts_of_crumpled_paper_hang_together_and_do_not_overlap(self, seed):
         """Many cuts, after which pieces touch themselves in points."""

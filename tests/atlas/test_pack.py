@@ -164,6 +164,7 @@ def test_a_square_on_its_corner_and_a_triangle_alone():
     assert packed.scale == pytest.approx(6**0.5 - 2**0.5, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_tiles():
     corners, chart = charts_of(*(star(5, 0.5, 1.0, seed) for seed in range(24)))
     one, many = pack_charts(corners, chart), pack_charts(corners, chart, tiles=12)
@@ -216,6 +217,7 @@ def test_the_same_again_and_in_any_order():
     np.testing.assert_allclose(shuffled.corner_uv[:, [2, 0, 1]], packed.corner_uv[order], atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1e-6, 1.0, 1e6])
 def test_turned_and_scaled_before_makes_no_difference(factor):
     corners, chart = without_symmetry()
@@ -306,6 +308,7 @@ def test_bad_options(options, said):
         pack_charts(corners, chart, **options)
 
 
+@pytest.mark.slow
 def test_a_gap_that_leaves_no_space_is_refused_soon():
     square = np.array([[[0.0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]])
     corners = np.concatenate([square + 2 * i for i in range(13)])

@@ -44,6 +44,7 @@ def sparse(vertices, faces, distortion=0.2, count=None, **options):
     return search.fewest(distortion) if count is None else search.best_of(count)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHAPES)
 def test_what_was_asked_before_costs_no_cone(name):
     search = search_on(*SHAPES[name])
@@ -54,6 +55,7 @@ def test_what_was_asked_before_costs_no_cone(name):
     assert len(found.solution.cones) <= len(alone.solution.cones)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHAPES)
 def test_reported_distortion_is_that_of_the_log_scale(name):
     laplacian, curvature, areas, is_boundary, chi = surface(*SHAPES[name])
@@ -108,6 +110,7 @@ def test_no_cone_can_be_left_out(name):
         assert search.exact.energy(np.delete(members, place)) > 0.01
 
 
+@pytest.mark.slow
 def test_noise_needs_cones_beyond_those_of_the_coarse_model():
     """With sets of the coarse model only, 102 cones are needed."""
     search = search_on(*noisy("noisy-sphere"))
@@ -118,6 +121,7 @@ def test_noise_needs_cones_beyond_those_of_the_coarse_model():
     assert search.best_of(count).distortion <= found.distortion
 
 
+@pytest.mark.slow
 def test_noise_where_few_vertices_may_be_cones():
     """The vertices around which the gain is largest are mostly not allowed."""
     vertices, faces = noisy("noisy-sphere")
@@ -127,6 +131,7 @@ def test_noise_where_few_vertices_may_be_cones():
     assert allowed[found.solution.cones].all()
 
 
+@pytest.mark.slow
 def test_a_distortion_out_of_reach_has_the_same_answer_again():
     """And has not many cones that gain nothing."""
     search = search_on(*noisy("noisy-sphere"), positive_only=True)
@@ -340,6 +345,7 @@ def test_coarse_model_of_odd_connectivity_stays_small(shape):
     assert functions.nnz < 30 * len(inside)
 
 
+@pytest.mark.slow
 def test_hubs_leave_vertices_to_choose_from():
     """Two vertices that all others meet: their aggregates must not swallow the rest."""
     count = 20_000
@@ -353,6 +359,7 @@ def test_hubs_leave_vertices_to_choose_from():
     assert len(sparse(np.concatenate([ring, [[0, 0, 0.3], [0, 0, -0.3]]]), faces).solution.cones) >= 3
 
 
+@pytest.mark.slow
 def test_more_cones_than_are_searched_for_is_an_error():
     with pytest.raises(CurvatureError, match="400 cones or more"):
         sparse(*SHAPES["sphere"], min_cone_angle=1.99 * np.pi)

@@ -147,6 +147,7 @@ def test_a_triangulation_has_no_overlaps_at_any_scale():
         assert overlaps.fraction == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_fans_leave_the_pairs_as_they_are(seed, monkeypatch):
     monkeypatch.setattr("coneflat.geometry.fans.MIN_CORNERS", 2)

@@ -59,6 +59,7 @@ def face_sizes(path):
     return [len(line.split()) - 1 for line in path.read_text().splitlines() if line.startswith("f ")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.0, 0.01, 0.05])
 def test_fans_of_written_polygons_are_upright_and_apart(tmp_path, noise):
     vertices, faces = quads(2, noise)

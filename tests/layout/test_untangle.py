@@ -80,7 +80,10 @@ WILD = {
 }
 
 
-@pytest.fixture(scope="module", params=WILD)
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(name, marks=[pytest.mark.slow] * ("spikes 1.0" in name)) for name in WILD],
+)
 def untangled(request):
     """The result of a wild mesh in one chart, and the patches that were untangled for it."""
     seen = []
@@ -141,7 +144,12 @@ class TestWinding:
 
 class TestFreeSeams:
     @pytest.mark.parametrize(
-        "mesh", [spikes(11, 1.0, "2"), stretched(shapes.torus(30, 12), 60), stretched(shapes.sphere(3), 100)]
+        "mesh",
+        [
+            pytest.param(spikes(11, 1.0, "2"), marks=pytest.mark.slow),
+            stretched(shapes.torus(30, 12), 60),
+            stretched(shapes.sphere(3), 100),
+        ],
     )
     def test_what_has_no_room_is_upright_at_the_expense_of_seams(self, mesh):
         result = coneflat.flatten(*mesh, charts="one")
@@ -186,7 +194,11 @@ class TestPrescribed:
 
     @pytest.mark.parametrize(
         ("boundary", "cells"),
-        [("disk", 16), ("straight", 12), (dict.fromkeys((0, 16, 288, 272), np.pi / 2), 16)],
+        [
+            ("disk", 16),
+            pytest.param("straight", 12, marks=pytest.mark.slow),
+            (dict.fromkeys((0, 16, 288, 272), np.pi / 2), 16),
+        ],
     )
     def test_a_prescribed_boundary_is_not_moved(self, boundary, cells):
         result = coneflat.flatten(*folded(0.3, cells), boundary=boundary)
@@ -201,6 +213,7 @@ class TestPrescribed:
         off = np.abs(result.curvature_residual[border & is_upright(result)]).max()
         assert off < 1e-9 or any("the angle sum differs" in note for note in result.notes)
 
+    @pytest.mark.slow
     def test_lengths_of_the_boundary_are_kept(self):
         result = coneflat.flatten(*folded(0.3), boundary="lengths")
         assert result.solve.untangled_triangles
@@ -218,7 +231,7 @@ class TestPrescribed:
 
 class TestMarkedSeams:
     @pytest.mark.parametrize("boundary", RULES)
-    @pytest.mark.parametrize("noise", [0.0, 0.1, 0.2])
+    @pytest.mark.parametrize("noise", [0.0, 0.1, pytest.param(0.2, marks=pytest.mark.slow)])
     def test_both_sides_are_equal_whatever_the_boundary(self, boundary, noise):
         result = coneflat.flatten(*folded(noise), boundary=boundary, seams=self.seams(), charts="one")
         assert result.distortion.charts == 3
@@ -227,7 +240,7 @@ class TestMarkedSeams:
         assert np.count_nonzero(marked) == 32
         np.testing.assert_allclose(result.seam_data.seam_scale[marked], 1, rtol=1e-9)
 
-    @pytest.mark.parametrize("boundary", ["free", "lengths"])
+    @pytest.mark.parametrize("boundary", ["free", pytest.param("lengths", marks=pytest.mark.slow)])
     def test_lengths_that_cannot_be_kept_are_named(self, boundary, monkeypatch):
         """Where triangles at a seam are too coarse for the curvature beside it, there is no metric with their sides."""
         monkeypatch.setattr(import_module("coneflat.flatten"), "MAX_SEARCHES", 1)  # other cones may help

@@ -40,6 +40,7 @@ def limbs():
     return vertices * stretch[:, None], faces
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("parts", "up"), [(4, None), (6, (0.0, 0.3, 1.0))])
 def test_seams_of_an_atlas_turn_by_whole_quanta(limbs, parts, up):
     quantum = 2 * np.pi / parts
@@ -121,6 +122,7 @@ def test_sides_of_seams_that_differ_are_told():
     assert any("sides of seams differ" in note for note in unmet_guarantees(spoiled(result, uv)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["linear", "bff", "lscm"])
 def test_overlaps_in_an_atlas_are_told_whatever_the_method(method):
     vertices, faces = shapes.sphere(3)

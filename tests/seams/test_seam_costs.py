@@ -87,6 +87,7 @@ class TestVisibility:
             assert np.mean(np.abs(other - share) < 1e-6) > 0.99
             assert np.abs(other - share).max() < 0.1
 
+    @pytest.mark.slow
     def test_more_directions_and_pixels_change_little(self, monkeypatch):
         vertices, faces, _ = well()
         share = visible_share(vertices, faces)

@@ -37,6 +37,7 @@ def invoke(*arguments):
     return CliRunner().invoke(cli, [str(argument) for argument in arguments])
 
 
+@pytest.mark.slow
 def test_failures_stop_nothing(models, tmp_path):
     out = tmp_path / "out"
     result = invoke("batch", models, "--out", out, "--jobs", 2)
@@ -56,6 +57,7 @@ def test_failures_stop_nothing(models, tmp_path):
     assert not (out / "broken.obj").exists()
 
 
+@pytest.mark.slow
 def test_textures(models, tmp_path):
     result = invoke(
         "batch", models / "ball.obj", "--out", tmp_path, "--max-energy", 4.2, "--require", "energy<=4.2"
@@ -67,6 +69,7 @@ def test_textures(models, tmp_path):
     assert "above 4" in str(refused.exception)
 
 
+@pytest.mark.slow
 def test_a_further_run_does_what_is_left(models, tmp_path):
     out = tmp_path / "out"
     run = partial(invoke, "batch", models, "--out", out, "--jobs", 1)
@@ -88,6 +91,7 @@ def test_a_further_run_does_what_is_left(models, tmp_path):
     assert "2 of them before" in run("--distortion", 0.5).output
 
 
+@pytest.mark.slow
 def test_a_mesh_that_hangs_is_ended(models, tmp_path):
     jobs = find_jobs([str(models / "ball.obj"), str(models / "hill.obj")], tmp_path, ".npz", {}, None)
     child = Child()
@@ -121,6 +125,7 @@ def test_refusals(models, monkeypatch, arguments, message):
     assert message in text
 
 
+@pytest.mark.slow
 def test_a_cluster_does_the_same_even_if_it_loses_a_worker(models, tmp_path, monkeypatch):
     distributed = pytest.importorskip("distributed")
     for i in range(6):
@@ -156,6 +161,7 @@ def test_a_cluster_does_the_same_even_if_it_loses_a_worker(models, tmp_path, mon
             assert (here / name).read_bytes() == (there / name).read_bytes()
 
 
+@pytest.mark.slow
 def test_interrupted_batches_keep_what_they_have(models, tmp_path):
     jobs = find_jobs([str(models)], tmp_path, ".obj", {}, None)
 
@@ -170,6 +176,7 @@ def test_interrupted_batches_keep_what_they_have(models, tmp_path):
     assert len(run_batch(jobs, tmp_path).rows) == 3
 
 
+@pytest.mark.slow
 def test_a_link_that_leads_nowhere_is_one_failed_mesh(models, tmp_path):
     (models / "dangling.obj").symlink_to("nowhere.obj")
     (models / "loop.obj").symlink_to("loop.obj")
@@ -226,6 +233,7 @@ def test_every_result_has_a_name_of_its_own_in_the_folder(tmp_path):
     assert {os.path.dirname(job.output) for job in jobs} == {str(tmp_path / "out")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", [b"", b"no JSON\n", b'{"half": '])
 def test_a_worker_that_crashes_fails_its_mesh_alone_and_leaves_nothing_half_written(
     models, tmp_path, monkeypatch, what

@@ -1,4 +1,4 @@
-"""The Blender extension: its zip, what runs without bpy, and sessions in Blender where bpy can be imported."""
+"""The Blender extension: its zip, and what runs without bpy."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ import ast
 import importlib
 import itertools
 import os
-import subprocess
 import sys
 import time
 import types
 import zipfile
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -47,17 +45,6 @@ def extension(archive):
     for name in ("job", "environment", "exchange"):
         setattr(package, name, importlib.import_module(f"{package.__name__}.{name}"))
     return package
-
-
-@pytest.mark.skipif(find_spec("bpy") is None, reason="bpy is not installed")
-@pytest.mark.parametrize("name", SESSIONS)
-def test_session(name, archive, tmp_path):
-    source = str(Path(coneflat.__file__).parents[1])
-    environment = {**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path), "PYTHONPATH": source}
-    done = subprocess.run(
-        [sys.executable, SESSION, name, archive], env=environment, capture_output=True, text=True, timeout=900
-    )
-    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
 
 
 def test_every_session_is_run():
@@ -319,6 +306,7 @@ def test_the_environment_is_found(extension, tmp_path, monkeypatch):
         environment.find("", tmp_path)
 
 
+@pytest.mark.slow
 def test_an_environment_without_a_network(extension, tmp_path, monkeypatch):
     commands, failure = extension.environment.install_commands, extension.job.Failure
     with pytest.raises(

@@ -139,7 +139,9 @@ def test_what_is_no_curvature(text):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="sh closes the streams")
-@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize(
+    "closed", [*(pytest.param(one, marks=pytest.mark.slow) for one in (">&-", "2>&-")), "<&- >&- 2>&-"]
+)
 def test_closed_standard_streams_do_not_prevent_the_output(tmp_path, closed):
     shapes.write_obj(tmp_path / "in.obj", *shapes.sphere(2))
     command = f'"{sys.executable}" -m coneflat flatten in.obj -o out.obj {closed}'
@@ -210,8 +212,10 @@ def test_messages_are_one_line(tmp_path):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has other signals")
-@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
-@pytest.mark.parametrize("step", ["cones", "write"])
+@pytest.mark.parametrize(
+    "name", ["SIGINT", *(pytest.param(name, marks=pytest.mark.slow) for name in ("SIGTERM", "SIGHUP"))]
+)
+@pytest.mark.parametrize("step", [pytest.param("cones", marks=pytest.mark.slow), "write"])
 def test_interrupt_leaves_no_incomplete_file(tmp_path, step, name):
     shapes.write_obj(tmp_path / "big.obj", *shapes.sphere(4))
     # A file that is written waits for the signal before it gets its name.
@@ -234,6 +238,7 @@ def test_interrupt_leaves_no_incomplete_file(tmp_path, step, name):
     assert [path.name for path in tmp_path.iterdir()] == ["big.obj"]
 
 
+@pytest.mark.slow
 def test_demo(tmp_path):
     pytest.importorskip("matplotlib")
     done = run("demo", cwd=tmp_path)
@@ -291,6 +296,7 @@ def test_marked_seams(tmp_path):
     assert "no UV coordinates" in done.stderr
 
 
+@pytest.mark.slow
 def test_no_seams_takes_vertices_and_pairs(tmp_path):
     vertices, faces = shapes.sphere(3, bumps=0.4, seed=5)
     shapes.write_obj(tmp_path / "ball.obj", vertices, faces)

@@ -178,6 +178,7 @@ class TestOwnUVs:
         assert done.exit_code == 0
         assert "are shown; --again" not in done.stdout
 
+    @pytest.mark.slow
     def test_a_page_shows_the_map_for_a_texture_instead(self, square):
         done = run("view", square, "-o", "a.html", "--unwrap")
         assert done.exit_code == 0, done.output

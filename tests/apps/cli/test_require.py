@@ -96,6 +96,7 @@ def test_measure(folder):
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_batch_counts_what_is_not_met_as_failed(folder):
     done = run("batch", "ball.obj", "hill.obj", "--out", "flat", "--jobs", "1", "--require", "triangles=60")
     assert done.exit_code == 1

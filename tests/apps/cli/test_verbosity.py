@@ -42,6 +42,7 @@ def needed(name):
         pytest.importorskip("matplotlib")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COMMANDS)
 def test_verbose_tells_each_step_and_where_the_time_went(folder, name):
     needed(name)

@@ -111,6 +111,7 @@ def test_uvs_of_others_are_welded_and_measured(ball, monkeypatch):
     assert len(theirs.cones) == 0
 
 
+@pytest.mark.slow
 def test_commands(tmp_path, ball):
     pytest.importorskip("matplotlib")
     mesh = shapes.write_obj(tmp_path / "ball.obj", *ball)
@@ -201,6 +202,7 @@ def test_layouts_of_other_charts_stay(hill):
     assert aligned_layouts([hill, other])[1] is other
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stretch", [1.0, 8.0])
 def test_no_text_runs_into_another_or_over_the_edge(stretch):
     pytest.importorskip("matplotlib")

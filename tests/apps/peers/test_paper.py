@@ -60,6 +60,7 @@ def test_the_experiments_of_the_paper(tmp_path):
     assert "In another resolution" in text
 
 
+@pytest.mark.slow
 def test_the_script_writes_the_tables_and_figures(tmp_path):
     pytest.importorskip("matplotlib")
     mesh = shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(2))

@@ -67,6 +67,7 @@ def test_short_sharp_edges_are_noise():
     assert len(sharp_or_boundary(mesh, 100.0)) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["box", "torus", "genus 2", "hill"])
 def test_the_linear_model_agrees_with_an_exact_map(name):
     """Between two sets of cones that differ a little, log scale and rotation change by nearly the same."""
@@ -92,6 +93,7 @@ def test_the_linear_model_agrees_with_an_exact_map(name):
     assert len(loops) == 2 * mesh.genus()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["box", "torus", "hill", "genus 2"])
 def test_cones_do_not_depend_on_numbering_scale_or_place(name):
     vertices, faces = SURFACES[name]
@@ -103,6 +105,7 @@ def test_cones_do_not_depend_on_numbering_scale_or_place(name):
     assert sum(one.values()) == 4 * mesh_of(name).euler_characteristic
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("distortion", [0.1, 0.2])
 def test_sizes_are_as_even_as_asked(distortion):
     mesh = coneflat.quads(*shapes.sphere(4), quads=2000, distortion=distortion)
@@ -121,6 +124,7 @@ def test_quads_follow_the_sharp_edges_of_a_box():
     assert length == pytest.approx(4 * (high - low).sum())
 
 
+@pytest.mark.slow
 def test_fewer_quads_have_fewer_cones():
     counts = [len(coneflat.quads(*shapes.sphere(4), quads=count).irregular) for count in (200, 5000)]
     assert counts[0] <= counts[1]

@@ -88,7 +88,7 @@ def check_laws(grid):
 
 
 @pytest.mark.parametrize("quads", [40, 1000])
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", ["sphere", "torus", "hill", pytest.param("two", marks=pytest.mark.slow)])
 def test_laws_on_shapes(name, quads):
     grid = integer_grid(*SHAPES[name], quads=quads)
     check_laws(grid)
@@ -149,6 +149,7 @@ def askew():
     return vertices[used], faces.reshape(-1, 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quads", [300, 2000])
 def test_loops_that_are_askew_come_to_lie_on_grid_lines(quads):
     grid = integer_grid(*askew(), quads=quads, repair=True)
@@ -227,7 +228,10 @@ def test_cones_that_are_no_quarter_turns_are_refused():
         integer_grid(free, charts="one")
 
 
-@pytest.mark.parametrize(("every", "height"), [(7, 1.5), (9, 1.5), (13, 0.8)])
+@pytest.mark.parametrize(
+    ("every", "height"),
+    [(7, 1.5), *(pytest.param(*spikes, marks=pytest.mark.slow) for spikes in ((9, 1.5), (13, 0.8)))],
+)
 def test_charts_stay_joined_where_edges_between_them_are_split(every, height):
     """The first chain between two charts is another one then."""
     options = {**QUARTER, "charts": "atlas", "correct_handles": True, "distortion": 0.1}

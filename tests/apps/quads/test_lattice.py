@@ -60,6 +60,7 @@ def test_reduced_bases_keep_the_lattice_and_its_lengths(seed):
     assert (np.abs(np.triu(root, 1)) <= 0.51 * np.abs(np.diag(root))[:, None]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 def test_nearest_points_with_equations_are_those_of_brute_force(seed):
     rng = np.random.default_rng(seed)

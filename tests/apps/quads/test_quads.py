@@ -140,6 +140,7 @@ def test_quads_that_touch_in_a_point_have_a_vertex_each():
     assert mesh.area_left_out == pytest.approx(0.4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["hill", "annulus", "rotated square"])
 def test_open_borders_are_covered_to_the_last_quad(name):
     if name == "rotated square":  # its corners are kept, though the grid is not aligned with its sides
@@ -237,6 +238,7 @@ def test_components_with_few_vertices_get_quads():
     assert len(mesh.grid.faces) > len(faces)
 
 
+@pytest.mark.slow
 def test_quads_that_meet_themselves_are_made_smaller():
     """Around each hole of a surface with three handles there are too few squares."""
     options = {"quads": 10, "cones": "sparse", "distortion": 0.2}
@@ -269,6 +271,7 @@ def test_bad_quads_are_left_out_where_no_finer_grid_is_found(monkeypatch):
     assert mesh.grid.seconds.keys() >= {"flatten", "grid"}
 
 
+@pytest.mark.slow
 def test_cones_are_chosen_once_for_all_sizes_of_one_price(monkeypatch):
     chosen, sizes, choose, extract = [], [], integer_grid.aligned_flattening, extract_quads
 
@@ -296,12 +299,14 @@ def test_cones_are_chosen_once_for_all_sizes_of_one_price(monkeypatch):
     assert len(chosen) == 3
 
 
+@pytest.mark.slow
 def test_components_of_equal_price_have_grids_of_their_own():
     vertices, faces = shapes.sphere(3)
     mesh = coneflat.quads(*shapes.join((vertices, faces), (vertices + 5, faces)), quads=5000)
     assert np.ptp(mesh.vertices, axis=0).min() > 5 + 0.9 * np.ptp(vertices, axis=0).min()
 
 
+@pytest.mark.slow
 def test_a_large_grid_that_is_much_finer_than_wanted_is_not_refined(monkeypatch):
     tried, extract = [], extract_quads
 
@@ -323,6 +328,7 @@ def test_a_large_grid_that_is_much_finer_than_wanted_is_not_refined(monkeypatch)
     assert len(tried) == 1
 
 
+@pytest.mark.slow
 def test_grids_whose_bad_quads_are_left_out_keep_all_notes(monkeypatch):
     """The first grid, of aligned cones, is taken, not that of the fewest cones."""
 
@@ -338,6 +344,7 @@ def test_grids_whose_bad_quads_are_left_out_keep_all_notes(monkeypatch):
     assert any("Cones are not chosen" in note for note in coneflat.quads(*shapes.sphere(3), quads=200).notes)
 
 
+@pytest.mark.slow
 def test_a_thin_component_does_not_make_the_others_finer(monkeypatch):
     sizes = []
 

@@ -172,6 +172,7 @@ def test_cones_that_are_given(tmp_path):
             coneflat.quads(vertices, faces, cones=cones)
 
 
+@pytest.mark.slow
 def test_quads_are_more_alike_where_weights_are():
     vertices, faces = shapes.sphere(4, bumps=0.5)
     matters = vertices[:, 2] > np.quantile(vertices[:, 2], 0.7)
@@ -196,6 +197,7 @@ def test_quads_are_flattened_again(tmp_path):
     assert len(again.offsets) == len(coneflat.read_mesh(path).offsets)
 
 
+@pytest.mark.slow
 def test_the_command_tries_a_finer_grid_as_the_function_does(tmp_path):
     """Around each hole of a surface with three handles there are too few squares."""
     vertices, faces = shapes.genus(3)

@@ -133,6 +133,7 @@ def test_impossible_angles(angle):
         integer_grid(*SHAPES["cube"], quads=100, sharp_angle=angle)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("size", [12, 150])
 def test_elimination_spans_all_solutions(size, seed):
@@ -191,6 +192,7 @@ def test_elimination_without_coefficients(equations, variables):
     np.testing.assert_array_equal(left, np.ones(equations))
 
 
+@pytest.mark.slow
 def test_elimination_of_many_separate_equations_stays_sparse():
     """The basis has 20,000 vectors, of two entries each: as an array it would need 6 GB."""
     blocks = block_diag([csr_matrix([[1.0, -1.0]])] * 20_000, format="csr")
@@ -216,6 +218,7 @@ def test_two_triangles_back_to_back(count):
     assert abs(len(mesh.quads) - count) < 0.1 * count + 5
 
 
+@pytest.mark.slow
 def test_sharp_edges_without_room_are_left_out_with_a_note():
     """Between the edges of a pyramid of 40 quads there is less than a square."""
     angle = np.pi / 6 * np.arange(12)

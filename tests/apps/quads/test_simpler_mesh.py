@@ -155,6 +155,7 @@ def with_holes(count, corners=((20, 20), (60, 20), (20, 60), (60, 60))):
     return vertices, faces[~gone]
 
 
+@pytest.mark.slow
 def test_holes_smaller_than_quads_are_filled():
     found = coneflat.quads(*with_holes(80), quads=100)
     assert (len(found.quads), found.euler_characteristic, len(found.irregular)) == (100, 1, 0)
@@ -172,6 +173,7 @@ def test_quads_over_filled_holes_are_left_out(monkeypatch):
     assert coneflat.measure_quads(found).jacobian_min > 0
 
 
+@pytest.mark.slow
 def test_round_holes_that_are_filled_give_no_flipped_quads(monkeypatch):
     monkeypatch.setattr(module, "MAX_HOLES", 1)
     vertices, faces = shapes.grid(60, 60)
@@ -193,6 +195,7 @@ def test_a_boundary_with_very_many_corners_is_free(monkeypatch):
     assert not any("corners" in note for note in asked.notes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["as given", "coarse", "filled", "few"])
 def test_components_for_which_no_grid_is_found_are_divided(monkeypatch, name):
     """Each triangle of the cube becomes three quads, and the surface is the given one."""
@@ -240,6 +243,7 @@ def test_extreme_sizes_are_refused(size):
         coneflat.quads(*shapes.grid(8, 8), size=size)
 
 
+@pytest.mark.slow
 def test_noise_is_not_a_crease():
     """Of a noisy sphere there are no sharp edges, and not more irregular vertices; those of a noisy box are kept."""
     rng = np.random.default_rng(0)
@@ -275,6 +279,7 @@ def test_edges_of_a_small_part_are_no_noise(cells):
     assert len(sharp_ends(mesh)) == 4 + 8 + 4 + 8 * cells + 4
 
 
+@pytest.mark.slow
 def test_meshes_of_thin_triangles_are_triangulated_anew():
     """As in files of CAD programs: a pipe of strips as long as it, and a cap with a fan around its centre."""
     count = 60
@@ -309,6 +314,7 @@ def test_meshes_whose_triangles_stay_thin_are_taken_as_given():
     assert (some.tolist(), of.tolist()) == (list(range(len(mesh.vertices))), list(range(len(mesh.faces))))
 
 
+@pytest.mark.slow
 def test_triangles_that_stay_thin_are_not_split_without_bound(monkeypatch):
     """The triangles of a cylinder of many sides are thin at their tips, however often they are split."""
     most, coarse = [], module.coarse_mesh

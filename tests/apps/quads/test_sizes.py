@@ -52,6 +52,7 @@ def test_sizes_count_up_to_a_factor(ball, graded):
     np.testing.assert_allclose(again.vertices, graded.vertices, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_quads_are_smaller_where_the_surface_bends():
     vertices, faces = shapes.sphere(3)
 
@@ -142,6 +143,7 @@ def test_sizes_hold_between_components(two_balls):
     assert sides[~is_small].mean() == pytest.approx(2 * sides[is_small].mean(), rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_coarse_mesh_without_a_grid_is_refined(monkeypatch):
     search = GridSearch._of_aligned_cones
 

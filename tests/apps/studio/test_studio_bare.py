@@ -10,6 +10,8 @@ from test_studio_session import settled
 import coneflat
 from coneflat.apps.studio.session import Session
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def open_mesh(tmp_path):

@@ -148,6 +148,7 @@ class TestKnownArrays:
         assert self.arrays_of(whole) == {"places": [1.0, 2.0], "tints": [1, 2, 4], "uv": [0.5]}
 
 
+@pytest.mark.slow
 def test_a_change_cancels_the_separation_of_overlaps(tmp_path, monkeypatch):
     """The preview comes before the separation, which may take long, and the next change does not wait for it."""
     path = shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(5))

@@ -5,7 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from browsing import need_browser
 from studio_browsing import Studio, StudioVisit, sample, studio, visit  # noqa: F401
+
+need_browser()
 
 FOCUS = "document.activeElement.getAttribute('aria-label') ?? document.activeElement.textContent"
 

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import functools
 import http.client
 import http.server
 import re
-import threading
 import urllib.error
 import urllib.request
 
 import numpy as np
 import pytest
 import shapes
-from browsing import PATIENCE
 
 import coneflat
 from coneflat.errors import ArrayShapeError, MeshFileError, OptionError, StudioError
@@ -28,6 +25,7 @@ def page():
         yield opened
 
 
+@pytest.mark.slow
 def test_arrays_are_flattened_as_they_are(page):
     whole = coneflat.flatten(*shapes.sphere(3), repair=False)
     np.testing.assert_array_equal(page.result.vertices, whole.vertices)
@@ -36,6 +34,7 @@ def test_arrays_are_flattened_as_they_are(page):
     assert page.project.exists()
 
 
+@pytest.mark.slow
 def test_choices_are_set_and_read(page):
     assert page.choices["options"] == {}
     page.choices = {"options": {"cone_count": 9}, "paint": {"no_cone": "0-80"}}
@@ -60,6 +59,7 @@ def test_choices_are_set_and_read(page):
         assert page.result
 
 
+@pytest.mark.slow
 def test_files_and_projects(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(2))
@@ -78,42 +78,6 @@ def test_files_and_projects(tmp_path, monkeypatch):
         coneflat.studio(np.zeros((3, 2)), np.array([[0, 1, 2]]))
     with pytest.raises(ArrayShapeError, match="integers"):
         coneflat.studio(np.zeros((3, 3)), np.zeros((1, 3)))
-
-
-def test_a_frame_of_a_notebook_shows_it_and_of_no_other_page(browser, page, tmp_path):
-    assert page.result is not None
-    (tmp_path / "index.html").write_text(page._repr_html_())
-    handler = functools.partial(http.server.SimpleHTTPRequestHandler, directory=str(tmp_path))
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    context = browser.new_context(viewport={"width": 1200, "height": 760}, reduced_motion="reduce")
-    try:
-        for place in (f"http://localhost:{server.server_port}/", "http://elsewhere.example/"):
-            outer = context.new_page()
-            if "elsewhere" in place:
-                # A page of the web, played by the browser.
-                outer.route(
-                    place, lambda route: route.fulfill(body=page._repr_html_(), content_type="text/html")
-                )
-            outer.goto(place)
-            if "elsewhere" in place:
-                assert outer.frames[-1].url.startswith("chrome-error:")
-                continue
-            frame = outer.frame_locator("iframe")
-            frame.locator("html[data-settled='true']").wait_for(state="attached", timeout=PATIENCE)
-            assert "1,280 triangles" in frame.locator("#title").inner_text()
-            # What is done there is chosen here, and the other way round.
-            frame.locator("#charts").select_option("one")
-            frame.locator("#undo:not([disabled])").wait_for(timeout=PATIENCE)
-            assert page.choices["options"] == {"charts": "one"}
-            page.choices = {"options": {"cone_count": 7}}
-            frame.locator("#cones-by >> option[value=cone_count]:checked").wait_for(
-                state="attached", timeout=PATIENCE
-            )
-    finally:
-        context.close()
-        server.shutdown()
-        server.server_close()
 
 
 def test_through_a_proxy_the_token_alone_opens_it():

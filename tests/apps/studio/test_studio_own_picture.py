@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scenes import SceneMaker
 from shapes import sphere
-from studio_browsing import Studio, StudioVisit
 
 import coneflat
 from coneflat.apps.studio.outputs import own_picture
@@ -65,52 +64,3 @@ def test_files_without_a_readable_picture_have_none(tmp_path):
     path.write_bytes(coloured_ball(image=b"\x89PNG\r\n\x1a\n broken"))
     assert own_picture(coneflat.read_mesh(path)) is None
     assert own_picture(coneflat.read_mesh(coneflat.sample_path())) is None
-
-
-#: The pixel of a pane, as bytes, at the middle of a triangle that is nearest to a place.
-PIXELS = """
-(() => { const {renderer, panes, model} = coneflat, {canvas, gl} = renderer, out = [];
-const bytes = new Uint8Array(4 * canvas.width * canvas.height);
-gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);
-for (const pane of panes) for (let i = 0; i < model.triangleCount; i += 7) {
-const [middle] = model.shapeOf({kind: "triangle", index: i}, pane.inPlane);
-const place = [0, 1, 2].map((k) => (middle[0][k] + middle[1][k] + middle[2][k]) / 3);
-const [x, y] = pane.camera.project(place), thing = renderer.pick(pane, x, y, coneflat.state);
-if (thing?.kind !== "triangle" || thing.index !== i) continue;
-const column = Math.floor((pane.left + x) * renderer.pixel);
-const row = canvas.height - 1 - Math.floor((pane.top + y) * renderer.pixel);
-const at = 4 * (row * canvas.width + column), centre = model.place(model.vertexAt(3 * i))[0];
-out.push([pane.name, centre, bytes[at], bytes[at + 1], bytes[at + 2]]); }
-return out; })()
-"""
-
-
-def test_the_texture_of_the_file_is_shown_in_both_views(browser, tmp_path):
-    path = tmp_path / "ball.glb"
-    path.write_bytes(coloured_ball())
-    served = Studio(tmp_path)
-    try:
-        served.session.open(path)
-        visit = StudioVisit(browser, served)
-        try:
-            visit.settle()
-            visit.wait("coneflat.renderer.look.asInFile === true")
-            visit.run("coneflat.state.set({show: 'picture', seams: false, cones: false})")
-            visit.rest()
-            found = visit.run(PIXELS)
-            left = [one for one in found if one[0] == "layout"]
-            assert {one[0] for one in found} == {"model", "layout"}
-            assert len(left) > 50
-            is_red, is_green = (np.array([one[2 + k] > 100 + one[3 - k] for one in found]) for k in (0, 1))
-            assert is_red.sum() > 30
-            assert is_green.sum() > 30
-            side = np.array([one[1] for one in found])
-            assert side[is_red].min() > side[is_green].max() - 0.4
-            # An image of the user is in the UVs of the layout again.
-            visit.run("coneflat.renderer.setPicture(coneflat.renderer.look.picture)")
-            assert visit.run("coneflat.renderer.look.asInFile") is False
-        finally:
-            visit.close()
-    finally:
-        served.close()

@@ -120,6 +120,7 @@ class TestPaint:
         assert "weights" not in by_hand.with_angle(9, 1.0).with_angle(1, 1.0).keywords()
 
 
+@pytest.mark.slow
 class TestStories:
     def test_painted_places_are_heeded_and_replayed(self, session, tmp_path):
         result = coneflat.flatten(*shapes.sphere(3))

@@ -109,6 +109,7 @@ class TestPage:
             headers = {"origin": f"http://{name}:{PORT}", "host": f"{name}:{PORT}"}
             assert page.get("/state", headers=headers).status_code == 200
 
+    @pytest.mark.slow
     def test_a_mesh_is_dropped_flattened_changed_and_saved(self, page, session, ball, tmp_path):
         assert page.get("/state").json()["mesh"] is None
         assert page.get("/layout").status_code == 400
@@ -207,6 +208,7 @@ def test_the_page_costs_edges_as_seams_do():
 class TestFailedOpening:
     """What is shown stays, and no file is left, if a dropped file cannot be opened."""
 
+    @pytest.mark.slow
     def test_what_is_shown_stays_and_no_file_is_left(self, page, session, ball, tmp_path):
         assert page.post("/mesh?name=ball.obj", content=ball.read_bytes()).status_code == 200
         assert session.wait_until_idle(120)
@@ -235,6 +237,7 @@ class TestFailedOpening:
         assert "other.obj cannot be stored: No such file or directory" in answer.text
 
 
+@pytest.mark.slow
 def test_a_refused_export_replaces_no_reason(page, session, ball):
     page.post("/mesh?name=ball.obj", content=ball.read_bytes())
     assert session.wait_until_idle(120)

@@ -61,6 +61,7 @@ class TestSession:
         assert found[1] in state["found"]
         assert len(state["found"]) == len(found) + 1
 
+    @pytest.mark.slow
     def test_what_is_saved_is_what_the_command_makes(self, session, tmp_path):
         found = settled(session)["found"]
         session.act({"do": "remove", "vertex": found[0]})
@@ -76,11 +77,13 @@ class TestSession:
         assert done.exit_code == 0, done.output
         np.testing.assert_array_equal(coneflat.read_flattening(tmp_path / "again.npz").uv, saved)
 
+    @pytest.mark.slow
     def test_it_saves(self, session):
         begins = {".obj": b"v ", ".ply": b"ply", ".glb": b"glTF", ".npz": b"PK", ".svg": b"<svg"}
         for ending, begin in begins.items():
             assert session.export(ending).startswith(begin), ending
 
+    @pytest.mark.slow
     def test_newer_changes_end_older_work(self, session):
         for step in range(1, 8):
             session.act({"do": "set", "name": "stretch", "value": step / 10})
@@ -92,6 +95,7 @@ class TestSession:
             uv_of(session.export(".npz"))
         )
 
+    @pytest.mark.slow
     def test_a_failure_is_told_and_undone(self, session):
         found = settled(session)["found"]
         for vertex in found:
@@ -119,6 +123,7 @@ class TestSession:
                 session.act(action)
             assert session.state()["choices"] == before
 
+    @pytest.mark.slow
     def test_a_killed_process_is_told_of_and_started_again(self, session):
         settled(session)
         first = worker_process()
@@ -177,6 +182,7 @@ def test_frames_come_whole_or_not_at_all():
     assert read_frame(BytesIO(whole[:19])) is None
 
 
+@pytest.mark.slow
 def test_the_command_prints_its_address_first_and_lives_on_this_machine(tmp_path, mesh):
     pytest.importorskip("uvicorn")
     httpx = pytest.importorskip("httpx2")

@@ -1,5 +1,4 @@
-"""Maps for textures in the studio: choices, replay from projects, cancellation, and the page."""
-# ruff: noqa: F811  (fixtures that are imported)
+"""Maps for textures in the studio: choices, replay from projects, and cancellation."""
 
 from __future__ import annotations
 
@@ -9,7 +8,6 @@ import math
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from studio_browsing import sample, studio, visit  # noqa: F401
 
 import coneflat
 from coneflat.apps.cli.main import cli
@@ -166,6 +164,7 @@ class TestReplay:
         chosen = Choices().with_texture(True).cut((1, 2))
         assert command_line("b.obj", "p.json", chosen) == "coneflat unwrap --project p.json"
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("for_texture", [False, True])
     def test_a_project_has_both_maps(self, tmp_path, mesh, for_texture):
         chosen = Choices().with_option("max_energy", 4.3).with_option("distortion", 0.3)
@@ -194,6 +193,7 @@ class TestReplay:
 
 
 class TestSession:
+    @pytest.mark.slow
     def test_the_kind_of_map_is_a_step(self, session, mesh):
         assert session.wait_until_idle(120)
         first = session.picture()[0]["title"]
@@ -211,6 +211,7 @@ class TestSession:
         assert session.picture()[0]["title"] == first
         assert not read_project(session.project_file).choices.for_texture
 
+    @pytest.mark.slow
     def test_what_cannot_be_is_refused(self, session):
         session.act({"do": "texture", "value": True})
         with pytest.raises(StudioError, match="has no cones to edit"):
@@ -238,106 +239,3 @@ class TestSession:
         with pytest.raises(Changed), cancel_with(check):
             JobRunner().flatten(job, lambda stage, fraction: None, lambda head, body: None)
         assert calls == 15
-
-
-HIDDEN = (
-    "#tool-cone",
-    "#tool-corner",
-    "#tool-no_cone",
-    "#tool-importance",
-    "#cones-by",
-    "#stretch",
-    "#boundary",
-)
-
-
-def test_the_page_switches_between_the_maps(visit, studio):
-    visit.settle()
-    page, cones = visit.page, visit.cones()
-    page.keyboard.press("a")
-    assert page.is_hidden("#max-energy")
-    page.select_option("#purpose", "texture")
-    visit.settle()
-    assert [name for name in HIDDEN if page.is_visible(name)] == []
-    assert page.input_value("#max-energy") == "4.1"
-    assert "energy 4.0" in page.inner_text("#title")
-    assert visit.cones() == []
-    assert visit.run("[studio.tools.mode, coneflat.state.get('cones')]") == ["look", False]
-
-    # Keys of cones have no effect, and those of seams have.
-    page.locator("#model").focus()
-    for key in ("a", "p", "n", "m", "l", "q", "Delete"):
-        page.keyboard.press(key)
-    visit.settle()
-    assert visit.run("[studio.tools.mode, studio.news.undo, studio.refused]") == ["look", 1, None]
-    page.keyboard.press("x")
-    assert visit.run("studio.tools.mode") == "cut"
-
-    page.fill("#max-energy", "4")
-    page.keyboard.press("Enter")
-    visit.wait("studio.refused")
-    visit.troubles.clear()  # The browser reports the refused request.
-    assert (
-        page.inner_text("#refusal-text")
-        == "“Energy at most” must be above 4, the energy of an isometry, got 4."
-    )
-    page.fill("#max-energy", "4.4")
-    page.keyboard.press("Enter")
-    visit.settle()
-    assert page.text_content("#command") == "coneflat unwrap sample.obj --max-energy 4.4"
-    assert studio.session.state()["choices"]["options"] == {"max_energy": 4.4}
-
-    page.select_option("#purpose", "angles")
-    visit.settle()
-    assert page.is_visible("#cones-by")
-    assert visit.cones() == cones
-    assert visit.run("coneflat.state.get('cones')")
-
-
-def test_less_common_options_are_set_by_the_page(visit):
-    page = visit.page
-    visit.settle()
-    page.click("#more summary")
-    assert page.is_hidden("#more-area")
-    page.fill("#more-quantise", "90")
-    page.keyboard.press("Enter")
-    visit.settle()
-    assert "--quantise 1.57079" in page.text_content("#command")
-    page.fill("#more-quantise", "")
-    page.keyboard.press("Enter")
-    page.select_option("#purpose", "texture")
-    visit.settle()
-    assert page.is_hidden("#more-quantise")
-    assert page.is_hidden("#chart-number")
-    page.fill("#more-area", "0.3")
-    page.keyboard.press("Enter")
-    page.select_option("#more-up", "-z")
-    page.select_option("#charts", "number")
-    page.fill("#chart-number", "5")
-    page.keyboard.press("Enter")
-    visit.settle()
-    assert page.text_content("#command") == (
-        "coneflat unwrap sample.obj --area 0.3 --up 0.0,0.0,-1.0 --charts 5"
-    )
-    assert [page.input_value(f"#{name}") for name in ("more-up", "more-area", "charts")] == [
-        "-z",
-        "0.3",
-        "number",
-    ]
-    assert "5 charts" in page.inner_text("#title")
-    assert page.input_value("#max-energy") == ""
-    page.click("#no-more")
-    visit.wait("studio.refused")
-    visit.troubles.clear()  # The browser reports the refused request.
-    assert "“Seams” none and “Area distortion at most” cannot be combined" in page.inner_text("#refusal-text")
-    assert not page.is_checked("#no-more")
-    page.fill("#more-area", "")
-    page.keyboard.press("Enter")
-    page.select_option("#charts", "atlas")
-    visit.settle()
-    page.check("#no-more")
-    visit.settle()
-    assert "--seams none" in page.text_content("#command")
-    page.select_option("#purpose", "angles")
-    visit.settle()
-    assert page.text_content("#command") == "coneflat flatten sample.obj --up 0.0,0.0,-1.0"

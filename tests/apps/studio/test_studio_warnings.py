@@ -36,6 +36,7 @@ class TestPlaces:
         (two,) = misplaced_warning(painted.added(20).added(10).added(3))
         assert "2 cones set by hand or locked lie in regions painted as “No cones”: vertices 3, 20." in two
 
+    @pytest.mark.slow
     def test_they_are_told_at_once_and_noted(self, session):
         found = settled(session)["found"]
         session.act({"do": "paint", "layer": "no_cone", "where": f"{found[0]}"})
@@ -66,6 +67,7 @@ class TestAngles:
         with pytest.raises(StudioError, match="got 3,000"):
             Choices.from_plain(plain)
 
+    @pytest.mark.slow
     def test_what_typed_angles_leave_out_of_bounds_is_told(self, session):
         """Of a ball's 720 degrees, three cones of 220 take 420; what is left leaves one more an angle below 90."""
         settled(session)

@@ -112,6 +112,7 @@ def folder(tmp_path_factory):
     return here
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 def test_colours_of_ten_models_arrive(name, tmp_path):
     old, new, out = (tmp_path / f"{stem}.glb" for stem in ("old", "new", "out"))
@@ -123,6 +124,7 @@ def test_colours_of_ten_models_arrive(name, tmp_path):
     assert mean_difference(new) > 10.0
 
 
+@pytest.mark.slow
 def test_vertex_colours_arrive_on_other_triangles(folder, tmp_path):
     fine = tmp_path / "fine.glb"
     fine.write_bytes(model(torus, count=150, image=False, colours=True))

@@ -61,6 +61,7 @@ def test_a_sphere_needs_one_seam_whatever_the_energy():
     assert len(np.unique(result.seams)) == len(result.seams) + 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", CLOSED.values(), ids=CLOSED)
 def test_handles_need_closed_curves_only(shape):
     result = unwrap(*shape, seams="none", charts="one")
@@ -88,6 +89,7 @@ def test_no_seams_but_those_given():
     assert not any("sides of seams" in note for note in result.notes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [shapes.sphere(3), shapes.hill(), shapes.genus(2)])
 def test_there_are_as_many_charts_as_requested(shape):
     few = unwrap(*shape, charts=1)
@@ -129,6 +131,7 @@ def test_fewer_charts_than_components_give_a_note():
     assert result.notes[-1].startswith("The texture has 2 charts instead of 1: components")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bound", [0.02, 0.06, 0.15])
 @pytest.mark.parametrize(
     "shape",
@@ -147,6 +150,7 @@ def test_the_area_distortion_is_within_its_bound(shape, bound):
     assert not any("allowed" in note for note in result.notes)
 
 
+@pytest.mark.slow
 def test_a_smaller_area_distortion_needs_longer_seams():
     lengths = [unwrap(*shapes.sphere(3), area=bound).distortion.seam_length for bound in (0.02, 0.06, 0.15)]
     assert lengths[0] > lengths[1] > lengths[2]
@@ -180,6 +184,7 @@ def test_what_cannot_be_is_refused(options, message):
         read_options(options, UnwrapOptions)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{"seams": "none"}, {"charts": 4}, {"area": 0.06}])
 def test_scale_motion_and_numbering_change_nothing(options):
     vertices, faces = shapes.sphere(3)
@@ -195,6 +200,7 @@ def test_scale_motion_and_numbering_change_nothing(options):
         assert found.seam_length == pytest.approx(base.seam_length, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_commands_take_them(tmp_path):
     mesh = shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(2))
     done = command(

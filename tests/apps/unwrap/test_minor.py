@@ -45,6 +45,7 @@ def every_part_is_minor(monkeypatch):
     monkeypatch.setattr(CutSearch, "best", lambda self: pytest.fail("a part is searched alone"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KINDS)
 def test_promises_hold_for_every_kind_of_component(name, every_part_is_minor):
     vertices, faces = crumbs([KINDS[name]], 6)
@@ -63,6 +64,7 @@ def test_promises_hold_for_every_kind_of_component(name, every_part_is_minor):
         assert d.energy == pytest.approx(4)
 
 
+@pytest.mark.slow
 def test_seams_are_as_short_as_when_components_are_cut_alone(monkeypatch):
     vertices, faces = crumbs([KINDS["icosphere"], KINDS["hill"]], 12)
 
@@ -95,6 +97,7 @@ def test_a_large_bound_needs_fewer_cones(every_part_is_minor):
     assert len(unwrap(*parts, max_energy=50).cones) < len(unwrap(*parts).cones)
 
 
+@pytest.mark.slow
 def test_the_numbering_of_components_changes_nothing(every_part_is_minor):
     vertices, faces = crumbs(list(KINDS.values()), 9)
     component = label_faces(faces, len(vertices))[1]

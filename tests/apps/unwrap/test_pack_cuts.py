@@ -136,6 +136,7 @@ def test_only_large_charts_of_several_layouts_are_cut():
     assert other is small
 
 
+@pytest.mark.slow
 def test_scale_motion_and_numbering_change_nothing():
     vertices, faces = grid(lambda x, y: starfish(1.1 * x + 0.1 * y**2, y))
     # Without equal paths, among which the numbering would choose.
@@ -154,6 +155,7 @@ def test_scale_motion_and_numbering_change_nothing():
     assert cut_for_packing([layout], [costs], GAP)[0].chart.tolist() == found.chart.tolist()
 
 
+@pytest.mark.slow
 def test_with_a_gap_that_leaves_no_space_nothing_is_cut():
     layout, costs = layout_of(*grid(plus, 20))
     assert cut_for_packing([layout, layout, layout], [costs] * 3, 0.6)[0] is layout

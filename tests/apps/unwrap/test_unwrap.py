@@ -30,7 +30,7 @@ CLOSED = {"sphere": shapes.sphere(3), "two handles": shapes.genus(2), "box": sha
 OPEN = {"hill": shapes.hill(), "annulus": shapes.annulus(), "cylinder": shapes.cylinder()}
 
 
-@pytest.mark.parametrize("bound", [4.02, 4.1, 4.5])
+@pytest.mark.parametrize("bound", [pytest.param(4.02, marks=pytest.mark.slow), 4.1, 4.5])
 @pytest.mark.parametrize("shape", [*CLOSED.values(), *OPEN.values()], ids=[*CLOSED, *OPEN])
 def test_the_energy_is_within_the_bound(shape, bound):
     result = unwrap(*shape, max_energy=bound)
@@ -47,6 +47,7 @@ def test_the_search_goes_on_where_the_first_candidates_have_the_same_cones(monke
     assert unwrap(vertices * [1, 1, 0.25], faces, max_energy=4.00243).distortion.energy <= 4.00243
 
 
+@pytest.mark.slow
 def test_noise_that_a_coarse_mesh_does_not_show():
     """The cones of the coarse mesh leave an energy of 4.116, and with sets of the coarse model only, seams are 10.8."""
     result = unwrap(*noisy("noisy-torus"))
@@ -55,6 +56,7 @@ def test_noise_that_a_coarse_mesh_does_not_show():
     assert d.seam_length < 9.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [shapes.sphere(3), shapes.genus(2)], ids=["one chart", "several charts"])
 def test_the_exact_metric_need_not_converge(shape, monkeypatch):
     # Whether a cut pays for packing may depend on small differences.
@@ -95,6 +97,7 @@ def fandisk(shared):
     return unwrap(shared("fandisk.obj"))
 
 
+@pytest.mark.slow
 def test_models_have_short_seams_within_the_bound(shared, cow, fandisk):
     for result, most in (
         (cow, 4.5),
@@ -128,6 +131,7 @@ def test_freed_seams_lower_the_energy():
     assert 4 < energy < tied.distortion.energy - 1e-3
 
 
+@pytest.mark.slow
 def test_a_flipped_start_is_replaced():
     part = Source(as_input(*shapes.hill())).prepared(Options()).parts[0]
     method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
@@ -239,6 +243,7 @@ def test_the_energy_of_a_stretched_square():
         assert coneflat.measure(mesh, stretched).energy == pytest.approx(5.0)
 
 
+@pytest.mark.slow
 def test_branching_charts_are_cut_to_fill_the_texture(shared, cow, monkeypatch):
     monkeypatch.setattr("coneflat.apps.unwrap.unwrap.cut_for_packing", lambda layouts, *_: layouts)
     whole = unwrap(shared("spot.obj"))
@@ -247,6 +252,7 @@ def test_branching_charts_are_cut_to_fill_the_texture(shared, cow, monkeypatch):
     assert max(cow.distortion.energy, whole.distortion.energy) <= 4.1
 
 
+@pytest.mark.slow
 def test_a_chart_with_short_seams_is_cut_as_well(shared, fandisk, monkeypatch):
     """Cuts may cost as much as the root of the area, even if the seams are hardly longer; sharp edges cost less."""
     found = fandisk
@@ -258,6 +264,7 @@ def test_a_chart_with_short_seams_is_cut_as_well(shared, fandisk, monkeypatch):
     assert found.distortion.seam_length <= whole.distortion.seam_length + 1.5
 
 
+@pytest.mark.slow
 def test_small_charts_are_joined_to_others_where_they_fit(shared, monkeypatch):
     path, bound = shared("spot.obj"), 4.02
     result = unwrap(path, max_energy=bound)
@@ -273,6 +280,7 @@ def test_small_charts_are_joined_to_others_where_they_fit(shared, monkeypatch):
     assert result.curvatures == pytest.approx(2 * np.pi - angles[result.cones], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_cut_of_a_large_mesh_is_searched_on_a_coarse_one(monkeypatch):
     """The seams are hardly longer than those found on the mesh itself."""
     shape = shapes.torus(120, 40)
@@ -284,6 +292,7 @@ def test_the_cut_of_a_large_mesh_is_searched_on_a_coarse_one(monkeypatch):
     assert coarse.seam_length <= 1.25 * fine.seam_length
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tiles", [1, 3])
 def test_the_resolution_follows_from_the_texel_density(tiles):
     result = unwrap(*shapes.torus(), texel_density=200.0, tiles=tiles)
@@ -348,6 +357,7 @@ def test_a_coarse_part_keeps_what_belongs_to_its_vertices():
         assert len(np.unique(one)) > 1
 
 
+@pytest.mark.slow
 def test_forbidden_edges_that_are_cut_are_counted(shared):
     mesh = coneflat.read_mesh(shared("spot.obj"))
     right = np.flatnonzero(mesh.vertices[:, 0] > np.median(mesh.vertices[:, 0]))
@@ -358,6 +368,7 @@ def test_forbidden_edges_that_are_cut_are_counted(shared):
     assert int(noted[0].split()[0]) == is_cut > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "most"),
     [("rocker-arm.obj", 1.85), ("fandisk.obj", 1.5), *((name, 2.6) for name in at_hand("elephant.obj"))],

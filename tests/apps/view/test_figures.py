@@ -29,6 +29,7 @@ def result():
 class TestFigures:
     @pytest.mark.parametrize("kind", KINDS[:5])
     @pytest.mark.parametrize("closed", [True, False])
+    @pytest.mark.slow
     def test_every_kind_fills_its_panels(self, result, kind, closed):
         shown = result if closed else shapes.tube()
         figure = coneflat.make_figure(shown, kind, dpi=60, up="z", title="A $title_ of {its} own")

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from browsing import NARROW, WIDE, Visit, thing
+from browsing import NARROW, WIDE, Visit, need_browser, thing
 
 from coneflat.apps.view.page.content import content_of
 from coneflat.options.declared import SHOWS
+
+need_browser()
 
 
 def colour_at(visit, u, v):
