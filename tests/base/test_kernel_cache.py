@@ -62,6 +62,17 @@ def test_a_kernel_is_compiled_once(folder):
     assert kernel_cache.compilation.count == 2
 
 
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="another name of the temporary folder")
+def test_a_chosen_folder_gets_what_others_contain(folder, monkeypatch):
+    compiled(copy_of(product))(np.arange(4.0), 2.0)
+    monkeypatch.setattr(tempfile, "gettempdir", lambda: str(folder.parent))
+    folder.rename(folder.parent / f"coneflat-{os.getuid()}")
+    kernel_cache.writable_folder.cache_clear()
+    assert compiled(copy_of(product))(np.arange(4.0), 2.0) == 12.0
+    assert kernel_cache.compilation.count == 1
+    assert len(list(folder.iterdir())) == 1
+
+
 @pytest.mark.parametrize(
     "damage",
     [lambda content: b"", lambda content: content[:-1], lambda content: content[:90] + b"x" + content[91:]],

@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from .. import flatten, sample_path, unwrap
-from ..base import FloatArray, IntArray
+from ..base import FloatArray, IntArray, inner_calls
 from ..geometry import visible_share
 from .quads.quads import quads
 from .quads.quality import measure_quads
@@ -43,9 +43,10 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
 def compile_kernels(report: Callable[[str, float], object] = lambda name, done: None) -> None:
     """Compile all kernels that are not cached; `report` is called with the name of a step and the fraction done."""
     todo = list(steps())
-    for i, (name, compute) in enumerate(todo):
-        report(name, i / len(todo))
-        compute()
+    with inner_calls():  # The results do not matter.
+        for i, (name, compute) in enumerate(todo):
+            report(name, i / len(todo))
+            compute()
 
 
 def _tube(closed: bool, around: int = 40, across: int = 24) -> tuple[FloatArray, IntArray]:

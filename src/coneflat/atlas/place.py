@@ -160,7 +160,11 @@ def cover(
                 is_in = around != 0 or on > 0
                 if is_in and not inside:
                     if found == len(runs):
-                        runs = np.concatenate((runs, np.empty_like(runs)))
+                        larger = np.empty((2 * found, 3), np.int64)
+                        for i in range(found):
+                            for x in range(3):
+                                larger[i, x] = runs[i, x]
+                        runs = larger
                     runs[found, 0], runs[found, 1], runs[found, 2] = row, column, columns - 1
                     found += 1
                 elif inside and not is_in:
@@ -326,8 +330,12 @@ def place_all(
     size, runs, first, turns = masks.size, masks.runs, masks.first, len(masks.size) // len(plan.order)
     chosen, place = np.empty(len(plan.order), np.int64), np.empty((len(plan.order), 3), np.int64)
     # For each cell, the next occupied cell in its row, itself included, and the first free cell after that.
-    taken = np.full((tiles, limit, width), width, dtype=np.int16)
-    clear = np.full((tiles, limit, width), width, dtype=np.int16)
+    taken = np.empty((tiles, limit, width), dtype=np.int16)
+    clear = np.empty((tiles, limit, width), dtype=np.int16)
+    for t in range(tiles):
+        for y in range(limit):
+            for x in range(width):
+                taken[t, y, x] = clear[t, y, x] = width
     floor = np.zeros((tiles, group.max() + 1), np.int64)
     top, work, far = 0, tiles * limit, len(reach) - 1
     for c in plan.order:

@@ -65,6 +65,7 @@ class KernelCache(_Cache):  # type: ignore[misc]
         for folder in readable_folders():
             payload = read_kernel(folder / name)
             if payload is not None:
+                _copy_to_chosen(folder, name, payload)
                 with suppress(Exception):  # written by an incompatible version of a dependency
                     return CompileResult._rebuild(target_context, *pickle.loads(payload))
         compilation.begin(self._function.__name__)
@@ -234,6 +235,14 @@ def write_kernel(path: Path, payload: bytes) -> None:
         with suppress(OSError):
             os.unlink(temporary)
         raise
+
+
+def _copy_to_chosen(folder: Path, name: str, payload: bytes) -> None:
+    """Copy a kernel to the folder of the environment variable, which is to contain all that is needed."""
+    chosen = _chosen_folder()
+    if chosen not in (None, folder) and chosen == writable_folder():
+        with suppress(OSError):
+            write_kernel(chosen / name, payload)
 
 
 @cache

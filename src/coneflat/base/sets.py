@@ -35,7 +35,9 @@ def find_root(parent: IntArray, node: int) -> int:
 @compiled
 def grow_forest(ends: IntArray, nodes: int) -> BoolArray:
     """Return (e,) which edges are in the spanning forest that takes edges greedily in their order (Kruskal 1956)."""
-    parent, in_tree = np.arange(nodes), np.zeros(len(ends), np.bool_)
+    parent, in_tree = np.empty(nodes, np.int64), np.zeros(len(ends), np.bool_)
+    for v in range(nodes):
+        parent[v] = v
     for e in range(len(ends)):
         in_tree[e] = unite(parent, ends[e, 0], ends[e, 1])
     return in_tree
@@ -44,7 +46,9 @@ def grow_forest(ends: IntArray, nodes: int) -> BoolArray:
 @compiled
 def label_nodes(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntArray]:
     """Return the number of connected components and the (count,) component of each node, numbered by first node."""
-    parent = np.arange(count)
+    parent = np.empty(count, np.int64)
+    for v in range(count):
+        parent[v] = v
     for e in range(len(tails)):
         unite(parent, tails[e], heads[e])
     number = 0

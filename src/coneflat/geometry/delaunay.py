@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from ..base.arrays import FloatArray, IntArray
+from ..base.arrays import FloatArray, IntArray, Numbers
 from ..base.jit import compiled
 from ..linalg.shortest_paths import drop_first, push
 from ..mesh.connectivity import TriangleMesh
@@ -176,6 +176,15 @@ def flip(
 
 
 @compiled
+def doubled(values: Numbers) -> Numbers:
+    """Return an array with room for twice as many values."""
+    larger = np.empty(2 * len(values), values.dtype)
+    for i in range(len(values)):
+        larger[i] = values[i]
+    return larger
+
+
+@compiled
 def flip_until_delaunay(
     twin: IntArray,
     tail: IntArray,
@@ -205,7 +214,7 @@ def flip_until_delaunay(
         amount = violation(twin, tail, length, scale, h)
         if amount > 0.0:
             if size == len(items):
-                keys, items = np.concatenate((keys, keys)), np.concatenate((items, items))
+                keys, items = doubled(keys), doubled(items)
             size = push(keys, items, size, -amount, h)
     record, count = np.empty(64, np.int64), 0
     while size > 0 and count < most:
@@ -214,13 +223,13 @@ def flip_until_delaunay(
         if key == 0.0 or -violation(twin, tail, length, scale, h) != key:  # outdated: the quad has changed
             continue
         if count == len(record):
-            record = np.concatenate((record, record))
+            record = doubled(record)
         record[count] = h
         count += 1
         if size + 4 > len(items):
-            keys, items = np.concatenate((keys, keys)), np.concatenate((items, items))
+            keys, items = doubled(keys), doubled(items)
         for side in flip(twin, tail, length, h, is_euclidean):
             amount = violation(twin, tail, length, scale, side)
             if amount > 0.0:
                 size = push(keys, items, size, -amount, side)
-    return record[:count].copy()
+    return record[:count]

@@ -83,10 +83,10 @@ def list_columns(tail: IntArray, twin: IntArray, starts: Int32Array, keys: IntAr
                     starts[j + 1] += 1
     for v in range(n):
         starts[v + 1] += starts[v]
-    place = starts.copy()
+    place = np.empty(n, np.int32)
     for v in range(n):
-        keys[place[v]] = np.int64(v) << 32
-        place[v] += 1
+        keys[starts[v]] = np.int64(v) << 32
+        place[v] = starts[v] + 1
     for base in range(0, len(tail), 3):
         for x in range(3):
             i, j = tail[base + x], tail[base + (x + 1) % 3]

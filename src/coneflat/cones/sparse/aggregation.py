@@ -129,7 +129,9 @@ def aggregate(
     the geometric mean of the diagonals do not count.
     """
     count = len(diagonal)
-    labels = np.full(count, -1, np.int64)
+    labels, joined = np.empty(count, np.int64), np.empty(count, np.int64)
+    for vertex in range(count):
+        labels[vertex] = -1
     number = 0
     for vertex in order:
         if labels[vertex] >= 0:
@@ -162,8 +164,8 @@ def aggregate(
             labels[strongest] = number
             space -= 1
         number += 1
-    joined = labels.copy()
     for vertex in order:
+        joined[vertex] = labels[vertex]
         if labels[vertex] >= 0:
             continue
         strongest, best = -1, 0.0
