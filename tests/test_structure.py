@@ -15,11 +15,12 @@ from structure import (
     Module,
     imported_packages,
     levels,
+    module_paths,
     package_of,
     read_modules,
 )
 
-MODULES = read_modules()
+NAMES = module_paths()
 #: Applications that set up the others, and modules of applications that others may import, beside options.
 FRONT = ("apps.warm_up", "apps.blender", "apps.cli", "apps.studio")
 SHARED = ("apps.quads.nearest",)
@@ -33,7 +34,7 @@ def is_core(name: str) -> bool:
 
 def test_packages_do_not_import_each_other_in_circles():
     try:
-        found = levels(MODULES)
+        found = levels(read_modules())
     except CycleError as error:
         pytest.fail(f"packages import each other in a circle: {' -> '.join(error.args[1])}")
     assert max(level for name, level in found.items() if is_core(name)) <= LEVELS
@@ -41,12 +42,12 @@ def test_packages_do_not_import_each_other_in_circles():
 
 @pytest.mark.parametrize("stage", STAGES)
 def test_stages_stand_side_by_side(stage: str):
-    assert imported_packages(MODULES)[stage] & {*STAGES, "options", "flatten"} == set()
+    assert imported_packages(read_modules())[stage] & {*STAGES, "options", "flatten"} == set()
 
 
-@pytest.mark.parametrize("name", sorted(name for name in MODULES if not is_core(name)))
+@pytest.mark.parametrize("name", sorted(name for name in NAMES if not is_core(name)))
 def test_applications_import_what_packages_export(name: str):
-    module = MODULES[name]
+    module = read_modules()[name]
     imported = module.imports | module.late_imports
     assert {other for other in imported if is_core(other) and other.count(".") > 0} == set()
     if not name.startswith("apps.view"):
@@ -56,7 +57,7 @@ def test_applications_import_what_packages_export(name: str):
 def test_applications_do_not_import_what_is_inside_others():
     found = {
         (name, other)
-        for name, module in MODULES.items()
+        for name, module in read_modules().items()
         if name.startswith("apps.") and not name.startswith(FRONT)
         for other in module.imports | module.late_imports
         if other.count(".") > 1 and not is_core(other) and package_of(other) != package_of(name)
@@ -64,9 +65,9 @@ def test_applications_do_not_import_what_is_inside_others():
     assert {(name, other) for name, other in found if other not in SHARED} == set()
 
 
-@pytest.mark.parametrize("name", sorted(filter(is_core, MODULES)))
+@pytest.mark.parametrize("name", sorted(filter(is_core, NAMES)))
 def test_the_core_imports_no_application(name: str):
-    module = MODULES[name]
+    module = read_modules()[name]
     allowed = name in ("", "result", "__main__")
     imported = set() if allowed else module.imports | module.late_imports
     assert [other for other in imported if not is_core(other)] == []
@@ -74,7 +75,7 @@ def test_the_core_imports_no_application(name: str):
 
 def test_tests_mirror_the_packages():
     tests = Path(__file__).parent
-    known = {package_of(name).replace(".", "/") for name in MODULES}
+    known = {package_of(name).replace(".", "/") for name in NAMES}
     folders = {
         path.parent.relative_to(tests).as_posix() for path in tests.rglob("test_*.py") if path.parent != tests
     }

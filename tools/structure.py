@@ -176,12 +176,19 @@ class Module:
     late_imports: frozenset[str]
 
 
-def read_modules(package: Path = PACKAGE) -> dict[str, Module]:
-    """Return the modules of a package by name; what only type checkers import does not count."""
+def module_paths(package: Path = PACKAGE) -> dict[str, Path]:
+    """Return the files of the modules of a package by name."""
     paths = {}
     for path in sorted(package.rglob("*.py")):
         parts = path.relative_to(package).with_suffix("").parts
         paths[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
+    return paths
+
+
+@cache
+def read_modules(package: Path = PACKAGE) -> dict[str, Module]:
+    """Return the modules of a package by name; what only type checkers import does not count."""
+    paths = module_paths(package)
     return {name: _read(name, path, paths) for name, path in paths.items()}
 
 

@@ -184,6 +184,7 @@ def test_more_tiles_than_charts():
     assert sorted(packed.tile_of_chart.tolist()) == [0, 1]
 
 
+@pytest.mark.slow
 def test_many_charts():
     rng = np.random.default_rng(5)
     corners = rng.random((600, 3, 2)) * rng.uniform(0.2, 1.0, (600, 1, 1))
@@ -208,6 +209,7 @@ def test_many_charts():
     assert count.sum() / 1024**2 == pytest.approx(packed.efficiency, rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_same_again_and_in_any_order():
     corners, chart = without_symmetry()
     packed = pack_charts(corners, chart)
@@ -299,7 +301,7 @@ def test_bad_input():
         ({"tiles": True}, "tiles must be .* got True"),
         ({"rotate": "free"}, "'free': choose from any, quarter, none"),
         ({"padding": 512}, "512 texels of padding leave no space in a texture of 1024"),
-        ({"padding": 370}, "a gap of .* % .* between 7 charts"),
+        pytest.param({"padding": 370}, "a gap of .* % .* between 7 charts", marks=pytest.mark.slow),
     ],
 )
 def test_bad_options(options, said):

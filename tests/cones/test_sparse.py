@@ -160,6 +160,7 @@ def test_a_torus_has_no_cones_or_two_and_more():
     assert len(sparse(vertices, faces, count=1).solution.cones) == 0
 
 
+@pytest.mark.slow
 def test_a_sphere_needs_enough_cones():
     vertices, faces = shapes.sphere(3)
     with pytest.raises(CurvatureError, match=r"2 cones of at most 1\.5 pi each .* 4 pi: 3 or more"):
@@ -169,6 +170,7 @@ def test_a_sphere_needs_enough_cones():
     assert len(needles.solution.cones) == 3
 
 
+@pytest.mark.slow
 def test_more_cones_are_no_worse():
     search = search_on(*SHAPES["sphere"])
     energies = [search.best_of(count).distortion for count in range(3, 9)]

@@ -264,6 +264,7 @@ def measured(seen):
     return measure(checked.mesh, seen.corner_uv)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "shape"), CASES)
 def test_other_readers_find_the_mesh_and_its_measures(tmp_path, name, shape):
     given = twice(shape())

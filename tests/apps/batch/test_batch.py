@@ -192,6 +192,7 @@ def test_a_link_that_leads_nowhere_is_one_failed_mesh(models, tmp_path):
     assert "symbolic links" in rows["loop.obj"]["error"]
 
 
+@pytest.mark.slow
 def test_broken_lines_of_the_journal_are_left_out_and_named(models, tmp_path):
     out = tmp_path / "out"
     run = partial(invoke, "batch", "--out", out, "--jobs", 1, models / "ball.obj")

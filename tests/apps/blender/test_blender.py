@@ -151,6 +151,7 @@ def test_numbers_of_single_precision_are_written_as_they_were_typed(extension):
     assert "--distortion" not in " ".join(extension.exchange.arguments(records, values))
 
 
+@pytest.mark.slow
 def test_maps_of_two_meshes_in_one_atlas(extension, tmp_path):
     """A mesh of quads with a marked loop and one of triangles: seams are where UVs differ, and densities agree."""
     exchange = extension.exchange

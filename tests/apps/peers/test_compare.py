@@ -90,6 +90,7 @@ def test_peers_are_measured_like_us(ball, name):
     assert found[name].result.distortion.qc_mean < 1.5
 
 
+@pytest.mark.slow
 def test_the_map_for_textures_is_a_row_with_its_energy(ball):
     found = compare_methods(*ball, methods=("exact",), peers=("unwrap",))
     expected = coneflat.unwrap(*ball).distortion

@@ -129,6 +129,7 @@ def check_sides(grid):
     assert area == pytest.approx(round(area), abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quads", [20, 100, 1000])
 @pytest.mark.parametrize("shape", [shapes.hill(), shapes.annulus()], ids=["hill", "annulus"])
 def test_straight_sides_lie_on_grid_lines(shape, quads):
@@ -172,6 +173,7 @@ def test_a_flat_rectangle_keeps_its_shape():
     assert (double_areas(grid) * grid.size**2 / wanted).min() == pytest.approx(1)
 
 
+@pytest.mark.slow
 def test_a_grid_that_is_too_coarse_is_made_finer():
     """A sphere with spikes and more than forty cones, in five squares."""
     result = flatten(*spiked(7, 0.8), quantise=np.pi / 2, charts="one", correct_handles=True)

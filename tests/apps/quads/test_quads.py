@@ -223,6 +223,7 @@ def test_components_without_area_get_no_quads():
     assert len(both.quads) == len(alone.quads)
 
 
+@pytest.mark.slow
 def test_cones_may_be_of_any_angle():
     without, bounded = (
         coneflat.quads(*shapes.genus(2), quads=500, max_cone_angle=most) for most in (None, 20.0)

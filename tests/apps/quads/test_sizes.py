@@ -34,6 +34,7 @@ def graded(ball):
     return coneflat.quads(*ball, quads=1500, size=2.0 ** ball[0][:, 2])
 
 
+@pytest.mark.slow
 def test_quads_have_the_wanted_sizes(ball, graded):
     sides, places = edges_and_places(graded)
     asked, reached = places[:, 2] * np.log(2), np.log(sides)
@@ -126,6 +127,7 @@ def two_balls(ball):
     )
 
 
+@pytest.mark.slow
 def test_components_have_squares_of_the_same_size(two_balls):
     grid = coneflat.integer_grid(*two_balls, quads=1000)
     mesh = coneflat.quads(grid)
@@ -136,6 +138,7 @@ def test_components_have_squares_of_the_same_size(two_balls):
     np.testing.assert_array_equal(np.unique(grid.faces), np.arange(len(grid.vertices)))
 
 
+@pytest.mark.slow
 def test_sizes_hold_between_components(two_balls):
     sizes = np.repeat([1.0, 2.0], len(two_balls[0]) // 2)
     sides, places = edges_and_places(coneflat.quads(*two_balls, quads=1000, size=sizes))

@@ -287,6 +287,7 @@ def test_nearest_triangles_are_those_of_all_pairs():
     assert np.allclose(found, np.linalg.norm(np.array(each) - points, axis=2).min(axis=0), atol=1e-12)
 
 
+@pytest.mark.slow
 def test_bad_input_is_named(folder, tmp_path):
     plain = tmp_path / "plain.glb"
     plain.write_bytes(model(torus, image=False))

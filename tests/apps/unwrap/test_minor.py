@@ -109,6 +109,7 @@ def test_the_numbering_of_components_changes_nothing(every_part_is_minor):
     assert set(map(tuple, np.sort(one.seams))) == set(map(tuple, np.sort(other.seams)))
 
 
+@pytest.mark.slow
 def test_a_component_that_would_overlap_itself_is_separated(every_part_is_minor):
     # A long spiral strip, of which the relaxed layout overlaps itself in one chart.
     turns = np.linspace(0, 6 * np.pi, 300)

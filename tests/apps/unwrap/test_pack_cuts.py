@@ -128,6 +128,7 @@ def test_a_square_is_not_cut():
     assert cut_for_packing([layout], [costs], GAP)[0] is layout
 
 
+@pytest.mark.slow
 def test_only_large_charts_of_several_layouts_are_cut():
     (large, large_costs), (small, small_costs) = layout_of(*grid(plus)), layout_of(*grid(plus, 20))
     small = replace(small, points=small.points / 20)

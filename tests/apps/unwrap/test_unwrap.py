@@ -143,6 +143,7 @@ def test_a_flipped_start_is_replaced():
     assert found == pytest.approx(wanted, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_few_flipped_triangles_are_untangled_in_place(monkeypatch):
     """Embedding the whole chart anew takes many more steps."""
     part = Source(as_input(*shapes.hill(20, 20))).prepared(Options()).parts[0]

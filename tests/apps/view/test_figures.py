@@ -53,6 +53,7 @@ class TestFigures:
         picture = figure.axes[0].images[0].get_array()
         assert picture.shape[1] == pytest.approx(figure.axes[0].get_window_extent().width, abs=1)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("ending", ["png", "svg", "pdf", "PNG"])
     def test_files_are_of_their_kind_and_the_same_each_time(self, result, tmp_path, ending):
         paths = [
@@ -107,6 +108,7 @@ class TestCommand:
     def test_the_kinds_are_those_of_the_package(self):
         assert figure_command.KINDS == KINDS
 
+    @pytest.mark.slow
     @pytest.mark.parametrize("kind", KINDS)
     def test_of_a_mesh(self, run, tmp_path, kind):
         vertices = coneflat.read_mesh(tmp_path / "ball.obj").vertices
