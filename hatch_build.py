@@ -17,7 +17,7 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 # What flattening arrays imports.
-NEEDED = ("numpy", "scipy", "cholespy", "numba", "threadpoolctl")
+NEEDED = ("numpy", "scipy", "rslab", "numba", "threadpoolctl")
 TIME_LIMIT = 300
 
 
