@@ -107,6 +107,8 @@ class PardisoFactor(Factor):
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return the solution x of A x = right, for one right-hand side (n,) or several (n, k)."""
+        if not right.size:
+            return np.zeros(right.shape)
         # Each right-hand side must be contiguous; for the transpose of a (k, n) array this is a view.
         columns = right.T if is_aligned(right.T) else _copied(right.T)
         solution = aligned(columns.shape)
