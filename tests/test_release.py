@@ -19,7 +19,7 @@ else:
 
 #: Names that conda-forge writes differently, and what it has not.
 CONDA_NAMES = {"mapbox-earcut": "mapbox_earcut"}
-NOT_ON_CONDA = {"cholespy"}
+NOT_ON_CONDA = {"rslab"}
 
 
 def text(name: str) -> str:

@@ -1,33 +1,53 @@
 """Every factorization against dense linear algebra, and which of them is taken."""
 
 import ctypes
+import logging
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
 import shapes
-from scipy.sparse import csc_matrix, diags
+from scipy.sparse import csc_matrix, diags, tril
 
-from coneflat import errors, flatten
+from coneflat import errors, flatten, read_mesh
 from coneflat.base.threads import limit_threads
 from coneflat.geometry import cotangent_laplacian, cotangents, edge_lengths
-from coneflat.linalg import SuperLUFactor, factorize, pardiso
-from coneflat.linalg.factors import MIN_PARDISO_UNKNOWNS, CholespyFactor, has_pardiso
+from coneflat.linalg import SuperLUFactor, factorize, pardiso, rslab, solvers
 from coneflat.linalg.pardiso import PardisoFactor
+from coneflat.linalg.rslab import RslabFactor
+from coneflat.linalg.solvers import MIN_PARDISO_UNKNOWNS, MIN_RSLAB_UNKNOWNS, PACKAGES, SOLVER_VARIABLE
 
-needs_pardiso = pytest.mark.skipif(not has_pardiso(), reason="pypardiso is not installed")
-KINDS = [CholespyFactor, SuperLUFactor, pytest.param(PardisoFactor, marks=needs_pardiso)]
+
+def needs(name):
+    return pytest.mark.skipif(find_spec(PACKAGES[name]) is None, reason=f"{PACKAGES[name]} is not installed")
 
 
-@pytest.fixture(params=KINDS)
+needs_pardiso, needs_rslab = needs("pardiso"), needs("rslab")
+KINDS = {"superlu": SuperLUFactor, "rslab": RslabFactor, "pardiso": PardisoFactor}
+
+
+@pytest.fixture(params=[pytest.param(name, marks=needs(name)) for name in KINDS])
 def kind(request, monkeypatch):
-    """A kind of factor; `factorize` takes it for all but indefinite matrices."""
-    name = "coneflat.linalg.factors"
-    monkeypatch.setattr(f"{name}.has_pardiso", lambda: request.param is PardisoFactor)
-    monkeypatch.setattr(f"{name}.MIN_PARDISO_UNKNOWNS", 1)
-    monkeypatch.setattr(f"{name}.MAX_SMALL_SYSTEM", 0)
-    if request.param is SuperLUFactor:
-        monkeypatch.setattr(f"{name}.CholespyFactor", SuperLUFactor)
-    return request.param
+    """A kind of factor, which `factorize` takes for all matrices of rank n."""
+    monkeypatch.setenv(SOLVER_VARIABLE, request.param)
+    return KINDS[request.param]
+
+
+@pytest.fixture
+def unforced(monkeypatch):
+    """Solvers are chosen by size, whatever the environment of the tests says."""
+    monkeypatch.delenv(SOLVER_VARIABLE, raising=False)
+
+
+@pytest.fixture
+def hidden(monkeypatch, unforced):
+    """Return a function that hides solvers."""
+    solver = solvers.solver
+
+    def hide(*names):
+        monkeypatch.setattr(solvers, "solver", lambda name: None if name in names else solver(name))
+
+    return hide
 
 
 def grounded_laplacian(faces, vertices):
@@ -86,7 +106,7 @@ def test_flattening_is_the_same_by_every_solver(kind):
     vertices, faces = shapes.sphere(3)
     result = flatten(vertices, faces)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("coneflat.linalg.factors.has_pardiso", lambda: False)
+        patch.setenv(SOLVER_VARIABLE, "superlu")
         expected = flatten(vertices, faces)
     assert result.cones.tolist() == expected.cones.tolist()
     assert result.log_scale == pytest.approx(expected.log_scale, abs=1e-8)
@@ -98,21 +118,25 @@ def test_solutions_are_the_same_every_time(kind, matrix):
     assert np.array_equal(first, second)
 
 
-@needs_pardiso
-def test_large_systems_are_solved_by_pardiso_where_it_is_installed(matrix, monkeypatch):
+def test_the_size_chooses_the_solver(matrix, hidden):
+    """The larger system that a matrix belongs to counts, and what is missing is replaced by the next."""
     right = np.ones(matrix.shape[0])
     expected = np.linalg.solve(matrix.toarray(), right)
-    monkeypatch.setattr("coneflat.linalg.factors.MAX_SMALL_SYSTEM", 0)
-    for is_installed, large in ((True, PardisoFactor), (False, CholespyFactor)):
-        monkeypatch.setattr("coneflat.linalg.factors.has_pardiso", lambda: is_installed)  # noqa: B023
-        for total_size, kind in ((0, CholespyFactor), (MIN_PARDISO_UNKNOWNS, large)):
+    standard = RslabFactor if find_spec("rslab") else SuperLUFactor
+    large = PardisoFactor if find_spec("pypardiso") else standard
+    for missing, kinds in (
+        ((), (SuperLUFactor, standard, large)),
+        (("pardiso",), (SuperLUFactor, standard, standard)),
+        (("pardiso", "rslab"), (SuperLUFactor, SuperLUFactor, SuperLUFactor)),
+    ):
+        hidden(*missing)
+        for total_size, kind in zip((0, MIN_RSLAB_UNKNOWNS, MIN_PARDISO_UNKNOWNS), kinds, strict=True):
             factor = factorize(matrix, total_size=total_size)
             assert type(factor) is kind
             assert factor.solve(right) == pytest.approx(expected, abs=1e-9)
 
 
-def test_small_systems_are_solved_by_superlu_without_messages(matrix, capfd):
-    """CHOLMOD prints on standard output if a matrix is indefinite."""
+def test_small_systems_are_solved_by_superlu(matrix, unforced, capfd):
     right = np.ones(matrix.shape[0])
     indefinite = csc_matrix(matrix - diags(np.full(matrix.shape[0], 0.5)))
     for each in (matrix, indefinite):
@@ -122,9 +146,107 @@ def test_small_systems_are_solved_by_superlu_without_messages(matrix, capfd):
     assert capfd.readouterr().out == ""
 
 
-def test_larger_systems_are_solved_by_cholmod(matrix, monkeypatch):
-    monkeypatch.setattr("coneflat.linalg.factors.MAX_SMALL_SYSTEM", 10_000)
-    assert type(factorize(matrix)) is CholespyFactor
+@pytest.mark.parametrize("name", ["rocker-arm.obj", "horse.ply"])
+def test_solutions_on_real_meshes(kind, shared, name):
+    """With several right-hand sides, before and after other values of the same pattern."""
+    mesh = read_mesh(shared(name))
+    matrix = grounded_laplacian(mesh.triangles, mesh.vertices)
+    right = np.random.default_rng(0).normal(size=(matrix.shape[0], 17))
+    scale = diags(np.exp(np.random.default_rng(1).normal(size=matrix.shape[0])))
+    scaled = csc_matrix(
+        ((scale @ matrix @ scale).tocsc().data, matrix.indices, matrix.indptr), shape=matrix.shape
+    )
+    factor = None
+    for values in (matrix, scaled, matrix):
+        factor = factorize(values, factor)
+        assert type(factor) is kind
+        for sides in (right, right[:, 0], np.asfortranarray(right)[:, 3:5]):
+            solution = factor.solve(sides)
+            assert solution.shape == sides.shape
+            # The backward error: a solution is exact for a matrix that differs in the last digits.
+            scale_of_rows = abs(values) @ abs(solution) + abs(sides)
+            assert (abs(values @ solution - sides) / scale_of_rows).max() < 1e-12
+
+
+def test_a_reused_analysis_changes_no_bit(kind, matrix):
+    right = np.random.default_rng(0).normal(size=(matrix.shape[0], 3))
+    scaled = csc_matrix((matrix.data * 3, matrix.indices, matrix.indptr), shape=matrix.shape)
+    reused = factorize(matrix, factorize(scaled))
+    assert np.array_equal(reused.solve(right), factorize(matrix).solve(right))
+
+
+def test_no_right_hand_sides(kind, matrix):
+    assert factorize(matrix).solve(np.zeros((matrix.shape[0], 0))).shape == (matrix.shape[0], 0)
+
+
+def test_singular_matrices(kind, matrix):
+    """A row of zeros: an error of the package with the number of unknowns."""
+    keep = diags((np.arange(matrix.shape[0]) != 7).astype(float))
+    singular = csc_matrix(keep @ matrix @ keep)
+    if kind is not PardisoFactor:  # which perturbs zero pivots
+        with pytest.raises(errors.MetricError, match=rf"system of {matrix.shape[0]} unknowns is singular"):
+            factorize(singular)
+
+
+@needs_rslab
+def test_rslab_factorizes_the_lower_triangle(matrix):
+    """Its analysis is of the lower triangle alone, whose values are given in the order of the whole matrix."""
+    lower = csc_matrix(tril(matrix))
+    triangle = rslab.Triangle(matrix)
+    assert triangle.rows.tolist() == lower.indices.tolist()
+    assert triangle.starts.tolist() == lower.indptr.tolist()
+    assert triangle.values(matrix).tolist() == lower.data.tolist()
+
+
+def test_an_unknown_solver_is_an_error(monkeypatch, matrix):
+    monkeypatch.setenv(SOLVER_VARIABLE, "umfpack")
+    with pytest.raises(errors.OptionError, match=r"umfpack: the solvers are pardiso, rslab, superlu"):
+        factorize(matrix)
+
+
+@pytest.mark.parametrize("name", ["pardiso", "rslab"])
+def test_a_missing_solver_that_is_forced_is_an_error_that_says_how_to_get_it(
+    name, hidden, monkeypatch, matrix
+):
+    hidden(name)
+    monkeypatch.setenv(SOLVER_VARIABLE, name)
+    with pytest.raises(
+        errors.OptionError, match=f"^{SOLVER_VARIABLE}={name}.* pip install {PACKAGES[name]}$"
+    ):
+        flatten(*shapes.sphere(2))
+
+
+def test_a_solver_that_is_not_installed_is_not_mentioned(monkeypatch, unforced, caplog):
+    monkeypatch.setattr(solvers, "find_spec", lambda name: None)
+    solvers.solver.cache_clear()
+    try:
+        assert solvers.solver_for(10**6) is SuperLUFactor
+    finally:
+        solvers.solver.cache_clear()
+    assert caplog.records == []
+
+
+@needs_pardiso
+@pytest.mark.parametrize(
+    "error", [ImportError("no MKL\nhere"), OSError("bad image"), AttributeError("pardiso")]
+)
+def test_mkl_that_cannot_be_loaded_is_logged_once_and_the_next_solver_is_taken(
+    error, monkeypatch, unforced, caplog
+):
+    def fail():
+        raise error
+
+    monkeypatch.setattr(pardiso, "_routines", fail)
+    solvers.solver.cache_clear()
+    expected = RslabFactor if find_spec("rslab") else SuperLUFactor
+    try:
+        with caplog.at_level(logging.WARNING, "coneflat"):
+            assert [solvers.solver_for(MIN_PARDISO_UNKNOWNS) for _ in range(2)] == [expected, expected]
+    finally:
+        solvers.solver.cache_clear()
+    (record,) = caplog.records
+    assert record.getMessage().startswith("pypardiso cannot be loaded, others solve instead: ")
+    assert "\n" not in record.getMessage()
 
 
 def test_no_unknowns():
@@ -158,7 +280,7 @@ def test_mkl_is_found_where_no_package_tells_of_it(monkeypatch, found):
 
 @needs_pardiso
 def test_the_number_of_threads_changes_nothing_but_rounding(monkeypatch):
-    monkeypatch.setattr("coneflat.linalg.factors.MIN_PARDISO_UNKNOWNS", 1)
+    monkeypatch.setenv(SOLVER_VARIABLE, "pardiso")
     vertices, faces = shapes.sphere(4)
     one, two, again = (flatten(vertices, faces, threads=n, max_cones=4) for n in (1, 3, 3))
     assert one.cones.tolist() == two.cones.tolist()

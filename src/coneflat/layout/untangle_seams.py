@@ -11,7 +11,7 @@ from ..geometry.intrinsic import halfedge_twins
 from ..geometry.operators import cotangent_laplacian
 from ..geometry.planar import sides_between, signed_double_areas
 from ..geometry.straight import FlatTriangles
-from ..linalg.factors import factorize
+from ..linalg import factorize
 from ..mesh.connectivity import TriangleMesh
 from ..stages import ConeSpec, Layout
 from .relax import StretchEnergy, relax

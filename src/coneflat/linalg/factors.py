@@ -1,28 +1,23 @@
-"""Sparse factorizations: MKL PARDISO (pypardiso) for large systems if it is installed, else CHOLMOD (cholespy).
+"""The interface of factorized matrices, and SuperLU of SciPy.
 
-A matrix is factorized once and used for many solves. SuperLU factorizes small and indefinite matrices.
+A matrix is factorized once and used for many solves. `solvers.py` chooses the solver.
 """
 
 from __future__ import annotations
 
 import math
-from functools import cache
-from importlib.util import find_spec
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import bmat, csc_matrix, csr_matrix
+from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
 from ..base.arrays import FloatArray
 from ..errors import MetricError
 
-# Number of unknowns below which loading MKL, 0.03 s in each process, takes longer than it saves.
-MIN_PARDISO_UNKNOWNS = 12_000
-# Number of unknowns of a small system. With a twentieth of them, SuperLU is as fast as CHOLMOD, which prints a message
-# on standard output if a matrix is indefinite.
-MAX_SMALL_SYSTEM = 20_000
+# Size of a diagonal entry, relative to the largest of its column, from which on SuperLU takes it as the pivot. With its
+# default, 1, a badly scaled definite matrix of 48,000 unknowns takes minutes instead of 0.4 s, because pivots off the
+# diagonal undo the ordering.
+DIAGONAL_THRESHOLD = 0.01
 
 
 class NotPositiveDefinite(ArithmeticError):
@@ -42,6 +37,34 @@ def is_aligned(array: FloatArray) -> bool:
     return array.dtype == np.float64 and array.flags.c_contiguous and array.ctypes.data % 64 == 0
 
 
+class Triangle:
+    """The lower triangle of symmetric matrices of one pattern.
+
+    Args:
+        matrix: (n, n), both triangles, with sorted indices.
+
+    Attributes:
+        starts: (n + 1,) where each column starts among the entries.
+        rows: (z,) row of each entry.
+    """
+
+    def __init__(self, matrix: csc_matrix) -> None:
+        indices, size = matrix.indices, matrix.shape[0]
+        columns = np.repeat(np.arange(size, dtype=indices.dtype), np.diff(matrix.indptr))
+        self._indices, self._is_lower = indices, indices >= columns
+        self.rows = np.ascontiguousarray(indices[self._is_lower], dtype=np.int32)
+        self.starts = np.zeros(size + 1, dtype=np.int32)
+        np.cumsum(np.bincount(columns[self._is_lower], minlength=size), out=self.starts[1:])
+
+    def has_pattern_of(self, matrix: csc_matrix) -> bool:
+        """Return whether a matrix is known to have this pattern: its indices are those of the first matrix."""
+        return matrix.indices is self._indices
+
+    def values(self, matrix: csc_matrix) -> FloatArray:
+        """Return (z,) the entries of a matrix of this pattern."""
+        return matrix.data[self._is_lower]
+
+
 class Factor:
     """Interface of factorized matrices, and the factor of the matrix without rows (a mesh without free vertices).
 
@@ -53,6 +76,15 @@ class Factor:
 
     def __init__(self, matrix: csc_matrix) -> None:
         pass
+
+    @classmethod
+    def indefinite(cls, matrix: csc_matrix) -> Factor:
+        """Return the factor of a matrix that is not positive definite, with pivoting.
+
+        Raises:
+            MetricError: the matrix is singular in double precision.
+        """
+        return SuperLUFactor(matrix)
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return the solution x of A x = right, for one right-hand side (n,) or several (n, k)."""
@@ -74,7 +106,12 @@ class SuperLUFactor(Factor):
 
     def __init__(self, matrix: csc_matrix) -> None:
         try:
-            self._factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+            self._factor = splu(
+                matrix,
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=DIAGONAL_THRESHOLD,
+                options={"SymmetricMode": True},
+            )
         except RuntimeError as error:
             raise MetricError(
                 f"a linear system of {matrix.shape[0]} unknowns is singular: the mesh has triangles too "
@@ -84,91 +121,3 @@ class SuperLUFactor(Factor):
     def solve(self, right: FloatArray) -> FloatArray:
         """Return the solution x of A x = right, for one right-hand side (n,) or several (n, k)."""
         return self._factor.solve(np.asarray(right, dtype=np.float64))
-
-
-class CholespyFactor(Factor):
-    """A sparse Cholesky factorization by CHOLMOD: available everywhere, quick to load, slow on large meshes."""
-
-    def __init__(self, matrix: csc_matrix) -> None:
-        from cholespy import CholeskySolverD, MatrixType
-
-        if not (matrix.diagonal() > 1e-13 * np.abs(matrix.data).max(initial=0.0)).all():
-            # CHOLMOD prints a message on standard output where it fails, mostly at thin triangles.
-            raise NotPositiveDefinite("the diagonal is not positive, or of very different sizes")
-        try:
-            self._solver = CholeskySolverD(
-                matrix.shape[0],
-                matrix.indptr.astype(np.int32),
-                matrix.indices.astype(np.int32),
-                matrix.data.astype(np.float64),
-                MatrixType.CSC,
-            )
-        except ValueError as error:
-            raise NotPositiveDefinite(str(error)) from error
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Return the solution x of A x = right, for one right-hand side (n,) or several (n, k)."""
-        right = np.ascontiguousarray(right, dtype=np.float64)
-        solution = np.zeros_like(right)
-        self._solver.solve(right, solution)
-        return solution
-
-
-@cache
-def has_pardiso() -> bool:
-    """Return whether PARDISO (pypardiso) is installed."""
-    return find_spec("pypardiso") is not None
-
-
-def factorize(matrix: csc_matrix, previous: Factor | None = None, total_size: int = 0) -> Factor:
-    """Return the factorization of a sparse symmetric positive definite matrix.
-
-    Args:
-        matrix: (n, n), both triangles, with sorted indices.
-        previous: the factor of another matrix of the same size that is not needed any more; its symbolic analysis is
-            reused if possible.
-        total_size: number of unknowns of the larger system that the matrix belongs to, if any. PARDISO is chosen by the
-            larger of both sizes: it is loaded anyway, and reuses its analysis, which takes most of the time.
-
-    Raises:
-        MetricError: the matrix is singular in double precision.
-    """
-    size = matrix.shape[0]
-    if size == 0:
-        return Factor(matrix)
-    is_by_pardiso = max(size, total_size) >= MIN_PARDISO_UNKNOWNS and has_pardiso()
-    try:
-        if previous is not None:
-            return previous.refactorized(matrix)
-        if 20 * size < MAX_SMALL_SYSTEM and not is_by_pardiso:
-            return SuperLUFactor(matrix)
-        return _by_pardiso(matrix) if is_by_pardiso else CholespyFactor(matrix)
-    except NotPositiveDefinite:
-        # Rounding has made the matrix indefinite; with pivoting it can still be factorized.
-        return _by_pardiso(matrix, is_definite=False) if is_by_pardiso else SuperLUFactor(matrix)
-
-
-def _by_pardiso(matrix: csc_matrix, is_definite: bool = True) -> Factor:
-    from .pardiso import PardisoFactor
-
-    return PardisoFactor(matrix, is_definite)
-
-
-class HermitianFactor:
-    """A factorized Hermitian positive definite matrix, stored as a real matrix of twice the size.
-
-    Args:
-        matrix: (n, n) complex.
-
-    Raises:
-        MetricError: the matrix is singular in double precision.
-    """
-
-    def __init__(self, matrix: csr_matrix) -> None:
-        real, imaginary = matrix.real, matrix.imag
-        self._factor = factorize(csc_matrix(bmat([[real, -imaginary], [imaginary, real]])))
-
-    def solve(self, right: NDArray[Any]) -> NDArray[np.complex128]:
-        """Return the complex solution x of A x = right, both (n,)."""
-        parts = self._factor.solve(np.concatenate([right.real, right.imag]))
-        return parts[: len(right)] + 1j * parts[len(right) :]

@@ -22,7 +22,7 @@ from scipy.sparse import csc_matrix
 
 from ..base.arrays import FloatArray
 from ..base.threads import threads
-from .factors import MAX_SMALL_SYSTEM, Factor, NotPositiveDefinite, aligned, is_aligned
+from .factors import Factor, NotPositiveDefinite, Triangle, aligned, is_aligned
 
 AnyArray: TypeAlias = NDArray[Any]
 
@@ -62,9 +62,9 @@ class Code(IntEnum):
 # Parallel nested dissection, and a two-level factorization. A permutation, given or requested, would silently disable
 # the latter.
 SETTINGS = {Parameter.NO_DEFAULTS: 1, Parameter.ORDERING: 3, Parameter.SCHEDULE: 1, Parameter.FROM_ZERO: 1}
-# Minimum degree, and a factorization level by level: on one thread, a third less time for the analysis of up to
-# `MAX_SMALL_SYSTEM` unknowns.
-SMALL_SETTINGS = {**SETTINGS, Parameter.ORDERING: 0, Parameter.SCHEDULE: 0}
+# Minimum degree, and a factorization level by level: on one thread, a third less time for the analysis of systems of up
+# to so many unknowns.
+SMALL_SETTINGS, MAX_SMALL_SYSTEM = {**SETTINGS, Parameter.ORDERING: 0, Parameter.SCHEDULE: 0}, 20_000
 # File names of MKL on the operating systems, and the environment variable that gives pypardiso another path.
 RUNTIMES = ("libmkl_rt.", "mkl_rt.")
 LIBRARY_VARIABLE = "PYPARDISO_MKL_RT"
@@ -97,30 +97,32 @@ class PardisoFactor(Factor):
         self._fill(matrix)
 
     def _set_pattern(self, matrix: csc_matrix) -> None:
-        starts, rows = matrix.indptr, matrix.indices
-        columns = np.repeat(np.arange(len(starts) - 1, dtype=rows.dtype), np.diff(starts))
-        self._indices, self._is_lower = rows, rows >= columns
-        self._rows = np.ascontiguousarray(rows[self._is_lower], dtype=np.int32)
-        self._starts = np.zeros(len(starts), dtype=np.int32)
-        np.cumsum(np.bincount(columns[self._is_lower], minlength=len(starts) - 1), out=self._starts[1:])
-        self._values = _copied(matrix.data[self._is_lower])
+        self._triangle = Triangle(matrix)
+        self._values = _copied(self._triangle.values(matrix))
         self._call(Phase.ANALYSE)
 
     def _fill(self, matrix: csc_matrix) -> None:
-        self._values = _copied(matrix.data[self._is_lower])
+        self._values = _copied(self._triangle.values(matrix))
         self._call(Phase.FACTORIZE)
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return the solution x of A x = right, for one right-hand side (n,) or several (n, k)."""
+        if not right.size:
+            return np.zeros(right.shape)
         # Each right-hand side must be contiguous; for the transpose of a (k, n) array this is a view.
         columns = right.T if is_aligned(right.T) else _copied(right.T)
         solution = aligned(columns.shape)
         self._call(Phase.SOLVE, columns, solution)
         return solution.T
 
+    @classmethod
+    def indefinite(cls, matrix: csc_matrix) -> PardisoFactor:
+        """Return the factor of a matrix that is not positive definite, with pivoting."""
+        return cls(matrix, is_definite=False)
+
     def refactorized(self, matrix: csc_matrix) -> PardisoFactor:
         """Return the factor of another matrix of the same size; this factor must not be used afterwards."""
-        if matrix.indices is not self._indices:
+        if not self._triangle.has_pattern_of(matrix):
             # A second analysis with the same handle would leak the memory of the first.
             _release(self._kind, self._threads, self._handle, self._table, matrix.shape[0])
             self._handle[:] = 0
@@ -136,7 +138,7 @@ class PardisoFactor(Factor):
             phase,
             self._handle,
             self._table,
-            (self._values, self._starts, self._rows, self._order),
+            (self._values, self._triangle.starts, self._triangle.rows, self._order),
             (right, solution),
             count,
         )
@@ -146,6 +148,16 @@ class PardisoFactor(Factor):
             raise MemoryError(f"PARDISO does not have enough memory for {len(self._order):,} unknowns")
         if code:
             raise RuntimeError(f"PARDISO failed with code {code} in phase {phase}")
+
+
+def load() -> type[Factor]:
+    """Return the factorization, after MKL was loaded.
+
+    Raises:
+        ImportError, OSError, AttributeError: it cannot be loaded.
+    """
+    _routines()
+    return PardisoFactor
 
 
 def _copied(array: FloatArray) -> FloatArray:
