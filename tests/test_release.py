@@ -56,7 +56,7 @@ def test_the_recipe_for_conda_needs_what_the_package_needs(project):
     assert recipe is not None
     lines = [line.strip("- ") for line in recipe[1].splitlines() if "python" not in line]
     needed = {re.sub(r"[ ;].*", "", line) for line in project["dependencies"]}
-    bounds = dict(re.fullmatch(r"([\w-]+)(>=[\d.]+)", line).groups() for line in needed)
+    bounds = dict(re.fullmatch(r"([\w-]+)(>=[\d.,<]+)", line).groups() for line in needed)
     assert {
         f"{CONDA_NAMES.get(name, name)} {bound}" for name, bound in bounds.items() if name not in NOT_ON_CONDA
     } == set(lines)
