@@ -113,7 +113,7 @@ def main() -> NoReturn:
 def _open_streams() -> None:
     """Connect closed standard streams to the null device, and what libraries print on standard output.
 
-    No other file gets the descriptors of closed streams then. CHOLMOD prints if a matrix is not positive definite.
+    No other file gets the descriptors of closed streams then. Compiled libraries may print.
     """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
