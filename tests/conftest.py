@@ -1,11 +1,15 @@
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
 import pytest
 from browsing import browser, open_visit, viewed, viewed_page, visit  # noqa: F401
 from stored import find_model
+
+# As in an installation: otherwise each process compiles the bytecode again, which takes a second.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
 def pytest_configure(config):

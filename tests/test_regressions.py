@@ -72,7 +72,8 @@ def test_components_of_opened_triangles_count_for_the_area_distortion(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "ending"), [("uneven-seams-spikes", ".obj"), ("uneven-seams-hemisphere", None)]
+    ("name", "ending"),
+    [("uneven-seams-spikes", ".obj"), pytest.param("uneven-seams-hemisphere", None, marks=pytest.mark.slow)],
 )
 def test_seams_that_a_note_names_are_noted(name, ending, tmp_path):
     outcome = outcome_of(name, ending, tmp_path)
@@ -80,6 +81,7 @@ def test_seams_that_a_note_names_are_noted(name, ending, tmp_path):
     assert any("sides of seams differ" in cause for cause in outcome.noted)
 
 
+@pytest.mark.slow
 def test_seams_that_differ_by_more_than_rounding_are_noted():
     """On some processors, by a bit more than the limit: by 1.7e-8."""
     assert outcome_of("uneven-seams-ring").breaches == []

@@ -38,6 +38,7 @@ def agree(path):
 
 
 class TestAgainstDefinitions:
+    @pytest.mark.slow
     def test_uvs_of_artists(self, shared):
         found = agree(shared("spot.obj"))
         assert found["charts"] > 10

@@ -151,6 +151,7 @@ def test_renumbering_changes_nothing(name):
     assert one.distortion == pytest.approx(two.distortion, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_torus_has_no_cones_or_two_and_more():
     vertices, faces = shapes.torus()
     loose = sparse(vertices, faces, distortion=10)
@@ -289,7 +290,13 @@ def test_changing_bounds_one_by_one_starts_from_the_bounds_found_at_once(monkeyp
 PUBLISHED = {"fandisk.obj": 5, "hand.obj": 10, "3holes.off": 9}
 
 
-@pytest.mark.parametrize("name", ["fandisk.obj", *at_hand("hand.obj", "3holes.off")])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "fandisk.obj",
+        *(pytest.param(name, marks=pytest.mark.slow) for name in at_hand("hand.obj", "3holes.off")),
+    ],
+)
 def test_fewer_cones_than_published(shared, name):
     """Li et al. 2023 report 5, 10 and 10 cones for E <= 0.2."""
     model = read_mesh(shared(name))
@@ -371,6 +378,7 @@ def test_more_cones_than_are_searched_for_is_an_error():
         sparse(*HANDLE, max_angles=np.full(len(HANDLE[0]), 2.5 * np.pi), count=15)
 
 
+@pytest.mark.slow
 def test_the_few_vertices_with_room_are_found():
     """Four saddles of 4 pi carry the curvature, and only six vertices can have one."""
     wide = np.random.default_rng(0).choice(len(HANDLE[0]), 6, replace=False)

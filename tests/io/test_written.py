@@ -157,6 +157,7 @@ def test_positions_beyond_single_precision_are_refused(tmp_path):
     assert not (tmp_path / "out.glb").exists()
 
 
+@pytest.mark.slow
 def test_notes_of_a_file_are_those_of_its_numbers():
     """What 32 bits cannot hold apart is told."""
     result = flatten(*shapes.sphere(3), charts="atlas")

@@ -160,6 +160,7 @@ class TestFreeSeams:
         assert exact != ("they are positively oriented, but" in said)
         assert exact or "of seams differ in length" in said or "angle sum differs from" in said
 
+    @pytest.mark.slow
     def test_seams_of_quarter_turns_stay(self):
         result = coneflat.flatten(*stretched(shapes.torus(30, 12), 60), quantise=np.pi / 2, charts="one")
         assert result.distortion.seam_mismatch_max < 1e-6

@@ -264,6 +264,7 @@ def test_flattening_is_the_same_to_the_last_bit(kind):
     assert np.array_equal(results[0], results[2])
 
 
+@pytest.mark.slow
 @needs_pardiso
 @pytest.mark.parametrize("found", [None, ()])
 def test_mkl_is_found_where_no_package_tells_of_it(monkeypatch, found):
@@ -278,6 +279,7 @@ def test_mkl_is_found_where_no_package_tells_of_it(monkeypatch, found):
     assert usual["pardiso"] is not None
 
 
+@pytest.mark.slow
 @needs_pardiso
 def test_the_number_of_threads_changes_nothing_but_rounding(monkeypatch):
     monkeypatch.setenv(SOLVER_VARIABLE, "pardiso")

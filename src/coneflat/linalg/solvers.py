@@ -91,7 +91,9 @@ def solver(name: str) -> type[Factor] | None:
         return import_module(f".{name}", __package__).load()
     except (ImportError, OSError, AttributeError) as error:
         reason = " ".join(str(error).split())
-        getLogger("coneflat").warning("coneflat: %s cannot be loaded, others solve instead: %s", PACKAGES[name], reason)
+        getLogger("coneflat").warning(
+            "coneflat: %s cannot be loaded, others solve instead: %s", PACKAGES[name], reason
+        )
         return None
 
 

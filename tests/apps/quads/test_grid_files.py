@@ -113,6 +113,7 @@ class TestWhatIsNone:
             IntegerGrid.load(tmp_path / "bad.npz")
         assert "\n" not in str(caught.value)
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("change", "message"),
         [

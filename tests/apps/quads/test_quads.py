@@ -253,6 +253,7 @@ def test_quads_that_meet_themselves_are_made_smaller():
     assert not degenerate_quads(mesh.quads, edges_of(mesh.quads)).any()
 
 
+@pytest.mark.slow
 def test_bad_quads_are_left_out_where_no_finer_grid_is_found(monkeypatch):
     options = {"quads": 10, "cones": "sparse", "distortion": 0.2}
     search, tried = GridSearch._as_given, []

@@ -47,6 +47,7 @@ def test_quads_have_the_wanted_sizes(ball, graded):
     assert "have a correlation of 0.9" in " ".join(graded.notes)
 
 
+@pytest.mark.slow
 def test_sizes_count_up_to_a_factor(ball, graded):
     again = coneflat.quads(*ball, quads=1500, size=256 * 2.0 ** ball[0][:, 2])
     np.testing.assert_array_equal(again.quads, graded.quads)
@@ -163,6 +164,7 @@ def test_a_coarse_mesh_without_a_grid_is_refined(monkeypatch):
     assert coneflat.quads(grid).euler_characteristic == 0
 
 
+@pytest.mark.slow
 def test_triangles_around_flipped_ones_are_split(monkeypatch):
     vertices, faces = shapes.torus()
 

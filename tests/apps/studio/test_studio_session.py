@@ -43,6 +43,7 @@ def uv_of(content):
 
 
 class TestSession:
+    @pytest.mark.slow
     def test_it_flattens_what_is_chosen(self, session):
         state = settled(session)
         assert state["trouble"] is None
