@@ -55,7 +55,7 @@ CEILINGS = {
     "geometry": 1542,
     "io": 2823,
     "layout": 1901,
-    "linalg": 451,
+    "linalg": 519,
     "measure": 805,
     "mesh": 533,
     "metric": 915,
@@ -73,8 +73,8 @@ OWN_CEILING = {"apps.blender", "apps.brains", "apps.transfer", "apps.unwrap"}
 FRONT = ("apps.ahead", "apps.blender", "apps.cli", "apps.studio")
 SHARED = ("apps.quads.nearest",)
 #: The largest size of the core, and of everything else.
-CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 144, 14_798, 232, 24_492
-CONSTANTS, KERNELS, NAMES, LEVELS = 292, 84, 30, 8
+CORE_FILES, CORE_LINES, ALL_FILES, ALL_LINES = 146, 14_866, 234, 24_542
+CONSTANTS, KERNELS, NAMES, LEVELS = 294, 84, 30, 8
 #: Lines from which on a file may serve one other file alone.
 OWN_FILE = 80
 
