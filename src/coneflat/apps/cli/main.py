@@ -113,7 +113,7 @@ def main() -> NoReturn:
 def _open_streams() -> None:
     """Connect closed standard streams to the null device, and what libraries print on standard output.
 
-    No other file gets the descriptors of closed streams then. Compiled libraries may print.
+    No other file gets the descriptors of closed streams then, and a result on standard output stays whole.
     """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
