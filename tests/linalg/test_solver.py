@@ -245,7 +245,7 @@ def test_mkl_that_cannot_be_loaded_is_logged_once_and_the_next_solver_is_taken(
     finally:
         solvers.solver.cache_clear()
     (record,) = caplog.records
-    assert record.getMessage().startswith("pypardiso cannot be loaded, others solve instead: ")
+    assert record.getMessage().startswith("coneflat: pypardiso cannot be loaded, others solve instead: ")
     assert "\n" not in record.getMessage()
 
 
