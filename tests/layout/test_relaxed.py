@@ -176,6 +176,7 @@ def side_lengths(result):
     return np.linalg.norm(corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]], axis=2) / result.uv_scale
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"stretch": 0.5}])
 def test_small_components_are_relaxed_together_as_each_by_itself(options, monkeypatch):
     pieces, vertices, faces = of_many_sizes()

@@ -27,6 +27,7 @@ def test_sharp_edges_take_a_box_apart_into_its_sides():
     assert result.distortion.seam_mismatch_max < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [10, 26])
 def test_charts_that_touch_themselves_do_not_overlap(seed):
     """Flat pieces of a box lie beside their own sides, which rounding must not push across each other."""

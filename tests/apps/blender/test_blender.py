@@ -201,6 +201,7 @@ def test_maps_of_two_meshes_in_one_atlas(extension, tmp_path):
     assert {frozenset(pair) for pair in loop.tolist()} <= {frozenset(p) for p in maps[0].seams.tolist()}
 
 
+@pytest.mark.slow
 def test_a_mesh_that_is_repaired_keeps_its_corners(extension, tmp_path):
     """A reversed triangle and one that occurs twice: corners get their points, and dropped ones none."""
     exchange = extension.exchange

@@ -65,6 +65,7 @@ class TestJoining:
         assert (joined.edges, joined.left) == (0, 3)
         assert "3 open edges at the same positions as others, left open; --weld" in joined.notes()[0]
 
+    @pytest.mark.slow
     def test_what_was_manifold_stays_so(self):
         """Triangles between few places, and two parts of a ball with vertices of their own and a few holes."""
         random = np.random.default_rng(7)

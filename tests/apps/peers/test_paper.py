@@ -39,6 +39,7 @@ def test_models_are_known_by_their_names(tmp_path):
     assert MODELS["torso"].qc == {"linear-abf/free": 1.004, "linear": 1.005}
 
 
+@pytest.mark.slow
 def test_the_experiments_of_the_paper(tmp_path):
     shapes.write_obj(tmp_path / "fandisk.obj", *shapes.sphere(3))
     shapes.write_obj(tmp_path / "another.obj", *shapes.hill(12, 12))

@@ -200,6 +200,7 @@ def test_measures_by_hand():
     assert measures.hausdorff == pytest.approx(0, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_distances_are_the_least_of_all_triangles():
     rng = np.random.default_rng(0)
     vertices, faces = rng.normal(size=(40, 3)), rng.integers(0, 40, (23, 3))
@@ -231,6 +232,7 @@ def test_cones_may_be_of_any_angle():
     np.testing.assert_array_equal(without.quads, bounded.quads)
 
 
+@pytest.mark.slow
 def test_components_with_few_vertices_get_quads():
     """A tetrahedron has four vertices for the eight cones of a cube: its triangles are split."""
     vertices, faces = shapes.join(shapes.sphere(3), shapes.tetrahedron())

@@ -129,6 +129,7 @@ def test_the_grid_is_written_and_made_into_the_same_quads(tmp_path, ball, quads_
     assert "is a grid: leave out --quads" in refused.output
 
 
+@pytest.mark.slow
 def test_options_of_the_search(tmp_path, ball):
     path = write_obj(tmp_path / "ball.obj", *ball)
     out = tmp_path / "q.npz"
@@ -187,6 +188,7 @@ def test_quads_are_more_alike_where_weights_are():
     assert spread(np.where(matters, 100.0, 1.0)) < 0.9 * spread(None)
 
 
+@pytest.mark.slow
 def test_quads_are_flattened_again(tmp_path):
     path = coneflat.quads(*shapes.sphere(3), quads=800).save(tmp_path / "quads.obj")
     result = coneflat.flatten(path)

@@ -128,6 +128,7 @@ def components_of(found):
     return connected_components(quads)[0], found.surface.components[0]
 
 
+@pytest.mark.slow
 def test_all_but_the_largest_components_are_divided(monkeypatch):
     monkeypatch.setattr(module, "MAX_COMPONENTS", 2)
     cube, (ball, faces) = shapes.box(1, (1.0, 1.0, 1.0)), shapes.sphere(3)

@@ -98,6 +98,7 @@ def test_sizes_need_cones_that_may_be_chosen(ball, more):
         coneflat.quads(*ball, quads=100, size="curvature", **more)
 
 
+@pytest.mark.slow
 def test_the_command_reads_sizes(tmp_path, ball, graded):
     (tmp_path / "ball.obj").write_text(
         "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in ball[0].tolist())

@@ -82,6 +82,7 @@ class TestFirstViews:
         assert self.shown(session) == ("newest", False, False, 2)
 
 
+@pytest.mark.slow
 def test_a_first_view_comes_before_the_layout_and_has_no_numbers(tmp_path):
     path = shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(3))
     events = []

@@ -137,6 +137,7 @@ def test_vertex_colours_arrive_on_other_triangles(folder, tmp_path):
     assert baked.notes == ()
 
 
+@pytest.mark.slow
 def test_the_image_of_an_obj_is_given(folder, tmp_path):
     coneflat.flatten(str(folder / "old.glb")).save(tmp_path / "new.ply")
     lines = ["v 0 0 0", "v 1 0 0", "v 0 1 0", "vt 0 0", "vt 1 0", "vt 0 1", "f 1/1 2/2 3/3"]

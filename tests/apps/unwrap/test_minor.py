@@ -92,6 +92,7 @@ def test_a_needle_whose_tips_are_neighbours_gives_no_warning(every_part_is_minor
     assert (result.distortion.flipped, result.distortion.overlapping_pairs) == (0, 0)
 
 
+@pytest.mark.slow
 def test_a_large_bound_needs_fewer_cones(every_part_is_minor):
     parts = crumbs([KINDS["icosphere"]], 3)
     assert len(unwrap(*parts, max_energy=50).cones) < len(unwrap(*parts).cones)

@@ -63,6 +63,7 @@ def image_of_faces(result, normal=(1.0, 0.0, 0.0)):
     return distance.argmin(axis=1), turned
 
 
+@pytest.mark.slow
 def test_each_face_has_the_points_of_its_mirror_image(stacked):
     image, turned = image_of_faces(stacked)
     corners, uv = stacked.vertices[stacked.faces], stacked.corner_uv

@@ -158,6 +158,7 @@ def test_few_flipped_triangles_are_untangled_in_place(monkeypatch):
     assert freed(replace(layout, points=points))[1] == pytest.approx(wanted, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [shapes.sphere(3), shapes.hill(20, 20)])
 def test_scale_motion_and_numbering_change_nothing(shape):
     vertices, faces = shape
@@ -207,6 +208,7 @@ def test_unknown_options_are_refused():
         unwrap(*shapes.sphere(1), distortion=0.1)
 
 
+@pytest.mark.slow
 def test_seams_of_the_user_are_cut():
     vertices, faces = shapes.box()
     edges = coneflat.check_mesh(vertices, faces).mesh.edges

@@ -43,6 +43,7 @@ class TestFigures:
         assert (image[:, :2] > 250).all()
         assert (image[:, -2:] > 250).all()
 
+    @pytest.mark.slow
     def test_size_and_resolution_are_those_asked_for(self, result, tmp_path):
         image = pytest.importorskip("PIL.Image")
         figure = coneflat.make_figure(result, "quality", size=(6.0, 4.0), dpi=120)

@@ -54,6 +54,7 @@ class TestLayout:
 
 
 class TestQuality:
+    @pytest.mark.slow
     def test_the_layout_has_the_colours_of_its_triangles(self, result):
         from matplotlib import colormaps
 

@@ -110,6 +110,7 @@ def test_a_line_is_cut_where_it_vanishes():
     np.testing.assert_array_equal(pieces[0, 1], pieces[1, 0])
 
 
+@pytest.mark.slow
 def test_the_squares_of_a_checkerboard_are_squares():
     """A square in the plane is its own layout: the board has straight lines at equal distances."""
     points, faces = shapes.grid(7, 7)

@@ -146,6 +146,7 @@ def fine():
 
 
 class TestThinning:
+    @pytest.mark.slow
     def test_as_few_triangles_as_asked_and_not_far_fewer(self, fine):
         whole = content_of(fine, 10**6)
         assert whole.left_out == 0
