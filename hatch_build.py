@@ -40,6 +40,9 @@ class KernelHook(BuildHookInterface):
         if not self._is_requested() or version == "editable":
             return
         self._scratch = tempfile.TemporaryDirectory(prefix="coneflat-kernels-", ignore_cleanup_errors=True)
+        # No kernel comes from another cache.
+        empty = Path(self._scratch.name) / "empty"
+        empty.mkdir()
         self.app.display_info("compiling the kernels")
         paths = [str(Path(self.root) / "src"), *sys.path]
         environment = {
@@ -47,11 +50,17 @@ class KernelHook(BuildHookInterface):
             "PYTHONPATH": os.pathsep.join(paths),
             "PYTHONDONTWRITEBYTECODE": "1",
             "CONEFLAT_CACHE_DIR": self._scratch.name,
+            **dict.fromkeys(("HOME", "XDG_CACHE_HOME", "LOCALAPPDATA", "TMPDIR", "TEMP", "TMP"), str(empty)),
         }
         command = [sys.executable, "-m", "coneflat.apps.warm_up"]
-        done = subprocess.run(
-            command, env=environment, check=False, timeout=TIME_LIMIT, capture_output=True, text=True
-        )
+        try:
+            done = subprocess.run(
+                command, env=environment, check=False, timeout=TIME_LIMIT, capture_output=True, text=True
+            )
+        except subprocess.TimeoutExpired as error:
+            raise RuntimeError(
+                f"the kernels requested by {REQUEST} are not compiled in {TIME_LIMIT} s"
+            ) from error
         kernels = sorted(Path(self._scratch.name).glob("*.kernel"))
         if done.returncode or not kernels:
             raise RuntimeError(

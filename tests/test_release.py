@@ -55,7 +55,8 @@ def test_the_recipe_for_conda_needs_what_the_package_needs(project):
     recipe = re.search(r"^  run:\n((?:    - .*\n)+)", text("packaging/conda/recipe.yaml"), re.MULTILINE)
     assert recipe is not None
     lines = [line.strip("- ") for line in recipe[1].splitlines() if "python" not in line]
-    needed = {re.sub(r"[ ;].*", "", line) for line in project["dependencies"]}
+    # Intel Macs have a bound of their own for wheels.
+    needed = {re.sub(r"[ ;].*", "", line) for line in project["dependencies"] if "== 'darwin'" not in line}
     bounds = dict(re.fullmatch(r"([\w-]+)(>=[\d.,<]+)", line).groups() for line in needed)
     assert {
         f"{CONDA_NAMES.get(name, name)} {bound}" for name, bound in bounds.items() if name not in NOT_ON_CONDA

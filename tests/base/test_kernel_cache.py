@@ -14,6 +14,7 @@ from importlib import import_module
 from pathlib import Path
 
 import numpy as np
+import platformdirs
 import pytest
 
 import coneflat
@@ -37,7 +38,7 @@ def folder(tmp_path, monkeypatch):
     chosen = tmp_path / "cache"
     monkeypatch.setenv(CACHE_VARIABLE, str(chosen))
     (tmp_path / "file").write_text("")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    monkeypatch.setattr(platformdirs, "user_cache_path", lambda *_, **__: tmp_path / "file" / "below")
     monkeypatch.setattr(tempfile, "gettempdir", lambda: str(tmp_path / "file"))
     kernel_cache.writable_folder.cache_clear()
     monkeypatch.setattr(kernel_cache, "compilation", kernel_cache.Compilation())
@@ -67,6 +68,7 @@ def test_a_chosen_folder_gets_what_others_contain(folder, monkeypatch):
     compiled(copy_of(product))(np.arange(4.0), 2.0)
     monkeypatch.setattr(tempfile, "gettempdir", lambda: str(folder.parent))
     folder.rename(folder.parent / f"coneflat-{os.getuid()}")
+    (folder.parent / f"coneflat-{os.getuid()}").chmod(0o700)
     kernel_cache.writable_folder.cache_clear()
     assert compiled(copy_of(product))(np.arange(4.0), 2.0) == 12.0
     assert kernel_cache.compilation.count == 1
@@ -227,6 +229,38 @@ class TestFolders:
         assert stat.S_IMODE(folder.stat().st_mode) == 0o700
         assert not Path("/nonexistent").exists()
 
+    @pytest.mark.skipif(sys.platform != "linux", reason="other folders")
+    def test_without_any_home_and_any_temporary_folder_there_is_none(self, tmp_path):
+        script = """
+import os, pwd, tempfile
+os.environ.pop("HOME", None)
+def unknown(_): raise KeyError("no such user")
+pwd.getpwuid = unknown
+tempfile._candidate_tempdir_list = lambda: []
+tempfile.tempdir = None
+from coneflat.base.kernel_cache import readable_folders, writable_folder
+print(writable_folder(), len(list(readable_folders())))
+"""
+        done = subprocess.run(
+            [sys.executable, "-c", script],
+            env={
+                name: value
+                for name, value in os.environ.items()
+                if name not in ("XDG_CACHE_HOME", CACHE_VARIABLE)
+            },
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        assert done.stdout == "None 1\n"
+
+    @pytest.mark.skipif(not hasattr(os, "getuid"), reason="no modes of files")
+    def test_a_folder_that_others_can_write_to_is_not_used(self, tmp_path):
+        home = tmp_path / "coneflat"
+        home.mkdir()
+        home.chmod(0o777)
+        assert self.folder(tmp_path, XDG_CACHE_HOME=str(tmp_path)) != str(home)
+
     @pytest.mark.skipif(not hasattr(os, "getuid"), reason="no modes of files")
     def test_a_temporary_folder_of_somebody_else_is_not_used(self, tmp_path):
         target = tmp_path / "theirs"
@@ -244,6 +278,7 @@ def test_the_first_compilation_is_announced_and_reported(folder, caplog):
         kernel(np.arange(4.0), 2.0)
         kernel(np.arange(4), 2.0)
     assert [record.getMessage() for record in caplog.records] == [
-        f"coneflat: compiling, once: about {kernel_cache.SECONDS_TO_COMPILE} s (cached in {folder})"
+        f"coneflat: compiling, once, as the result is cached in {folder}: up to about "
+        f"{kernel_cache.SECONDS_TO_COMPILE} s"
     ]
-    assert reported == ["stage", "stage: compiling, once (1: product)", "stage: compiling, once (2: product)"]
+    assert reported == ["stage", "stage: compiling (1: product)", "stage: compiling (2: product)"]

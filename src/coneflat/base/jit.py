@@ -16,6 +16,9 @@ from .kernel_cache import KernelCache
 
 F = TypeVar("F", bound=Callable[..., object])
 
+# A wrapper for calls from C, which nobody makes, is a twentieth of the compilation.
+OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+
 
 def compiled(function: F) -> F:
     """Return a function of arrays and numbers compiled to machine code, which is cached on disk between runs.
@@ -23,7 +26,6 @@ def compiled(function: F) -> F:
     Divisions by zero give inf or nan, as in NumPy. Results do not depend on the number of cores, because the function
     is not parallelised and floating-point operations are not reassociated. The interpreter lock is released.
     """
-    # A wrapper for calls from C, which nobody makes, is a twentieth of the compilation.
-    kernel: Any = numba.njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True)(function)
-    kernel._cache = KernelCache(function)  # type: ignore[arg-type]
+    kernel: Any = numba.njit(**OPTIONS)(function)
+    kernel._cache = KernelCache(function, OPTIONS)  # type: ignore[arg-type]
     return kernel

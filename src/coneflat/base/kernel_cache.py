@@ -1,9 +1,9 @@
 """The cache of compiled kernels, on disk.
 
 numba's own cache stands beside the sources, which may be read-only, and trusts the time of one file. Here the name of
-a cached kernel is a digest of everything that its machine code depends on: the bytecode and constants of the function
-and of the kernels that it calls, the types of the arguments, the processor, and the versions of Python and numba. So
-versions of coneflat, environments and processes can share a folder; no cached kernel is ever out of date.
+a cached kernel is a digest of what its machine code depends on: the bytecode and constants of the function and of the
+kernels that it calls, the types of the arguments, the options of numba, the processor, and the versions of Python,
+numba and numpy. So versions of coneflat, environments and processes can share a folder.
 """
 
 from __future__ import annotations
@@ -16,15 +16,17 @@ import stat
 import sys
 import tempfile
 import types
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from enum import EnumMeta
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import llvmlite
 import numba
 import numpy as np
+import platformdirs
 from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
@@ -39,6 +41,8 @@ CACHE_VARIABLE = "CONEFLAT_CACHE_DIR"
 #: Folder of the package with the kernels of a wheel that was built for one platform.
 BUILT_KERNELS = "kernels"
 ENDING = ".kernel"
+# Modules that kernels may use.
+MODULES = ("heapq", "math", "numpy")
 # Identifies the format of cached files.
 HEADER = b"coneflat kernel 1\n"
 DIGEST_SIZE = hashlib.sha256().digest_size
@@ -47,10 +51,15 @@ SECONDS_TO_COMPILE = 20
 
 
 class KernelCache(_Cache):  # type: ignore[misc]
-    """The cached machine code of one kernel, for the dispatcher of numba."""
+    """The cached machine code of one kernel, for the dispatcher of numba.
 
-    def __init__(self, function: types.FunctionType) -> None:
-        self._function = function
+    Args:
+        function: the kernel.
+        options: how numba compiles it.
+    """
+
+    def __init__(self, function: types.FunctionType, options: Mapping[str, object]) -> None:
+        self._function, self._options = function, sorted(options.items())
 
     @property
     def cache_path(self) -> str | None:
@@ -65,9 +74,13 @@ class KernelCache(_Cache):  # type: ignore[misc]
         for folder in readable_folders():
             payload = read_kernel(folder / name)
             if payload is not None:
+                try:
+                    kernel = CompileResult._rebuild(target_context, *pickle.loads(payload))
+                except Exception as error:
+                    log.debug("coneflat: %s cannot be used: %r", folder / name, error)
+                    continue
                 _copy_to_chosen(folder, name, payload)
-                with suppress(Exception):  # written by an incompatible version of a dependency
-                    return CompileResult._rebuild(target_context, *pickle.loads(payload))
+                return kernel
         compilation.begin(self._function.__name__)
         return None
 
@@ -77,10 +90,13 @@ class KernelCache(_Cache):  # type: ignore[misc]
         folder = writable_folder()
         if folder is None or data.library.has_dynamic_globals:
             return
+        path, payload = folder / self._file_name(sig, data.codegen), dumps(data._reduce())
         try:
-            write_kernel(folder / self._file_name(sig, data.codegen), dumps(data._reduce()))
+            write_kernel(path, payload)
         except OSError as error:
-            compilation.report_unwritten(folder, error)
+            # On Windows, a file that another process reads cannot be replaced.
+            if read_kernel(path) is None:
+                compilation.report_unwritten(folder, error)
 
     def enable(self) -> None:
         """Do nothing: the cache is always enabled."""
@@ -92,8 +108,15 @@ class KernelCache(_Cache):  # type: ignore[misc]
         """Do nothing: cached kernels are never out of date."""
 
     def _file_name(self, sig: Sequence[Any], codegen: Any) -> str:
-        versions = (sys.implementation.cache_tag, numba.__version__)
-        key = (kernel_digest(self._function), str(sig), codegen.magic_tuple(), versions)
+        versions = (sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, np.__version__)
+        key = (
+            HEADER,
+            kernel_digest(self._function),
+            self._options,
+            str(sig),
+            codegen.magic_tuple(),
+            versions,
+        )
         return f"{self._function.__name__}-{_digest(key)[:40]}{ENDING}"
 
 
@@ -102,29 +125,30 @@ class Compilation:
 
     Attributes:
         count: number of kernels compiled so far.
+        unwritten: why they cannot be written; empty if they are.
     """
 
     def __init__(self) -> None:
-        self.count = 0
-        self._is_announced = self._is_unwritten = False
+        self.count, self.unwritten = 0, ""
+        self._is_announced = False
 
     def begin(self, name: str) -> None:
         """Report that a kernel is compiled."""
         if not self._is_announced:
             self._is_announced = True
-            log.warning("coneflat: compiling, once: about %d s (%s)", SECONDS_TO_COMPILE, _where())
+            log.warning("coneflat: compiling, %s: up to about %d s", _where(), SECONDS_TO_COMPILE)
         log.info("coneflat: compiling %s", name)
-        report_detail(f"compiling, once ({self.count + 1}: {name})")
+        report_detail(f"compiling ({self.count + 1}: {name})")
 
     def report_unwritten(self, folder: Path, error: OSError) -> None:
         """Report that compiled kernels cannot be written, once."""
-        if not self._is_unwritten:
-            self._is_unwritten = True
+        if not self.unwritten:
+            self.unwritten = error.strerror or str(error)
             log.warning(
                 "coneflat: compiled kernels cannot be written to %s (%s), and are compiled again in the next process; "
                 "%s names another folder",
                 folder,
-                error.strerror or error,
+                self.unwritten,
                 CACHE_VARIABLE,
             )
 
@@ -135,7 +159,9 @@ compilation = Compilation()
 def readable_folders() -> Iterator[Path]:
     """Yield the folders that may contain kernels: those of the package first, then the user's."""
     yield Path(__file__).parent.parent / BUILT_KERNELS
-    yield from _user_folders()
+    for folder in _user_folders():
+        if _is_trusted(folder):
+            yield folder
 
 
 @cache
@@ -147,7 +173,8 @@ def writable_folder() -> Path | None:
             # os.access does not know of read-only and full file systems.
             with tempfile.TemporaryFile(dir=folder) as file:
                 file.write(HEADER)
-            return folder
+            if _is_trusted(folder):
+                return folder
     return None
 
 
@@ -169,13 +196,13 @@ def cache_folder() -> Path:
 def _where() -> str:
     folder = writable_folder()
     if folder is not None:
-        return f"cached in {folder}"
-    return f"in every process, as no cache folder is writable; set {CACHE_VARIABLE} to one that is"
+        return f"once, as the result is cached in {folder}"
+    return f"in every process, as no cache folder is writable ({CACHE_VARIABLE} names another one)"
 
 
 def _chosen_folder() -> Path | None:
-    chosen = os.environ.get(CACHE_VARIABLE)
-    return Path(chosen).absolute() if chosen else None
+    path = os.environ.get(CACHE_VARIABLE)
+    return Path(path).absolute() if path else None
 
 
 def _user_folders() -> Iterator[Path]:
@@ -183,26 +210,28 @@ def _user_folders() -> Iterator[Path]:
     chosen = _chosen_folder()
     if chosen is not None:
         yield chosen
-    from platformdirs import user_cache_path
-
-    folder = user_cache_path("coneflat", appauthor=False)
-    # Without a home, which must not be made here, the path is relative, or that of a user who does not exist.
-    has_home = os.environ.get("XDG_CACHE_HOME") or Path("~").expanduser().is_dir()
-    if has_home and folder.is_absolute():
-        yield folder
+    with suppress(RuntimeError):  # The user has no home.
+        # A home that does not exist must not be made here.
+        if os.environ.get("XDG_CACHE_HOME") or Path("~").expanduser().is_dir():
+            yield platformdirs.user_cache_path("coneflat", appauthor=False).absolute()
     user = f"-{os.getuid()}" if hasattr(os, "getuid") else ""
-    temporary = Path(tempfile.gettempdir()) / f"coneflat{user}"
-    if not os.path.lexists(temporary) or _is_private(temporary):
-        yield temporary
+    with suppress(OSError):  # No temporary folder is writable.
+        yield Path(tempfile.gettempdir()) / f"coneflat{user}"
 
 
-def _is_private(folder: Path) -> bool:
-    """Return whether nobody else can have written to a folder for all users; machine code is loaded from it."""
-    status = folder.lstat()
+def _is_trusted(folder: Path) -> bool:
+    """Return whether a folder exists, and nobody else can write to it; machine code is loaded from it.
+
+    The folder of the environment variable is trusted.
+    """
+    try:
+        status = folder.lstat()
+    except OSError:
+        return False
+    if folder == _chosen_folder() or not hasattr(os, "getuid"):
+        return True
     is_shared = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-    return not hasattr(os, "getuid") or (
-        stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not is_shared
-    )
+    return stat.S_ISDIR(status.st_mode) and status.st_uid == os.getuid() and not is_shared
 
 
 def read_kernel(path: Path) -> bytes | None:
@@ -240,9 +269,10 @@ def write_kernel(path: Path, payload: bytes) -> None:
 def _copy_to_chosen(folder: Path, name: str, payload: bytes) -> None:
     """Copy a kernel to the folder of the environment variable, which is to contain all that is needed."""
     chosen = _chosen_folder()
-    if chosen not in (None, folder) and chosen == writable_folder():
-        with suppress(OSError):
-            write_kernel(chosen / name, payload)
+    if chosen in (None, folder) or chosen != writable_folder() or (chosen / name).exists():
+        return
+    with suppress(OSError):
+        write_kernel(chosen / name, payload)
 
 
 @cache
@@ -250,8 +280,10 @@ def kernel_digest(function: types.FunctionType) -> str:
     """Return a digest of what a kernel computes: its code, and the constants and kernels that it refers to.
 
     Raises:
-        TypeError: it refers to an object whose value has no digest.
+        TypeError: it refers to an object whose value has no digest, or is a closure.
     """
+    if function.__closure__:
+        raise TypeError(f"{function.__qualname__} is compiled and a closure, which has no digest")
     code, values = function.__code__, function.__globals__
     names = sorted({name for part in _codes(code) for name in part.co_names})
     referred = [(name, _describe(values[name], function)) for name in names if name in values]
@@ -278,15 +310,18 @@ def _describe(value: object, user: types.FunctionType) -> str:
     """Return what identifies the value of a global name that a kernel uses."""
     if hasattr(value, "py_func"):
         return "itself" if value.py_func is user else kernel_digest(value.py_func)
-    if isinstance(value, (bool, int, float, complex, str, bytes, tuple, type(None))):
+    if isinstance(value, tuple):
+        return repr([_describe(part, user) for part in value])
+    if isinstance(value, (bool, int, float, complex, str, bytes, type(None))):
         return repr(value)
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {value.shape} {value.tobytes().hex()}"
     if isinstance(value, EnumMeta):
         return repr(list(value))
-    if isinstance(value, types.ModuleType):
+    # Constants of other modules would be compiled in.
+    if isinstance(value, types.ModuleType) and value.__name__ in MODULES:
         return value.__name__
-    if callable(value):
+    if callable(value) and not isinstance(value, types.ModuleType):
         return f"{getattr(value, '__module__', '')}.{getattr(value, '__qualname__', value)!s}"
     raise TypeError(f"{user.__qualname__} is compiled and refers to {value!r}, which has no digest")
 

@@ -59,17 +59,21 @@ def warn_of(notes: Iterable[str], where: str) -> None:
     unmet = tuple(dict.fromkeys(note for note in notes if isinstance(note, Unmet)))
     if not unmet or _is_inside.get():
         return
-    left = len(unmet) - MAX_QUOTED
-    rest = f"{plural(left, 'more unmet guarantee')}; all are in {where}" if left > 0 else f"see {where}"
-    text = f"{' '.join(unmet[:MAX_QUOTED])} ({rest})"
+    unquoted = len(unmet) - MAX_QUOTED
+    place = (
+        f"{plural(unquoted, 'more unmet guarantee')}; all are in {where}" if unquoted > 0 else f"see {where}"
+    )
+    text = f"{' '.join(unmet[:MAX_QUOTED])} ({place})"
     warnings.warn(GuaranteeWarning(text, tuple(map(str, unmet))), stacklevel=CALLER)
 
 
-def new_notes(result: Any, *given: Any) -> Iterator[str]:
+def new_notes(result: Any, *arguments: Any) -> Iterator[str]:
     """Yield the notes of a result that none of the arguments has: of those, another call has warned."""
-    notes = (getattr(one, "notes", ()) for one in given)
-    known = {note for each in notes if isinstance(each, tuple) for note in each if isinstance(note, str)}
-    return (note for note in result.notes if note not in known)
+    tuples = (getattr(argument, "notes", ()) for argument in arguments)
+    old_notes = {
+        note for notes in tuples if isinstance(notes, tuple) for note in notes if isinstance(note, str)
+    }
+    return (note for note in result.notes if note not in old_notes)
 
 
 def warns(

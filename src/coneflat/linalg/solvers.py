@@ -61,10 +61,10 @@ def solver_for(size: int) -> type[Factor]:
     Raises:
         OptionError: the environment variable names a solver that is unknown or not installed.
     """
-    if forced := os.environ.get(SOLVER_VARIABLE):
-        return _forced(forced)
-    for name, least in (("pardiso", MIN_PARDISO_UNKNOWNS), ("rslab", MIN_RSLAB_UNKNOWNS)):
-        if size >= least and (kind := solver(name)):
+    if only := os.environ.get(SOLVER_VARIABLE):
+        return _forced(only)
+    for name, min_size in (("pardiso", MIN_PARDISO_UNKNOWNS), ("rslab", MIN_RSLAB_UNKNOWNS)):
+        if size >= min_size and (kind := solver(name)):
             return kind
     return SuperLUFactor
 

@@ -234,8 +234,11 @@ def test_every_result_has_a_name_of_its_own_in_the_folder(tmp_path):
     assert {os.path.dirname(job.output) for job in jobs} == {str(tmp_path / "out")}
 
 
+MESSAGE = b'{"level": 20, "message": "coneflat: compiling a kernel"}\n'
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("what", [b"", b"no JSON\n", b'{"half": '])
+@pytest.mark.parametrize("what", [b"", b"no JSON\n", b'{"half": ', MESSAGE])
 def test_a_worker_that_crashes_fails_its_mesh_alone_and_leaves_nothing_half_written(
     models, tmp_path, monkeypatch, what
 ):

@@ -98,12 +98,13 @@ class Child:
         with suppress(OSError, ValueError):  # It may die before it reads the job, or while it writes.
             process.stdin.write(job.as_json() + "\n")
             process.stdin.flush()
-            row = _answer(process, limit)
-            while "message" in row:
-                # Compilation, once for all meshes, does not count.
+            answer = _answer(process, limit)
+            while "message" in answer:
+                # The compilation of a kernel begins, which happens once for all meshes: the time starts anew.
                 start = time.perf_counter()
-                log_once(row["level"], row["message"])
-                row = _answer(process, limit)
+                log_once(answer["level"], answer["message"])
+                answer = _answer(process, limit)
+            row = answer
         seconds = time.perf_counter() - start
         if row:
             return row
