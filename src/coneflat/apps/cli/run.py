@@ -29,6 +29,7 @@ from .shared import QUIET, VERBOSE, repair_keywords
 if TYPE_CHECKING:
     from rich.progress import Progress
 
+LOG = logging.getLogger("coneflat")
 AGAIN = "--again flattens the mesh again"
 
 #: The rows that are always printed, in this order; the others are printed if verbose.
@@ -54,8 +55,6 @@ class Console:
 
     def __init__(self, verbosity: str | None = None) -> None:
         self.quiet, self.verbose = verbosity == QUIET, verbosity == VERBOSE
-        if self.quiet:
-            logging.getLogger("coneflat").setLevel(logging.ERROR)
         self._stages = Stopwatch(self.progress)
         self.seconds = self._stages.seconds
         self._start = time.perf_counter()
@@ -69,6 +68,9 @@ class Console:
             self._task = self._bar.add_task("", total=1.0)
 
     def __enter__(self) -> Console:
+        self._level = LOG.level
+        if self.quiet:
+            LOG.setLevel(logging.ERROR)
         if self._bar:
             self._bar.start()
         elif not self.quiet and not self.verbose:
@@ -76,6 +78,7 @@ class Console:
         return self
 
     def __exit__(self, *_: object) -> None:
+        LOG.setLevel(self._level)
         with self._lock:
             self._is_finished.set()
         if self._bar:
