@@ -392,7 +392,8 @@ def test_small_charts_inside_another_one_are_joined(monkeypatch):
     ((search, one),) = found
     layout = one.layout
     inner = np.flatnonzero(~layout.mesh.is_boundary_vertex)
-    middle = inner[np.argmin(np.abs(layout.mesh.vertices - vertices.mean(axis=0)).sum(axis=1)[inner])]
+    offsets = np.abs(layout.mesh.vertices - layout.mesh.vertices.mean(axis=0)).sum(axis=1)
+    middle = inner[np.argmin(offsets[inner])]
     around = np.flatnonzero((layout.mesh.faces == middle).any(axis=1))
     chart = layout.chart.copy()
     chart[around], chart[around[0]] = 1, 2
