@@ -72,8 +72,7 @@ def measured(forced: str, work: str, name: str, runs: int) -> list[float]:
 
 def systems(name: str, runs: int) -> list[float]:
     """Return the unknowns of the Laplacian of a mesh without its first vertex, processor times and memory in MB."""
-    stem, _, pieces = name.partition("/")
-    vertices, faces = model(stem, round(np.log(int(pieces or 1)) / np.log(4)))
+    vertices, faces = split(name)
     laplacian = cotangent_laplacian(faces, cotangents(edge_lengths(vertices, faces)), len(vertices))
     matrix = csc_matrix(csc_matrix(laplacian)[1:][:, 1:])
     size = matrix.shape[0]
@@ -100,10 +99,16 @@ def systems(name: str, runs: int) -> list[float]:
 
 def whole(work: str, name: str, runs: int) -> list[float]:
     """Return the processor time of a flattening, or of a texture."""
-    vertices, faces = model(name, 0)
+    vertices, faces = split(name)
     call: Callable[..., object] = flatten if work == "flatten" else unwrap
     call(vertices, faces)  # This compiles or loads the kernels.
     return [processor_time(lambda: call(vertices, faces), runs)]
+
+
+def split(name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return a model; after a slash, the number of triangles into which each of its own is split, a power of 4."""
+    stem, _, pieces = name.partition("/")
+    return model(stem, round(np.log(int(pieces or 1)) / np.log(4)))
 
 
 def processor_time(call: Callable[[], object], runs: int) -> float:

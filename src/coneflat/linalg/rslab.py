@@ -20,8 +20,7 @@ ORDERING = "amf"
 class RslabFactor(Factor):
     """A sparse LDL^T factorization; its analysis is reused for matrices of the same pattern.
 
-    It runs on one thread: two save a fifth of the wall time and take more processor time. Results are the same bit for
-    bit in every run.
+    It runs on one thread: two gain nothing measurable. Results are the same bit for bit in every run.
     """
 
     break_even = 20
