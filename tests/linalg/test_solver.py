@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import shapes
 from scipy.sparse import csc_matrix, diags, tril
+from stored import at_hand
 
 from coneflat import errors, flatten, read_mesh
 from coneflat.base.threads import limit_threads
@@ -146,7 +147,7 @@ def test_small_systems_are_solved_by_superlu(matrix, unforced, capfd):
     assert capfd.readouterr().out == ""
 
 
-@pytest.mark.parametrize("name", ["rocker-arm.obj", "horse.ply"])
+@pytest.mark.parametrize("name", ["rocker-arm.obj", *at_hand("horse.ply")])
 def test_solutions_on_real_meshes(kind, shared, name):
     """With several right-hand sides, before and after other values of the same pattern."""
     mesh = read_mesh(shared(name))
