@@ -11,6 +11,7 @@ import numpy as np
 
 from .atlas import arrange_charts, separate_touching
 from .base.arrays import FloatArray, IntArray, rows_of
+from .base.notes import counted_notes
 from .base.progress import Stopwatch
 from .geometry.overlap import Overlaps
 from .measure.distortion import curvature_errors, measure
@@ -145,7 +146,7 @@ def evaluate(
         notes=(
             *checked.notes,
             *prepared.notes,
-            *dict.fromkeys(note for one in layouts for note in one.notes),
+            *counted_notes([one.notes for one in layouts]),
         ),
         settings=settings(options),
         solve=SolveStatistics.of_all(

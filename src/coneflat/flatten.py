@@ -17,21 +17,21 @@ from .base.notes import Unmet, warns
 from .base.progress import Stopwatch
 from .base.text import list_some, plural
 from .base.threads import concurrently, limit_threads
-from .cones import MAX_SEARCHED, close_search, find_cones, uses_sparse_search
-from .errors import CurvatureError, MetricError, SeamError
+from .bounds import TOLERATED_EXCESS, excess, is_too_distorted, rank
+from .cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, close_search, find_cones, with_corners
+from .errors import CurvatureError, MetricError, OptionError, SeamError
 from .evaluate import evaluate
-from .geometry.operators import area_distortion, weighted_areas
+from .geometry.operators import weighted_areas
 from .geometry.overlap import UNKNOWN_OVERLAPS
-from .geometry.planar import signed_double_areas
 from .io.packages import as_input
-from .layout import lay_out, relax_layouts, untangle_seams
+from .layout import lay_out, mean_qc, relax_layouts, untangle_seams
 from .mesh.connectivity import TriangleMesh
 from .metric import find_metric, loop_rotations
 from .options import Options, read_options, takes
 from .result import Flattening
 from .seams import cut_to_disk, seam_costs
 from .source.copies import Copy, copied, find_copies
-from .source.parts import Part, Source
+from .source.parts import Part, Prepared, Source
 from .stages import ConeSolution, ConeSpec, FlatMetric, Layout, MetricSpec, RelaxSpec, Surface
 
 #: Receives the first layout, before triangles are relaxed and overlaps are separated.
@@ -43,9 +43,11 @@ FindMetric: TypeAlias = Callable[[Surface, ConeSolution, MetricSpec], FlatMetric
 
 # Largest number of cone searches per part. A search is repeated if the triangles around a cone cannot hold its angle.
 MAX_SEARCHES = 4
-# A result may exceed the allowed area distortion by this factor. Beyond that, the part is relaxed with this stretch,
-# then flattened with tighter bounds of the search: at most so often, and by at most this factor each time.
-TOLERATED_EXCESS, MAX_CORRECTIONS, MAX_TIGHTENING, CORRECTING_STRETCH = 1.02, 2, 2.0, 0.1
+# A part beyond the allowed area distortion is relaxed with this stretch, then flattened with tighter bounds of the
+# search: at most so often, and by at most this factor each time.
+MAX_CORRECTIONS, MAX_TIGHTENING, CORRECTING_STRETCH = 2, 2.0, 0.1
+# Dihedral angle, radians, above which edges are cut where a component is too distorted otherwise.
+SHARP_ANGLE = np.radians(40)
 # Curvature error of an infeasible cone, radians: ideally a full turn; rounding and untangled neighbours reduce it.
 INFEASIBLE_ERROR = 1.0
 # A log scale that varies by less is constant: the surface is a polyhedron with vertices as cones, cut along its edges.
@@ -143,27 +145,88 @@ def flatten_source(
     relax = RelaxSpec(o.relax if o.method == "exact" else "off", o.stretch)
     method = Method(relax, o.charts == "atlas", o.quantise, watch, surface_of, find_metric)
     with limit_threads(o.threads):
-        copies = find_copies(prepared.parts)
-        originals = {i: part for i, part in enumerate(prepared.parts) if copies[i] is None}
-        layouts = lay_out_parts(originals, method)
-        if on_preview is not None:
-            preview = with_copies(layouts, prepared.parts, copies)
-            on_preview(evaluate(prepared, preview, replace(o, charts="one"), Stopwatch(), UNKNOWN_OVERLAPS))
-        finished = finish_within_bound(originals, layouts, method)
-        # Notes contain vertex indices, so copies of parts with notes are computed, too.
-        noted = {i: prepared.parts[i] for i, copy in enumerate(copies) if copy and finished[copy.first].notes}
-        finished |= finish_within_bound(noted, lay_out_parts(noted, method), method)
-    every = with_copies(finished, prepared.parts, copies)
-    own = max(map(_excess, ([part] for part in prepared.parts), ([one] for one in every)))
-    if (excess := max(own, _excess(prepared.parts, every))) > TOLERATED_EXCESS:
-        every[0] = every[0].with_notes(
-            Unmet(
-                f"The triangles of {'a component' if own == excess else 'all components'} have an area distortion of "
-                f"{excess * o.distortion:.3g}, above the {o.distortion:g} allowed. Allow more cones, or refine the "
-                "mesh."
+        show = None if on_preview is None else partial(_preview, prepared, o, on_preview)
+        layouts = flatten_parts(prepared.parts, method, show)
+        prepared, layouts = cut_along_sharp_edges(source, prepared, layouts, o, method)
+    layouts[0] = layouts[0].with_notes(*_bound_notes(prepared.parts, layouts, o))
+    return evaluate(prepared, layouts, o, watch)
+
+
+def _preview(prepared: Prepared, o: Options, on_preview: Preview, layouts: Sequence[Layout]) -> None:
+    on_preview(evaluate(prepared, layouts, replace(o, charts="one"), Stopwatch(), UNKNOWN_OVERLAPS))
+
+
+def flatten_parts(
+    parts: Sequence[Part], method: Method, on_layouts: Callable[[list[Layout]], None] | None = None
+) -> list[Layout]:
+    """Return the layouts of parts; of parts that are copies of each other, the layout of the first is copied.
+
+    on_layouts: called with the first layouts of all parts, as of `flatten_source`.
+    """
+    copies = find_copies(parts)
+    originals = {i: part for i, part in enumerate(parts) if copies[i] is None}
+    layouts = lay_out_parts(originals, method)
+    if on_layouts is not None:
+        on_layouts(with_copies(layouts, parts, copies))
+    finished = finish_within_bound(originals, layouts, method)
+    # Notes contain vertex indices, so copies of parts with notes are computed, too.
+    noted = {i: parts[i] for i, copy in enumerate(copies) if copy and finished[copy.first].notes}
+    finished |= finish_within_bound(noted, lay_out_parts(noted, method), method)
+    return with_copies(finished, parts, copies)
+
+
+def cut_along_sharp_edges(
+    source: Source, prepared: Prepared, layouts: list[Layout], o: Options, method: Method
+) -> tuple[Prepared, list[Layout]]:
+    """Return the input with sharp edges as seams where components are too distorted otherwise, and the layouts.
+
+    Args:
+        source, prepared, o: the mesh, its parts, and the options.
+        layouts: the layouts of the parts.
+        method: how parts are flattened.
+    """
+    pairs = zip(prepared.parts, layouts, strict=True)
+    distorted = [i for i, (part, layout) in enumerate(pairs) if is_too_distorted(part, layout)]
+    if not distorted or not method.separates or o.sharp_angle is not None:
+        return prepared, layouts
+    try:
+        sharp = source.prepared(replace(o, sharp_angle=SHARP_ANGLE))
+    except (OptionError, SeamError):  # options name vertices or edges that such seams exclude
+        return prepared, layouts
+    pieces_of = sharp.pieces_of(prepared, distorted)
+    pieces = [piece for i in distorted for piece in pieces_of[i]]
+    flat = iter(flatten_parts(pieces, method))
+    replaced = {}
+    for i in distorted:
+        part, cut = prepared.parts[i], [next(flat) for _ in pieces_of[i]]
+        if rank(pieces_of[i], cut) < rank([part], [layouts[i]]):
+            note = (
+                f"Edges above {np.degrees(SHARP_ANGLE):g} degrees are seams {part.where}: without them its mean QC "
+                f"distortion is {mean_qc(layouts[i]):.3g}."
             )
+            replaced[i] = [cut[0].with_notes(note), *cut[1:]]
+    if not replaced:
+        return prepared, layouts
+    together = [replaced.get(i, [layout]) for i, layout in enumerate(layouts)]
+    return prepared.with_pieces(sharp, {i: pieces_of[i] for i in replaced}), [
+        layout for several in together for layout in several
+    ]
+
+
+def _bound_notes(parts: Sequence[Part], layouts: Sequence[Layout], o: Options) -> Iterator[Unmet]:
+    """Yield a note if the area distortion of a component, or of all of them together, is above the one allowed."""
+    alone = max(excess([part], [layout]) for part, layout in zip(parts, layouts, strict=True))
+    together = excess(parts, layouts)
+    if (beyond := max(alone, together)) > TOLERATED_EXCESS:
+        advice = "refine the mesh, or use a larger stretch"
+        if o.charts == "one":
+            advice = f"allow more charts, {advice}"
+        if o.max_cones is not None:
+            advice = f"allow more cones, {advice}"
+        yield Unmet(
+            f"The triangles of {'a component' if alone == beyond else 'all components'} have an area distortion of "
+            f"{beyond * o.distortion:.3g}, above the {o.distortion:g} allowed: {advice}."
         )
-    return evaluate(prepared, every, o, watch)
 
 
 def lay_out_parts(parts: Mapping[int, Part], method: Method) -> dict[int, Layout]:
@@ -256,54 +319,55 @@ def finish_within_bound(
 
     The cone search bounds the distortion of the linear model. On coarse meshes, that of the triangles in the plane may
     be larger. First all triangles of such a part are relaxed with some weight on areas, then more cones are searched.
+    A polyhedron with few corners, or one that is too distorted, opens at all of them, where that is better.
     """
     finished = finish_parts(parts, layouts, method)
-    left = {i: part for i, part in parts.items() if _excess([part], [finished[i]]) > TOLERATED_EXCESS}
-    if len(left) > 0 and not method.relax.is_off and method.relax.stretch < CORRECTING_STRETCH:
+    polyhedra = with_corners_as_cones(parts, finished)
+    _keep_better(finished, finish_parts(polyhedra, lay_out_parts(polyhedra, method), method), parts)
+    beyond = {i: part for i, part in parts.items() if excess([part], [finished[i]]) > TOLERATED_EXCESS}
+    if len(beyond) > 0 and not method.relax.is_off and method.relax.stretch < CORRECTING_STRETCH:
         method = replace(method, relax=replace(method.relax, stretch=CORRECTING_STRETCH))
-        _keep_better(finished, finish_parts(left, layouts, method), parts)
+        _keep_better(finished, finish_parts(beyond, layouts, method), parts)
     for _ in range(MAX_CORRECTIONS):
-        excess = {i: min(_excess([parts[i]], [finished[i]]), MAX_TIGHTENING) for i in left}
+        factors = {i: min(excess([parts[i]], [finished[i]]), MAX_TIGHTENING) for i in beyond}
         # About that many times as many cones are needed; a search without enough of them takes longest.
-        left = {
-            i: left[i].with_distortion(TOLERATED_EXCESS / excess[i])
-            for i in left
-            if excess[i] > TOLERATED_EXCESS and excess[i] * len(finished[i].cones) <= MAX_SEARCHED
+        beyond = {
+            i: beyond[i].with_distortion(TOLERATED_EXCESS / factors[i])
+            for i in beyond
+            if factors[i] > TOLERATED_EXCESS and factors[i] * len(finished[i].cones) <= MAX_SEARCHED
         }
-        better = _keep_better(finished, finish_parts(left, lay_out_parts(left, method), method), parts)
-        left = {i: left[i] for i in better}
+        better = _keep_better(finished, finish_parts(beyond, lay_out_parts(beyond, method), method), parts)
+        beyond = {i: beyond[i] for i in better}
     return finished
+
+
+def with_corners_as_cones(parts: Mapping[int, Part], finished: Mapping[int, Layout]) -> dict[int, Part]:
+    """Return the polyhedra among parts that may open better at all their corners, with these as cones.
+
+    Args:
+        parts: the parts.
+        finished: their layouts with searched cones. Where these are too distorted, any number of corners will do; an
+            open part that needs no cone gets none.
+    """
+    polyhedra = {}
+    for i, part in parts.items():
+        is_distorted = is_too_distorted(part, finished[i])
+        if not is_distorted and not len(finished[i].cones) and part.mesh.is_boundary_vertex.any():
+            continue
+        most = MAX_SEARCHED if is_distorted else MAX_POLYHEDRON_CORNERS
+        cones = with_corners(part.mesh, part.lengths, part.cones, most)
+        if cones is not None:
+            polyhedra[i] = replace(part, cones=cones)
+    return polyhedra
 
 
 def _keep_better(
     finished: dict[int, Layout], others: Mapping[int, Layout], parts: Mapping[int, Part]
 ) -> list[int]:
     """Replace finished layouts of parts by better ones, and return the indices of these parts."""
-    better = [i for i in others if _rank(parts[i], others[i]) < _rank(parts[i], finished[i])]
+    better = [i for i in others if rank([parts[i]], [others[i]]) < rank([parts[i]], [finished[i]])]
     finished.update((i, others[i]) for i in better)
     return better
-
-
-def _rank(part: Part, layout: Layout) -> tuple[int, float]:
-    """Return what decides between layouts of a part: the smaller is the better."""
-    return len(layout.notes), _excess([part], [layout])
-
-
-def _excess(parts: Sequence[Part], layouts: Sequence[Layout]) -> float:
-    """Return the area distortion of the triangles of all layouts, divided by the one allowed; 0 without a bound."""
-    bounded = [(part, one) for part, one in zip(parts, layouts, strict=True) if _is_bounded(part)]
-    if not bounded:
-        return 0.0
-    areas = np.concatenate([part.double_areas for part, _ in bounded])
-    flat = np.concatenate([signed_double_areas(one.points[one.corners]) for _, one in bounded])
-    chosen = (areas > 0) & (flat > 0)
-    log_scale = np.log(flat[chosen] / areas[chosen]) / 2
-    return area_distortion(log_scale, areas[chosen]) / parts[0].cones.distortion
-
-
-def _is_bounded(part: Part) -> bool:
-    is_free = all(each is None for each in (part.cones.count, part.cones.weights, part.cones.quantum))
-    return part.is_exact and is_free and uses_sparse_search(part.mesh, part.cones)
 
 
 def infeasible_cones(layout: Layout) -> IntArray:

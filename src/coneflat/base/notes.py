@@ -6,6 +6,7 @@ repairs of the input.
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -18,6 +19,9 @@ from .text import plural
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+# A number within a note.
+_NUMBER = re.compile(r"\d[\d.,e+-]*")
 
 # Notes in the text of a warning; the others are counted.
 MAX_QUOTED = 3
@@ -32,6 +36,23 @@ class Unmet(str):
     """A note on a guarantee, or on a request of the user, that is not met."""
 
     __slots__ = ()
+
+
+def counted_notes(notes: Iterable[Iterable[str]]) -> list[str]:
+    """Return the notes on components; those that differ in numbers alone are one note, with a count of the others.
+
+    Args:
+        notes: the notes on each component.
+    """
+    similar: dict[tuple[type, str], list[str]] = {}
+    for of_component in notes:
+        for note in of_component:
+            similar.setdefault((type(note), _NUMBER.sub("#", note)), []).append(note)
+    counted = []
+    for first, *others in similar.values():
+        more = f" (and similarly {plural(len(others), 'component')} more)."
+        counted.append(type(first)(first.rstrip(".") + more) if others else first)
+    return counted
 
 
 @contextmanager

@@ -1,8 +1,8 @@
 """Cone placement and target curvatures, one file per strategy."""
 
+from .corners import MAX_POLYHEDRON_CORNERS, with_corners
 from .find import (
     CONE_ANGLE_PER_TRIANGLE,
-    MAX_POLYHEDRON_CORNERS,
     close_search,
     coneless_solution,
     find_cones,
@@ -18,7 +18,7 @@ from .sparse.limits import MAX_SEARCHED
 from .sparse.search import ConeSearch
 
 __all__ = [
-    "ConeSearch", "GroundedLaplacian", "CONE_ANGLE_PER_TRIANGLE", "MAX_POLYHEDRON_CORNERS", "MAX_SEARCHED",
-    "SparseCones", "close_search", "cones_at", "cones_with_curvature", "find_cones", "greedy_cones",
-    "coneless_solution", "open_search", "unmet_requests", "uses_sparse_search",
+    "ConeSearch", "GroundedLaplacian", "CONE_ANGLE_PER_TRIANGLE", "MAX_POLYHEDRON_CORNERS",
+    "MAX_SEARCHED", "SparseCones", "close_search", "cones_at", "cones_with_curvature", "find_cones", "greedy_cones",
+    "coneless_solution", "open_search", "unmet_requests", "uses_sparse_search", "with_corners",
 ]  # fmt: skip

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from ..base.arrays import FloatArray, IntArray
-from ..base.defaults import TYPED_TOLERANCE
 from ..base.notes import Unmet
 from ..base.progress import Stopwatch
 from ..base.text import plural
@@ -18,7 +17,7 @@ from ..geometry.operators import weighted_areas
 from ..mesh.connectivity import TriangleMesh
 from ..mesh.ties import mesh_tie_key
 from ..stages import ConeSolution, ConeSpec, Surface
-from .given import cones_at, cones_with_curvature, fitted_cones
+from .given import cones_at, fitted_cones
 from .greedy import greedy_cones
 from .solution import check_enough, check_feasible
 from .sparse import ConeSearch, SparseCones
@@ -35,8 +34,6 @@ CONE_ANGLE_PER_TRIANGLE = 0.6 * np.pi
 # widened by the same factor, must then not exceed this angle. Otherwise a triangle with straight sides may be unable to
 # hold its corner, and the search has to be repeated, which takes 14% of the time on a horse of 97,000 triangles.
 FINE_VERTICES, MAX_CORNER = 30_000, 0.95 * np.pi
-# Largest number of corners of a polyhedron that all become cones.
-MAX_POLYHEDRON_CORNERS = 24
 # Relative excess of the distortion over the requested one up to which there is no note.
 RELATIVE_TOLERANCE = 1e-3
 # Largest factor by which E may grow when cones are moved to align the rotations along handles.
@@ -63,8 +60,7 @@ def find_cones(
     mesh = surface.mesh
     too_many_handles = has_many_handles(mesh, spec)
     if uses_sparse_search(mesh, spec):
-        corners = polyhedron_corners(surface, spec)
-        return _search(surface, spec, watch, holonomy) if corners is None else corners
+        return _search(surface, spec, watch, holonomy)
     given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
     is_greedy = spec.strategy == "greedy" or too_many_handles
     if is_greedy:
@@ -105,22 +101,6 @@ def has_many_handles(mesh: TriangleMesh, spec: ConeSpec) -> bool:
         return False
     # Each handle except one needs two cones of angle 4 pi.
     return -mesh.euler_characteristic > MAX_SEARCHED // 2
-
-
-def polyhedron_corners(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
-    """Return the corners of a polyhedron as cones if there are few, as it unfolds without distortion; else None."""
-    if spec.strategy != "auto" or spec.needs_sparse_search or spec.searches_corners:
-        return None
-    mesh, curvature = surface.mesh, surface.curvature
-    corners = np.flatnonzero((np.abs(curvature) > TYPED_TOLERANCE) & ~mesh.is_boundary_vertex)
-    angles = 2 * np.pi - curvature[corners]
-    most = MAX_POLYHEDRON_CORNERS if spec.max_count is None else min(MAX_POLYHEDRON_CORNERS, spec.max_count)
-    if not 0 < len(corners) <= most or not spec.is_allowed[corners].all():
-        return None
-    if angles.min() < spec.min_angle or angles.max() > (spec.max_angle or np.inf):
-        return None
-    given = surface.laplacian, curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
-    return cones_with_curvature(*given, corners, curvature[corners])
 
 
 def coneless_solution(surface: Surface, spec: ConeSpec) -> ConeSolution | None:

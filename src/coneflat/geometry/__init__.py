@@ -13,9 +13,11 @@ from .planar import (
     as_pairs,
     layout_curvature,
     map_factors,
+    mean_energy,
     sides_between,
     signed_angles,
     signed_double_areas,
+    triangle_energies,
     vertex_log_scale,
 )
 from .straight import FlatTriangles, flat_triangles
@@ -40,6 +42,6 @@ __all__ = [
     "corner_angles", "corner_normals", "cotangent_laplacian", "cotangents", "dihedral_angles", "double_areas",
     "edge_lengths", "face_normals", "fill_nearest", "fill_orientations", "find_overlaps", "flat_triangles",
     "handle_loops", "halfedge_twins", "is_broken", "approximate_overlap_areas", "layout_curvature",
-    "map_factors", "mollify", "orientation", "sides_between", "signed_angles", "signed_double_areas", "unit_vectors",
-    "vertex_log_scale", "vertex_normals", "visible_share",
+    "map_factors", "mean_energy", "mollify", "orientation", "sides_between", "signed_angles", "signed_double_areas",
+    "triangle_energies", "unit_vectors", "vertex_log_scale", "vertex_normals", "visible_share",
 ]  # fmt: skip

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, has_any
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh
+from .triangles import cotangents, double_areas
 
 # Height divided by longest side below which a triangle counts as degenerate, neither positively oriented nor flipped:
 # coordinates are accurate to about 1e-12 of an edge.
@@ -112,3 +113,37 @@ def vertex_log_scale(mesh: TriangleMesh, before: FloatArray, after: FloatArray) 
     around = [np.bincount(corner, np.repeat(areas, 3), count) for areas in (before, after)]
     one, two = (np.maximum(each, MIN_AREA * each.mean()) for each in around)
     return np.log(two / one) / 2
+
+
+def triangle_energies(lengths: FloatArray, places: FloatArray) -> FloatArray:
+    """Return (m,) the symmetric Dirichlet energy of each triangle, multiplied by its area.
+
+    Args:
+        lengths: (m, 3) its side lengths on the surface.
+        places: (m, 3, 2) its corners in the plane.
+    """
+    dirichlet, of_inverse = dirichlet_energies(lengths, places)
+    return dirichlet + of_inverse
+
+
+def mean_energy(lengths: FloatArray, places: FloatArray) -> float:
+    """Return the mean symmetric Dirichlet energy of triangles by area, in the plane scaled as a whole to its minimum.
+
+    Args:
+        lengths, places: as of `triangle_energies`.
+    """
+    dirichlet, of_inverse = dirichlet_energies(lengths, places)
+    return float(2 * np.sqrt(dirichlet.sum() * of_inverse.sum()) / (double_areas(lengths).sum() / 2))
+
+
+def dirichlet_energies(lengths: FloatArray, places: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return (m,) the Dirichlet energy of each triangle's map and (m,) of its inverse, multiplied by the area.
+
+    These are the sums of the squares of the singular values and of their inverses.
+    """
+    sides = places[:, [2, 0, 1]] - places[:, [1, 2, 0]]
+    areas = double_areas(lengths) / 2
+    dirichlet = (cotangents(lengths) * (sides**2).sum(axis=2)).sum(axis=1) / 2
+    # Flipped triangles count as compressed to nearly nothing.
+    ratio = np.maximum(signed_double_areas(places) / (2 * areas), 1e-100)
+    return dirichlet, dirichlet * ratio**-2

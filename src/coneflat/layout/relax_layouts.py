@@ -73,6 +73,12 @@ def relax_layouts(
         return [layouts[0].with_notes(Unmet(f"Not relaxed: {error}.")) if spec.relaxes_all else layouts[0]]
 
 
+def mean_qc(layout: Layout) -> float:
+    """Return the mean quasi-conformal distortion of a layout by area, over positively oriented triangles."""
+    group = LayoutGroup([layout], [None])
+    return float(group.means(group.ratios(group.points))[0])
+
+
 def _relaxed(group: LayoutGroup, spec: RelaxSpec, report: Callable[[str], None]) -> list[Layout]:
     mesh, points = group.mesh, group.points
     before = group.ratios(points)

@@ -185,8 +185,8 @@ class ConeOptions(ConeNumber, ConeBounds, ConeQuanta):
         cones: How cones are found. sparse: search for the fewest cones with the allowed distortion. greedy: the search
             of the paper, which needs three to six times as many cones. none: no cones, for meshes with boundary and
             tori. Or a list of vertices, each with or without a curvature; missing curvatures are chosen for the least
-            area distortion. auto: sparse, except that a prescribed boundary gets no cones, a polyhedron with few
-            corners gets its corners, and closed surfaces with over 51 handles use greedy.
+            area distortion. auto: sparse, except that a prescribed boundary gets no cones, a polyhedron opens at
+            its corners where that is better, and closed surfaces with over 51 handles use greedy.
         max_cones: Largest number of cones per component, at which searches stop.
     """
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, TypeAlias, TypeVar
 
@@ -80,6 +80,31 @@ class Prepared:
     parts: tuple[Part, ...]
     seams: IntArray
     own_lengths: FloatArray | None
+
+    def pieces_of(self, coarser: Prepared, chosen: Sequence[int]) -> dict[int, list[Part]]:
+        """Return the parts that lie in chosen parts of the same input with fewer seams."""
+        whole = np.full(len(self.checked.mesh.faces), -1)
+        for i in chosen:
+            whole[coarser.parts[i].faces] = i
+        pieces: dict[int, list[Part]] = {i: [] for i in chosen}
+        for part in self.parts:
+            if (i := int(whole[part.faces[0]])) >= 0:
+                pieces[i].append(part)
+        return pieces
+
+    def with_pieces(self, finer: Prepared, pieces: Mapping[int, Sequence[Part]]) -> Prepared:
+        """Return the input with some parts replaced by their pieces, and with the seams between these.
+
+        Args:
+            finer: the same input with more seams.
+            pieces: the pieces of parts, from `pieces_of`.
+        """
+        is_cut = mask_of(
+            len(self.checked.mesh.vertices), np.concatenate([self.parts[i].vertices for i in pieces])
+        )
+        seams = np.concatenate([self.seams, finer.seams[is_cut[finer.seams].all(axis=1)]])
+        parts = [piece for i, part in enumerate(self.parts) for piece in pieces.get(i, [part])]
+        return replace(self, parts=tuple(parts), seams=np.unique(seams, axis=0))
 
 
 #: A connected mesh, the indices of its vertices and faces in the whole mesh, and its (m, 3) side lengths.

@@ -10,9 +10,8 @@ import shapes
 
 from coneflat import unwrap
 from coneflat.apps.unwrap import unwrap as unwrap_module
-from coneflat.apps.unwrap.free import triangle_energies
 from coneflat.apps.unwrap.search import CutSearch
-from coneflat.geometry import double_areas, edge_lengths
+from coneflat.geometry import double_areas, edge_lengths, triangle_energies
 from coneflat.mesh import label_faces
 
 KINDS = {

@@ -12,11 +12,11 @@ from ...atlas import ChartLayout, separate_overlaps, with_charts
 from ...base import BoolArray, FloatArray, IntArray
 from ...errors import SeamError
 from ...geometry import (
-    cotangents,
     double_areas,
     find_overlaps,
     layout_curvature,
     signed_double_areas,
+    triangle_energies,
     vertex_log_scale,
 )
 from ...layout import StretchEnergy, embedded_disks, relax, untangled_disk
@@ -175,16 +175,3 @@ def seam_edges(layout: Layout) -> IntArray:
     mesh, count = layout.mesh, len(layout.mesh.vertices)
     keys = np.sort(mesh.edges, axis=1) @ [count, 1]
     return np.flatnonzero(np.isin(keys, np.sort(layout.seams, axis=1) @ [count, 1]))
-
-
-def triangle_energies(lengths: FloatArray, places: FloatArray) -> FloatArray:
-    """Return (m,) the symmetric Dirichlet energy of each triangle, multiplied by its area.
-
-    lengths, places: (m, 3) its side lengths and (m, 3, 2) its corners in the plane.
-    """
-    sides = places[:, [2, 0, 1]] - places[:, [1, 2, 0]]
-    areas = double_areas(lengths) / 2
-    squares = (cotangents(lengths) * (sides**2).sum(axis=2)).sum(axis=1) / (2 * areas)
-    # Flipped triangles count as compressed to nearly nothing.
-    ratio = np.maximum(signed_double_areas(places) / (2 * areas), 1e-100)
-    return np.asarray(squares * (1 + ratio**-2) * areas)

@@ -27,7 +27,8 @@ class MinorParts:
     """The search for the cuts of several parts.
 
     The next cone of a part is where its log scale is the largest, if it is zero at the cones so far, as in Section 3.2
-    of the paper. A polyhedron with few corners has them all. Cones are added until the energy is within the bound.
+    of the paper. Cones are added until the energy is within the bound. A polyhedron with few corners is also opened at
+    all of them, and the cheaper cut is taken.
 
     Args:
         searches: the searches of the parts.
@@ -51,10 +52,23 @@ class MinorParts:
 
     def candidates(self) -> list[Candidate | None]:
         """Return a candidate for each part; None for parts with an energy above the bound."""
+        candidates = self._candidates_from(self._first_cones())
+        has_few = np.flatnonzero(self._corners_per_part() > 0).tolist()
+        polyhedra = [i for i in has_few if (one := candidates[i]) is None or len(one.layout.seams)]
+        if polyhedra:
+            opened = MinorParts([self._searches[i] for i in polyhedra])
+            for i, at_corners in zip(polyhedra, opened._candidates_from(opened._corners()), strict=True):
+                searched = candidates[i]
+                if at_corners is not None and (searched is None or at_corners.cost < searched.cost):
+                    candidates[i] = at_corners
+        return candidates
+
+    def _candidates_from(self, cones: BoolArray) -> list[Candidate | None]:
+        """Return a candidate for each part whose cones include the given ones (n,); None if above the bound."""
         bound, count = self._searches[0].max_energy, len(self._searches)
         first = max(FIRST_DISTORTION, ((bound - ISOMETRIC) / ENERGY_PER_AREA) ** 0.5)
         distortion, energies = np.full(count, first), np.full(count, np.inf)
-        cones, places = self._first_cones(), np.zeros((len(self._of_face), 3, 2))
+        places = np.zeros((len(self._of_face), 3, 2))
         for _ in range(MAX_ROUNDS):
             is_open = energies > bound
             if not is_open.any():
@@ -96,13 +110,20 @@ class MinorParts:
         return np.asarray(np.bincount(of, energies) / np.bincount(of, self._areas))
 
     def _first_cones(self) -> BoolArray:
-        """Return (n,) the corners of polyhedra with few of them, and one vertex of other closed parts."""
-        curvature, of, is_boundary = self._surface.curvature, self._of, self._mesh.is_boundary_vertex
-        cones = (np.abs(curvature) > TYPED_TOLERANCE) & self._is_allowed
-        cones &= (np.bincount(of, cones) <= MAX_POLYHEDRON_CORNERS)[of]
-        is_closed = np.bincount(of, cones | is_boundary, len(self._searches)) == 0
+        """Return (n,) one vertex of each closed part."""
+        curvature, cones = self._surface.curvature, np.zeros(len(self._of), dtype=bool)
+        is_closed = np.bincount(self._of, self._mesh.is_boundary_vertex, len(self._searches)) == 0
         cones[self._largest(curvature - curvature.min() + 1, is_closed)] = True
         return cones
+
+    def _corners(self) -> BoolArray:
+        """Return (n,) the vertices with curvature."""
+        return (np.abs(self._surface.curvature) > TYPED_TOLERANCE) & self._is_allowed
+
+    def _corners_per_part(self) -> IntArray:
+        """Return the number of corners of each part, 0 if it is more than `MAX_POLYHEDRON_CORNERS`."""
+        counts = np.bincount(self._of, self._corners(), len(self._searches)).astype(np.int64)
+        return np.where(counts <= MAX_POLYHEDRON_CORNERS, counts, 0)
 
     def _with_more_cones(
         self, cones: BoolArray, is_open: BoolArray, allowed: FloatArray

@@ -18,15 +18,23 @@ import numpy as np
 
 from ...atlas import ChartLayout, Seams, with_charts
 from ...base import BoolArray, FloatArray, IntArray, has_any, mask_of
-from ...cones import MAX_SEARCHED, close_search
+from ...cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, close_search, with_corners
 from ...errors import MetricError, SeamError
 from ...flatten import Method, lay_out_once
-from ...geometry import coarse_mesh, double_areas, edge_lengths, find_overlaps, mollify, signed_double_areas
+from ...geometry import (
+    coarse_mesh,
+    double_areas,
+    edge_lengths,
+    find_overlaps,
+    mollify,
+    signed_double_areas,
+    triangle_energies,
+)
 from ...mesh import nearby
 from ...seams import seam_costs, without_loose_ends
 from ...source import Part
 from ...stages import Layout, Surface, VertexCurvatures
-from .free import as_one_chart, freed, recut, seam_edges, separate_charts, side_by_side, triangle_energies
+from .free import as_one_chart, freed, recut, seam_edges, separate_charts, side_by_side
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .tips import RINGS, find_tips, moved_tips, moves_for
 
@@ -133,6 +141,8 @@ class CutSearch:
         if self._has_coarse:
             return self._from_coarse()
         found, reach = self._by_distortion(), self.max_energy + MAX_EXCESS * (self.max_energy - ISOMETRIC)
+        if all(len(one.layout.seams) or one.energy > self.max_energy for one in found):
+            found = [*found, *self._at_corners()]
         near = [self.separated(one) for one in found if one.energy <= reach]
         near.sort(key=self._expected_cost)
         if near and near[0].energy > self.max_energy:
@@ -270,6 +280,15 @@ class CutSearch:
             if same if is_within else (same or len(layout.cones) >= MAX_SEARCHED) and distortion < reached:
                 break  # The search finds no others.
         return found
+
+    def _at_corners(self) -> list[Candidate]:
+        """Return a candidate that is open at all corners of a polyhedron with few of them, if it is one."""
+        part = self.part
+        spec = with_corners(part.mesh, part.lengths, part.cones, MAX_POLYHEDRON_CORNERS)
+        if spec is None:
+            return []
+        layout, _ = lay_out_once(self._surface, part, spec, self._method)
+        return [self._candidate(layout, 0.0)]
 
     def _next_distortion(self, tried: int) -> float | None:
         """Return the area distortion of the next candidate, or None if enough are found."""

@@ -12,8 +12,9 @@ import numpy as np
 
 from ... import TriangleMesh
 from ...base import BoolArray, FloatArray, IntArray, mask_of
+from ...geometry import triangle_energies
 from ...stages import Layout
-from .free import freed, recut, triangle_energies
+from .free import freed, recut
 
 # Lengths relative to the square root of the area: of the extension that measures the decrease of the energy; over which
 # the decrease per length falls to 1 / e; and the largest move of a tip.

@@ -1,0 +1,84 @@
+"""Bounds on the distortion of layouts, and which of two layouts of a component is the better one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .base.arrays import FloatArray
+from .cones import uses_sparse_search
+from .geometry.operators import area_distortion
+from .geometry.planar import mean_energy, signed_double_areas
+from .layout import mean_qc
+from .measure.guarantees import EXTREME_QC
+from .source.parts import Part
+from .stages import Layout
+
+# A layout may exceed the allowed area distortion by this factor.
+TOLERATED_EXCESS = 1.02
+# Length of seams, relative to the square root of the area, that is worth as much as one unit of the mean symmetric
+# Dirichlet energy. A cube opens at its eight corners (2.86) instead of five cones (1.93) with an energy that is 0.3
+# higher; a sheet of 5 x 5 vertices stays closed where its nine (2.5) would lower the energy by 0.03.
+SEAMS_PER_ENERGY = 20.0
+
+
+def rank(parts: Sequence[Part], layouts: Sequence[Layout]) -> tuple[int, float, float]:
+    """Return what decides between layouts of a component, in one part or cut into several: the smaller is the better.
+
+    Fewer notes are better, then a smaller excess over the allowed area distortion, and within that bound a smaller sum
+    of seams and distortion.
+    """
+    notes = sum(len(layout.notes) for layout in layouts)
+    return notes, max(excess(parts, layouts), TOLERATED_EXCESS), borders_and_distortion(parts, layouts)
+
+
+def is_too_distorted(part: Part, layout: Layout) -> bool:
+    """Return whether a part of which no more than a bound is asked has more area or angle distortion than is usable."""
+    if not is_bounded(part):
+        return False
+    return excess([part], [layout]) > TOLERATED_EXCESS or mean_qc(layout) > EXTREME_QC
+
+
+def excess(parts: Sequence[Part], layouts: Sequence[Layout]) -> float:
+    """Return the area distortion of the triangles of all layouts, divided by the one allowed; 0 without a bound."""
+    bounded = [(part, layout) for part, layout in zip(parts, layouts, strict=True) if is_bounded(part)]
+    if not bounded:
+        return 0.0
+    areas = np.concatenate([part.double_areas for part, _ in bounded])
+    flat = np.concatenate([signed_double_areas(layout.points[layout.corners]) for _, layout in bounded])
+    chosen = (areas > 0) & (flat > 0)
+    log_scale = np.log(flat[chosen] / areas[chosen]) / 2
+    return area_distortion(log_scale, areas[chosen]) / parts[0].cones.distortion
+
+
+def is_bounded(part: Part) -> bool:
+    """Return whether the area distortion of a part's layout is bounded by the options."""
+    cones = part.cones
+    is_free = cones.count is None and cones.weights is None and cones.quantum is None
+    return part.is_exact and is_free and uses_sparse_search(part.mesh, cones)
+
+
+def borders_and_distortion(parts: Sequence[Part], layouts: Sequence[Layout]) -> float:
+    """Return the length of all borders and seams, relative to the square root of the area, and a cost of distortion.
+
+    A seam counts once, the two borders of parts that it separates half each.
+    """
+    areas = np.array([layout.area for layout in layouts])
+    energies = [mean_energy(layout.lengths, layout.points[layout.corners]) for layout in layouts]
+    length = sum(
+        seam_length(layout) + border_length(part) / 2 for part, layout in zip(parts, layouts, strict=True)
+    )
+    return float(length / np.sqrt(areas.sum()) + SEAMS_PER_ENERGY * np.average(energies, weights=areas))
+
+
+def seam_length(layout: Layout) -> float:
+    """Return the length of the seams of a layout on the surface, model units."""
+    ends: FloatArray = layout.mesh.vertices[layout.seams]
+    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+
+
+def border_length(part: Part) -> float:
+    """Return the length of the border of a part on the surface, model units."""
+    sides = part.mesh.edge_halfedges[part.mesh.is_boundary_edge, 0]
+    return float(part.lengths.ravel()[sides].sum())

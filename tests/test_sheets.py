@@ -1,0 +1,82 @@
+"""Laws of sheets with few vertices: what needs no cone within the bound gets no seam."""
+
+import numpy as np
+import pytest
+
+import coneflat
+from coneflat import xatlas
+
+BOUND = 0.2
+
+
+def sheet(size, height, waves=1.3):
+    """Return a curved sheet of size x size vertices."""
+    x, y = np.meshgrid(np.arange(size, dtype=float), np.arange(size, dtype=float))
+    z = height * np.sin(waves * x) * np.cos(0.7 * waves * y)
+    corner = (np.arange(size - 1)[:, None] * size + np.arange(size - 1)).ravel()
+    first = np.stack([corner, corner + 1, corner + size + 1], axis=1)
+    second = np.stack([corner, corner + size + 1, corner + size], axis=1)
+    return np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1), np.concatenate([first, second])
+
+
+SHEETS = [(size, height) for size in (3, 4, 5, 6) for height in (0.003, 0.1, 0.5)]
+
+
+@pytest.mark.parametrize(("size", "height"), SHEETS)
+def test_a_sheet_that_needs_no_cone_is_flattened_without_a_seam(size, height):
+    mesh = sheet(size, height)
+    assert coneflat.flatten(*mesh, cones="none").distortion.area_std <= BOUND
+    result = coneflat.flatten(*mesh)
+    assert (len(result.cones), result.distortion.charts, result.distortion.seam_length) == (0, 1, 0)
+    assert result.distortion.area_std <= BOUND
+
+
+@pytest.mark.parametrize(("size", "height"), SHEETS)
+def test_a_sheet_within_the_energy_bound_is_unwrapped_without_a_seam(size, height):
+    mesh = sheet(size, height)
+    measures = coneflat.unwrap(*mesh).distortion
+    assert (measures.charts, measures.seam_length) == (1, 0)
+    assert measures.energy <= 4.1
+
+
+def test_the_drop_in_has_one_chart_for_a_sheet():
+    atlas = xatlas.Atlas()
+    atlas.add_mesh(*sheet(5, 0.003))
+    atlas.generate()
+    assert atlas.chart_count == 1
+
+
+def test_searched_cones_replace_corners_that_hardly_matter():
+    # A flat bipyramid: its apices have a curvature of 0.01 pi, its rim has the rest.
+    turn = np.arange(6) * np.pi / 3
+    rim = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    vertices = np.concatenate([rim, [[0, 0, 0.05], [0, 0, -0.05]]])
+    faces = [(i, (i + 1) % 6, 6) for i in range(6)] + [((i + 1) % 6, i, 7) for i in range(6)]
+    result = coneflat.flatten(vertices, faces)
+    assert len(result.cones) == 6
+    assert result.distortion.qc_mean < 1.01
+
+
+class TestPolyhedra:
+    @staticmethod
+    def cylinder(sides):
+        """Return a closed cylinder of radius 1 and height 2, without vertices inside its faces but two centres."""
+        turn = 2 * np.pi * np.arange(sides) / sides
+        circle = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+        vertices = np.concatenate([circle, circle + np.array([0, 0, 2]), [[0, 0, 0], [0, 0, 2]]])
+        near, far = np.arange(sides), (np.arange(sides) + 1) % sides
+        bottom = np.stack([far, near, 0 * near + 2 * sides], axis=1)
+        top = np.stack([near + sides, far + sides, 0 * near + 2 * sides + 1], axis=1)
+        wall = [
+            np.stack([near, far, far + sides], axis=1),
+            np.stack([near, far + sides, near + sides], axis=1),
+        ]
+        return vertices, np.concatenate([bottom, top, *wall])
+
+    @pytest.mark.parametrize("sides", [6, 20, 64])
+    def test_coarse_polyhedra_open_at_all_corners_where_searched_cones_distort_them(self, sides):
+        result = coneflat.flatten(*self.cylinder(sides))
+        assert len(result.cones) == 2 * sides
+        assert result.distortion.qc_max < 1 + 1e-6
+        assert result.distortion.area_std < 1e-6
+        assert not result.notes
