@@ -11,7 +11,6 @@ from importlib import import_module
 import numpy as np
 import pytest
 import shapes
-from stored import noisy
 
 import coneflat
 from coneflat import errors, flatten, read_mesh, sample_path

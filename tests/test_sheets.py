@@ -1,10 +1,13 @@
-"""Laws of sheets with few vertices: what needs no cone within the bound gets no seam."""
+"""Laws of surfaces with few vertices: what needs no cone gets no seam, and a polyhedron opens where that is better."""
 
 import numpy as np
 import pytest
+import shapes
+from stored import regression
 
 import coneflat
 from coneflat import xatlas
+from coneflat.base.notes import Unmet, counted_notes
 
 BOUND = 0.2
 
@@ -80,3 +83,60 @@ class TestPolyhedra:
         assert result.distortion.qc_max < 1 + 1e-6
         assert result.distortion.area_std < 1e-6
         assert not result.notes
+
+    def test_a_plate_with_windows_opens_without_distortion(self):
+        vertices, faces, _ = regression("plate-with-windows")
+        result = coneflat.flatten(vertices, faces)
+        assert result.distortion.qc_max < 1 + 1e-6
+        assert not result.notes
+
+    def test_a_part_with_more_corners_than_cones_is_cut_along_sharp_edges_with_a_note(self):
+        result = coneflat.flatten(*self.cylinder(128))
+        assert result.distortion.qc_max < 1 + 1e-6
+        assert result.distortion.charts == 3
+        assert result.distortion.seam_mismatch_max < 1e-9
+        assert len(result.notes) == 1
+        assert result.notes[0].startswith("Edges above 40 degrees are seams in the component of vertex 0")
+
+    def test_one_chart_is_not_cut_along_sharp_edges(self):
+        result = coneflat.flatten(*self.cylinder(128), charts="one")
+        assert result.distortion.charts == 1
+
+    @pytest.mark.slow
+    def test_noise_is_not_cut_along_all_sharp_edges(self):
+        result = coneflat.flatten(*noisy_ball(), distortion=0.05)
+        assert result.distortion.charts < 20
+
+
+def noisy_ball():
+    """Return a sphere with more corners than cones are searched for, and noise of a third of the radius."""
+    vertices, faces = shapes.sphere(3)
+    return vertices * np.random.default_rng(0).uniform(0.7, 1.3, len(vertices))[:, None], faces
+
+
+@pytest.mark.slow
+def test_the_distortion_that_a_note_advises_to_allow_is_met():
+    (note,) = [note for note in coneflat.flatten(*noisy_ball(), distortion=0.05).notes if "allow " in note]
+    advised = float(note.split(": allow ")[1].split(",")[0].rstrip("."))
+    followed = coneflat.flatten(*noisy_ball(), distortion=advised)
+    assert followed.distortion.area_std <= 1.02 * advised
+    assert not any("allow " in note for note in followed.notes)
+
+
+@pytest.mark.slow
+def test_smaller_triangles_lower_a_high_angle_distortion_as_a_note_says():
+    ball = noisy_ball()
+    options = {"distortion": 0.05, "charts": "one"}
+    assert any(
+        "smaller triangles would lower it" in note for note in coneflat.flatten(*ball, **options).notes
+    )
+    refined = shapes.subdivide(*shapes.subdivide(*ball))
+    assert not any("smaller triangles" in note for note in coneflat.flatten(*refined, **options).notes)
+
+
+def test_similar_notes_of_components_are_one_note_with_a_count():
+    note, other = Unmet("2 cones at vertex 3 (1.5 pi) are missed."), "Cut at 3 edges."
+    counted = counted_notes([[note], [Unmet("7 cones at vertex 91 (0.25 pi) are missed."), other], []])
+    assert counted == ["2 cones at vertex 3 (1.5 pi) are missed (and similarly 1 component more).", other]
+    assert isinstance(counted[0], Unmet)
+    assert not isinstance(counted[1], Unmet)
