@@ -15,6 +15,7 @@ from coneflat.geometry import (
     is_broken,
     mollify,
 )
+from coneflat.geometry.opening import thickness
 
 
 def test_right_triangle():
@@ -69,20 +70,52 @@ def test_laplacian_energy_is_the_dirichlet_energy():
     np.testing.assert_allclose(f @ (laplacian @ f), (areas * (gradient**2).sum(axis=1)).sum())
 
 
-def test_mollify_opens_collapsed_triangles_only_when_there_are_any():
-    vertices = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0, 0], [0.5, 1, 0.0]])
-    faces = np.array([[0, 1, 2], [0, 1, 3]])
-    lengths = edge_lengths(vertices, faces)
-    opened, note = mollify(lengths)
-    assert (double_areas(opened) > 0).all()
-    assert 0 < abs(opened - lengths).max() < 2e-5
+def test_only_the_shortest_side_of_a_triangle_without_area_gets_longer():
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0.4, 0, 0], [0.5, 1, 0.0]])
+    mesh = TriangleMesh(vertices, np.array([[0, 1, 2], [1, 0, 3]]))
+    lengths = edge_lengths(mesh.vertices, mesh.faces)
+    opened, note = mollify(lengths, mesh)
+    changed = np.argwhere(opened != lengths).tolist()
+    assert changed == [[0, 1]]  # from vertex 2 to 0
+    assert 0 < opened[0, 1] - lengths[0, 1] < 1e-10
     assert "1 triangle" in note
     with pytest.raises(errors.DegenerateFaceError, match="1 triangle without area: 0"):
-        mollify(lengths, strict=True)
-    healthy = lengths[1:]
-    assert mollify(healthy) == (pytest.approx(healthy, abs=0), None)
+        mollify(lengths, mesh, strict=True)
+
+
+def test_lengths_of_triangles_with_area_do_not_change():
+    vertices, faces = shapes.sphere(2)
+    lengths = edge_lengths(vertices, faces)
+    opened, note = mollify(lengths, TriangleMesh(vertices, faces))
+    np.testing.assert_array_equal(opened, lengths)
+    assert note is None
+
+
+def test_a_mesh_without_area_is_refused():
+    mesh = TriangleMesh(np.array([[0, 0, 0], [1, 0, 0], [0.5, 0, 0]]), np.array([[0, 1, 2]]))
     with pytest.raises(errors.DegenerateFaceError, match="no area: 1 triangle on a line"):
-        mollify(lengths[:1])
+        mollify(edge_lengths(mesh.vertices, mesh.faces), mesh)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_opened_lengths_are_those_of_triangles_and_hardly_change(seed):
+    """Also where coincident vertices, caps and needles are neighbours; both sides of an edge stay equal."""
+    rng = np.random.default_rng(seed)
+    vertices, faces = shapes.grid(12, 12)
+    for v in rng.permutation(len(vertices))[:20]:
+        neighbours = np.unique(faces[(faces == v).any(axis=1)])
+        a, b = rng.choice(neighbours[neighbours != v], 2, replace=False)
+        vertices[v] = vertices[a] + rng.choice([0, 0.3, 10.0 ** rng.uniform(-14, -2)]) * (
+            vertices[b] - vertices[a]
+        )
+    mesh = TriangleMesh(vertices, faces)
+    lengths = edge_lengths(vertices, faces)
+    opened, _ = mollify(lengths, mesh)
+    assert (thickness(opened) > 1e-6).all()
+    assert (opened >= lengths).all()
+    assert (opened - lengths).max() < 1e-3 * lengths.mean()
+    pairs = mesh.edge_halfedges[mesh.edge_halfedges[:, 1] >= 0]
+    np.testing.assert_array_equal(opened.ravel()[pairs[:, 0]], opened.ravel()[pairs[:, 1]])
 
 
 @pytest.mark.parametrize("shape", [shapes.tetrahedron(), shapes.hill(6, 5)])
@@ -125,7 +158,7 @@ def test_a_laplacian_of_arrays_that_do_not_fit_is_refused(faces, cots, count, ki
         cotangent_laplacian(faces, cots, count)
 
 
-@pytest.mark.parametrize("function", [corner_angles, cotangents, double_areas, mollify])
+@pytest.mark.parametrize("function", [corner_angles, cotangents, double_areas, thickness])
 @pytest.mark.parametrize("lengths", [np.ones(3), np.ones((2, 2)), np.ones((2, 3, 3)), [["a"] * 3], 1.0])
 def test_lengths_that_are_no_sides_of_triangles_are_refused(function, lengths):
     with pytest.raises(errors.ArrayShapeError):

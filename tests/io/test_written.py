@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapes
 
-from coneflat import flatten
+from coneflat import flatten, measure_uv
 from coneflat.atlas.touch import round_safely
 from coneflat.errors import MeshFileError
 from coneflat.geometry.overlap import find_overlaps
@@ -196,3 +196,34 @@ def test_notes_name_what_another_format_does_not_keep(tmp_path):
         for ending in (".obj", ".ply", ".glb", ".npz"):
             keeps = ending == ".npz" or name.endswith(ending) or (ending == ".ply" and "coloured" in name)
             assert any(f"{note} {ending}" in each for each in all_notes(tmp_path / name, ending)) != keeps
+
+
+def bent_quads_with_corners_on_sides(count):
+    """Return vertices and polygons of a curved sheet of quads, one of whose sides has `count` further corners."""
+    x, y = np.meshgrid(np.arange(6.0), np.arange(6.0))
+    vertices = np.stack([x.ravel(), y.ravel(), 0.3 * np.sin(x.ravel()) * np.cos(y.ravel())], axis=1)
+    quads = [[6 * i + j, 6 * i + j + 1, 6 * i + j + 7, 6 * i + j + 6] for i in range(5) for j in range(5)]
+    start, end = vertices[14], vertices[15]
+    extra = [len(vertices) + k for k in range(count)]
+    share = (np.arange(count) + 1) / (count + 1)
+    vertices = np.concatenate([vertices, start + share[:, None] * (end - start)])
+    quads[2 * 5 + 2] = [14, *extra, 15, 21, 20]
+    quads[1 * 5 + 2] = [8, 9, 15, *extra[::-1], 14]
+    return vertices, quads
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+@pytest.mark.parametrize("first", range(5))
+def test_fans_of_written_polygons_have_no_triangles_with_area_in_the_plane_alone(count, first, tmp_path):
+    """Corners on the side of a polygon make triangles without area in some of its fans, which readers make."""
+    vertices, polygons = bent_quads_with_corners_on_sides(count)
+    lines = [f"v {' '.join(map(repr, point))}" for point in vertices.tolist()]
+    for polygon in polygons:
+        k = first % len(polygon)
+        lines.append("f " + " ".join(str(v + 1) for v in polygon[k:] + polygon[:k]))
+    source = tmp_path / "quads.obj"
+    source.write_text("\n".join(lines) + "\n")
+    result = flatten(source)
+    result.save(tmp_path / "out.obj")
+    measured = measure_uv(tmp_path / "out.obj").distortion
+    assert measured.qc_max < 2

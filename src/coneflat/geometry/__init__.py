@@ -5,6 +5,7 @@ from .coverage import approximate_overlap_areas
 from .handles import handle_loops
 from .intrinsic import halfedge_twins
 from .layers import MAX_CELLS
+from .opening import mollify
 from .operators import angle_defect, cotangent_laplacian
 from .orientation import fill_orientations, orientation
 from .overlap import Overlaps, find_overlaps
@@ -31,7 +32,6 @@ from .triangles import (
     edge_lengths,
     face_normals,
     is_broken,
-    mollify,
     unit_vectors,
     vertex_normals,
 )

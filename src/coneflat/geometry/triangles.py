@@ -13,15 +13,9 @@ from numpy.typing import ArrayLike
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats, dots
 from ..base.jit import compiled
-from ..base.text import list_some, plural
-from ..errors import ArrayShapeError, DegenerateFaceError, FaceIndexError
+from ..errors import ArrayShapeError, FaceIndexError
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh, corner_fans, measure_sides
 
-# Twice the area divided by the square of the longest side, at which a triangle counts as having no area. Smaller values
-# cannot be represented by rounded lengths; the flattest triangles of real scans have 1e-3.
-ZERO_AREA = 1e-7
-# Slack that mollification gives every triangle, relative to the mean side length: enough for angles accurate to 1e-11.
-MIN_SLACK = 1e-5
 #: Cosine of the dihedral angle, about 53 degrees, above which an edge is drawn sharp. It is between the 42 degrees of
 #: an icosahedron, which approximates a sphere, and the 60 degrees of a hexagonal prism, which has sharp edges.
 CREASE_COSINE = 0.6
@@ -112,50 +106,6 @@ def cotangents(lengths: FloatArray) -> FloatArray:
         lengths: (m, 3) side lengths, column i opposite corner i.
     """
     return measure_cotangents(as_triples(lengths))
-
-
-def mollify(
-    lengths: FloatArray, *, strict: bool = False, names: IntArray | None = None
-) -> tuple[FloatArray, str | None]:
-    """Return lengths with which every triangle has area, and a note if they were changed.
-
-    If a triangle has no area, the same small length is added to every side of the mesh. This opens collapsed triangles
-    and hardly changes the others (N. Sharp and K. Crane 2020, Section 4.5).
-
-    Args:
-        lengths: (m, 3) side lengths.
-        strict: raise an error for triangles without area instead.
-        names: (m,) face numbers of the input, for messages.
-
-    Returns:
-        (m, 3) the lengths, and the note or None.
-
-    Raises:
-        DegenerateFaceError: `strict` is True and a triangle has no area, or the total area of the mesh is zero.
-    """
-    lengths = as_triples(lengths)
-    longest = np.maximum(np.maximum(lengths[:, 0], lengths[:, 1]), lengths[:, 2])
-    areas, squares = double_areas(lengths), longest**2
-    bad = np.flatnonzero(areas <= ZERO_AREA * squares)
-    if not len(bad):
-        return lengths, None
-    if areas.sum() <= ZERO_AREA * squares.sum():
-        raise DegenerateFaceError(
-            f"the mesh has no area: {plural(len(lengths), 'triangle')} on a line or point"
-        )
-    where = list_some(bad if names is None else names[bad])
-    if strict:
-        raise DegenerateFaceError(
-            f"{plural(len(bad), 'triangle')} without area: {where}; "
-            "leave out --strict (strict=False) to open them by a tiny perturbation"
-        )
-    mean = float(lengths.mean())
-    growth = MIN_SLACK * mean - min(float(slacks(lengths[bad]).min()), 0.0)
-    note = (
-        f"Opened {plural(len(bad), 'triangle')} without area ({where}) by lengthening every edge "
-        f"by {growth / mean:.1e} of the mean edge."
-    )
-    return lengths + growth, note
 
 
 @compiled

@@ -222,7 +222,7 @@ def write_obj(result: Flattening, stream: IO[bytes], folder: Path) -> None:
         source, numbers = None, faces.reshape(-1) + 1
         offsets = np.arange(0, len(numbers) + 1, 3)
         face_corners = np.arange(len(numbers)).reshape(-1, 3)
-    to_write = find_pieces(result.uv, result.uv_faces, offsets, face_corners)
+    to_write = find_pieces(result, offsets, face_corners)
     columns = [numbers[to_write.corners], to_write.points + 1]
     if normal is not None:
         columns.append(normal[to_write.corners] + 1)

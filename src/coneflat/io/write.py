@@ -199,7 +199,7 @@ def _in_fans(result: Flattening, offsets: IntArray, face_corners: IntArray) -> F
     """Return the result with polygons split into fans, as most programs read them."""
     if np.all(np.diff(offsets) == 3):
         return result
-    pieces = find_pieces(result.uv, result.uv_faces, offsets, face_corners)
+    pieces = find_pieces(result, offsets, face_corners)
     corners, uv_faces = pieces.fans()
     vertex = np.full(int(offsets[-1]), -1, dtype=np.int64)
     vertex[face_corners] = result.faces
@@ -209,8 +209,8 @@ def _in_fans(result: Flattening, offsets: IntArray, face_corners: IntArray) -> F
     if len(pieces.split):
         names = plural(len(pieces.split), "polygon is", "polygons are")
         notes = (
-            f"{names} written in convex pieces, because other programs would read flipped triangles: not convex in "
-            f"the plane (the first is {pieces.split[0]}).",
+            f"{names} written in convex pieces, because other programs would read flipped triangles, or triangles "
+            f"that have area in the plane alone (the first is {pieces.split[0]}).",
         )
     fans = replace(
         result,

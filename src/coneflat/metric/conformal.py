@@ -20,6 +20,9 @@ from .hessian import HessianPattern, conjugate_gradients, corrected
 
 # Residual, radians, at which the solve stops: the rounding error of a sum of a few angles.
 GOAL_RESIDUAL = 1e-13
+# Relative rounding error of a length: of the exponential and the products that it is made of. And the largest error of
+# the curvature, radians, that is put down to rounding.
+LENGTH_ROUNDING, MAX_ROUNDING_ERROR = 4 * float(np.finfo(np.float64).eps), 1e-8
 # Largest change of phi in one step. Beyond a factor e^5 of lengths, the quadratic model is meaningless.
 MAX_STEP = 5.0
 # A Newton step is computed with a relative error like the residual, but at most this; less accurate steps cost more
@@ -131,6 +134,15 @@ class ConformalProblem:
         self.last = State(log_scale, residual, is_admissible, curvature, cots, broken)
         return self.last
 
+    def rounding_error(self, state: State) -> float:
+        """Return the largest error of a curvature, radians, that the rounding of lengths can cause.
+
+        A relative change of a length changes the angles of a triangle by its cotangents times as much.
+        """
+        triangles = np.abs(state.cots).reshape(-1, 3).sum(axis=1)
+        errors = np.bincount(self.triangulation.tail, np.repeat(triangles, 3))
+        return min(LENGTH_ROUNDING * float(errors.max()), MAX_ROUNDING_ERROR)
+
     def direction(self, here: State, exactly: bool) -> tuple[FloatArray, bool]:
         """Return (n,) the Newton direction of a state, 0 at fixed vertices, and whether the Hessian was factorized.
 
@@ -186,6 +198,7 @@ def find_scale(
     start = problem.evaluate(log_scale)
     if not start.is_admissible:
         start = problem.evaluate(np.where(problem.fixed, log_scale, 0.0))
+    tolerance = max(tolerance, problem.rounding_error(start))
     halvings = HALVINGS_BOUNDED if problem.is_bounded else HALVINGS
     best, steps = minimise(
         problem, start, Limits(tolerance, max_steps, GOAL_RESIDUAL, halvings, largest_step=MAX_STEP)

@@ -157,11 +157,11 @@ def exact_metric(
         return problem, state, original, steps
 
     problem, state, original, steps = solved_from(log_scale)
-    if not _is_solved(state, tolerance) and mesh.is_boundary_vertex.any() and not doubled:
+    if not _is_solved(problem, state, tolerance) and mesh.is_boundary_vertex.any() and not doubled:
         doubled = True
         problem, state, original, more = solved_from(log_scale)
         steps += more
-    if not _is_solved(state, tolerance) and (log_scale != plain).any():
+    if not _is_solved(problem, state, tolerance) and (log_scale != plain).any():
         # An initial phi may be so far off, for example on a surface of many spikes, that triangles there vanish. With
         # phi = 0 they are those of the input.
         again = solved_from(plain)
@@ -183,7 +183,7 @@ def exact_metric(
         steps=steps,
         residual=state.largest,
         worst_vertex=int(np.abs(state.residual[:n]).argmax()),
-        converged=_is_solved(state, tolerance),
+        converged=_is_solved(problem, state, tolerance),
         doubled=doubled,
     )
 
@@ -202,8 +202,9 @@ def _at(vertices: IntArray) -> str:
     return f"{plural(len(vertices), 'vertex', 'vertices')}: {list_some(vertices)}"
 
 
-def _is_solved(state: State, tolerance: float) -> bool:
-    return state.largest <= tolerance and state.broken == 0
+def _is_solved(problem: ConformalProblem, state: State, tolerance: float) -> bool:
+    """Return whether the residual is within the tolerance, or what the rounding at needles leaves of it."""
+    return not state.broken and state.largest <= max(tolerance, problem.rounding_error(state))
 
 
 def _keep_area(

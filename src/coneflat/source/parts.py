@@ -217,7 +217,7 @@ def _open_triangles(
 ) -> tuple[FloatArray, str | None]:
     """Return (m, 3) side lengths with which every triangle has area, and a note if lengths were changed."""
     lengths = edge_lengths(checked.mesh.vertices, checked.mesh.faces) if own is None else own
-    return mollify(lengths, strict=strict, names=checked.face_origin)
+    return mollify(lengths, checked.mesh, strict=strict, names=checked.face_origin)
 
 
 def _pieces(mesh: TriangleMesh, marked: IntArray, lengths: FloatArray) -> tuple[Piece, ...]:

@@ -75,15 +75,16 @@ def test_the_exact_metric_need_not_converge(shape, monkeypatch):
     assert d.seam_length == pytest.approx(exact, rel=0.05)
 
 
-def test_a_triangle_nearly_without_area_is_named_as_the_reason_for_a_large_energy():
+@pytest.mark.parametrize("height", [1e-3, 1e-6, 1e-9, 1e-12])
+def test_a_triangle_nearly_without_area_does_not_raise_the_energy(height):
     vertices, faces = shapes.sphere(2)
     (a, b, c), new = faces[0], len(vertices)
-    for height, is_noted in ((1e-3, False), (1e-9, True)):
-        point = (1 - height) * (vertices[a] + vertices[b]) / 2 + height * vertices[c]
-        split = np.vstack([faces[1:], [[a, b, new], [b, c, new], [c, a, new]]])
-        result = unwrap(np.vstack([vertices, point]), split)
-        assert (result.distortion.energy > 4.1) == is_noted
-        assert any("nearly no area" in note for note in result.notes) == is_noted
+    point = (1 - height) * (vertices[a] + vertices[b]) / 2 + height * vertices[c]
+    split = np.vstack([faces[1:], [[a, b, new], [b, c, new], [c, a, new]]])
+    measures = unwrap(np.vstack([vertices, point]), split).distortion
+    assert measures.energy < 4.1
+    # The plane has the shape of triangles that are a millionth as high as long, and a thicker one of others.
+    assert measures.qc_max < max(20, 1e-5 / height)
 
 
 @pytest.fixture(scope="module")

@@ -74,7 +74,7 @@ def complex_sums(labels: IntArray, values: ComplexArray, count: int) -> ComplexA
 
 def preferred_directions(mesh: TriangleMesh, angle: float = SHARP_ANGLE) -> Directions:
     """Return the preferred crosses of a mesh, at edges sharper than an angle and along curvature."""
-    lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces))
+    lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces), mesh)
     areas = double_areas(lengths) / 2
     areas = np.maximum(areas, 1e-12 * areas.sum())  # Weights of edges are inverse to areas.
     scale = float(np.sqrt(areas.sum()))
@@ -159,7 +159,7 @@ def smoothest_cross_field(mesh: TriangleMesh, directions: Directions) -> Complex
     References:
         F. Knoeppel, K. Crane, U. Pinkall, P. Schroeder, "Globally optimal direction fields", 2013.
     """
-    lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces))
+    lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces), mesh)
     areas = double_areas(lengths) / 2
     energy = _dual_laplacian(mesh, areas, edge_rotations(mesh, halfedge_angles(corner_angles(lengths))))
     sharp = SHARP_WEIGHT * directions.sharp * np.sqrt(areas.sum() / areas)
@@ -209,7 +209,7 @@ def directions_and_indices(mesh: TriangleMesh, angle: float) -> tuple[Directions
     """
     smooth = _smoothed(mesh)
     before, after = (
-        halfedge_angles(corner_angles(mollify(edge_lengths(one.vertices, one.faces))[0])).reshape(-1, 3)
+        halfedge_angles(corner_angles(mollify(edge_lengths(one.vertices, one.faces), one)[0])).reshape(-1, 3)
         for one in (smooth, mesh)
     )
     # From the frame of a smoothed triangle to that of the triangle, so that sides agree in the mean.
@@ -229,7 +229,7 @@ def _smoothed(mesh: TriangleMesh) -> TriangleMesh:
 
 def diffused(mesh: TriangleMesh, values: FloatArray, radius: float) -> FloatArray:
     """Return values (n, k) at vertices after an implicit step of diffusion; the radius is relative to the root area."""
-    lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces))
+    lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces), mesh)
     areas, count = double_areas(lengths) / 2, len(mesh.vertices)
     share = np.asarray(np.bincount(mesh.faces.ravel(), areas.repeat(3) / 3, count))
     stiffness = cotangent_laplacian(mesh.faces, cotangents(lengths), count)

@@ -144,7 +144,7 @@ def aligned(result: Flattening, size: float, sharp_angle: float = SHARP_ANGLE) -
     if not 1e-60 < largest < 1e60:
         raise GridError(f"the largest coordinate is {largest:.3g}, out of range for quads: scale the mesh")
     own = edge_lengths(mesh.vertices, mesh.faces) if result.lengths is None else result.lengths
-    lengths, _ = mollify(own)
+    lengths, _ = mollify(own, mesh)
     flat, bad = signed_double_areas(result.corner_uv), int((~has_area(result)).sum())
     if bad:
         raise GridError(f"{bad} of {len(flat):,} triangles of the layout are flipped or have no area")

@@ -66,7 +66,7 @@ class MapModel:
             triangles: (n,) the number of triangles at each vertex in the mesh that gets the cones.
             log_scale: (n,) the wanted log scale, up to a constant; None for 0.
         """
-        lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces))
+        lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces), mesh)
         angles, count = corner_angles(lengths), len(mesh.vertices)
         areas, key = double_areas(lengths), tie_key(mesh.vertices)
         share = np.bincount(mesh.faces.ravel(), areas.repeat(3), count) / (3 * areas.sum())

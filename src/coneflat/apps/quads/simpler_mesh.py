@@ -312,7 +312,7 @@ def _manageable(mesh: TriangleMesh, side: float) -> tuple[BoolArray, list[IntArr
     seen, holes, filled, is_jagged = set[int](), 0, list[IntArray](), False
     lengths = np.array([lengths_along(mesh, mesh.halfedge_edges[walk]).sum() for walk in walks])
     keys = [key[mesh.tails[walk]].sum() for walk in walks]
-    angles = corner_angles(mollify(edge_lengths(mesh.vertices, mesh.faces))[0])
+    angles = corner_angles(mollify(edge_lengths(mesh.vertices, mesh.faces), mesh)[0])
     quarters = np.rint(angle_defect(mesh.faces, angles, mesh.is_boundary_vertex) / (np.pi / 2))
     for k in np.lexsort((keys, -np.round(lengths / lengths.max(initial=1e-300), 9))):
         component = int(label[mesh.tails[walks[k][0]]])

@@ -46,7 +46,7 @@ def _scales_of_curvature(mesh: TriangleMesh, ratio: float = 4.0) -> FloatArray:
     the root of the sum of the squared principal curvatures, averaged over the same radius as their directions. Values
     are bounded around their median, such that sizes differ by `ratio` at most, and smoothed over twice this radius.
     """
-    lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces))
+    lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces), mesh)
     areas, count = double_areas(lengths) / 2, len(mesh.vertices)
     radius = CURVATURE_SCALE * float(np.sqrt(areas.sum()))
     tensors = curvature_tensors(mesh, areas, radius)

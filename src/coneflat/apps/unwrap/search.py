@@ -403,5 +403,5 @@ def coarse_part(part: Part, count: int) -> tuple[Part, IntArray]:
     cones = of_kept(part.cones, "is_allowed", "absorbs_curvature", "names")
     metric = of_kept(part.metric, "keeps_length", "names")
     seams = replace(of_kept(part.seams, "visibility", "weights"), is_avoided=none, is_forbidden=none)
-    near = coarse, part.vertices[kept], faces, mollify(own)[0], double_areas(own)
+    near = coarse, part.vertices[kept], faces, mollify(own, coarse)[0], double_areas(own)
     return Part(*near, cones, metric, seams), kept

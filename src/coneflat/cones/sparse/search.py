@@ -129,7 +129,7 @@ class ConeSearch:
             weights: (n,) importance of each vertex; None: 1.
             options: keyword arguments of the class.
         """
-        lengths = mollify(edge_lengths(mesh.vertices, mesh.faces))[0] if lengths is None else lengths
+        lengths = mollify(edge_lengths(mesh.vertices, mesh.faces), mesh)[0] if lengths is None else lengths
         count, is_boundary = len(mesh.vertices), mesh.is_boundary_vertex
         linear = LinearModel.of(
             cotangent_laplacian(mesh.faces, cotangents(lengths), count),

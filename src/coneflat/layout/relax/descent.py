@@ -17,6 +17,9 @@ from .motions import Motions
 
 # Relative rounding error of sums, for the energy and for the remaining distance to the constraints.
 RELATIVE_ROUNDING = 1e-12
+# Added to the diagonal of the Hessian, relative to it, one after the other until steps lead downwards: where triangles
+# are a million times as long as high, rounding makes the Hessian indefinite.
+RIDGES = (0.0, 1e-9, 1e-7)
 # The constraints cannot be reached if a step covers less than this fraction of the distance to them.
 MIN_PROGRESS = 1e-3
 # If less than this fraction of the unknowns is in parts that have not converged, only these parts are continued. And
@@ -98,11 +101,16 @@ def descend(
             maps, active, factor = elements.maps(places), np.ones(parts, dtype=bool), None
         check_cancelled()
         gradient, pull, matrix = elements.newton_system(energy, maps, remaining)
-        factor = factorize(matrix, factor, REPEATED * len(points))
-        step = np.append(factor.solve(-gradient - pull), remaining)
-        if not np.isfinite(step).all():
-            raise MetricError(f"relaxation found no finite step of its {elements.count:,} unknowns")
-        slope = np.bincount(unknown_part, gradient * step[:-1], parts)
+        for ridge in RIDGES:
+            if ridge:
+                matrix.setdiag(matrix.diagonal() * (1 + ridge))
+            factor = factorize(matrix, factor, REPEATED * len(points))
+            step = np.append(factor.solve(-gradient - pull), remaining)
+            if not np.isfinite(step).all():
+                raise MetricError(f"relaxation found no finite step of its {elements.count:,} unknowns")
+            slope = np.bincount(unknown_part, gradient * step[:-1], parts)
+            if remaining or not (slope[active] > RELATIVE_ROUNDING * here[active]).any():
+                break
         is_last = (-slope <= tolerance * (here - least)) & (not remaining)
         if not remaining:
             active &= -slope > RELATIVE_ROUNDING * here
