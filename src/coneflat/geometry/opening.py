@@ -17,8 +17,8 @@ ZERO_AREA, THIN_AREA = 1e-7, 2e-6
 # The thickness of opened triangles. They are laid out about as thin as they are, which keeps their share of the
 # distortion small: with 1e-3, single triangles have raised a mean QC distortion of 1.05 to 2.34.
 OPENED_AREA, MAX_OPENED = 4e-6, 0.25
-# Length that an edge of a triangle without any length gets, and height of an opened triangle, relative to the mean edge:
-# a thousand roundings of coordinates in the plane.
+# Length that an edge of a triangle without any length gets, and height of an opened triangle, relative to the mean
+# edge: a million roundings of coordinates in the plane.
 POINT_SIZE, MIN_HEIGHT = 1e-5, 1e-10
 # Relative difference of lengths that count as equal.
 EQUAL_LENGTHS = 1e-9
