@@ -15,6 +15,7 @@ from ..geometry.overlap import Overlaps
 from ..geometry.planar import sides_between
 from ..mesh.connectivity import TriangleMesh
 from .distortion import angle_sum_errors, measure, measure_map
+from .report import MAP_MEASURES
 from .seam_data import Rotations, seam_rotations
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ def unmet_guarantees(result: Flattening, unit: float = DOUBLE) -> tuple[Unmet, .
         unit: relative rounding of the coordinates.
     """
     notes = (
+        *_undefined(result),
         *_orientation(result),
         *_overlaps(result),
         *_angle_sums(result, unit),
@@ -121,6 +123,17 @@ def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:
 def _is_exact(result: Flattening) -> bool:
     """Return whether the layout has the angles and seams of an exact flat metric, not a least squares fit."""
     return result.settings.get("method") == "exact"
+
+
+def _undefined(result: Flattening) -> Iterator[str]:
+    """Yield a note if measures of the map are not numbers, which is so if no triangle has area."""
+    names = [name for name in MAP_MEASURES if not np.isfinite(getattr(result.distortion, name))]
+    if names:
+        count = int(np.count_nonzero(np.isfinite(result.distortion.qc)))
+        yield (
+            f"Measures that are not defined: {', '.join(names)}; {count:,} of {plural(len(result.faces), 'triangle')} "
+            "have area on the model and in the plane."
+        )
 
 
 def _orientation(result: Flattening) -> Iterator[str]:
