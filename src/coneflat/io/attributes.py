@@ -6,19 +6,19 @@ difference is the note on a written file.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..base.arrays import FloatArray
-from ..base.text import list_some, printable
+from ..base.text import printable
 
 if TYPE_CHECKING:
     from .mesh_file import MeshFile
 
-# Characters of a name that a note shows.
-MAX_NAME = 40
+# Characters of a name that a note shows, and names of a kind.
+MAX_NAME, MAX_NAMES = 40, 20
 # Largest value of a colour in bytes, and the value of sRGB up to which its curve is a line.
 BYTE, LINEAR_BELOW = 255, 0.04045
 
@@ -72,7 +72,13 @@ def list_attributes(attributes: Iterable[Attribute]) -> str:
     names: dict[str, list[str]] = {}
     for kind, name in attributes:
         names.setdefault(kind, []).extend([printable(name)[:MAX_NAME]] if name else [])
-    return ", ".join(f"{kind} ({list_some(each)})" if each else kind for kind, each in names.items())
+    return ", ".join(f"{kind} ({_list_names(each)})" if each else kind for kind, each in names.items())
+
+
+def _list_names(names: Sequence[str]) -> str:
+    """Return names as text, with the number of those that are not shown."""
+    more = len(names) - MAX_NAMES
+    return ", ".join(names[:MAX_NAMES]) + (f" and {more:,} more" if more > 0 else "")
 
 
 def colour_shades(values: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ import numpy as np
 from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of
 from ..base.notes import Unmet
 from ..base.text import list_some, plural
-from ..errors import DegenerateFaceError, EmptyMeshError, OptionError
+from ..errors import DegenerateFaceError, OptionError
 from ..geometry import double_areas, edge_lengths, mollify
 from ..geometry.visibility import visible_share
 from ..linalg.memory import check_memory
@@ -23,7 +23,7 @@ from ..stages import ConeSpec, MetricSpec, SeamSpec
 from .constraints import Constraints, locate_constraints
 from .input_mesh import InputMesh, at_unit_size, lengths_of_input, reorder_corners
 from .marked_edges import effective_marks, forbidden_edges, marked_edges, unreachable
-from .rounding import rounding_notes, rounding_reason
+from .rounding import named_rounding, rounding_notes
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +144,8 @@ class Source:
         checked, is_diagonal = self._checked.of(options.repair, lambda: self._check(options.repair))
         own = _own_lengths(given, checked, options)
         metric = options.repair, options.strict, None if own is None else own.tobytes()
-        lengths, note = self._lengths.of(metric, lambda: _open_triangles(checked, own, options.strict))
+        with named_rounding(given.vertices, given.faces):
+            lengths, note = self._lengths.of(metric, lambda: _open_triangles(checked, own, options.strict))
         constraints = locate_constraints(checked, options, given)
         notes = [] if note is None else [note]
         if note is not None or len(checked.face_origin) < len(np.asarray(given.faces)):
@@ -182,13 +183,8 @@ class Source:
     def _check(self, repair: bool) -> tuple[CheckedMesh, BoolArray]:
         """Return the checked mesh, and (m, 3) which of its sides are inside a polygon of the input."""
         dropped = _short_faces(self.given, repair)
-        try:
+        with named_rounding(self.given.vertices, self.given.faces):
             checked = at_unit_size(check_mesh(self.given.vertices, self.given.faces, repair=repair))
-        except (DegenerateFaceError, EmptyMeshError) as error:
-            reason = rounding_reason(self.given.vertices, self.given.faces)
-            if not reason:
-                raise
-            raise type(error)(f"{error}{reason}") from error
         checked = replace(checked, notes=(*dropped, *checked.notes))
         return checked, reorder_corners(checked, ~self.given.is_side())
 

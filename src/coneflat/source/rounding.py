@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.arrays import FloatArray, IntArray, unit_exponent
 from ..base.notes import Unmet
 from ..base.text import plural
+from ..errors import DegenerateFaceError, EmptyMeshError
 from ..geometry import double_areas, edge_lengths
 from ..geometry.triangles import ZERO_AREA
 
@@ -37,13 +41,21 @@ def coarse_step(vertices: FloatArray, faces: IntArray) -> tuple[float, int]:
     lengths = edge_lengths(points, faces)
     longest = lengths.max(axis=1)
     is_flat = double_areas(lengths) <= ZERO_AREA * longest**2
-    differences = [np.diff(np.unique(axis)) for axis in used.T]
-    step = max((float(axis.min()) for axis in differences if len(axis)), default=0.0)
+    step = max(_step(axis) for axis in used.T)
     is_small = is_flat & (longest <= MAX_STEPS * step)
     is_coarse = np.median(longest) <= MAX_MEDIAN_STEPS * step and np.abs(used).max() >= MIN_STEPS * step
     if not is_coarse or not is_small.any():
         return 0.0, 0
     return float(np.ldexp(step, exponent)), int(np.count_nonzero(is_small))
+
+
+def _step(values: FloatArray) -> float:
+    """Return the smallest difference of (k,) coordinates on an axis, or that of 32-bit numbers if they are such."""
+    differences = np.diff(np.unique(values))
+    rounded = values.astype(np.float32)
+    is_single = np.array_equal(rounded, values)
+    single = float(np.spacing(np.abs(rounded).max())) if is_single else 0.0
+    return max(single, float(differences.min()) if len(differences) else 0.0)
 
 
 def rounding_notes(vertices: ArrayLike, faces: ArrayLike) -> list[Unmet]:
@@ -60,12 +72,20 @@ def rounding_notes(vertices: ArrayLike, faces: ArrayLike) -> list[Unmet]:
     ]
 
 
-def rounding_reason(vertices: ArrayLike, faces: ArrayLike) -> str:
-    """Return what to add to an error on triangles without area if rounding of the input is the cause, else ""."""
-    step, _ = coarse_step(np.asarray(vertices, dtype=np.float64), np.asarray(faces))
-    if not step:
-        return ""
-    return (
-        f": coordinates of the input are rounded to steps of {step:.2g}; move the model to the origin before it is "
-        "saved, or save it with more digits"
-    )
+@contextmanager
+def named_rounding(vertices: ArrayLike, faces: ArrayLike) -> Iterator[None]:
+    """Add to errors on triangles without area that rounding of the input is the cause, if it is.
+
+    Raises:
+        DegenerateFaceError, EmptyMeshError: those of the block.
+    """
+    try:
+        yield
+    except (DegenerateFaceError, EmptyMeshError) as error:
+        step, _ = coarse_step(np.asarray(vertices, dtype=np.float64), np.asarray(faces))
+        if not step:
+            raise
+        raise type(error)(
+            f"{error}: coordinates of the input are rounded to steps of {step:.2g}; move the model to the origin "
+            "before it is saved, or save it with more digits"
+        ) from error
