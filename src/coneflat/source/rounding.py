@@ -19,6 +19,8 @@ from ..geometry.triangles import ZERO_AREA
 MAX_STEPS = 4
 #: and that of a median triangle, if the coordinates are too coarse for the mesh.
 MAX_MEDIAN_STEPS = 100
+#: Decimal places of text at most, steps from the origin up to which they are recognised, and the tolerance for it.
+MAX_PLACES, MAX_DECIMALS, IS_INTEGER = 8, 1e11, 1e-3
 #: Steps from the origin to the farthest coordinate at least: integers of small grids are not rounded numbers.
 MIN_STEPS = 1e5
 
@@ -30,32 +32,57 @@ def coarse_step(vertices: FloatArray, faces: IntArray) -> tuple[float, int]:
     numbers of STL, GLB and most PLY files for a model far from the origin, or text with few digits.
 
     Returns:
-        The largest of the smallest differences of coordinates along the axes; 0, 0 if rounding is not the cause.
+        The step, model units; 0, 0 if rounding is not the cause.
     """
     if not faces.size or not np.isfinite(vertices[np.unique(faces)]).all():
         return 0.0, 0
     used = vertices[np.unique(faces)]
+    step = _single_step(used) or _decimal_step(used)
     # Scaling by a power of two avoids underflow and overflow of squared lengths.
     exponent = unit_exponent(used)
-    points, used = np.ldexp(vertices, -exponent), np.ldexp(used, -exponent)
-    lengths = edge_lengths(points, faces)
-    longest = lengths.max(axis=1)
+    lengths = edge_lengths(np.ldexp(vertices, -exponent), faces)
+    longest, unit = lengths.max(axis=1), float(np.ldexp(step, -exponent))
     is_flat = double_areas(lengths) <= ZERO_AREA * longest**2
-    step = max(_step(axis) for axis in used.T)
-    is_small = is_flat & (longest <= MAX_STEPS * step)
-    is_coarse = np.median(longest) <= MAX_MEDIAN_STEPS * step and np.abs(used).max() >= MIN_STEPS * step
-    if not is_coarse or not is_small.any():
-        return 0.0, 0
-    return float(np.ldexp(step, exponent)), int(np.count_nonzero(is_small))
+    is_small = is_flat & (longest <= MAX_STEPS * unit)
+    is_coarse = np.median(longest) <= MAX_MEDIAN_STEPS * unit and MIN_STEPS * unit <= 1
+    return (step, int(np.count_nonzero(is_small))) if is_coarse and is_small.any() else (0.0, 0)
 
 
-def _step(values: FloatArray) -> float:
-    """Return the smallest difference of (k,) coordinates on an axis, or that of 32-bit numbers if they are such."""
+def _single_step(points: FloatArray) -> float:
+    """Return the largest step of the coordinates (n, 3) if they are rounded to 32-bit numbers, else 0."""
+    with np.errstate(over="ignore"):
+        rounded = points.astype(np.float32)
+    if not np.array_equal(rounded, points):
+        return 0.0
+    steps = np.spacing(np.abs(rounded).max(axis=0)).astype(np.float64)
+    return max(
+        (step for step, axis in zip(steps.tolist(), points.T, strict=True) if _is_step(step, axis)),
+        default=0.0,
+    )
+
+
+def _decimal_step(points: FloatArray) -> float:
+    """Return the step of the coordinates (n, 3) if they are rounded to decimal places, else 0."""
+    largest = float(np.abs(points).max())
+    for places in range(MAX_PLACES):
+        step = 10.0**-places
+        # Beyond it, doubles are not exact enough to tell.
+        if not largest < MAX_DECIMALS * step:
+            break
+        numbers = points / step
+        if np.abs(numbers - np.rint(numbers)).max() <= IS_INTEGER:
+            return step if any(_is_step(step, axis) for axis in points.T) else 0.0
+    return 0.0
+
+
+def _is_step(step: float, values: FloatArray) -> bool:
+    """Return whether coordinates on an axis differ by no less than a step, but by it; also if all are equal.
+
+    The coordinates of a regular grid differ by more.
+    """
     differences = np.diff(np.unique(values))
-    rounded = values.astype(np.float32)
-    is_single = np.array_equal(rounded, values)
-    single = float(np.spacing(np.abs(rounded).max())) if is_single else 0.0
-    return max(single, float(differences.min()) if len(differences) else 0.0)
+    differences = differences[differences > step / 2]
+    return not len(differences) or bool(differences.min() < (1 + IS_INTEGER) * step)
 
 
 def rounding_notes(vertices: ArrayLike, faces: ArrayLike) -> list[Unmet]:

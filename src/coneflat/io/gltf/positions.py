@@ -15,8 +15,8 @@ MIN_SIZE, MAX_SIZE = 1e-15, 1e18
 #: Distance from the origin, in sizes of the model, from which positions are relative to a node: 32-bit numbers have 24
 #: binary digits, of which at most two are lost below it.
 FAR = 4.0
-#: Binary digits of a position after those of the size of the model.
-DIGITS = 23
+#: Binary digits of 32-bit numbers.
+DIGITS = 24
 
 
 class LocalPositions(NamedTuple):
