@@ -414,10 +414,12 @@ def _text_values(path: Path, content: bytes, start: int, elements: Sequence[_Ele
             i = int(wrong[0])
             ends = np.cumsum([element.length for element in elements])
             name = elements[int(np.searchsorted(ends, i, side="right"))].name
-            raise MeshFileError(
-                f"{path}, line {_filled_line(path, content, start, i)}: the properties of this {name} need "
-                f"{needed[i]:,} numbers, but the line has {lengths[i]:,}"
+            reason = (
+                f"the list of this {name} has no valid length"
+                if needed[i] < 0
+                else f"the properties of this {name} need {needed[i]:,} numbers, but the line has {lengths[i]:,}"
             )
+            raise MeshFileError(f"{path}, line {_filled_line(path, content, start, i)}: {reason}")
     return values.astype("<f8", copy=False).tobytes()
 
 
