@@ -34,7 +34,7 @@ def coarse_step(vertices: FloatArray, faces: IntArray) -> tuple[float, int]:
     Returns:
         The step, model units; 0, 0 if rounding is not the cause.
     """
-    if not faces.size or not np.isfinite(vertices[np.unique(faces)]).all():
+    if not faces.size or not vertices.size or not np.isfinite(vertices[np.unique(faces)]).all():
         return 0.0, 0
     used = vertices[np.unique(faces)]
     step = _single_step(used) or _decimal_step(used)
