@@ -260,6 +260,23 @@ def test_names_are_shown_up_to_a_number(tmp_path):
     assert lost == f"vertex properties ({', '.join(names[:20])} and 30 more); .ply keeps them."
 
 
+@pytest.mark.parametrize("weld", [(), ("--weld",)])
+def test_properties_that_merged_vertices_do_not_share_are_named(weld, tmp_path):
+    lines = ["ply", "format ascii 1.0", "element vertex 6", *(f"property double {axis}" for axis in "xyz")]
+    lines += [
+        "property int label",
+        "property int same",
+        "element face 2",
+        "property list uchar int vertex_indices",
+    ]
+    lines += ["end_header", "0 0 0 1 9", "1 0 0 2 9", "0 1 0 3 9", "1 0 0 2 9", "1 1 0 5 9", "0 1 0 4 9"]
+    (tmp_path / "slit.ply").write_text("\n".join([*lines, "3 0 1 2", "3 3 4 5"]) + "\n")
+    found = command("flatten", tmp_path / "slit.ply", "-o", tmp_path / "out.ply", *weld).stdout
+    assert "note: Merged vertices differ in label: the values of the first of them are used" in found
+    found = command("flatten", tmp_path / "slit.ply", "-o", tmp_path / "out.ply", "--no-weld").stdout
+    assert "Merged" not in found
+
+
 def test_a_report_has_the_note(painted, tmp_path):
     command("flatten", painted, "-o", tmp_path / "out.obj", "--report", tmp_path / "report.json")
     notes = json.loads((tmp_path / "report.json").read_text())["notes"]

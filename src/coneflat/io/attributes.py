@@ -71,14 +71,15 @@ def list_attributes(attributes: Iterable[Attribute]) -> str:
     """Return attributes as text: "groups, vertex properties (quality, label)"."""
     names: dict[str, list[str]] = {}
     for kind, name in attributes:
-        names.setdefault(kind, []).extend([printable(name)[:MAX_NAME]] if name else [])
-    return ", ".join(f"{kind} ({_list_names(each)})" if each else kind for kind, each in names.items())
+        names.setdefault(kind, []).extend([name] if name else [])
+    return ", ".join(f"{kind} ({list_names(each)})" if each else kind for kind, each in names.items())
 
 
-def _list_names(names: Sequence[str]) -> str:
+def list_names(names: Sequence[str]) -> str:
     """Return names as text, with the number of those that are not shown."""
     more = len(names) - MAX_NAMES
-    return ", ".join(names[:MAX_NAMES]) + (f" and {more:,} more" if more > 0 else "")
+    shown = ", ".join(printable(name)[:MAX_NAME] for name in names[:MAX_NAMES])
+    return f"{shown} and {more:,} more" if more > 0 else shown
 
 
 def colour_shades(values: FloatArray) -> FloatArray:

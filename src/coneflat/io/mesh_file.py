@@ -50,6 +50,7 @@ class MeshFile:
         ply: the types of the properties of a PLY file, and its comments.
         attributes: the data that the file has in addition to positions, faces, UVs and normals. A note on a written
             file lists those that it does not keep.
+        merged_properties: names of the vertex properties in which vertices differ that were merged.
         short_faces: number of faces with fewer than three corners, which are left out.
 
     Examples:
@@ -76,6 +77,7 @@ class MeshFile:
     ply: PlyHeader | None = None
     face_properties: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     attributes: tuple[Attribute, ...] = ()
+    merged_properties: tuple[str, ...] = ()
     short_faces: int = 0
 
     @property
@@ -130,6 +132,18 @@ def without_short_faces(mesh: MeshFile) -> MeshFile:
         obj=None if mesh.obj is None else mesh.obj.without_polygons(~is_whole),
         face_properties={name: values[is_whole] for name, values in mesh.face_properties.items()},
         short_faces=int(np.count_nonzero(~is_whole)),
+    )
+
+
+def differing_properties(mesh: MeshFile, replaced_by: IntArray) -> tuple[str, ...]:
+    """Return the names of the vertex properties in which vertices differ from those that replace them.
+
+    replaced_by: (n,) the vertex that is used for each vertex.
+    """
+    return tuple(
+        name
+        for name, values in mesh.properties.items()
+        if not np.array_equal(values, values[replaced_by], equal_nan=True)
     )
 
 

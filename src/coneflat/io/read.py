@@ -18,7 +18,7 @@ from .brains import FREESURFER, is_freesurfer, is_gifti, parse_freesurfer, parse
 from .files import PIPE, PathName, as_path, known_ending, read_bytes, read_input, readable
 from .gltf.read import parse_gltf
 from .join import Joined, join_borders
-from .mesh_file import MeshFile, check_corners, without_short_faces
+from .mesh_file import MeshFile, check_corners, differing_properties, without_short_faces
 from .obj import parse_obj
 from .off import is_off, parse_off
 from .ply import parse_ply
@@ -162,11 +162,12 @@ def _welded(mesh: MeshFile) -> MeshFile:
         count += len(first)
     if count == len(mesh.vertices):
         return mesh
-    every = np.concatenate(kept)
+    every, number = np.concatenate(kept), np.concatenate(merged)
     return replace(
         mesh,
         vertices=mesh.vertices[every],
-        corners=np.concatenate(merged)[mesh.corners],
+        corners=number[mesh.corners],
+        merged_properties=differing_properties(mesh, every[number]),
         welded=len(mesh.vertices) - count,
         unwelded=mesh.corners,
         properties={name: values[every] for name, values in mesh.properties.items()},
