@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.arrays import unit_exponent
+from ..base.arrays import FloatArray, unit_exponent
 from ..base.notes import Unmet
 from ..base.text import list_some, plural
 from ..geometry.overlap import Overlaps
@@ -126,14 +126,28 @@ def _is_exact(result: Flattening) -> bool:
 
 
 def _undefined(result: Flattening) -> Iterator[str]:
-    """Yield a note if measures of the map are not numbers, which is so if no triangle has area."""
-    names = [name for name in MAP_MEASURES if not np.isfinite(getattr(result.distortion, name))]
-    if names:
-        count = int(np.count_nonzero(np.isfinite(result.distortion.qc)))
-        yield (
-            f"Measures that are not defined: {', '.join(names)}; {count:,} of {plural(len(result.faces), 'triangle')} "
-            "have area on the model and in the plane."
-        )
+    """Yield a note if measures of the map are not numbers."""
+    values = {name: getattr(result.distortion, name) for name in MAP_MEASURES}
+    yield from undefined_measures(values, result.distortion.qc)
+
+
+def undefined_measures(values: Mapping[str, float], qc: FloatArray) -> tuple[Unmet, ...]:
+    """Return a note on the measures that are not numbers, which is so if no triangle has area.
+
+    Args:
+        values: the measures by name.
+        qc: (m,) the QC of each triangle, NaN for those without area.
+    """
+    names = [name for name, value in values.items() if not np.isfinite(value)]
+    if not names:
+        return ()
+    count = int(np.count_nonzero(np.isfinite(qc)))
+    return (
+        Unmet(
+            f"Measures that are not defined: {', '.join(names)}; {count:,} of {plural(len(qc), 'triangle')} have area "
+            "on the model and in the plane."
+        ),
+    )
 
 
 def _orientation(result: Flattening) -> Iterator[str]:
