@@ -277,6 +277,20 @@ def test_properties_that_merged_vertices_do_not_share_are_named(weld, tmp_path):
     assert "Merged" not in found
 
 
+@pytest.mark.parametrize("has_uv", [True, False])
+@pytest.mark.parametrize("line", ["map_Kd skin.png", "Kd 1 0 0"])
+def test_textures_of_the_old_uvs_of_an_obj_are_named(line, has_uv, tmp_path):
+    (tmp_path / "a.mtl").write_text(f"newmtl paint\n{line}\n")
+    corner = "{0}/{0}" if has_uv else "{0}"
+    lines = ["mtllib a.mtl", "v 0 0 0", "v 1 0 0", "v 0 1 0", "vt 0 0", "vt 1 0", "vt 0 1", "usemtl paint"]
+    lines.append("f " + " ".join(corner.format(v) for v in (1, 2, 3)))
+    (tmp_path / "a.obj").write_text("\n".join(lines))
+    result = coneflat.flatten(tmp_path / "a.obj")
+    note = "The textures of the file are kept, but were made for the old UVs"
+    found = [any(each.startswith(note) for each in result.as_written(ending).notes) for ending in KEPT]
+    assert found == [has_uv and line.startswith("map") and ending == ".obj" for ending in KEPT]
+
+
 def test_a_report_has_the_note(painted, tmp_path):
     command("flatten", painted, "-o", tmp_path / "out.obj", "--report", tmp_path / "report.json")
     notes = json.loads((tmp_path / "report.json").read_text())["notes"]

@@ -62,6 +62,14 @@ def losses(
     return (f"These data of the input are not kept in {ending}: {list_attributes(lost)}{advice}.",)
 
 
+def old_textures(owner: str) -> str:
+    """Return the note that textures of an owner, such as "2 materials", do not fit the new UVs."""
+    return (
+        f"The textures of {owner} are kept, but were made for the old UVs; `coneflat transfer` bakes them into the new "
+        "ones."
+    )
+
+
 def texture_files(source: MeshFile) -> list[Attribute]:
     """Return the names of images among the attributes of a file."""
     return [each for each in source.attributes if each.kind == TEXTURE_FILES]

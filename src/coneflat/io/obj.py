@@ -10,6 +10,7 @@ import os
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO
@@ -18,12 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
-from ..errors import FaceIndexError, MeshFileError
+from ..errors import ConeflatError, FaceIndexError, MeshFileError
 from ..mesh.polygons import COLOURS, first_bad_corner
 from ..result import Flattening
 from .attributes import GROUPS, MATERIALS, OBJECTS, VERTEX_COLOURS, Attribute, colour_shades
 from .convex_pieces import find_pieces
-from .files import moved_path
+from .files import inner_path, moved_path, read_bytes
 from .mesh_file import MeshFile, check_filled, offsets_of
 from .text import Growing, TextBlock, newline_of, text_blocks
 
@@ -34,6 +35,7 @@ _HEADS = {b"v ": _VERTEX, b"f ": _FACE, b"l ": _ELEMENT, b"p ": _ELEMENT, b"vt":
 _KINDS[[int.from_bytes(head, "big") for head in _HEADS]] = [*_HEADS.values()]
 _TEXTURE_INDICES = re.compile(rb"(#[^\r\n]*)|/[-+0-9]*")
 _MATERIALS = re.compile(rb"(?m)^([ \t]*mtllib[ \t]+)([^\r\n]*?)(?=[ \t]*\r?$)")
+_TEXTURE_MAP = re.compile(rb"(?im)^[ \t]*(map_\w+|bump|norm|disp|decal)[ \t]")
 _STATEMENT = re.compile(rb"(?m)^[ \t]*([A-Za-z_]+)(?![^ \t\r\n])")
 #: Statements of the data that an OBJ has in addition to its mesh.
 _STATEMENTS = {
@@ -156,6 +158,25 @@ def _attributes(text: ObjText, lengths: set[int]) -> tuple[Attribute, ...]:
 def kept_in_obj(source: MeshFile) -> set[Attribute]:
     """Return the attributes of a source file that `write_obj` keeps: those of an OBJ."""
     return set() if source.obj is None else set(source.attributes)
+
+
+def obj_has_textures(source: MeshFile) -> bool:
+    """Return whether the materials of a source file have textures of its UVs, which `write_obj` keeps."""
+    if source.obj is None or source.uv is None:
+        return False
+    folder = source.path.parent
+    for gap in source.obj.gaps.values():
+        for _, names in _MATERIALS.findall(gap) if b"mtllib" in gap else ():
+            for name in _library_names(names, folder):
+                with suppress(ConeflatError):
+                    if _TEXTURE_MAP.search(read_bytes(inner_path(folder, os.fsdecode(name)))):
+                        return True
+    return False
+
+
+def _library_names(names: bytes, folder: str | Path) -> list[bytes]:
+    """Return the files of a line of material libraries: several names, or one with blanks if such a file exists."""
+    return [names] if os.path.exists(os.path.join(os.fsencode(folder), names)) else names.split()
 
 
 def _uv_points(block: TextBlock, rows: IntArray) -> FloatArray:
@@ -305,11 +326,7 @@ def relocated(text: ObjText, old: Path, new: Path) -> ObjText:
         return text
 
     def line(match: re.Match[bytes]) -> bytes:
-        names = match[2]
-        # A line may have several names, or one name with blanks; it is one name if such a file exists.
-        is_one = os.path.exists(os.path.join(os.fsencode(here), names))
-        parts = [names] if is_one else names.split()
-        return match[1] + b" ".join(moved_path(name, here, there) for name in parts)
+        return match[1] + b" ".join(moved_path(name, here, there) for name in _library_names(match[2], here))
 
     gaps = {i: _MATERIALS.sub(line, gap) if b"mtllib" in gap else gap for i, gap in text.gaps.items()}
     return replace(text, gaps=gaps)

@@ -482,14 +482,9 @@ def kept_in_ply(source: MeshFile) -> set[Attribute]:
     return kept | ({VERTEX_COLOURS} if source.has_colours else set())
 
 
-def texture_notes(source: MeshFile) -> tuple[str, ...]:
-    """Return a note on the textures of a source file that `write_ply` names, if it has any and UVs for them."""
-    if source.uv is None or not texture_files(source):
-        return ()
-    return (
-        "The textures of the file are kept, but were made for the old UVs; `coneflat transfer` bakes them into the new "
-        "ones.",
-    )
+def ply_has_textures(source: MeshFile) -> bool:
+    """Return whether a source file names textures of its UVs, which `write_ply` keeps."""
+    return source.ply is not None and source.uv is not None and len(texture_files(source)) > 0
 
 
 def _kept_properties(source: MeshFile) -> list[str]:

@@ -18,15 +18,15 @@ from ..measure.guarantees import DOUBLE, SINGLE, remeasured
 from ..mesh.polygons import polygon_of
 from ..options.declared import FORMATS
 from ..result import Flattening
-from .attributes import ALPHA, VERTEX_COLOURS, Attribute, losses
+from .attributes import ALPHA, VERTEX_COLOURS, Attribute, losses, old_textures
 from .convex_pieces import find_pieces
 from .files import PathName, atomic_write, checked_target
 from .gltf.positions import local_positions
 from .gltf.write import kept_in_glb, scene_losses, write_glb
 from .mesh_file import MeshFile
 from .npz import write_npz
-from .obj import kept_in_obj, write_obj
-from .ply import kept_in_ply, texture_notes, write_ply
+from .obj import kept_in_obj, obj_has_textures, write_obj
+from .ply import kept_in_ply, ply_has_textures, write_ply
 from .texture import find_texture
 
 #: Endings of the files that `write_flattening` writes.
@@ -38,6 +38,10 @@ KEPT: dict[str, Callable[[MeshFile], set[Attribute]]] = {
     ".glb": kept_in_glb,
     ".npz": lambda _: set(),
 }
+
+
+#: Whether a file of a format keeps textures of the old UVs of a source file, beside those of glTF scenes.
+HAS_TEXTURES: dict[str, Callable[[MeshFile], bool]] = {".obj": obj_has_textures, ".ply": ply_has_textures}
 
 
 def check_output(path: PathName, texture: PathName | None = None) -> Path:
@@ -240,4 +244,5 @@ def left_out(result: Flattening, ending: str, has_texture: bool = False) -> tupl
     kept = KEPT[ending](source) - hidden
     lost = set(source.attributes) - kept
     other = next((other for other, kept_in in KEPT.items() if lost <= kept_in(source)), "")
-    return (*losses(source, ending, kept, other), *(texture_notes(source) if ending == ".ply" else ()))
+    has_textures = HAS_TEXTURES[ending](source) if ending in HAS_TEXTURES else False
+    return (*losses(source, ending, kept, other), *([old_textures("the file")] if has_textures else []))

@@ -26,7 +26,7 @@ from ...errors import ConeflatError, MeshFileError
 from ...geometry.triangles import vertex_normals
 from ...mesh.polygons import COLOURS
 from ...result import Flattening
-from ..attributes import ALPHA, MAX_NAME, VERTEX_COLOURS, Attribute, colour_shades, to_linear
+from ..attributes import ALPHA, MAX_NAME, VERTEX_COLOURS, Attribute, colour_shades, old_textures, to_linear
 from ..files import moved_path, read_bytes
 from ..mesh_file import MeshFile
 from ..split import distinct_pairs, input_vertices, shading_normals, source_normals, split_at_seams
@@ -338,10 +338,7 @@ def scene_losses(result: Flattening, has_texture: bool = False) -> tuple[str, ..
     used = {one["material"] for one in primitives if "material" in one}
     painted = [i for i in used if any(name.endswith("Texture") for name in keys_of(tree["materials"][i]))]
     if painted and not has_texture:
-        notes.append(
-            f"The textures of {plural(len(painted), 'material')} are kept, but were made for the old UVs; `coneflat "
-            "transfer` bakes them into the new ones."
-        )
+        notes.append(old_textures(plural(len(painted), "material")))
     return tuple(notes)
 
 
