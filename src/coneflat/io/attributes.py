@@ -45,21 +45,21 @@ GROUPS, OBJECTS, MATERIALS = Attribute("groups"), Attribute("objects"), Attribut
 
 
 def losses(
-    source: MeshFile | None, ending: str, kept: Collection[Attribute], other: str = ""
+    source: MeshFile | None, ending: str, kept_attributes: Collection[Attribute], better_ending: str = ""
 ) -> tuple[str, ...]:
     """Return a note on the attributes of a source file that a written file does not keep, if there are any.
 
     Args:
         source: the file that the mesh was read from, if any.
         ending: the ending of the written file.
-        kept: the attributes that are kept.
-        other: ending of a format that keeps all of them, if there is one.
+        kept_attributes: the attributes that are kept.
+        better_ending: ending of a format that keeps all of them, if there is one.
     """
-    lost = [] if source is None else [each for each in source.attributes if each not in kept]
-    if not lost:
+    lost_attributes = [] if source is None else [a for a in source.attributes if a not in kept_attributes]
+    if not lost_attributes:
         return ()
-    advice = f"; {other} keeps them" if other else ""
-    return (f"These data of the input are not kept in {ending}: {list_attributes(lost)}{advice}.",)
+    advice = f"; {better_ending} keeps them" if better_ending else ""
+    return (f"These data of the input are not kept in {ending}: {list_attributes(lost_attributes)}{advice}.",)
 
 
 def old_textures(owner: str) -> str:
@@ -72,22 +72,21 @@ def old_textures(owner: str) -> str:
 
 def texture_files(source: MeshFile) -> list[Attribute]:
     """Return the names of images among the attributes of a file."""
-    return [each for each in source.attributes if each.kind == TEXTURE_FILES]
+    return [attribute for attribute in source.attributes if attribute.kind == TEXTURE_FILES]
 
 
 def list_attributes(attributes: Iterable[Attribute]) -> str:
     """Return attributes as text: "groups, vertex properties (quality, label)"."""
-    names: dict[str, list[str]] = {}
+    names_of: dict[str, list[str]] = {}
     for kind, name in attributes:
-        names.setdefault(kind, []).extend([name] if name else [])
-    return ", ".join(f"{kind} ({list_names(each)})" if each else kind for kind, each in names.items())
+        names_of.setdefault(kind, []).extend([name] if name else [])
+    return ", ".join(f"{kind} ({list_names(names)})" if names else kind for kind, names in names_of.items())
 
 
 def list_names(names: Sequence[str]) -> str:
     """Return names as text, with the number of those that are not shown."""
-    more = len(names) - MAX_NAMES
-    shown = ", ".join(printable(name)[:MAX_NAME] for name in names[:MAX_NAMES])
-    return f"{shown} and {more:,} more" if more > 0 else shown
+    text = ", ".join(printable(name)[:MAX_NAME] for name in names[:MAX_NAMES])
+    return f"{text} and {len(names) - MAX_NAMES:,} more" if len(names) > MAX_NAMES else text
 
 
 def colour_shades(values: FloatArray) -> FloatArray:

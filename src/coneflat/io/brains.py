@@ -87,13 +87,13 @@ def parse_gifti(path: Path, content: bytes) -> MeshFile:
 
 def _gifti_attributes(image: Any) -> list[Attribute]:
     """Return the data of a GIFTI image in addition to its mesh: metadata with values, and further arrays."""
-    found = list[Attribute]()
+    attributes = list[Attribute]()
     for owner in (image, *image.darrays):
         filled = (str(name) for name, value in dict(owner.meta).items() if str(value).strip())
-        found += [Attribute("metadata", name) for name in filled]
+        attributes += [Attribute("metadata", name) for name in filled]
     if len(image.darrays) > 2:
-        found.append(Attribute("values at vertices"))
-    return list(dict.fromkeys(found))
+        attributes.append(Attribute("values at vertices"))
+    return list(dict.fromkeys(attributes))
 
 
 def _triangles(path: Path, points: Any, corners: Any, attributes: Sequence[Attribute]) -> MeshFile:

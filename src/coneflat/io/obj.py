@@ -150,9 +150,9 @@ def _attributes(text: ObjText, lengths: set[int]) -> tuple[Attribute, ...]:
     lengths: the different numbers of words after `v`.
     """
     words = {word.lower() for gap in text.gaps.values() for word in _STATEMENT.findall(gap)}
-    found = [attribute for attribute, names in _STATEMENTS.items() if not words.isdisjoint(names)]
-    found += [VERTEX_COLOURS] if lengths & {6, 7} else []
-    return (*found, *([Attribute("weights of vertices")] if lengths - {3, 6} else []))
+    attributes = [attribute for attribute, names in _STATEMENTS.items() if not words.isdisjoint(names)]
+    attributes += [VERTEX_COLOURS] if lengths & {6, 7} else []
+    return (*attributes, *([Attribute("weights of vertices")] if lengths - {3, 6} else []))
 
 
 def kept_in_obj(source: MeshFile) -> set[Attribute]:

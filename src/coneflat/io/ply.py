@@ -109,23 +109,23 @@ def parse_ply(path: Path, content: bytes) -> MeshFile:
         # Converted to an array of doubles, the text is read by the same code as the binary forms; doubles represent
         # every possible index exactly.
         content, start = _text_values(path, content, start, elements), 0
-    found: dict[str, list[Column]] = {}
+    columns_of: dict[str, list[Column]] = {}
     for element in elements:
-        wanted = _wanted(path, element)
+        chosen_properties = _wanted(path, element)
         try:
-            columns, start = _decode(content, start, _stored(element, form), wanted)
+            columns, start = _decode(content, start, _stored(element, form), chosen_properties)
         except _EndOfFile as error:
             raise MeshFileError(
                 f"{path} ends before the {element.length} {element.name} elements in its header"
             ) from error
-        found[element.name] = columns
-        if found.keys() >= {"vertex", "face"}:
+        columns_of[element.name] = columns
+        if columns_of.keys() >= {"vertex", "face"}:
             break
     _refuse_strips(path, elements)
     by_name = {element.name: element for element in elements}
-    mesh = _vertices(path, by_name, found)
-    if "face" in found:
-        mesh = _with_faces(path, mesh, by_name["face"], found["face"])
+    mesh = _vertices(path, by_name, columns_of)
+    if "face" in columns_of:
+        mesh = _with_faces(path, mesh, by_name["face"], columns_of["face"])
     check_filled(path, len(mesh.vertices), len(mesh.offsets) - 1)
     pairs = [pair for pair in _VERTEX_UV if set(pair) <= mesh.properties.keys()]
     chosen = pairs[0] if pairs and mesh.uv is None else ()
@@ -141,11 +141,13 @@ def parse_ply(path: Path, content: bytes) -> MeshFile:
     return mesh
 
 
-def _vertices(path: Path, elements: Mapping[str, _Element], found: Mapping[str, list[Column]]) -> MeshFile:
+def _vertices(
+    path: Path, elements: Mapping[str, _Element], columns_of: Mapping[str, list[Column]]
+) -> MeshFile:
     """Return a mesh of the vertices of a file and their properties, without faces."""
     vertices, properties = np.empty((0, 3)), dict[str, FloatArray]()
-    if "vertex" in found:
-        element, columns = elements["vertex"], found["vertex"]
+    if "vertex" in columns_of:
+        element, columns = elements["vertex"], columns_of["vertex"]
         declared = [element.properties[i] for i in _wanted(path, element)]
         vertices = np.stack([np.asarray(c, np.float64) for c in columns[:3]], axis=1)
         properties = {p.name: _shade(p, c) for p, c in zip(declared[3:], columns[3:], strict=True)}
@@ -155,12 +157,12 @@ def _vertices(path: Path, elements: Mapping[str, _Element], found: Mapping[str, 
 def _with_faces(path: Path, mesh: MeshFile, element: _Element, columns: list[Column]) -> MeshFile:
     """Return a mesh with its faces, their properties and the UVs of their corners."""
     sizes, corners = columns[0].astype(np.int64), _as_integers(path, columns[1])
-    wanted = [element.properties[i] for i in _wanted(path, element)]
-    lists = sum(p.count is not None for p in wanted)
+    chosen_properties = [element.properties[i] for i in _wanted(path, element)]
+    lists = sum(p.count is not None for p in chosen_properties)
     texture, uv = _corner_uv(path, sizes, *columns[2:4]) if lists == 2 else (None, None)
     properties = {
         p.name: _in_type(np.asarray(c), p.word)
-        for p, c in zip(wanted[lists:], columns[2 * lists :], strict=True)
+        for p, c in zip(chosen_properties[lists:], columns[2 * lists :], strict=True)
     }
     has_uv = uv is not None and len(uv) > 0
     return replace(
@@ -189,22 +191,24 @@ def _attributes(
 
     uv: names of the vertex properties that are its UVs.
     """
-    found = [Attribute(TEXTURE_FILES, _texture_name(line)) for line in comments if _texture_name(line)]
+    attributes = [Attribute(TEXTURE_FILES, _texture_name(line)) for line in comments if _texture_name(line)]
     properties = mesh.properties
     replaced = {*"xyz", *uv, "source_vertex", *(_NORMAL if set(_NORMAL) <= properties.keys() else ())}
     if mesh.has_colours:
         replaced |= set(COLOURS)
-        found.append(VERTEX_COLOURS)
+        attributes.append(VERTEX_COLOURS)
     for element in elements:
         names = [p.name for p in element.properties]
         if element.name == "vertex":
-            found += [Attribute("vertex properties", name) for name in names if name not in replaced]
+            attributes += [Attribute("vertex properties", name) for name in names if name not in replaced]
         elif element.name == "face":
             corners = _corners_of(element)
-            found += [Attribute("face properties", name) for name in names if name not in (corners, _FACE_UV)]
+            attributes += [
+                Attribute("face properties", name) for name in names if name not in (corners, _FACE_UV)
+            ]
         elif element.length:
-            found.append(Attribute("elements", element.name))
-    return tuple(dict.fromkeys(found))
+            attributes.append(Attribute("elements", element.name))
+    return tuple(dict.fromkeys(attributes))
 
 
 def _texture_name(comment: str) -> str:
@@ -476,10 +480,10 @@ def _as_integers(path: Path, corners: Column) -> IntArray:
 
 def kept_in_ply(source: MeshFile) -> set[Attribute]:
     """Return the attributes of a source file that `write_ply` keeps."""
-    kept = {Attribute("vertex properties", name) for name in _kept_properties(source)}
-    kept |= {Attribute("face properties", name) for name in source.face_properties}
-    kept |= set(texture_files(source))
-    return kept | ({VERTEX_COLOURS} if source.has_colours else set())
+    attributes = {Attribute("vertex properties", name) for name in _kept_properties(source)}
+    attributes |= {Attribute("face properties", name) for name in source.face_properties}
+    attributes |= set(texture_files(source))
+    return attributes | ({VERTEX_COLOURS} if source.has_colours else set())
 
 
 def ply_has_textures(source: MeshFile) -> bool:
@@ -585,13 +589,13 @@ def write_parts(
         faces: (m, k) vertex indices.
         face_properties: (m,) further properties of faces by name.
     """
-    more = {} if face_properties is None else face_properties
+    face_columns = {} if face_properties is None else face_properties
     kind: list[tuple[Any, ...]] = [("count", "u1"), ("corners", "<i4", faces.shape[1])]
-    kind += [(f"p{i}", values.dtype.newbyteorder("<")) for i, values in enumerate(more.values())]
+    kind += [(f"p{i}", values.dtype.newbyteorder("<")) for i, values in enumerate(face_columns.values())]
     rows = np.empty(len(faces), kind)
     rows["count"] = faces.shape[1]
     rows["corners"] = faces
-    for i, values in enumerate(more.values()):
+    for i, values in enumerate(face_columns.values()):
         rows[f"p{i}"] = values
     header = [
         "ply",
@@ -601,7 +605,7 @@ def write_parts(
         *(f"property {declared}" for declared in properties),
         f"element face {len(faces)}",
         "property list uchar int vertex_indices",
-        *(f"property {_WORDS[values.dtype.str[1:]]} {name}" for name, values in more.items()),
+        *(f"property {_WORDS[values.dtype.str[1:]]} {name}" for name, values in face_columns.items()),
         "end_header",
     ]
     stream.write(("\n".join(header) + "\n").encode("latin-1"))

@@ -241,8 +241,9 @@ def left_out(result: Flattening, ending: str, has_texture: bool = False) -> tupl
         return ()
     # A texture would be multiplied by colours of vertices.
     hidden = {VERTEX_COLOURS, ALPHA} if has_texture and source.scene is None else set()
-    kept = KEPT[ending](source) - hidden
-    lost = set(source.attributes) - kept
-    other = next((other for other, kept_in in KEPT.items() if lost <= kept_in(source)), "")
-    has_textures = HAS_TEXTURES[ending](source) if ending in HAS_TEXTURES else False
-    return (*losses(source, ending, kept, other), *([old_textures("the file")] if has_textures else []))
+    kept_attributes = KEPT[ending](source) - hidden
+    lost_attributes = set(source.attributes) - kept_attributes
+    better = (name for name, attributes_of in KEPT.items() if lost_attributes <= attributes_of(source))
+    notes = losses(source, ending, kept_attributes, next(better, ""))
+    has_textures = ending in HAS_TEXTURES and HAS_TEXTURES[ending](source)
+    return (*notes, old_textures("the file")) if has_textures else notes

@@ -197,21 +197,21 @@ def _attributes(data: GltfData, parts: Sequence[ScenePart]) -> tuple[Attribute, 
     """Return the data of a scene in addition to its mesh."""
     tree = data.tree
     primitives = [tree["meshes"][part.mesh]["primitives"][part.primitive] for part in parts]
-    every = [primitive for mesh in tree["meshes"] for primitive in mesh["primitives"]]
+    file_primitives = [primitive for mesh in tree["meshes"] for primitive in mesh["primitives"]]
     names = dict.fromkeys(name for primitive in primitives for name in primitive["attributes"])
-    found = [Attribute("vertex attributes", name) for name in names if name not in _MESH]
-    found += [Attribute("morph targets")] * any(primitive.get("targets") for primitive in primitives)
-    found += [MATERIALS] * any("material" in primitive for primitive in primitives)
-    found += [Attribute("textures")] * bool(tree.get("textures"))
-    found += [Attribute("nodes")] * (len(tree.get("nodes", [])) > 1)
-    found += [Attribute(name) for name in ("skins", "animations", "cameras") if tree.get(name)]
-    modes = {primitive.get("mode", Mode.TRIANGLES) for primitive in every}
-    found += [Attribute("lines and points")] * bool(modes - set(Mode))
-    shown = {part.mesh for part in parts}
-    found += [Attribute("hidden meshes")] * (len(shown) < len(tree["meshes"]))
-    used = (name for name in tree.get("extensionsUsed", []) if name not in (DRACO, *COMPRESSED))
-    found += [Attribute("extensions", str(name)) for name in used]
-    return (*found, *([Attribute("extras")] if "extras" in set(keys_of(tree)) else []))
+    attributes = [Attribute("vertex attributes", name) for name in names if name not in _MESH]
+    attributes += [Attribute("morph targets")] * any(primitive.get("targets") for primitive in primitives)
+    attributes += [MATERIALS] * any("material" in primitive for primitive in primitives)
+    attributes += [Attribute("textures")] * bool(tree.get("textures"))
+    attributes += [Attribute("nodes")] * (len(tree.get("nodes", [])) > 1)
+    attributes += [Attribute(name) for name in ("skins", "animations", "cameras") if tree.get(name)]
+    modes = {primitive.get("mode", Mode.TRIANGLES) for primitive in file_primitives}
+    attributes += [Attribute("lines and points")] * bool(modes - set(Mode))
+    shown_meshes = {part.mesh for part in parts}
+    attributes += [Attribute("hidden meshes")] * (len(shown_meshes) < len(tree["meshes"]))
+    extensions = (name for name in tree.get("extensionsUsed", []) if name not in (DRACO, *COMPRESSED))
+    attributes += [Attribute("extensions", str(name)) for name in extensions]
+    return (*attributes, *([Attribute("extras")] if "extras" in set(keys_of(tree)) else []))
 
 
 class _Rows:

@@ -325,15 +325,15 @@ def scene_losses(result: Flattening, has_texture: bool = False) -> tuple[str, ..
         )
     if any("TANGENT" in one["attributes"] and "TANGENT" in _replaced(data, one) for one in primitives):
         notes.append("Tangents of the old UVs are not in the file: viewers compute them from the new ones.")
-    missing = [
+    unread_images = [
         printable(image["uri"])[:MAX_NAME]
         for image in image_files(tree)
         if not _content_of(data, image["uri"])
     ]
-    if missing:
+    if unread_images:
         notes.append(
-            f"{plural(len(missing), 'image file is', 'image files are')} not embedded, because nothing can be read "
-            f"there, or because it is outside the folder of the scene: {list_some(missing)}."
+            f"{plural(len(unread_images), 'image file is', 'image files are')} not embedded, because nothing can be "
+            f"read there, or because it is outside the folder of the scene: {list_some(unread_images)}."
         )
     used = {one["material"] for one in primitives if "material" in one}
     painted = [i for i in used if any(name.endswith("Texture") for name in keys_of(tree["materials"][i]))]
