@@ -203,6 +203,24 @@ def test_a_file_of_another_layout_is_found(ball, tmp_path, ending):
     assert any("another layout" in cause or "differently" in cause for cause, _ in other.breaches)
 
 
+@pytest.mark.slow
+def test_data_that_are_lost_without_a_note_are_found(monkeypatch):
+    seeds = range(12)
+    assert not any(run_case("attribute", seed).breaches for seed in seeds)
+    monkeypatch.setattr("coneflat.io.write.losses", lambda *_: ())
+    causes = [cause for seed in seeds for cause, _ in run_case("attribute", seed).breaches]
+    assert any("lost without a note" in cause for cause in causes)
+
+
+@pytest.mark.slow
+def test_triangles_that_rounding_destroys_are_found(monkeypatch):
+    seeds = range(24)
+    assert not any(run_case("offset", seed).breaches for seed in seeds)
+    monkeypatch.setattr("coneflat.io.gltf.positions.FAR", np.inf)
+    causes = [cause for seed in seeds for cause, _ in run_case("offset", seed).breaches]
+    assert "offsets: .glb is another shape" in causes
+
+
 @pytest.fixture(autouse=True)
 def elsewhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
