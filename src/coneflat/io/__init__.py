@@ -11,11 +11,25 @@ from .files import (
     known_ending,
     make_folder,
     read_bytes,
+    readable,
     remove_unfinished,
 )
+from .gltf.references import keys_of
 from .gltf.write import FOR_INDICES, FOR_VERTICES, MATERIAL, Glb, bounds
 from .join import Joined
 from .mapped import UVMesh, as_uv_mesh, has_uv, uv_mesh_of
+from .materials import (
+    CLAMP,
+    MIRRORED,
+    REPEAT,
+    SLOTS,
+    SPECULAR,
+    TRANSFORM,
+    ImageTexture,
+    Materials,
+    read_materials,
+    slot_of,
+)
 from .npz import CheckedArrays, number, read_archive, read_flattening
 from .obj import lines_of, relocated
 from .packages import as_input
@@ -32,16 +46,19 @@ from .texture import (
     decode_image,
     encode_png,
     read_picture,
+    to_linear,
+    to_srgb,
 )
 from .write import as_written, check_output, stored_in_glb, write_flattening, write_measured, write_stream
 
 __all__ = [
-    "uv_mesh_of", "CELLS", "CheckedArrays", "DARK_CELL", "FOR_INDICES", "FOR_VERTICES", "Glb", "INPUT_FORMATS",
+    "uv_mesh_of", "CELLS", "CLAMP", "CheckedArrays", "DARK_CELL", "ImageTexture", "MIRRORED", "Materials", "REPEAT",
+    "SLOTS", "SPECULAR", "TRANSFORM", "FOR_INDICES", "FOR_VERTICES", "Glb", "INPUT_FORMATS",
     "Joined", "LIGHT_CELL", "MATERIAL", "UVMesh", "VALUES", "PIPE", "Texture", "as_input",
     "as_uv_mesh", "as_path", "as_written", "atomic_write", "bounds", "cell_side", "check_cells", "check_output",
     "check_target", "checked_target", "decode_image", "encode_png", "find_meshes", "has_uv", "imported",
-    "known_ending", "lines_of", "make_folder", "nibabel", "number", "read_archive", "read_bytes",
+    "keys_of", "known_ending", "lines_of", "make_folder", "nibabel", "number", "read_archive", "read_bytes",
     "read_flattening", "read_joined", "read_label", "read_mesh", "read_mesh_from", "read_picture", "read_vertex_values",
     "relocated", "remove_unfinished", "shading_normals", "split_at_seams", "stored_in_glb", "write_flattening",
-    "write_measured", "write_parts", "write_stream",
+    "read_materials", "readable", "slot_of", "to_linear", "to_srgb", "write_measured", "write_parts", "write_stream",
 ]  # fmt: skip

@@ -40,6 +40,8 @@ class MeshFile:
         normals: (k, 3) the normals in the file, of any length, in the coordinate frame of the positions.
         normal: (c,) index into `normals` of every corner, -1 for corners without one; None if no corner has one.
         scene: the other data of a glTF file, which a written GLB keeps.
+        images: names of the image files that a PLY file lists.
+        image: (p,) index into `images` of every polygon, -1 for polygons without one; None if the file lists none.
 
     Examples:
         >>> mesh = coneflat.read_mesh(coneflat.sample_path())
@@ -62,6 +64,8 @@ class MeshFile:
     normals: FloatArray | None = None
     normal: IntArray | None = None
     scene: GltfScene | None = None
+    images: tuple[str, ...] = ()
+    image: IntArray | None = None
 
     @property
     def has_colours(self) -> bool:

@@ -6,6 +6,8 @@ in a header before memory is allocated.
 
 from __future__ import annotations
 
+import os
+import re
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -37,6 +39,9 @@ _CORNERS = ("vertex_indices", "vertex_index")
 #: Names that programs use for a vertex's UV point, and for the list of those of a face's corners: u, v, u, v, ...
 _VERTEX_UV = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"), ("u0", "v0"))
 _FACE_UV = "texcoord"
+#: The name of a face's image, as an index of those that comments in the header list.
+_FACE_IMAGE = "texnumber"
+_IMAGE_COMMENT = re.compile(rb"^comment[ \t]+TextureFile[ \t]+(.*?)[ \t]*$", re.IGNORECASE | re.MULTILINE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +73,7 @@ def parse_ply(path: Path, content: bytes) -> MeshFile:
         EmptyMeshError: it has no vertex or no face.
     """
     form, elements, start = _header(path, content)
+    images, image = _images(content[:start]), None
     if form == "ascii":
         # Converted to an array of doubles, the text is read by the same code as the binary forms; doubles represent
         # every possible index exactly.
@@ -90,6 +96,8 @@ def parse_ply(path: Path, content: bytes) -> MeshFile:
             properties = {name: _shade(name, c) for name, c in zip(names[3:], columns[3:], strict=True)}
         elif element.name == "face":
             sizes, corners = columns[0].astype(np.int64), _as_integers(path, columns[1])
+            if element.properties[wanted[-1]].name == _FACE_IMAGE:
+                image = columns.pop().astype(np.int64)
             texture, uv = _corner_uv(path, sizes, *columns[2:]) if columns[2:] else (None, None)
         missing.discard(element.name)
         if not missing:
@@ -114,7 +122,16 @@ def parse_ply(path: Path, content: bytes) -> MeshFile:
         uv=uv,
         normals=normals,
         normal=None if normals is None else corners,
+        images=images,
+        # Without numbers, the first image is that of all faces.
+        image=(np.zeros(len(sizes), np.int64) if image is None else image) if images else None,
     )
+
+
+def _images(header: bytes) -> tuple[str, ...]:
+    """Return the names of the image files that the comments of a header list."""
+    # Some old files end lines with a single carriage return.
+    return tuple(map(os.fsdecode, _IMAGE_COMMENT.findall(b"\n".join(header.splitlines()))))
 
 
 def _corner_uv(path: Path, sizes: IntArray, counts: Column, numbers: Column) -> tuple[IntArray, FloatArray]:
@@ -185,7 +202,9 @@ def _wanted(path: Path, element: _Element) -> list[int]:
         named = [i for i in lists if element.properties[i].name in _CORNERS]
         if not named and (len(lists) != 1 or element.properties[lists[0]].name == _FACE_UV):
             raise MeshFileError(f"{path}: its faces have no list 'vertex_indices'")
-        return (named[:1] or lists) + [i for i in lists if element.properties[i].name == _FACE_UV][:1]
+        points = [i for i in lists if element.properties[i].name == _FACE_UV]
+        images = [i for i, p in enumerate(element.properties) if p.name == _FACE_IMAGE and not p.count]
+        return (named[:1] or lists) + points[:1] + images[:1]
     return []
 
 

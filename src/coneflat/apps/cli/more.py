@@ -130,7 +130,7 @@ def transfer(
             baked = bake(old, new, resolution=resolution, texture=texture)
         with console.stage("write"):
             baked.save(output)
-        console.say(f"note: {note}" for note in baked.notes)
+        console.say(f"note: {note}" for note in (*baked.notes, *baked.losses(output)))
         console.finish([output])
 
 
