@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats
 from ..errors import ArrayShapeError, MissingUVError
-from ..mesh.polygons import fan_corners
+from ..mesh.polygons import fan_corners, polygon_of
 from ..result import Flattening
 from .join import Joined
+from .materials import image_numbers
 from .mesh_file import MeshFile
 from .npz import read_flattening
 from .packages import as_input
@@ -33,6 +34,7 @@ class UVMesh:
         without, not_finite: number of polygon corners without UV, and with a UV that is NaN or infinite.
         notes: changes made on reading, one sentence each.
         source: the file, if any.
+        texture: (m,) the number of the image that each triangle's material has; None if it is the same for all.
     """
 
     vertices: FloatArray
@@ -43,6 +45,7 @@ class UVMesh:
     not_finite: int
     notes: tuple[str, ...] = ()
     source: MeshFile | None = None
+    texture: IntArray | None = None
 
     @property
     def has_uv(self) -> BoolArray:
@@ -97,6 +100,7 @@ def uv_mesh_of(joined: Joined) -> UVMesh:
     texture = np.where(mesh.texture < 0, len(mesh.uv), mesh.texture)
     fans = fan_corners(mesh.offsets)
     missing = texture == len(mesh.uv)
+    images, notes = image_numbers(mesh)
     return UVMesh(
         vertices=mesh.vertices,
         faces=mesh.corners[fans],
@@ -104,8 +108,9 @@ def uv_mesh_of(joined: Joined) -> UVMesh:
         polygons=len(mesh.offsets) - 1,
         without=int(np.count_nonzero(missing)),
         not_finite=int(np.count_nonzero(~np.isfinite(points[texture]).all(axis=1) & ~missing)),
-        notes=joined.notes(),
+        notes=(*joined.notes(), *notes),
         source=mesh,
+        texture=images[polygon_of(fans, mesh.offsets)] if images.any() else None,
     )
 
 
