@@ -27,6 +27,7 @@ from .meshes import make_mesh, make_tiny
 from .outcome import LONGEST_MESSAGE, Outcome
 from .promises import check
 from .textures import texture_case
+from .transfers import transfer_case
 from .written import READERS, check_file, check_report
 
 Random = np.random.Generator
@@ -281,12 +282,22 @@ KINDS: dict[str, Callable[[Random, Outcome], None]] = {
     "tiny": _tiny,
     "process": _process,
     "texture": texture_case,
+    "transfer": transfer_case,
     "grid": grid_case,
     "crash": _crash,
     "hang": _hang,
     "swell": _swell,
 }
-SHARES = {"mesh": 14, "tiny": 6, "texture": 8, "file": 6, "argument": 3, "command": 2, "process": 1}
+SHARES = {
+    "mesh": 14,
+    "tiny": 6,
+    "texture": 8,
+    "file": 6,
+    "argument": 3,
+    "command": 2,
+    "transfer": 2,
+    "process": 1,
+}
 
 
 def cases(count: int, first: int, kinds: tuple[str, ...] = tuple(SHARES)) -> list[tuple[str, int]]:
