@@ -185,7 +185,7 @@ def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:
         corner_uv=corner_uv,
         distortion=replace(distortion, overlap=cover.overlap, overlapping_pairs=cover.pairs),
         counts=counts,
-        notes=(*mapped.notes, *_notes(mapped, checked), *cover.notes),
+        notes=(*mapped.notes, *_notes(mapped, checked), *mapped.texture_notes, *cover.notes),
         path=None if mapped.source is None else mapped.source.path,
     )
 

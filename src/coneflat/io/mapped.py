@@ -35,6 +35,7 @@ class UVMesh:
         notes: changes made on reading, one sentence each.
         source: the file, if any.
         texture: (m,) the number of the image that each triangle's material has; None if it is the same for all.
+        texture_notes: notes on materials whose image is not known.
     """
 
     vertices: FloatArray
@@ -46,6 +47,7 @@ class UVMesh:
     notes: tuple[str, ...] = ()
     source: MeshFile | None = None
     texture: IntArray | None = None
+    texture_notes: tuple[str, ...] = ()
 
     @property
     def has_uv(self) -> BoolArray:
@@ -100,7 +102,7 @@ def uv_mesh_of(joined: Joined) -> UVMesh:
     texture = np.where(mesh.texture < 0, len(mesh.uv), mesh.texture)
     fans = fan_corners(mesh.offsets)
     missing = texture == len(mesh.uv)
-    images, notes = image_numbers(mesh)
+    images, texture_notes = image_numbers(mesh)
     return UVMesh(
         vertices=mesh.vertices,
         faces=mesh.corners[fans],
@@ -108,9 +110,10 @@ def uv_mesh_of(joined: Joined) -> UVMesh:
         polygons=len(mesh.offsets) - 1,
         without=int(np.count_nonzero(missing)),
         not_finite=int(np.count_nonzero(~np.isfinite(points[texture]).all(axis=1) & ~missing)),
-        notes=(*joined.notes(), *notes),
+        notes=joined.notes(),
         source=mesh,
         texture=images[polygon_of(fans, mesh.offsets)] if images.any() else None,
+        texture_notes=texture_notes,
     )
 
 

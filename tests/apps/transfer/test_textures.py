@@ -310,6 +310,19 @@ class TestObj:
         assert baked.notes == ("Materials that are in no library are white: b.",)
         assert (colours(baked)[:, 2:] == 255).all()
 
+    def test_materials_of_the_target_are_not_read(self, tmp_path):
+        """They are replaced, so it does not matter that their library is missing."""
+        solid([255, 0, 0], tmp_path / "x.png")
+        new = two_squares(tmp_path)
+        lines = (
+            new.read_text()
+            .replace("f 1/1", "mtllib none.mtl\nusemtl a\nf 1/1")
+            .replace("f 2/2", "usemtl b\nf 2/2")
+        )
+        new.write_text(lines)
+        old = painted_obj(tmp_path, "newmtl a\nmap_Kd x.png\n", ("a", "a"))
+        assert transfer(old, new, resolution=4).notes == ()
+
     @pytest.mark.parametrize(
         ("library", "message"),
         [
