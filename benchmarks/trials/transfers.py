@@ -6,15 +6,18 @@ texel of the target, and the area that each texture covers, follow from the defi
 
 from __future__ import annotations
 
+import json
 import math
+import os
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scenes import SceneMaker
+from scenes import SceneMaker, opened
 
+from .files import damaged_bytes, damaged_scene
 from .outcome import Outcome
 
 Random = np.random.Generator
@@ -79,8 +82,39 @@ def transfer_case(rng: Random, outcome: Outcome) -> None:
         picture.save(name)
     path = {"glb": _write_glb, "obj": _write_obj, "ply": _write_ply}[kind](rng, row, files)
     outcome.recipe = f"transfer .{kind} of {[one[0].mode for one in images]} to {side} texels: {row}"
+    if rng.random() < 0.3:
+        _try_damaged(rng, outcome, path)
+        return
     _check_colours(outcome, row, [pixels for _, pixels in images], path, side)
     _check_measures(outcome, row, path)
+
+
+def _try_damaged(rng: Random, outcome: Outcome, path: Path) -> None:
+    """Bake and measure a model whose file, library, image or scene is damaged: that may be refused."""
+    import coneflat
+    from coneflat.apps.transfer import transfer
+
+    names = sorted(name for name in os.listdir() if name.endswith((path.suffix, ".png", ".mtl")))
+    broken = Path(str(rng.choice(names)))
+    if broken.suffix == ".glb" and rng.random() < 0.8:
+        tree, _, _ = opened(broken.read_bytes())
+        content = broken.read_bytes()
+        length = int.from_bytes(content[12:16], "little")
+        text = json.dumps(damaged_scene(rng, tree)).encode()
+        text += b" " * (-len(text) % 4)
+        size = len(content) - length + len(text)
+        head = (
+            b"glTF" + (2).to_bytes(4, "little") + size.to_bytes(4, "little") + len(text).to_bytes(4, "little")
+        )
+        broken.write_bytes(head + content[16:20] + text + content[20 + length :])
+    else:
+        broken.write_bytes(damaged_bytes(rng, broken.read_bytes()))
+    outcome.recipe += f"; {broken} is damaged"
+    Path("new.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n")
+    with outcome.guarded("damaged: ", expects_nan=True):
+        transfer(path, "new.obj", resolution=4).save("out.glb")
+    with outcome.guarded("damaged: ", expects_nan=True):
+        coneflat.measure_uv(path)
 
 
 def _image(rng: Random) -> tuple[Any, np.ndarray]:
@@ -272,7 +306,8 @@ def _check_colours(outcome: Outcome, row: Row, images: list[np.ndarray], path: P
         if has_colours and outcome.message:
             outcome.breach("transfer: refused", outcome.message)
         return
-    if not has_colours:
+    # Materials of specular-glossiness are not metallic, which is in an image if the others are.
+    if not has_colours and path.suffix != ".glb":
         outcome.breach("transfer: a model without colours is baked")
     texels = baked.images["baseColorTexture"].astype(int)
     for line in range(side):
