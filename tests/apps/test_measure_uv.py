@@ -256,6 +256,16 @@ class TestTextures:
         assert found["packing_efficiency"] == pytest.approx(0.75)
         assert found["box_efficiency"] == pytest.approx(2.5 / 2)
 
+    def test_charts_end_where_the_texture_changes(self, tmp_path):
+        """Also where the UVs continue: the second square is in the next tile, as of a repeated image."""
+        text = f"mtllib a.mtl\n{PAIR}vt 2 0\nvt 2 1\nusemtl one\n{LEFT}usemtl the other\nf 2/2 5/5 6/6 3/3\n"
+        for image, charts, length in (("a.png", 1, 0), ("b.png", 2, 1 / math.sqrt(2))):
+            written(tmp_path, f"newmtl one\nmap_Kd a.png\nnewmtl the other\nmap_Kd {image}\n", "a.mtl")
+            found = measure_uv(written(tmp_path, text)).report()
+            assert (found["charts"], found["tiles"], found["packing_efficiency"]) == (charts, 2, 1)
+            assert found["seam_length"] == pytest.approx(length)
+            assert (found["flipped"], found["seam_mismatch"]) == (0, 0)
+
     def test_udim_tiles_are_separate_in_one_texture(self, tmp_path):
         shifted = PAIR + "vt 1 0\nvt 2 0\nvt 2 1\nvt 1 1\n"
         found = measure_uv(written(tmp_path, shifted + LEFT + "f 2/5 5/6 6/7 3/8\n")).report()

@@ -154,13 +154,15 @@ def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:
     exponent = unit_exponent(corner_uv)
     unit = np.ldexp(corner_uv, -exponent)
     scaled = at_unit_size(checked)
-    distortion = measure_map(scaled.mesh, unit).rescaled((scaled.exponent + exponent) * np.log(2))
-    every = mapped.corner_uv[known]
     texture = np.zeros(len(known), np.int64) if mapped.texture is None else mapped.texture
     textures = np.unique(texture[known])
+    owner = texture[known][checked.face_origin]
+    distortion = measure_map(scaled.mesh, unit, texture=owner).rescaled(
+        (scaled.exponent + exponent) * np.log(2)
+    )
+    every = mapped.corner_uv[known]
     cover = _cover_of_textures(np.ldexp(every, -exponent), texture[known])
     points, corners = uv_points(checked.mesh, unit)
-    owner = texture[known][checked.face_origin]
     tiles = sum(len(chart_tiles(points, corners[owner == number], exponent)) for number in textures)
     with np.errstate(over="ignore"):  # A value that is not finite is reported as unknown.
         covered = float(np.ldexp(cover.area, 2 * exponent))

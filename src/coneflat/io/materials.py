@@ -205,9 +205,11 @@ def _of_obj(folder: Path, text: ObjText, count: int) -> Materials:
     textures: dict[tuple[Path, bool], ImageTexture] = {}
     items = [_as_item(name, *found[name], textures) if name in found else {"name": name} for name in names]
     for name in names:
-        left_out = found[name][1].left_out if name in found else ()
-        if left_out:
-            notes.append(f"Not read of the material {name}: {', '.join(left_out)}.")
+        material = found[name][1] if name in found else MtlMaterial()
+        if material.left_out:
+            notes.append(f"Not read of the material {name}: {', '.join(material.left_out)}.")
+        if material.image is not None and not any(material.colour):
+            notes.append(f"The material {name} is black (Kd 0 0 0), and so is its image {material.image}.")
     listed = list(textures.values())
     return Materials([*items, {}], polygon % (len(items) + 1), listed.__getitem__, tuple(notes), unknown)
 

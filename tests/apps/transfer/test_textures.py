@@ -299,6 +299,13 @@ class TestObj:
         baked = transfer(painted_obj(tmp_path, library), two_squares(tmp_path), resolution=4)
         assert baked.notes == ("Not read of the material a: ke, -mm of map_Kd, map_bump, norm.",)
 
+    def test_a_black_image_is_named(self, tmp_path):
+        solid([255, 255, 255], tmp_path / "x.png")
+        old = painted_obj(tmp_path, "newmtl a\nKd 0 0 0\nmap_Kd x.png\n", ("a", "a"))
+        baked = transfer(old, two_squares(tmp_path), resolution=4)
+        assert baked.notes == ("The material a is black (Kd 0 0 0), and so is its image x.png.",)
+        assert not colours(baked).any()
+
     def test_missing_libraries_and_materials_are_named(self, tmp_path):
         new = two_squares(tmp_path)
         with pytest.raises(errors.OptionError, match=r"got neither.*old\.mtl: there is no such file"):
