@@ -9,7 +9,10 @@ A case is a kind and a seed: `--case mesh:17` runs one case in this process and 
 - file: mesh files of all formats, intact or damaged, read, flattened, written, and read back by other software;
 - argument: public functions with odd arguments;
 - command: odd command lines;
-- process: commands with closed standard streams, and commands that a signal ends.
+- process: commands with closed standard streams, and commands that a signal ends;
+- attribute: files with groups, properties, colours, materials and so on, by `flatten`, `unwrap` and `quads`: all of it
+  is in the written file, or a note names it;
+- offset: files of models far from the origin: the triangles of the written file are those that were read, or a note.
 
 Each runs in a worker with limits of time and memory. Of every result all promises are measured anew, by plain code of
 this benchmark's own (`trials/promises.py`): finite points in the texture, no flipped triangle, no overlaps in an atlas,
@@ -18,7 +21,7 @@ that says what was measured. What is not kept and not named by a note is a breac
 package's own, messages of several lines, crashes, hangs, and too much memory. The exit code is 1 if there is any.
 
 Options: --cases 10000, --jobs 2, --seed 0 (the first), --kinds mesh,tiny,texture,transfer,file,argument,command,
-process, --out FILE.json (all outcomes), --again FILE.json (only the breaches in such a file).
+process,attribute,offset, --out FILE.json (all outcomes), --again FILE.json (only the breaches in such a file).
 """
 
 from __future__ import annotations

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from typing import Any
 
 import numpy as np
 from shapes import sphere
@@ -17,7 +18,12 @@ class SceneMaker:
     """A tree of glTF, and a buffer."""
 
     def __init__(self):
-        self.tree = {"asset": {"version": "2.0"}, "accessors": [], "bufferViews": [], "buffers": [{}]}
+        self.tree: dict[str, Any] = {
+            "asset": {"version": "2.0"},
+            "accessors": [],
+            "bufferViews": [],
+            "buffers": [{}],
+        }
         self.binary = bytearray()
 
     def view(self, content, **more):

@@ -135,7 +135,8 @@ def test_the_least_quantum_gives_its_multiples():
 def test_angles_without_bound_are_no_bound():
     vertices, faces = shapes.torus(10, 8)
     plain = coneflat.flatten(vertices, faces, max_cone_angle=None)
-    assert np.array_equal(coneflat.flatten(vertices, faces, max_cone_angle=1e300).uv, plain.uv)
+    for bound in (1e300, math.inf, "none"):
+        assert np.array_equal(coneflat.flatten(vertices, faces, max_cone_angle=bound).uv, plain.uv)
     with pytest.raises(errors.OptionError, match="smallest cone angle must be positive and at most 1000 pi"):
         coneflat.flatten(vertices, faces, min_cone_angle=1e300, max_cone_angle=None)
 

@@ -19,11 +19,13 @@ from typing import Any
 import numpy as np
 
 from .arguments import DOORS, Calls
+from .attributes import attribute_case
 from .choices import cross_options, in_short, make_options
 from .commands import interrupt_command, make_command, run_command, run_without_streams
 from .files import make_file
 from .grids import grid_case, grid_of_mesh
 from .meshes import make_mesh, make_tiny
+from .offsets import offset_case
 from .outcome import LONGEST_MESSAGE, Outcome
 from .promises import check
 from .textures import texture_case
@@ -283,21 +285,17 @@ KINDS: dict[str, Callable[[Random, Outcome], None]] = {
     "process": _process,
     "texture": texture_case,
     "transfer": transfer_case,
+    "attribute": attribute_case,
+    "offset": offset_case,
     "grid": grid_case,
     "crash": _crash,
     "hang": _hang,
     "swell": _swell,
 }
 SHARES = {
-    "mesh": 14,
-    "tiny": 6,
-    "texture": 8,
-    "file": 6,
-    "argument": 3,
-    "command": 2,
-    "transfer": 2,
-    "process": 1,
-}
+    "mesh": 14, "tiny": 6, "texture": 8, "file": 6, "argument": 3, "command": 2, "process": 1, "transfer": 2,
+    "attribute": 2, "offset": 2,
+}  # fmt: skip
 
 
 def cases(count: int, first: int, kinds: tuple[str, ...] = tuple(SHARES)) -> list[tuple[str, int]]:

@@ -146,7 +146,12 @@ class TestGltf:
             ("%00", "embedded null|cannot be read|no such file"),
             (".", "is a folder"),
             (f"{'x' * 3000}.obj", "cannot be read: "),
-            ("/dev/zero", "not a file but a device"),
+            ("/dev/zero", "'/dev/zero' is outside the folder of the file, and is not read"),
+            ("../a.bin", "'../a.bin' is outside the folder"),
+            ("b/../../a.bin", "'b/../../a.bin' is outside the folder"),
+            ("%2e%2e/a.bin", "'../a.bin' is outside the folder"),
+            ("C:%5Ca.bin", "is outside the folder"),
+            ("b/../a.bin", "there is no such file"),
             (17, "is not a string"),
         ],
     )

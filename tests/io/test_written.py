@@ -187,12 +187,13 @@ def test_notes_name_what_another_format_does_not_keep(tmp_path):
     mesh.export(tmp_path / "coloured.ply")
     mesh.export(tmp_path / "coloured.obj", include_color=True)
     told = {
-        "painted.obj": "Groups and materials of the file are not kept in",
-        "scene.glb": "Nodes, materials and textures of the file are not kept in",
-        "coloured.ply": "Vertex colours of the file are not kept in",
-        "coloured.obj": "Vertex colours of the file are not kept in",
+        "painted.obj": "materials; .obj keeps them.",
+        "scene.glb": "materials",
+        "coloured.ply": "vertex colours, vertex properties (alpha); .ply keeps them.",
+        "coloured.obj": "vertex colours; .obj keeps them.",
     }
-    for name, note in told.items():
+    for name, data in told.items():
         for ending in (".obj", ".ply", ".glb", ".npz"):
-            keeps = ending == ".npz" or name.endswith(ending) or (ending == ".ply" and "coloured" in name)
-            assert any(f"{note} {ending}" in each for each in all_notes(tmp_path / name, ending)) != keeps
+            keeps = name.endswith(ending) or (ending in (".ply", ".glb") and "coloured" in name)
+            note = f"These data of the input are not kept in {ending}: {data}"
+            assert any(note in each for each in all_notes(tmp_path / name, ending)) != keeps

@@ -15,9 +15,9 @@ from ..base import FloatArray, IntArray, Unmet, mask_of, plural, unit_exponent, 
 from ..errors import MissingUVError
 from ..geometry import MAX_CELLS, approximate_overlap_areas, find_overlaps, signed_double_areas
 from ..io import UVMesh, as_uv_mesh
-from ..measure import MAP_MEASURES, measure_map, path_text, sum_angles
+from ..measure import MAP_MEASURES, measure_map, path_text, sum_angles, undefined_measures
 from ..mesh import CheckedMesh, corner_fans, end_corners, joined_edges, label_faces, left_out
-from ..source import at_unit_size
+from ..source import at_unit_size, rounding_notes
 
 #: Limit of overlapping pairs, per triangle and at least. With more pairs, areas are counted in pixels, because the
 #: number of pairs can be quadratic.
@@ -182,7 +182,7 @@ def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:
         "box_efficiency": cover.box_efficiency,
         "angle_sum_error": angle_sum_error(checked.mesh, unit),
     }
-    return UVMeasures(
+    measures = UVMeasures(
         mesh=checked.mesh,
         corner_uv=corner_uv,
         distortion=replace(distortion, overlap=cover.overlap, overlapping_pairs=cover.pairs),
@@ -190,6 +190,10 @@ def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:
         notes=(*mapped.notes, *_notes(mapped, checked), *mapped.texture_notes, *cover.notes),
         path=None if mapped.source is None else mapped.source.path,
     )
+    notes = [*measures.notes, *undefined_measures(measures.values(), distortion.qc)]
+    if distortion.degenerate_input or len(checked.mesh.faces) < len(every):
+        notes += rounding_notes(mapped.vertices, mapped.faces[known])
+    return replace(measures, notes=tuple(notes))
 
 
 def surface_of(mapped: UVMesh, *, strict: bool = False) -> tuple[CheckedMesh, FloatArray]:

@@ -1,5 +1,6 @@
 """Reading of meshes from files, and writing of flattened meshes to files."""
 
+from .attributes import ALPHA, GROUPS, MATERIALS, OBJECTS, VERTEX_COLOURS, Attribute, losses, texture_files
 from .brains import VALUES, nibabel, read_label, read_vertex_values
 from .files import (
     PIPE,
@@ -14,6 +15,7 @@ from .files import (
     readable,
     remove_unfinished,
 )
+from .gltf.positions import local_positions
 from .gltf.references import keys_of
 from .gltf.write import FOR_INDICES, FOR_VERTICES, MATERIAL, Glb, bounds
 from .join import Joined
@@ -49,16 +51,26 @@ from .texture import (
     to_linear,
     to_srgb,
 )
-from .write import as_written, check_output, stored_in_glb, write_flattening, write_measured, write_stream
+from .write import (
+    KEPT,
+    as_written,
+    check_output,
+    stored_in_glb,
+    write_flattening,
+    write_measured,
+    write_stream,
+)
 
 __all__ = [
-    "uv_mesh_of", "CELLS", "CLAMP", "CheckedArrays", "DARK_CELL", "ImageTexture", "MIRRORED", "Materials", "REPEAT",
-    "SLOTS", "SPECULAR", "TRANSFORM", "FOR_INDICES", "FOR_VERTICES", "Glb", "INPUT_FORMATS",
-    "Joined", "LIGHT_CELL", "MATERIAL", "UVMesh", "VALUES", "PIPE", "Texture", "as_input",
-    "as_uv_mesh", "as_path", "as_written", "atomic_write", "bounds", "cell_side", "check_cells", "check_output",
-    "check_target", "checked_target", "decode_image", "encode_png", "find_meshes", "has_uv", "imported",
-    "keys_of", "known_ending", "lines_of", "make_folder", "nibabel", "number", "read_archive", "read_bytes",
-    "read_flattening", "read_joined", "read_label", "read_mesh", "read_mesh_from", "read_picture", "read_vertex_values",
-    "relocated", "remove_unfinished", "shading_normals", "split_at_seams", "stored_in_glb", "write_flattening",
-    "read_materials", "readable", "slot_of", "to_linear", "to_srgb", "write_measured", "write_parts", "write_stream",
+    "ALPHA", "as_input", "as_path", "as_uv_mesh", "as_written", "atomic_write", "Attribute", "bounds", "cell_side",
+    "CELLS", "check_cells", "check_output", "check_target", "checked_target", "CheckedArrays", "DARK_CELL",
+    "decode_image", "encode_png", "find_meshes", "FOR_INDICES", "FOR_VERTICES", "Glb", "GROUPS", "has_uv",
+    "imported", "INPUT_FORMATS", "Joined", "KEPT", "known_ending", "LIGHT_CELL", "lines_of", "local_positions",
+    "losses", "make_folder", "MATERIAL", "MATERIALS", "nibabel", "number", "OBJECTS", "PIPE", "read_archive",
+    "read_bytes", "read_flattening", "read_joined", "read_label", "read_mesh", "read_mesh_from", "read_picture",
+    "read_vertex_values", "relocated", "remove_unfinished", "shading_normals", "split_at_seams", "stored_in_glb",
+    "Texture", "texture_files", "uv_mesh_of", "UVMesh", "VALUES", "VERTEX_COLOURS", "write_flattening",
+    "write_measured", "write_parts", "write_stream",
+    "CLAMP", "ImageTexture", "keys_of", "Materials", "MIRRORED", "read_materials", "readable", "REPEAT", "slot_of",
+    "SLOTS", "SPECULAR", "to_linear", "to_srgb", "TRANSFORM",
 ]  # fmt: skip

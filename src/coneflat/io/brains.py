@@ -5,6 +5,7 @@ GIFTI, annotations and MGH are read by nibabel (the extra `brains`); FreeSurfer'
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 from ..base.arrays import FloatArray, IntArray
 from ..base.text import list_some
 from ..errors import MeshFileError, OptionError
+from .attributes import Attribute
 from .files import PathName, as_path, imported, read_bytes, readable
 from .mesh_file import MeshFile
 
@@ -55,7 +57,12 @@ def parse_freesurfer(path: Path, content: bytes) -> MeshFile:
         vertices, faces = (int(count) for count in np.frombuffer(body[:8].ljust(8, b"\xff"), ">i4"))
         if min(vertices, faces) >= 0 and len(body) >= 8 + 12 * (vertices + faces):
             points = np.frombuffer(body, ">f4", 3 * vertices, 8).reshape(-1, 3)
-            return _triangles(path, points, np.frombuffer(body, ">i4", 3 * faces, 8 + 12 * vertices))
+            # What follows says where the volume is that the surface was made from.
+            has_more = len(body) > 8 + 12 * (vertices + faces)
+            attributes = [Attribute("geometry of the volume")] if has_more else []
+            return _triangles(
+                path, points, np.frombuffer(body, ">i4", 3 * faces, 8 + 12 * vertices), attributes
+            )
     raise MeshFileError(
         f"{path} is not a FreeSurfer surface of triangles, or is truncated at {len(content):,} bytes"
     )
@@ -75,12 +82,24 @@ def parse_gifti(path: Path, content: bytes) -> MeshFile:
     for values, kind in ((points, "positions"), (faces, "triangles")):
         if np.ndim(values) != 2 or np.shape(values)[1] != 3:
             raise MeshFileError(f"{path} must be a surface, got a GIFTI file without {kind}")
-    return _triangles(path, points, faces)
+    return _triangles(path, points, faces, _gifti_attributes(image))
 
 
-def _triangles(path: Path, points: Any, corners: Any) -> MeshFile:
+def _gifti_attributes(image: Any) -> list[Attribute]:
+    """Return the data of a GIFTI image in addition to its mesh: metadata with values, and further arrays."""
+    found = list[Attribute]()
+    for owner in (image, *image.darrays):
+        filled = (str(name) for name, value in dict(owner.meta).items() if str(value).strip())
+        found += [Attribute("metadata", name) for name in filled]
+    if len(image.darrays) > 2:
+        found.append(Attribute("values at vertices"))
+    return list(dict.fromkeys(found))
+
+
+def _triangles(path: Path, points: Any, corners: Any, attributes: Sequence[Attribute]) -> MeshFile:
     corners = np.asarray(corners, dtype=np.int64).reshape(-1)
-    return MeshFile(path, np.asarray(points, dtype=np.float64), corners, np.arange(0, len(corners) + 1, 3))
+    positions, offsets = np.asarray(points, dtype=np.float64), np.arange(0, len(corners) + 1, 3)
+    return MeshFile(path, positions, corners, offsets, attributes=tuple(attributes))
 
 
 def read_vertex_values(path: PathName) -> FloatArray:

@@ -12,9 +12,10 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from importlib import import_module
 from os import PathLike
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import IO, Any, TypeAlias
 
+from ..base.text import short_repr
 from ..errors import ConeflatError, EmptyMeshError, MeshFileError, OptionError, UnknownFormatError
 
 #: The types of file names that users may pass.
@@ -139,6 +140,23 @@ def known_ending(path: Path, endings: Collection[str], what: str) -> str:
         wrong = f"ends with {path.suffix!r}, which is not a known format" if path.suffix else "has no ending"
         raise UnknownFormatError(f"{path} {wrong}; {what} {', '.join(endings)}")
     return ending
+
+
+def inner_path(folder: Path, name: str) -> Path:
+    """Return the path of a file that another file names relative to its folder.
+
+    Only files in this folder, and in folders in it, are read: a file from elsewhere must not make a program read
+    others. Links are followed.
+
+    Raises:
+        MeshFileError: the name is an absolute path, or leads out of the folder.
+    """
+    is_absolute = os.path.isabs(name) or PureWindowsPath(name).is_absolute()
+    if is_absolute or os.path.normpath(name).split(os.sep)[0] == os.pardir:
+        raise MeshFileError(
+            f"{short_repr(name)} is outside the folder of the file, and is not read: put both into one folder"
+        )
+    return folder / name
 
 
 def moved_path(name: bytes, here: str, there: str) -> bytes:

@@ -20,7 +20,8 @@ from ..geometry.triangulate import triangulate
 from ..mesh.check import is_left_out, left_out
 from ..mesh.check import weld as number_places
 from ..mesh.connectivity import label_components, sort_pairs
-from .mesh_file import MeshFile
+from .attributes import list_names
+from .mesh_file import MeshFile, differing_properties
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +55,11 @@ class Joined:
             )
         elif self.mesh.welded:
             notes.append(f"Merged {self.mesh.welded:,} vertices at the same positions.")
+        if self.mesh.merged_properties:
+            names = list_names(self.mesh.merged_properties)
+            notes.append(
+                f"Merged vertices differ in {names}: the values of the first of them are used; --no-weld keeps all."
+            )
         if self.left:
             notes.append(
                 f"{plural(self.left, 'open edge')} at the same positions as others, left open; --weld merges all "
@@ -146,7 +152,11 @@ def join_borders(mesh: MeshFile) -> Joined:
     if not len(one):
         return Joined(mesh, every, left=left)
     joined = replace(
-        mesh, corners=used[mesh.corners], unwelded=mesh.corners, welded=int(np.count_nonzero(used != every))
+        mesh,
+        corners=used[mesh.corners],
+        unwelded=mesh.corners,
+        welded=int(np.count_nonzero(used != every)),
+        merged_properties=differing_properties(mesh, used),
     )
     return Joined(joined, used, len(one), left)
 

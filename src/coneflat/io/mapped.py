@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats
 from ..errors import ArrayShapeError, MissingUVError
+from ..mesh.check import short_faces_note
 from ..mesh.polygons import fan_corners, polygon_of
 from ..result import Flattening
 from .join import Joined
@@ -110,7 +111,7 @@ def uv_mesh_of(joined: Joined) -> UVMesh:
         polygons=len(mesh.offsets) - 1,
         without=int(np.count_nonzero(missing)),
         not_finite=int(np.count_nonzero(~np.isfinite(points[texture]).all(axis=1) & ~missing)),
-        notes=joined.notes(),
+        notes=(*joined.notes(), *([short_faces_note(mesh.short_faces)] if mesh.short_faces else [])),
         source=mesh,
         texture=images[polygon_of(fans, mesh.offsets)] if images.any() else None,
         texture_notes=texture_notes,

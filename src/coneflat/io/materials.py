@@ -12,6 +12,7 @@ import numpy as np
 from ..base.arrays import IntArray
 from ..base.text import list_some, plural
 from ..errors import ConeflatError, MeshFileError
+from .attributes import texture_files
 from .files import read_bytes, readable
 from .gltf.data import GltfData, Item
 from .gltf.read import GltfScene
@@ -81,8 +82,11 @@ def read_materials(mesh: MeshFile) -> Materials:
         return _of_scene(mesh.scene)
     if mesh.obj is not None:
         return _of_obj(mesh.path.parent, mesh.obj, count)
-    if mesh.image is not None:
-        return _of_images(mesh.path, mesh.images, mesh.image)
+    images = tuple(name for _, name in texture_files(mesh))
+    if images:
+        # Without numbers, the first image is that of all faces.
+        numbers = mesh.face_properties.get("texnumber", np.zeros(count))
+        return _of_images(mesh.path, images, np.asarray(numbers, np.int64))
     return Materials([{}], np.zeros(count, np.int64), _no_texture(mesh.path))
 
 

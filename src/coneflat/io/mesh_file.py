@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.arrays import FloatArray, IntArray
-from ..errors import EmptyMeshError, FaceIndexError, MeshFileError
+from ..errors import EmptyMeshError, FaceIndexError
 from ..geometry.triangulate import triangulate
 from ..mesh.polygons import COLOURS, first_bad_corner
+from .attributes import Attribute
 
 if TYPE_CHECKING:
     from .gltf.read import GltfScene
     from .obj import ObjText
+    from .ply import PlyHeader
+
+#: Corners of a face at least; files may have faces with fewer.
+MIN_CORNERS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,14 +40,18 @@ class MeshFile:
         obj: the text of an OBJ file, from which the output keeps groups, materials and comments.
         properties: further data of every vertex by name, each (n,), for example `quality` or `red` of a PLY file.
             Colours are 0 to 1.
+        face_properties: further data of every polygon by name, each (p,), in the type of the file.
         texture: (c,) index of the UV point of every corner, -1 for corners without one; None if no corner has one.
         uv: (u, 2) the UV points that `texture` refers to, v upwards, not validated: they may be NaN; None if the file
             has none.
         normals: (k, 3) the normals in the file, of any length, in the coordinate frame of the positions.
         normal: (c,) index into `normals` of every corner, -1 for corners without one; None if no corner has one.
         scene: the other data of a glTF file, which a written GLB keeps.
-        images: names of the image files that a PLY file lists.
-        image: (p,) index into `images` of every polygon, -1 for polygons without one; None if the file lists none.
+        ply: the types of the properties of a PLY file, and its comments.
+        attributes: the data that the file has in addition to positions, faces, UVs and normals. A note on a written
+            file lists those that it does not keep.
+        merged_properties: names of the vertex properties in which vertices differ that were merged.
+        short_faces: number of faces with fewer than three corners, which are left out.
 
     Examples:
         >>> mesh = coneflat.read_mesh(coneflat.sample_path())
@@ -64,8 +74,11 @@ class MeshFile:
     normals: FloatArray | None = None
     normal: IntArray | None = None
     scene: GltfScene | None = None
-    images: tuple[str, ...] = ()
-    image: IntArray | None = None
+    ply: PlyHeader | None = None
+    face_properties: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    attributes: tuple[Attribute, ...] = ()
+    merged_properties: tuple[str, ...] = ()
+    short_faces: int = 0
 
     @property
     def has_colours(self) -> bool:
@@ -83,19 +96,14 @@ class MeshFile:
 
 
 def check_corners(path: Path, mesh: MeshFile) -> None:
-    """Raise an error for a mesh without vertices or faces, with a face of fewer than 3 corners, or with a bad index.
+    """Raise an error for a mesh without vertices or faces, or with a bad index.
 
     Raises:
-        EmptyMeshError: there are no vertices or no faces.
-        MeshFileError: a face has fewer than 3 corners.
+        EmptyMeshError: there are no vertices, or no faces with three corners or more.
         FaceIndexError: a corner has an invalid vertex index.
     """
     count = len(mesh.vertices)
     check_filled(path, count, len(mesh.offsets) - 1)
-    sizes = np.diff(mesh.offsets)
-    if sizes.min() < 3:
-        i = int(np.argmax(sizes < 3))
-        raise MeshFileError(f"{path}: face {i} has {sizes[i]} corners, but a face needs at least 3")
     c = first_bad_corner(mesh.corners, count)
     if c is not None:
         i = int(np.searchsorted(mesh.offsets, c, side="right")) - 1
@@ -104,9 +112,44 @@ def check_corners(path: Path, mesh: MeshFile) -> None:
         )
 
 
+def without_short_faces(mesh: MeshFile) -> MeshFile:
+    """Return a mesh without its faces of fewer than three corners, which have no triangles."""
+    sizes = np.diff(mesh.offsets)
+    is_whole = sizes >= MIN_CORNERS
+    if is_whole.all():
+        return mesh
+    at_corner = np.repeat(is_whole, sizes)
+
+    def chosen(per_corner: IntArray | None) -> IntArray | None:
+        return None if per_corner is None else per_corner[at_corner]
+
+    return replace(
+        mesh,
+        corners=mesh.corners[at_corner],
+        offsets=offsets_of(sizes[is_whole]),
+        texture=chosen(mesh.texture),
+        normal=chosen(mesh.normal),
+        obj=None if mesh.obj is None else mesh.obj.without_polygons(~is_whole),
+        face_properties={name: values[is_whole] for name, values in mesh.face_properties.items()},
+        short_faces=int(np.count_nonzero(~is_whole)),
+    )
+
+
+def differing_properties(mesh: MeshFile, replaced_by: IntArray) -> tuple[str, ...]:
+    """Return the names of the vertex properties in which vertices differ from those that replace them.
+
+    replaced_by: (n,) the vertex that is used for each vertex.
+    """
+    return tuple(
+        name
+        for name, values in mesh.properties.items()
+        if not np.array_equal(values, values[replaced_by], equal_nan=True)
+    )
+
+
 def check_filled(path: Path, vertices: int, faces: int) -> None:
     """Raise EmptyMeshError if a file has no vertices or no faces."""
-    for count, name in ((vertices, "vertices"), (faces, "faces")):
+    for count, name in ((vertices, "vertices"), (faces, "faces of three corners or more")):
         if count <= 0:
             raise EmptyMeshError(f"{path} has no {name}")
 

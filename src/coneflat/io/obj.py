@@ -17,10 +17,11 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import FloatArray, IntArray
+from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..errors import FaceIndexError, MeshFileError
 from ..mesh.polygons import COLOURS, first_bad_corner
 from ..result import Flattening
+from .attributes import GROUPS, MATERIALS, OBJECTS, VERTEX_COLOURS, Attribute, colour_shades
 from .convex_pieces import find_pieces
 from .files import moved_path
 from .mesh_file import MeshFile, check_filled, offsets_of
@@ -33,6 +34,15 @@ _HEADS = {b"v ": _VERTEX, b"f ": _FACE, b"l ": _ELEMENT, b"p ": _ELEMENT, b"vt":
 _KINDS[[int.from_bytes(head, "big") for head in _HEADS]] = [*_HEADS.values()]
 _TEXTURE_INDICES = re.compile(rb"(#[^\r\n]*)|/[-+0-9]*")
 _MATERIALS = re.compile(rb"(?m)^([ \t]*mtllib[ \t]+)([^\r\n]*?)(?=[ \t]*\r?$)")
+_STATEMENT = re.compile(rb"(?m)^[ \t]*([A-Za-z_]+)(?![^ \t\r\n])")
+#: Statements of the data that an OBJ has in addition to its mesh.
+_STATEMENTS = {
+    GROUPS: (b"g",),
+    OBJECTS: (b"o",),
+    MATERIALS: (b"usemtl", b"mtllib"),
+    Attribute("lines and points"): (b"l", b"p"),
+    Attribute("curves and surfaces"): (b"curv", b"curv2", b"surf", b"cstype", b"vp"),
+}
 #: Number of lines written at a time: their numbers take some MB as Python objects.
 _LINES = 1 << 15
 
@@ -50,6 +60,14 @@ class ObjText:
     gaps: Mapping[int, bytes]
     newline: bytes
 
+    def without_polygons(self, is_left_out: BoolArray) -> ObjText:
+        """Return the text without some polygons, (p,); the text before them is kept."""
+        number = np.append(0, np.cumsum(~is_left_out))
+        gaps: defaultdict[int, bytes] = defaultdict(bytes)
+        for polygon in sorted(self.gaps):
+            gaps[int(number[polygon])] += self.gaps[polygon]
+        return replace(self, gaps=dict(gaps))
+
 
 def parse_obj(path: Path, content: bytes) -> MeshFile:
     """Return the mesh of an OBJ file.
@@ -66,15 +84,13 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
     corners, textures, normals, sizes = (Growing(np.int64) for _ in range(4))
     uv = Growing(np.float64, 2)
     gaps: defaultdict[int, bytearray] = defaultdict(bytearray)
+    lengths: set[int] = set()
     for block in text_blocks(path, content, continued=True):
         kinds = _KINDS[block.heads()]
         points = block.words(np.flatnonzero(kinds == _VERTEX), first=1).points()
         rows = np.flatnonzero(kinds == _FACE)
         words = block.words(rows, first=1)
         counts = words.counts
-        if len(rows) and counts.min() < 3:
-            i = int(np.argmax(counts < 3))
-            block.fail(int(rows[i]), f"a face needs at least 3 corners, but has {counts[i]}")
         given, texture, normal = words.corners()
         del words  # free its text before the next block is read
         above = len(vertices) + np.cumsum(kinds == _VERTEX)[rows]
@@ -84,6 +100,7 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
         # Many programs write a colour after the position.
         if points.shape[1] in (6, 7):
             colours.add(points[:, 3:6])
+        lengths.update(np.unique(block.counts[kinds == _VERTEX] - 1).tolist())
         sizes.add(counts)
         if texture is not None:
             beyond = len(uv) + np.cumsum(kinds == _TEXTURE)[rows]
@@ -105,16 +122,16 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
     for known, none in ((textures, -1), (normals, 0)):
         if len(known):
             known.add(np.full(len(corners) - len(known), none))
+    has_colours = len(colours) == len(vertices)
+    obj_text = ObjText({polygon: bytes(gaps.pop(polygon)) for polygon in list(gaps)}, newline)
     mesh = MeshFile(
         path,
         vertices=vertices.done(),
         corners=corners.done(),
         offsets=offsets_of(sizes.done()),
-        obj=ObjText(
-            gaps={polygon: bytes(gaps.pop(polygon)) for polygon in list(gaps)},
-            newline=newline,
-        ),
-        properties=dict(zip(COLOURS, colours.done().T, strict=True)) if len(colours) == len(vertices) else {},
+        obj=obj_text,
+        properties=dict(zip(COLOURS, colour_shades(colours.done()).T, strict=True)) if has_colours else {},
+        attributes=_attributes(obj_text, lengths),
         texture=textures.done() if len(textures) else None,
         # Some programs write indices of UV points, but not the points.
         uv=uv.done() if len(textures) and len(uv) else None,
@@ -123,6 +140,22 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
     )
     _check_corners(path, content, mesh)
     return mesh
+
+
+def _attributes(text: ObjText, lengths: set[int]) -> tuple[Attribute, ...]:
+    """Return the data of a file in addition to its mesh.
+
+    lengths: the different numbers of words after `v`.
+    """
+    words = {word.lower() for gap in text.gaps.values() for word in _STATEMENT.findall(gap)}
+    found = [attribute for attribute, names in _STATEMENTS.items() if not words.isdisjoint(names)]
+    found += [VERTEX_COLOURS] if lengths & {6, 7} else []
+    return (*found, *([Attribute("weights of vertices")] if lengths - {3, 6} else []))
+
+
+def kept_in_obj(source: MeshFile) -> set[Attribute]:
+    """Return the attributes of a source file that `write_obj` keeps: those of an OBJ."""
+    return set() if source.obj is None else set(source.attributes)
 
 
 def _uv_points(block: TextBlock, rows: IntArray) -> FloatArray:

@@ -1,29 +1,38 @@
 """Reader for PLY files, text and binary, which keeps polygons, and writer for PLY.
 
-This package has its own reader to keep polygons, all vertex properties and the UVs of corners, and to check the counts
-in a header before memory is allocated.
+This package has its own reader to keep polygons, all properties of vertices and faces and the UVs of corners, and to
+check the counts in a header before memory is allocated.
 """
 
 from __future__ import annotations
 
 import os
-import re
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import IO, Any, TypeAlias
+from typing import IO, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import FloatArray, IntArray
 from ..errors import MeshFileError
-from ..mesh.polygons import COLOURS
+from ..mesh.polygons import COLOURS, polygon_of
 from ..result import Flattening
+from .attributes import (
+    ALPHA,
+    TEXTURE_FILES,
+    VERTEX_COLOURS,
+    Attribute,
+    as_bytes,
+    colour_shades,
+    texture_files,
+)
+from .files import moved_path
 from .mesh_file import MeshFile, check_filled, offsets_of
-from .split import source_normals, split_at_seams
+from .split import input_vertices, source_normals, split_at_seams
 from .text import Growing, text_blocks
 
 #: The code of each type, in numpy and in struct.
@@ -32,6 +41,8 @@ _TYPES = {
     "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "int64": "q", "uint64": "Q",
     "float32": "f", "float64": "d",
 }  # fmt: skip
+#: The first word of each type, by the kind and the bytes of numpy.
+_WORDS = {np.dtype(code).str[1:]: word for word, code in reversed(_TYPES.items())}
 #: One property of an element in all rows.
 Column: TypeAlias = "np.ndarray[tuple[int, ...], np.dtype[Any]]"
 
@@ -39,9 +50,28 @@ _CORNERS = ("vertex_indices", "vertex_index")
 #: Names that programs use for a vertex's UV point, and for the list of those of a face's corners: u, v, u, v, ...
 _VERTEX_UV = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"), ("texture_s", "texture_t"), ("u0", "v0"))
 _FACE_UV = "texcoord"
-#: The name of a face's image, as an index of those that comments in the header list.
-_FACE_IMAGE = "texnumber"
-_IMAGE_COMMENT = re.compile(rb"^comment[ \t]+TextureFile[ \t]+(.*?)[ \t]*$", re.IGNORECASE | re.MULTILINE)
+_NORMAL = ("nx", "ny", "nz")
+#: Vertex properties that every written file has.
+_WRITTEN = ("x", "y", "z", *_NORMAL, "s", "t", "source_vertex")
+#: The comment by which programs name the image of a texture.
+_TEXTURE = "comment TextureFile "
+_COMMENT = "flattened by coneflat"
+#: Elements of faces that this package does not read.
+_STRIPS = ("tristrips", "tristrip")
+
+
+class PlyHeader(NamedTuple):
+    """What a PLY file declares in addition to the values of its mesh.
+
+    Attributes:
+        comments: its lines of comments and of `obj_info`, in order.
+        kinds: the type of every vertex property in `MeshFile.properties`, by the word of the file: "uchar".
+        uv: the vertex properties that are its UVs.
+    """
+
+    comments: tuple[str, ...]
+    kinds: Mapping[str, str]
+    uv: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +79,14 @@ class _Property:
     name: str
     kind: str  # numpy code of the value, or of a list's items; with the byte order once that is known
     count: str | None = None  # numpy code of a list's length, likewise
+    word: str = ""  # the type of the value in the file's header
 
 
 @dataclass(frozen=True, eq=False)
 class _Element:
     name: str
     length: int
+    line: int
     properties: tuple[_Property, ...] = ()
 
     @cached_property
@@ -72,16 +104,12 @@ def parse_ply(path: Path, content: bytes) -> MeshFile:
         MeshFileError: the file is not PLY, has fewer elements than its header declares, or has text for a number.
         EmptyMeshError: it has no vertex or no face.
     """
-    form, elements, start = _header(path, content)
-    images, image = _images(content[:start]), None
+    form, elements, start, comments = _header(path, content)
     if form == "ascii":
         # Converted to an array of doubles, the text is read by the same code as the binary forms; doubles represent
         # every possible index exactly.
-        content, start = _text_values(path, content, start), 0
-    vertices: FloatArray = np.empty((0, 3))
-    sizes: IntArray = np.empty(0, np.int64)
-    corners, properties, missing = sizes, dict[str, FloatArray](), {"vertex", "face"}
-    texture, uv = None, None
+        content, start = _text_values(path, content, start, elements), 0
+    found: dict[str, list[Column]] = {}
     for element in elements:
         wanted = _wanted(path, element)
         try:
@@ -90,48 +118,108 @@ def parse_ply(path: Path, content: bytes) -> MeshFile:
             raise MeshFileError(
                 f"{path} ends before the {element.length} {element.name} elements in its header"
             ) from error
-        if element.name == "vertex":
-            names = [element.properties[i].name for i in wanted]
-            vertices = np.stack([np.asarray(c, np.float64) for c in columns[:3]], axis=1)
-            properties = {name: _shade(name, c) for name, c in zip(names[3:], columns[3:], strict=True)}
-        elif element.name == "face":
-            sizes, corners = columns[0].astype(np.int64), _as_integers(path, columns[1])
-            if element.properties[wanted[-1]].name == _FACE_IMAGE:
-                image = columns.pop().astype(np.int64)
-            texture, uv = _corner_uv(path, sizes, *columns[2:]) if columns[2:] else (None, None)
-        missing.discard(element.name)
-        if not missing:
+        found[element.name] = columns
+        if found.keys() >= {"vertex", "face"}:
             break
-    check_filled(path, len(vertices), len(sizes))
+    _refuse_strips(path, elements)
+    by_name = {element.name: element for element in elements}
+    mesh = _vertices(path, by_name, found)
+    if "face" in found:
+        mesh = _with_faces(path, mesh, by_name["face"], found["face"])
+    check_filled(path, len(mesh.vertices), len(mesh.offsets) - 1)
+    pairs = [pair for pair in _VERTEX_UV if set(pair) <= mesh.properties.keys()]
+    chosen = pairs[0] if pairs and mesh.uv is None else ()
+    kinds = {p.name: p.word for p in by_name["vertex"].properties if p.name in mesh.properties}
+    header = PlyHeader(comments, kinds, tuple(name for pair in pairs for name in pair))
+    shading = {name: mesh.properties[name] for name in (*chosen, *_NORMAL) if name in mesh.properties}
+    mesh = replace(mesh, ply=header, attributes=_attributes(mesh, by_name.values(), comments, chosen))
+    if chosen:
+        mesh = replace(mesh, texture=mesh.corners, uv=np.stack([shading[name] for name in chosen], axis=1))
+    if set(_NORMAL) <= shading.keys():
+        normals = np.stack([shading[name] for name in _NORMAL], axis=1)
+        mesh = replace(mesh, normals=normals, normal=mesh.corners)
+    return mesh
 
-    def together(names: tuple[str, ...]) -> FloatArray | None:
-        found = [properties[name] for name in names if name in properties]
-        return np.stack(found, axis=1) if len(found) == len(names) else None
 
-    if uv is None or not len(uv):
-        uv = next((points for pair in _VERTEX_UV if (points := together(pair)) is not None), None)
-        texture = None if uv is None else corners
-    normals = together(("nx", "ny", "nz"))
-    return MeshFile(
-        path,
-        vertices,
-        corners,
-        offsets_of(sizes),
-        properties=properties,
-        texture=texture,
-        uv=uv,
-        normals=normals,
-        normal=None if normals is None else corners,
-        images=images,
-        # Without numbers, the first image is that of all faces.
-        image=(np.zeros(len(sizes), np.int64) if image is None else image) if images else None,
+def _vertices(path: Path, elements: Mapping[str, _Element], found: Mapping[str, list[Column]]) -> MeshFile:
+    """Return a mesh of the vertices of a file and their properties, without faces."""
+    vertices, properties = np.empty((0, 3)), dict[str, FloatArray]()
+    if "vertex" in found:
+        element, columns = elements["vertex"], found["vertex"]
+        declared = [element.properties[i] for i in _wanted(path, element)]
+        vertices = np.stack([np.asarray(c, np.float64) for c in columns[:3]], axis=1)
+        properties = {p.name: _shade(p, c) for p, c in zip(declared[3:], columns[3:], strict=True)}
+    return MeshFile(path, vertices, np.empty(0, np.int64), np.zeros(1, np.int64), properties=properties)
+
+
+def _with_faces(path: Path, mesh: MeshFile, element: _Element, columns: list[Column]) -> MeshFile:
+    """Return a mesh with its faces, their properties and the UVs of their corners."""
+    sizes, corners = columns[0].astype(np.int64), _as_integers(path, columns[1])
+    wanted = [element.properties[i] for i in _wanted(path, element)]
+    lists = sum(p.count is not None for p in wanted)
+    texture, uv = _corner_uv(path, sizes, *columns[2:4]) if lists == 2 else (None, None)
+    properties = {
+        p.name: _in_type(np.asarray(c), p.word)
+        for p, c in zip(wanted[lists:], columns[2 * lists :], strict=True)
+    }
+    has_uv = uv is not None and len(uv) > 0
+    return replace(
+        mesh,
+        corners=corners,
+        offsets=offsets_of(sizes),
+        face_properties=properties,
+        texture=texture if has_uv else None,
+        uv=uv if has_uv else None,
     )
 
 
-def _images(header: bytes) -> tuple[str, ...]:
-    """Return the names of the image files that the comments of a header list."""
-    # Some old files end lines with a single carriage return.
-    return tuple(map(os.fsdecode, _IMAGE_COMMENT.findall(b"\n".join(header.splitlines()))))
+def _in_type(values: NDArray[Any], word: str) -> NDArray[Any]:
+    """Return numbers in a type of PLY; those that an integer type does not have are clipped, and NaN becomes 0."""
+    kind = np.dtype(_TYPES[word])
+    if kind.kind in "iu" and values.dtype.kind == "f":
+        limits = np.iinfo(kind)
+        values = np.clip(np.rint(np.nan_to_num(values)), limits.min, limits.max)
+    return values.astype(kind)
+
+
+def _attributes(
+    mesh: MeshFile, elements: Iterable[_Element], comments: Sequence[str], uv: Sequence[str]
+) -> tuple[Attribute, ...]:
+    """Return the data of a file in addition to its mesh.
+
+    uv: names of the vertex properties that are its UVs.
+    """
+    found = [Attribute(TEXTURE_FILES, _texture_name(line)) for line in comments if _texture_name(line)]
+    properties = mesh.properties
+    replaced = {*"xyz", *uv, "source_vertex", *(_NORMAL if set(_NORMAL) <= properties.keys() else ())}
+    if mesh.has_colours:
+        replaced |= set(COLOURS)
+        found.append(VERTEX_COLOURS)
+    for element in elements:
+        names = [p.name for p in element.properties]
+        if element.name == "vertex":
+            found += [Attribute("vertex properties", name) for name in names if name not in replaced]
+        elif element.name == "face":
+            corners = _corners_of(element)
+            found += [Attribute("face properties", name) for name in names if name not in (corners, _FACE_UV)]
+        elif element.length:
+            found.append(Attribute("elements", element.name))
+    return tuple(dict.fromkeys(found))
+
+
+def _texture_name(comment: str) -> str:
+    """Return the name of the image in a comment, or ""."""
+    return comment.removeprefix(_TEXTURE).strip() if comment.startswith(_TEXTURE) else ""
+
+
+def _refuse_strips(path: Path, elements: Sequence[_Element]) -> None:
+    """Raise an error for a file whose faces are triangle strips."""
+    strips = [element for element in elements if element.name in _STRIPS and element.length]
+    if strips and not any(element.name == "face" and element.length for element in elements):
+        raise MeshFileError(
+            f"{path}, line {strips[0].line}: its faces are triangle strips ({strips[0].name}), which are not "
+            "supported: save it with separate triangles"
+        )
 
 
 def _corner_uv(path: Path, sizes: IntArray, counts: Column, numbers: Column) -> tuple[IntArray, FloatArray]:
@@ -152,8 +240,8 @@ def _corner_uv(path: Path, sizes: IntArray, counts: Column, numbers: Column) -> 
     return texture, np.asarray(numbers, np.float64).reshape(-1, 2)
 
 
-def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
-    """Return the format, the elements, and the position after the header."""
+def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int, tuple[str, ...]]:
+    """Return the format, the elements, the position after the header, and the comments."""
     end = content.find(b"end_header")
     if not content.startswith(b"ply") or end < 0:
         raise MeshFileError(f"{path} is not a PLY file: it has no PLY header")
@@ -166,26 +254,29 @@ def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
 
     form = ""
     elements: list[_Element] = []
+    comments = []
     for i, line in enumerate(lines):
         words = line.decode("latin-1").split()
         try:
             if words[:1] == ["format"]:
                 form = words[1]
+            elif words[:1] in (["comment"], ["obj_info"]):
+                comments.append(line.decode("latin-1"))
             elif words[:1] == ["element"]:
-                elements.append(_Element(words[1], int(words[2])))
+                elements.append(_Element(words[1], int(words[2]), i + 1))
                 if elements[-1].length < 0:
                     raise ValueError("a negative count")
             elif words[:1] == ["property"]:
                 if words[1] == "list":
-                    new = _Property(words[4], _TYPES[words[3]], _TYPES[words[2]])
+                    new = _Property(words[4], _TYPES[words[3]], _TYPES[words[2]], words[3])
                 else:
-                    new = _Property(words[2], _TYPES[words[1]])
+                    new = _Property(words[2], _TYPES[words[1]], None, words[1])
                 elements[-1] = replace(elements[-1], properties=(*elements[-1].properties, new))
         except (IndexError, KeyError, ValueError) as error:
             raise MeshFileError(f"{path}, line {i + 1}: invalid line in a PLY header: {line!r}") from error
     if form not in ("ascii", "binary_little_endian", "binary_big_endian"):
         raise MeshFileError(f"{path} is not a PLY file: its header has no known format")
-    return form, elements, start
+    return form, elements, start, tuple(comments)
 
 
 def _wanted(path: Path, element: _Element) -> list[int]:
@@ -198,20 +289,31 @@ def _wanted(path: Path, element: _Element) -> list[int]:
         axes = [names.index(axis) for axis in "xyz"]
         return axes + [i for i, p in enumerate(element.properties) if i not in axes and not p.count]
     if element.name == "face":
-        lists = [i for i, p in enumerate(element.properties) if p.count]
-        named = [i for i in lists if element.properties[i].name in _CORNERS]
-        if not named and (len(lists) != 1 or element.properties[lists[0]].name == _FACE_UV):
+        corners, names = _corners_of(element), [p.name for p in element.properties]
+        if corners is None:
             raise MeshFileError(f"{path}: its faces have no list 'vertex_indices'")
-        points = [i for i in lists if element.properties[i].name == _FACE_UV]
-        images = [i for i, p in enumerate(element.properties) if p.name == _FACE_IMAGE and not p.count]
-        return (named[:1] or lists) + points[:1] + images[:1]
+        lists, scalars = (
+            [i for i, p in enumerate(element.properties) if bool(p.count) == is_list] for is_list in (1, 0)
+        )
+        return [names.index(corners), *(i for i in lists if names[i] == _FACE_UV), *scalars]
     return []
 
 
-def _shade(name: str, values: Column) -> FloatArray:
-    """Return a property as doubles; colours, which are bytes in most files, are scaled to 0 to 1."""
+def _corners_of(element: _Element) -> str | None:
+    """Return the name of the list of corners of faces, or None."""
+    lists = [p.name for p in element.properties if p.count]
+    named = [name for name in lists if name in _CORNERS]
+    alone = [name for name in lists if name != _FACE_UV] if len(lists) == 1 else []
+    return next(iter(named or alone), None)
+
+
+def _shade(declared: _Property, values: Column) -> FloatArray:
+    """Return a property as doubles; colours, which are integers in most files, are scaled to 0 to 1."""
     numbers = np.asarray(values, np.float64)
-    return numbers / 255 if name in COLOURS and numbers.max(initial=0.0) > 1 else numbers
+    if declared.name not in COLOURS:
+        return numbers
+    kind = np.dtype(_TYPES[declared.word])
+    return numbers / np.iinfo(kind).max if kind.kind in "iu" else colour_shades(numbers)
 
 
 class _EndOfFile(Exception):
@@ -293,12 +395,63 @@ def _row(content: bytes, start: int, element: _Element) -> tuple[int, list[int]]
     return start, lengths
 
 
-def _text_values(path: Path, content: bytes, start: int) -> bytes:
-    """Return all numbers of a text body, as little-endian doubles."""
-    numbers = Growing(np.float64)
+def _text_values(path: Path, content: bytes, start: int, elements: Sequence[_Element]) -> bytes:
+    """Return all numbers of a text body, as little-endian doubles.
+
+    Raises:
+        MeshFileError: a word is not a number, or a line does not have the numbers that its element needs.
+    """
+    numbers, counts = Growing(np.float64), Growing(np.int64)
     for block in text_blocks(path, content, start, comments=False):
         numbers.add(block.words(np.arange(len(block.counts))).floats())
-    return numbers.done().astype("<f8", copy=False).tobytes()
+        counts.add(block.counts[block.counts > 0])
+    values, lengths = numbers.done(), counts.done()
+    # Some files have rows of several lines.
+    if len(lengths) == sum(element.length for element in elements):
+        needed = _needed(elements, values, lengths)
+        wrong = np.flatnonzero(needed != lengths)
+        if len(wrong):
+            i = int(wrong[0])
+            ends = np.cumsum([element.length for element in elements])
+            name = elements[int(np.searchsorted(ends, i, side="right"))].name
+            reason = (
+                f"the list of this {name} has no valid length"
+                if needed[i] < 0
+                else f"the properties of this {name} need {needed[i]:,} numbers, but the line has {lengths[i]:,}"
+            )
+            raise MeshFileError(f"{path}, line {_filled_line(path, content, start, i)}: {reason}")
+    return values.astype("<f8", copy=False).tobytes()
+
+
+def _needed(elements: Sequence[_Element], values: FloatArray, lengths: IntArray) -> IntArray:
+    """Return (k,) how many numbers each line of a text body needs, given those of all lines; -1 for an invalid list.
+
+    lengths: (k,) numbers on each line.
+    """
+    needed = np.empty(len(lengths), np.int64)
+    first, begin = np.cumsum(lengths) - lengths, 0
+    for element in elements:
+        rows = slice(begin, begin + element.length)
+        place, is_valid = first[rows].copy(), np.ones(element.length, dtype=bool)
+        for declared in element.properties:
+            if declared.count:
+                size = values[np.minimum(place, len(values) - 1)] if len(values) else np.zeros(len(place))
+                is_valid &= (size >= 0) & (size <= len(values)) & (size == np.floor(size))
+                place += np.where(is_valid, np.nan_to_num(size), 0).astype(np.int64)
+            place += 1
+        needed[rows] = np.where(is_valid, place - first[rows], -1)
+        begin += element.length
+    return needed
+
+
+def _filled_line(path: Path, content: bytes, start: int, i: int) -> int:
+    """Return the number of the i-th line with words of a text body."""
+    for block in text_blocks(path, content, start, comments=False):
+        rows = np.flatnonzero(block.counts)
+        if i < len(rows):
+            return block.line_number(int(rows[i]))
+        i -= len(rows)
+    raise AssertionError("there is no such line")
 
 
 def _stored(element: _Element, form: str) -> _Element:
@@ -308,7 +461,7 @@ def _stored(element: _Element, form: str) -> _Element:
     def kind(code: str) -> str:
         return "<d" if form == "ascii" else order + code
 
-    stored = [_Property(p.name, kind(p.kind), p.count and kind(p.count)) for p in element.properties]
+    stored = [_Property(p.name, kind(p.kind), p.count and kind(p.count), p.word) for p in element.properties]
     return replace(element, properties=tuple(stored))
 
 
@@ -321,15 +474,41 @@ def _as_integers(path: Path, corners: Column) -> IntArray:
     return numbers
 
 
-def write_ply(result: Flattening, stream: IO[bytes]) -> None:
+def kept_in_ply(source: MeshFile) -> set[Attribute]:
+    """Return the attributes of a source file that `write_ply` keeps."""
+    kept = {Attribute("vertex properties", name) for name in _kept_properties(source)}
+    kept |= {Attribute("face properties", name) for name in source.face_properties}
+    kept |= set(texture_files(source))
+    return kept | ({VERTEX_COLOURS} if source.has_colours else set())
+
+
+def texture_notes(source: MeshFile) -> tuple[str, ...]:
+    """Return a note on the textures of a source file that `write_ply` names, if it has any and UVs for them."""
+    if source.uv is None or not texture_files(source):
+        return ()
+    return (
+        "The textures of the file are kept, but were made for the old UVs; `coneflat transfer` bakes them into the new "
+        "ones.",
+    )
+
+
+def _kept_properties(source: MeshFile) -> list[str]:
+    """Return the names of the vertex properties that `write_ply` keeps: all but UVs and what it writes anew."""
+    replaced = (*_WRITTEN, *(() if source.ply is None else source.ply.uv))
+    return [name for name in source.properties if name not in replaced]
+
+
+def write_ply(result: Flattening, stream: IO[bytes], folder: Path) -> None:
     """Write a result as binary little-endian PLY, coordinates as doubles.
 
     Every vertex has its UV as `s` and `t`, and its vertex in the input as `source_vertex`; a vertex at a seam is
-    repeated. Normals and colours of the input are kept. Vertices without a face are left out.
+    repeated. Normals, colours, and the properties of vertices and faces of a PLY input are kept, with its comments.
+    Vertices without a face are left out.
 
     Args:
         result: the result to write.
         stream: a binary file.
+        folder: folder of the file, for relative paths of its textures.
     """
     mesh = split_at_seams(result, source_normals(result))
     doubles = {"x y z": mesh.vertices}
@@ -337,55 +516,99 @@ def write_ply(result: Flattening, stream: IO[bytes]) -> None:
         doubles["nx ny nz"] = mesh.normals
     doubles["s t"] = mesh.uv
     names = " ".join(doubles).split()
-    colours = _colours(result, mesh.own)
-    kind = [("doubles", "<f8", len(names)), ("source_vertex", "<i4"), ("colours", "u1", colours.shape[1])]
+    source = None if result.face_corners is None else result.source
+    columns = [] if source is None else list(_vertex_columns(source, input_vertices(result)[mesh.own]))
+    kind: list[tuple[Any, ...]] = [("doubles", "<f8", len(names)), ("source_vertex", "<i4")]
+    kind += [(f"p{i}", values.dtype.newbyteorder("<")) for i, (_, _, values) in enumerate(columns)]
     vertices = np.empty(len(mesh.vertices), kind)
     vertices["doubles"] = np.concatenate(list(doubles.values()), axis=1)
     vertices["source_vertex"] = mesh.origin
-    vertices["colours"] = colours
+    for i, (_, _, values) in enumerate(columns):
+        vertices[f"p{i}"] = values
     properties = [
         *(f"double {name}" for name in names),
         "int source_vertex",
-        *(f"uchar {name}" for name in COLOURS[: colours.shape[1]]),
+        *(f"{word} {name}" for name, word, _ in columns),
     ]
-    write_parts(stream, "flattened by coneflat", properties, vertices, mesh.faces)
+    comments = list[str]()
+    if source is not None and source.ply is not None:
+        comments += _moved(source.ply, source.path.parent, folder)
+    if f"comment {_COMMENT}" not in comments:
+        comments.append(f"comment {_COMMENT}")
+    write_parts(stream, comments, properties, vertices, mesh.faces, _face_columns(result))
+
+
+def _vertex_columns(source: MeshFile, numbers: IntArray) -> Iterator[tuple[str, str, NDArray[Any]]]:
+    """Yield the name, the type and the values of each kept property of some vertices of a source file."""
+    kinds = {} if source.ply is None else source.ply.kinds
+    for name in _kept_properties(source):
+        values = source.properties[name][numbers]
+        is_shade = name in COLOURS
+        word = kinds.get(name, "uchar" if is_shade or name == ALPHA.name else "double")
+        kind = np.dtype(_TYPES[word])
+        if name not in kinds and word == "uchar":
+            yield name, word, as_bytes(values)
+        elif is_shade and kind.kind in "iu":
+            yield name, word, _in_type(values * np.iinfo(kind).max, word)
+        else:
+            yield name, word, _in_type(values, word)
+
+
+def _face_columns(result: Flattening) -> dict[str, NDArray[Any]]:
+    """Return the properties of the polygons of a source file at the triangles of a result."""
+    if result.source is None or result.face_corners is None:
+        return {}
+    polygon = polygon_of(result.face_corners, result.source.offsets)
+    return {name: values[polygon] for name, values in result.source.face_properties.items()}
+
+
+def _moved(header: PlyHeader, old: Path, new: Path) -> Iterator[str]:
+    """Yield the comments of a file, with paths of textures relative to another folder."""
+    here, there = os.path.realpath(old), os.path.realpath(new)
+    for line in header.comments:
+        name = _texture_name(line)
+        if name and here != there:
+            line = _TEXTURE + moved_path(name.encode("latin-1"), here, there).decode("latin-1")
+        yield line
 
 
 def write_parts(
-    stream: IO[bytes], comment: str, properties: Sequence[str], vertices: NDArray[Any], faces: IntArray
+    stream: IO[bytes],
+    comments: Sequence[str],
+    properties: Sequence[str],
+    vertices: NDArray[Any],
+    faces: IntArray,
+    face_properties: Mapping[str, NDArray[Any]] | None = None,
 ) -> None:
     """Write vertices and faces as binary little-endian PLY.
 
     Args:
         stream: a binary file.
-        comment: a comment line of the header.
+        comments: lines of the header, such as "comment by coneflat".
         properties: declarations of the vertex properties, such as "double x".
         vertices: (n, ...) structured array with these properties in the layout of the file.
         faces: (m, k) vertex indices.
+        face_properties: (m,) further properties of faces by name.
     """
-    rows = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", faces.shape[1])])
+    more = {} if face_properties is None else face_properties
+    kind: list[tuple[Any, ...]] = [("count", "u1"), ("corners", "<i4", faces.shape[1])]
+    kind += [(f"p{i}", values.dtype.newbyteorder("<")) for i, values in enumerate(more.values())]
+    rows = np.empty(len(faces), kind)
     rows["count"] = faces.shape[1]
     rows["corners"] = faces
+    for i, values in enumerate(more.values()):
+        rows[f"p{i}"] = values
     header = [
         "ply",
         "format binary_little_endian 1.0",
-        f"comment {comment}",
+        *comments,
         f"element vertex {len(vertices)}",
-        *(f"property {one}" for one in properties),
+        *(f"property {declared}" for declared in properties),
         f"element face {len(faces)}",
         "property list uchar int vertex_indices",
+        *(f"property {_WORDS[values.dtype.str[1:]]} {name}" for name, values in more.items()),
         "end_header",
     ]
-    stream.write(("\n".join(header) + "\n").encode("ascii"))
+    stream.write(("\n".join(header) + "\n").encode("latin-1"))
     stream.write(vertices.data)
     stream.write(rows.data)
-
-
-def _colours(result: Flattening, vertices: IntArray) -> NDArray[np.uint8]:
-    """Return (k, 3) the colours of vertices of the result in the source file, 0 to 255; (k, 0) if it has none."""
-    source = result.source
-    if source is None or result.face_corners is None or not source.has_colours:
-        return np.empty((len(vertices), 0), np.uint8)
-    number = np.arange(len(result.vertices)) if result.vertex_origin is None else result.vertex_origin
-    shades = np.stack([source.properties[name][number[vertices]] for name in COLOURS], axis=1)
-    return np.round(255 * np.clip(np.nan_to_num(shades), 0, 1)).astype(np.uint8)

@@ -18,7 +18,7 @@ from .brains import FREESURFER, is_freesurfer, is_gifti, parse_freesurfer, parse
 from .files import PIPE, PathName, as_path, known_ending, read_bytes, read_input, readable
 from .gltf.read import parse_gltf
 from .join import Joined, join_borders
-from .mesh_file import MeshFile, check_corners
+from .mesh_file import MeshFile, check_corners, differing_properties, without_short_faces
 from .obj import parse_obj
 from .off import is_off, parse_off
 from .ply import parse_ply
@@ -35,6 +35,8 @@ _READERS: dict[str, Callable[[Path, bytes], MeshFile]] = {
     ".gii": parse_gifti,
     **dict.fromkeys(FREESURFER, parse_freesurfer),
 }
+#: Formats that are read as text, or have a header of text.
+_TEXT = (".obj", ".ply", ".off", ".gltf")
 #: STL has no shared vertices; glTF repeats a vertex wherever a normal or a UV differs.
 _WELDED_BY_DEFAULT = {".stl", ".gltf", ".glb"}
 
@@ -111,13 +113,15 @@ def read_mesh_from(
     if not content or content.isspace():
         raise EmptyMeshError(f"{path} is empty")
     ending = format_of(content) if ending is None else ending.lower()
+    if ending in _TEXT and is_utf16(content):
+        raise MeshFileError(f"{path}, line 1: this is text in UTF-16: save the file as UTF-8 or ASCII")
     if ending not in _READERS:
         raise UnknownFormatError(
             f"{ending!r} is not a format that meshes are read from: {', '.join(INPUT_FORMATS)}"
         )
     with readable(path, f"{ending[1:].upper()} file"):
         with np.errstate(invalid="ignore"):  # NaN coordinates are not rejected here
-            mesh = _READERS[ending](path, content)
+            mesh = without_short_faces(_READERS[ending](path, content))
         check_corners(path, mesh)
     normal = None
     if mesh.normals is not None and mesh.normal is not None:
@@ -141,6 +145,12 @@ def format_of(content: bytes) -> str:
     return next((ending for ending, is_found in formats if is_found), ".obj")
 
 
+def is_utf16(content: bytes) -> bool:
+    """Return whether a content begins as text in UTF-16 does: with its mark, or with a letter and a zero."""
+    is_filled = list(map(bool, content[:4]))
+    return content.startswith((b"\xff\xfe", b"\xfe\xff")) or is_filled in ([1, 0, 1, 0], [0, 1, 0, 1])
+
+
 def _welded(mesh: MeshFile) -> MeshFile:
     """Return a mesh with vertices at the same position merged, separately for each node of a scene."""
     blocks = (0, len(mesh.vertices)) if mesh.scene is None else mesh.scene.blocks
@@ -152,11 +162,12 @@ def _welded(mesh: MeshFile) -> MeshFile:
         count += len(first)
     if count == len(mesh.vertices):
         return mesh
-    every = np.concatenate(kept)
+    every, number = np.concatenate(kept), np.concatenate(merged)
     return replace(
         mesh,
         vertices=mesh.vertices[every],
-        corners=np.concatenate(merged)[mesh.corners],
+        corners=number[mesh.corners],
+        merged_properties=differing_properties(mesh, every[number]),
         welded=len(mesh.vertices) - count,
         unwelded=mesh.corners,
         properties={name: values[every] for name, values in mesh.properties.items()},

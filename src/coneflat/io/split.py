@@ -65,8 +65,13 @@ def split_at_seams(result: Flattening, normals: CornerNormals | None = None) -> 
         corners = normals.corners.reshape(-1)
         pair, normal, faces = distinct_pairs(faces, corners, len(normals.normals))
         own, point, shading = own[pair], point[pair], normals.normals[normal]
-    origin = own if result.vertex_origin is None else result.vertex_origin[own]
+    origin = input_vertices(result)[own]
     return SplitMesh(result.vertices[own], result.uv[point], faces.reshape(-1, 3), own, origin, shading)
+
+
+def input_vertices(result: Flattening) -> IntArray:
+    """Return (n,) the vertex of the input that each vertex of a result came from."""
+    return np.arange(len(result.vertices)) if result.vertex_origin is None else result.vertex_origin
 
 
 def distinct_pairs(

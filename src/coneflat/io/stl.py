@@ -9,9 +9,13 @@ import numpy as np
 
 from ..base.arrays import FloatArray
 from ..errors import EmptyMeshError, MeshFileError
+from .attributes import Attribute
 from .mesh_file import MeshFile
 from .text import Growing, text_blocks
 
+#: The solids of a text file, which may have names.
+SOLIDS = Attribute("solids")
+_SOLID = re.compile(rb"(?im)^[ \t]*solid[ \t]*([^\r\n]*?)[ \t]*$")
 _HEADER = np.dtype([("comment", "S80"), ("count", "<u4")])
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
@@ -34,8 +38,10 @@ def parse_stl(path: Path, content: bytes) -> MeshFile:
     if len(content) == needed or (len(content) > needed > 0 and not is_text):
         triangles = np.frombuffer(content, _TRIANGLE, declared, _HEADER.itemsize)
         points = triangles["corners"].reshape(-1, 3).astype(np.float64)
+        attributes = (Attribute("attributes of facets"),) if triangles["attribute"].any() else ()
     elif is_text:
         points = _text_points(path, content)
+        attributes = (SOLIDS,) if _has_names(content) else ()
     elif needed:
         found = (len(content) - _HEADER.itemsize) // _TRIANGLE.itemsize
         raise MeshFileError(f"{path} ends after {found} of the {declared} triangles in its header")
@@ -43,7 +49,14 @@ def parse_stl(path: Path, content: bytes) -> MeshFile:
         raise MeshFileError(f"{path} is not an STL file: it is shorter than an STL header")
     if not len(points):
         raise EmptyMeshError(f"{path} has no faces")
-    return MeshFile(path, points, np.arange(len(points)), np.arange(0, len(points) + 1, 3))
+    count = len(points)
+    return MeshFile(path, points, np.arange(count), np.arange(0, count + 1, 3), attributes=attributes)
+
+
+def _has_names(content: bytes) -> bool:
+    """Return whether a text has solids with names, or several solids."""
+    names = _SOLID.findall(content)
+    return len(names) > 1 or any(names)
 
 
 def _declared(content: bytes) -> tuple[int, int]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,25 +11,33 @@ import numpy as np
 
 from ..atlas import round_safely
 from ..base.arrays import FloatArray, IntArray
+from ..base.notes import Unmet
 from ..base.text import plural, short_repr
-from ..errors import MeshFileError, OptionError
+from ..errors import OptionError
 from ..measure.guarantees import DOUBLE, SINGLE, remeasured
 from ..mesh.polygons import polygon_of
 from ..options.declared import FORMATS
 from ..result import Flattening
+from .attributes import ALPHA, VERTEX_COLOURS, Attribute, losses
 from .convex_pieces import find_pieces
 from .files import PathName, atomic_write, checked_target
-from .gltf.write import scene_losses, write_glb
+from .gltf.positions import local_positions
+from .gltf.write import kept_in_glb, scene_losses, write_glb
+from .mesh_file import MeshFile
 from .npz import write_npz
-from .obj import write_obj
-from .ply import write_ply
+from .obj import kept_in_obj, write_obj
+from .ply import kept_in_ply, texture_notes, write_ply
 from .texture import find_texture
 
 #: Endings of the files that `write_flattening` writes.
 OUTPUT_FORMATS = tuple(f".{name}" for name in FORMATS)
-# Range of model sizes for which squares of small lengths are also 32-bit numbers, as other programs compute them.
-MIN_SIZE, MAX_SIZE = 1e-15, 1e18
-_MATERIAL = re.compile(rb"^[ \t]*usemtl\s", re.MULTILINE)
+#: The attributes of a source file that each format keeps.
+KEPT: dict[str, Callable[[MeshFile], set[Attribute]]] = {
+    ".obj": kept_in_obj,
+    ".ply": kept_in_ply,
+    ".glb": kept_in_glb,
+    ".npz": lambda _: set(),
+}
 
 
 def check_output(path: PathName, texture: PathName | None = None) -> Path:
@@ -80,7 +87,7 @@ def write_flattening(result: Flattening, path: PathName, texture: PathName | Non
 def write_measured(result: Flattening, path: PathName, texture: PathName | None = None) -> Flattening:
     """Write a flattened mesh as `write_flattening` does, and return it as the file stores it; see `as_written`."""
     written, stored = write_stored(result, path, texture)
-    return as_written(stored, written.suffix.lower())
+    return as_written(stored, written.suffix.lower(), has_texture=texture is not None)
 
 
 def write_stored(result: Flattening, path: PathName, texture: PathName | None) -> tuple[Path, Flattening]:
@@ -114,10 +121,10 @@ def write_stream(
     _check_texture(f"a {ending}", ending, texture)
     image = None if texture is None else find_texture(texture, result)
     # A .glb has fewer digits; triangles must also be positively oriented and disjoint after rounding.
-    stored = as_written(result, ending) if ending == ".glb" else result
+    stored = as_written(result, ending, has_texture=texture is not None) if ending == ".glb" else result
     writers: dict[str, Callable[[], None]] = {
         ".obj": lambda: write_obj(stored, stream, folder),
-        ".ply": lambda: write_ply(stored, stream),
+        ".ply": lambda: write_ply(stored, stream, folder),
         ".glb": lambda: write_glb(stored, stream, image, folder),
         ".npz": lambda: write_npz(stored, stream),
     }
@@ -130,7 +137,7 @@ def _check_texture(name: object, ending: str, texture: PathName | None) -> None:
         raise OptionError(f"only .glb files carry a texture, and {name} is not one")
 
 
-def as_written(result: Flattening, ending: str) -> Flattening:
+def as_written(result: Flattening, ending: str, *, has_texture: bool = False) -> Flattening:
     """Return a result as a file of a given format stores it, with measures of the stored numbers.
 
     A .glb has 32-bit numbers and v pointing down; touching triangles that overlap after rounding are separated. An
@@ -140,16 +147,17 @@ def as_written(result: Flattening, ending: str) -> Flattening:
     Args:
         result: the result that is written.
         ending: the ending of the format, such as ".glb".
+        has_texture: whether it is written with a texture.
 
     Raises:
         MeshFileError: numbers are out of range for the format.
     """
     if not isinstance(ending, str):
         raise OptionError(f"ending must be text such as .glb, got {short_repr(ending)}")
-    stored, lost = result, left_out(result, ending)
+    stored, lost = result, left_out(result, ending, has_texture)
     if ending == ".glb":
         stored = _in_single_precision(result)
-        lost = (*lost, *scene_losses(stored))
+        lost = (*lost, *scene_losses(stored, has_texture))
     elif ending == ".obj" and result.source is not None and result.face_corners is not None:
         stored = _in_fans(result, result.source.offsets, result.face_corners)
     lost = tuple(note for note in lost if note not in stored.notes)
@@ -157,31 +165,29 @@ def as_written(result: Flattening, ending: str) -> Flattening:
 
 
 def _in_single_precision(result: Flattening) -> Flattening:
-    """Return the result with 32-bit positions and UVs."""
-    keeps_scene = result.source is not None and result.source.scene is not None
-    vertices = result.vertices if keeps_scene else _positions_in_glb(result.vertices)
-    is_stored = np.array_equal(stored_in_glb(result.uv), result.uv)
-    if is_stored and np.array_equal(vertices, result.vertices):
-        return result
-    uv, overlaps = round_safely(result.uv, result.uv_faces, stored_in_glb)
-    return remeasured(result, replace(result, vertices=vertices, uv=uv), SINGLE, overlaps=overlaps)
-
-
-def _positions_in_glb(vertices: FloatArray) -> FloatArray:
-    """Return (n, 3) positions as 32-bit numbers.
+    """Return the result with the positions and UVs of a .glb.
 
     Raises:
         MeshFileError: the largest coordinate is too large or too small for 32-bit numbers.
     """
-    with np.errstate(over="ignore"):
-        stored = vertices.astype(np.float32).astype(np.float64)
-    largest = float(np.abs(vertices).max())
-    if not MIN_SIZE < largest < MAX_SIZE:
-        raise MeshFileError(
-            f"positions of up to {largest:.3g} are beyond the 32-bit numbers of .glb, which support sizes from "
-            f"{MIN_SIZE:.0e} to {MAX_SIZE:.0e}: scale the mesh, or write .ply"
-        )
-    return stored
+    vertices = result.vertices
+    if result.source is None or result.source.scene is None:
+        used = np.unique(result.faces)
+        vertices = vertices.copy()
+        vertices[used] = local_positions(vertices[used]).vertices
+    is_stored = np.array_equal(stored_in_glb(result.uv), result.uv)
+    if is_stored and np.array_equal(vertices, result.vertices, equal_nan=True):
+        return result
+    uv, overlaps = round_safely(result.uv, result.uv_faces, stored_in_glb)
+    stored = remeasured(result, replace(result, vertices=vertices, uv=uv), SINGLE, overlaps=overlaps)
+    flattened = stored.distortion.degenerate_input - result.distortion.degenerate_input
+    if flattened <= 0:
+        return stored
+    note = Unmet(
+        f"{plural(flattened, 'triangle has', 'triangles have')} no area in the 32-bit numbers of .glb, as they are too "
+        "small for the size of the model: .obj and .ply have all digits."
+    )
+    return replace(stored, notes=(*stored.notes, note))
 
 
 def stored_in_glb(uv: FloatArray) -> FloatArray:
@@ -224,21 +230,14 @@ def _in_fans(result: Flattening, offsets: IntArray, face_corners: IntArray) -> F
     return remeasured(result, fans, DOUBLE, notes)
 
 
-def left_out(result: Flattening, ending: str) -> tuple[str, ...]:
-    """Return notes on data of the source file that a file of another format does not keep, one sentence each.
-
-    There are none for an .npz, which stores the result and not the source file.
-    """
+def left_out(result: Flattening, ending: str, has_texture: bool = False) -> tuple[str, ...]:
+    """Return notes on data of the source file that a file of another format does not keep, one sentence each."""
     source = result.source
-    if source is None or result.face_corners is None or ending == ".npz":
+    if source is None or result.face_corners is None or ending not in KEPT:
         return ()
-    notes, lost = [], f"of the file are not kept in {ending}:"
-    if source.scene is not None and ending != ".glb":
-        tree = source.scene.data.tree
-        if tree.get("materials") or len(tree.get("nodes", [])) > 1:
-            notes.append(f"Nodes, materials and textures {lost} .glb keeps them.")
-    if source.obj is not None and ending != ".obj" and any(map(_MATERIAL.search, source.obj.gaps.values())):
-        notes.append(f"Groups and materials {lost} .obj keeps them.")
-    if source.has_colours and ending != ".ply" and (source.obj is None or ending != ".obj"):
-        notes.append(f"Vertex colours {lost} .ply keeps them.")
-    return tuple(notes)
+    # A texture would be multiplied by colours of vertices.
+    hidden = {VERTEX_COLOURS, ALPHA} if has_texture and source.scene is None else set()
+    kept = KEPT[ending](source) - hidden
+    lost = set(source.attributes) - kept
+    other = next((other for other, kept_in in KEPT.items() if lost <= kept_in(source)), "")
+    return (*losses(source, ending, kept, other), *(texture_notes(source) if ending == ".ply" else ()))

@@ -1,12 +1,12 @@
 """Measures of a parameterization, reports and guarantees."""
 
 from .distortion import angle_sum_errors, measure, measure_map, quantile, sum_angles
-from .guarantees import unmet_guarantees
+from .guarantees import undefined_measures, unmet_guarantees
 from .report import MAP_MEASURES, Row, as_rows, map_rows, number_text, packing_row, path_text
 from .requirements import REPORTED, Requirement, breaches, parse_requirements
 
 __all__ = [
     "as_rows", "angle_sum_errors", "MAP_MEASURES", "REPORTED", "Requirement", "Row", "breaches", "unmet_guarantees",
     "map_rows", "measure", "measure_map", "number_text", "packing_row", "parse_requirements", "path_text", "quantile",
-    "sum_angles",
+    "sum_angles", "undefined_measures",
 ]  # fmt: skip

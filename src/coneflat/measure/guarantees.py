@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.arrays import unit_exponent
+from ..base.arrays import FloatArray, unit_exponent
 from ..base.notes import Unmet
 from ..base.text import list_some, plural
 from ..geometry.overlap import Overlaps
 from ..geometry.planar import sides_between
 from ..mesh.connectivity import TriangleMesh
 from .distortion import angle_sum_errors, measure, measure_map
+from .report import MAP_MEASURES
 from .seam_data import Rotations, seam_rotations
 
 if TYPE_CHECKING:
@@ -48,6 +49,7 @@ def unmet_guarantees(result: Flattening, unit: float = DOUBLE) -> tuple[Unmet, .
         unit: relative rounding of the coordinates.
     """
     notes = (
+        *_undefined(result),
         *_orientation(result),
         *_overlaps(result),
         *_angle_sums(result, unit),
@@ -121,6 +123,31 @@ def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:
 def _is_exact(result: Flattening) -> bool:
     """Return whether the layout has the angles and seams of an exact flat metric, not a least squares fit."""
     return result.settings.get("method") == "exact"
+
+
+def _undefined(result: Flattening) -> Iterator[str]:
+    """Yield a note if measures of the map are not numbers."""
+    values = {name: getattr(result.distortion, name) for name in MAP_MEASURES}
+    yield from undefined_measures(values, result.distortion.qc)
+
+
+def undefined_measures(values: Mapping[str, float], qc: FloatArray) -> tuple[Unmet, ...]:
+    """Return a note on the measures that are not numbers, which is so if no triangle has area.
+
+    Args:
+        values: the measures by name.
+        qc: (m,) the QC of each triangle, NaN for those without area.
+    """
+    names = [name for name, value in values.items() if not np.isfinite(value)]
+    if not names:
+        return ()
+    count = int(np.count_nonzero(np.isfinite(qc)))
+    return (
+        Unmet(
+            f"Measures that are not defined: {', '.join(names)}; {count:,} of {plural(len(qc), 'triangle')} have area "
+            "on the model and in the plane."
+        ),
+    )
 
 
 def _orientation(result: Flattening) -> Iterator[str]:

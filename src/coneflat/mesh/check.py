@@ -92,6 +92,11 @@ def left_out(count: int) -> str:
     return f"{LEFT_OUT}{plural(count, 'vertex', 'vertices')}{FACELESS}"
 
 
+def short_faces_note(count: int) -> str:
+    """Return the note that faces with fewer than three corners were dropped."""
+    return f"Dropped {plural(count, 'face')} with fewer than three corners."
+
+
 def is_left_out(note: str) -> bool:
     """Return whether a note was made by `left_out`."""
     return note.startswith(LEFT_OUT) and note.endswith(FACELESS)

@@ -75,7 +75,7 @@ class Number(Kind):
         is_integer: the number must be an integer.
         is_positive: the number must be finite and above 0.
         is_angle, is_strength: the number is an angle, or a strength.
-        optional: None is allowed.
+        optional: None is allowed, also as the word "none".
     """
 
     least: float = -math.inf
@@ -87,7 +87,7 @@ class Number(Kind):
     optional: bool = False
 
     def parse(self, name: str, value: Any) -> float | None:
-        if value is None and self.optional:
+        if self.optional and (value is None or (isinstance(value, str) and value == "none")):
             return None
         if self.is_strength and type(value).__name__ in ("bool", "bool_"):
             value = float(value)

@@ -4,5 +4,8 @@ from .constraints import vertex_numbers
 from .copies import find_copies
 from .input_mesh import at_unit_size, result_numbering
 from .parts import Part, Prepared, Source
+from .rounding import rounding_notes
 
-__all__ = ["Part", "Prepared", "Source", "at_unit_size", "find_copies", "result_numbering", "vertex_numbers"]
+__all__ = [
+    "Part", "Prepared", "Source", "at_unit_size", "find_copies", "result_numbering", "rounding_notes", "vertex_numbers",
+]  # fmt: skip

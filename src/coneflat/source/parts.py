@@ -11,18 +11,19 @@ import numpy as np
 from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of
 from ..base.notes import Unmet
 from ..base.text import list_some, plural
-from ..errors import OptionError
+from ..errors import DegenerateFaceError, OptionError
 from ..geometry import double_areas, edge_lengths, mollify
 from ..geometry.visibility import visible_share
 from ..linalg.memory import check_memory
 from ..mesh.charts import CutMesh, open_along
-from ..mesh.check import CheckedMesh, check_mesh
+from ..mesh.check import REPAIR_ADVICE, CheckedMesh, check_mesh, short_faces_note
 from ..mesh.connectivity import TriangleMesh
 from ..options import Options
 from ..stages import ConeSpec, MetricSpec, SeamSpec
 from .constraints import Constraints, locate_constraints
 from .input_mesh import InputMesh, at_unit_size, lengths_of_input, reorder_corners
 from .marked_edges import effective_marks, forbidden_edges, marked_edges, unreachable
+from .rounding import named_rounding, rounding_notes
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,9 +144,12 @@ class Source:
         checked, is_diagonal = self._checked.of(options.repair, lambda: self._check(options.repair))
         own = _own_lengths(given, checked, options)
         metric = options.repair, options.strict, None if own is None else own.tobytes()
-        lengths, note = self._lengths.of(metric, lambda: _open_triangles(checked, own, options.strict))
+        with named_rounding(given.vertices, given.faces):
+            lengths, note = self._lengths.of(metric, lambda: _open_triangles(checked, own, options.strict))
         constraints = locate_constraints(checked, options, given)
         notes = [] if note is None else [note]
+        if note is not None or len(checked.face_origin) < len(np.asarray(given.faces)):
+            notes += rounding_notes(given.vertices, given.faces)
         forbidden = forbidden_edges(checked, options, len(np.asarray(given.vertices)))
         marked = np.empty(0, dtype=np.int64)
         if options.marks_seams:
@@ -178,13 +182,32 @@ class Source:
 
     def _check(self, repair: bool) -> tuple[CheckedMesh, BoolArray]:
         """Return the checked mesh, and (m, 3) which of its sides are inside a polygon of the input."""
-        checked = at_unit_size(check_mesh(self.given.vertices, self.given.faces, repair=repair))
+        dropped = _short_faces(self.given, repair)
+        with named_rounding(self.given.vertices, self.given.faces):
+            checked = at_unit_size(check_mesh(self.given.vertices, self.given.faces, repair=repair))
+        checked = replace(checked, notes=(*dropped, *checked.notes))
         return checked, reorder_corners(checked, ~self.given.is_side())
 
     def _visibility(self, checked: CheckedMesh, options: Options) -> FloatArray:
         up = None if options.up is None else np.array(options.up)
         key = options.repair, None if up is None else up.tobytes()
         return self._seen.of(key, lambda: visible_share(checked.mesh.vertices, checked.mesh.faces, up))
+
+
+def _short_faces(given: InputMesh, repair: bool) -> tuple[str, ...]:
+    """Return a note on faces of the file with fewer than three corners, which are left out.
+
+    Raises:
+        DegenerateFaceError: there are some, and the mesh is not repaired.
+    """
+    count = 0 if given.source is None else given.source.short_faces
+    if not count:
+        return ()
+    if not repair:
+        raise DegenerateFaceError(
+            f"{plural(count, 'face')} with fewer than three corners; {REPAIR_ADVICE} to drop them"
+        )
+    return (short_faces_note(count),)
 
 
 def _open_triangles(

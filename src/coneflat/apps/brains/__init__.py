@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .files import FLAT_FORMATS, read_flat
+from .files import FLAT_FORMATS, kept_in_flat, read_flat
 from .flat import FlatCortex, flatten_cortex
 from .measures import FLAT_MEASURES, FlatMeasures, measure_flat, metric_distortion
 
@@ -12,6 +12,7 @@ __all__ = [
     "FlatCortex",
     "FlatMeasures",
     "flatten_cortex",
+    "kept_in_flat",
     "measure_flat",
     "metric_distortion",
     "read_flat",

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ... import MeshFile
 from ...base import BoolArray, FloatArray, IntArray
 from ...errors import MeshFileError, OptionError
-from ...io import UVMesh, atomic_write, known_ending, nibabel, read_bytes, read_mesh
+from ...io import Attribute, UVMesh, atomic_write, known_ending, nibabel, read_bytes, read_mesh
 
 #: Endings of flat maps; FreeSurfer's patches, such as lh.flat.patch.3d, have the ending .3d.
 FLAT_FORMATS = (".gii", ".3d")
@@ -34,6 +35,14 @@ def check_same_side(surface: Path, others: dict[str, Path]) -> None:
                 f"{what} {path} must be of the {side_of(surface)} hemisphere, like {surface}, got the "
                 f"{side_of(path)} one"
             )
+
+
+def kept_in_flat(surface: MeshFile, ending: str) -> list[Attribute]:
+    """Return the attributes of the file of a surface that its flat map keeps: the hemisphere, if the name tells it."""
+    keeps_side = ending == ".gii" and side_of(surface.path)
+    # The flat map has its own geometric type.
+    names = ("GeometricType", "AnatomicalStructurePrimary")[: 1 + bool(keeps_side)]
+    return [Attribute("metadata", name) for name in names]
 
 
 def write_gifti(path: Path, points: FloatArray, faces: IntArray, side: str) -> None:

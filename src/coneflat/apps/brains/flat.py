@@ -96,7 +96,8 @@ def flatten_cortex(
     checked = check_mesh(mesh.vertices, faces, repair=True)  # separates what touches in a point
     count, part = label_faces(checked.mesh.faces, len(checked.mesh.vertices))
     largest = faces[checked.face_origin[part == np.bincount(part, minlength=count).argmax()]]
-    given = replace(mesh, corners=largest.reshape(-1), offsets=np.arange(0, largest.size + 1, 3))
+    offsets = np.arange(0, largest.size + 1, 3)
+    given = MeshFile(path, mesh.vertices, largest.reshape(-1), offsets, attributes=mesh.attributes)
     if len(kept):
         options["no_seams"] = kept[~cut_off[kept]]
     result = flatten(given, **{"stretch": 1.0, "repair": True, **options})

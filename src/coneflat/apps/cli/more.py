@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,6 +13,9 @@ from ...options import FORMATS, ConeNumber, RunOptions, option, strength
 from .measure import rows_of_measures
 from .options import flag, keywords, option_flags, path_flag, pop_flags
 from .shared import GroupedCommand, verbosity_options
+
+if TYPE_CHECKING:
+    from ..transfer import Baked
 
 _PATH = click.Path(path_type=Path)
 
@@ -63,8 +66,8 @@ def brain(context: click.Context, /, surface: Path, verbosity: str | None, **giv
       coneflat figure lh.npz --color lh.sulc
       coneflat measure lh.flat.gii --surface lh.white
     """
-    from ...io import check_target, checked_target
-    from ..brains import FLAT_FORMATS, flatten_cortex, measure_flat
+    from ...io import as_written, check_target, checked_target, losses
+    from ..brains import FLAT_FORMATS, flatten_cortex, kept_in_flat, measure_flat
     from .run import Console, require_distinct, write_report
 
     flags, options = pop_flags(given, BrainFlags), keywords({**given, "repair": True}, BrainOptions)
@@ -91,7 +94,13 @@ def brain(context: click.Context, /, surface: Path, verbosity: str | None, **giv
             write_report(flags.report, {**measured.report(), "seconds": dict(console.seconds)})
         left_out = len(found.result.faces) - int(measured.uv.counts["triangles"])
         along = [f"{plural(left_out, 'triangle')} along cuts left out of the flat map."] if left_out else []
-        console.say(f"note: {note}" for note in (*found.result.notes, *measured.uv.notes, *along))
+        notes = [*found.result.notes, *measured.uv.notes, *along]
+        for ending in dict.fromkeys(path.suffix.lower() for path in outputs):
+            if ending in FLAT_FORMATS:
+                notes += losses(found.surface, ending, kept_in_flat(found.surface, ending))
+            else:
+                notes += as_written(found.result, ending).notes
+        console.say(f"note: {note}" for note in dict.fromkeys(notes))
         console.finish([*outputs, *([] if flags.report is None else [flags.report])])
         console.table(rows_of_measures(measured.uv, measured))
 
@@ -130,8 +139,26 @@ def transfer(
             baked = bake(old, new, resolution=resolution, texture=texture)
         with console.stage("write"):
             baked.save(output)
-        console.say(f"note: {note}" for note in (*baked.notes, *baked.losses(output)))
+        losses = (*baked.losses(output), *_not_baked(baked, output))
+        console.say(f"note: {note}" for note in (*baked.notes, *losses))
         console.finish([output])
+
+
+def _not_baked(baked: Baked, output: Path) -> tuple[str, ...]:
+    """Return a note on data of a model that its file with baked textures does not keep; a picture is not the model."""
+    from ... import io
+
+    source, ending = baked.uv_mesh.source, output.suffix.lower()
+    if source is None or ending not in io.KEPT:
+        return ()
+    # Baked textures replace them.
+    replaced = {
+        io.MATERIALS,
+        io.Attribute("textures"),
+        io.VERTEX_COLOURS,
+        io.Attribute("vertex attributes", "COLOR_0"),
+    }
+    return io.losses(source, ending, io.KEPT[ending](source) | replaced | set(io.texture_files(source)))
 
 
 @click.command(short_help="Write the Blender extension.")

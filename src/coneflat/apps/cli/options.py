@@ -58,9 +58,9 @@ def path_flag(default: Path | None = None, **more: Any) -> Any:
 
 
 def _angle(value: Any) -> float:
-    """Return an angle in radians from 1.57, pi/2, 0.1pi, 90deg or inf."""
+    """Return an angle in radians from 1.57, pi/2, 0.1pi, 90deg, inf, or none, which is inf."""
     try:
-        return math.inf if value.strip().lower() == "inf" else values.parse_angle(value)
+        return math.inf if value.strip().lower() in ("inf", "none") else values.parse_angle(value)
     except OptionError as error:
         raise click.BadParameter(str(error)) from error
 

@@ -59,7 +59,7 @@ def quads(
     from ... import integer_grid, measure_quads
     from ... import quads as find_quads
     from ...io import check_target, read_joined
-    from ..quads.files import check_grid_output, check_quads_output, read_grid
+    from ..quads.files import check_grid_output, check_quads_output, quads_left_out, read_grid
     from ..quads.page import page_of_quads
     from ..view import check_page, write_page
     from .run import Console, require_distinct, write_report
@@ -102,6 +102,9 @@ def quads(
             if found is not None and view is not None:
                 write_page(page_of_quads(found, name=mesh.name), view)
         notes = list(done.notes if joined is None else joined.all_notes(done.notes))
+        endings = [path.suffix.lower() for path in (output, grid) if path is not None]
+        for ending in dict.fromkeys(endings):
+            notes += quads_left_out(None if joined is None else joined.mesh, ending)
         if flags.report is not None:
             measured = {} if measures is None else measures.report()
             rest = {"grid": {"size": grid_map.size}, "seconds": dict(console.seconds), "notes": notes}

@@ -282,7 +282,8 @@ def save(
         else:
             # Like files, the result is written completely or not at all.
             content = BytesIO()
-            result = as_written(write_stream(result, content, ending, texture), ending)
+            stored = write_stream(result, content, ending, texture)
+            result = as_written(stored, ending, has_texture=texture is not None)
             stdout.write(content.getbuffer())
             stdout.flush()
     result = replace(result, seconds=dict(console.seconds))

@@ -14,14 +14,17 @@ from typing import IO, Any
 
 import numpy as np
 
-from ... import TriangleMesh, check_mesh
+from ... import MeshFile, TriangleMesh, check_mesh
 from ...base import FloatArray, IntArray
 from ...errors import MeshError, MeshFileError
 from ...geometry import sides_between, vertex_normals
 from ...io import (
     FOR_INDICES,
     FOR_VERTICES,
+    GROUPS,
     MATERIAL,
+    MATERIALS,
+    OBJECTS,
     CheckedArrays,
     Glb,
     as_path,
@@ -31,6 +34,8 @@ from ...io import (
     imported,
     known_ending,
     lines_of,
+    local_positions,
+    losses,
     number,
     read_archive,
     relocated,
@@ -90,13 +95,21 @@ def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:
     return path
 
 
+def quads_left_out(source: MeshFile | None, ending: str) -> tuple[str, ...]:
+    """Return a note on data of the file that a mesh was read from and that a file of its quads does not keep."""
+    is_obj = source is not None and source.obj is not None and ending == ".obj"
+    return losses(source, ending, (GROUPS, OBJECTS, MATERIALS) if is_obj else ())
+
+
 def write_quads_stream(mesh: QuadMesh, stream: IO[bytes], ending: str, path: Path = Path()) -> None:
     """Write a quad mesh to the binary stream of a file; `ending` is one of `QUAD_FORMATS`, see `write_quads`."""
     if ending == ".obj":
         _write_obj(mesh, stream, path)
     elif ending == ".ply":
         places = np.ascontiguousarray(mesh.vertices, "<f8")
-        write_parts(stream, "quads by coneflat", [f"double {axis}" for axis in "xyz"], places, mesh.quads)
+        write_parts(
+            stream, ["comment quads by coneflat"], [f"double {axis}" for axis in "xyz"], places, mesh.quads
+        )
     elif ending == ".glb":
         _write_glb(mesh, stream)
     elif ending in _MESHIO:
@@ -220,7 +233,7 @@ def _write_glb(mesh: QuadMesh, stream: IO[bytes]) -> None:
 
     The first primitive has the vertices in their order, and for each quad the two triangles at its shorter diagonal.
     The second has the edges, raised above the quads by a hundredth of the mean edge length; closer lines
-    appear dashed in viewers. Coordinates are 32-bit floats.
+    appear dashed in viewers. Coordinates are 32-bit floats, relative to the node if the mesh is far from the origin.
 
     Raises:
         MeshFileError: the file would be larger than GLB allows.
@@ -228,13 +241,14 @@ def _write_glb(mesh: QuadMesh, stream: IO[bytes]) -> None:
     normals = shading_normals(vertex_normals(mesh.vertices, mesh.triangles))
     ends = mesh.vertices[mesh.edges]
     length = float(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).mean())
+    places = local_positions(mesh.vertices)
     glb = Glb(
         {
             "asset": {"version": "2.0", "generator": "coneflat"},
             "extensionsUsed": ["KHR_materials_unlit"],
             "scene": 0,
             "scenes": [{"nodes": [0]}],
-            "nodes": [{"mesh": 0, "name": "quads"}],
+            "nodes": [{"mesh": 0, "name": "quads"} | places.node],
             "materials": [MATERIAL, _LINE_MATERIAL],
         }
     )
@@ -249,9 +263,10 @@ def _write_glb(mesh: QuadMesh, stream: IO[bytes]) -> None:
         attributes = {"POSITION": floats(places, **bounds(places.astype("<f4")))}
         return {"attributes": attributes, "indices": at, **more}
 
-    faces = primitive(mesh.vertices, mesh.triangles, material=0)
+    faces = primitive(places.local.astype(np.float64), mesh.triangles, material=0)
     faces["attributes"]["NORMAL"] = floats(normals)
-    lines = primitive(mesh.vertices + 0.01 * length * normals, mesh.edges, material=1, mode=1)
+    raised = places.local.astype(np.float64) + 0.01 * length * normals
+    lines = primitive(raised, mesh.edges, material=1, mode=1)
     glb.tree["meshes"] = [{"name": "quads", "primitives": [faces, lines]}]
     glb.write(stream)
 

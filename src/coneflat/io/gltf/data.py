@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ...base.arrays import FloatArray, IntArray
 from ...errors import ConeflatError, MeshFileError
-from ..files import read_bytes
+from ..files import inner_path, read_bytes
 
 #: An object of the JSON.
 Item: TypeAlias = dict[str, Any]
@@ -197,8 +197,12 @@ class GltfData:
         return self.count(slot | self.entry(extensions, "KHR_texture_transform", dict), "texCoord", 0)
 
     def resolve(self, uri: str) -> Path:
-        """Return the path of a URI that is relative to this file."""
-        return self.path.parent / unquote(uri)
+        """Return the path of a URI that is relative to this file.
+
+        Raises:
+            MeshFileError: it is outside the folder of this file.
+        """
+        return inner_path(self.path.parent, unquote(uri))
 
     def _rows(self, index: Any, item: Item, count: int, size: int, stride: int | None = None) -> ByteRows:
         """Return (count, size) bytes of the buffer view that an accessor, or a part of it, refers to."""
@@ -242,8 +246,8 @@ class GltfData:
             elif "://" in uri:
                 self.fail(f"buffer {i} is at {uri[:60]!r}, but remote files are not loaded")
             else:
-                path = self.resolve(uri)
                 try:
+                    path = self.resolve(uri)
                     found = known[path] = known[path] if path in known else read_bytes(path)
                 except ConeflatError as error:
                     raise MeshFileError(f"{self.path}: buffer {i} cannot be read: {error}") from error

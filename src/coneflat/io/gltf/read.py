@@ -6,7 +6,7 @@ the node, mesh and primitive of each triangle.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -17,11 +17,14 @@ import numpy as np
 from ...base.arrays import FloatArray, IntArray
 from ...errors import EmptyMeshError
 from ...mesh.check import weld
+from ..attributes import MATERIALS, Attribute
 from ..mesh_file import MeshFile
-from .data import GltfData, Item, numbers
-from .references import check_references
+from .data import COMPRESSED, GltfData, Item, numbers
+from .references import check_references, keys_of
 
 DRACO = "KHR_draco_mesh_compression"
+#: Attributes that are the mesh itself, or the numbers that this package wrote for an earlier one.
+_MESH = ("POSITION", "NORMAL", "TEXCOORD_0", "_SOURCE_VERTEX")
 #: Maximum number of corners of a scene, counting meshes as often as nodes show them,
 MAX_CORNERS = 10_000_000
 #: or per byte of the file, whichever is larger.
@@ -161,6 +164,7 @@ class _Reading:
             uv=None if uv is None else uv * [1, -1] + [0, 1],
             normals=normals,
             normal=normal,
+            attributes=_attributes(self.data, self._parts),
             scene=GltfScene(self.data, tuple(self._parts), tuple(self._blocks)),
         )
 
@@ -187,6 +191,27 @@ class _Reading:
         if item.get("bufferView") is None and (packed or item.get("sparse") is None):
             save = f"are compressed ({DRACO}); save it without compression"
             self.data.fail(f"the positions of a mesh {save if packed else 'are not in the file'}")
+
+
+def _attributes(data: GltfData, parts: Sequence[ScenePart]) -> tuple[Attribute, ...]:
+    """Return the data of a scene in addition to its mesh."""
+    tree = data.tree
+    primitives = [tree["meshes"][part.mesh]["primitives"][part.primitive] for part in parts]
+    every = [primitive for mesh in tree["meshes"] for primitive in mesh["primitives"]]
+    names = dict.fromkeys(name for primitive in primitives for name in primitive["attributes"])
+    found = [Attribute("vertex attributes", name) for name in names if name not in _MESH]
+    found += [Attribute("morph targets")] * any(primitive.get("targets") for primitive in primitives)
+    found += [MATERIALS] * any("material" in primitive for primitive in primitives)
+    found += [Attribute("textures")] * bool(tree.get("textures"))
+    found += [Attribute("nodes")] * (len(tree.get("nodes", [])) > 1)
+    found += [Attribute(name) for name in ("skins", "animations", "cameras") if tree.get(name)]
+    modes = {primitive.get("mode", Mode.TRIANGLES) for primitive in every}
+    found += [Attribute("lines and points")] * bool(modes - set(Mode))
+    shown = {part.mesh for part in parts}
+    found += [Attribute("hidden meshes")] * (len(shown) < len(tree["meshes"]))
+    used = (name for name in tree.get("extensionsUsed", []) if name not in (DRACO, *COMPRESSED))
+    found += [Attribute("extensions", str(name)) for name in used]
+    return (*found, *([Attribute("extras")] if "extras" in set(keys_of(tree)) else []))
 
 
 class _Rows:

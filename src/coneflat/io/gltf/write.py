@@ -11,6 +11,7 @@ import json
 import os
 import struct
 from collections import defaultdict, deque
+from collections.abc import Iterator
 from copy import deepcopy
 from pathlib import Path
 from typing import IO, Any
@@ -20,14 +21,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import FloatArray, IntArray
-from ...base.text import plural
+from ...base.text import list_some, plural, printable
 from ...errors import ConeflatError, MeshFileError
 from ...geometry.triangles import vertex_normals
+from ...mesh.polygons import COLOURS
 from ...result import Flattening
+from ..attributes import ALPHA, MAX_NAME, VERTEX_COLOURS, Attribute, colour_shades, to_linear
 from ..files import moved_path, read_bytes
-from ..split import distinct_pairs, shading_normals, source_normals, split_at_seams
+from ..mesh_file import MeshFile
+from ..split import distinct_pairs, input_vertices, shading_normals, source_normals, split_at_seams
 from ..texture import Texture, image_kind
 from .data import COMPRESSED, GltfData, Item
+from .positions import local_positions
 from .read import DRACO, GltfScene, Mode, ScenePart
 from .references import accessors_of_arrays, keys_of, numbers_in_extensions, view_owners, views_of_images
 
@@ -42,7 +47,9 @@ MATERIAL: Item = {
         "roughnessFactor": 0.7,
     },
 }
-UV = "TEXCOORD_0"
+#: It equals that of primitives without a material, by the specification.
+DEFAULT_MATERIAL: Item = {"name": "default"}
+UV, COLOUR = "TEXCOORD_0", "COLOR_0"
 #: Keys of an accessor that are copied to the accessor of a subset of its elements.
 _KEPT = ("componentType", "type", "normalized", "name", "extras")
 
@@ -159,8 +166,10 @@ def write_glb(result: Flattening, stream: IO[bytes], texture: Texture | None, fo
 
     For a mesh that was read from a glTF scene, the scene is written with new UVs. Otherwise the file has one mesh, with
     a two-sided material that is plain or has a texture. Every vertex has its UV as TEXCOORD_0 (with v pointing down, as
-    glTF defines it), the input's normal or else that of the uncut surface, and its vertex in the input as
-    _SOURCE_VERTEX. All are 32-bit floats, the only type that glTF has for them: source vertices are exact up to 2^24.
+    glTF defines it), the input's normal or else that of the uncut surface, its colour as COLOR_0 if the input has
+    colours and there is no texture, and its vertex in the input as _SOURCE_VERTEX. All but colours are 32-bit floats,
+    the only type that glTF has for them: source vertices are exact up to 2^24. Positions of a model far from the origin
+    are relative to its node, whose translation is in doubles.
 
     Args:
         result: the result to write.
@@ -182,20 +191,23 @@ def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
     normals = split.normals
     if normals is None:
         normals = shading_normals(vertex_normals(result.vertices, result.faces))[split.own]
+    places, colours = local_positions(split.vertices), None
+    if texture is None and result.source is not None and result.face_corners is not None:
+        colours = linear_colours(result.source, input_vertices(result)[split.own])
     primitive: Item = {"attributes": {}, "indices": 0, "material": 0}
     glb = Glb(
         {
             "asset": {"version": "2.0", "generator": "coneflat"},
             "scene": 0,
             "scenes": [{"nodes": [0]}],
-            "nodes": [{"mesh": 0, "name": "flattened"}],
+            "nodes": [{"mesh": 0, "name": "flattened"} | places.node],
             "meshes": [{"name": "flattened", "primitives": [primitive]}],
         }
         | {name: [] for name in ("materials", "accessors", "bufferViews", "buffers")}
     )
     glb.add_array(split.faces.reshape(-1, 1).astype("<u4"), {"componentType": 5125, "type": "SCALAR"})
     for name, kind, values in (
-        ("POSITION", "VEC3", split.vertices),
+        ("POSITION", "VEC3", places.local),
         ("NORMAL", "VEC3", normals),
         ("TEXCOORD_0", "VEC2", split.uv * [1, -1] + [0, 1]),
         ("_SOURCE_VERTEX", "SCALAR", split.origin.reshape(-1, 1)),
@@ -203,11 +215,39 @@ def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
         stored = values.astype("<f4")
         form = {"componentType": 5126, "type": kind} | (bounds(stored) if name == "POSITION" else {})
         primitive["attributes"][name] = glb.add_array(stored, form)
-    if texture is None:
+    if colours is not None:
+        form = {"componentType": 5123, "type": "VEC4", "normalized": True}
+        primitive["attributes"][COLOUR] = glb.add_array(colours, form, FOR_VERTICES)
+    if colours is not None:
+        # The material multiplies the colours.
+        plain = MATERIAL["pbrMetallicRoughness"] | {"baseColorFactor": [1.0] * 4}
+        glb.add("materials", MATERIAL | {"pbrMetallicRoughness": plain})
+    elif texture is None:
         glb.add("materials", MATERIAL)
     else:
         glb.add_material(texture)
     return glb
+
+
+def linear_colours(source: MeshFile, vertices: IntArray) -> NDArray[np.uint16] | None:
+    """Return (k, 4) the linear colours and alphas of vertices of a file, 0 to 65535; None if it has none.
+
+    Colours of files are sRGB; 16 bits keep all of their 256 steps.
+    """
+    if not source.has_colours:
+        return None
+    shades = np.stack([source.properties[name][vertices] for name in COLOURS], axis=1)
+    linear = to_linear(np.clip(np.nan_to_num(shades), 0, 1))
+    alpha = colour_shades(source.properties.get(ALPHA.name, np.ones(len(source.vertices))))[vertices]
+    rows = np.column_stack([linear, np.clip(np.nan_to_num(alpha), 0, 1)])
+    return np.rint(np.iinfo(np.uint16).max * rows).astype("<u2")
+
+
+def kept_in_glb(source: MeshFile) -> set[Attribute]:
+    """Return the attributes of a source file that `write_glb` keeps: those of a scene, or colours of vertices."""
+    if source.scene is not None:
+        return set(source.attributes)
+    return {VERTEX_COLOURS, ALPHA} if source.has_colours else set()
 
 
 def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: Texture | None) -> Glb:
@@ -239,7 +279,7 @@ def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: 
     if texture is not None:
         material = glb.add_material(texture)
     elif not all("material" in target for target in targets):
-        material = glb.add("materials", MATERIAL)
+        material = glb.add("materials", DEFAULT_MATERIAL)
     owned, first = _faces_of_parts(scene.parts, result.face_corners), 0
     for part, target, before, faces in zip(scene.parts, targets, old, owned, strict=True):
         vertices, points = part.corners[result.face_corners[faces] - first], result.uv_faces[faces]
@@ -254,8 +294,13 @@ def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: 
     return glb
 
 
-def scene_losses(result: Flattening) -> tuple[str, ...]:
-    """Return notes on data of the source glTF file that a GLB of a result does not keep, one sentence each."""
+def scene_losses(result: Flattening, has_texture: bool = False) -> tuple[str, ...]:
+    """Return notes on data of the source glTF file that a GLB of a result changes, one sentence each.
+
+    Args:
+        result: the result.
+        has_texture: whether a texture replaces the materials of its triangles.
+    """
     source = result.source
     if source is None or source.scene is None or result.face_corners is None:
         return ()
@@ -272,11 +317,27 @@ def scene_losses(result: Flattening) -> tuple[str, ...]:
             f"Meshes of several nodes were copied, to have UVs for each node: {plural(copies, 'copy', 'copies')}."
         )
     primitives = [tree["meshes"][part.mesh]["primitives"][part.primitive] for part in parts]
+    bare = sum("material" not in primitive for primitive in primitives)
+    if bare and not has_texture:
+        notes.append(
+            f"{plural(bare, 'primitive')} without a material got the default material of glTF, because some programs "
+            "read no UVs without one."
+        )
     if any("TANGENT" in one["attributes"] and "TANGENT" in _replaced(data, one) for one in primitives):
         notes.append("Tangents of the old UVs are not in the file: viewers compute them from the new ones.")
+    missing = [
+        printable(image["uri"])[:MAX_NAME]
+        for image in image_files(tree)
+        if not _content_of(data, image["uri"])
+    ]
+    if missing:
+        notes.append(
+            f"{plural(len(missing), 'image file is', 'image files are')} not embedded, because nothing can be read "
+            f"there, or because it is outside the folder of the scene: {list_some(missing)}."
+        )
     used = {one["material"] for one in primitives if "material" in one}
     painted = [i for i in used if any(name.endswith("Texture") for name in keys_of(tree["materials"][i]))]
-    if painted:
+    if painted and not has_texture:
         notes.append(
             f"The textures of {plural(len(painted), 'material')} are kept, but were made for the old UVs; `coneflat "
             "transfer` bakes them into the new ones."
@@ -345,14 +406,9 @@ def _gathered(glb: Glb, data: GltfData, index: int, own: IntArray, has_bounds: b
 
 def _embed_images(glb: Glb, data: GltfData, folder: Path) -> None:
     """Embed image files in the buffer; for those that cannot be read, rewrite the relative paths."""
-    for image in glb.tree.get("images", []):
-        uri = image.get("uri")
-        if not isinstance(uri, str) or uri.startswith("data:") or "://" in uri:
-            continue
-        try:
-            content = read_bytes(data.resolve(uri))
-        except ConeflatError:
-            content = b""
+    for image in image_files(glb.tree):
+        uri = image["uri"]
+        content = _content_of(data, uri)
         kind = image_kind(content)
         if kind is None or kind == "image/gif":  # glTF does not support GIF
             old, new = (os.path.realpath(place) for place in (data.path.parent, folder))
@@ -360,6 +416,22 @@ def _embed_images(glb: Glb, data: GltfData, folder: Path) -> None:
             continue
         del image["uri"]
         image |= {"bufferView": glb.add_view(content), "mimeType": kind}
+
+
+def image_files(tree: Item) -> Iterator[Item]:
+    """Yield the images of a scene that are files of their own."""
+    for image in tree.get("images", []):
+        uri = image.get("uri")
+        if isinstance(uri, str) and not uri.startswith("data:") and "://" not in uri:
+            yield image
+
+
+def _content_of(data: GltfData, uri: str) -> bytes:
+    """Return the content of an image file; empty if it cannot be read, or is outside the folder of the scene."""
+    try:
+        return read_bytes(data.resolve(uri))
+    except ConeflatError:
+        return b""
 
 
 def _drop_empty(glb: Glb, targets: list[Item]) -> None:
