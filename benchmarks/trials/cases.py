@@ -29,6 +29,7 @@ from .offsets import offset_case
 from .outcome import LONGEST_MESSAGE, Outcome
 from .promises import check
 from .textures import texture_case
+from .transfers import transfer_case
 from .written import READERS, check_file, check_report
 
 Random = np.random.Generator
@@ -283,6 +284,7 @@ KINDS: dict[str, Callable[[Random, Outcome], None]] = {
     "tiny": _tiny,
     "process": _process,
     "texture": texture_case,
+    "transfer": transfer_case,
     "attribute": attribute_case,
     "offset": offset_case,
     "grid": grid_case,
@@ -291,8 +293,8 @@ KINDS: dict[str, Callable[[Random, Outcome], None]] = {
     "swell": _swell,
 }
 SHARES = {
-    "mesh": 14, "tiny": 6, "texture": 8, "file": 6, "argument": 3, "command": 2, "process": 1, "attribute": 2,
-    "offset": 2,
+    "mesh": 14, "tiny": 6, "texture": 8, "file": 6, "argument": 3, "command": 2, "process": 1, "transfer": 2,
+    "attribute": 2, "offset": 2,
 }  # fmt: skip
 
 

@@ -149,7 +149,7 @@ def _gltf(rng: Random, vertices: np.ndarray, polygons: list[list[int]]) -> tuple
     return scene, binary
 
 
-def _damaged_scene(rng: Random, scene: dict) -> dict:
+def damaged_scene(rng: Random, scene: dict) -> dict:
     """A scene with one entry changed, removed or much too large; sometimes a sparse accessor."""
     if rng.random() < 0.2:
         accessor = scene["accessors"][int(rng.integers(2))]
@@ -184,7 +184,7 @@ def _damaged_scene(rng: Random, scene: dict) -> dict:
 def write_glb(rng: Random, vertices: np.ndarray, polygons: list[list[int]], damage: bool = False) -> bytes:
     scene, binary = _gltf(rng, vertices, polygons)
     if damage:
-        scene = _damaged_scene(rng, scene)
+        scene = damaged_scene(rng, scene)
     text = json.dumps(scene).encode()
     text += b" " * (-len(text) % 4)
     whole = 12 + 8 + len(text) + 8 + len(binary)
@@ -202,7 +202,7 @@ def write_gltf(rng: Random, vertices: np.ndarray, polygons: list[list[int]], dam
 
     scene, binary = _gltf(rng, vertices, polygons)
     scene["buffers"][0]["uri"] = "data:application/octet-stream;base64," + base64.b64encode(binary).decode()
-    return json.dumps(_damaged_scene(rng, scene) if damage else scene).encode()
+    return json.dumps(damaged_scene(rng, scene) if damage else scene).encode()
 
 
 def write_npz(rng: Random, vertices: np.ndarray, polygons: list[list[int]], damage: bool = False) -> bytes:

@@ -10,6 +10,7 @@ import pytest
 import reference
 import shapes
 from click.testing import CliRunner
+from scenes import SceneMaker
 
 import coneflat
 from coneflat import MeshFile, errors, measure_uv
@@ -135,6 +136,140 @@ class TestKnownAnswers:
         assert fan_corners(np.array([0, 3, 7, 12])).tolist() == [
             [0, 1, 2], [3, 4, 5], [3, 5, 6], [7, 8, 9], [7, 9, 10], [7, 10, 11]
         ]  # fmt: skip
+
+
+#: Two squares side by side, each with the whole unit square as its UVs.
+PAIR = SQUARE + "v 2 0 0\nv 2 1 0\n" + UNIT
+LEFT, RIGHT = "f 1/1 2/2 3/3 4/4\n", "f 2/1 5/2 6/3 3/4\n"
+
+
+def pair_of_materials(folder, library):
+    """Write two squares of two materials, and their library if there is one."""
+    if library is not None:
+        written(folder, library, "a.mtl")
+    return written(folder, f"mtllib a.mtl\n{PAIR}usemtl one\n{LEFT}usemtl the other\n{RIGHT}")
+
+
+def pair_of_primitives(folder, images, materials=(0, 1)):
+    """Write two squares as primitives of materials with the textures 0 and 1, which have some images."""
+    make = SceneMaker()
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    uv, indices = make.accessor(corners[:, :2].copy()), make.accessor([0, 1, 2, 0, 2, 3], 5125)
+    primitives = [
+        {
+            "attributes": {"POSITION": make.accessor(corners + np.array([place, 0, 0])), "TEXCOORD_0": uv},
+            "indices": indices,
+            "material": material,
+        }
+        for place, material in enumerate(materials)
+    ]
+    view = make.view(b"no image is read")
+    make.tree |= {
+        "images": [{"bufferView": view, "mimeType": "image/png"}] * 2,
+        "textures": [{"source": image} for image in images],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": i}}} for i in (0, 1)]
+        + [{}, {}],
+        "nodes": [{"mesh": 0}],
+        "scenes": [{"nodes": [0]}],
+        "meshes": [{"primitives": primitives}],
+    }
+    path = folder / "a.glb"
+    path.write_bytes(make.glb())
+    return path
+
+
+PLY = """ply
+format ascii 1.0
+comment TextureFile a.png
+comment TextureFile b.png
+element vertex 6
+property float x
+property float y
+property float z
+element face 2
+property list uchar int vertex_indices
+property list uchar float texcoord
+property int texnumber
+end_header
+0 0 0
+1 0 0
+1 1 0
+0 1 0
+2 0 0
+2 1 0
+4 0 1 2 3 8 0 0 1 0 1 1 0 1 {}
+4 1 4 5 2 8 0 0 1 0 1 1 0 1 {}
+"""
+
+
+class TestTextures:
+    """Charts in different textures do not overlap; each texture has its own unit square."""
+
+    def apart(self, path):
+        found = measure_uv(path).report()
+        assert (found["overlap"], found["overlapping_pairs"], found["outside"]) == (0, 0, 0)
+        assert (found["textures"], found["tiles"], found["packing_efficiency"]) == (2, 2, 1)
+        assert found["box_efficiency"] == pytest.approx(1)
+        assert "Charts of 2 textures: overlaps and packing are those within each texture." in found["notes"]
+
+    def together(self, path):
+        found = measure_uv(path).report()
+        assert (found["overlap"], found["textures"], found["tiles"]) == (1, 1, 1)
+        return found["notes"]
+
+    def test_images_of_obj_materials(self, tmp_path):
+        self.apart(pair_of_materials(tmp_path, "newmtl one\nmap_Kd a.png\nnewmtl the other\nmap_Kd b.png\n"))
+        self.together(
+            pair_of_materials(tmp_path, "newmtl one\nmap_Kd a.png\nnewmtl the other\nmap_Kd a.png\n")
+        )
+        self.together(pair_of_materials(tmp_path, "newmtl one\nKd 1 0 0\nnewmtl the other\nKd 0 1 0\n"))
+        # A material without an image is not in the texture of another one.
+        self.apart(pair_of_materials(tmp_path, "newmtl one\nKd 1 0 0\nnewmtl the other\nmap_Kd b.png\n"))
+
+    def test_libraries_that_cannot_be_read_are_named(self, tmp_path):
+        (note,) = self.together(pair_of_materials(tmp_path, None))
+        assert note == (
+            "Materials that are in no library that can be read count as one texture: one, the other."
+        )
+        (note,) = self.together(pair_of_materials(tmp_path, "newmtl one\nKd red\n"))
+        assert "All materials count as one texture" in note
+        assert "line 2" in note
+
+    def test_images_of_primitives(self, tmp_path):
+        self.apart(pair_of_primitives(tmp_path, (0, 1)))
+        self.apart(pair_of_primitives(tmp_path, (0, 1), (0, 2)))
+        self.together(pair_of_primitives(tmp_path, (1, 1)))
+        self.together(pair_of_primitives(tmp_path, (0, 1), (0, 0)))
+        self.together(pair_of_primitives(tmp_path, (0, 1), (2, 3)))
+
+    def test_numbers_of_ply_faces(self, tmp_path):
+        self.apart(written(tmp_path, PLY.format(0, 1), "a.ply"))
+        self.together(written(tmp_path, PLY.format(1, 1), "a.ply"))
+
+    def test_overlaps_within_textures_are_counted(self, tmp_path):
+        """Of three squares in one texture, two overlap; another texture is half full."""
+        text = PAIR + "v 3 0 0\nv 3 1 0\nvt 0.5 0\nvt 0.5 1\n"
+        text += f"usemtl one\n{LEFT}{RIGHT}usemtl the other\nf 5/1 7/5 8/6 6/4\n"
+        written(tmp_path, "newmtl one\nmap_Kd a.png\nnewmtl the other\nmap_Kd b.png\n", "a.mtl")
+        found = measure_uv(written(tmp_path, "mtllib a.mtl\n" + text)).report()
+        assert found["overlap"] == pytest.approx(1 / 1.5)
+        assert found["packing_efficiency"] == pytest.approx(0.75)
+        assert found["box_efficiency"] == pytest.approx(2.5 / 2)
+
+    def test_charts_end_where_the_texture_changes(self, tmp_path):
+        """Also where the UVs continue: the second square is in the next tile, as of a repeated image."""
+        text = f"mtllib a.mtl\n{PAIR}vt 2 0\nvt 2 1\nusemtl one\n{LEFT}usemtl the other\nf 2/2 5/5 6/6 3/3\n"
+        for image, charts, length in (("a.png", 1, 0), ("b.png", 2, 1 / math.sqrt(2))):
+            written(tmp_path, f"newmtl one\nmap_Kd a.png\nnewmtl the other\nmap_Kd {image}\n", "a.mtl")
+            found = measure_uv(written(tmp_path, text)).report()
+            assert (found["charts"], found["tiles"], found["packing_efficiency"]) == (charts, 2, 1)
+            assert found["seam_length"] == pytest.approx(length)
+            assert (found["flipped"], found["seam_mismatch"]) == (0, 0)
+
+    def test_udim_tiles_are_separate_in_one_texture(self, tmp_path):
+        shifted = PAIR + "vt 1 0\nvt 2 0\nvt 2 1\nvt 1 1\n"
+        found = measure_uv(written(tmp_path, shifted + LEFT + "f 2/5 5/6 6/7 3/8\n")).report()
+        assert (found["overlap"], found["tiles"], found["packing_efficiency"]) == (0, 2, 1)
 
 
 class TestFormats:

@@ -23,6 +23,9 @@ from ..source import at_unit_size, rounding_notes
 #: number of pairs can be quadratic.
 MAX_PAIRS_EACH, MIN_PAIRS = 8, 10_000
 
+#: Limit of the number of unit squares: integers up to it are exact in JSON.
+MAX_TILES = 2**53
+
 #: Measures in addition to those of a map.
 COUNTS = (
     "vertices",
@@ -32,6 +35,7 @@ COUNTS = (
     "corners_without_uv",
     "corners_not_finite",
     "outside",
+    "textures",
     "tiles",
     "packing_efficiency",
     "box_efficiency",
@@ -73,9 +77,11 @@ class UVMeasures:
 
         In addition to the measures of the map in `Flattening.report`, these are: `triangles_without_uv`;
         `corners_without_uv` and `corners_not_finite`, numbers of polygon corners; `outside`, the number of triangles
-        that are not inside the unit square; `tiles`, the number of unit squares that contain charts;
-        `packing_efficiency`, the covered fraction of these; `box_efficiency`, the area of all triangles over the area
-        of the smallest axis-aligned square around them; `angle_sum_error`, the largest difference between the angle
+        that are not inside the unit square; `textures`, the number of images that materials have; `tiles`, the number
+        of unit squares that contain charts, of all textures, and at least the covered area;
+        `packing_efficiency`, the covered fraction of these;
+        `box_efficiency`, the area of all triangles over the area of the smallest axis-aligned square around them, or
+        around those of each texture; `angle_sum_error`, the largest difference between the angle
         sum at a point inside a chart and a full turn, radians.
         """
         return {
@@ -148,12 +154,20 @@ def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:
     exponent = unit_exponent(corner_uv)
     unit = np.ldexp(corner_uv, -exponent)
     scaled = at_unit_size(checked)
-    distortion = measure_map(scaled.mesh, unit).rescaled((scaled.exponent + exponent) * np.log(2))
+    texture = np.zeros(len(known), np.int64) if mapped.texture is None else mapped.texture
+    textures = np.unique(texture[known])
+    owner = texture[known][checked.face_origin]
+    distortion = measure_map(scaled.mesh, unit, texture=owner).rescaled(
+        (scaled.exponent + exponent) * np.log(2)
+    )
     every = mapped.corner_uv[known]
-    cover = _cover(np.ldexp(every, -exponent))
-    tiles = len(chart_tiles(*uv_points(checked.mesh, unit), exponent))
+    cover = _cover_of_textures(np.ldexp(every, -exponent), texture[known])
+    points, corners = uv_points(checked.mesh, unit)
+    tiles = sum(len(chart_tiles(points, corners[owner == number], exponent)) for number in textures)
     with np.errstate(over="ignore"):  # A value that is not finite is reported as unknown.
         covered = float(np.ldexp(cover.area, 2 * exponent))
+    # A chart may extend over several squares.
+    tiles = max(tiles, round(min(covered, MAX_TILES)))
     counts = {
         "vertices": len(np.unique(mapped.faces)),
         "polygons": mapped.polygons,
@@ -162,6 +176,7 @@ def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:
         "corners_without_uv": mapped.without,
         "corners_not_finite": mapped.not_finite,
         "outside": int(((every < 0) | (every > 1)).any(axis=(1, 2)).sum()),
+        "textures": len(textures),
         "tiles": tiles,
         "packing_efficiency": covered / tiles,
         "box_efficiency": cover.box_efficiency,
@@ -172,7 +187,7 @@ def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:
         corner_uv=corner_uv,
         distortion=replace(distortion, overlap=cover.overlap, overlapping_pairs=cover.pairs),
         counts=counts,
-        notes=(*mapped.notes, *_notes(mapped, checked), *cover.notes),
+        notes=(*mapped.notes, *_notes(mapped, checked), *mapped.texture_notes, *cover.notes),
         path=None if mapped.source is None else mapped.source.path,
     )
     notes = [*measures.notes, *undefined_measures(measures.values(), distortion.qc)]
@@ -240,25 +255,57 @@ def chart_tiles(points: FloatArray, faces: IntArray, exponent: int = 0) -> Float
 
 
 class _Cover(NamedTuple):
-    """How triangles cover the plane: number of overlapping pairs, overlap, covered area, box efficiency, notes."""
+    """How triangles cover the plane.
+
+    Attributes:
+        pairs: number of overlapping pairs.
+        overlap: fraction of the covered area that is covered more than once.
+        area: covered area.
+        total: sum of the areas of the triangles.
+        square: area of the smallest axis-aligned square around them.
+        notes: one sentence each.
+    """
 
     pairs: int
     overlap: float
     area: float
-    box_efficiency: float
+    total: float
+    square: float
     notes: tuple[str, ...] = ()
+
+    @property
+    def box_efficiency(self) -> float:
+        """Return the area of the triangles over that of the square around them; NaN without area."""
+        return self.total / self.square if self.square > 0 else float("nan")
+
+
+def _cover_of_textures(corner_uv: FloatArray, texture: IntArray) -> _Cover:
+    """Return how triangles (m, 3, 2) cover several textures; texture: (m,) that of each triangle."""
+    covers = [_cover(corner_uv[texture == number]) for number in np.unique(texture)]
+    if len(covers) == 1:
+        return covers[0]
+    area = sum(cover.area for cover in covers)
+    twice = sum(cover.overlap * cover.area for cover in covers)
+    note = f"Charts of {len(covers):,} textures: overlaps and packing are those within each texture."
+    return _Cover(
+        sum(cover.pairs for cover in covers),
+        twice / area if area > 0 else 0.0,
+        area,
+        sum(cover.total for cover in covers),
+        sum(cover.square for cover in covers),
+        (note, *dict.fromkeys(note for cover in covers for note in cover.notes)),
+    )
 
 
 def _cover(corner_uv: FloatArray) -> _Cover:
     """Return how triangles (m, 3, 2) cover the plane: exactly, or counted in pixels if there are too many pairs."""
     total = float(np.abs(signed_double_areas(corner_uv)).sum()) / 2
-    side = float(np.ptp(corner_uv, axis=(0, 1)).max())
-    box_efficiency = total / side**2 if side > 0 else float("nan")
+    square = float(np.ptp(corner_uv, axis=(0, 1)).max()) ** 2
     limit = max(MIN_PAIRS, MAX_PAIRS_EACH * len(corner_uv))
     found = find_overlaps(corner_uv, limit=limit)
     if np.isfinite(found.fraction):
         area = found.area / found.fraction if found.fraction > 0 else total
-        return _Cover(len(found.pairs), found.fraction, area, box_efficiency)
+        return _Cover(len(found.pairs), found.fraction, area, total, square)
     twice, area = approximate_overlap_areas(corner_uv)
     more = (
         ""
@@ -266,7 +313,7 @@ def _cover(corner_uv: FloatArray) -> _Cover:
         else f"More than {limit:,} pairs of triangles overlap; the rest was not counted. "
     )
     note = Unmet(f"{more}The overlap was counted in {MAX_CELLS:,} x {MAX_CELLS:,} pixels.")
-    return _Cover(len(found.pairs), twice / area if area > 0 else 0.0, area, box_efficiency, (note,))
+    return _Cover(len(found.pairs), twice / area if area > 0 else 0.0, area, total, square, (note,))
 
 
 def _notes(mapped: UVMesh, checked: CheckedMesh) -> tuple[str, ...]:

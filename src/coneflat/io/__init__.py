@@ -12,12 +12,26 @@ from .files import (
     known_ending,
     make_folder,
     read_bytes,
+    readable,
     remove_unfinished,
 )
 from .gltf.positions import local_positions
+from .gltf.references import keys_of
 from .gltf.write import FOR_INDICES, FOR_VERTICES, MATERIAL, Glb, bounds
 from .join import Joined
 from .mapped import UVMesh, as_uv_mesh, has_uv, uv_mesh_of
+from .materials import (
+    CLAMP,
+    MIRRORED,
+    REPEAT,
+    SLOTS,
+    SPECULAR,
+    TRANSFORM,
+    ImageTexture,
+    Materials,
+    read_materials,
+    slot_of,
+)
 from .npz import CheckedArrays, number, read_archive, read_flattening
 from .obj import lines_of, relocated
 from .packages import as_input
@@ -34,6 +48,8 @@ from .texture import (
     decode_image,
     encode_png,
     read_picture,
+    to_linear,
+    to_srgb,
 )
 from .write import (
     KEPT,
@@ -55,4 +71,6 @@ __all__ = [
     "read_vertex_values", "relocated", "remove_unfinished", "shading_normals", "split_at_seams", "stored_in_glb",
     "Texture", "texture_files", "uv_mesh_of", "UVMesh", "VALUES", "VERTEX_COLOURS", "write_flattening",
     "write_measured", "write_parts", "write_stream",
+    "CLAMP", "ImageTexture", "keys_of", "Materials", "MIRRORED", "read_materials", "readable", "REPEAT", "slot_of",
+    "SLOTS", "SPECULAR", "to_linear", "to_srgb", "TRANSFORM",
 ]  # fmt: skip

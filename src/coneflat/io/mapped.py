@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike
 from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats
 from ..errors import ArrayShapeError, MissingUVError
 from ..mesh.check import short_faces_note
-from ..mesh.polygons import fan_corners
+from ..mesh.polygons import fan_corners, polygon_of
 from ..result import Flattening
 from .join import Joined
+from .materials import image_numbers
 from .mesh_file import MeshFile
 from .npz import read_flattening
 from .packages import as_input
@@ -34,6 +35,8 @@ class UVMesh:
         without, not_finite: number of polygon corners without UV, and with a UV that is NaN or infinite.
         notes: changes made on reading, one sentence each.
         source: the file, if any.
+        texture: (m,) the number of the image that each triangle's material has; None if it is the same for all.
+        texture_notes: notes on materials whose image is not known.
     """
 
     vertices: FloatArray
@@ -44,6 +47,8 @@ class UVMesh:
     not_finite: int
     notes: tuple[str, ...] = ()
     source: MeshFile | None = None
+    texture: IntArray | None = None
+    texture_notes: tuple[str, ...] = ()
 
     @property
     def has_uv(self) -> BoolArray:
@@ -98,6 +103,7 @@ def uv_mesh_of(joined: Joined) -> UVMesh:
     texture = np.where(mesh.texture < 0, len(mesh.uv), mesh.texture)
     fans = fan_corners(mesh.offsets)
     missing = texture == len(mesh.uv)
+    images, texture_notes = image_numbers(mesh)
     return UVMesh(
         vertices=mesh.vertices,
         faces=mesh.corners[fans],
@@ -107,6 +113,8 @@ def uv_mesh_of(joined: Joined) -> UVMesh:
         not_finite=int(np.count_nonzero(~np.isfinite(points[texture]).all(axis=1) & ~missing)),
         notes=(*joined.notes(), *([short_faces_note(mesh.short_faces)] if mesh.short_faces else [])),
         source=mesh,
+        texture=images[polygon_of(fans, mesh.offsets)] if images.any() else None,
+        texture_notes=texture_notes,
     )
 
 

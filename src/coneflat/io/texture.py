@@ -24,6 +24,11 @@ CELLS = 36
 EMBEDDED = {"PNG": "image/png", "JPEG": "image/jpeg"}
 #: Maximum size of a picture in a page; larger ones are slow to open.
 MAX_BYTES = 32 * 2**20
+#: End of the linear part of sRGB.
+LINEAR_SRGB = 0.04045
+#: Largest values of grey images of integers and of floating-point numbers; the first that is large enough is white.
+INTEGER_RANGES = (2**16 - 1, 2**31 - 1)
+FLOAT_RANGES = (1.0, 2**8 - 1, 2**16 - 1)
 
 _BEGINNINGS = {
     b"\x89PNG\r\n\x1a\n": "image/png",
@@ -84,7 +89,7 @@ def find_texture(texture: PathName, result: Flattening | None = None) -> Texture
         image.load()
         if image.format in EMBEDDED and image.mode != "CMYK":
             return Texture(content, EMBEDDED[image.format])
-        return Texture(_png(image.convert("RGBA")), EMBEDDED["PNG"])
+        return Texture(_png(pillow.fromarray(_as_rgba(image))), EMBEDDED["PNG"])
 
 
 def decode_image(content: bytes, name: PathName) -> NDArray[np.uint8]:
@@ -95,7 +100,32 @@ def decode_image(content: bytes, name: PathName) -> NDArray[np.uint8]:
         MeshFileError: it is not an image that Pillow reads.
     """
     with readable(as_path(name), "image"), _pillow().open(BytesIO(content)) as image:
+        return _as_rgba(image)
+
+
+def _as_rgba(image: Any) -> NDArray[np.uint8]:
+    """Return (h, w, 4) the RGBA of an image of Pillow; greys of more than 8 bits are scaled by their range.
+
+    Pillow itself would clip them: all values above 255 would be white.
+    """
+    if image.mode[0] not in "IF":
         return np.asarray(image.convert("RGBA"))
+    grey = np.nan_to_num(np.asarray(image, np.float64), nan=0.0)
+    # Some versions of Pillow open 16-bit files as 32-bit integers.
+    ranges = FLOAT_RANGES if image.mode == "F" else INTEGER_RANGES
+    largest = next((limit for limit in ranges if grey.max(initial=0.0) <= limit), ranges[-1])
+    shade = np.round(255 * np.clip(grey / largest, 0, 1)).astype(np.uint8)
+    return np.stack([shade, shade, shade, np.full_like(shade, 255)], axis=-1)
+
+
+def to_linear(values: NDArray[Any]) -> FloatArray:
+    """Return linear values of sRGB ones, both from 0 to 1."""
+    return np.where(values <= LINEAR_SRGB, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+
+
+def to_srgb(values: FloatArray) -> FloatArray:
+    """Return sRGB values of linear ones, both from 0 to 1."""
+    return np.where(values <= LINEAR_SRGB / 12.92, values * 12.92, 1.055 * values ** (1 / 2.4) - 0.055)
 
 
 def encode_png(pixels: NDArray[np.uint8]) -> Texture:

@@ -203,8 +203,12 @@ def measure_map(
     curvature_error: tuple[float, float] = (np.nan, np.nan),
     cones: IntArray | None = None,
     lengths: FloatArray | None = None,
+    texture: IntArray | None = None,
 ) -> Distortion:
-    """Return all measures except those of overlaps; arguments are those of `measure`."""
+    """Return all measures except those of overlaps; arguments are those of `measure`.
+
+    texture: (m,) the texture of each triangle; edges between different ones are seams.
+    """
     corner_uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
     shapes = (mesh.vertices, mesh.faces) if lengths is None else _place_separately(lengths)
     area, has_area, uv_area, has_uv_area, qc = measure_triangles(*shapes, corner_uv)
@@ -219,6 +223,8 @@ def measure_map(
     low, high = (quantile(scales, weights, fraction) for fraction in (0.05, 0.95))
 
     joined = joined_edges(mesh, corner_uv)
+    if texture is not None:
+        joined &= texture[mesh.edge_faces[:, 0]] == texture[mesh.edge_faces[:, 1]]
     seams = np.flatnonzero(~joined & ~mesh.is_boundary_edge)
     charts, chart = label_charts(mesh, joined)
     sign = np.where(has_uv_area, np.sign(uv_area), 0)

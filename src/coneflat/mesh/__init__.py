@@ -21,10 +21,11 @@ from .connectivity import (
     nearby,
     sort_pairs,
 )
+from .polygons import polygon_of
 from .ties import tie_key
 
 __all__ = [
     "CheckedMesh", "CutMesh", "NEXT", "PREVIOUS", "REPAIR_ADVICE", "corner_fans", "cut_open",
     "end_corners", "joined_edges", "label_charts", "label_components", "label_faces", "left_out",
-    "nearby", "open_along", "point_seams", "point_vertices", "sort_pairs", "tie_key", "uv_seams",
+    "nearby", "open_along", "point_seams", "point_vertices", "polygon_of", "sort_pairs", "tie_key", "uv_seams",
 ]  # fmt: skip

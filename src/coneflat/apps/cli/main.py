@@ -8,8 +8,9 @@ import signal
 import sys
 import time
 from _thread import start_new_thread
+from contextlib import suppress
 from types import FrameType
-from typing import NoReturn
+from typing import IO, Any, NoReturn
 
 import click
 
@@ -49,9 +50,23 @@ for command in (
 
 def main() -> NoReturn:
     """Run the command; every failure prints one line to stderr and gives a nonzero exit code."""
-    _open_streams()
+    opened = _open_streams()
     # The number of a signal does not always arrive with the error that it causes inside a compiled function.
     received = list[int]()
+    _handle_signals(received)
+    # Imports allocate half a million objects and no garbage. Garbage collection after every 700 objects, the
+    # default, takes a tenth of the time of a short run.
+    gc.set_threshold(100_000, 50, 50)
+    # numpy and SciPy have an OpenBLAS each, which takes as long to start threads that are never used.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    code = _close_streams(opened, _exit_code(received))
+    # At exit, Python collects garbage among all objects three times: a tenth of the time of a short run.
+    gc.freeze()
+    sys.exit(code)
+
+
+def _handle_signals(received: list[int]) -> None:
+    """Let signals interrupt the command, and append their numbers to a list."""
 
     def give_up() -> NoReturn:
         time.sleep(10)
@@ -68,64 +83,104 @@ def main() -> NoReturn:
     for number in {1, 2, 15} & signal.valid_signals():  # SIGHUP, which Windows has not, SIGINT, SIGTERM
         if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, interrupt)
-    # Imports allocate half a million objects and no garbage. Garbage collection after every 700 objects, the
-    # default, takes a tenth of the time of a short run.
-    gc.set_threshold(100_000, 50, 50)
-    # numpy and SciPy have an OpenBLAS each, which takes as long to start threads that are never used.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+
+def _exit_code(received: list[int]) -> int:
+    """Run the command and return its exit code, after a failure with a message; received: numbers of signals."""
     try:
-        code = cli.main(standalone_mode=False)
-    except click.exceptions.NoArgsIsHelpError as error:
-        click.echo(error.format_message())
-        code = ExitCode.USER_ERROR
+        return _call()
     except click.ClickException as error:
-        code = _fail(f"{error.format_message()}{_hint(error)}", ExitCode.USER_ERROR)
+        return _fail(f"{error.format_message()}{_hint(error)}", ExitCode.USER_ERROR)
     except ConeflatError as error:
-        code = _fail(str(error), ExitCode.USER_ERROR)
+        return _fail(str(error), ExitCode.USER_ERROR)
     except (KeyboardInterrupt, click.exceptions.Abort):
-        code = _fail_interrupted(received)
+        return _fail_interrupted(received)
     except OSError as error:
         # Errors of files are raised as ConeflatError, so this one is from the terminal, a full device, or a pipe whose
-        # reader has ended as in `coneflat ... | head`. The shutdown must not print another error.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = ExitCode.INTERNAL_ERROR
-        if not isinstance(error, BrokenPipeError):
-            _fail(f"cannot print: {error.strerror or error}", code)
+        # reader has ended as in `coneflat ... | head`.
+        _discard(sys.stdout)
+        return _fail_to_print(error)
     except MemoryError:
-        code = _fail("not enough memory for this mesh", ExitCode.INTERNAL_ERROR)
+        return _fail("not enough memory for this mesh", ExitCode.INTERNAL_ERROR)
     except Exception as error:
         if os.environ.get("CONEFLAT_DEBUG"):
             raise
         # An interrupt inside a compiled function arrives as another error, which it may or may not have as its cause.
         if received or isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
-            code = _fail_interrupted(received)
-        else:
-            code = _fail(
-                f"internal error, please report it: {type(error).__name__}: {error} "
-                "(CONEFLAT_DEBUG=1 shows where)",
-                ExitCode.INTERNAL_ERROR,
-            )
-    # At exit, Python collects garbage among all objects three times: a tenth of the time of a short run.
-    gc.freeze()
-    sys.exit(code if isinstance(code, int) else 0)
+            return _fail_interrupted(received)
+        return _fail(
+            f"internal error, please report it: {type(error).__name__}: {error} (CONEFLAT_DEBUG=1 shows where)",
+            ExitCode.INTERNAL_ERROR,
+        )
 
 
-def _open_streams() -> None:
+def _call() -> int:
+    """Run the command and return its exit code; without arguments, print the help."""
+    try:
+        code = cli.main(standalone_mode=False)
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+        return ExitCode.USER_ERROR
+    return code if isinstance(code, int) else 0
+
+
+def _open_streams() -> list[IO[Any]]:
     """Connect closed standard streams to the null device, and what libraries print on standard output.
 
     No other file gets the descriptors of closed streams then, and a result on standard output stays whole.
+
+    Returns:
+        The streams that were opened.
     """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
     os.close(descriptor)
+    opened: list[IO[Any]] = []
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+            opened.append(open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115
+            setattr(sys, name, opened[-1])
     is_replaced = sys.stdout is not sys.__stdout__  # By a test.
     if not is_replaced and not (os.name == "nt" and sys.stdout.isatty()):
         own = os.dup(1)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         sys.stdout = open(own, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)  # noqa: SIM115
+        opened.append(sys.stdout)
+    return opened
+
+
+def _close_streams(opened: list[IO[Any]], code: int) -> int:
+    """Print what is left, close the streams that were opened, and return the exit code; 1 if it cannot be printed."""
+    error = _flush(sys.stdout)
+    if error is not None and code == 0:
+        code = _fail_to_print(error)
+    _flush(sys.stderr)
+    for stream in opened:
+        stream.close()
+    return code
+
+
+def _flush(stream: IO[Any]) -> OSError | None:
+    """Print what is left in a stream; return the error if that fails, after what is left has been discarded."""
+    try:
+        stream.flush()
+    except OSError as error:
+        _discard(stream)
+        return error
+    return None
+
+
+def _discard(stream: IO[Any]) -> None:
+    """Connect a stream to the null device, so that Python can print what is left at its exit."""
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, stream.fileno())
+    os.close(null)
+
+
+def _fail_to_print(error: OSError) -> int:
+    if isinstance(error, BrokenPipeError):
+        return ExitCode.INTERNAL_ERROR
+    return _fail(f"cannot print: {error.strerror or error}", ExitCode.INTERNAL_ERROR)
 
 
 def _fail_interrupted(received: list[int]) -> int:
@@ -134,7 +189,8 @@ def _fail_interrupted(received: list[int]) -> int:
 
 
 def _fail(message: str, code: int) -> int:
-    click.echo(f"coneflat: error: {' '.join(message.split())}", err=True)
+    with suppress(OSError):  # The exit code remains if stderr is full.
+        click.echo(f"coneflat: error: {' '.join(message.split())}", err=True)
     return code
 
 

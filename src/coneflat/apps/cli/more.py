@@ -139,7 +139,8 @@ def transfer(
             baked = bake(old, new, resolution=resolution, texture=texture)
         with console.stage("write"):
             baked.save(output)
-        console.say(f"note: {note}" for note in (*baked.notes, *_not_baked(baked, output)))
+        losses = (*baked.losses(output), *_not_baked(baked, output))
+        console.say(f"note: {note}" for note in (*baked.notes, *losses))
         console.finish([output])
 
 

@@ -102,12 +102,13 @@ class Console:
     def _print_progress(self) -> None:
         stage, fraction = self._current
         self._last_line = self.elapsed
-        click.echo(f"{self.elapsed:6.1f} s  {fraction:4.0%}  {stage}", err=True)
+        with suppress(OSError):  # A full stderr does not stop the work, nor a reader that has closed it.
+            click.echo(f"{self.elapsed:6.1f} s  {fraction:4.0%}  {stage}", err=True)
 
     def _repeat_progress(self) -> None:
         """Print the progress again if nothing has been printed for a while."""
         while not self._is_finished.wait(self.INTERVAL / 4):
-            with self._lock, suppress(OSError, ValueError):  # The reader may have closed the stream.
+            with self._lock, suppress(ValueError):  # The stream may be closed.
                 late = self.elapsed - self._last_line > self.INTERVAL * (1 + bool(self._last_line))
                 if late and self._current[0] and not self._is_finished.is_set():
                     self._print_progress()

@@ -171,19 +171,19 @@ def bad_places(checked: CheckedMesh) -> list[list[int]]:
 
 
 def own_picture(mesh: MeshFile) -> tuple[Texture, FloatArray] | None:
-    """Return the base colours of the material of most triangles of a glTF file, and its UVs; None if it has no image.
+    """Return the base colours of the material of most triangles of a file, and its UVs; None if it has no image.
 
     The UVs (3 m, 2) are those of the corners in the file, v upwards, and -1e6 at triangles of other materials, by
     which the page knows them. The image is reduced to the default resolution of textures.
     """
     with suppress(ConeflatError, AttributeError, TypeError):  # Materials that are not valid are not shown.
         painted = Painted(mesh.path, None)
-        slots = {i: slot for i in painted.used if (slot := painted.value(BASE.name, i))}
-        most = max(slots, key=np.bincount(painted.material).item, default=None)
+        layers = {i: layer for i in painted.used if (layer := painted.layer(BASE, i)) is not None}
+        most = max(layers, key=np.bincount(painted.material).item, default=None)
         if most is not None:
-            is_own, slot = painted.material == most, slots[most]
-            uv = np.where(is_own[:, None, None], painted.uv_of(slot) * [1, -1] + [0, 1], -1e6)
-            image, _ = painted.image(slot.get("index"))
+            places = np.where((painted.material == most)[:, None, None], painted.placed(layers[most]), np.nan)
+            uv = np.where(np.isfinite(places), places * [1, -1] + [0, 1], -1e6)
+            image = painted.pixels(layers[most])
             step = -(-max(image.shape) // DECLARED["resolution"].default)
             return encode_png(np.ascontiguousarray(image[::step, ::step])), uv.reshape(-1, 2)
     return None

@@ -79,12 +79,15 @@ class Worker:
         return self._process
 
     def _listen(self, process: subprocess.Popen[bytes]) -> None:
+        assert process.stdin is not None
         assert process.stdout is not None
-        with suppress(OSError, ValueError):
+        with suppress(OSError, ValueError), process.stdout:
             while (frame := read_frame(process.stdout)) is not None:
                 if self._process is process:
                     self._on_message(*frame)
         code = process.wait()
+        with self._lock, suppress(OSError):  # A job that it has not read is discarded.
+            process.stdin.close()
         if self._process is process:  # It was not ended by `end`.
             self._on_exit(exit_text(code))
 

@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-from ... import io
-from ...base import FloatArray, IntArray, Unmet, check_cancelled, warns
-from ...errors import OptionError
+from ... import MeshFile, io
+from ...base import FloatArray, IntArray, Unmet, check_cancelled, unit_exponent, warns
+from ...errors import NonFiniteError, OptionError
 from ...geometry import fill_nearest, signed_double_areas, unit_vectors
-from ...io import UVMesh, as_path
+from ...io import UVMesh, as_path, to_srgb
 from ...options import Number
 from ..quads.nearest import TriangleTree
 from ..view import Barycentrics, uv_flattening
-from .materials import BASE, NORMAL, Channel, Painted, to_srgb
+from .materials import BASE, NORMAL, UNLIT, Channel, Painted
 
 #: Texels that are baked at once, which bounds memory.
 TEXELS_AT_ONCE = 2**18
@@ -33,7 +33,10 @@ FAR = 0.01
 ENDINGS = (".glb", ".png")
 #: Attributes and extensions of primitives that the material replaces: vertex colours are in the image; tangents may be
 #: those of other UVs, and viewers compute them; compressed copies contain both.
-REPLACED = ("COLOR_0", "TANGENT", "KHR_materials_variants", "KHR_draco_mesh_compression")
+VARIANTS = "KHR_materials_variants"
+REPLACED = ("COLOR_0", "TANGENT", VARIANTS, "KHR_draco_mesh_compression")
+#: Lists of a glTF file that belong to its materials.
+MATERIAL_LISTS = ("images", "textures", "samplers", "materials")
 #: Channels whose image belongs to the metallic-roughness model in a material.
 SURFACE = ("baseColorTexture", "metallicRoughnessTexture")
 
@@ -55,6 +58,15 @@ class Baked:
     notes: tuple[str, ...]
     model: Path
     uv_mesh: UVMesh
+
+    def losses(self, path: str | PathLike[str]) -> tuple[str, ...]:
+        """Return a note on what a file with the ending of a path does not keep, if anything."""
+        if as_path(path).suffix.lower() != ".png":
+            return ()
+        others = [name for name in self.images if name != BASE.name]
+        return (
+            (f"A .png has the base colour only, not {', '.join(others)}: .glb keeps all.",) if others else ()
+        )
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the model with its textures (.glb), or the image of its base colour (.png), and return the path.
@@ -85,15 +97,16 @@ def transfer(
     nearest texel with one. The materials of the old model become one. The triangles may differ.
 
     Args:
-        old: a file with textures (.gltf, .glb), with vertex colours (also .ply, .obj), or with UVs for `texture`.
+        old: a file with textures or vertex colours (.gltf, .glb, .obj with its .mtl, .ply), or with UVs for `texture`.
         new: a file with UVs, in the same position and scale.
         resolution: texels along a side of the new textures.
         texture: the image of the UVs of `old`, instead of its materials.
 
     Raises:
-        OptionError: Pillow is not installed; `old` has no colours; UVs of `new` are outside the unit square.
+        OptionError: Pillow is not installed; `old` has no colours or no size; UVs of `new` are outside the unit square.
         MissingUVError: `new` has no UVs.
-        MeshFileError: a file or an image cannot be read.
+        NonFiniteError: a position is not finite.
+        MeshFileError: a file, a material or an image cannot be read.
 
     Examples:
         >>> from coneflat.apps.transfer import transfer
@@ -104,7 +117,9 @@ def transfer(
     new = as_path(new)
     target = io.as_uv_mesh(new, weld=False)
     known = np.flatnonzero(target.has_uv & (signed_double_areas(target.corner_uv) != 0))
-    corner_uv = target.corner_uv[known]
+    corner_uv, corners = target.corner_uv[known], target.vertices[target.faces[known]]
+    if not np.isfinite(corners).all():
+        raise NonFiniteError(f"{new} has positions that are NaN or infinite")
     if corner_uv.min(initial=0) < -1 / side or corner_uv.max(initial=1) > 1 + 1 / side:
         raise OptionError(
             f"the UVs of {new} must be in the unit square, got {corner_uv.min():.3g} to {corner_uv.max():.3g}"
@@ -113,12 +128,10 @@ def transfer(
     owner, twice = _owners(texels, side)
     if owner.max() < 0:
         raise OptionError(f"no texel of {side} x {side} is in a triangle of {new}: raise the resolution")
-    images, farthest = _bake(painted, target.vertices[target.faces[known]], texels, owner)
+    images, farthest = _bake(painted, corners, texels, owner)
     source = distance_transform_edt(owner < 0, return_distances=False, return_indices=True)
-    notes = list(target.notes)
-    meshes = target.source.scene.data.tree["meshes"] if target.source and target.source.scene else []
-    if any("TANGENT" in one["attributes"] for mesh in meshes for one in mesh["primitives"]):
-        notes.append("Tangents are left out of a GLB: viewers compute those of the new UVs.")
+    notes = [*painted.notes, *target.notes]
+    notes += _replaced(painted.mesh, target.source)
     if twice:
         notes.append(
             Unmet(f"UVs overlap: {twice:,} texels are in several triangles, and show the first of them.")
@@ -131,6 +144,20 @@ def transfer(
     return Baked(filled, _material(painted, filled), tuple(notes), new, target)
 
 
+def _replaced(old: MeshFile, new: MeshFile | None) -> list[str]:
+    """Return notes on what the material of a GLB replaces."""
+    old_tree, new_tree = (
+        {} if model is None or model.scene is None else model.scene.data.tree for model in (old, new)
+    )
+    notes = []
+    primitives = [primitive for mesh in new_tree.get("meshes", []) for primitive in mesh["primitives"]]
+    if any("TANGENT" in primitive["attributes"] for primitive in primitives):
+        notes.append("Tangents are left out of a GLB: viewers compute those of the new UVs.")
+    if any(VARIANTS in tree.get("extensions", {}) for tree in (old_tree, new_tree)):
+        notes.append(f"Variants of materials ({VARIANTS}) are left out: the default ones are kept.")
+    return notes
+
+
 def _bake(
     painted: Painted, corners: FloatArray, texels: FloatArray, owner: IntArray
 ) -> tuple[dict[Channel, NDArray[np.uint8]], float]:
@@ -141,12 +168,19 @@ def _bake(
         corners, texels: (m, 3, 3), (m, 3, 2) corners of the new triangles in space and in the texture.
         owner: (r, r) the triangle of each texel, -1 for none.
     """
-    tree, farthest, side = TriangleTree(painted.vertices, painted.faces), 0.0, len(owner)
+    # Squares of distances are finite at unit size.
+    exponent = unit_exponent(painted.vertices[painted.faces])
+    vertices, corners = np.ldexp(painted.vertices, -exponent), np.ldexp(corners, -exponent)
+    tree, farthest, side = TriangleTree(vertices, painted.faces), 0.0, len(owner)
+    if not tree.diagonal > 0:
+        raise OptionError(
+            f"all points of {painted.mesh.path} are at one position, so no colours can be found there"
+        )
     images = {channel: np.zeros((side, side, 4), np.uint8) for channel in painted.channels()}
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     if NORMAL in images:
         axes = _tangents(corners, texels)
-        old_axes = _tangents(painted.vertices[painted.faces], painted.normal_uv())
+        old_axes = _tangents(vertices[painted.faces], painted.normal_uv())
     places = Barycentrics(texels.reshape(-1, 2), np.arange(3 * len(texels)).reshape(-1, 3))
     every = np.flatnonzero(owner.reshape(-1) >= 0)
     for begin in range(0, len(every), TEXELS_AT_ONCE):
@@ -156,7 +190,7 @@ def _bake(
         weights = places.of(faces, place % side, place // side)
         points = np.einsum("qi,qix->qx", weights, corners[faces])
         on, at = tree.nearest(points, normals[faces])
-        nearest = np.einsum("qi,qix->qx", at, painted.vertices[painted.faces[on]])
+        nearest = np.einsum("qi,qix->qx", at, vertices[painted.faces[on]])
         farthest = max(farthest, float(np.linalg.norm(nearest - points, axis=1).max()) / tree.diagonal)
         for channel, image in images.items():
             values = painted.at(channel, on, at)
@@ -193,14 +227,15 @@ def _owners(texels: FloatArray, side: int) -> tuple[IntArray, int]:
 
 def _material(painted: Painted, names: Collection[str]) -> dict[str, Any]:
     """Return a glTF material without images, like the first one of a model; `names`: channels that get images."""
-    used = [painted.materials[i] for i in painted.used]
+    used = [painted.items[i] for i in painted.used]
     surface = used[0].get("pbrMetallicRoughness", {"metallicFactor": 0.0})
     kept = () if "metallicRoughnessTexture" in names else ("metallicFactor", "roughnessFactor")
     item: dict[str, Any] = {"doubleSided": any(each.get("doubleSided", False) for each in used)}
     item |= {name: used[0][name] for name in ("alphaCutoff", "emissiveFactor") if name in used[0]}
     item |= {"emissiveFactor": [1.0] * 3} if "emissiveTexture" in names else {}
-    modes = [each.get("alphaMode", "OPAQUE") for each in used]
-    item["alphaMode"] = max(modes, key=("OPAQUE", "MASK", "BLEND").index)
+    item["alphaMode"] = painted.alpha_mode
+    if painted.is_unlit:
+        item["extensions"] = {UNLIT: {}}
     return item | {"pbrMetallicRoughness": {name: surface[name] for name in kept if name in surface}}
 
 
@@ -212,15 +247,17 @@ def _with_material(baked: Baked) -> io.Glb:
         io.write_stream(uv_flattening(baked.uv_mesh), stream, ".glb")
         source = io.read_mesh_from(stream.getvalue(), baked.model)
     assert source.scene is not None
-    data, left_out = source.scene.data, ("images", "textures", "samplers", "materials")
-    glb = io.Glb({name: deepcopy(item) for name, item in data.tree.items() if name not in left_out})
+    data = source.scene.data
+    glb = io.Glb({name: deepcopy(item) for name, item in data.tree.items() if name not in MATERIAL_LISTS})
+    owners = [glb.tree]
     for mesh in glb.tree["meshes"]:
         for primitive in mesh["primitives"]:
             primitive["material"] = 0
-            targets, extensions = primitive.get("targets", []), primitive.get("extensions", {})
-            for name in REPLACED:
-                for item in (primitive["attributes"], extensions, *targets):
-                    item.pop(name, None)
+            owners += [primitive["attributes"], primitive, *primitive.get("targets", [])]
+    for owner in owners:
+        for name in REPLACED:
+            owner.pop(name, None)
+            owner.get("extensions", {}).pop(name, None)
     glb.copy_arrays(data)
     item = baked.material | {"pbrMetallicRoughness": dict(baked.material["pbrMetallicRoughness"])}
     for name, image in baked.images.items():
@@ -229,4 +266,19 @@ def _with_material(baked: Baked) -> io.Glb:
         place = item["pbrMetallicRoughness"] if name in SURFACE else item
         place[name] = {"index": glb.add("textures", {"source": number})}
     glb.add("materials", item)
+    _declare_extensions(glb.tree, {name: data.tree[name] for name in MATERIAL_LISTS if name in data.tree})
     return glb
+
+
+def _declare_extensions(tree: dict[str, Any], removed: dict[str, Any]) -> None:
+    """List the extensions of the new material, and no longer those that only removed objects had."""
+    # Extensions such as KHR_mesh_quantization are used without an object of their name.
+    dropped = {*io.keys_of(removed), *REPLACED} - {*io.keys_of(tree)}
+    for name in ("extensionsUsed", "extensionsRequired"):
+        left = [extension for extension in tree.pop(name, []) if extension not in dropped]
+        if name == "extensionsUsed":
+            left = list(dict.fromkeys([*left, *tree["materials"][0].get("extensions", {})]))
+        if left:
+            tree[name] = left
+    if tree.get("extensions") == {}:
+        del tree["extensions"]
