@@ -13,7 +13,7 @@ from ...errors import ConeflatError
 from ...geometry import as_pairs, edge_lengths
 from ...io import stored_in_glb
 from ...layout import rest_sides
-from ...mesh import label_components, label_faces
+from ...mesh import EdgeGroups, end_corners, glue_layers, label_faces, split_vertices, weld
 from .unwrap import unwrap
 
 
@@ -39,7 +39,8 @@ class UnwrappedSoup:
 def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> UnwrappedSoup:
     """Return UVs for triangles.
 
-    Faces are joined along edges with two faces of the same orientation; vertices at the same position are the same.
+    Faces are joined along edges with two faces of the same orientation, and layers with several faces at an edge each
+    on its own, as by a repair; vertices at the same position are the same.
 
     Args:
         vertices: (n, 3) positions.
@@ -47,8 +48,8 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
         options: those of `coneflat.unwrap`.
     """
     corner_uv, chart = np.zeros((len(faces), 3, 2)), np.full(len(faces), -1)
-    _, place = np.unique(vertices, axis=0, return_inverse=True)
-    one, two, three = place.ravel()[faces].T
+    first, place = weld(vertices)
+    one, two, three = place[faces].T
     is_face = (one != two) & (two != three) & (three != one) & np.isfinite(vertices[faces]).all(axis=(1, 2))
     chosen = np.flatnonzero(is_face)
     left_out, notes = len(faces) - len(chosen), list[str]()
@@ -56,9 +57,8 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
         notes.append(Unmet(f"{plural(left_out, 'face')} without area: the UVs of each are one point."))
     if not len(chosen):
         return UnwrappedSoup(corner_uv, chart, 0.0, 0.0, tuple(notes))
-    corner = _oriented(place.ravel()[faces[chosen]])
-    points = np.empty((int(corner.max()) + 1, 3))
-    points[corner] = vertices[faces[chosen]]
+    origin, corner = _oriented(place[faces[chosen]])
+    points = vertices[first[origin]]
     try:
         result = unwrap(points, corner, repair=True, **options)
     except ConeflatError as error:
@@ -80,19 +80,12 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
     return UnwrappedSoup(corner_uv, chart, result.packing_efficiency, result.uv_scale, tuple(notes))
 
 
-def _oriented(faces: IntArray) -> IntArray:
-    """Return (m, 3) other vertices of faces, so that they form surfaces oriented as the faces are.
+def _oriented(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the vertex of each vertex of oriented surfaces that faces form, and the surfaces as (m, 3) faces.
 
-    Two faces share an edge if no other face has it and they have opposite directions along it.
+    Faces are glued as a repair glues them, where they have opposite directions along an edge.
     """
-    count = int(faces.max()) + 1
-    tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    keys, back = tails * count + heads, heads * count + tails
-    order = np.argsort(keys, kind="stable")
-    first, last = (np.searchsorted(keys[order], back, side=side) for side in ("left", "right"))
-    here = np.searchsorted(keys[order], keys, side="right") - np.searchsorted(keys[order], keys, side="left")
-    joined = np.flatnonzero((last - first == 1) & (here == 1))
-    twins = order[first[joined]]
-    following = np.arange(faces.size).reshape(-1, 3)[:, [1, 2, 0]].ravel()
-    # The start of a half-edge is the end of its twin.
-    return label_components(faces.size, joined, following[twins])[1].reshape(-1, 3)
+    pairs = glue_layers(faces, EdgeGroups.of(faces, int(faces.max()) + 1)).pairs
+    (start_one, _), (_, end_two) = (end_corners(halfedges) for halfedges in pairs.T)
+    opposed = faces.ravel()[start_one] == faces.ravel()[end_two]
+    return split_vertices(faces, int(faces.max()) + 1, *pairs[opposed].T)
