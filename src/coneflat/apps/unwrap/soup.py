@@ -7,14 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from ...atlas import pack_charts, round_safely
+from ...atlas import Packed, pack_charts, round_safely
 from ...base import FloatArray, IntArray, Unmet, plural
-from ...errors import ConeflatError
+from ...errors import ConeflatError, OptionError
 from ...geometry import as_pairs, edge_lengths
 from ...io import stored_in_glb
 from ...layout import rest_sides
 from ...mesh import EdgeGroups, end_corners, glue_layers, label_faces, split_vertices, weld
-from .unwrap import unwrap
+from ...options import read_options
+from .options import UnwrapOptions
+from .unwrap import MAX_RESOLUTION, unwrap
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +28,7 @@ class UnwrappedSoup:
         chart: (m,) the chart of each face, from 0; -1 for faces without area.
         efficiency: covered fraction of the square.
         scale: UV units per unit of length; 0 without any face that has area.
+        resolution: texels along a side of the texture.
         notes: what was done to the triangles, one sentence each.
     """
 
@@ -33,6 +36,7 @@ class UnwrappedSoup:
     chart: IntArray
     efficiency: float
     scale: float
+    resolution: int
     notes: tuple[str, ...]
 
 
@@ -46,7 +50,11 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
         vertices: (n, 3) positions.
         faces: (m, 3) vertex indices.
         options: those of `coneflat.unwrap`.
+
+    Raises:
+        OptionError: an option is invalid, or the padding leaves no space for charts.
     """
+    o = read_options(options, UnwrapOptions)
     corner_uv, chart = np.zeros((len(faces), 3, 2)), np.full(len(faces), -1)
     first, place = weld(vertices)
     one, two, three = place[faces].T
@@ -56,18 +64,18 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
     if left_out:
         notes.append(Unmet(f"{plural(left_out, 'face')} without area: the UVs of each are one point."))
     if not len(chosen):
-        return UnwrappedSoup(corner_uv, chart, 0.0, 0.0, tuple(notes))
+        return UnwrappedSoup(corner_uv, chart, 0.0, 0.0, o.resolution, tuple(notes))
     origin, corner = _oriented(place[faces[chosen]])
     points = vertices[first[origin]]
     try:
         result = unwrap(points, corner, repair=True, **options)
+    except OptionError:
+        raise
     except ConeflatError as error:
         notes.append(Unmet(f"Each face is a chart of its own: {error}."))
-        sides = rest_sides(edge_lengths(points, corner))
-        flat = np.stack([np.zeros(len(sides)), sides[:, 2], -sides[:, 1]], axis=1)
-        packed = pack_charts(as_pairs(flat.ravel()).reshape(-1, 3, 2), np.arange(len(chosen)))
+        packed, resolution = _packed_separately(points, corner, o)
         corner_uv[chosen], chart[chosen] = packed.corner_uv, np.arange(len(chosen))
-        return UnwrappedSoup(corner_uv, chart, packed.efficiency, packed.scale, tuple(notes))
+        return UnwrappedSoup(corner_uv, chart, packed.efficiency, packed.scale, resolution, tuple(notes))
     assert result.face_origin is not None
     known = chosen[result.face_origin]
     # Where charts touch themselves, rounding to single precision may make overlaps.
@@ -77,7 +85,28 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
         count = plural(len(overlaps.pairs), "pair")
         notes.append(Unmet(f"{count} of triangles overlap in single precision."))
     corner_uv[known], chart[known] = uv[result.uv_faces], label_faces(result.uv_faces, len(uv))[1]
-    return UnwrappedSoup(corner_uv, chart, result.packing_efficiency, result.uv_scale, tuple(notes))
+    resolution = result.settings["resolution"]
+    return UnwrappedSoup(
+        corner_uv, chart, result.packing_efficiency, result.uv_scale, resolution, tuple(notes)
+    )
+
+
+def _packed_separately(points: FloatArray, corner: IntArray, options: UnwrapOptions) -> tuple[Packed, int]:
+    """Return the packing of faces (m, 3), each as a chart, and its resolution."""
+    sides = rest_sides(edge_lengths(points, corner))
+    flat = np.stack([np.zeros(len(sides)), sides[:, 2], -sides[:, 1]], axis=1)
+    charts = as_pairs(flat.ravel()).reshape(-1, 3, 2), np.arange(len(corner))
+    resolution, density = options.resolution, options.texel_density
+    packed = pack_charts(*charts, resolution=resolution, padding=options.padding)
+    while density is not None and resolution * packed.scale < density:
+        # The padding, and with it the scale, depends on the resolution.
+        resolution = max(2 * resolution, int(np.ceil(min(density / packed.scale, 2.0**62))))
+        if resolution > MAX_RESOLUTION:
+            raise OptionError(
+                f"texel_density is too large: {density:g} texels per unit need {resolution:,} texels per side"
+            )
+        packed = pack_charts(*charts, resolution=resolution, padding=options.padding)
+    return packed, resolution
 
 
 def _oriented(faces: IntArray) -> tuple[IntArray, IntArray]:
