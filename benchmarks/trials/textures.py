@@ -26,13 +26,20 @@ def texture_case(rng: Random, outcome: Outcome) -> None:
     vertices, faces, made = (make_mesh if rng.random() < 0.7 else make_tiny)(rng)
     if rng.random() < 0.25:
         check_xatlas(outcome, vertices, faces, made)
-        return
+    else:
+        unwrap_mesh(rng, outcome, vertices, faces, made)
+
+
+def unwrap_mesh(
+    rng: Random, outcome: Outcome, vertices: np.ndarray, faces: np.ndarray, made: str, **fixed: Any
+) -> None:
+    """Unwrap a mesh with random options, beside fixed ones."""
     import coneflat
     from coneflat.apps.unwrap.options import UnwrapOptions
     from coneflat.options import declarations
 
     given = make_options(rng, vertices, faces)
-    options = {name: value for name, value in given.items() if name in declarations(UnwrapOptions)}
+    options = {name: value for name, value in given.items() if name in declarations(UnwrapOptions)} | fixed
     if rng.random() < 0.5:
         options["max_energy"] = float(rng.choice([4.001, 4.02, 4.05, 4.2, 4.5, 6.0, 40.0]))
     if rng.random() < 0.05 and "resolution" not in options:
