@@ -19,9 +19,8 @@ def doubled_case(rng: Random, outcome: Outcome) -> None:
     sheet = (make_mesh if rng.random() < 0.7 else make_tiny)(rng)
     vertices, faces, layers, made = add_layers(rng, *sheet)
     outcome.recipe = made
-    is_whole = layers is not None and _is_whole(*sheet[:2])
     way = rng.random()
-    if is_whole:
+    if layers is not None and _is_whole(*sheet[:2]):
         single = coneflat.check_mesh(*sheet[:2]).mesh.components[0]
         count = coneflat.check_mesh(vertices, faces, repair=True).mesh.components[0]
         if count != layers * single:
