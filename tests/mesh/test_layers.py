@@ -129,11 +129,15 @@ def test_single_sheets_at_an_edge_are_separated():
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_any_triangles_become_a_manifold_with_all_faces(seed):
+def test_any_triangles_become_a_manifold_with_all_faces_however_they_are_numbered(seed):
     rng = np.random.default_rng(seed)
-    for count in rng.integers(4, 9, 20):
-        faces = np.array([rng.choice(count, 3, replace=False) for _ in range(rng.integers(2, 40))])
-        layers_of(rng.normal(size=(count, 3)), faces)
+    for count in rng.integers(3, 9, 20):
+        faces = np.array([rng.choice(count, 3, replace=False) for _ in range(rng.integers(1, 40))])
+        vertices = rng.normal(size=(count, 3))
+        number, order = rng.permutation(count), rng.permutation(len(faces))
+        layers, _ = layers_of(vertices, faces)
+        others, _ = layers_of(vertices[np.argsort(number)], number[faces][order])
+        assert sorted(map(len, layers)) == sorted(map(len, others))
 
 
 @pytest.mark.parametrize("command", [flatten, unwrap])

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 import coneflat.xatlas as ours
 from coneflat import errors
-from coneflat.apps.unwrap import xatlas_arrays
+from coneflat.apps.unwrap import soup, xatlas_arrays
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
 FACES = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
@@ -116,13 +116,22 @@ def test_a_doubled_surface_has_the_charts_of_two_sheets(sheet, turned):
     assert counts == [counts[0]] * 3
 
 
-@pytest.mark.parametrize(("density", "resolution"), [(0, 256), (5, 0), (20, 0), (100, 0)])
-def test_the_padding_is_that_of_the_final_texture(density, resolution):
+def fails(*arguments, **options):
+    raise errors.ConvergenceError("no metric")
+
+
+@pytest.mark.filterwarnings("ignore::coneflat.GuaranteeWarning")
+@pytest.mark.parametrize("is_possible", [True, False], ids=["unwrapped", "by separate faces"])
+@pytest.mark.parametrize(("density", "resolution"), [(0, 256), (5, 0), (20, 0), (100, 0), (400, 0)])
+def test_the_padding_is_that_of_the_final_texture(monkeypatch, density, resolution, is_possible):
+    if not is_possible:
+        monkeypatch.setattr(soup, "unwrap", fails)
     count, steps = 20, np.linspace(0, 1, 21)[:, None]
     atlas = ours.Atlas()
     atlas.add_mesh(np.random.default_rng(0).normal(size=(3 * count, 3)), np.arange(3 * count).reshape(-1, 3))
     options = ours.PackOptions(padding=8, texels_per_unit=density, resolution=resolution)
     atlas.generate(pack_options=options)
+    assert (len(atlas.notes) == 0) == is_possible
     _, indices, uvs = atlas[0]
     corners = uvs[indices].astype(float) * atlas.width
     rims = [
