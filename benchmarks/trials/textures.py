@@ -116,7 +116,7 @@ def check_xatlas(outcome: Outcome, vertices: np.ndarray, faces: np.ndarray, made
     area = plane.double_areas(corners)
     if (area < 0).any():
         _broken(outcome, "xatlas: flipped", notes, r"flipped", int((area < 0).sum()))
-    pairs = find_overlaps(corners[area > 0]).pairs
+    pairs = find_overlaps(corners[area > 0]).pairs if (area > 0).any() else ()
     if len(pairs):
         _broken(outcome, "xatlas: overlaps", notes, r"overlap", len(pairs))
 
