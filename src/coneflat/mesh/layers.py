@@ -141,12 +141,13 @@ class CrowdedEdges:
         numbers, sums = (
             np.bincount(side, weights, sides)[side ^ 1] for weights in (np.ones(count), np.arange(count))
         )
-        chosen = np.flatnonzero(numbers - has_reverse == 1)
-        candidate = (sums - np.where(has_reverse, reverse, 0)).astype(np.int64)[chosen]
-        is_only = np.bincount(candidate, minlength=count)[candidate] == 1
-        one, two = np.sort(np.stack([chosen, candidate])[:, is_only], axis=0)
-        one, two = np.divmod(np.unique(one * count + two), max(count, 1))
-        return self._pairs_of(first[one], first[two], np.minimum(sizes[one], sizes[two]))
+        decided = np.flatnonzero(numbers - has_reverse == 1)
+        candidate = (sums - np.where(has_reverse, reverse, 0)).astype(np.int64)[decided]
+        is_uncontested = np.bincount(candidate, minlength=count)[candidate] == 1
+        low, high = np.sort(np.stack([decided, candidate])[:, is_uncontested], axis=0)
+        # Two classes that are the only candidates of each other are one pair.
+        low, high = np.divmod(np.unique(low * count + high), max(count, 1))
+        return _zipped(self.halfedges, first[low], first[high], np.minimum(sizes[low], sizes[high]))
 
     def turned_pairs(self, pairs: IntArray) -> IntArray:
         """Return (p, 2) half-edges of one direction that are left over at edges between two apexes.
@@ -159,8 +160,9 @@ class CrowdedEdges:
         rest = np.flatnonzero(~np.isin(self.halfedges, pairs))
         first = _run_starts(self.edge[rest], self.apex[rest])
         sizes, edge = np.diff(np.append(first, len(rest))), self.edge[rest][first]
-        one = np.flatnonzero((edge[1:] == edge[:-1]) & (self._apex_counts()[edge[1:]] == 2))
-        return self._pairs_of(first[one], first[one + 1], np.minimum(sizes[one], sizes[one + 1]), rest)
+        run = np.flatnonzero((edge[1:] == edge[:-1]) & (self._apex_counts()[edge[1:]] == 2))
+        counts = np.minimum(sizes[run], sizes[run + 1])
+        return _zipped(self.halfedges[rest], first[run], first[run + 1], counts)
 
     def closes_again(self, plain: IntArray, pairs: IntArray) -> BoolArray:
         """Return (p,) whether more than two half-edges would lie between the same two vertices after `split_vertices`.
@@ -193,20 +195,6 @@ class CrowdedEdges:
         """Return (e,) the number of apexes of each edge."""
         return np.bincount(self.edge[_run_starts(self.edge, self.apex)])
 
-    def _pairs_of(
-        self, one: IntArray, two: IntArray, sizes: IntArray, order: IntArray | None = None
-    ) -> IntArray:
-        """Return the pairs (p, 2) of runs of half-edges: the first of one with the first of the other, and so on.
-
-        Args:
-            one, two: (r,) the first positions of the runs.
-            sizes: (r,) the number of pairs of each.
-            order: the half-edges that positions are about; all by default.
-        """
-        rank = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
-        halfedges = self.halfedges if order is None else self.halfedges[order]
-        return np.stack([halfedges[np.repeat(runs, sizes) + rank] for runs in (one, two)], axis=1)
-
 
 def _run_starts(*columns: IntArray | BoolArray) -> IntArray:
     """Return the first position of each run of equal rows of columns (k,)."""
@@ -219,3 +207,15 @@ def _run_starts(*columns: IntArray | BoolArray) -> IntArray:
 def _is_opposite_largest(faces: IntArray, halfedges: IntArray) -> BoolArray:
     """Return (k,) whether half-edges are opposite the largest vertex of their face, which has one such half-edge."""
     return faces.ravel()[halfedges] == faces[halfedges // 3].max(axis=1)
+
+
+def _zipped(halfedges: IntArray, starts: IntArray, other_starts: IntArray, sizes: IntArray) -> IntArray:
+    """Return (p, 2) half-edges of runs in pairs: the first of a run with the first of the other, and so on.
+
+    Args:
+        halfedges: (k,) half-edges.
+        starts, other_starts: (r,) where the two runs of each pair of runs start.
+        sizes: (r,) the number of pairs of half-edges of each.
+    """
+    rank = np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    return np.stack([halfedges[np.repeat(first, sizes) + rank] for first in (starts, other_starts)], axis=1)
