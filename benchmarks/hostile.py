@@ -6,6 +6,7 @@ A case is a kind and a seed: `--case mesh:17` runs one case in this process and 
 - tiny: meshes of at most some twenty triangles, closed ones of two among them, with many options at once, and as quads;
 - texture: such meshes through `coneflat.unwrap`, with random options, and through the interface of xatlas;
 - transfer: textured squares in every format, baked and measured, against a slow sampler;
+- doubled: surfaces with several layers, on common vertices or their own, through all of these;
 - file: mesh files of all formats, intact or damaged, read, flattened, written, and read back by other software;
 - argument: public functions with odd arguments;
 - command: odd command lines;
@@ -20,7 +21,7 @@ angles around inner vertices and cones, equal sides of seams, prescribed boundar
 that says what was measured. What is not kept and not named by a note is a breach; so are errors that are not the
 package's own, messages of several lines, crashes, hangs, and too much memory. The exit code is 1 if there is any.
 
-Options: --cases 10000, --jobs 2, --seed 0 (the first), --kinds mesh,tiny,texture,transfer,file,argument,command,
+Options: --cases 10000, --jobs 2, --seed 0 (the first), --kinds mesh,tiny,texture,doubled,transfer,file,argument,command,
 process,attribute,offset, --out FILE.json (all outcomes), --again FILE.json (only the breaches in such a file).
 """
 

@@ -133,6 +133,13 @@ def test_a_planted_fault_is_found(ball, fault, cause):
     assert cause in breaches_of(planted(result, fault), options, *mesh)
 
 
+def test_a_lost_face_is_found(ball):
+    result, options, (vertices, faces) = ball
+    assert breaches_of(result, options, vertices, np.concatenate([faces, faces[5:6]])) == [
+        "origin: a face of the input is lost"
+    ]
+
+
 def test_a_fault_that_its_own_note_names_is_no_breach(ball):
     result, options, mesh = ball
     turned, cause = planted(result, "flipped"), "flipped triangles, exact"

@@ -143,7 +143,7 @@ def test_repairs_are_no_warnings():
     with warnings.catch_warnings():
         warnings.simplefilter("error", GuaranteeWarning)
         result = coneflat.flatten(vertices, np.concatenate([faces, faces]), repair=True)
-    assert any("2 duplicate faces" in note for note in result.notes)
+    assert any("Put 2 faces on the same three vertices" in note for note in result.notes)
     assert not any(isinstance(note, Unmet) for note in result.notes)
 
 

@@ -22,6 +22,7 @@ from .arguments import DOORS, Calls
 from .attributes import attribute_case
 from .choices import cross_options, in_short, make_options
 from .commands import interrupt_command, make_command, run_command, run_without_streams
+from .doubled import doubled_case
 from .files import make_file
 from .grids import grid_case, grid_of_mesh
 from .meshes import make_mesh, make_tiny
@@ -275,7 +276,7 @@ def _swell(rng: Random, outcome: Outcome) -> None:
     np.ones(200_000_000)
 
 
-#: The kinds of cases, and how many of forty are of each. The last three put the workers to the test.
+#: The kinds of cases, and how many of 44 are of each. The last three put the workers to the test.
 KINDS: dict[str, Callable[[Random, Outcome], None]] = {
     "mesh": _mesh,
     "file": _file,
@@ -287,14 +288,15 @@ KINDS: dict[str, Callable[[Random, Outcome], None]] = {
     "transfer": transfer_case,
     "attribute": attribute_case,
     "offset": offset_case,
+    "doubled": doubled_case,
     "grid": grid_case,
     "crash": _crash,
     "hang": _hang,
     "swell": _swell,
 }
 SHARES = {
-    "mesh": 14, "tiny": 6, "texture": 8, "file": 6, "argument": 3, "command": 2, "process": 1, "transfer": 2,
-    "attribute": 2, "offset": 2,
+    "mesh": 14, "tiny": 6, "texture": 8, "doubled": 4, "file": 6, "argument": 3, "command": 2, "process": 1,
+    "transfer": 2, "attribute": 2, "offset": 2,
 }  # fmt: skip
 
 

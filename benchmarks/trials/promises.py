@@ -114,6 +114,9 @@ def _check_origin(trial: Trial) -> None:
     named = np.sort(result.vertex_origin[result.faces], axis=1)
     if not np.array_equal(named, np.sort(faces[result.face_origin], axis=1)):
         trial.outcome.breach("origin: faces are not the input's", "")
+    is_proper = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    if len(np.setdiff1d(np.flatnonzero(is_proper), result.face_origin)):
+        trial.breach("origin: a face of the input is lost", f"{len(result.faces)} of {len(faces)}")
     if len(np.unique(result.face_origin)) < len(result.faces):
         trial.outcome.breach("origin: a face of the input twice", "")
     if (trial.topology.count > 2).any():

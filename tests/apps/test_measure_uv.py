@@ -298,7 +298,7 @@ class TestFormats:
         found = measure_uv(path).report()
         assert found["triangles"] == 4
         assert found["overlapping_pairs"] == 2
-        assert "Dropped 1 duplicate face." in found["notes"][0]
+        assert "Put 1 face on the same three vertices as others" in found["notes"][0]
         with pytest.raises(errors.NonManifoldError):
             measure_uv(path, strict=True)
 

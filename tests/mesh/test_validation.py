@@ -88,9 +88,3 @@ def test_crowded_edges_are_refused_or_separated():
     assert np.isfinite(result.uv).all()
     assert result.distortion.qc_max == pytest.approx(1)
     np.testing.assert_array_equal(result.vertex_origin[result.faces], faces)
-
-
-def test_repair_drops_faces_given_twice():
-    checked = check_mesh(V, np.r_[F, F[:2], F[2:3, [0, 2, 1]]], repair=True)
-    np.testing.assert_array_equal(checked.mesh.faces, F)
-    assert "3 duplicate faces" in checked.notes[0]

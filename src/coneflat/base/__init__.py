@@ -15,15 +15,27 @@ from .text import MAX_LISTED, exit_text, list_some, plural, printable, short_rep
 from .threads import THREADS, limit_threads
 
 if TYPE_CHECKING:
-    from .arrays import BoolArray, ComplexArray, FloatArray, IntArray, dots, has_any, mask_of, unit_exponent
+    from .arrays import (
+        BoolArray,
+        ComplexArray,
+        FloatArray,
+        IntArray,
+        as_floats,
+        as_indices,
+        dots,
+        has_any,
+        mask_of,
+        unit_exponent,
+    )
     from .jit import compiled
     from .kernel_cache import cache_folder, compilation
 
 __all__ = [
     "BoolArray", "ComplexArray", "DISTORTION", "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE", "MAX_LISTED",
-    "MIN_CONE_ANGLE", "Progress", "Stopwatch", "THREADS", "TYPED_TOLERANCE", "Unmet", "cache_folder", "cancel_with",
-    "check_cancelled", "compilation", "compiled", "dots", "exit_text", "has_any", "inner_calls", "limit_threads",
-    "list_some", "mask_of", "plural", "printable", "short_repr", "unit_exponent", "warn_of", "warns",
+    "MIN_CONE_ANGLE", "Progress", "Stopwatch", "THREADS", "TYPED_TOLERANCE", "Unmet", "as_floats", "as_indices",
+    "cache_folder", "cancel_with", "check_cancelled", "compilation", "compiled", "dots", "exit_text", "has_any",
+    "inner_calls", "limit_threads", "list_some", "mask_of", "plural", "printable", "short_repr", "unit_exponent",
+    "warn_of", "warns",
 ]  # fmt: skip
 
 

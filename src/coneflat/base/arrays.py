@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -52,6 +52,36 @@ def unit_exponent(values: FloatArray) -> int:
     return int(np.frexp(max(values.max(), -values.min()))[1])
 
 
+def as_array(name: str, values: ArrayLike) -> NDArray[Any]:
+    """Return values as an array of their own type, such as those of tensors and of lists.
+
+    Values of users are converted here: objects whose `__array__` takes no type can only be converted in a second step.
+
+    Raises:
+        ArrayShapeError: the values do not form an array; the message has `name`.
+    """
+    try:
+        return np.asarray(values)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ArrayShapeError(f"{name} must be an array of numbers: {error}") from error
+
+
+def as_indices(name: str, values: ArrayLike) -> IntArray:
+    """Return indices as an int64 array; floats are accepted if they are integers.
+
+    Raises:
+        ArrayShapeError: `values` contains something else than integers; the message has `name`.
+    """
+    array = as_array(name, values)
+    if array.dtype.kind not in "fiu" and array.size:
+        raise ArrayShapeError(f"{name} must be an array of vertex indices: their type is {array.dtype}")
+    with np.errstate(invalid="ignore"):
+        indices = np.ascontiguousarray(array, dtype=np.int64)
+    if array.dtype.kind == "f" and (indices != array).any():
+        raise ArrayShapeError(f"{name} must hold integers, vertex indices from 0")
+    return indices
+
+
 def as_faces(faces: ArrayLike, vertex_count: int) -> IntArray:
     """Return faces as an (m, 3) array of vertex indices, checked.
 
@@ -64,20 +94,11 @@ def as_faces(faces: ArrayLike, vertex_count: int) -> IntArray:
         EmptyMeshError: there are no faces.
         FaceIndexError: an index is out of range; the message lists the faces.
     """
-    try:
-        array = np.asarray(faces)
-        if array.dtype.kind not in "fiu" and array.size:
-            raise TypeError(f"their type is {array.dtype}")
-        with np.errstate(invalid="ignore"):
-            triangles = np.ascontiguousarray(array, dtype=np.int64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ArrayShapeError(f"faces must be an (m, 3) array of vertex indices: {error}") from error
+    triangles = as_indices("faces", faces)
     if triangles.size == 0:
         raise EmptyMeshError("the mesh has no faces")
     if triangles.ndim != 2 or triangles.shape[1] != 3:
         raise ArrayShapeError(f"faces must have the shape (m, 3), got {triangles.shape}")
-    if array.dtype.kind == "f" and (triangles != array).any():
-        raise ArrayShapeError("faces must hold integers, vertex indices from 0")
     if triangles.min() < 0 or triangles.max() >= vertex_count:
         bad = np.flatnonzero(((triangles < 0) | (triangles >= vertex_count)).any(axis=1))
         row = triangles[bad[0]]
@@ -107,10 +128,10 @@ def as_floats(name: str, values: ArrayLike) -> FloatArray:
     Raises:
         ArrayShapeError: `values` contains something else than numbers; the message has `name`.
     """
+    array = as_array(name, values)
+    if array.dtype.kind not in "bfiuO":
+        raise ArrayShapeError(f"{name} must be an array of numbers: their type is {array.dtype}")
     try:
-        array = np.asarray(values)
-        if array.dtype.kind not in "bfiuO":
-            raise TypeError(f"their type is {array.dtype}")
         return np.asarray(array, dtype=np.float64, order="C")
     except (TypeError, ValueError, OverflowError) as error:
         raise ArrayShapeError(f"{name} must be an array of numbers: {error}") from error

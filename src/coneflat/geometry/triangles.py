@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats, dots
+from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats, as_indices, dots
 from ..base.jit import compiled
 from ..errors import ArrayShapeError, FaceIndexError
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh, corner_fans, measure_sides
@@ -32,7 +32,7 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
         ArrayShapeError: the vertices are not (n, 3) or (n, 2), or the faces are not (m, 3).
         FaceIndexError: a face refers to a vertex that does not exist.
     """
-    points, triangles = as_floats("vertices", vertices), np.asarray(faces, dtype=np.int64)
+    points, triangles = as_floats("vertices", vertices), as_indices("faces", faces)
     if points.ndim != 2:
         raise ArrayShapeError(
             f"vertices must have the shape (n, 3), or (n, 2) in the plane, got {points.shape}"

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.arrays import as_array, as_floats
 from ..errors import ArrayShapeError
 from ..geometry.triangulate import triangulate
 from ..result import Flattening
@@ -39,24 +40,28 @@ def as_input(mesh: Any, faces: ArrayLike | None = None) -> InputMesh:
             raise ArrayShapeError(
                 "a mesh or file already has faces: leave out faces, or give vertices (n, 3)"
             )
-        return InputMesh(mesh, faces)
+        return _from_arrays(mesh, faces)
     if isinstance(mesh, (str, PathLike)):
         mesh = read_mesh(mesh)
     if isinstance(mesh, MeshFile):
         triangles, corners = triangulate(mesh.vertices, mesh.corners, mesh.offsets)
         return InputMesh(mesh.vertices, triangles, mesh, corners)
     if isinstance(mesh, (tuple, list)) and len(mesh) == 2:
-        return InputMesh(mesh[0], mesh[1])
+        return _from_arrays(mesh[0], mesh[1])
     if hasattr(mesh, "points") and hasattr(mesh, "cells") and not hasattr(mesh, "n_points"):
         return _from_meshio(mesh)
     if hasattr(mesh, "points") and hasattr(mesh, "faces"):
         return _from_pyvista(mesh)
     if hasattr(mesh, "vertices") and hasattr(mesh, "faces"):
-        return InputMesh(mesh.vertices, mesh.faces)
+        return _from_arrays(mesh.vertices, mesh.faces)
     raise ArrayShapeError(
         f"cannot read a mesh from {type(mesh).__name__}: give vertices and faces, a file's path, or a mesh of "
         "trimesh, meshio or pyvista (for pyvista, a surface: extract_surface())"
     )
+
+
+def _from_arrays(vertices: ArrayLike, faces: ArrayLike) -> InputMesh:
+    return InputMesh(as_array("vertices", vertices), as_array("faces", faces))
 
 
 def _from_meshio(mesh: Any) -> InputMesh:
@@ -68,11 +73,11 @@ def _from_meshio(mesh: Any) -> InputMesh:
 
 
 def _from_pyvista(mesh: Any) -> InputMesh:
-    padded = np.asarray(mesh.faces)
+    padded = as_array("faces", mesh.faces)
     if padded.ndim == 2:  # not padded: rows of equal size
-        return InputMesh(mesh.points, padded)
+        return _from_arrays(mesh.points, padded)
     if padded.size and padded.size % 4 == 0 and (padded[::4] == 3).all():
-        return InputMesh(mesh.points, padded.reshape(-1, 4)[:, 1:])
+        return _from_arrays(mesh.points, padded.reshape(-1, 4)[:, 1:])
     polygons, position = [], 0
     while position < padded.size:
         size = int(padded[position])
@@ -88,7 +93,7 @@ def _from_pyvista(mesh: Any) -> InputMesh:
 
 
 def _from_polygons(points: ArrayLike, polygons: list[list[int]]) -> InputMesh:
-    vertices = np.asarray(points, dtype=np.float64)
+    vertices = as_floats("points", points)
     if vertices.ndim == 2 and vertices.shape[1] == 2:  # planar meshes
         vertices = np.column_stack([vertices, np.zeros(len(vertices))])
     if vertices.ndim != 2 or vertices.shape[1] != 3:

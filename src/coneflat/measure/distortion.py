@@ -145,6 +145,8 @@ def measure(
         >>> round(found.qc_mean, 6), found.flipped
         (2.0, 0)
     """
+    corner_uv = as_floats("corner_uv", corner_uv)
+    prescribed = None if prescribed is None else as_floats("prescribed", prescribed)
     _check_arrays(mesh, corner_uv, cones, prescribed)
     own = None if lengths is None else check_lengths(mesh, lengths, flat=True)
     measured = measure_map(mesh, corner_uv, curvature_error, cones, own)
@@ -164,7 +166,7 @@ def _check_arrays(
             f"mesh must be a TriangleMesh, for example check_mesh(vertices, faces).mesh, got {short_repr(mesh)}"
         )
     as_faces(mesh.faces, len(mesh.vertices))
-    if not np.isfinite(as_floats("corner_uv", corner_uv)).all():
+    if not np.isfinite(corner_uv).all():
         raise NonFiniteError("corner_uv has points that are NaN or infinite")
     bad = [] if cones is None else [v for v in np.asarray(cones).tolist() if not 0 <= v < len(mesh.vertices)]
     if bad:

@@ -10,7 +10,7 @@ from .charts import (
     point_vertices,
     uv_seams,
 )
-from .check import REPAIR_ADVICE, CheckedMesh, left_out
+from .check import REPAIR_ADVICE, CheckedMesh, left_out, weld
 from .connectivity import (
     NEXT,
     PREVIOUS,
@@ -20,12 +20,15 @@ from .connectivity import (
     label_faces,
     nearby,
     sort_pairs,
+    split_vertices,
 )
+from .layers import EdgeGroups, glue_layers
 from .polygons import polygon_of
 from .ties import tie_key
 
 __all__ = [
-    "CheckedMesh", "CutMesh", "NEXT", "PREVIOUS", "REPAIR_ADVICE", "corner_fans", "cut_open",
-    "end_corners", "joined_edges", "label_charts", "label_components", "label_faces", "left_out",
-    "nearby", "open_along", "point_seams", "point_vertices", "polygon_of", "sort_pairs", "tie_key", "uv_seams",
+    "CheckedMesh", "CutMesh", "EdgeGroups", "NEXT", "PREVIOUS", "REPAIR_ADVICE", "corner_fans", "cut_open",
+    "end_corners", "glue_layers", "joined_edges", "label_charts", "label_components", "label_faces", "left_out",
+    "nearby", "open_along", "point_seams", "point_vertices", "polygon_of", "sort_pairs", "split_vertices", "tie_key", "uv_seams",
+    "weld",
 ]  # fmt: skip

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats, mask_of, require_finite
+from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats, require_finite
 from ..base.sets import grow_forest
 from ..base.text import list_some, plural
 from ..errors import (
@@ -17,7 +17,8 @@ from ..errors import (
     NonManifoldError,
     NonOrientableError,
 )
-from .connectivity import NEXT, PREVIOUS, TriangleMesh, label_components, sort_pairs, split_vertices
+from .connectivity import NEXT, PREVIOUS, TriangleMesh, label_components, split_vertices
+from .layers import EdgeGroups, glue_layers
 
 REPAIR_ADVICE = "pass repair=True (on the command line: leave out --strict)"
 
@@ -54,9 +55,9 @@ def check_mesh(vertices: ArrayLike, faces: ArrayLike, *, repair: bool = False) -
     Args:
         vertices: (n, 3) positions.
         faces: (m, 3) vertex indices, from 0.
-        repair: drop faces that use a vertex twice and faces given twice, split non-manifold edges and
-            vertices, and cut non-orientable surfaces, instead of raising an error. A mesh that raises no error is not
-            changed.
+        repair: drop faces that use a vertex twice, split non-manifold edges and vertices, and cut non-orientable
+            surfaces, instead of raising an error. The two sides of a sheet, on the same vertices, become two layers.
+            A mesh that raises no error is not changed.
 
     Returns:
         The mesh, and how its vertices and faces correspond to the input.
@@ -143,7 +144,7 @@ class _Check:
             raise EmptyMeshError("the mesh has no faces left once degenerate ones are dropped")
 
     def drop_degenerate_faces(self) -> None:
-        """Drop faces that use a vertex twice, and faces given twice, if the mesh is repaired.
+        """Drop faces that use a vertex twice, if the mesh is repaired.
 
         Raises:
             DegenerateFaceError: a face uses a vertex twice and the mesh is not repaired.
@@ -159,35 +160,30 @@ class _Check:
                 )
             self._keep(~bad)
             self.notes.append(f"Dropped {plural(len(where), 'face')} with the same vertex twice.")
-        if self.repair:
-            _, first = np.unique(np.sort(self.faces, axis=1), axis=0, return_index=True)
-            if len(first) < len(self.faces):
-                keep = mask_of(len(self.faces), first)
-                self.notes.append(f"Dropped {plural(int((~keep).sum()), 'duplicate face')}.")
-                self._keep(keep)
 
     def pair_halfedges(self) -> None:
-        """Find the pairs (k, 2) of half-edges that are glued; those of edges with three or more faces are not.
+        """Find the pairs (k, 2) of half-edges that are glued; at edges with three or more faces, only layers are.
 
         Raises:
             NonManifoldError: an edge has more than two faces and the mesh is not repaired.
         """
-        tails, heads = self.faces[:, NEXT].ravel(), self.faces[:, PREVIOUS].ravel()
-        order, is_first = sort_pairs(tails, heads, len(self.vertices))
-        starts = np.flatnonzero(is_first)
-        counts = np.diff(np.append(starts, len(order)))
-        crowded = starts[counts > 2]
-        if len(crowded):
-            edges = [self._edge_name(h) for h in order[crowded[:5]]]
-            what = plural(len(crowded), "edge")
-            if not self.repair:
-                raise NonManifoldError(
-                    f"{what} with more than two faces (vertex pairs {list_some(edges, len(crowded))}); "
-                    f"{REPAIR_ADVICE} to separate the faces there"
-                )
-            self.notes.append(f"Separated the faces at {what} with more than two.")
-        double = starts[counts == 2]
-        self.pairs = np.stack([order[double], order[double + 1]], axis=1)
+        groups = EdgeGroups.of(self.faces, len(self.vertices))
+        self.pairs, crowded = groups.pairs, groups.crowded
+        if not len(crowded):
+            return
+        if not self.repair:
+            edges = [self._edge_name(h) for h in crowded[:5]]
+            raise NonManifoldError(
+                f"{plural(len(crowded), 'edge')} with more than two faces "
+                f"(vertex pairs {list_some(edges, len(crowded))}); {REPAIR_ADVICE} to separate the faces there"
+            )
+        glued = glue_layers(self.faces, groups)
+        self.pairs = glued.pairs
+        if glued.stacked:
+            what = plural(glued.stacked, "face")
+            self.notes.append(f"Put {what} on the same three vertices as others into separate layers.")
+        if glued.separated:
+            self.notes.append(f"Separated the faces at {plural(glued.separated, 'edge')} with more than two.")
 
     def orient(self) -> None:
         """Flip faces so that neighbours have the same orientation; in each component, the smaller set is flipped.

@@ -13,7 +13,7 @@ from ..base.notes import Unmet
 from ..base.text import plural
 from ..errors import DegenerateFaceError, EmptyMeshError
 from ..geometry import double_areas, edge_lengths
-from ..geometry.triangles import ZERO_AREA
+from ..geometry.opening import ZERO_AREA
 
 #: Steps of the coordinates that the longest side of a triangle has at most, if rounding can have removed its area,
 MAX_STEPS = 4

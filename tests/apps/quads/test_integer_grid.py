@@ -304,3 +304,10 @@ def test_edges_between_cones_and_lines_are_split():
     assert len(lines) == 2
     assert not np.isin(mesh.edges, [4, 5, 6]).all(axis=1).any()
     assert np.isin(split_between_nodes(layout).mesh.edges, [4, 5, 6]).all(axis=1).any()
+
+
+def test_components_without_area_are_refused_by_name():
+    line = np.array([[0, 0, 0], [1, 2, 0], [0, 0, 0], [2, -1, 0.0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3], [2, 1, 0], [3, 2, 0]])
+    with pytest.raises(errors.GridError, match="4 components: they have no area"):
+        integer_grid(np.concatenate([line, line]), np.concatenate([faces, faces + 4]), quads=50, repair=True)

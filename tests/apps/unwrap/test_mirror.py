@@ -230,3 +230,15 @@ def test_the_command_says_why(tmp_path):
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert not (tmp_path / "no.obj").exists()
+
+
+@pytest.mark.parametrize("turned", [True, False], ids=["back", "again"])
+def test_both_sides_of_mirrored_cloth_have_their_images(turned):
+    vertices, faces = mirrored(*shapes.hill(6, 5))
+    count = len(faces)
+    second = faces[:, [0, 2, 1]] if turned else faces
+    result = unwrap(vertices, np.concatenate([faces, second]), repair=True, stack="mirrored")
+    assert len(result.faces) == 2 * count
+    # The two halves of each sheet share their texels.
+    texels = [np.sort(np.round(uv, 9), axis=0).tobytes() for uv in result.uv[result.uv_faces]]
+    assert len(set(texels)) == count

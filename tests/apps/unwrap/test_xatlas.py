@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
+import tracemalloc
 
 import numpy as np
 import pytest
 import shapes
+from scipy.spatial import cKDTree
 
 import coneflat.xatlas as ours
+from coneflat import errors
+from coneflat.apps.unwrap import soup, xatlas_arrays
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
 FACES = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
@@ -91,9 +96,108 @@ def test_an_atlas_of_several_meshes():
             atlas[index]
 
 
+@pytest.mark.parametrize("turned", [True, False], ids=["back", "again"])
+@pytest.mark.parametrize("sheet", [shapes.hill(8, 7), shapes.sphere(2)], ids=["hill", "sphere"])
+def test_a_doubled_surface_has_the_charts_of_two_sheets(sheet, turned):
+    vertices, faces = sheet
+    second = faces[:, ::-1] if turned else faces
+    own, both = np.concatenate([faces, len(vertices) + second]), np.concatenate([faces, second])
+    counts = []
+    for points, triangles in (
+        (np.concatenate([vertices, vertices + np.array([8, 0, 0])]), own),
+        (np.concatenate([vertices, vertices]), own),
+        (vertices, both),
+    ):
+        atlas = ours.Atlas()
+        atlas.add_mesh(points, triangles)
+        atlas.generate()
+        counts.append(atlas.chart_count)
+        assert (areas(*atlas[0][1:]) > 0).all()
+    assert counts == [counts[0]] * 3
+
+
+def fails(*arguments, **options):
+    raise errors.ConvergenceError("no metric")
+
+
+@pytest.mark.filterwarnings("ignore::coneflat.GuaranteeWarning")
+@pytest.mark.parametrize("is_possible", [True, False], ids=["unwrapped", "by separate faces"])
+@pytest.mark.parametrize(("density", "resolution"), [(0, 256), (5, 0), (20, 0), (100, 0), (400, 0)])
+def test_the_padding_is_that_of_the_final_texture(monkeypatch, density, resolution, is_possible):
+    if not is_possible:
+        monkeypatch.setattr(soup, "unwrap", fails)
+    count, steps = 20, np.linspace(0, 1, 21)[:, None]
+    atlas = ours.Atlas()
+    atlas.add_mesh(np.random.default_rng(0).normal(size=(3 * count, 3)), np.arange(3 * count).reshape(-1, 3))
+    options = ours.PackOptions(padding=8, texels_per_unit=density, resolution=resolution)
+    atlas.generate(pack_options=options)
+    assert (len(atlas.notes) == 0) == is_possible
+    _, indices, uvs = atlas[0]
+    corners = uvs[indices].astype(float) * atlas.width
+    rims = [
+        np.concatenate([(1 - steps) * a + steps * b for a, b in zip(t, t[[1, 2, 0]], strict=True)])
+        for t in corners
+    ]
+    gaps = [
+        cKDTree(rim).query(np.concatenate([*rims[:i], *rims[i + 1 :]]))[0].min() for i, rim in enumerate(rims)
+    ]
+    assert min(gaps) >= 8 - 1e-3
+    assert min(corners.min(), atlas.width - corners.max()) >= 8 - 1e-3
+    assert atlas.texels_per_unit >= density
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"padding": -3},
+        {"padding": float("nan")},
+        {"padding": "wide"},
+        {"padding": 10**300},
+        {"resolution": -3},
+        {"resolution": 2.5},
+        {"resolution": 10**300},
+        {"texels_per_unit": -3},
+        {"texels_per_unit": float("inf")},
+        {"texels_per_unit": 10**300},
+    ],
+)
+def test_invalid_options_are_named(options):
+    atlas = ours.Atlas()
+    atlas.add_mesh(SQUARE, FACES)
+    with pytest.raises(errors.OptionError, match=next(iter(options))):
+        atlas.generate(pack_options=ours.PackOptions(**options))
+
+
+def test_the_size_of_a_texture_without_faces_is_checked():
+    atlas = ours.Atlas()
+    with pytest.raises(errors.OptionError, match="resolution must be an integer from 1"):
+        atlas.generate(pack_options=ours.PackOptions(resolution=-3))
+
+
+def test_an_atlas_is_equal_to_itself_alone():
+    one, two = ours.Atlas(), ours.Atlas()
+    for atlas in (one, two):
+        atlas.add_mesh(SQUARE, FACES)
+    assert one == one
+    assert one != two
+    assert len({one, two, one}) == 2
+
+
+def test_the_interface_is_imported_without_the_rest():
+    script = "import sys, coneflat.xatlas; print([name for name in ('numpy', 'numba', 'scipy') if name in sys.modules])"
+    assert subprocess.check_output([sys.executable, "-c", script], text=True).strip() == "[]"
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        ((SQUARE, iter(FACES.tolist())), "indices must be an array of vertex indices"),
+        ((iter(SQUARE.tolist()), FACES), "positions must be an array of numbers"),
+        ((SQUARE, FACES + 0.5), "indices must hold integers"),
+        ((SQUARE, np.where(FACES == 1, np.nan, FACES)), "indices must hold integers"),
+        ((SQUARE, np.where(FACES == 1, np.inf, FACES)), "indices must hold integers"),
+        ((SQUARE.astype(complex), FACES), "positions must be an array of numbers"),
+        ((SQUARE, FACES, iter([1])), "normals must be an array of numbers"),
         ((SQUARE[:, :2], FACES), "positions must have the shape"),
         ((SQUARE, FACES.ravel()), "indices must have the shape"),
         ((SQUARE, FACES + 2), "indices must be from 0 to 3"),
@@ -119,6 +223,54 @@ def test_the_image_without_faces_is_black():
     atlas.generate(pack_options=ours.PackOptions(create_image=True, resolution=64))
     assert atlas.chart_image.shape == (64, 64, 3)
     assert not atlas.chart_image.any()
+
+
+def test_the_image_is_drawn_in_bands(monkeypatch):
+    vertices, faces = shapes.sphere(2)
+    texture = xatlas_arrays.unwrap_meshes(
+        [xatlas_arrays.read_arrays(vertices, faces, None, None)], ours.PackOptions(resolution=2048)
+    )
+    tracemalloc.start()
+    image = xatlas_arrays.draw_charts(texture)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert image.dtype == np.uint8
+    # At once, depths and faces alone take 16 bytes for each texel.
+    assert peak - image.nbytes < 12 * 2048**2
+    monkeypatch.setattr(xatlas_arrays, "TEXELS_PER_BAND", 2048 * 2048)
+    np.testing.assert_array_equal(xatlas_arrays.draw_charts(texture), image)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "kind"),
+    [
+        ((SQUARE, FACES, SQUARE[:3, :2]), errors.ArrayShapeError),
+        ((SQUARE, FACES, None, SQUARE[:, :2]), errors.ArrayShapeError),
+        ((SQUARE,), errors.ArrayShapeError),
+        ((SQUARE, FACES + 0.5), errors.ArrayShapeError),
+        ((SQUARE, FACES + 2), errors.FaceIndexError),
+        ((SQUARE * np.nan, FACES), errors.NonFiniteError),
+    ],
+)
+def test_export_writes_nothing_of_wrong_arrays(tmp_path, arguments, kind):
+    with pytest.raises(kind):
+        ours.export(tmp_path / "wrong.obj", *arguments)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("path", ["missing/square.obj", "", "with\0zero.obj", None, 3])
+def test_export_to_a_path_that_cannot_be_written(tmp_path, path):
+    with pytest.raises(errors.MeshFileError, match="cannot be written|file name must be"):
+        ours.export(str(tmp_path / path) if path else path, SQUARE, FACES) if path != 3 else ours.export(
+            3, SQUARE, FACES
+        )
+
+
+def test_export_without_indices_or_with_normals_alone(tmp_path):
+    ours.export(tmp_path / "a.obj", SQUARE[:3])
+    assert (tmp_path / "a.obj").read_text().endswith("f 1 2 3\n")
+    ours.export(tmp_path / "a.obj", SQUARE, FACES, None, SQUARE)
+    assert "f 1//1 2//2 3//3\n" in (tmp_path / "a.obj").read_text()
 
 
 def test_export(tmp_path):

@@ -260,7 +260,8 @@ class GridSearch:
                     Unmet(f"No grid for a component of {plural(len(part.faces), 'triangle')}: {error}.")
                 )
         if not found:
-            raise GridError(f"no grid was found for any of {mesh.components[0]} components: {why[0]}")
+            reason = why[0] if why else "they have no area."
+            raise GridError(f"no grid was found for any of {mesh.components[0]} components: {reason}")
         return joined_grids(found, (*checked.notes, *why))
 
     def _may_align(self) -> bool:

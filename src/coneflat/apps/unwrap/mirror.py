@@ -164,9 +164,11 @@ def _mirror_at(plane: FloatArray, mesh: TriangleMesh) -> Mirror | tuple[float, s
     )
     rows = np.concatenate([own.ravel()[here], turned.ravel()[there]])
     key, back = np.split(np.unique(rows, axis=0, return_inverse=True)[1].ravel(), 2)
+    # Of faces at the same place, which are layers of the surface, the first is the image of the first, and so on.
     order = np.argsort(key, kind="stable")
-    partner = order[np.minimum(np.searchsorted(key[order], back), len(key) - 1)]
-    # Faces at the same place have no image of their own.
+    layer = np.empty_like(order)
+    layer[order] = np.arange(len(order)) - np.searchsorted(key[order], key[order])
+    partner = order[np.minimum(np.searchsorted(key[order], back) + layer, len(key) - 1)]
     is_missing = (key[partner] != back) | (partner[partner] != np.arange(len(own)))
     vertices = np.full(len(mesh.vertices), -1)
     of_corners, known = mesh.faces.ravel(), np.flatnonzero(~is_missing)

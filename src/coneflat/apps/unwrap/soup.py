@@ -7,14 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from ...atlas import pack_charts, round_safely
+from ...atlas import Packed, pack_charts, round_safely
 from ...base import FloatArray, IntArray, Unmet, plural
-from ...errors import ConeflatError
+from ...errors import ConeflatError, OptionError
 from ...geometry import as_pairs, edge_lengths
 from ...io import stored_in_glb
 from ...layout import rest_sides
-from ...mesh import label_components, label_faces
-from .unwrap import unwrap
+from ...mesh import EdgeGroups, end_corners, glue_layers, label_faces, split_vertices, weld
+from ...options import read_options
+from .options import UnwrapOptions
+from .unwrap import MAX_RESOLUTION, unwrap
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +28,7 @@ class UnwrappedSoup:
         chart: (m,) the chart of each face, from 0; -1 for faces without area.
         efficiency: covered fraction of the square.
         scale: UV units per unit of length; 0 without any face that has area.
+        resolution: texels along a side of the texture.
         notes: what was done to the triangles, one sentence each.
     """
 
@@ -33,41 +36,46 @@ class UnwrappedSoup:
     chart: IntArray
     efficiency: float
     scale: float
+    resolution: int
     notes: tuple[str, ...]
 
 
 def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> UnwrappedSoup:
     """Return UVs for triangles.
 
-    Faces are joined along edges with two faces of the same orientation; vertices at the same position are the same.
+    Faces are joined along edges with two faces of the same orientation, and layers with several faces at an edge each
+    on its own, as by a repair; vertices at the same position are the same.
 
     Args:
         vertices: (n, 3) positions.
         faces: (m, 3) vertex indices.
         options: those of `coneflat.unwrap`.
+
+    Raises:
+        OptionError: an option is invalid, or the padding leaves no space for charts.
     """
+    o = read_options(options, UnwrapOptions)
     corner_uv, chart = np.zeros((len(faces), 3, 2)), np.full(len(faces), -1)
-    _, place = np.unique(vertices, axis=0, return_inverse=True)
-    one, two, three = place.ravel()[faces].T
+    first, place = weld(vertices)
+    one, two, three = place[faces].T
     is_face = (one != two) & (two != three) & (three != one) & np.isfinite(vertices[faces]).all(axis=(1, 2))
     chosen = np.flatnonzero(is_face)
     left_out, notes = len(faces) - len(chosen), list[str]()
     if left_out:
         notes.append(Unmet(f"{plural(left_out, 'face')} without area: the UVs of each are one point."))
     if not len(chosen):
-        return UnwrappedSoup(corner_uv, chart, 0.0, 0.0, tuple(notes))
-    corner = _oriented(place.ravel()[faces[chosen]])
-    points = np.empty((int(corner.max()) + 1, 3))
-    points[corner] = vertices[faces[chosen]]
+        return UnwrappedSoup(corner_uv, chart, 0.0, 0.0, o.resolution, tuple(notes))
+    origin, corner = _oriented(place[faces[chosen]])
+    points = vertices[first[origin]]
     try:
         result = unwrap(points, corner, repair=True, **options)
+    except OptionError:
+        raise
     except ConeflatError as error:
         notes.append(Unmet(f"Each face is a chart of its own: {error}."))
-        sides = rest_sides(edge_lengths(points, corner))
-        flat = np.stack([np.zeros(len(sides)), sides[:, 2], -sides[:, 1]], axis=1)
-        packed = pack_charts(as_pairs(flat.ravel()).reshape(-1, 3, 2), np.arange(len(chosen)))
+        packed, resolution = _packed_separately(points, corner, o)
         corner_uv[chosen], chart[chosen] = packed.corner_uv, np.arange(len(chosen))
-        return UnwrappedSoup(corner_uv, chart, packed.efficiency, packed.scale, tuple(notes))
+        return UnwrappedSoup(corner_uv, chart, packed.efficiency, packed.scale, resolution, tuple(notes))
     assert result.face_origin is not None
     known = chosen[result.face_origin]
     # Where charts touch themselves, rounding to single precision may make overlaps.
@@ -77,22 +85,36 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
         count = plural(len(overlaps.pairs), "pair")
         notes.append(Unmet(f"{count} of triangles overlap in single precision."))
     corner_uv[known], chart[known] = uv[result.uv_faces], label_faces(result.uv_faces, len(uv))[1]
-    return UnwrappedSoup(corner_uv, chart, result.packing_efficiency, result.uv_scale, tuple(notes))
+    resolution = result.settings["resolution"]
+    return UnwrappedSoup(
+        corner_uv, chart, result.packing_efficiency, result.uv_scale, resolution, tuple(notes)
+    )
 
 
-def _oriented(faces: IntArray) -> IntArray:
-    """Return (m, 3) other vertices of faces, so that they form surfaces oriented as the faces are.
+def _packed_separately(points: FloatArray, corner: IntArray, options: UnwrapOptions) -> tuple[Packed, int]:
+    """Return the packing of faces (m, 3), each as a chart, and its resolution."""
+    sides = rest_sides(edge_lengths(points, corner))
+    flat = np.stack([np.zeros(len(sides)), sides[:, 2], -sides[:, 1]], axis=1)
+    charts = as_pairs(flat.ravel()).reshape(-1, 3, 2), np.arange(len(corner))
+    resolution, density = options.resolution, options.texel_density
+    packed = pack_charts(*charts, resolution=resolution, padding=options.padding)
+    while density is not None and resolution * packed.scale < density:
+        # The padding, and with it the scale, depends on the resolution.
+        resolution = max(2 * resolution, int(np.ceil(min(density / packed.scale, 2.0**62))))
+        if resolution > MAX_RESOLUTION:
+            raise OptionError(
+                f"texel_density is too large: {density:g} texels per unit need {resolution:,} texels per side"
+            )
+        packed = pack_charts(*charts, resolution=resolution, padding=options.padding)
+    return packed, resolution
 
-    Two faces share an edge if no other face has it and they have opposite directions along it.
+
+def _oriented(faces: IntArray) -> tuple[IntArray, IntArray]:
+    """Return the vertex of each vertex of oriented surfaces that faces form, and the surfaces as (m, 3) faces.
+
+    Faces are glued as a repair glues them, where they have opposite directions along an edge.
     """
-    count = int(faces.max()) + 1
-    tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    keys, back = tails * count + heads, heads * count + tails
-    order = np.argsort(keys, kind="stable")
-    first, last = (np.searchsorted(keys[order], back, side=side) for side in ("left", "right"))
-    here = np.searchsorted(keys[order], keys, side="right") - np.searchsorted(keys[order], keys, side="left")
-    joined = np.flatnonzero((last - first == 1) & (here == 1))
-    twins = order[first[joined]]
-    following = np.arange(faces.size).reshape(-1, 3)[:, [1, 2, 0]].ravel()
-    # The start of a half-edge is the end of its twin.
-    return label_components(faces.size, joined, following[twins])[1].reshape(-1, 3)
+    pairs = glue_layers(faces, EdgeGroups.of(faces, int(faces.max()) + 1)).pairs
+    (start_one, _), (_, end_two) = (end_corners(halfedges) for halfedges in pairs.T)
+    opposed = faces.ravel()[start_one] == faces.ravel()[end_two]
+    return split_vertices(faces, int(faces.max()) + 1, *pairs[opposed].T)

@@ -1,23 +1,22 @@
-"""`coneflat.unwrap` with the interface of the package xatlas; see `coneflat.xatlas`."""
+"""`coneflat.unwrap` with the interface of the package xatlas; see `coneflat.xatlas`.
+
+What needs more than Python is in `xatlas_arrays.py`, so that `import coneflat.xatlas` is fast.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from operator import index as as_index
 from os import PathLike
-from typing import TypeAlias
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from ...base import inner_calls, warn_of, warns
 
-from ...base import FloatArray, IntArray, inner_calls, warn_of
-from ...errors import ArrayShapeError, FaceIndexError
-from ...geometry import fill_nearest
-from ...io import atomic_write
-from .options import UnwrapOptions
-from .soup import UnwrappedSoup, unwrap_soup
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
-#: What xatlas returns for a mesh: (k,) the input vertex of each vertex, (m, 3) faces, and (k, 2) UVs.
-Mapped: TypeAlias = tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float32]]
+    from .xatlas_arrays import Mapped, MeshArrays
 
 
 @dataclass
@@ -42,9 +41,9 @@ class PackOptions:
     """The options for packing of xatlas.
 
     Attributes:
-        padding: texels between charts; 0 for the default.
+        padding: texels between charts, and between charts and the border, at least; 0 for the default.
         resolution: texels along a side of the texture; 0 for that of `texels_per_unit`, or else 1024.
-        texels_per_unit: texels per unit of length, without a resolution: there is one texture, of one size.
+        texels_per_unit: texels per unit of length, at least, without a resolution; there is one texture.
         create_image: make `Atlas.chart_image`. The other options have no effect.
     """
 
@@ -68,7 +67,7 @@ class Utilization(float):
         return [float(self)][index]
 
 
-@dataclass
+@dataclass(eq=False)
 class Atlas:
     """Meshes that share a square texture.
 
@@ -87,8 +86,8 @@ class Atlas:
     chart_count: int = 0
     utilization: Utilization = field(default_factory=Utilization)
     notes: tuple[str, ...] = ()
-    _given: list[tuple[FloatArray, IntArray]] = field(default_factory=list, repr=False)
-    _mapped: list[Mapped] = field(default_factory=list, repr=False)
+    _added: list[MeshArrays] = field(default_factory=list, repr=False)
+    _mapped: tuple[Mapped, ...] = field(default=(), repr=False)
     _image: NDArray[np.uint8] | None = field(default=None, repr=False)
 
     def add_mesh(
@@ -101,51 +100,36 @@ class Atlas:
         """Add a mesh: (n, 3) positions and (m, 3) indices; normals and UVs have no effect.
 
         Raises:
-            ArrayShapeError: arrays have the wrong shape.
+            ArrayShapeError: arrays have the wrong shape or type.
             FaceIndexError: an index is not that of a vertex.
         """
-        vertices, faces = np.asarray(positions, dtype=np.float64), np.asarray(indices)
-        given = {"positions": vertices, "indices": faces, "normals": normals, "uvs": uvs}
-        for name, shape in [(name, np.shape(array)) for name, array in given.items() if array is not None]:
-            rows, count = len(vertices) if name in ("normals", "uvs") else "n", 2 if name == "uvs" else 3
-            if shape[1:] != (count,) or rows not in ("n", shape[0]):
-                raise ArrayShapeError(f"{name} must have the shape ({rows}, {count}), not {shape}")
-        faces = faces.astype(np.int64)
-        if len(faces) and not (faces.min() >= 0 and faces.max() < len(vertices)):
-            raise FaceIndexError(f"indices must be from 0 to {len(vertices) - 1:,}")
-        self._given.append((vertices, faces))
+        from .xatlas_arrays import read_arrays
 
+        self._added.append(read_arrays(positions, indices, normals, uvs))
+
+    @warns("atlas.notes", notes=lambda _, atlas, *options: atlas.notes)
     def generate(
         self,
         chart_options: ChartOptions | None = None,
         pack_options: PackOptions | None = None,
         verbose: bool = False,
     ) -> None:
-        """Compute the UVs of all meshes; unmet guarantees are a `GuaranteeWarning`."""
-        self._generate(pack_options)
-        warn_of(self.notes, "atlas.notes")
+        """Compute the UVs of all meshes; unmet guarantees are a `GuaranteeWarning`.
 
-    def _generate(self, pack_options: PackOptions | None = None) -> None:
+        Raises:
+            OptionError: an option for packing is invalid, or leaves no space for charts.
+        """
+        from .xatlas_arrays import draw_charts, unwrap_meshes
+
         pack = PackOptions() if pack_options is None else pack_options
-        starts = np.cumsum([0, *(len(vertices) for vertices, _ in self._given)])
-        vertices = np.concatenate([np.empty((0, 3)), *(each for each, _ in self._given)])
-        every = [faces + start for (_, faces), start in zip(self._given, starts, strict=False)]
-        faces = np.concatenate([np.empty((0, 3), dtype=np.int64), *every])
-        size = {"resolution": pack.resolution} if pack.resolution else {}
-        with inner_calls():
-            found = unwrap_soup(
-                vertices, faces, **({"padding": pack.padding} if pack.padding else {}), **size
-            )
-        self.notes = found.notes
-        side = pack.resolution or UnwrapOptions().resolution
-        if pack.texels_per_unit and not pack.resolution and found.scale:
-            side = int(np.ceil(pack.texels_per_unit / found.scale))
-        self.width = self.height = side
-        self.texels_per_unit, self.utilization = side * found.scale, Utilization(found.efficiency)
-        self.chart_count = int(found.chart.max(initial=-1)) + 1
-        parts = np.split(found.corner_uv, np.cumsum([len(each) for each in every], dtype=np.int64)[:-1])
-        self._mapped = [_mapped(given, part) for (_, given), part in zip(self._given, parts, strict=False)]
-        self._image = _image(found, side) if pack.create_image else None
+        texture = unwrap_meshes(self._added, pack)
+        self.notes = texture.soup.notes
+        self.width = self.height = texture.side
+        self.texels_per_unit = texture.side * texture.soup.scale
+        self.utilization = Utilization(texture.soup.efficiency)
+        self.chart_count = texture.chart_count
+        self._mapped = texture.meshes
+        self._image = draw_charts(texture) if pack.create_image else None
 
     def get_mesh(self, index: int) -> Mapped:
         """Return a mesh: (k,) the input vertex of each vertex, (m, 3) faces in the given order, and (k, 2) UVs.
@@ -153,7 +137,7 @@ class Atlas:
         Raises:
             IndexError: there is no such mesh.
         """
-        if not 0 <= index < len(self._mapped):
+        if not 0 <= as_index(index) < len(self._mapped):
             raise IndexError(f"mesh index {index} is not from 0 to {len(self._mapped) - 1}")
         return self._mapped[index]
 
@@ -161,7 +145,7 @@ class Atlas:
 
     def __len__(self) -> int:
         """Return the number of meshes."""
-        return len(self._given)
+        return len(self._added)
 
     mesh_count = property(__len__)
 
@@ -199,7 +183,8 @@ def parametrize(
     """
     atlas = Atlas()
     atlas.add_mesh(positions, indices, normals, uvs)
-    atlas._generate()
+    with inner_calls():
+        atlas.generate()
     warn_of(atlas.notes, "`notes` of this warning")
     return atlas[0]
 
@@ -211,31 +196,14 @@ def export(
     uvs: ArrayLike | None = None,
     normals: ArrayLike | None = None,
 ) -> None:
-    """Write a mesh as OBJ; vertices have the indices of their UVs and normals."""
-    arrays = {"v": positions, "vt": uvs, "vn": normals}
-    given = {name: np.asarray(array, dtype=np.float64) for name, array in arrays.items() if array is not None}
-    faces = np.arange(len(given["v"])).reshape(-1, 3) if indices is None else np.asarray(indices)
-    with atomic_write(path, "w") as file:
-        for name, array in given.items():
-            file.writelines(f"{name} {' '.join(map(repr, row))}\n" for row in array.tolist())
-        form = {1: "{0}", 2: "{0}/{0}" if uvs is not None else "{0}//{0}", 3: "{0}/{0}/{0}"}[len(given)]
-        file.writelines(f"f {' '.join(form.format(i + 1) for i in row)}\n" for row in faces.tolist())
+    """Write a mesh as OBJ; vertices have the indices of their UVs and normals.
 
+    Without indices, three vertices in a row are a face.
 
-def _mapped(faces: IntArray, corner_uv: FloatArray) -> Mapped:
-    """Return a mesh with one vertex for each pair of an input vertex and a point."""
-    uv = corner_uv.reshape(-1, 2).astype(np.float32)
-    rows = np.column_stack([faces.ravel(), uv.view(np.int32)])
-    _, first, label = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    return faces.ravel()[first].astype(np.uint32), label.reshape(faces.shape).astype(np.uint32), uv[first]
+    Raises:
+        ArrayShapeError, NonFiniteError, FaceIndexError: arrays have the wrong shape or type, NaN, or wrong indices.
+        MeshFileError: the file cannot be written.
+    """
+    from .xatlas_arrays import write_obj
 
-
-def _image(found: UnwrappedSoup, side: int) -> NDArray[np.uint8]:
-    """Return (side, side, 3) an image of charts; a texel has the colour of a triangle that contains its centre."""
-    face, depth = np.full((side, side), -1), np.full((side, side), np.inf)
-    points = np.pad(found.corner_uv.reshape(-1, 2) * side, ((0, 0), (0, 1)))
-    fill_nearest(points, np.arange(len(points)).reshape(-1, 3), depth, face)
-    colors = np.random.default_rng(0).integers(64, 256, (int(found.chart.max(initial=0)) + 1, 3))
-    image, shown = np.zeros((side, side, 3), dtype=np.uint8), face >= 0
-    image[shown] = colors[found.chart[face[shown]]]
-    return image
+    write_obj(path, positions, indices, uvs, normals)

@@ -90,7 +90,7 @@ def nonnegative(energy: float) -> float:
     return max(float(energy), 0.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """The best curvatures of a set of cones.
 

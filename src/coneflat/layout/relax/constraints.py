@@ -13,7 +13,7 @@ from ...base.text import plural
 from ...errors import OptionError
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lines:
     """Points that are constrained to lines.
 
@@ -32,7 +32,7 @@ class Lines:
     offsets: ArrayLike | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PointConstraints:
     """Constraints on points; they need not hold at the start, but hold after relaxation.
 
