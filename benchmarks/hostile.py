@@ -21,8 +21,8 @@ angles around inner vertices and cones, equal sides of seams, prescribed boundar
 that says what was measured. What is not kept and not named by a note is a breach; so are errors that are not the
 package's own, messages of several lines, crashes, hangs, and too much memory. The exit code is 1 if there is any.
 
-Options: --cases 10000, --jobs 2, --seed 0 (the first), --kinds mesh,tiny,texture,doubled,transfer,file,argument,command,
-process,attribute,offset, --out FILE.json (all outcomes), --again FILE.json (only the breaches in such a file).
+Options: --cases 10000, --jobs 2, --seed 0 (the first), --kinds mesh,tiny,texture,doubled,transfer,file,argument,
+command,process,attribute,offset, --out FILE.json (all outcomes), --again FILE.json (only the breaches in such a file).
 """
 
 from __future__ import annotations

@@ -29,6 +29,6 @@ from .ties import tie_key
 __all__ = [
     "CheckedMesh", "CutMesh", "EdgeGroups", "NEXT", "PREVIOUS", "REPAIR_ADVICE", "corner_fans", "cut_open",
     "end_corners", "glue_layers", "joined_edges", "label_charts", "label_components", "label_faces", "left_out",
-    "nearby", "open_along", "point_seams", "point_vertices", "polygon_of", "sort_pairs", "split_vertices", "tie_key", "uv_seams",
-    "weld",
+    "nearby", "open_along", "point_seams", "point_vertices", "polygon_of", "sort_pairs", "split_vertices",
+    "tie_key", "uv_seams", "weld",
 ]  # fmt: skip
