@@ -22,7 +22,7 @@ from .connectivity import (
     sort_pairs,
     split_vertices,
 )
-from .layers import EdgeGroups, glue_layers
+from .doubled import EdgeGroups, glue_layers
 from .polygons import polygon_of
 from .ties import tie_key
 

@@ -18,7 +18,7 @@ from ..errors import (
     NonOrientableError,
 )
 from .connectivity import NEXT, PREVIOUS, TriangleMesh, label_components, split_vertices
-from .layers import EdgeGroups, glue_layers
+from .doubled import EdgeGroups, glue_layers
 
 REPAIR_ADVICE = "pass repair=True (on the command line: leave out --strict)"
 
