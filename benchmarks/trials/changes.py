@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import shapes
+from needles import with_caps, with_needles
 
 from .surfaces import MAKERS, Mesh, Random, amount
 
@@ -29,6 +30,14 @@ def slivers(vertices: np.ndarray, faces: np.ndarray, rng: Random) -> Mesh:
         i, j, k = np.roll(faces[f], rng.integers(3))
         goal = vertices[j] if rng.random() < 0.5 else (vertices[j] + vertices[k]) / 2
         vertices[i] = goal + (vertices[i] - goal) * amount(rng, -12, -1)
+    return vertices, faces
+
+
+def needles(vertices: np.ndarray, faces: np.ndarray, rng: Random) -> Mesh:
+    """Edges split next to one of their ends, or triangles at a point beside one of their sides, many at all heights."""
+    split = (with_caps, with_needles)[int(rng.integers(2))]
+    for _ in range(int(rng.integers(1, 4))):
+        vertices, faces = split(vertices, faces, amount(rng, -14, -2), int(rng.integers(1, 20)), rng)
     return vertices, faces
 
 
@@ -136,6 +145,7 @@ CHANGES: tuple[tuple[Callable[[np.ndarray, np.ndarray, Random], Mesh], float], .
     (hole, 0.12),
     (jitter, 0.12),
     (slivers, 0.08),
+    (needles, 0.08),
     (flips, 0.05),
     (flat_triangles, 0.03),
     (two_parts, 0.05),

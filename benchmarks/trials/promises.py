@@ -40,6 +40,7 @@ SENTENCES = {
     "sides": r"The two sides of seams differ in length|.* no seam or cone is exact",
     "lengths": r"Lengths along the boundary are not preserved",
     "round": r"The boundary is not quite round",
+    "needles": r"[\d,]+ triangles? with a QC distortion above 1000|There (is|are) .*(flipped|degenerate) triangle",
     "rotations": r"Seam rotations are .* rad off multiples of [\d.e+-]+ rad",
     "area": r"The triangles of (all components|a component) have an area distortion",
     "cone count": r"[\d,]+ cones? instead of the [\d,]+ asked for",
@@ -58,7 +59,9 @@ class Trial:
         self.topology = Topology.of(result.faces, len(result.vertices))
         self.method = options.get("method", "exact")
         self.boundary = options.get("boundary", "free")
-        self.is_marked = options.get("seams") is not None or options.get("sharp_angle") is not None
+        self.is_marked = any(options.get(name) is not None for name in ("seams", "sharp_angle")) or any(
+            note.startswith("Edges above") for note in result.notes
+        )
         self.sides = plane.side_lengths(self.corners)
 
     def breach(self, cause: str, details: object) -> None:
@@ -81,6 +84,7 @@ def check(outcome: Outcome, result: Any, options: dict[str, Any], vertices: Any,
     _check_origin(trial)
     _check_place(trial)
     _check_orientation(trial)
+    _check_needles(trial)
     _check_overlap(trial)
     _check_angles(trial)
     _check_sides(trial)
@@ -143,6 +147,14 @@ def _check_orientation(trial: Trial) -> None:
         trial.broken("flipped", f"flipped triangles, {_method(trial)}", f"{against} triangles")
     if told.degenerate:
         trial.broken("collapsed", f"triangles collapsed, {_method(trial)}", f"{told.degenerate} triangles")
+
+
+def _check_needles(trial: Trial) -> None:
+    """Check that triangles that are distorted beyond use are named."""
+    distortion = trial.result.distortion.qc
+    count = int(np.count_nonzero(distortion > 1e3))
+    if count:
+        trial.broken("needles", "triangles distorted beyond use", f"{count}, up to {distortion.max():.3g}")
 
 
 def _check_overlap(trial: Trial) -> None:

@@ -97,6 +97,16 @@ def polycube(rng: Random) -> Mesh:
     return np.round(vertices) if rng.random() < 0.5 else vertices, faces
 
 
+def plate(rng: Random) -> Mesh:
+    """A plate with rectangular windows, as coarse as CAD exports it: cells of all sizes, without vertices inside."""
+    columns, rows = rng.integers(1, 8, 2).tolist()
+    pattern = ["".join(rng.choice(["#", "#", "#", "."], rows)) for _ in range(columns)] + ["#" * rows]
+    places = np.rint(shapes.blocks(pattern, 1)[0]).astype(int)
+    faces = shapes.blocks(pattern, 1)[1]
+    steps = [np.cumsum(10 ** rng.uniform(-1, 1, count)) for count in places.max(axis=0) + 1]
+    return np.stack([step[places[:, axis]] for axis, step in enumerate(steps)], axis=1), faces
+
+
 def crate(rng: Random) -> Mesh:
     if rng.random() < 0.2:
         return shapes.tetrahedron()
@@ -209,6 +219,7 @@ MAKERS: tuple[tuple[Callable[[Random], Mesh], float], ...] = (
     (tube, 6),
     (handles, 5),
     (polycube, 4),
+    (plate, 4),
     (crate, 5),
     (cone, 5),
     (spikes, 7),

@@ -1,0 +1,48 @@
+"""Laws of thin triangles: none is distorted beyond use unless the model's own is thinner than a millionth."""
+
+import numpy as np
+import pytest
+import shapes
+from needles import with_caps, with_needles
+
+import coneflat
+from coneflat.geometry import edge_lengths
+from coneflat.geometry.opening import thickness
+
+WORST_QC, THINNEST = 1e3, 1e-6
+
+
+def check_thin(result, ending=None):
+    """Check that only triangles below `THINNEST` are distorted beyond `WORST_QC`, and that these are named."""
+    measured = result if ending is None else result.as_written(ending)
+    lengths = edge_lengths(result.vertices, result.faces)
+    # Triangles of needles that are split again are as small as the rounding of coordinates.
+    thin = (thickness(lengths) < THINNEST) | (lengths.max(axis=1) < THINNEST * lengths.mean())
+    assert measured.distortion.flipped == 0
+    assert measured.distortion.qc[~thin].max() <= WORST_QC
+    is_bad = measured.distortion.qc > WORST_QC
+    assert any("with a QC distortion above" in note for note in measured.notes) == is_bad.any()
+
+
+@pytest.mark.parametrize("split", [with_caps, with_needles])
+@pytest.mark.parametrize("height", [1e-3, 1e-5, 1.1e-6, 1e-7, 1e-9, 1e-13, 0.0])
+@pytest.mark.parametrize("method", [coneflat.flatten, coneflat.unwrap])
+def test_thin_triangles_are_laid_out_about_as_thin_as_they_are(method, height, split):
+    mesh = split(*shapes.sphere(3), height, 15, np.random.default_rng(0))
+    result = method(*mesh)
+    check_thin(result)
+    check_thin(result, ".glb")
+    clean = method(*shapes.sphere(3)).distortion
+    assert result.distortion.energy < clean.energy + 0.05
+    assert result.distortion.qc_mean < clean.qc_mean + 0.02
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("method", [coneflat.flatten, coneflat.unwrap])
+def test_neighbouring_needles_and_caps_of_all_heights_do_not_spoil_one_another(method, seed):
+    rng = np.random.default_rng(seed)
+    vertices, faces = shapes.sphere(3)
+    for _ in range(4):
+        split = (with_caps, with_needles)[rng.integers(2)]
+        vertices, faces = split(vertices, faces, 10.0 ** rng.uniform(-14, -3), 40, rng)
+    check_thin(method(vertices, faces))
