@@ -4,6 +4,7 @@ A case is a kind and a seed: `--case mesh:17` runs one case in this process and 
 
 - mesh: small meshes of all kinds, many of them invalid, with random options;
 - tiny: meshes of at most some twenty triangles, closed ones of two among them, with many options at once, and as quads;
+- many: meshes of hundreds to thousands of such components, some repeated, some without area;
 - texture: such meshes through `coneflat.unwrap`, with random options, and through the interface of xatlas;
 - file: mesh files of all formats, intact or damaged, read, flattened, written, and read back by other software;
 - argument: public functions with odd arguments;
@@ -16,7 +17,7 @@ angles around inner vertices and cones, equal sides of seams, prescribed boundar
 that says what was measured. What is not kept and not named by a note is a breach; so are errors that are not the
 package's own, messages of several lines, crashes, hangs, and too much memory. The exit code is 1 if there is any.
 
-Options: --cases 10000, --jobs 2, --seed 0 (the first), --kinds mesh,tiny,texture,file,argument,command,process,
+Options: --cases 10000, --jobs 2, --seed 0 (the first), --kinds mesh,tiny,many,texture,file,argument,command,process,
 --out FILE.json (all outcomes), --again FILE.json (only the breaches in such a file).
 """
 

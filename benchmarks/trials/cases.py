@@ -23,10 +23,10 @@ from .choices import cross_options, in_short, make_options
 from .commands import interrupt_command, make_command, run_command, run_without_streams
 from .files import make_file
 from .grids import grid_case, grid_of_mesh
-from .meshes import make_mesh, make_tiny
+from .meshes import make_many, make_mesh, make_tiny
 from .outcome import LONGEST_MESSAGE, Outcome
 from .promises import check
-from .textures import texture_case
+from .textures import texture_case, unwrap_mesh
 from .written import READERS, check_file, check_report
 
 Random = np.random.Generator
@@ -96,6 +96,19 @@ def _tiny(rng: Random, outcome: Outcome) -> None:
         grid_of_mesh(rng, outcome, vertices, faces, made, size=None, **options)
         return
     options = cross_options(rng, vertices, faces)
+    outcome.recipe = f"{made}; {in_short(options)}"
+    _flatten(rng, outcome, lambda: coneflat.flatten(vertices, faces, **options), options, (vertices, faces))
+
+
+def _many(rng: Random, outcome: Outcome) -> None:
+    """Flatten a mesh of many tiny components with random options, or unwrap it."""
+    import coneflat
+
+    vertices, faces, made = make_many(rng)
+    if rng.random() < 0.4:
+        unwrap_mesh(rng, outcome, vertices, faces, made)
+        return
+    options = {"repair": True, **make_options(rng, vertices, faces), "resolution": 8192}
     outcome.recipe = f"{made}; {in_short(options)}"
     _flatten(rng, outcome, lambda: coneflat.flatten(vertices, faces, **options), options, (vertices, faces))
 
@@ -279,6 +292,7 @@ KINDS: dict[str, Callable[[Random, Outcome], None]] = {
     "argument": _argument,
     "command": _command,
     "tiny": _tiny,
+    "many": _many,
     "process": _process,
     "texture": texture_case,
     "grid": grid_case,
@@ -286,7 +300,16 @@ KINDS: dict[str, Callable[[Random, Outcome], None]] = {
     "hang": _hang,
     "swell": _swell,
 }
-SHARES = {"mesh": 14, "tiny": 6, "texture": 8, "file": 6, "argument": 3, "command": 2, "process": 1}
+SHARES = {
+    "mesh": 14,
+    "tiny": 6,
+    "many": 1,
+    "texture": 8,
+    "file": 6,
+    "argument": 3,
+    "command": 2,
+    "process": 1,
+}
 
 
 def cases(count: int, first: int, kinds: tuple[str, ...] = tuple(SHARES)) -> list[tuple[str, int]]:

@@ -17,16 +17,17 @@ from .base.notes import Unmet, warns
 from .base.progress import Stopwatch
 from .base.text import list_some, plural
 from .base.threads import concurrently, limit_threads
-from .cones import MAX_SEARCHED, close_search, find_cones, uses_sparse_search
+from .cones import MAX_SEARCHED, close_search, find_cones, leaves_flat_disks, uses_sparse_search
 from .errors import CurvatureError, MetricError, SeamError
 from .evaluate import evaluate
 from .geometry.operators import area_distortion, weighted_areas
 from .geometry.overlap import UNKNOWN_OVERLAPS
 from .geometry.planar import signed_double_areas
 from .io.packages import as_input
-from .layout import lay_out, relax_layouts, untangle_seams
+from .layout import lay_out, lay_out_flat_disks, relax_layouts, untangle_seams
 from .mesh.connectivity import TriangleMesh
-from .metric import find_metric, loop_rotations
+from .metric import find_metric as conformal_metric
+from .metric import loop_rotations
 from .options import Options, read_options, takes
 from .result import Flattening
 from .seams import cut_to_disk, seam_costs
@@ -121,7 +122,7 @@ def flatten_source(
     source: Source,
     o: Options,
     surface_of: SurfaceOf = Surface.of,
-    find_metric: FindMetric = find_metric,
+    find_metric: FindMetric = conformal_metric,
     on_preview: Preview | None = None,
 ) -> Flattening:
     """Return the flattening of a mesh by parsed options; see `flatten`.
@@ -141,15 +142,19 @@ def flatten_source(
     with watch("check"):
         prepared = source.prepared(o)
     relax = RelaxSpec(o.relax if o.method == "exact" else "off", o.stretch)
+    finds_conformal = find_metric is conformal_metric
     method = Method(relax, o.charts == "atlas", o.quantise, watch, surface_of, find_metric)
     with limit_threads(o.threads):
-        copies = find_copies(prepared.parts)
-        originals = {i: part for i, part in enumerate(prepared.parts) if copies[i] is None}
-        layouts = lay_out_parts(originals, method)
+        # A map of another kind need not be an isometry of flat parts.
+        flat = lay_out_flat_parts(prepared.parts, watch) if finds_conformal else {}
+        with watch("check"):
+            copies = find_copies(prepared.parts, flat)
+        originals = {i: part for i, part in enumerate(prepared.parts) if copies[i] is None and i not in flat}
+        layouts = flat | lay_out_parts(originals, method)
         if on_preview is not None:
             preview = with_copies(layouts, prepared.parts, copies)
             on_preview(evaluate(prepared, preview, replace(o, charts="one"), Stopwatch(), UNKNOWN_OVERLAPS))
-        finished = finish_within_bound(originals, layouts, method)
+        finished = flat | finish_within_bound(originals, layouts, method)
         # Notes contain vertex indices, so copies of parts with notes are computed, too.
         noted = {i: prepared.parts[i] for i, copy in enumerate(copies) if copy and finished[copy.first].notes}
         finished |= finish_within_bound(noted, lay_out_parts(noted, method), method)
@@ -166,11 +171,33 @@ def flatten_source(
     return evaluate(prepared, every, o, watch)
 
 
+def lay_out_flat_parts(parts: Sequence[Part], watch: Stopwatch) -> dict[int, Layout]:
+    """Return the finished layouts of the small parts that are flat disks and do not overlap themselves.
+
+    An isometry is their only flat metric without cones, so nothing is searched, solved or relaxed.
+    """
+    chosen = [i for i, part in enumerate(parts) if len(part.faces) <= SMALL_TRIANGLES and _may_be_flat(part)]
+    if not chosen:
+        return {}
+    with watch("layout"):
+        layouts = lay_out_flat_disks(
+            [parts[i].mesh for i in chosen],
+            [parts[i].lengths for i in chosen],
+            [parts[i].metric.keeps_length for i in chosen],
+        )
+    return {i: layout for i, layout in zip(chosen, layouts, strict=True) if layout is not None}
+
+
+def _may_be_flat(part: Part) -> bool:
+    """Return whether a part is laid out without cones and with a free shape if it is a flat disk."""
+    return part.is_exact and part.metric.boundary in ("free", "lengths") and leaves_flat_disks(part.cones)
+
+
 def lay_out_parts(parts: Mapping[int, Part], method: Method) -> dict[int, Layout]:
     """Return the layout of each part in one chart."""
-    layouts = {}
+    layouts, places = {}, _Places(parts, method.watch, LAYING_OUT)
     for i, part in parts.items():
-        with _at(part, parts, method.watch, LAYING_OUT):
+        with places.at(part):
             layouts[i] = lay_out_part(part, method)
     return layouts
 
@@ -226,13 +253,14 @@ def finish_parts(
 ) -> dict[int, Layout]:
     """Return relaxed layouts without inverted triangles, and without overlaps if the method separates them."""
     watch, finished = method.watch, dict[int, Layout]()
+    places = _Places(parts, watch, 1 - LAYING_OUT)
     for group in _groups(parts, method.relax):
         watch.share = 0.0
         with watch("relax"):
             weights = [parts[i].cones.weights for i in group]
             relaxed = relax_layouts([layouts[i] for i in group], weights, method.relax, watch.report)
         for i, layout in zip(group, relaxed, strict=True):
-            with _at(parts[i], parts, watch, 1 - LAYING_OUT):
+            with places.at(parts[i]):
                 finished[i] = finish_part(parts[i], layout, method)
     return finished
 
@@ -353,14 +381,30 @@ def _groups(parts: Mapping[int, Part], relax: RelaxSpec) -> list[list[int]]:
     return groups
 
 
-@contextmanager
-def _at(part: Part, parts: Mapping[int, Part], watch: Stopwatch, portion: float) -> Iterator[None]:
-    """Run a portion of the work on a part; errors name the part if there are several."""
-    watch.share = portion * len(part.faces) / sum(len(each.faces) for each in parts.values())
-    try:
-        yield
-    except (CurvatureError, MetricError, SeamError) as error:
-        if len(parts) == 1:
-            raise
-        raise type(error)(f"{part.where}: {error}") from error
-    watch.end_component()
+class _Places:
+    """The places of parts in a portion of the work, for its progress, and for errors if there are several parts.
+
+    Args:
+        parts: all parts.
+        watch: the stopwatch.
+        portion: fraction of the work.
+    """
+
+    def __init__(self, parts: Mapping[int, Part], watch: Stopwatch, portion: float) -> None:
+        self._watch, self._count, self._begun = watch, len(parts), 0
+        self._share = portion / max(sum(len(part.faces) for part in parts.values()), 1)
+
+    @contextmanager
+    def at(self, part: Part) -> Iterator[None]:
+        """Run the work on the next part in the block; errors name the part if there are several."""
+        self._begun += 1
+        self._watch.share = self._share * len(part.faces)
+        if self._count > 1:
+            self._watch.component = f"component {self._begun:,} of {self._count:,}"
+        try:
+            yield
+        except (CurvatureError, MetricError, SeamError) as error:
+            if self._count == 1:
+                raise
+            raise type(error)(f"{part.where}: {error}") from error
+        self._watch.end_component()

@@ -1,6 +1,6 @@
 """Reading of meshes from files, and writing of flattened meshes to files."""
 
-from .brains import VALUES, nibabel, read_label, read_vertex_values
+from .brains import VALUES, nibabel, read_label, read_structure, read_vertex_values
 from .files import (
     PIPE,
     as_path,
@@ -41,7 +41,7 @@ __all__ = [
     "as_uv_mesh", "as_path", "as_written", "atomic_write", "bounds", "cell_side", "check_cells", "check_output",
     "check_target", "checked_target", "decode_image", "encode_png", "find_meshes", "has_uv", "imported",
     "known_ending", "lines_of", "make_folder", "nibabel", "number", "read_archive", "read_bytes",
-    "read_flattening", "read_joined", "read_label", "read_mesh", "read_mesh_from", "read_picture", "read_vertex_values",
-    "relocated", "remove_unfinished", "shading_normals", "split_at_seams", "stored_in_glb", "write_flattening",
-    "write_measured", "write_parts", "write_stream",
+    "read_flattening", "read_joined", "read_label", "read_mesh", "read_mesh_from", "read_picture", "read_structure",
+    "read_vertex_values", "relocated", "remove_unfinished", "shading_normals", "split_at_seams", "stored_in_glb",
+    "write_flattening", "write_measured", "write_parts", "write_stream",
 ]  # fmt: skip
