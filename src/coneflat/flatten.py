@@ -159,7 +159,9 @@ def flatten_source(
         noted = {i: prepared.parts[i] for i, copy in enumerate(copies) if copy and finished[copy.first].notes}
         finished |= finish_within_bound(noted, lay_out_parts(noted, method), method)
     every = with_copies(finished, prepared.parts, copies)
-    own = max(map(_excess, ([part] for part in prepared.parts), ([one] for one in every)))
+    with watch("measure"):
+        curved = [i for i in range(len(every)) if i not in flat]
+        own = max((_excess([prepared.parts[i]], [every[i]]) for i in curved), default=0.0)
     if (excess := max(own, _excess(prepared.parts, every))) > TOLERATED_EXCESS:
         every[0] = every[0].with_notes(
             Unmet(

@@ -125,7 +125,7 @@ def _vertices(mesh: MeshFile, labels: Sequence[str]) -> IntArray:
 
 
 def _as_flat(result: Flattening, surface: MeshFile, up: FloatArray) -> FlatCortex:
-    """Return a result, turned upright, with one point for each vertex: that of the copy with the largest area."""
+    """Return a result, rotated by `up`, with one point for each vertex: that of the copy with the largest area."""
     origin = np.arange(len(result.vertices)) if result.vertex_origin is None else result.vertex_origin
     count, vertex = len(surface.vertices), np.empty(len(result.uv), np.int64)
     vertex[result.uv_faces] = origin[result.faces]
@@ -138,11 +138,11 @@ def _as_flat(result: Flattening, surface: MeshFile, up: FloatArray) -> FlatCorte
     is_whole = (chosen[vertex[result.uv_faces]] == result.uv_faces).all(axis=1)
     faces = origin[result.faces[is_whole]]
     used = chosen >= 0
-    points[used] = upright(points[used], surface.vertices[used], up, area[chosen[used]])
+    points[used] = rotated_up(points[used], surface.vertices[used], up, area[chosen[used]])
     return FlatCortex(result, surface, points, faces, np.bincount(vertex, minlength=count) == 1)
 
 
-def upright(flat: FloatArray, positions: FloatArray, up: FloatArray, weights: FloatArray) -> FloatArray:
+def rotated_up(flat: FloatArray, positions: FloatArray, up: FloatArray, weights: FloatArray) -> FloatArray:
     """Return the points of a flat map (n, 2) about their mean, rotated so that a direction of the surface points up.
 
     The direction is mapped by the affine map from the positions to the plane that fits the points best.
