@@ -109,7 +109,9 @@ def run_autoflatten(folder: Path, surface: str, faces: np.ndarray, python: str) 
     nibabel.freesurfer.write_geometry(base, mesh.vertices, mesh.triangles)
     write_folded_patch(patch, mesh.vertices, faces)
     command = [python, "-c", AUTOFLATTEN, *map(str, (patch, base, output))]
-    printed = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+    printed = subprocess.run(
+        command, check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ).stdout
     seconds = float(printed.rsplit("seconds", 1)[1])
     print(line(surface, "autoflatten .3d", measure_flat(read_flat(output, base)), seconds), flush=True)
 

@@ -285,7 +285,7 @@ def _swell(rng: Random, outcome: Outcome) -> None:
     np.ones(200_000_000)
 
 
-#: The kinds of cases, and how many of forty are of each. The last three put the workers to the test.
+#: The kinds of cases, and their shares. The last three put the workers to the test.
 KINDS: dict[str, Callable[[Random, Outcome], None]] = {
     "mesh": _mesh,
     "file": _file,

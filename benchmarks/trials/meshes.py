@@ -55,6 +55,8 @@ def make_tiny(rng: Random) -> tuple[np.ndarray, np.ndarray, str]:
 
 #: Powers of ten of the numbers of components of a mesh of many.
 MANY = 2.0, 3.2
+#: Their largest coordinates: others would leave only one component to see.
+LARGEST_PLACE = 1e4
 
 
 def make_many(rng: Random) -> tuple[np.ndarray, np.ndarray, str]:
@@ -70,7 +72,7 @@ def make_many(rng: Random) -> tuple[np.ndarray, np.ndarray, str]:
                 vertices @ turn if rng.random() < 0.7 else vertices.astype(np.float32).astype(np.float64)
             )
         else:
-            vertices, faces, _ = make_tiny(rng)
+            vertices, faces = _valid_piece(rng)
         if rng.random() < 0.03:
             vertices = vertices * [1.0, 0.0, 0.0]
         place = spacing * np.array([number % 40, number // 40, 0.0])
@@ -82,3 +84,12 @@ def make_many(rng: Random) -> tuple[np.ndarray, np.ndarray, str]:
         faces,
         f"{count} components, {len(faces)} faces",
     )
+
+
+def _valid_piece(rng: Random) -> tuple[np.ndarray, np.ndarray]:
+    """Return a tiny mesh whose indices and positions are valid: one that is not would refuse the whole mesh."""
+    while True:
+        vertices, faces, _ = make_tiny(rng)
+        is_valid = len(faces) and faces.min() >= 0 and faces.max() < len(vertices)
+        if is_valid and np.isfinite(vertices).all() and np.abs(vertices).max() < LARGEST_PLACE:
+            return vertices, faces

@@ -85,9 +85,11 @@ def check_xatlas(outcome: Outcome, vertices: np.ndarray, faces: np.ndarray, made
 
     outcome.recipe = f"xatlas {made}"
     found = None
+    with np.errstate(over="ignore"):
+        single = vertices.astype(np.float32)
     with outcome.guarded(expects_nan=True), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        found = coneflat.xatlas.parametrize(vertices.astype(np.float32), faces)
+        found = coneflat.xatlas.parametrize(single, faces)
     unmet = [each.message for each in caught if isinstance(each.message, coneflat.GuaranteeWarning)]
     notes = " ".join(note for warning in unmet for note in warning.notes)
     if len(unmet) > 1 or any(each.filename != __file__ for each in caught):

@@ -15,8 +15,9 @@ from ..base.progress import check_cancelled
 from ..errors import OptionError
 from .charts import Outlines
 
-# Columns of the grid per square root of the number of charts, and the maximum number of cells of all tiles.
-COLUMNS_PER_CHART, MAX_CELLS = 24.0, 4_000_000
+# Columns of the grid per square root of the number of charts, and the maximum number of cells of all tiles: at first,
+# and where gaps between the charts need more.
+COLUMNS_PER_CHART, MAX_CELLS, MOST_CELLS = 24.0, 4_000_000, 16_000_000
 # The work after which the search ends, in comparisons of runs of cells: about a second.
 MAX_WORK = 40_000_000
 # Up to OFFSET_CHARTS charts, a chart may be forced to the right, which happens in this fraction of the tries. With more
@@ -24,6 +25,8 @@ MAX_WORK = 40_000_000
 OFFSET_CHARTS, OFFSET_SHARE = 5, 0.3
 # With more charts than GROUPED_CHARTS, those whose boxes differ by less than this factor are treated as equal.
 GROUPED_CHARTS, GROUP_RATIO = 1000, 1.02
+# Smallest fraction of the width that gaps must leave to charts in rows.
+MIN_SHARE_LEFT = 0.02
 # Width of the grid relative to the width that charts without gaps would need, and to the longest chart. It is not a
 # round number, so that simple charts do not end at cell borders, where rounding would decide which cell is the last.
 GRID_MARGIN = 1.2347
@@ -231,7 +234,10 @@ def pack(
     """
     rng = np.random.default_rng(0)
     columns = int(max(effort.columns, COLUMNS_PER_CHART * (len(outlines) / tiles) ** 0.5))
-    columns = min(columns, int((MAX_CELLS / tiles) ** 0.5))
+    # Many charts in rows leave this fraction of a width between them to the charts, and the tiles are so much wider.
+    share = 1 - gap * (len(outlines) / tiles) ** 0.5
+    growth = 1 / max(share, MIN_SHARE_LEFT) if len(outlines) > GROUPED_CHARTS else 1.0
+    columns = int(min(columns, (MAX_CELLS / tiles) ** 0.5, (MOST_CELLS / tiles) ** 0.5 / growth))
     _, extent = rotated_boxes(outlines, angles)
     extent = np.where(allowed, extent, complex(np.inf, np.inf))
     longest = float(np.maximum(extent.real, extent.imag).min(axis=1).max())
@@ -247,9 +253,9 @@ def pack(
     def fill(plan: Plan, width: int, limit: int) -> _Placed:
         return _Placed(plan, *place_all(plan, group, masks, _reach(gap * width), tiles, width, limit))
 
-    while (best := fill(start, width, width)).height > width:
+    while share < MIN_SHARE_LEFT or (best := fill(start, width, width)).height > width:
         width += width // 12 + 1
-        if width > 4 * columns or tiles * width**2 > 4 * MAX_CELLS:
+        if share < MIN_SHARE_LEFT or width > 4 * growth * columns or tiles * width**2 > 1.5 * MOST_CELLS:
             raise OptionError(
                 f"a gap of {100 * gap:.3g} % of the texture's width between {len(order):,} charts leaves no space for "
                 "them: use less padding, a higher resolution or more tiles"
@@ -337,7 +343,7 @@ def place_all(
             for x in range(width):
                 taken[t, y, x] = clear[t, y, x] = width
     floor = np.zeros((tiles, group.max() + 1), np.int64)
-    top, work, far = 0, tiles * limit, len(reach) - 1
+    top, work, far, widest = 0, tiles * limit, len(reach) - 1, reach.max()
     for c in plan.order:
         best, shape, tile, column, row = limit + 1, -1, 0, 0, 0
         for j in range(c * turns, (c + 1) * turns):
@@ -361,12 +367,17 @@ def place_all(
                 out = reach[abs(y - row - runs[k, 0])]
                 for x in range(max(column + runs[k, 1] - out, 0), min(column + runs[k, 2] + out + 1, width)):
                     taken[tile, y, x] = x
+        left, right = max(column - widest, 0), min(column + size[shape, 0] + widest, width)
         for y in range(max(row - far, 0), min(best + far, limit)):
             following, free = width, width
-            for x in range(width - 1, -1, -1):
+            if right < width:
+                following, free = taken[tile, y, right], clear[tile, y, right]
+            for x in range(right - 1, -1, -1):
                 if taken[tile, y, x] == x:
                     free = free if following == x + 1 else x + 1
                     following = x
+                elif x < left and taken[tile, y, x] == following and clear[tile, y, x] == free:
+                    break  # What follows is the same as before, and so it is for all cells to the left.
                 taken[tile, y, x], clear[tile, y, x] = following, free
         # About 50 cells are visited in the time of a comparison.
         work += ((best - row + 2 * far) * width + 4 * far * far * (first[shape + 1] - first[shape])) // 50
