@@ -25,8 +25,10 @@ MAX_WORK = 40_000_000
 OFFSET_CHARTS, OFFSET_SHARE = 5, 0.3
 # With more charts than GROUPED_CHARTS, those whose boxes differ by less than this factor are treated as equal.
 GROUPED_CHARTS, GROUP_RATIO = 1000, 1.02
-# Smallest fraction of the width that gaps must leave to charts in rows.
-MIN_SHARE_LEFT = 0.02
+# Number of widths in small steps that are too small, from which on the steps are larger.
+MANY_FAILURES = 5
+# Cells by which rounding enlarges a chart and the gap beside it.
+ROUNDED_CELLS = 2.0
 # Width of the grid relative to the width that charts without gaps would need, and to the longest chart. It is not a
 # round number, so that simple charts do not end at cell borders, where rounding would decide which cell is the last.
 GRID_MARGIN = 1.2347
@@ -234,14 +236,20 @@ def pack(
     """
     rng = np.random.default_rng(0)
     columns = int(max(effort.columns, COLUMNS_PER_CHART * (len(outlines) / tiles) ** 0.5))
-    # Many charts in rows leave this fraction of a width between them to the charts, and the tiles are so much wider.
-    share = 1 - gap * (len(outlines) / tiles) ** 0.5
-    growth = 1 / max(share, MIN_SHARE_LEFT) if len(outlines) > GROUPED_CHARTS else 1.0
-    columns = int(min(columns, (MAX_CELLS / tiles) ** 0.5, (MOST_CELLS / tiles) ** 0.5 / growth))
+    columns = int(min(columns, (MAX_CELLS / tiles) ** 0.5))
     _, extent = rotated_boxes(outlines, angles)
     extent = np.where(allowed, extent, complex(np.inf, np.inf))
     longest = float(np.maximum(extent.real, extent.imag).min(axis=1).max())
     side = GRID_MARGIN * max((area / tiles) ** 0.5, longest) or 1.0
+    widest = min(4 * columns, int((1.5 * MOST_CELLS / tiles) ** 0.5))
+    if len(outlines) > GROUPED_CHARTS:
+        # Charts in rows, with gaps that are a fraction of the width: so many cells of the width are left to each.
+        in_row = (len(outlines) / tiles) ** 0.5
+        cells = (MOST_CELLS / tiles) ** 0.5 * (1 / in_row - gap) - ROUNDED_CELLS
+        size = float(np.sqrt(extent.real * extent.imag).min(axis=1).mean())
+        columns = int(min(columns, max(cells, 0.0) * side / size if size > 0 else columns))
+    if columns < 1:
+        raise _no_space(gap, len(outlines))
     masks = cover_charts(outlines, angles, side / columns)
     box = (extent.real + extent.imag).min(axis=1)
     order = np.argsort(-box, kind="stable")
@@ -253,13 +261,12 @@ def pack(
     def fill(plan: Plan, width: int, limit: int) -> _Placed:
         return _Placed(plan, *place_all(plan, group, masks, _reach(gap * width), tiles, width, limit))
 
-    while share < MIN_SHARE_LEFT or (best := fill(start, width, width)).height > width:
-        width += width // 12 + 1
-        if share < MIN_SHARE_LEFT or width > 4 * growth * columns or tiles * width**2 > 1.5 * MOST_CELLS:
-            raise OptionError(
-                f"a gap of {100 * gap:.3g} % of the texture's width between {len(order):,} charts leaves no space for "
-                "them: use less padding, a higher resolution or more tiles"
-            )
+    failures = 0
+    while (best := fill(start, width, width)).height > width:
+        failures += 1
+        width += width // (12 if failures < MANY_FAILURES else 4) + 1
+        if width > widest:
+            raise _no_space(gap, len(order))
     last, least, step, work = best, int(longest / masks.cell) + 1, width // 16, 0
     wanted = int(min(effort.most / masks.cell, width)) + 1
     for tried in range(effort.tries):
@@ -285,6 +292,13 @@ def pack(
     corner = complex(low.real.min(), low.imag.min())
     side = max(high.real.max() - corner.real, high.imag.max() - corner.imag)
     return Packing(min(side, width * masks.cell), masks.angle[best.chosen], shift - corner, tile)
+
+
+def _no_space(gap: float, count: int) -> OptionError:
+    return OptionError(
+        f"a gap of {100 * gap:.3g} % of the texture's width between {count:,} charts leaves no space for them: use less "
+        "padding, a higher resolution or more tiles"
+    )
 
 
 def _changed(plan: Plan, permitted: BoolArray, rng: np.random.Generator) -> Plan:
