@@ -4,7 +4,7 @@ A case is a kind and a seed: `--case mesh:17` runs one case in this process and 
 
 - mesh: small meshes of all kinds, many of them invalid, with random options;
 - tiny: meshes of at most some twenty triangles, closed ones of two among them, with many options at once, and as quads;
-- many: meshes of hundreds to thousands of such components, some repeated, some without area;
+- many: meshes of hundreds of such components, some repeated, some without area;
 - texture: such meshes through `coneflat.unwrap`, with random options, and through the interface of xatlas;
 - file: mesh files of all formats, intact or damaged, read, flattened, written, and read back by other software;
 - argument: public functions with odd arguments;

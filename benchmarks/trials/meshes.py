@@ -54,7 +54,7 @@ def make_tiny(rng: Random) -> tuple[np.ndarray, np.ndarray, str]:
 
 
 #: Powers of ten of the numbers of components of a mesh of many.
-MANY = 2.0, 3.2
+MANY = 2.0, 2.8
 #: Their largest coordinates: others would leave only one component to see.
 LARGEST_PLACE = 1e4
 

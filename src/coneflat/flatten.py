@@ -107,6 +107,7 @@ class Method:
         watch: the stopwatch.
         surface_of, find_metric: the two steps that a caller can replace.
         untangles: inverted triangles are flipped where both sides of the seams can stay equal.
+        names_parts: errors say in which part they occur, as there are several.
     """
 
     relax: RelaxSpec
@@ -116,6 +117,7 @@ class Method:
     surface_of: SurfaceOf
     find_metric: FindMetric
     untangles: bool = True
+    names_parts: bool = False
 
 
 def flatten_source(
@@ -143,7 +145,10 @@ def flatten_source(
         prepared = source.prepared(o)
     relax = RelaxSpec(o.relax if o.method == "exact" else "off", o.stretch)
     finds_conformal = find_metric is conformal_metric
-    method = Method(relax, o.charts == "atlas", o.quantise, watch, surface_of, find_metric)
+    names_parts = len(prepared.parts) > 1
+    method = Method(
+        relax, o.charts == "atlas", o.quantise, watch, surface_of, find_metric, names_parts=names_parts
+    )
     with limit_threads(o.threads):
         # A map of another kind need not be an isometry of flat parts.
         flat = lay_out_flat_parts(prepared.parts, watch) if finds_conformal else {}
@@ -197,7 +202,7 @@ def _may_be_flat(part: Part) -> bool:
 
 def lay_out_parts(parts: Mapping[int, Part], method: Method) -> dict[int, Layout]:
     """Return the layout of each part in one chart."""
-    layouts, places = {}, _Places(parts, method.watch, LAYING_OUT)
+    layouts, places = {}, _Places(parts, method, LAYING_OUT)
     for i, part in parts.items():
         with places.at(part):
             layouts[i] = lay_out_part(part, method)
@@ -255,7 +260,7 @@ def finish_parts(
 ) -> dict[int, Layout]:
     """Return relaxed layouts without inverted triangles, and without overlaps if the method separates them."""
     watch, finished = method.watch, dict[int, Layout]()
-    places = _Places(parts, watch, 1 - LAYING_OUT)
+    places = _Places(parts, method, 1 - LAYING_OUT)
     for group in _groups(parts, method.relax):
         watch.share = 0.0
         with watch("relax"):
@@ -384,21 +389,22 @@ def _groups(parts: Mapping[int, Part], relax: RelaxSpec) -> list[list[int]]:
 
 
 class _Places:
-    """The places of parts in a portion of the work, for its progress, and for errors if there are several parts.
+    """The places of parts in a portion of the work, for its progress and for errors.
 
     Args:
         parts: all parts.
-        watch: the stopwatch.
+        method: the stopwatch, and whether errors name parts.
         portion: fraction of the work.
     """
 
-    def __init__(self, parts: Mapping[int, Part], watch: Stopwatch, portion: float) -> None:
-        self._watch, self._count, self._begun = watch, len(parts), 0
+    def __init__(self, parts: Mapping[int, Part], method: Method, portion: float) -> None:
+        self._watch, self._names_parts = method.watch, method.names_parts
+        self._count, self._begun = len(parts), 0
         self._share = portion / max(sum(len(part.faces) for part in parts.values()), 1)
 
     @contextmanager
     def at(self, part: Part) -> Iterator[None]:
-        """Run the work on the next part in the block; errors name the part if there are several."""
+        """Run the work on the next part in the block."""
         self._begun += 1
         self._watch.share = self._share * len(part.faces)
         if self._count > 1:
@@ -406,7 +412,7 @@ class _Places:
         try:
             yield
         except (CurvatureError, MetricError, SeamError) as error:
-            if self._count == 1:
+            if not self._names_parts:
                 raise
             raise type(error)(f"{part.where}: {error}") from error
         self._watch.end_component()

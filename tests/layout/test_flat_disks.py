@@ -9,6 +9,7 @@ import pytest
 import shapes
 
 import coneflat
+from coneflat.errors import CurvatureError
 from coneflat.geometry import edge_lengths, signed_double_areas
 from coneflat.layout import lay_out_flat_disks
 
@@ -102,3 +103,10 @@ def test_requests_for_cones_or_a_shape_are_heard():
     radii = np.linalg.norm(border - border.mean(axis=0), axis=1)
     assert np.ptp(radii) < 0.1 * radii.mean()
     assert coneflat.flatten(vertices, faces, cones=[14]).cones.tolist() == [14]
+
+
+def test_errors_name_the_only_component_that_is_not_flat():
+    """A sphere without cones beside leaf cards."""
+    vertices, faces = shapes.join(cards(3), shapes.sphere(1))[:2]
+    with pytest.raises(CurvatureError, match=r"^in the component of vertex 12 \(80 triangles\): "):
+        coneflat.flatten(vertices, faces, cones="none")

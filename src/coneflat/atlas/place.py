@@ -296,8 +296,8 @@ def pack(
 
 def _no_space(gap: float, count: int) -> OptionError:
     return OptionError(
-        f"a gap of {100 * gap:.3g} % of the texture's width between {count:,} charts leaves no space for them: use less "
-        "padding, a higher resolution or more tiles"
+        f"a gap of {100 * gap:.3g} % of the texture's width between {count:,} charts leaves no space for them: use "
+        "less padding, a higher resolution or more tiles"
     )
 
 
