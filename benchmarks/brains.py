@@ -4,14 +4,19 @@ The surfaces are those of fsaverage5 in the package nilearn, with FreeSurfer's f
 five cuts by an expert. Ours cut off the medial wall, and find relief cuts automatically. The measures are those of
 the files written. `--fine` subdivides the left pial surface twice, to 163,842 vertices. `--figures DIR` draws the maps
 with sulcal depth.
+
+`--autoflatten PYTHON` also runs the package autoflatten, in the environment of that Python, on the patch that we write,
+with the same cuts. Its seconds include what JAX compiles.
 """
 
 from __future__ import annotations
 
 import argparse
 import gzip
+import subprocess
 import tempfile
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -22,14 +27,22 @@ from coneflat.apps.brains import FlatMeasures, flatten_cortex, measure_flat, rea
 from coneflat.apps.view import own_quantity
 
 SIDES = {"lh": "left", "rh": "right"}
+AUTOFLATTEN = """
+import sys, time
+start = time.perf_counter()
+from autoflatten.backends.pyflatten import PyflattenBackend
+PyflattenBackend().flatten(*sys.argv[1:], verbose=False)
+print("seconds", time.perf_counter() - start)
+"""
 COLUMNS = "surface|map|triangles|QC|area std|metric %|areal|inverted|charts|s"
 
 
 def data_folder() -> Path:
     """Return the folder of fsaverage5 in nilearn."""
-    import nilearn
-
-    return Path(nilearn.__file__).parent / "datasets" / "data" / "fsaverage5"
+    package = find_spec("nilearn")
+    if package is None or package.origin is None:
+        raise SystemExit("the surfaces are those of nilearn: pip install nilearn")
+    return Path(package.origin).parent / "datasets" / "data" / "fsaverage5"
 
 
 def prepare(folder: Path) -> None:
@@ -87,6 +100,33 @@ def smoothed(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return (vertices + sums / np.bincount(tails, minlength=len(vertices))[:, None]) / 2
 
 
+def run_autoflatten(folder: Path, surface: str, faces: np.ndarray, python: str) -> None:
+    """Print the line of autoflatten for the patch of some triangles of a surface."""
+    import nibabel
+
+    mesh = read_mesh(folder / surface)
+    base, patch, output = (folder / f"auto.{name}" for name in ("base", "patch.3d", "flat.patch.3d"))
+    nibabel.freesurfer.write_geometry(base, mesh.vertices, mesh.triangles)
+    write_folded_patch(patch, mesh.vertices, faces)
+    command = [python, "-c", AUTOFLATTEN, *map(str, (patch, base, output))]
+    printed = subprocess.run(
+        command, check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ).stdout
+    seconds = float(printed.rsplit("seconds", 1)[1])
+    print(line(surface, "autoflatten .3d", measure_flat(read_flat(output, base)), seconds), flush=True)
+
+
+def write_folded_patch(path: Path, vertices: np.ndarray, faces: np.ndarray) -> None:
+    """Write the vertices of triangles as a FreeSurfer patch that is not flat yet; those on its border are negative."""
+    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    pairs, count = np.unique(edges, axis=0, return_counts=True)
+    inside = np.unique(faces)
+    rows = np.empty(len(inside), np.dtype([("vertex", ">i4"), ("point", ">f4", 3)]))
+    rows["vertex"] = np.where(np.isin(inside, pairs[count == 1]), -1 - inside, inside + 1)
+    rows["point"] = vertices[inside]
+    path.write_bytes(np.array([-1, len(rows)], ">i4").tobytes() + rows.tobytes())
+
+
 def line(surface: str, name: str, found: FlatMeasures, seconds: float) -> str:
     d = found.uv.distortion
     cells = [
@@ -101,6 +141,7 @@ def main() -> None:
     parser.add_argument("--distortion", type=float, default=0.2)
     parser.add_argument("--fine", action="store_true")
     parser.add_argument("--figures", type=Path)
+    parser.add_argument("--autoflatten", metavar="PYTHON")
     arguments = parser.parse_args()
     print(f"| {' | '.join(COLUMNS.split('|'))} |\n{'| --- ' * (COLUMNS.count('|') + 1)}|")
     with tempfile.TemporaryDirectory() as name:
@@ -128,6 +169,9 @@ def main() -> None:
             if side:
                 theirs = measure_flat(read_flat(folder / f"{side}.flat.gii", folder / surface))
                 print(line(surface, "FreeSurfer", theirs, 0.0), flush=True)
+            if side and arguments.autoflatten:
+                faces = found.uv_mesh(Path("flat.3d")).faces
+                run_autoflatten(folder, surface, faces, arguments.autoflatten)
             if side and arguments.figures is not None:
                 arguments.figures.mkdir(parents=True, exist_ok=True)
                 depth = own_quantity(found.result, str(folder / f"{side}.sulc.gii"))

@@ -4,6 +4,7 @@ A case is a kind and a seed: `--case mesh:17` runs one case in this process and 
 
 - mesh: small meshes of all kinds, many of them invalid, with random options;
 - tiny: meshes of at most some twenty triangles, closed ones of two among them, with many options at once, and as quads;
+- many: meshes of hundreds of such components, some repeated, some without area;
 - texture: such meshes through `coneflat.unwrap`, with random options, and through the interface of xatlas;
 - transfer: textured squares in every format, baked and measured, against a slow sampler;
 - doubled: surfaces with several layers, on common vertices or their own, through all of these;
@@ -21,8 +22,9 @@ angles around inner vertices and cones, equal sides of seams, prescribed boundar
 that says what was measured. What is not kept and not named by a note is a breach; so are errors that are not the
 package's own, messages of several lines, crashes, hangs, and too much memory. The exit code is 1 if there is any.
 
-Options: --cases 10000, --jobs 2, --seed 0 (the first), --kinds mesh,tiny,texture,doubled,transfer,file,argument,
-command,process,attribute,offset, --out FILE.json (all outcomes), --again FILE.json (only the breaches in such a file).
+Options: --cases 10000, --jobs 2, --seed 0 (the first), --kinds mesh,tiny,many,texture,doubled,transfer,file,
+argument,command,process,attribute,offset, --out FILE.json (all outcomes), --again FILE.json (only the breaches of such
+a file).
 """
 
 from __future__ import annotations

@@ -92,7 +92,7 @@ def test_copies_are_laid_out_as_each_by_itself(mesh: Mesh, monkeypatch: pytest.M
     monkeypatch.setattr(method, "lay_out_part", lambda *some: calls.append(some) or lay_out_part(*some))
     found = coneflat.flatten(*whole)
     assert len(calls) == 1
-    monkeypatch.setattr(method, "find_copies", lambda parts: [None] * len(parts))
+    monkeypatch.setattr(method, "find_copies", lambda parts, _: [None] * len(parts))
     alone = coneflat.flatten(*whole)
     assert len(calls) == 1 + 4
     assert np.array_equal(found.cones, alone.cones)
@@ -100,3 +100,14 @@ def test_copies_are_laid_out_as_each_by_itself(mesh: Mesh, monkeypatch: pytest.M
     assert np.allclose(found.log_scale, alone.log_scale, rtol=0, atol=1e-7)
     assert np.allclose(sides_of(found), sides_of(alone), rtol=1e-7)
     assert found.distortion.flipped == 0
+
+
+def test_the_search_is_linear_where_copies_are_rounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Copies in single precision differ by more than double precision allows: each is a kind of its own."""
+    module, calls = import_module("coneflat.source.copies"), []
+    compare = module._scale_of_copy
+    monkeypatch.setattr(module, "_scale_of_copy", lambda *some: calls.append(some) or compare(*some))
+    copies = [turned(bump(), seed) for seed in range(40)]
+    vertices, faces = joined(*((np.asarray(v, dtype=np.float32).astype(float), f) for v, f in copies))
+    assert find_copies(parts_of((vertices, faces), Options())) == [None] * 40
+    assert len(calls) <= 40 * module.MAX_COMPARED

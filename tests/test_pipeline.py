@@ -318,6 +318,9 @@ def test_progress_names_the_stages():
     assert stages[0] == "check"
     assert stages[-1] == "measure"
     assert list(fractions) == sorted(fractions)
+    assert {"cones, component 1 of 2", "cones, component 2 of 2"} <= {
+        stage.partition(":")[0] for stage in stages
+    }
 
 
 def test_sample_has_limbs_and_a_handle():

@@ -25,11 +25,11 @@ from .commands import interrupt_command, make_command, run_command, run_without_
 from .doubled import doubled_case
 from .files import make_file
 from .grids import grid_case, grid_of_mesh
-from .meshes import make_mesh, make_tiny
+from .meshes import make_many, make_mesh, make_tiny
 from .offsets import offset_case
 from .outcome import LONGEST_MESSAGE, Outcome
 from .promises import check
-from .textures import texture_case
+from .textures import texture_case, texture_mesh
 from .transfers import transfer_case
 from .written import READERS, check_file, check_report
 
@@ -100,6 +100,19 @@ def _tiny(rng: Random, outcome: Outcome) -> None:
         grid_of_mesh(rng, outcome, vertices, faces, made, size=None, **options)
         return
     options = cross_options(rng, vertices, faces)
+    outcome.recipe = f"{made}; {in_short(options)}"
+    _flatten(rng, outcome, lambda: coneflat.flatten(vertices, faces, **options), options, (vertices, faces))
+
+
+def _many(rng: Random, outcome: Outcome) -> None:
+    """Flatten a mesh of many tiny components with random options, or unwrap it."""
+    import coneflat
+
+    vertices, faces, made = make_many(rng)
+    if rng.random() < 0.4:
+        texture_mesh(rng, outcome, vertices, faces, made)
+        return
+    options = {"repair": True, **make_options(rng, vertices, faces), "resolution": 8192}
     outcome.recipe = f"{made}; {in_short(options)}"
     _flatten(rng, outcome, lambda: coneflat.flatten(vertices, faces, **options), options, (vertices, faces))
 
@@ -276,13 +289,14 @@ def _swell(rng: Random, outcome: Outcome) -> None:
     np.ones(200_000_000)
 
 
-#: The kinds of cases, and how many of 44 are of each. The last three put the workers to the test.
+#: The kinds of cases, and their shares. The last three put the workers to the test.
 KINDS: dict[str, Callable[[Random, Outcome], None]] = {
     "mesh": _mesh,
     "file": _file,
     "argument": _argument,
     "command": _command,
     "tiny": _tiny,
+    "many": _many,
     "process": _process,
     "texture": texture_case,
     "transfer": transfer_case,
@@ -295,7 +309,7 @@ KINDS: dict[str, Callable[[Random, Outcome], None]] = {
     "swell": _swell,
 }
 SHARES = {
-    "mesh": 14, "tiny": 6, "texture": 8, "doubled": 4, "file": 6, "argument": 3, "command": 2, "process": 1,
+    "mesh": 14, "tiny": 6, "many": 1, "texture": 8, "doubled": 4, "file": 6, "argument": 3, "command": 2, "process": 1,
     "transfer": 2, "attribute": 2, "offset": 2,
 }  # fmt: skip
 

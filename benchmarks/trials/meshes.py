@@ -51,3 +51,45 @@ def make_tiny(rng: Random) -> tuple[np.ndarray, np.ndarray, str]:
         vertices, faces = change(vertices, faces, rng)
         recipe.append(change.__name__)
     return vertices, faces, f"{' + '.join(recipe)}, {len(vertices)} vertices, {len(faces)} faces"
+
+
+#: Powers of ten of the numbers of components of a mesh of many.
+MANY = 2.0, 2.8
+#: Their largest coordinates: others would leave only one component to see.
+LARGEST_PLACE = 1e4
+
+
+def make_many(rng: Random) -> tuple[np.ndarray, np.ndarray, str]:
+    """Return vertices, faces and a description of a mesh of many tiny components, some repeated, some without area."""
+    count = int(10 ** rng.uniform(*MANY))
+    sizes, spacing = rng.choice([0.0, 1.0, 4.0]), float(rng.choice([0.0, 1.0, 3.0, 1e4]))
+    pieces: list[tuple[np.ndarray, np.ndarray]] = []
+    for number in range(count):
+        if pieces and rng.random() < 0.1:
+            vertices, faces = pieces[int(rng.integers(len(pieces)))]
+            turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+            vertices = (
+                vertices @ turn if rng.random() < 0.7 else vertices.astype(np.float32).astype(np.float64)
+            )
+        else:
+            vertices, faces = _valid_piece(rng)
+        if rng.random() < 0.03:
+            vertices = vertices * [1.0, 0.0, 0.0]
+        place = spacing * np.array([number % 40, number // 40, 0.0])
+        pieces.append((10 ** (sizes * rng.normal() / 4) * vertices + place, faces))
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])
+    faces = np.concatenate([faces + start for (_, faces), start in zip(pieces, starts, strict=False)])
+    return (
+        np.concatenate([vertices for vertices, _ in pieces]),
+        faces,
+        f"{count} components, {len(faces)} faces",
+    )
+
+
+def _valid_piece(rng: Random) -> tuple[np.ndarray, np.ndarray]:
+    """Return a tiny mesh whose indices and positions are valid: one that is not would refuse the whole mesh."""
+    while True:
+        vertices, faces, _ = make_tiny(rng)
+        is_valid = len(faces) and faces.min() >= 0 and faces.max() < len(vertices)
+        if is_valid and np.isfinite(vertices).all() and np.abs(vertices).max() < LARGEST_PLACE:
+            return vertices, faces

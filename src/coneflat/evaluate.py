@@ -92,24 +92,24 @@ def evaluate(
         overlaps: overlapping pairs of the result's triangles; None to compute them.
     """
     checked = prepared.checked
-    numbering = _number_vertices(prepared)
-    # The triangles of all components are sorted in the order of the input's faces.
-    origin = np.concatenate([part.faces for part in prepared.parts])
-    order = np.argsort(origin, kind="stable")
-    faces = rows_of(numbering.renumber([part.mesh.faces for part in prepared.parts]), order)
-    mesh = _known_or_new(checked.mesh, np.ldexp(numbering.positions, checked.exponent), faces)
     with watch("pack"):
+        numbering = _number_vertices(prepared)
+        # The triangles of all components are sorted in the order of the input's faces.
+        origin = np.concatenate([part.faces for part in prepared.parts])
+        order = np.argsort(origin, kind="stable")
+        faces = rows_of(numbering.renumber([part.mesh.faces for part in prepared.parts]), order)
+        mesh = _known_or_new(checked.mesh, np.ldexp(numbering.positions, checked.exponent), faces)
         layout = _pack(layouts, order, mesh, options)
-    source, face_corners = prepared.given.source, prepared.given.face_corners
-    if face_corners is not None and source is not None:
-        face_corners = reorder_corners(checked, face_corners)
-    target = numbering.spread([one.target for one in layouts])
-    residual = target - numbering.spread([one.curvature for one in layouts])
-    prescribed = numbering.spread([one.prescribed for one in layouts])
-    # A vertex on a marked seam has several copies in the plane.
-    prescribed[numbering.of_checked[prepared.seams]] = np.nan
-    cones = numbering.renumber([one.cones for one in layouts])
     with watch("measure"):
+        source, face_corners = prepared.given.source, prepared.given.face_corners
+        if face_corners is not None and source is not None:
+            face_corners = reorder_corners(checked, face_corners)
+        target = numbering.spread([one.target for one in layouts])
+        residual = target - numbering.spread([one.curvature for one in layouts])
+        prescribed = numbering.spread([one.prescribed for one in layouts])
+        # A vertex on a marked seam has several copies in the plane.
+        prescribed[numbering.of_checked[prepared.seams]] = np.nan
+        cones = numbering.renumber([one.cones for one in layouts])
         measured = partial(
             measure,
             mesh,
@@ -126,6 +126,9 @@ def evaluate(
                 layout = replace(layout, uv=separated)
                 distortion = measured(separated[layout.corners], overlaps=left)
         rotations = _rotations(layouts, layout.uv[layout.own], options)
+        combined = SolveStatistics.of_all(
+            [one.statistics for one in layouts], [one.area if len(layouts) > 1 else 1.0 for one in layouts]
+        )
     result = Flattening(
         vertices=numbering.positions,
         faces=faces,
@@ -149,9 +152,7 @@ def evaluate(
             *counted_notes([one.notes for one in layouts]),
         ),
         settings=settings(options),
-        solve=SolveStatistics.of_all(
-            [one.statistics for one in layouts], [one.area if len(layouts) > 1 else 1.0 for one in layouts]
-        ),
+        solve=combined,
         rotations=rotations,
         vertex_origin=numbering.vertex_origin,
         face_origin=checked.face_origin[origin[order]],

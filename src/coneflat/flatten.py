@@ -18,16 +18,24 @@ from .base.progress import Stopwatch
 from .base.text import list_some, plural
 from .base.threads import concurrently, limit_threads
 from .bounds import TOLERATED_EXCESS, borders_and_distortion, excess, is_too_distorted, rank
-from .cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, close_search, find_cones, with_corners
+from .cones import (
+    MAX_POLYHEDRON_CORNERS,
+    MAX_SEARCHED,
+    close_search,
+    find_cones,
+    leaves_flat_disks,
+    with_corners,
+)
 from .errors import CurvatureError, MetricError, OptionError, SeamError
 from .evaluate import evaluate
 from .geometry import dihedral_angles
 from .geometry.operators import weighted_areas
 from .geometry.overlap import UNKNOWN_OVERLAPS
 from .io.packages import as_input
-from .layout import lay_out, mean_qc, relax_layouts, untangle_seams
+from .layout import lay_out, lay_out_flat_disks, mean_qc, relax_layouts, untangle_seams
 from .mesh.connectivity import TriangleMesh
-from .metric import find_metric, loop_rotations
+from .metric import find_metric as conformal_metric
+from .metric import loop_rotations
 from .options import Options, read_options, takes
 from .result import Flattening
 from .seams import cut_to_disk, seam_costs
@@ -111,6 +119,7 @@ class Method:
         watch: the stopwatch.
         surface_of, find_metric: the two steps that a caller can replace.
         untangles: inverted triangles are flipped where both sides of the seams can stay equal.
+        names_parts: errors say in which part they occur, as there are several.
     """
 
     relax: RelaxSpec
@@ -120,13 +129,14 @@ class Method:
     surface_of: SurfaceOf
     find_metric: FindMetric
     untangles: bool = True
+    names_parts: bool = False
 
 
 def flatten_source(
     source: Source,
     o: Options,
     surface_of: SurfaceOf = Surface.of,
-    find_metric: FindMetric = find_metric,
+    find_metric: FindMetric = conformal_metric,
     on_preview: Preview | None = None,
 ) -> Flattening:
     """Return the flattening of a mesh by parsed options; see `flatten`.
@@ -146,7 +156,10 @@ def flatten_source(
     with watch("check"):
         prepared = source.prepared(o)
     relax = RelaxSpec(o.relax if o.method == "exact" else "off", o.stretch)
-    method = Method(relax, o.charts == "atlas", o.quantise, watch, surface_of, find_metric)
+    names_parts = len(prepared.parts) > 1
+    method = Method(
+        relax, o.charts == "atlas", o.quantise, watch, surface_of, find_metric, names_parts=names_parts
+    )
     with limit_threads(o.threads):
         show = None if on_preview is None else partial(_preview, prepared, o, on_preview)
         layouts = flatten_parts(prepared.parts, method, show)
@@ -166,12 +179,15 @@ def flatten_parts(
 
     on_layouts: called with the first layouts of all parts, as of `flatten_source`.
     """
-    copies = find_copies(parts)
-    originals = {i: part for i, part in enumerate(parts) if copies[i] is None}
-    layouts = lay_out_parts(originals, method)
+    # A map of another kind need not be an isometry of flat parts.
+    flat = lay_out_flat_parts(parts, method.watch) if method.find_metric is conformal_metric else {}
+    with method.watch("check"):
+        copies = find_copies(parts, flat)
+    originals = {i: part for i, part in enumerate(parts) if copies[i] is None and i not in flat}
+    layouts = flat | lay_out_parts(originals, method)
     if on_layouts is not None:
         on_layouts(with_copies(layouts, parts, copies))
-    finished = finish_within_bound(originals, layouts, method)
+    finished = flat | finish_within_bound(originals, layouts, method)
     # Notes contain vertex indices, so copies of parts with notes are computed, too.
     noted = {i: parts[i] for i, copy in enumerate(copies) if copy and finished[copy.first].notes}
     finished |= finish_within_bound(noted, lay_out_parts(noted, method), method)
@@ -188,12 +204,12 @@ def cut_along_sharp_edges(
         layouts: the layouts of the parts.
         method: how parts are flattened.
     """
-    pairs = zip(prepared.parts, layouts, strict=True)
-    distorted = [i for i, (part, layout) in enumerate(pairs) if is_too_distorted(part, layout)]
-    if method.separates and o.sharp_angle is None:
-        distorted = [i for i in distorted if is_machined(prepared.parts[i].mesh)]
-    else:
-        distorted = []
+    if not method.separates or o.sharp_angle is not None:
+        return prepared, layouts
+    pairs = enumerate(zip(prepared.parts, layouts, strict=True))
+    distorted = [
+        i for i, (part, layout) in pairs if is_machined(part.mesh) and is_too_distorted(part, layout)
+    ]
     if not distorted:
         return prepared, layouts
     try:
@@ -239,7 +255,9 @@ def is_machined(mesh: TriangleMesh) -> bool:
 
 def _bound_notes(parts: Sequence[Part], layouts: Sequence[Layout], o: Options) -> Iterator[Unmet]:
     """Yield a note if the area distortion of a component, or of all of them together, is above the one allowed."""
-    alone = max(excess([part], [layout]) for part, layout in zip(parts, layouts, strict=True))
+    pairs = zip(parts, layouts, strict=True)
+    curved = [(part, layout) for part, layout in pairs if layout.statistics.area_distortion > 0]
+    alone = max((excess([part], [layout]) for part, layout in curved), default=0.0)
     together = excess(parts, layouts)
     if (beyond := max(alone, together)) > TOLERATED_EXCESS:
         reached = beyond * o.distortion
@@ -252,11 +270,33 @@ def _bound_notes(parts: Sequence[Part], layouts: Sequence[Layout], o: Options) -
         )
 
 
+def lay_out_flat_parts(parts: Sequence[Part], watch: Stopwatch) -> dict[int, Layout]:
+    """Return the finished layouts of the small parts that are flat disks and do not overlap themselves.
+
+    An isometry is their only flat metric without cones, so nothing is searched, solved or relaxed.
+    """
+    chosen = [i for i, part in enumerate(parts) if len(part.faces) <= SMALL_TRIANGLES and _may_be_flat(part)]
+    if not chosen:
+        return {}
+    with watch("layout"):
+        layouts = lay_out_flat_disks(
+            [parts[i].mesh for i in chosen],
+            [parts[i].lengths for i in chosen],
+            [parts[i].metric.keeps_length for i in chosen],
+        )
+    return {i: layout for i, layout in zip(chosen, layouts, strict=True) if layout is not None}
+
+
+def _may_be_flat(part: Part) -> bool:
+    """Return whether a part is laid out without cones and with a free shape if it is a flat disk."""
+    return part.is_exact and part.metric.boundary in ("free", "lengths") and leaves_flat_disks(part.cones)
+
+
 def lay_out_parts(parts: Mapping[int, Part], method: Method) -> dict[int, Layout]:
     """Return the layout of each part in one chart."""
-    layouts = {}
+    layouts, places = {}, _Places(parts, method, LAYING_OUT)
     for i, part in parts.items():
-        with _at(part, parts, method.watch, LAYING_OUT):
+        with places.at(part):
             layouts[i] = lay_out_part(part, method)
     return layouts
 
@@ -312,13 +352,14 @@ def finish_parts(
 ) -> dict[int, Layout]:
     """Return relaxed layouts without inverted triangles, and without overlaps if the method separates them."""
     watch, finished = method.watch, dict[int, Layout]()
+    places = _Places(parts, method, 1 - LAYING_OUT)
     for group in _groups(parts, method.relax):
         watch.share = 0.0
         with watch("relax"):
             weights = [parts[i].cones.weights for i in group]
             relaxed = relax_layouts([layouts[i] for i in group], weights, method.relax, watch.report)
         for i, layout in zip(group, relaxed, strict=True):
-            with _at(parts[i], parts, watch, 1 - LAYING_OUT):
+            with places.at(parts[i]):
                 finished[i] = finish_part(parts[i], layout, method)
     return finished
 
@@ -440,14 +481,31 @@ def _groups(parts: Mapping[int, Part], relax: RelaxSpec) -> list[list[int]]:
     return groups
 
 
-@contextmanager
-def _at(part: Part, parts: Mapping[int, Part], watch: Stopwatch, portion: float) -> Iterator[None]:
-    """Run a portion of the work on a part; errors name the part if there are several."""
-    watch.share = portion * len(part.faces) / sum(len(each.faces) for each in parts.values())
-    try:
-        yield
-    except (CurvatureError, MetricError, SeamError) as error:
-        if len(parts) == 1:
-            raise
-        raise type(error)(f"{part.where}: {error}") from error
-    watch.end_component()
+class _Places:
+    """The places of parts in a portion of the work, for its progress and for errors.
+
+    Args:
+        parts: all parts.
+        method: the stopwatch, and whether errors name parts.
+        portion: fraction of the work.
+    """
+
+    def __init__(self, parts: Mapping[int, Part], method: Method, portion: float) -> None:
+        self._watch, self._names_parts = method.watch, method.names_parts
+        self._count, self._begun = len(parts), 0
+        self._share = portion / max(sum(len(part.faces) for part in parts.values()), 1)
+
+    @contextmanager
+    def at(self, part: Part) -> Iterator[None]:
+        """Run the work on the next part in the block."""
+        self._begun += 1
+        self._watch.share = self._share * len(part.faces)
+        if self._count > 1:
+            self._watch.component = f"component {self._begun:,} of {self._count:,}"
+        try:
+            yield
+        except (CurvatureError, MetricError, SeamError) as error:
+            if not self._names_parts:
+                raise
+            raise type(error)(f"{part.where}: {error}") from error
+        self._watch.end_component()

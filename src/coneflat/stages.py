@@ -41,6 +41,8 @@ class VertexCurvatures:
 
     def within(self, component: IntArray) -> VertexCurvatures:
         """Return the vertices inside a component, in its numbering; `component` has its vertices in ascending order."""
+        if not len(self):
+            return self
         inside = np.isin(self.vertices, component)
         return VertexCurvatures(np.searchsorted(component, self.vertices[inside]), self.curvatures[inside])
 

@@ -8,7 +8,7 @@ import shapes
 
 import coneflat
 from coneflat.atlas import pack_charts
-from coneflat.atlas.charts import read_charts
+from coneflat.atlas.charts import Outlines, read_charts
 from coneflat.atlas.orient import border_directions, straight_directions, straight_runs
 from coneflat.atlas.pack import arrange_charts
 
@@ -113,7 +113,11 @@ def test_runs_and_directions_by_hand():
     sides = as_sides((x + 1j * y) * np.exp(0.3j))
     for seed in range(3):
         mixed = sides[np.random.default_rng(seed).permutation(len(sides))]
-        np.testing.assert_allclose(np.sort(np.abs(straight_runs(mixed))), [1, 1, 4, 4], rtol=1e-12)
+        np.testing.assert_allclose(
+            np.sort(np.abs(straight_runs(Outlines(mixed, np.array([0, len(mixed)])))[0])),
+            [1, 1, 4, 4],
+            rtol=1e-12,
+        )
         np.testing.assert_allclose(straight_directions(mixed), [0.3], rtol=1e-12)
     # Of an octagon there are two; of a hexagon no direction has more than a third.
     assert len(straight_directions(as_sides(polygon(8)))) == 2

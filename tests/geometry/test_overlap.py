@@ -12,7 +12,7 @@ from coneflat import errors
 from coneflat.atlas import separate_touching
 from coneflat.geometry import coverage
 from coneflat.geometry.orientation import fill_orientations
-from coneflat.geometry.overlap import bounding_boxes, find_overlaps
+from coneflat.geometry.overlap import bounding_boxes, find_overlaps, has_overlaps
 
 UNIT = [[0, 0], [1, 0], [0, 1]]
 ULP = 2.0**-53
@@ -332,3 +332,13 @@ def test_bad_input_is_refused(points, triangles, kind, message):
 def test_bad_limit_is_refused():
     with pytest.raises(errors.OptionError, match="1 or more, got 0"):
         find_overlaps(np.zeros((1, 3, 2)), limit=0)
+
+
+def test_groups_with_overlaps_are_those_with_pairs():
+    """Groups may overlap one another, touch themselves, and have flipped and degenerate triangles."""
+    random = np.random.default_rng(3)
+    groups = [random.integers(0, 7, (int(random.integers(1, 5)), 3, 2)).astype(float) for _ in range(300)]
+    starts = np.cumsum([0, *map(len, groups)])
+    expected = [len(find_overlaps(group).pairs) > 0 for group in groups]
+    assert has_overlaps(np.concatenate(groups), starts).tolist() == expected
+    assert 0 < sum(expected) < len(groups)

@@ -49,6 +49,14 @@ def test_components_keep_their_numbers():
         np.testing.assert_array_equal(part.vertices, mesh.vertices[vertices])
 
 
+def test_components_have_the_connectivity_that_they_would_have_alone():
+    whole = shapes.renumber(*shapes.join(shapes.hill(3, 2), shapes.torus(6, 5), shapes.annulus(7, 2)))
+    for part, _, _ in TriangleMesh(*whole[:2]).split_components():
+        alone = TriangleMesh(part.vertices, part.faces)
+        for name in ("edges", "halfedge_edges", "edge_halfedges", "is_boundary_edge", "is_boundary_vertex"):
+            np.testing.assert_array_equal(getattr(part, name), getattr(alone, name), err_msg=name)
+
+
 def test_fans_are_the_vertices_of_the_glued_surface():
     mesh = TriangleMesh(*shapes.torus(8, 6))
     count, fan = corner_fans(mesh.faces, *mesh.edge_halfedges.T)

@@ -26,6 +26,8 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
     for mesh in (torus, disk):
         yield "given topologies", partial(flatten, *mesh)
         yield "given topologies", partial(flatten, *mesh, cones="greedy")
+    flat = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]), np.array([[0, 1, 2], [0, 2, 3]])
+    yield "flat components", partial(flatten, *flat)
     yield "edge flips", partial(flatten, points * [10, 1, 1], faces)
     # Six triangles cannot hold an angle of 7 pi, so they are split.
     cones = {0: -5 * np.pi, **dict.fromkeys(range(100, 600, 100), np.pi)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+import math
 
 import numpy as np
 
@@ -28,7 +28,13 @@ RELATIVE_TOLERANCE = 1e-6
 
 def border_directions(outlines: Outlines) -> list[FloatArray]:
     """Return for each chart the directions of the straight parts of its border, see `straight_directions`."""
-    return [straight_directions(outlines.sides[start:stop]) for start, stop in pairwise(outlines.start)]
+    runs, chart = straight_runs(outlines)
+    lengths, angles = np.abs(runs), np.mod(np.angle(runs), HALF_PI)
+    order = np.lexsort((angles, chart))
+    start = np.searchsorted(chart[order], np.arange(len(outlines) + 1))
+    borders = np.add.reduceat(np.abs(outlines.sides[:, 1] - outlines.sides[:, 0]), outlines.start[:-1])
+    directions, ends = common_directions(angles[order], lengths[order], start, borders)
+    return np.split(directions, ends[:-1])
 
 
 def straight_angles(charts: Charts, outlines: Outlines, directions: list[FloatArray]) -> FloatArray:
@@ -39,7 +45,8 @@ def straight_angles(charts: Charts, outlines: Outlines, directions: list[FloatAr
         outlines: their outlines.
         directions: for each chart the directions of its border, see `border_directions`.
     """
-    angles = np.array([straight_angle(outlines.points(c), directions[c]) for c in range(charts.count)])
+    chart = np.repeat(np.arange(len(outlines)), 2 * np.diff(outlines.start))
+    angles = _rectangle_angles(outlines.sides.ravel(), chart, directions)
     turned = outlines.times(np.exp(1j * angles)).sides.imag.ravel()
     start = 2 * outlines.start[:-1]
     middle = (np.minimum.reduceat(turned, start) + np.maximum.reduceat(turned, start)) / 2
@@ -54,14 +61,99 @@ def straight_angle(points: ComplexArray, directions: FloatArray) -> float:
     One side of the rectangle is along one of the directions. If there are none, it is along a side of the convex
     hull, as for the rectangle of least area overall (Freeman and Shapira 1975).
     """
-    hull = convex_hull(points)
-    if not len(directions):
-        directions = np.angle(np.roll(hull, -1) - hull)
-    width, height = _extents(hull, directions)
-    area, longer = width * height, np.maximum(width, height)
-    # Among rectangles of equal area, as around many quadrilaterals, the longest is chosen.
-    best = int(np.where(area <= area.min() * (1 + RELATIVE_TOLERANCE), longer, 0.0).argmax())
-    return float(-directions[best] + (HALF_PI if height[best] > width[best] else 0.0))
+    return float(_rectangle_angles(points, np.zeros(len(points), dtype=np.int64), [directions])[0])
+
+
+def _rectangle_angles(points: ComplexArray, chart: IntArray, directions: list[FloatArray]) -> FloatArray:
+    """Return (k,) the angles of `straight_angle` for the points (n,) of k charts; chart: (n,) that of each."""
+    order = np.lexsort((points.imag, points.real, chart))
+    points, chart = points[order], chart[order]
+    is_new = np.concatenate([[True], (np.diff(chart) > 0) | (np.diff(points) != 0)])
+    points, chart = points[is_new], chart[is_new]
+    start = np.searchsorted(chart, np.arange(len(directions) + 1))
+    ends = np.cumsum([len(of_border) for of_border in directions])
+    return rectangle_angles(points.view(np.float64).reshape(-1, 2), start, np.concatenate(directions), ends)
+
+
+@compiled
+def rectangle_angles(
+    points: FloatArray, start: IntArray, directions: FloatArray, ends: IntArray
+) -> FloatArray:
+    """Return (k,) the angles, radians, that align the rectangles of least area around charts, see `straight_angle`.
+
+    Args:
+        points: (n, 2) points of the charts, sorted and distinct within each chart.
+        start: (k + 1,) the first point of each chart.
+        directions: (d,) directions that the sides of rectangles must have.
+        ends: (k,) where those of each chart end; a chart without any uses the sides of its convex hull.
+    """
+    angles = np.zeros(len(ends))
+    for c in range(len(ends)):
+        first, size = start[c], start[c + 1] - start[c]
+        hull, corners = np.zeros(size + 1, np.int64), 1
+        if size > 1:
+            corners = fill_hull(points[first : first + size], hull)
+        begin = ends[c - 1] if c > 0 else 0
+        is_free = ends[c] == begin
+        count = corners if is_free else ends[c] - begin
+        angle, width, height = np.empty(count), np.empty(count), np.empty(count)
+        # The corners that are farthest along a side of the hull, at a right angle to it, and against it.
+        far, top, near = 0, 0, 0
+        for i in range(count):
+            if is_free:
+                here, there = first + hull[i], first + hull[(i + 1) % corners]
+                angle[i] = math.atan2(points[there, 1] - points[here, 1], points[there, 0] - points[here, 0])
+                x, y = math.cos(angle[i]), math.sin(angle[i])
+                far = climb(points, hull, corners, first, max(far, i), x, y)
+                top = climb(points, hull, corners, first, max(top, far), -y, x)
+                near = climb(points, hull, corners, first, max(near, top), -x, -y)
+                f, t, n = (
+                    first + hull[far % corners],
+                    first + hull[top % corners],
+                    first + hull[near % corners],
+                )
+                width[i] = (points[f, 0] - points[n, 0]) * x + (points[f, 1] - points[n, 1]) * y
+                height[i] = (points[t, 1] - points[here, 1]) * x - (points[t, 0] - points[here, 0]) * y
+            else:
+                angle[i] = directions[begin + i]
+                x, y = math.cos(angle[i]), math.sin(angle[i])
+                least_x, least_y, most_x, most_y = np.inf, np.inf, -np.inf, -np.inf
+                for k in range(corners):
+                    u, v = points[first + hull[k], 0], points[first + hull[k], 1]
+                    along, across = u * x + v * y, v * x - u * y
+                    least_x, most_x = min(least_x, along), max(most_x, along)
+                    least_y, most_y = min(least_y, across), max(most_y, across)
+                width[i], height[i] = most_x - least_x, most_y - least_y
+        least, longest, best = np.inf, -1.0, 0
+        for i in range(count):
+            least = min(least, width[i] * height[i])
+        for i in range(count):
+            # Among rectangles of equal area, as around many quadrilaterals, the longest is chosen.
+            longer = max(width[i], height[i])
+            if width[i] * height[i] <= least * (1 + RELATIVE_TOLERANCE) and longer > longest:
+                longest, best = longer, i
+        angles[c] = -angle[best] + (HALF_PI if height[best] > width[best] else 0.0)
+    return angles
+
+
+@compiled
+def climb(points: FloatArray, hull: IntArray, corners: int, first: int, at: int, x: float, y: float) -> int:
+    """Return the place on a hull, from a place on and counterclockwise, at which the points cease to rise.
+
+    Args:
+        points: (n, 2) points.
+        hull: corners of the hull, counterclockwise, as indices from `first` on.
+        corners: number of the corners; places are counted on beyond it.
+        first: see `hull`.
+        at: the place to begin at.
+        x, y: the direction in which points rise.
+    """
+    for _ in range(corners):
+        here, there = first + hull[at % corners], first + hull[(at + 1) % corners]
+        if (points[there, 0] - points[here, 0]) * x + (points[there, 1] - points[here, 1]) * y <= 0.0:
+            break
+        at += 1
+    return at
 
 
 def square_angle(points: ComplexArray, directions: FloatArray) -> float:
@@ -159,44 +251,70 @@ def straight_directions(sides: ComplexArray) -> FloatArray:
     Args:
         sides: (s, 2) start and end of each side of an outline as complex numbers, in any order.
     """
-    runs = straight_runs(sides)
-    lengths, angles = np.abs(runs), np.mod(np.angle(runs), HALF_PI)
-    order = np.argsort(angles, kind="stable")
-    lengths, angles = lengths[order], angles[order]
-    around = np.concatenate([angles - HALF_PI, angles, angles + HALF_PI])
-    total = np.concatenate([[0.0], np.cumsum(np.tile(lengths, 3))])
-    begin = np.searchsorted(around, angles - SAME_DIRECTION)
-    end = np.searchsorted(around, angles + SAME_DIRECTION, side="right")
-    alike = total[end] - total[begin]
-    border = np.abs(sides[:, 1] - sides[:, 0]).sum()
-    if not len(runs) or alike.max() <= MIN_STRAIGHT_SHARE * border:
-        return np.empty(0)
-    best = alike >= alike.max() * (1 - RELATIVE_TOLERANCE)
-    return _separate([_middle_angle(runs[order], angle) for angle in angles[best]])
+    return border_directions(Outlines(sides, np.array([0, len(sides)])))[0]
 
 
-def _middle_angle(runs: ComplexArray, near: float) -> float:
-    """Return the median direction, weighted by length, of the runs nearly parallel or perpendicular to a direction.
+@compiled
+def common_directions(
+    angles: FloatArray, lengths: FloatArray, start: IntArray, borders: FloatArray
+) -> tuple[FloatArray, IntArray]:
+    """Return the directions of the straight runs of charts, and (k,) where those of each chart end.
 
-    With the median, small deviations of some runs do not rotate a border that is otherwise exactly straight.
+    A direction is the median, weighted by length, of the runs nearly parallel or perpendicular to it: with the median,
+    small deviations of some runs do not rotate a border that is otherwise exactly straight.
+
+    Args:
+        angles: (r,) directions of the runs, in [0, pi / 2), ascending within each chart.
+        lengths: (r,) their lengths.
+        start: (k + 1,) the first run of each chart.
+        borders: (k,) the length of each chart's border.
     """
-    turned = runs * np.exp(-1j * near)
-    off = np.angle(turned * 1j ** -np.round(np.angle(turned) / HALF_PI))
-    order = np.argsort(off, kind="stable")
-    order = order[np.abs(off[order]) <= SAME_DIRECTION]
-    until = np.cumsum(np.abs(runs[order]))
-    both = np.searchsorted(until, until[-1] / 2 * np.array([1 - RELATIVE_TOLERANCE, 1 + RELATIVE_TOLERANCE]))
-    return float(np.mod(near + off[order][both].mean(), HALF_PI))
-
-
-def _separate(angles: list[float]) -> FloatArray:
-    """Return the angles, modulo a quarter turn, without those nearly equal to an earlier one."""
-    kept: list[float] = []
-    for angle in angles:
-        off = [abs((angle - other + HALF_PI / 2) % HALF_PI - HALF_PI / 2) for other in kept]
-        if all(angle_off > SAME_DIRECTION for angle_off in off):
-            kept.append(angle)
-    return np.array(kept)
+    most = 0
+    for c in range(len(borders)):
+        most = max(most, start[c + 1] - start[c])
+    # The runs of a chart three times, a quarter turn apart: their angles, and the sums of the lengths before each.
+    around, total = np.empty(3 * most), np.empty(3 * most + 1)
+    begin, end, alike = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
+    found, count, ends = np.empty(len(angles)), 0, np.empty(len(borders), np.int64)
+    for c in range(len(borders)):
+        size, first = start[c + 1] - start[c], count
+        total[0] = 0.0
+        for j in range(3 * size):
+            at = start[c] + j % size
+            around[j] = angles[at] + (j // size - 1) * HALF_PI
+            total[j + 1] = total[j] + lengths[at]
+        low, high, largest = 0, 0, 0.0
+        for i in range(size):
+            angle = angles[start[c] + i]
+            while around[low] < angle - SAME_DIRECTION:
+                low += 1
+            while high < 3 * size and around[high] <= angle + SAME_DIRECTION:
+                high += 1
+            begin[i], end[i], alike[i] = low, high, total[high] - total[low]
+            largest = max(largest, alike[i])
+        for i in range(size if largest > MIN_STRAIGHT_SHARE * borders[c] else 0):
+            if alike[i] < largest * (1 - RELATIVE_TOLERANCE):
+                continue
+            # The median is between the first runs with so much of the length up to their ends.
+            before, after = begin[i], begin[i]
+            while before < end[i] - 1 and total[before + 1] - total[begin[i]] < alike[i] / 2 * (
+                1 - RELATIVE_TOLERANCE
+            ):
+                before += 1
+            while after < end[i] - 1 and total[after + 1] - total[begin[i]] < alike[i] / 2 * (
+                1 + RELATIVE_TOLERANCE
+            ):
+                after += 1
+            middle = ((around[before] + around[after]) / 2) % HALF_PI
+            is_new = True
+            for other in range(first, count):
+                off = (middle - found[other] + HALF_PI / 2) % HALF_PI - HALF_PI / 2
+                is_new = is_new and abs(off) > SAME_DIRECTION
+            if is_new:
+                found[count] = middle
+                count += 1
+        ends[c] = count
+    return found[:count], ends
 
 
 def along_axes(directions: list[FloatArray], turned: FloatArray, angles: FloatArray) -> BoolArray:
@@ -216,36 +334,87 @@ def along_axes(directions: list[FloatArray], turned: FloatArray, angles: FloatAr
     return allowed
 
 
-def straight_runs(sides: ComplexArray) -> ComplexArray:
-    """Return (r,) the straight runs of a border, as complex vectors with their length and their middle's direction.
+def straight_runs(outlines: Outlines) -> tuple[ComplexArray, IntArray]:
+    """Return (r,) the straight runs of borders, as complex vectors with their length and their middle's direction.
 
-    Each curve of the border is split recursively at its farthest point from the line between its ends, until all
-    pieces are straight (Ramer 1972, Douglas and Peucker 1973).
+    Each curve of a border is split recursively at its farthest point from the line between its ends, until all
+    pieces are straight (Ramer 1972, Douglas and Peucker 1973). Also (r,) the chart of each run.
     """
-    points, number = np.unique(sides.ravel(), return_inverse=True)
-    order, first = border_curves(number.reshape(-1, 2), len(points))
-    runs = [_runs_of_curve(sides[order[start:stop]]) for start, stop in pairwise(first)]
-    return np.concatenate(runs) if runs else np.empty(0, dtype=np.complex128)
+    sides, chart = outlines.sides, np.repeat(np.arange(len(outlines)), np.diff(outlines.start))
+    order, first = border_curves(*_numbered_ends(sides, chart))
+    runs, curve = runs_of_curves(sides[order], first)
+    return runs, chart[order[first[curve]]]
 
 
-def _runs_of_curve(sides: ComplexArray) -> ComplexArray:
-    """Return the straight runs of one curve, whose sides are in order."""
-    curve = sides[:, 0]
-    if sides[-1, 1] == curve[0]:
-        # If the curve has corners, the point farthest from the centre is one of them.
-        begin = int(np.abs(curve - curve.mean()).argmax())
-        curve = np.roll(curve, -begin)
-    curve = np.append(curve, curve[0] if sides[-1, 1] == sides[0, 0] else sides[-1, 1])
-    is_end = np.zeros(len(curve), dtype=np.bool_)
-    split_curve(curve.view(np.float64).reshape(-1, 2), is_end)
-    ends = np.flatnonzero(is_end)
-    along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(curve)))])
-    start, length = along[ends[:-1]], np.diff(along[ends])
-    low, high = (
-        np.interp(at, along, curve.real) + 1j * np.interp(at, along, curve.imag)
-        for at in (start + END_SHARE * length, start + (1 - END_SHARE) * length)
-    )
-    return np.asarray((high - low) / (1 - 2 * END_SHARE))
+def _numbered_ends(sides: ComplexArray, chart: IntArray) -> tuple[IntArray, int]:
+    """Return (s, 2) the number of the point at the ends of each side, and the count; charts share no point."""
+    ends, of = sides.ravel(), np.repeat(chart, 2)
+    order = np.lexsort((ends.imag, ends.real, of))
+    is_new = (np.diff(of[order]) > 0) | (np.diff(ends[order]) != 0)
+    number = np.empty(len(ends), dtype=np.int64)
+    number[order] = np.concatenate([[0], np.cumsum(is_new)])
+    return number.reshape(-1, 2), int(is_new.sum()) + 1
+
+
+@compiled
+def runs_of_curves(sides: ComplexArray, first: IntArray) -> tuple[ComplexArray, IntArray]:
+    """Return (r,) the straight runs of curves, and (r,) the curve of each.
+
+    Args:
+        sides: (s, 2) start and end of each side, in order within each curve.
+        first: (c + 1,) where each curve begins.
+    """
+    runs, of, count = np.empty(len(sides), np.complex128), np.empty(len(sides), np.int64), 0
+    for c in range(len(first) - 1):
+        begin, size = first[c], first[c + 1] - first[c]
+        is_closed, shift = sides[first[c + 1] - 1, 1] == sides[begin, 0], 0
+        if is_closed:
+            # If the curve has corners, the point farthest from the centre is one of them.
+            centre, largest = 0.0 + 0.0j, -1.0
+            for i in range(size):
+                centre += sides[begin + i, 0] / size
+            for i in range(size):
+                distance = abs(sides[begin + i, 0] - centre)
+                if distance > largest:
+                    largest, shift = distance, i
+        curve, along = np.empty((size + 1, 2)), np.zeros(size + 1)
+        for i in range(size + 1):
+            point = (
+                sides[begin + size - 1, 1]
+                if i == size and not is_closed
+                else sides[begin + (i + shift) % size, 0]
+            )
+            curve[i, 0], curve[i, 1] = point.real, point.imag
+            if i > 0:
+                along[i] = along[i - 1] + math.hypot(
+                    curve[i, 0] - curve[i - 1, 0], curve[i, 1] - curve[i - 1, 1]
+                )
+        is_end = np.zeros(size + 1, np.bool_)
+        split_curve(curve, is_end)
+        last = 0
+        for i in range(1, size + 1):
+            if is_end[i]:
+                # The run without its ends, which may bend into a rounded corner.
+                length = along[i] - along[last]
+                low = point_along(curve, along, last, i, along[last] + END_SHARE * length)
+                high = point_along(curve, along, last, i, along[last] + (1 - END_SHARE) * length)
+                runs[count] = (high - low) / (1 - 2 * END_SHARE)
+                of[count] = c
+                count += 1
+                last = i
+    return runs[:count], of[:count]
+
+
+@compiled
+def point_along(curve: FloatArray, along: FloatArray, first: int, last: int, at: float) -> complex:
+    """Return the point of a curve (n, 2) between two of its points, at a length (n,) along it."""
+    i = first
+    while i < last - 1 and along[i + 1] < at:
+        i += 1
+    length = along[i + 1] - along[i]
+    share = min((at - along[i]) / length, 1.0) if length > 0 else 0.0
+    x = curve[i, 0] + share * (curve[i + 1, 0] - curve[i, 0])
+    return complex(x, curve[i, 1] + share * (curve[i + 1, 1] - curve[i, 1]))
 
 
 @compiled

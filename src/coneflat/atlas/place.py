@@ -15,8 +15,9 @@ from ..base.progress import check_cancelled
 from ..errors import OptionError
 from .charts import Outlines
 
-# Columns of the grid per square root of the number of charts, and the maximum number of cells of all tiles.
-COLUMNS_PER_CHART, MAX_CELLS = 24.0, 4_000_000
+# Columns of the grid per square root of the number of charts, and the maximum number of cells of all tiles: at first,
+# and where gaps between the charts need more.
+COLUMNS_PER_CHART, MAX_CELLS, MOST_CELLS = 24.0, 4_000_000, 16_000_000
 # The work after which the search ends, in comparisons of runs of cells: about a second.
 MAX_WORK = 40_000_000
 # Up to OFFSET_CHARTS charts, a chart may be forced to the right, which happens in this fraction of the tries. With more
@@ -24,6 +25,10 @@ MAX_WORK = 40_000_000
 OFFSET_CHARTS, OFFSET_SHARE = 5, 0.3
 # With more charts than GROUPED_CHARTS, those whose boxes differ by less than this factor are treated as equal.
 GROUPED_CHARTS, GROUP_RATIO = 1000, 1.02
+# Number of widths in small steps that are too small, from which on the steps are larger.
+MANY_FAILURES = 5
+# Cells by which rounding enlarges a chart and the gap beside it.
+ROUNDED_CELLS = 2.0
 # Width of the grid relative to the width that charts without gaps would need, and to the longest chart. It is not a
 # round number, so that simple charts do not end at cell borders, where rounding would decide which cell is the last.
 GRID_MARGIN = 1.2347
@@ -231,11 +236,20 @@ def pack(
     """
     rng = np.random.default_rng(0)
     columns = int(max(effort.columns, COLUMNS_PER_CHART * (len(outlines) / tiles) ** 0.5))
-    columns = min(columns, int((MAX_CELLS / tiles) ** 0.5))
+    columns = int(min(columns, (MAX_CELLS / tiles) ** 0.5))
     _, extent = rotated_boxes(outlines, angles)
     extent = np.where(allowed, extent, complex(np.inf, np.inf))
     longest = float(np.maximum(extent.real, extent.imag).min(axis=1).max())
     side = GRID_MARGIN * max((area / tiles) ** 0.5, longest) or 1.0
+    widest = min(4 * columns, int((1.5 * MOST_CELLS / tiles) ** 0.5))
+    if len(outlines) > GROUPED_CHARTS:
+        # Charts in rows, with gaps that are a fraction of the width: so many cells of the width are left to each.
+        in_row = (len(outlines) / tiles) ** 0.5
+        cells = (MOST_CELLS / tiles) ** 0.5 * (1 / in_row - gap) - ROUNDED_CELLS
+        size = float(np.sqrt(extent.real * extent.imag).min(axis=1).mean())
+        columns = int(min(columns, max(cells, 0.0) * side / size if size > 0 else columns))
+    if columns < 1:
+        raise _no_space(gap, len(outlines))
     masks = cover_charts(outlines, angles, side / columns)
     box = (extent.real + extent.imag).min(axis=1)
     order = np.argsort(-box, kind="stable")
@@ -247,13 +261,12 @@ def pack(
     def fill(plan: Plan, width: int, limit: int) -> _Placed:
         return _Placed(plan, *place_all(plan, group, masks, _reach(gap * width), tiles, width, limit))
 
+    failures = 0
     while (best := fill(start, width, width)).height > width:
-        width += width // 12 + 1
-        if width > 4 * columns or tiles * width**2 > 4 * MAX_CELLS:
-            raise OptionError(
-                f"a gap of {100 * gap:.3g} % of the texture's width between {len(order):,} charts leaves no space for "
-                "them: use less padding, a higher resolution or more tiles"
-            )
+        failures += 1
+        width += width // (12 if failures < MANY_FAILURES else 4) + 1
+        if width > widest:
+            raise _no_space(gap, len(order))
     last, least, step, work = best, int(longest / masks.cell) + 1, width // 16, 0
     wanted = int(min(effort.most / masks.cell, width)) + 1
     for tried in range(effort.tries):
@@ -279,6 +292,13 @@ def pack(
     corner = complex(low.real.min(), low.imag.min())
     side = max(high.real.max() - corner.real, high.imag.max() - corner.imag)
     return Packing(min(side, width * masks.cell), masks.angle[best.chosen], shift - corner, tile)
+
+
+def _no_space(gap: float, count: int) -> OptionError:
+    return OptionError(
+        f"a gap of {100 * gap:.3g} % of the texture's width between {count:,} charts leaves no space for them: use "
+        "less padding, a higher resolution or more tiles"
+    )
 
 
 def _changed(plan: Plan, permitted: BoolArray, rng: np.random.Generator) -> Plan:
@@ -337,7 +357,7 @@ def place_all(
             for x in range(width):
                 taken[t, y, x] = clear[t, y, x] = width
     floor = np.zeros((tiles, group.max() + 1), np.int64)
-    top, work, far = 0, tiles * limit, len(reach) - 1
+    top, work, far, widest = 0, tiles * limit, len(reach) - 1, reach.max()
     for c in plan.order:
         best, shape, tile, column, row = limit + 1, -1, 0, 0, 0
         for j in range(c * turns, (c + 1) * turns):
@@ -361,12 +381,17 @@ def place_all(
                 out = reach[abs(y - row - runs[k, 0])]
                 for x in range(max(column + runs[k, 1] - out, 0), min(column + runs[k, 2] + out + 1, width)):
                     taken[tile, y, x] = x
+        left, right = max(column - widest, 0), min(column + size[shape, 0] + widest, width)
         for y in range(max(row - far, 0), min(best + far, limit)):
             following, free = width, width
-            for x in range(width - 1, -1, -1):
+            if right < width:
+                following, free = taken[tile, y, right], clear[tile, y, right]
+            for x in range(right - 1, -1, -1):
                 if taken[tile, y, x] == x:
                     free = free if following == x + 1 else x + 1
                     following = x
+                elif x < left and taken[tile, y, x] == following and clear[tile, y, x] == free:
+                    break  # What follows is the same as before, and so it is for all cells to the left.
                 taken[tile, y, x], clear[tile, y, x] = following, free
         # About 50 cells are visited in the time of a comparison.
         work += ((best - row + 2 * far) * width + 4 * far * far * (first[shape + 1] - first[shape])) // 50

@@ -50,6 +50,7 @@ class Stopwatch:
         seconds: wall time of each stage so far, in order of first appearance.
         done: fraction of the total work that was done before the current component.
         share: fraction of the total work of the current component.
+        component: which component it is, for the progress; empty if there is only one.
 
     Raises:
         OptionError: `progress` is not callable.
@@ -62,7 +63,7 @@ class Stopwatch:
             )
         self.seconds: dict[str, float] = {}
         self.done = self.share = self._within = 0.0
-        self._name = ""
+        self.component = self._name = ""
         self._progress = progress
 
     @contextmanager
@@ -85,10 +86,12 @@ class Stopwatch:
     def end_component(self) -> None:
         """Count the current component as done."""
         self.done += self.share
-        self._within = 0.0
+        self._within, self.component = 0.0, ""
 
     def report(self, detail: str = "") -> None:
         """Report the current stage and the fraction done to the callback, with an optional detail."""
         if self._progress is not None:
-            text = f"{self._name}: {detail}" if detail else self._name
-            self._progress(text, min(self.done + self.share * self._within, 1.0))
+            place = ", ".join(filter(None, [self._name, self.component]))
+            self._progress(
+                f"{place}: {detail}" if detail else place, min(self.done + self.share * self._within, 1.0)
+            )

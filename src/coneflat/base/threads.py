@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from functools import cache
@@ -30,12 +30,22 @@ def concurrently(call: Callable[[], Result], triangles: int) -> Iterator[Future[
     the function finishes before the block starts. The function and the block must not share data that either modifies.
     Compiled loops, factorizations and most of NumPy release the interpreter lock.
     """
+    # On small meshes both would mostly wait for the interpreter lock, and starting a thread takes 0.1 ms.
+    if threads() == 1 or not 2_000 <= triangles <= MEMORY_BOUND_TRIANGLES:
+        yield _finished(call)
+        return
     with ThreadPoolExecutor(1, thread_name_prefix="coneflat") as executor:
-        future = executor.submit(copy_context().run, call)
-        # On small meshes both mostly wait for the interpreter lock.
-        if threads() == 1 or not 2_000 <= triangles <= MEMORY_BOUND_TRIANGLES:
-            wait([future])
-        yield future
+        yield executor.submit(copy_context().run, call)
+
+
+def _finished(call: Callable[[], Result]) -> Future[Result]:
+    """Return the future of a call that has finished; as on another thread, its exception is raised by `result`."""
+    future = Future[Result]()
+    try:
+        future.set_result(copy_context().run(call))
+    except Exception as error:
+        future.set_exception(error)
+    return future
 
 
 def threads() -> int:

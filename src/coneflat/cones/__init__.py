@@ -6,6 +6,7 @@ from .find import (
     close_search,
     coneless_solution,
     find_cones,
+    leaves_flat_disks,
     open_search,
     unmet_requests,
     uses_sparse_search,
@@ -20,5 +21,6 @@ from .sparse.search import ConeSearch
 __all__ = [
     "ConeSearch", "GroundedLaplacian", "CONE_ANGLE_PER_TRIANGLE", "MAX_POLYHEDRON_CORNERS",
     "MAX_SEARCHED", "SparseCones", "close_search", "cones_at", "cones_with_curvature", "find_cones", "greedy_cones",
-    "coneless_solution", "open_search", "unmet_requests", "uses_sparse_search", "with_corners",
+    "coneless_solution", "leaves_flat_disks", "open_search", "unmet_requests", "uses_sparse_search",
+    "with_corners",
 ]  # fmt: skip

@@ -95,6 +95,13 @@ def uses_sparse_search(mesh: TriangleMesh, spec: ConeSpec) -> bool:
     )
 
 
+def leaves_flat_disks(spec: ConeSpec) -> bool:
+    """Return whether a flat disk gets no cones by any search: none are requested, and its boundary is free."""
+    requests = spec.count, spec.quantum
+    is_free = not (spec.prescribes_boundary or spec.searches_corners or spec.strategy == "greedy")
+    return is_free and not (len(spec.given) or len(spec.required)) and all(one is None for one in requests)
+
+
 def has_many_handles(mesh: TriangleMesh, spec: ConeSpec) -> bool:
     """Return whether a mesh has so many handles that the sparse search would take too long for the required cones."""
     if spec.strategy != "auto" or spec.needs_sparse_search or mesh.is_boundary_vertex.any():

@@ -9,7 +9,16 @@ from numbers import Integral
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import FloatArray, IntArray, as_faces, as_floats, require_finite, rows_of, unit_exponent
+from ..base.arrays import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    as_faces,
+    as_floats,
+    require_finite,
+    rows_of,
+    unit_exponent,
+)
 from ..base.jit import compiled
 from ..errors import ArrayShapeError, OptionError
 from .coverage import overlap_areas
@@ -95,6 +104,21 @@ def overlaps_of_mesh(edge_halfedges: IntArray, corners: FloatArray) -> Overlaps:
     # The sides of triangles that are not counterclockwise do not cancel with those of their neighbours.
     is_open = open_sides(edge_halfedges, corners, signs - 1)
     return _overlaps(oriented, exponent, may_overlap(corners, signs, is_open), None)
+
+
+def has_overlaps(corners: FloatArray, starts: IntArray) -> BoolArray:
+    """Return (k,) whether triangles of the same group overlap; for many small groups, which may overlap each other.
+
+    Args:
+        corners: (m, 3, 2) corners of the triangles in the plane.
+        starts: (k + 1,) the first triangle of each group, and m.
+    """
+    scaled, _ = _at_unit_size(_corners(corners, None))
+    oriented, signs = counterclockwise(scaled)
+    flat = np.ascontiguousarray(oriented).reshape(-1, 6)
+    boxes = np.empty((len(flat), 4))
+    fill_boxes(flat, 1.0, 0.0, 0.0, boxes)
+    return find_overlapping_groups(flat, signs != 0, boxes, starts, np.empty(12))
 
 
 def _overlaps(oriented: FloatArray, exponent: int, chosen: IntArray, limit: int | None) -> Overlaps:
@@ -276,6 +300,35 @@ def _lies_outside(corners: FloatArray, one: int, two: int, parts: FloatArray) ->
         if k == 6:
             return True
     return False
+
+
+@compiled
+def find_overlapping_groups(
+    corners: FloatArray, has_area: BoolArray, boxes: FloatArray, starts: IntArray, parts: FloatArray
+) -> BoolArray:
+    """Return (k,) whether two triangles of the same group overlap, by comparing all pairs of each group.
+
+    Args:
+        corners: (m, 6) corners of the triangles, counterclockwise.
+        has_area: (m,) False for triangles that cover nothing.
+        boxes: (m, 4) their boxes x0, y0, -x1, -y1.
+        starts: (k + 1,) the first triangle of each group.
+        parts: (12,) buffer for exact sums.
+    """
+    found = np.zeros(len(starts) - 1, np.bool_)
+    for group in range(len(found)):
+        for one in range(starts[group], starts[group + 1]):
+            for two in range(one + 1, starts[group + 1]):
+                if (
+                    not found[group]
+                    and has_area[one]
+                    and has_area[two]
+                    and _boxes_meet(boxes, one, two)
+                    and not _lies_outside(corners, one, two, parts)
+                    and not _lies_outside(corners, two, one, parts)
+                ):
+                    found[group] = True
+    return found
 
 
 @compiled

@@ -1,7 +1,7 @@
 """Reading of meshes from files, and writing of flattened meshes to files."""
 
 from .attributes import ALPHA, GROUPS, MATERIALS, OBJECTS, VERTEX_COLOURS, Attribute, losses, texture_files
-from .brains import VALUES, nibabel, read_label, read_vertex_values
+from .brains import VALUES, nibabel, read_label, read_structure, read_vertex_values
 from .files import (
     PIPE,
     as_path,
@@ -68,8 +68,8 @@ __all__ = [
     "imported", "INPUT_FORMATS", "Joined", "KEPT", "known_ending", "LIGHT_CELL", "lines_of", "local_positions",
     "losses", "make_folder", "MATERIAL", "MATERIALS", "nibabel", "number", "OBJECTS", "PIPE", "read_archive",
     "read_bytes", "read_flattening", "read_joined", "read_label", "read_mesh", "read_mesh_from", "read_picture",
-    "read_vertex_values", "relocated", "remove_unfinished", "shading_normals", "split_at_seams", "stored_in_glb",
-    "Texture", "texture_files", "uv_mesh_of", "UVMesh", "VALUES", "VERTEX_COLOURS", "write_flattening",
+    "read_structure", "read_vertex_values", "relocated", "remove_unfinished", "shading_normals", "split_at_seams",
+    "stored_in_glb", "Texture", "texture_files", "uv_mesh_of", "UVMesh", "VALUES", "VERTEX_COLOURS", "write_flattening",
     "write_measured", "write_parts", "write_stream",
     "CLAMP", "ImageTexture", "keys_of", "Materials", "MIRRORED", "read_materials", "readable", "REPEAT", "slot_of",
     "SLOTS", "SPECULAR", "to_linear", "to_srgb", "TRANSFORM",

@@ -48,8 +48,9 @@ def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
     """Return the mesh of a file, with its polygons, in the file's own order of vertices and faces.
 
     The format is given by the path's ending, in upper or lower case: .obj, .ply, .stl, .off, .gltf, .glb; .gii and
-    names such as lh.pial for brains. All meshes of a glTF scene are combined, each transformed by its nodes. NaN and
-    infinite coordinates are not rejected here.
+    names such as lh.pial for brains. FreeSurfer's surfaces with other names are recognized by their content. All
+    meshes of a glTF scene are combined, each transformed by its nodes. NaN and infinite coordinates are not rejected
+    here.
 
     OBJ, OFF, PLY and STL have parsers in this package, because libraries renumber vertices, split polygons, or drop the
     groups, materials and comments that are needed to write an OBJ.
@@ -86,6 +87,11 @@ def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
         raise MeshFileError(
             f"{path} is a folder, not a file; `coneflat batch` flattens all meshes in a folder"
         )
+    if path.suffix.lower() not in INPUT_FORMATS and path.is_file():
+        # The names of FreeSurfer's surfaces are not a fixed set: lh.graymid, lh.pial.T1.
+        content = read_bytes(path)
+        if is_freesurfer(content):
+            return read_mesh_from(content, path, weld)
     ending = known_ending(path, INPUT_FORMATS, "meshes are read from")
     return read_mesh_from(read_bytes(path), path, weld, ending)
 

@@ -90,6 +90,25 @@ def unfold(flat: FlatTriangles, corners: ArrayLike) -> FloatArray:
     return as_pairs(points)
 
 
+def unfold_from(flat: FlatTriangles, corners: IntArray, seeds: IntArray) -> FloatArray:
+    """Return (u, 2) the positions in the plane of the points of small flat meshes without a cut, breadth first.
+
+    Args:
+        flat: the m triangles of all meshes.
+        corners: (m, 3) the points at the triangles' corners.
+        seeds: a triangle of each mesh, whose first corner is placed at the origin.
+    """
+    corner, count = corners.ravel(), int(corners.max()) + 1
+    frame, points = np.ones(len(corners), dtype=np.complex128), np.zeros(count, dtype=np.complex128)
+    placed, reached = np.zeros(count, dtype=np.bool_), np.zeros(len(corners), dtype=np.bool_)
+    queue = np.empty(len(corners), dtype=np.int64)
+    queue[: len(seeds)] = seeds
+    reached[seeds] = placed[corners[seeds, 0]] = True
+    arrays = (flat.twin, flat.twin < 0, flat.sides, flat.turns, corner, queue)
+    spread(*arrays, len(seeds), reached, frame, placed, points)
+    return as_pairs(points)
+
+
 def _border(flat: FlatTriangles, cut: BoolArray, start: int) -> tuple[IntArray, ComplexArray]:
     """Return the border loop through a half-edge, and frames of its triangles in which the directions close up."""
     size = int(cut.sum())

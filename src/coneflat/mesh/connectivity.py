@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -209,18 +210,55 @@ class TriangleMesh:
         count, labels = self.components
         if count == 1:
             return [(self, np.arange(len(self.vertices)), np.arange(len(self.faces)))]
-        face_order = np.argsort(labels[self.faces[:, 0]], kind="stable")
-        vertex_order = np.argsort(labels, kind="stable")
-        face_cuts = np.cumsum(np.bincount(labels[self.faces[:, 0]], minlength=count))[:-1]
-        vertex_cuts = np.cumsum(np.bincount(labels, minlength=count))[:-1]
-        local = np.empty(len(labels), dtype=np.int64)
+        of_vertex, of_face, of_edge = labels, labels[self.faces[:, 0]], labels[self.edges[:, 0]]
+        vertices, faces, edges = (_Sorted.by(of, count) for of in (of_vertex, of_face, of_edge))
+        positions = self.vertices[vertices.order]
+        corners = vertices.number[self.faces[faces.order]]
+        pairs = vertices.number[self.edges[edges.order]]
+        edge_of = edges.number[self.halfedge_edges.reshape(-1, 3)[faces.order]]
+        sides = self.edge_halfedges[edges.order]
+        sides = np.where(sides < 0, -1, 3 * faces.number[sides // 3] + sides % 3)
+        on_boundary, is_outer = self.is_boundary_vertex[vertices.order], self.is_boundary_edge[edges.order]
         parts = []
-        for vertices, faces in zip(
-            np.split(vertex_order, vertex_cuts), np.split(face_order, face_cuts), strict=True
-        ):
-            local[vertices] = np.arange(len(vertices))
-            parts.append((TriangleMesh(self.vertices[vertices], local[self.faces[faces]]), vertices, faces))
+        for v, f, e in zip(vertices.slices(), faces.slices(), edges.slices(), strict=True):
+            part = TriangleMesh(positions[v], corners[f])
+            # Computed once for all parts, this takes a tenth of the time with small ones.
+            part.__dict__.update(
+                _pairing=(pairs[e], edge_of[f].reshape(-1), sides[e]),
+                is_boundary_edge=is_outer[e],
+                is_boundary_vertex=on_boundary[v],
+            )
+            parts.append((part, vertices.order[v], faces.order[f]))
         return parts
+
+
+@dataclass(frozen=True, eq=False)
+class _Sorted:
+    """Items sorted by the component that they are in.
+
+    Attributes:
+        order: (k,) the items, ascending within each component.
+        number: (k,) the place of each item in its component.
+        starts: (c + 1,) the first place of each component in the order.
+    """
+
+    order: IntArray
+    number: IntArray
+    starts: IntArray
+
+    @classmethod
+    def by(cls, component: IntArray, count: int) -> _Sorted:
+        order = np.argsort(component, kind="stable")
+        sizes = np.bincount(component, minlength=count)
+        starts = np.concatenate([[0], np.cumsum(sizes)])
+        number = np.empty(len(order), dtype=np.int64)
+        number[order] = np.arange(len(order)) - np.repeat(starts[:-1], sizes)
+        return cls(order, number, starts)
+
+    def slices(self) -> list[slice]:
+        """Return the places of each component in the order."""
+        starts = self.starts.tolist()
+        return [slice(begin, end) for begin, end in pairwise(starts)]
 
 
 def nearby(faces: IntArray, seeds: BoolArray, rings: int) -> BoolArray:

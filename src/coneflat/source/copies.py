@@ -5,7 +5,7 @@ For 60 copies of a sphere of 320 triangles this reduces the time to 44%.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,9 @@ from .parts import Part
 COPY_ROUNDING, SIDE_TOLERANCE = 2.0**-48, 1e-10
 # Digits of the values by which possible copies are grouped before they are compared.
 MATCHED_DIGITS = 6
+# Largest number of kinds of the same group with which a component is compared. Copies of a coarser precision, such as
+# that of a file, would all be kinds of their own.
+MAX_COMPARED = 8
 
 
 @dataclass(frozen=True)
@@ -34,21 +37,23 @@ class Copy:
     scale: float
 
 
-def find_copies(parts: Sequence[Part]) -> list[Copy | None]:
+def find_copies(parts: Sequence[Part], others: Container[int] = ()) -> list[Copy | None]:
     """Return for each part the part of which it is a copy, None for the first of a kind.
 
     Copies have the same connectivity with the same numbering and the same options for vertices and edges; a rotation, a
     translation and a uniform scaling map one to the other.
+
+    others: indices of parts that are not compared.
     """
     found: list[Copy | None] = [None] * len(parts)
     if len(parts) == 1:
         return found
     kinds: dict[tuple[object, ...], list[int]] = {}
     for i, part in enumerate(parts):
-        if _has_vertex_options(part):
+        if i in others or _has_vertex_options(part):
             continue
         alike = kinds.setdefault(_copy_key(part), [])
-        for first in alike:
+        for first in alike[:MAX_COMPARED]:
             scale = _scale_of_copy(parts[first], part)
             if scale is not None:
                 found[i] = Copy(first, scale)

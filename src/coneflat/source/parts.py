@@ -187,6 +187,9 @@ class Source:
         pieces = self._pieces.of((metric, marked.tobytes()), lambda: _pieces(checked.mesh, marked, lengths))
         seen = self._visibility(checked, options) if options.hide_seams else None
         is_forbidden = forbidden[checked.mesh.halfedge_edges].reshape(-1, 3)
+        areas = double_areas(
+            edge_lengths(checked.mesh.vertices, checked.mesh.faces) if own is None else lengths
+        )
         parts = tuple(
             _part(
                 piece,
@@ -194,6 +197,7 @@ class Source:
                 is_diagonal[piece[2]],
                 is_forbidden[piece[2]],
                 None if seen is None else seen[piece[1]],
+                areas[piece[2]],
                 options,
             )
             for piece in pieces
@@ -274,6 +278,7 @@ def _part(
     is_diagonal: BoolArray,
     is_forbidden: BoolArray,
     visibility: FloatArray | None,
+    areas: FloatArray,
     options: Options,
 ) -> Part:
     """Return a part with its specifications.
@@ -283,6 +288,7 @@ def _part(
         limits: constraints on its vertices.
         is_diagonal, is_forbidden: (m, 3) sides inside polygons of the input, and sides that must not be cut.
         visibility: (n,) fraction of directions from which each vertex is visible, or None.
+        areas: (m,) twice the areas of its triangles before any were opened.
         options: all options.
     """
     mesh, vertices, faces, lengths = piece
@@ -332,5 +338,4 @@ def _part(
         is_avoided=is_diagonal.ravel()[sides],
         is_forbidden=is_forbidden.ravel()[sides],
     )
-    own = edge_lengths(mesh.vertices, mesh.faces) if options.lengths is None else lengths
-    return Part(mesh, vertices, faces, lengths, double_areas(own), cones, metric, seams)
+    return Part(mesh, vertices, faces, lengths, areas, cones, metric, seams)

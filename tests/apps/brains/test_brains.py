@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -56,6 +57,9 @@ def folder(tmp_path_factory):
     )
     rows = [f"{v} 0 0 0 0" for v in np.flatnonzero(wall)]
     (here / "lh.wall.label").write_text("\n".join(["#!ascii label", str(len(rows)), *rows]) + "\n")
+    rows = [f"{v} 0 0 0 0" for v in np.flatnonzero(vertices @ [0.6, 0.64, 0.48] < -45)]
+    for name in ("lh.cap.label", "cap.label"):
+        (here / name).write_text("\n".join(["#!ascii label", str(len(rows)), *rows]) + "\n")
     return here
 
 
@@ -90,6 +94,116 @@ def test_headers_are_read_as_freesurfer_and_nibabel_read_them(folder, tmp_path, 
         (tmp_path / "lh.pial").write_bytes(b"\xff\xff\xfe" + head.encode() + short)
         with pytest.raises(MeshFileError, match=r"is truncated at [\d,]+ bytes"):
             coneflat.read_mesh(tmp_path / "lh.pial")
+
+
+@pytest.mark.parametrize("name", ["lh.fiducial", "lh.graymid", "lh.pial.T1", "rh.sphere.reg", "surface"])
+def test_surfaces_are_recognized_by_content(folder, tmp_path, name):
+    (tmp_path / name).write_bytes((folder / "lh.pial").read_bytes())
+    assert np.array_equal(
+        coneflat.read_mesh(tmp_path / name).triangles, coneflat.read_mesh(folder / "lh.pial").triangles
+    )
+    (tmp_path / name).write_bytes(b"something else")
+    with pytest.raises(UnknownFormatError):
+        coneflat.read_mesh(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("magic", "kind", "factor"), [(b"\xff\xff\xff", ">i2", 100), (b"\xff\xff\xfd", ">f4", 1)]
+)
+def test_old_surfaces_of_quads_are_read_as_nibabel_reads_them(tmp_path, magic, kind, factor):
+    """Which diagonal splits a quad depends on its first vertex; the older form rounds positions to a hundredth."""
+    columns, rows = 5, 4
+    x, y = np.meshgrid(np.arange(columns), np.arange(rows))
+    vertices = np.stack([x, y, 0.25 * x * y], axis=-1).reshape(-1, 3)
+    at = np.arange(columns * rows).reshape(rows, columns)
+    quads = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:], at[1:, :-1]], axis=-1).reshape(-1, 4)
+
+    def three_bytes(values):
+        return np.asarray(values, ">u4").reshape(-1, 1).view(np.uint8)[:, 1:].tobytes()
+
+    head = magic + three_bytes([len(vertices), len(quads)])
+    content = head + (factor * vertices).astype(kind).tobytes() + three_bytes(quads)
+    (tmp_path / "lh.orig").write_bytes(content)
+    points, faces = nibabel.freesurfer.read_geometry(tmp_path / "lh.orig")
+    mesh = coneflat.read_mesh(tmp_path / "lh.orig")
+    assert np.allclose(mesh.vertices, points)
+
+    def rotated(triangles):
+        return {tuple(np.roll(face, -int(np.argmin(face))).tolist()) for face in triangles}
+
+    assert rotated(mesh.triangles) == rotated(faces)
+    for count in (5, len(content) - 1):
+        (tmp_path / "lh.orig").write_bytes(content[:count])
+        with pytest.raises(MeshFileError, match="is truncated at"):
+            coneflat.read_mesh(tmp_path / "lh.orig")
+
+
+@pytest.mark.parametrize("up", [None, (0, 1, 0), (1, 0, 0.5)])
+def test_a_direction_of_the_surface_points_up_in_the_map(folder, flat, up):
+    """Superior by default; by a fit of the map, without weights, it points up to some degrees."""
+    found = (
+        flat if up is None else flatten_cortex(folder / "lh.pial", remove=[f"{folder}/lh.cap.label"], up=up)
+    )
+    used = np.unique(found.faces)
+    placed, points = found.surface.vertices[used], found.points[used]
+    affine = np.linalg.lstsq(placed - placed.mean(axis=0), points - points.mean(axis=0), rcond=None)[0]
+    x, y = np.array((0, 0, 1) if up is None else up) @ affine
+    assert abs(np.degrees(np.arctan2(x, y))) < 10
+
+
+def test_the_anatomical_structure_is_kept(folder, tmp_path):
+    """That of a GIFTI surface, whatever its name; else that of the name."""
+    vertices, faces = nibabel.freesurfer.read_geometry(folder / "lh.pial")
+    for name, meta, expected in (
+        ("surface.gii", "CortexRight", "CortexRight"),
+        ("lh.pial.gii", "CortexRight", "CortexRight"),
+        ("rh.pial.gii", "", "CortexRight"),
+        ("surface.gii", "Cerebellum", "Cerebellum"),
+        ("surface.gii", "", None),
+    ):
+        write_gifti(tmp_path / name, (vertices, "POINTSET"), (faces, "TRIANGLE"))
+        image = nibabel.load(tmp_path / name)
+        if meta:
+            image.darrays[0].meta["AnatomicalStructurePrimary"] = meta
+        nibabel.save(image, tmp_path / name)
+        found = flatten_cortex(tmp_path / name, remove=[f"{folder}/cap.label"], stretch=0, distortion=9.0)
+        written = nibabel.load(found.save(tmp_path / "flat.gii")).darrays[0].meta
+        assert written.get("AnatomicalStructurePrimary") == expected, (name, meta)
+    image = nibabel.load(folder / "lh.parts.gii")
+    image.meta["AnatomicalStructurePrimary"] = "CortexLeft"
+    nibabel.save(image, tmp_path / "parts.gii")
+    with pytest.raises(OptionError, match="must be of the right hemisphere, like .*, got the left one"):
+        flatten_cortex(tmp_path / "rh.pial.gii", remove=[f"{tmp_path}/parts.gii:wall"])
+
+
+def test_labels_of_another_surface_are_refused(folder, tmp_path):
+    """A file with a value for each vertex has as many as the surface, and a list has its vertices."""
+    numbers = np.ones(700, dtype=np.int32)
+    numbers[:300] = 0
+    table = np.array([[9, 9, 9, 0], [200, 0, 0, 0]])
+    nibabel.freesurfer.write_annot(tmp_path / "short.annot", numbers, table, ["wall", "rest"], fill_ctab=True)
+    nibabel.freesurfer.write_morph_data(tmp_path / "short.curv", numbers.astype(np.float32))
+    write_gifti(tmp_path / "short.gii", (numbers, "LABEL"), labels={0: "wall", 1: "rest"})
+    for label in ("short.annot:wall", "short.curv", "short.gii:wall", "short.gii"):
+        with pytest.raises(OptionError, match=r"which has 2,562 vertices, got a file of 700 vertices"):
+            flatten_cortex(folder / "lh.pial", remove=[f"{tmp_path}/{label}"])
+    (tmp_path / "cut.label").write_text("#!ascii label\n3\n1 0 0 0 0\n2 0 0 0 0\n")
+    with pytest.raises(MeshFileError, match="must have 3 vertices, as it says, got 2"):
+        flatten_cortex(folder / "lh.pial", remove=[f"{tmp_path}/cut.label"])
+
+
+def test_warnings_of_nibabel_are_lines_of_the_log(folder, tmp_path, monkeypatch, caplog, recwarn):
+    package = nibabel.freesurfer
+    annotation = package.read_annot
+
+    def read_annot(path):
+        warnings.warn("something\nodd", stacklevel=2)
+        return annotation(path)
+
+    monkeypatch.setattr(package, "read_annot", read_annot)
+    read_label(f"{folder}/lh.aparc.annot:wall")
+    assert [record.getMessage() for record in caplog.records] == [f"{folder}/lh.aparc.annot: something odd"]
+    assert len(recwarn) == 0
 
 
 def test_values_and_labels_are_read_in_all_formats(folder):
@@ -204,7 +318,7 @@ def test_bad_input_is_named(folder, flat, tmp_path):
     with pytest.raises(OptionError, match="must be of the left hemisphere, like .*, got the right one"):
         flatten_cortex(folder / "lh.pial", remove=[f"{tmp_path}/rh.wall.label"])
     (tmp_path / "lh.far.label").write_text("#!ascii label\n1\n99999 0 0 0 0\n")
-    with pytest.raises(OptionError, match=r"with 2,562 vertices, got vertex 99999"):
+    with pytest.raises(OptionError, match=r"which has 2,562 vertices, got vertex 99999"):
         flatten_cortex(folder / "lh.pial", remove=[f"{tmp_path}/lh.far.label"])
     with pytest.raises(OptionError, match="must leave triangles"):
         flatten_cortex(folder / "lh.pial", remove=[wall, f"{folder}/lh.sulc"])

@@ -48,3 +48,23 @@ def test_freesurfers_own_map_is_worse_in_all_measures(tmp_path, kind):
     assert ours.uv.distortion.qc_mean < theirs.uv.distortion.qc_mean
     assert ours.uv.distortion.area_std < theirs.uv.distortion.area_std
     assert (ours.metric < theirs.metric, ours.areal < theirs.areal, ours.inverted) == (True, True, 0)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_maps_lie_as_freesurfers_do(tmp_path, side):
+    """Superior is up, and anterior is on the side of the hemisphere, to half a right angle."""
+    for name in ("pial", "flat"):
+        (tmp_path / f"surface.{name}.gii").write_bytes(fsaverage(f"{name}_{side}"))
+    surface, theirs = (coneflat.read_mesh(tmp_path / f"surface.{name}.gii") for name in ("pial", "flat"))
+    missing = np.ones(10242, np.float32)
+    missing[theirs.triangles] = 0
+    nibabel.freesurfer.write_morph_data(tmp_path / "wall.curv", missing)
+    ours = flatten_cortex(tmp_path / "surface.pial.gii", remove=[f"{tmp_path}/wall.curv"])
+
+    def angles(points, used):
+        placed = np.column_stack([surface.vertices[used], np.ones(len(used))])
+        affine = np.linalg.lstsq(placed, points[used, :2], rcond=None)[0]
+        return np.degrees(np.arctan2(affine[1:3, 1], affine[1:3, 0]))
+
+    off = angles(ours.points, np.unique(ours.faces)) - angles(theirs.vertices, np.unique(theirs.triangles))
+    assert np.abs((off + 180) % 360 - 180).max() < 45

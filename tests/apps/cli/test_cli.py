@@ -52,6 +52,14 @@ def test_flatten_writes_mesh_report_and_table(model, tmp_path):
     np.testing.assert_array_equal(read_mesh(tmp_path / "out.obj").vertices, read_mesh(model).vertices)
 
 
+def test_the_time_row_has_all_that_a_command_takes(model, tmp_path):
+    done = run("flatten", model, "-o", "out.obj", cwd=tmp_path)
+    total, stages = re.search(r"^time +(\d+\.\d\d) s: (.*)$", done.stdout, re.MULTILINE).groups()
+    seconds = {name: float(taken) for name, taken in (stage.split() for stage in stages.split(", "))}
+    assert {"read", "check", "layout", "pack", "measure", "write", "other"} <= set(seconds)
+    assert sum(seconds.values()) == pytest.approx(float(total), abs=0.005 * len(seconds) + 0.01)
+
+
 def test_paper_is_the_published_method(model, tmp_path):
     done = run("flatten", model, "--paper", "--report", "paper.json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr

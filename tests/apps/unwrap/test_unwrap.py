@@ -336,7 +336,7 @@ def test_seams_follow_sharp_edges_where_these_bend_the_surface():
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     assert lengths[on_edge[result.seams].all(axis=1)].sum() > 0.8 * lengths.sum()
     creases = [
-        along_sharp_edges(Source(as_input(*shape)).prepared(Options()).parts[0]).seams.creases
+        along_sharp_edges(Source(as_input(*shape)).prepared(Options()).parts)[0].seams.creases
         for shape in (shapes.box(), shapes.sphere(3, 0.0))
     ]
     assert creases == [pytest.approx(0.3), 0.0]

@@ -10,7 +10,16 @@ import numpy as np
 from ... import MeshFile
 from ...base import BoolArray, FloatArray, IntArray
 from ...errors import MeshFileError, OptionError
-from ...io import Attribute, UVMesh, atomic_write, known_ending, nibabel, read_bytes, read_mesh
+from ...io import (
+    Attribute,
+    UVMesh,
+    atomic_write,
+    known_ending,
+    nibabel,
+    read_bytes,
+    read_mesh,
+    read_structure,
+)
 
 #: Endings of flat maps; FreeSurfer's patches, such as lh.flat.patch.3d, have the ending .3d.
 FLAT_FORMATS = (".gii", ".3d")
@@ -21,37 +30,39 @@ _SIDES = {
 }
 
 
-def side_of(path: Path) -> str:
-    """Return "left", "right" or "", the hemisphere that a file name tells: lh.pial, sub_hemi-R_pial.gii."""
-    found = [side for side, form in _SIDES.items() if re.search(form, path.name.lower())]
-    return found[0] if len(found) == 1 else ""
+def structure_of(path: Path) -> str:
+    """Return the anatomical structure of a surface or label, such as CortexLeft; "" if nothing tells it.
+
+    GIFTI files name it; else the file name tells the hemisphere: lh.pial, sub_hemi-R_pial.gii.
+    """
+    sides = [side for side, form in _SIDES.items() if re.search(form, path.name.lower())]
+    return read_structure(path) or (f"Cortex{sides[0].title()}" if len(sides) == 1 else "")
 
 
 def check_same_side(surface: Path, others: dict[str, Path]) -> None:
-    """Raise OptionError if a file is of the other hemisphere than the surface, by their names."""
+    """Raise OptionError if a file is of the other hemisphere than the surface."""
     for what, path in others.items():
-        if {side_of(surface), side_of(path)} == {"left", "right"}:
+        structures = structure_of(surface), structure_of(path)
+        if set(structures) == {"CortexLeft", "CortexRight"}:
+            here, there = (structure.removeprefix("Cortex").lower() for structure in structures)
             raise OptionError(
-                f"{what} {path} must be of the {side_of(surface)} hemisphere, like {surface}, got the "
-                f"{side_of(path)} one"
+                f"{what} {path} must be of the {here} hemisphere, like {surface}, got the {there} one"
             )
 
 
 def kept_in_flat(surface: MeshFile, ending: str) -> list[Attribute]:
-    """Return the attributes of the file of a surface that its flat map keeps: the hemisphere, if the name tells it."""
-    keeps_side = ending == ".gii" and side_of(surface.path)
+    """Return the attributes of the file of a surface that its flat map keeps: the hemisphere, if something tells it."""
+    keeps_side = ending == ".gii" and structure_of(surface.path)
     # The flat map has its own geometric type.
     names = ("GeometricType", "AnatomicalStructurePrimary")[: 1 + bool(keeps_side)]
     return [Attribute("metadata", name) for name in names]
 
 
-def write_gifti(path: Path, points: FloatArray, faces: IntArray, side: str) -> None:
-    """Write a flat map (n, 2) with triangles (m, 3) as a GIFTI surface, z = 0."""
+def write_gifti(path: Path, points: FloatArray, faces: IntArray, structure: str) -> None:
+    """Write a flat map (n, 2) of a structure with triangles (m, 3) as a GIFTI surface, z = 0."""
     package = nibabel()
     image, gifti = package.GiftiImage(), package.gifti
-    meta = {"GeometricType": "Flat"} | (
-        {"AnatomicalStructurePrimary": f"Cortex{side.title()}"} if side else {}
-    )
+    meta = {"GeometricType": "Flat"} | ({"AnatomicalStructurePrimary": structure} if structure else {})
     for values, intent in ((np.pad(points, ((0, 0), (0, 1))), "POINTSET"), (faces, "TRIANGLE")):
         kind = np.float32 if intent == "POINTSET" else np.int32
         more = {"meta": gifti.GiftiMetaData(meta)} if intent == "POINTSET" else {}

@@ -16,7 +16,10 @@ from ...errors import OptionError
 from ...geometry import signed_double_areas
 from ...io import UVMesh, as_path, checked_target, read_label, read_mesh
 from ...mesh import label_faces
-from .files import FLAT_FORMATS, check_same_side, side_of, write_gifti, write_patch
+from .files import FLAT_FORMATS, check_same_side, structure_of, write_gifti, write_patch
+
+#: The upward direction of a surface in the coordinates of the field, right, anterior and superior.
+SUPERIOR = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +60,7 @@ class FlatCortex:
         """
         path = checked_target(path, FLAT_FORMATS, "flat maps are written as")
         if path.suffix.lower() == ".gii":
-            write_gifti(path, self.points, self.faces, side_of(self.surface.path))
+            write_gifti(path, self.points, self.faces, structure_of(self.surface.path))
             return path
         faces = self._patch_faces()
         ends = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
@@ -73,6 +76,7 @@ def flatten_cortex(
     *,
     remove: Sequence[str] = (),
     keep: Sequence[str] = (),
+    up: Sequence[float] | None = None,
     **options: Any,
 ) -> FlatCortex:
     """Return the flat map of a cortex; relief cuts are found by the search of cones.
@@ -81,12 +85,13 @@ def flatten_cortex(
         surface: a GIFTI or FreeSurfer surface of one hemisphere.
         remove: labels to cut off, such as the medial wall; see `coneflat.io.read_label`.
         keep: labels that no cut may cross.
+        up: the direction of the surface that points up in the flat map; None for superior.
         options: as of `coneflat.flatten`; stretch is 1 by default.
 
     Raises:
         MeshFileError, OptionError: a file cannot be read, a label does not exist or is of another surface.
     """
-    path = as_path(surface)
+    path, upward = as_path(surface), SUPERIOR if up is None else up
     mesh = read_mesh(path, weld=False)
     wall, kept = (_vertices(mesh, labels) for labels in (remove, keep))
     cut_off = mask_of(len(mesh.vertices), wall)
@@ -100,12 +105,12 @@ def flatten_cortex(
     given = MeshFile(path, mesh.vertices, largest.reshape(-1), offsets, attributes=mesh.attributes)
     if len(kept):
         options["no_seams"] = kept[~cut_off[kept]]
-    result = flatten(given, **{"stretch": 1.0, "repair": True, **options})
+    result = flatten(given, **{"stretch": 1.0, "repair": True, "up": tuple(upward), **options})
     if len(largest) < len(faces):
         left_out = plural(len(faces) - len(largest), "triangle")
         note = f"{left_out} in separate pieces were left out."
         result = replace(result, notes=(*result.notes, note))
-    return _as_flat(result, mesh)
+    return _as_flat(result, mesh, np.array(upward, dtype=np.float64))
 
 
 def _vertices(mesh: MeshFile, labels: Sequence[str]) -> IntArray:
@@ -113,19 +118,15 @@ def _vertices(mesh: MeshFile, labels: Sequence[str]) -> IntArray:
     found = [np.empty(0, np.int64)]
     for label in labels:
         check_same_side(mesh.path, {"the label": Path(label.rpartition(":")[0] or label)})
-        vertices = read_label(label)
-        for vertex in vertices[(vertices < 0) | (vertices >= len(mesh.vertices))]:
-            raise OptionError(
-                f"{label} must be a label of {mesh.path} with {len(mesh.vertices):,} vertices, got vertex {vertex}"
-            )
+        vertices = read_label(label, len(mesh.vertices))
         if not len(vertices):
             raise OptionError(f"{label} must have vertices, got none: choose another label")
         found.append(vertices)
     return np.unique(np.concatenate(found))
 
 
-def _as_flat(result: Flattening, surface: MeshFile) -> FlatCortex:
-    """Return a result with one point for each vertex: that of the copy with the largest area."""
+def _as_flat(result: Flattening, surface: MeshFile, up: FloatArray) -> FlatCortex:
+    """Return a result, rotated by `up`, with one point for each vertex: that of the copy with the largest area."""
     origin = np.arange(len(result.vertices)) if result.vertex_origin is None else result.vertex_origin
     count, vertex = len(surface.vertices), np.empty(len(result.uv), np.int64)
     vertex[result.uv_faces] = origin[result.faces]
@@ -137,6 +138,27 @@ def _as_flat(result: Flattening, surface: MeshFile) -> FlatCortex:
     points = np.where(chosen[:, None] < 0, 0.0, (result.uv / result.uv_scale)[chosen])
     is_whole = (chosen[vertex[result.uv_faces]] == result.uv_faces).all(axis=1)
     faces = origin[result.faces[is_whole]]
-    middle = np.mean(points[chosen >= 0], axis=0)
-    points[chosen >= 0] -= middle
+    used = chosen >= 0
+    points[used] = rotated_up(points[used], surface.vertices[used], up, area[chosen[used]])
     return FlatCortex(result, surface, points, faces, np.bincount(vertex, minlength=count) == 1)
+
+
+def rotated_up(flat: FloatArray, positions: FloatArray, up: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return the points of a flat map (n, 2) about their mean, rotated so that a direction of the surface points up.
+
+    The direction is mapped by the affine map from the positions to the plane that fits the points best.
+
+    Args:
+        flat: (n, 2) points.
+        positions: (n, 3) their positions on the surface.
+        up: (3,) direction.
+        weights: (n,) areas around the points.
+    """
+    share = weights / weights.sum()
+    flat, placed = flat - flat.mean(axis=0), positions - share @ positions
+    roots = np.sqrt(share)[:, None]
+    affine = np.linalg.lstsq(roots * placed, roots * (flat - share @ flat), rcond=None)[0]
+    x, y = up @ affine
+    length = float(np.hypot(x, y))
+    # On a surface that is flat and seen along the direction, no direction in the plane is up.
+    return flat @ np.array([[y, x], [-x, y]]) / length if length > 0 else flat

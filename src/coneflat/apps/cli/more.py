@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...base import plural
-from ...options import FORMATS, ConeNumber, RunOptions, option, strength
+from ...options import FORMATS, ConeNumber, Direction, RunOptions, option, strength
 from .measure import rows_of_measures
 from .options import flag, keywords, option_flags, path_flag, pop_flags
 from .shared import GroupedCommand, verbosity_options
@@ -26,9 +26,11 @@ class BrainOptions(ConeNumber, RunOptions):
 
     Attributes:
         stretch: Trade-off between angles (0) and distances (1).
+        up: Direction of the surface that points up in the flat map, superior by default.
     """
 
     stretch: float = option(1.0, strength(1.0))
+    up: tuple[float, float, float] | None = option(None, Direction())
 
 
 @dataclass(frozen=True, kw_only=True)

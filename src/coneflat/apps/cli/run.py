@@ -152,8 +152,11 @@ class Console:
             self.say([f"time           {self._time_text()}"])
 
     def _time_text(self) -> str:
-        each = ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in self.seconds.items())
-        return f"{sum(self.seconds.values()):.2f} s: {each}"
+        elapsed = self.elapsed
+        # Loading modules and printing are no stages.
+        seconds = {**self.seconds, "other": max(elapsed - sum(self.seconds.values()), 0.0)}
+        each = ", ".join(f"{stage} {taken:.2f}" for stage, taken in seconds.items())
+        return f"{elapsed:.2f} s: {each}"
 
     def _result_rows(self, result: Flattening) -> list[tuple[str, str, str]]:
         """Return the main measures; if verbose, all measures and the statistics of the solvers."""

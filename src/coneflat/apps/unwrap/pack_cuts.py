@@ -7,7 +7,7 @@ places of a chart's border that are close to each other, compared with the area 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -35,12 +35,15 @@ TRIED, CONTINUED, PATIENCE = 6, 2, 2
 QUICK = Effort(columns=128, tries=12)
 
 
-def cut_for_packing(layouts: Sequence[Layout], costs: Sequence[FloatArray], gap: float) -> list[Layout]:
+def cut_for_packing(
+    layouts: Sequence[Layout], costs: Callable[[int], FloatArray], gap: float
+) -> list[Layout]:
     """Return layouts whose charts are cut such that they cover more of a square, where this is worth the seams.
 
     Args:
         layouts: layouts of one or several meshes, which are packed together.
-        costs: for each layout (e,) the costs of cutting its mesh's edges, infinite for those not to cut.
+        costs: returns for a layout, by its index, (e,) the costs of cutting its mesh's edges, infinite for those not to
+            cut.
         gap: minimum distance between charts, relative to the side of the square.
     """
     charts = _largest_charts(layouts, costs)
@@ -51,7 +54,7 @@ def cut_for_packing(layouts: Sequence[Layout], costs: Sequence[FloatArray], gap:
     return _cut(layouts, charts, _search(charts, area, max(SHARE * borders, area**0.5), gap).pieces)
 
 
-def cut_into(layouts: Sequence[Layout], costs: Sequence[FloatArray], count: int) -> list[Layout]:
+def cut_into(layouts: Sequence[Layout], costs: Callable[[int], FloatArray], count: int) -> list[Layout]:
     """Return layouts whose charts are cut until there are `count`, as far as possible.
 
     The next cut is always the shortest one relative to the root of the area that it separates.
@@ -280,7 +283,7 @@ class _State:
 
 
 def _largest_charts(
-    layouts: Sequence[Layout], costs: Sequence[FloatArray], min_piece: float = MIN_PIECE
+    layouts: Sequence[Layout], costs: Callable[[int], FloatArray], min_piece: float = MIN_PIECE
 ) -> list[_Piece]:
     """Return the largest charts of layouts, of which pieces may have a minimum share of the area."""
     found = []
@@ -294,7 +297,7 @@ def _largest_charts(
     for _, i, c in found[:MAX_CHARTS]:
         faces = np.flatnonzero(layouts[i].chart == c)
         disk = as_disk(layouts[i].points, layouts[i].corners[faces])
-        cost = costs[i][layouts[i].mesh.halfedge_edges].reshape(-1, 3)[faces].ravel()
+        cost = costs(i)[layouts[i].mesh.halfedge_edges].reshape(-1, 3)[faces].ravel()
         charts.append(_Piece(i, faces, disk, cost, least))
     return charts
 

@@ -13,9 +13,10 @@ from ... import Distortion, Flattening
 from ...base import TYPED_TOLERANCE, FloatArray, Stopwatch, Unmet, limit_threads, plural, warns
 from ...errors import ConvergenceError, OptionError
 from ...evaluate import evaluate
-from ...flatten import Method, with_copies
+from ...flatten import Method, lay_out_flat_parts, with_copies
 from ...geometry import dihedral_angles, double_areas
 from ...io import as_input
+from ...layout import joined as joined_meshes
 from ...metric import find_metric
 from ...options import Options, declarations, read_options, takes
 from ...source import Part, Source, find_copies
@@ -91,33 +92,42 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
             mirror, prepared = half_of(prepared, source, shared)
     relax, separates = RelaxSpec("off", 0.0), shared.charts == "atlas"
     method = Method(relax, separates, None, Stopwatch(), Surface.of, quick_metric, untangles=False)
-    parts = [along_sharp_edges(part) for part in prepared.parts]
-    found = dict[int, Candidate]()
+    parts, found = along_sharp_edges(prepared.parts), dict[int, Candidate]()
     areas, sizes = np.array([(double_areas(part.lengths).sum(), len(part.faces)) for part in parts]).T
     is_minor = areas < MINOR_SHARE * areas.sum()
     if o.texel_density is not None:
         side = np.sqrt(areas.sum() / 2 / COVERED / o.tiles) / 2.0**prepared.checked.exponent
         shared = replace(shared, resolution=_resolution(o.texel_density, side, o.padding))
     with limit_threads(o.threads if sizes.max() > PARALLEL else 1):
+        flat = lay_out_flat_parts(parts, watch)
+        found.update((i, Candidate(layout, ISOMETRIC, 0.0, 0.0, True)) for i, layout in flat.items())
         # Copies cannot have different numbers of charts.
-        copies = [None] * len(parts) if isinstance(o.charts, int) else find_copies(parts)
+        with watch("check"):
+            copies = [None] * len(parts) if isinstance(o.charts, int) else find_copies(parts, flat)
         originals = [i for i, copy in enumerate(copies) if copy is None]
         searches = {i: CutSearch(parts[i], o.bound, method, by_area=o.area is not None) for i in originals}
-        for group in _groups([i for i, search in searches.items() if is_minor[i] and search.may_join], sizes):
+        minor = [i for i, search in searches.items() if is_minor[i] and i not in flat and search.may_join]
+        for group in _groups(minor, sizes):
             watch.share = float(0.8 * sizes[group].sum() / sizes.sum())
             with watch("search", 1.0):
                 together = MinorParts([searches[i] for i in group]).candidates()
                 found.update((i, one) for i, one in zip(group, together, strict=True) if one is not None)
             watch.end_component()
         joined = set(found)
-        for i in [i for i in searches if i not in joined]:
+        alone = [i for i in searches if i not in joined]
+        for number, i in enumerate(alone):
+            watch.component = f"component {number + 1:,} of {len(alone):,}" if len(alone) > 1 else ""
             watch.share = float(0.8 * sizes[i] / sizes.sum())
             with watch("search", 1.0):
                 found[i] = searches[i].best()
             watch.end_component()
         layouts = [found[i].layout for i in searches]
         with watch("pack"):
-            costs = [search.costs for search in searches.values()]
+            in_order = list(searches.values())
+
+            def costs(i: int) -> FloatArray:
+                return in_order[i].costs
+
             if isinstance(o.charts, int):
                 layouts = cut_into(layouts, costs, o.charts)
             elif method.separates and o.up is None and np.isfinite(o.bound):
@@ -126,8 +136,17 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
                 # Joined parts would each need a relaxation of their own.
                 one = replace(found[i], layout=layout) if i in joined else search.shortened(found[i], layout)
                 found[i] = search.small_joined(one) if o.charts == "atlas" and one.layout.chart.any() else one
-    layouts = with_copies({i: measured(one.layout) for i, one in found.items()}, parts, copies)
-    cut = [part.seams.is_forbidden[seam_edges(one)].sum() for part, one in zip(parts, layouts, strict=True)]
+        with watch("measure"):
+            known = {
+                i: one.layout if one.layout is flat.get(i) else measured(one.layout)
+                for i, one in found.items()
+            }
+            layouts = with_copies(known, parts, copies)
+            cut = [
+                part.seams.is_forbidden[seam_edges(one)].sum()
+                for part, one in zip(parts, layouts, strict=True)
+                if len(one.seams)
+            ]
     shared = replace(shared, method=FREE)
     result = evaluate(prepared, layouts, shared, watch)
     has_risen = False
@@ -167,12 +186,22 @@ def _groups(chosen: Sequence[int], sizes: FloatArray) -> Iterator[list[int]]:
             yield group.tolist()
 
 
-def along_sharp_edges(part: Part) -> Part:
-    """Return a part with a preference for seams along sharp edges, as far as these are what bends its surface."""
-    mesh, angles = part.mesh, np.abs(dihedral_angles(part.mesh))
-    bending = angles * part.lengths.ravel()[mesh.edge_halfedges[:, 0]]
-    share = float(bending[angles > SHARP].sum() / max(bending.sum(), 1e-300))
-    return replace(part, seams=replace(part.seams, creases=max(CREASES * share, part.seams.creases)))
+def along_sharp_edges(parts: Sequence[Part]) -> list[Part]:
+    """Return parts with a preference for seams along sharp edges, as far as these are what bends their surfaces."""
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    mesh, count = joined_meshes([part.mesh for part in parts], starts), len(parts)
+    angles, lengths = np.abs(dihedral_angles(mesh)), np.concatenate([part.lengths.ravel() for part in parts])
+    bending = angles * lengths[mesh.edge_halfedges[:, 0]]
+    of = np.arange(count).repeat(np.diff(starts))[mesh.edges[:, 0]]
+    sharp = np.bincount(of, np.where(angles > SHARP, bending, 0.0), count)
+    shares = sharp / np.maximum(np.bincount(of, bending, count), 1e-300)
+    creases = [
+        max(CREASES * share, part.seams.creases) for share, part in zip(shares.tolist(), parts, strict=True)
+    ]
+    return [
+        part if strength == part.seams.creases else replace(part, seams=replace(part.seams, creases=strength))
+        for strength, part in zip(creases, parts, strict=True)
+    ]
 
 
 def _resolution(density: float, side: float, padding: float) -> int:

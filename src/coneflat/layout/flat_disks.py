@@ -1,0 +1,102 @@
+"""Layouts of many small disks that are flat already, all at once: they are unfolded, and nothing is distorted.
+
+For leaf cards and single triangles, the stages called for one component after the other take far longer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..geometry.intrinsic import intrinsic_triangulation
+from ..geometry.operators import angle_defect
+from ..geometry.overlap import has_overlaps
+from ..geometry.planar import layout_curvature
+from ..geometry.straight import FlatTriangles, straight_triangles
+from ..geometry.triangles import corner_angles
+from ..mesh.connectivity import TriangleMesh
+from ..stages import Layout, SolveStatistics
+from .relax_layouts import joined
+from .unfold import unfold_from
+from .untangle import find_degenerate
+
+# Largest curvature inside a flat disk, radians: the accuracy to which the exact metric is computed.
+FLAT_CURVATURE = 1e-10
+_NONE, _NO_PAIRS = np.empty(0, dtype=np.int64), np.empty((0, 2), dtype=np.int64)
+
+
+def lay_out_flat_disks(
+    meshes: Sequence[TriangleMesh], lengths: Sequence[FloatArray], fixed: Sequence[BoolArray]
+) -> list[Layout | None]:
+    """Return the isometric layout of each mesh; None for those that are not flat disks, or would overlap themselves.
+
+    Args:
+        meshes: connected meshes.
+        lengths: for each mesh (m, 3) its side lengths.
+        fixed: for each mesh (n,) boundary vertices that must not move.
+    """
+    if not meshes:
+        return []
+    first, starts = (np.cumsum([0, *map(len, arrays)]) for arrays in (fixed, lengths))
+    mesh, sides = joined(meshes, first), np.concatenate(lengths)
+    flat = straight_triangles(intrinsic_triangulation(mesh, sides), _NONE)
+    is_flat = _are_flat_disks(mesh, sides, flat, first, starts)
+    points = unfold_from(flat, mesh.faces, starts[:-1])
+    is_flat &= ~has_overlaps(points[mesh.faces], starts)
+    curvature = layout_curvature(mesh, points[mesh.faces])
+    target = np.where(mesh.is_boundary_vertex, curvature, 0.0)
+    zeros, chart = np.zeros(first[-1]), np.zeros(starts[-1], dtype=np.int64)
+    statistics = SolveStatistics(qc_mean_unrelaxed=1.0, qc_max_unrelaxed=1.0)
+    layouts = list[Layout | None]()
+    ranges = zip(first.tolist(), first[1:].tolist(), strict=False)
+    for i, (begin, end) in enumerate(ranges):
+        if not is_flat[i]:
+            layouts.append(None)
+            continue
+        at, component = slice(begin, end), meshes[i]
+        layouts.append(
+            Layout(
+                mesh=component,
+                lengths=lengths[i],
+                points=points[at],
+                corners=component.faces,
+                chart=chart[: len(component.faces)],
+                cones=_NONE,
+                seams=_NO_PAIRS,
+                log_scale=zeros[at],
+                target=target[at],
+                curvature=curvature[at],
+                is_open=mesh.is_boundary_vertex[at],
+                is_fixed=fixed[i],
+                statistics=statistics,
+                disk=component,
+            )
+        )
+    return layouts
+
+
+def _are_flat_disks(
+    mesh: TriangleMesh, lengths: FloatArray, flat: FlatTriangles, first: IntArray, starts: IntArray
+) -> BoolArray:
+    """Return (k,) whether each component is a disk without curvature inside and without degenerate triangles.
+
+    Args:
+        mesh: the union of k components.
+        lengths, flat: the side lengths of its triangles, and the triangles in the plane.
+        first, starts: (k + 1,) the first vertex and the first triangle of each component.
+    """
+    count = len(first) - 1
+    of_vertex, of_face = np.arange(count).repeat(np.diff(first)), np.arange(count).repeat(np.diff(starts))
+    of_edge = of_vertex[mesh.edges[:, 0]]
+    loops, loop = mesh.boundary_loops
+    of_loop = np.zeros(loops, dtype=np.int64)
+    of_loop[loop[mesh.is_boundary_vertex]] = of_vertex[mesh.is_boundary_vertex]
+    euler = np.diff(first) - np.bincount(of_edge, minlength=count) + np.diff(starts)
+    is_disk = (euler == 1) & (np.bincount(of_loop, minlength=count) == 1)
+    defect = angle_defect(mesh.faces, corner_angles(lengths), mesh.is_boundary_vertex)
+    is_curved = ~mesh.is_boundary_vertex & ~(np.abs(defect) <= FLAT_CURVATURE)
+    is_bad = find_degenerate(flat.sides.reshape(-1, 3))
+    unfit = np.bincount(of_vertex[is_curved], minlength=count) + np.bincount(of_face[is_bad], minlength=count)
+    return is_disk & (unfit == 0)
