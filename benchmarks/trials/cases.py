@@ -22,7 +22,7 @@ from .arguments import DOORS, Calls
 from .choices import cross_options, in_short, make_options
 from .commands import interrupt_command, make_command, run_command, run_without_streams
 from .files import make_file
-from .grids import grid_case, grid_of_mesh
+from .grids import few_case, grid_case, grid_of_mesh
 from .meshes import make_mesh, make_tiny
 from .outcome import LONGEST_MESSAGE, Outcome
 from .promises import check
@@ -282,6 +282,7 @@ KINDS: dict[str, Callable[[Random, Outcome], None]] = {
     "process": _process,
     "texture": texture_case,
     "grid": grid_case,
+    "few": few_case,
     "crash": _crash,
     "hang": _hang,
     "swell": _swell,
