@@ -10,7 +10,7 @@ import pytest
 import shapes
 
 from coneflat import TriangleMesh, errors, integer_grid, quads
-from coneflat.apps.quads.aligned_cones import MAX_PAIRS, _Search, aligned_cones
+from coneflat.apps.quads.aligned_cones import _Search, aligned_cones
 from coneflat.apps.quads.extract import _along_longest_side, extract_quads
 from coneflat.apps.quads.limits import (
     FEW_SQUARES,
@@ -130,7 +130,8 @@ def test_the_search_for_cones_ends_after_some_work(monkeypatch):
     monkeypatch.setattr(_Search, "_best_steps", lambda self, *rest: calls.append(1) or step(self, *rest))
     assert aligned_cones(mesh, 0.1) == usual
     many = len(calls)
-    monkeypatch.setattr("coneflat.apps.quads.aligned_cones.MAX_PAIRS", MAX_PAIRS // 1000)
+    for name in ("MAX_PAIRS_OF_FEW", "PAIRS_PER_VERTEX"):
+        monkeypatch.setattr(f"coneflat.apps.quads.aligned_cones.{name}", 1)
     calls.clear()
     with suppress(errors.CurvatureError):
         aligned_cones(mesh, 0.1)

@@ -36,9 +36,10 @@ COST_OF_AREAS, COST_OF_DIRECTIONS, TIMES_REQUIRED, COST_OF_MISSING = 15.0, 200.0
 RADII, PLACES_NEAR = (1.0, 0.6, 0.35, 0.2), 10
 # Number of triangles of a coarse mesh, on which the cones of larger meshes are searched.
 COARSE = 25_000
-# Largest number of pairs of places that a search compares, half a second of work: real models need up to a quarter.
-# Surfaces with hundreds of spikes, nearly all of whose vertices are cones, would need a hundred times as many.
-MAX_PAIRS = 10_000_000
+# Largest number of pairs of places that a search compares, half a second of work or more: for each vertex, and of small
+# meshes. Real models need up to 2,500 for each vertex, or 3 million. Surfaces with hundreds of spikes, nearly all of
+# whose vertices are cones, would need a hundred times as many.
+PAIRS_PER_VERTEX, MAX_PAIRS_OF_FEW = 6_000, 10_000_000
 # Least decrease of the cost by a step of a descent, which thus ends.
 MIN_GAIN = 1e-3
 # How often the cost of areas is doubled to meet the bound, and the bound for a distortion of 1: the log of the ratio of
@@ -202,7 +203,7 @@ class _Search:
         model.least[fixed] = model.most[fixed] = inside[fixed]
         is_border = mesh.is_boundary_vertex[model.places[fixed]]
         self.fixed_quarters = np.where(is_border, 2, 4) - inside[fixed]
-        self._pairs_left = MAX_PAIRS
+        self._pairs_left = max(MAX_PAIRS_OF_FEW, PAIRS_PER_VERTEX * len(mesh.vertices))
         self.indices = np.append(inside, start.sum() - inside.sum())
         self.price = np.append(np.full(len(inside), price), COST_OF_MISSING)
 
