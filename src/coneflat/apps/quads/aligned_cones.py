@@ -42,6 +42,8 @@ COARSE = 25_000
 PAIRS_PER_VERTEX, MAX_PAIRS_OF_FEW = 6_000, 10_000_000
 # Least decrease of the cost by a step of a descent, which thus ends.
 MIN_GAIN = 1e-3
+# Bounds of the area distortion. Below, areas would cost more than missing cones; above, nothing.
+MIN_DISTORTION, MAX_DISTORTION = 1e-3, 1e3
 # How often the cost of areas is doubled to meet the bound, and the bound for a distortion of 1: the log of the ratio of
 # the 95% and 5% quantiles of the areas of quads.
 MAX_DOUBLINGS, SPREAD = 3, 10 * np.log(2.0)
@@ -134,6 +136,7 @@ def aligned_cones(
         GridError: a grid with cones at all corners of the surface has more squares.
         CurvatureError: the mesh has too few vertices for the cones that it needs.
     """
+    distortion = min(max(distortion, MIN_DISTORTION), MAX_DISTORTION)
     angle, kept = SHARP_ANGLE if sharp_angle is None else sharp_angle, np.arange(len(mesh.vertices))
     degrees = np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
     if len(mesh.faces) > 2 * COARSE:
