@@ -22,7 +22,7 @@ from .aligned_cones import COARSE
 from .cross_field import sharp_ends
 from .features import edge_indices, lengths_along, split_edges, vertex_graph, without_pillows
 from .integer_grid import GridSearch
-from .limits import MAX_SQUARES, SquareLimit
+from .limits import MAX_SQUARES, NO_LIMIT, SquareLimit
 from .nearest import Stars, TriangleTree, slide_near
 from .options import QUADS, QuadOptions
 from .quad_mesh import QuadMesh
@@ -59,7 +59,7 @@ class SimplerMesh:
     given: TriangleMesh
     is_filling: BoolArray
     side: float
-    limit: SquareLimit
+    limit: SquareLimit = NO_LIMIT
     notes: tuple[str, ...] = ()
 
     @classmethod
