@@ -7,26 +7,30 @@ import numpy as np
 from coneflat.mesh.connectivity import TriangleMesh
 
 
-def with_caps(vertices, faces, height, count, rng):
+def with_caps(
+    vertices: np.ndarray, faces: np.ndarray, height: float, count: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
     """Return a mesh with vertices placed beside edges, at a height relative to their length."""
-    vertices, faces = list(vertices), faces.tolist()
-    for f in rng.permutation(len(faces))[:count].tolist():
-        a, b, c = faces[f]
-        across = (vertices[c] - vertices[a] + vertices[c] - vertices[b]) / 2
-        along = vertices[b] - vertices[a]
+    points, triangles = list(vertices), faces.tolist()
+    for f in rng.permutation(len(triangles))[:count].tolist():
+        a, b, c = triangles[f]
+        across = (points[c] - points[a] + points[c] - points[b]) / 2
+        along = points[b] - points[a]
         across -= along * (across @ along) / (along @ along)
-        foot = vertices[a] + rng.uniform(0.2, 0.8) * along
-        apex = len(vertices)
-        vertices.append(foot + height * np.linalg.norm(along) * across / np.linalg.norm(across))
-        faces[f] = [a, b, apex]
-        faces += [[b, c, apex], [c, a, apex]]
-    return np.array(vertices), np.array(faces)
+        foot = points[a] + rng.uniform(0.2, 0.8) * along
+        apex = len(points)
+        points.append(foot + height * np.linalg.norm(along) * across / np.linalg.norm(across))
+        triangles[f] = [a, b, apex]
+        triangles += [[b, c, apex], [c, a, apex]]
+    return np.array(points), np.array(triangles)
 
 
-def with_needles(vertices, faces, height, count, rng):
+def with_needles(
+    vertices: np.ndarray, faces: np.ndarray, height: float, count: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
     """Return a mesh with edges split at a relative distance from one of their ends."""
-    vertices, faces = list(vertices), faces.tolist()
-    mesh = TriangleMesh(np.array(vertices), np.array(faces))
+    mesh = TriangleMesh(vertices, faces)
+    points, triangles = list(vertices), faces.tolist()
     split: set[int] = set()
     for e in rng.permutation(len(mesh.edges)).tolist():
         sides = mesh.edge_halfedges[e]
@@ -35,9 +39,9 @@ def with_needles(vertices, faces, height, count, rng):
             continue
         split |= beside
         start, end = mesh.edges[e].tolist()
-        middle = len(vertices)
-        vertices.append(vertices[start] + height * (vertices[end] - vertices[start]))
+        middle = len(points)
+        points.append(points[start] + height * (points[end] - points[start]))
         for f in beside:
-            faces.append([middle if v == start else v for v in faces[f]])
-            faces[f] = [middle if v == end else v for v in faces[f]]
-    return np.array(vertices), np.array(faces)
+            triangles.append([middle if v == start else v for v in triangles[f]])
+            triangles[f] = [middle if v == end else v for v in triangles[f]]
+    return np.array(points), np.array(triangles)

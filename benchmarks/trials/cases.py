@@ -24,7 +24,7 @@ from .choices import cross_options, in_short, make_options
 from .commands import interrupt_command, make_command, run_command, run_without_streams
 from .doubled import doubled_case
 from .files import make_file
-from .grids import grid_case, grid_of_mesh
+from .grids import few_case, grid_case, grid_of_mesh
 from .meshes import make_many, make_mesh, make_tiny
 from .offsets import offset_case
 from .outcome import LONGEST_MESSAGE, Outcome
@@ -304,6 +304,7 @@ KINDS: dict[str, Callable[[Random, Outcome], None]] = {
     "offset": offset_case,
     "doubled": doubled_case,
     "grid": grid_case,
+    "few": few_case,
     "crash": _crash,
     "hang": _hang,
     "swell": _swell,

@@ -114,6 +114,73 @@ def grid_of_mesh(
         check_quads(outcome, found, grid)
 
 
+#: Surfaces of the trial of few triangles, and the numbers of quads asked for.
+FEW = (
+    surfaces.needle,
+    surfaces.needle,
+    surfaces.needle,
+    surfaces.pillow,
+    surfaces.one_or_two,
+    surfaces.fan,
+    surfaces.crate,
+    surfaces.ball,
+    surfaces.ring,
+    surfaces.tube,
+    surfaces.cone,
+    surfaces.spikes,
+    surfaces.random_hull,
+    surfaces.handles,
+)
+COUNTS = (1, 2, 5, 10, 30, 100, 1_000, 10_000, 100_000, 1_000_000, 10**9)
+#: Largest number of quads, relative to the number asked for.
+MAX_TIMES = 16
+
+
+def few_case(rng: Random, outcome: Outcome) -> None:
+    """Make quads of needles and of meshes of few triangles: few or very many quads, with random options."""
+    import coneflat
+
+    parts, makers = [], []
+    for _ in range(1 if rng.random() < 0.8 else int(rng.integers(2, 5))):
+        maker = FEW[int(rng.integers(len(FEW)))]
+        vertices, faces = maker(rng)
+        stretch = 10.0 ** rng.uniform(-3, 3, 3) if rng.random() < 0.3 else np.ones(3)
+        parts.append((vertices * stretch * surfaces.amount(rng, -2, 2), faces))
+        makers.append(maker.__name__)
+    vertices, faces = shapes.join(*parts)
+    options: dict[str, Any] = {"repair": True, "quads": int(rng.choice(COUNTS))}
+    for name, values, chance in (
+        ("stretch", (0.0, 1.0), 0.5),
+        ("boundary", ("free", "straight"), 0.4),
+        ("sharp_angle", (0.3, 0.7, 2.0), 0.3),
+        ("cones", ("sparse",), 0.25),
+        ("smooth", (0, 3), 0.5),
+        ("distortion", (0.02, 1.0), 0.2),
+    ):
+        if rng.random() < chance:
+            options[name] = values[int(rng.integers(len(values)))]
+    wanted = options["quads"]
+    if rng.random() < 0.2:
+        corners = vertices[faces]
+        area = np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        ).sum()
+        options["size"] = float(np.sqrt(area / 2 / options.pop("quads"))) or 1.0
+    outcome.recipe = f"{' and '.join(makers)}, {len(faces)} faces; {in_short(options)}"
+    found = None
+    with outcome.guarded():
+        found = coneflat.quads(vertices, faces, **options)
+    if found is None:
+        return
+    if not np.isfinite(found.vertices).all() or not np.isfinite(found.barycentric).all():
+        outcome.breach("quads: not finite", int((~np.isfinite(found.vertices)).sum()))
+    # The area, and with it the number for a size, changes a little by the repair.
+    if len(found.quads) > 1.01 * MAX_TIMES * wanted:
+        outcome.breach("quads: too many", f"{len(found.quads):,} for {wanted:,}")
+    if len(found.quads) < 50_000 and not np.isfinite(found.uv).all():
+        outcome.breach("quads: UVs not finite")
+
+
 def check_grid(outcome: Outcome, grid: Any, options: dict[str, Any]) -> None:
     """Check all guarantees of an integer grid; equations must hold exactly."""
     z = grid.corner_grid @ [1, 1j]

@@ -127,6 +127,25 @@ def cone(rng: Random) -> Mesh:
     return np.concatenate([circle, apex, [[0, 0, -rng.uniform(0, 1)]]]), np.concatenate([faces, below])
 
 
+def needle(rng: Random) -> Mesh:
+    """A body of revolution that gets as thin as a hair, open below; its tip is a ring of vertices in one place, or not.
+
+    Its radius falls with a power of the height.
+    """
+    around, rings = int(rng.integers(3, 10)), int(rng.integers(2, 6))
+    power, height, end = rng.uniform(0.5, 6), amount(rng, -1, 5), float(rng.choice([1.0, 1.0, 0.95]))
+    angle = 2 * np.pi * np.arange(around) / around
+    circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(around)], 1)
+    up = np.linspace(0, end, rings)
+    vertices = np.concatenate([circle * (1 - u) ** power + [0, 0, height * u] for u in up])
+    one = np.arange(around * (rings - 1))
+    two = one - one % around + (one + 1) % around
+    faces = np.concatenate(
+        [np.stack([one, two, two + around], 1), np.stack([one, two + around, one + around], 1)]
+    )
+    return vertices, faces
+
+
 def spikes(rng: Random) -> Mesh:
     """A sheet or a ball with vertices pulled far out of it."""
     vertices, faces = shapes.grid(*rng.integers(4, 13, 2)) if rng.random() < 0.6 else shapes.sphere(2)

@@ -157,8 +157,8 @@ class Worker:
 
 def recipe_of(kind: str, seed: int) -> str:
     """Return the description of a case that did not end."""
-    if kind == "grid":
-        return f"python benchmarks/grids.py --case {seed}"
+    if kind in ("grid", "few"):
+        return f"python benchmarks/grids.py --kind {kind} --case {seed}"
     if kind != "mesh":
         return "python benchmarks/hostile.py --case tells"
     import zlib

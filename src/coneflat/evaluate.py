@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -93,12 +93,7 @@ def evaluate(
     """
     checked = prepared.checked
     with watch("pack"):
-        numbering = _number_vertices(prepared)
-        # The triangles of all components are sorted in the order of the input's faces.
-        origin = np.concatenate([part.faces for part in prepared.parts])
-        order = np.argsort(origin, kind="stable")
-        faces = rows_of(numbering.renumber([part.mesh.faces for part in prepared.parts]), order)
-        mesh = _known_or_new(checked.mesh, np.ldexp(numbering.positions, checked.exponent), faces)
+        numbering, order, mesh = _result_mesh(prepared)
         layout = _pack(layouts, order, mesh, options)
     with watch("measure"):
         source, face_corners = prepared.given.source, prepared.given.face_corners
@@ -131,7 +126,7 @@ def evaluate(
         )
     result = Flattening(
         vertices=numbering.positions,
-        faces=faces,
+        faces=mesh.faces,
         uv=layout.uv,
         uv_faces=layout.corners,
         uv_scale=float(np.ldexp(layout.scale, checked.exponent)),
@@ -155,12 +150,39 @@ def evaluate(
         solve=combined,
         rotations=rotations,
         vertex_origin=numbering.vertex_origin,
-        face_origin=checked.face_origin[origin[order]],
+        face_origin=checked.face_origin[np.sort(np.concatenate([part.faces for part in prepared.parts]))],
         face_corners=face_corners,
         source=source,
         lengths=None if prepared.own_lengths is None else np.ldexp(prepared.own_lengths, -checked.exponent),
     )
     return replace(result, notes=(*result.notes, *unmet_guarantees(result)))
+
+
+def packed_scale(prepared: Prepared, layouts: Sequence[Layout], options: Options) -> Callable[[int], float]:
+    """Return the function from a resolution to the `uv_scale` that `evaluate` packs charts with.
+
+    The function raises OptionError if the padding leaves no space for charts.
+    """
+    _, order, mesh = _result_mesh(prepared)
+
+    def scale_at(resolution: int) -> float:
+        packed = _pack(layouts, order, mesh, replace(options, resolution=resolution))
+        return float(np.ldexp(packed.scale, prepared.checked.exponent))
+
+    return scale_at
+
+
+def _result_mesh(prepared: Prepared) -> tuple[_Numbering, IntArray, TriangleMesh]:
+    """Return the numbering of the result's vertices, (m,) the triangles of all components in its order, and its mesh.
+
+    Triangles are sorted in the order of the input's faces.
+    """
+    checked, numbering = prepared.checked, _number_vertices(prepared)
+    origin = np.concatenate([part.faces for part in prepared.parts])
+    order = np.argsort(origin, kind="stable")
+    faces = rows_of(numbering.renumber([part.mesh.faces for part in prepared.parts]), order)
+    points = np.ldexp(numbering.positions, checked.exponent)
+    return numbering, order, _known_or_new(checked.mesh, points, faces)
 
 
 def _number_vertices(prepared: Prepared) -> _Numbering:

@@ -106,7 +106,7 @@ def _parse_quads(path: Path, content: bytes) -> MeshFile:
     corners = _integers_of_three_bytes(content[end : end + 12 * quads]).reshape(-1, 4)
     # The diagonal of a quad is at its second corner if the number of its first is even.
     a, b, c, d = np.where(corners[:, :1] % 2 == 0, corners[:, [1, 2, 3, 0]], corners).T
-    return _triangles(path, points, np.stack([a, b, c, a, c, d], axis=1))
+    return _triangles(path, points, np.stack([a, b, c, a, c, d], axis=1), [])
 
 
 def _integers_of_three_bytes(content: bytes) -> IntArray:

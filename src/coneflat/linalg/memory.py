@@ -11,6 +11,8 @@ CHECKED_TRIANGLES = 1_000_000
 # Peak memory of a flattening in bytes per triangle, measured on five and ten million triangles. A search that tries
 # many cones needs more, so the check accepts some meshes that do not fit.
 BYTES_PER_TRIANGLE = 1400
+# Number of bytes from which the memory is checked.
+CHECKED_BYTES = 10**9
 CGROUP = Path("/sys/fs/cgroup")
 
 
@@ -22,11 +24,17 @@ def check_memory(triangles: int) -> None:
     """
     if triangles < CHECKED_TRIANGLES:
         return
-    needed, free = triangles * BYTES_PER_TRIANGLE, free_memory()
-    if needed > free:
-        raise TooLargeError(
-            f"{triangles:,} triangles need about {_size(needed)} of memory, but {_size(free)} are free"
-        )
+    require_memory(triangles * BYTES_PER_TRIANGLE, f"{triangles:,} triangles need")
+
+
+def require_memory(needed: float, what: str) -> None:
+    """Raise TooLargeError if a number of bytes does not fit into the free memory; not for less than a gigabyte.
+
+    Raises:
+        TooLargeError: the message has both sizes after `what`, such as "a grid needs".
+    """
+    if needed > CHECKED_BYTES and needed > (free := free_memory()):
+        raise TooLargeError(f"{what} about {_size(needed)} of memory, but {_size(free)} are free")
 
 
 def free_memory() -> float:

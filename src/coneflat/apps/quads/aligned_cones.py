@@ -24,6 +24,7 @@ from ...options import read_options
 from .cross_field import SHARP_ANGLE, directions_and_indices, sharp_ends
 from .features import split_around, split_chords, vertex_graph
 from .layout import has_area
+from .limits import NO_LIMIT, SquareLimit
 from .map_model import SAMPLES, MapModel
 from .options import FLATTENING_OPTIONS, GRID_TOLERANCE, QuadOptions, flattening_defaults
 from .sizes import extended
@@ -35,8 +36,14 @@ COST_OF_AREAS, COST_OF_DIRECTIONS, TIMES_REQUIRED, COST_OF_MISSING = 15.0, 200.0
 RADII, PLACES_NEAR = (1.0, 0.6, 0.35, 0.2), 10
 # Number of triangles of a coarse mesh, on which the cones of larger meshes are searched.
 COARSE = 25_000
+# Largest number of pairs of places that a search compares, half a second of work or more: for each vertex, and of small
+# meshes. Real models need up to 2,500 for each vertex, or 3 million. Surfaces with hundreds of spikes, nearly all of
+# whose vertices are cones, would need a hundred times as many.
+PAIRS_PER_VERTEX, MAX_PAIRS_OF_FEW = 6_000, 10_000_000
 # Least decrease of the cost by a step of a descent, which thus ends.
 MIN_GAIN = 1e-3
+# Bounds of the area distortion. Below, areas would cost more than missing cones; above, nothing.
+MIN_DISTORTION, MAX_DISTORTION = 1e-3, 1e3
 # How often the cost of areas is doubled to meet the bound, and the bound for a distortion of 1: the log of the ratio of
 # the 95% and 5% quantiles of the areas of quads.
 MAX_DOUBLINGS, SPREAD = 3, 10 * np.log(2.0)
@@ -50,6 +57,7 @@ def aligned_flattening(
     stages: Stopwatch,
     sharp_angle: float | None,
     log_scale: FloatArray | None,
+    limit: SquareLimit,
 ) -> Flattening:
     """Return a flattening with cones quantised to quarter turns, and straight boundaries.
 
@@ -61,8 +69,10 @@ def aligned_flattening(
         stages: the stopwatch.
         sharp_angle: dihedral angle of edges that are required on grid lines, or None.
         log_scale: (n,) the log scale wanted at the vertices, or None for equal sizes.
+        limit: largest number of squares of a grid.
 
     Raises:
+        GridError: a grid with cones at all corners of the surface has more squares.
         CurvatureError, MetricError, OptionError: as for `coneflat.flatten`.
     """
     own = read_options(options, QuadOptions)
@@ -72,7 +82,7 @@ def aligned_flattening(
     bounds = int(np.ceil(turns[0] - GRID_TOLERANCE)), int(np.floor(turns[1] + GRID_TOLERANCE))
     wanted = None if log_scale is None else extended(log_scale, mesh)
     with stages("cones"), limit_threads(own.threads):
-        found = aligned_cones(mesh, own.distortion, *bounds, price, sharp_angle, wanted)
+        found = aligned_cones(mesh, own.distortion, *bounds, price, sharp_angle, wanted, limit)
     cones = {vertex: quarters * np.pi / 2 for vertex, quarters in found.items()}
     given = {name: one for name, one in options.items() if name not in FLATTENING_OPTIONS}
     given |= {**flattening_defaults({"cones": cones}), "cones": cones}
@@ -108,6 +118,7 @@ def aligned_cones(
     price: float = 1.0,
     sharp_angle: float | None = None,
     log_scale: FloatArray | None = None,
+    limit: SquareLimit = NO_LIMIT,
 ) -> dict[int, int]:
     """Return cones of a connected mesh, and corners of its boundary, with their curvature in quarter turns.
 
@@ -119,10 +130,13 @@ def aligned_cones(
         sharp_angle: dihedral angle of edges that grid lines must follow, radians; None: that from which on they prefer
             to, and other directions count as much.
         log_scale: (n,) the log scale from which the distortion deviates, up to a constant; None for equal sizes.
+        limit: largest number of squares of a grid.
 
     Raises:
+        GridError: a grid with cones at all corners of the surface has more squares.
         CurvatureError: the mesh has too few vertices for the cones that it needs.
     """
+    distortion = min(max(distortion, MIN_DISTORTION), MAX_DISTORTION)
     angle, kept = SHARP_ANGLE if sharp_angle is None else sharp_angle, np.arange(len(mesh.vertices))
     degrees = np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
     if len(mesh.faces) > 2 * COARSE:
@@ -131,6 +145,7 @@ def aligned_cones(
     scale = None if log_scale is None else log_scale[kept]
     model = MapModel(mesh, directions.both, least, most, degrees[kept], scale)
     search = _Search(mesh, model, start, price, angle)
+    limit.check_cones(search.fixed_quarters)
     along = COST_OF_DIRECTIONS * (1.0 if sharp_angle is None else TIMES_REQUIRED)
     areas = COST_OF_AREAS
     for _ in range(MAX_DOUBLINGS + 1):
@@ -170,7 +185,12 @@ class _Block:
 
 
 class _Search:
-    """The descent; `indices` (p + 1,) are the curvatures at the places, the last one those without a place yet."""
+    """The descent.
+
+    Attributes:
+        indices: (p + 1,) the curvatures at the places in quarter turns; the last one is that without a place yet.
+        fixed_quarters: (k,) the angles of cones that stay where they are, in quarter turns.
+    """
 
     def __init__(
         self, mesh: TriangleMesh, model: MapModel, start: IntArray, price: float, sharp_angle: float
@@ -184,6 +204,9 @@ class _Search:
         is_corner = (inside != 0) & (edges_at > 2) & (np.abs(model.curvature - inside) < 0.25)
         fixed = np.flatnonzero(is_corner)
         model.least[fixed] = model.most[fixed] = inside[fixed]
+        is_border = mesh.is_boundary_vertex[model.places[fixed]]
+        self.fixed_quarters = np.where(is_border, 2, 4) - inside[fixed]
+        self._pairs_left = max(MAX_PAIRS_OF_FEW, PAIRS_PER_VERTEX * len(mesh.vertices))
         self.indices = np.append(inside, start.sum() - inside.sum())
         self.price = np.append(np.full(len(inside), price), COST_OF_MISSING)
 
@@ -214,14 +237,16 @@ class _Search:
         first, second = self._block(one), self._block(two)
         gram = first.scales.T @ second.scales
         squares = first.squares[:, None] + second.squares - 2 * gram
-        while True:
+        while self._pairs_left > 0:
             plus, minus = self._best_steps(first, second, squares, costs)
+            self._pairs_left -= squares.size
             if not len(plus):
                 return
             best, steps = 0, self._block(plus, minus)
             while True:
                 self.indices[plus[best]] += 1
                 self.indices[minus[best]] -= 1
+                self._pairs_left -= len(plus)
                 # Few places are all compared again after each step.
                 change = self._changes(steps, costs) + self._price_of(1)[plus] + self._price_of(-1)[minus]
                 best = int(np.argmin(np.round(change, 6)))

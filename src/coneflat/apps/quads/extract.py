@@ -19,10 +19,8 @@ from .exact_grid import ExactGrid, exact_grid
 from .features import vertex_graph
 from .grid_points import LOST, GridPoints, Ports, find_points, find_ports, join_ports
 from .integer_map import IntegerGrid
+from .limits import check_extraction
 from .quad_mesh import CoarseGridError, QuadMesh, corner_fans, degenerate_quads, opposite_sides
-
-# Largest number of squares; at about a kilobyte of peak memory for each, many machines have enough.
-MAX_SQUARES = 20_000_000
 
 
 def extract_quads(grid: IntegerGrid, leave_out: bool = False) -> QuadMesh:
@@ -41,13 +39,10 @@ def extract_quads(grid: IntegerGrid, leave_out: bool = False) -> QuadMesh:
 
     Raises:
         GridError: the map is not an integer-grid map, is so coarse that a quad has the same vertex or edge twice, or
-            has too many squares.
+            has too many squares or crossings.
+        TooLargeError: there is not enough memory.
     """
-    area = float(signed_double_areas(grid.corner_grid).sum()) / 2
-    if area > MAX_SQUARES:
-        raise GridError(
-            f"a grid of {area:,.0f} squares is too fine: at most {MAX_SQUARES:,} quads can be extracted"
-        )
+    check_extraction(grid.corner_grid)
     exact = exact_grid(grid)
     found = find_points(exact)
     ports = find_ports(exact, found)
@@ -152,7 +147,25 @@ def _barycentric(exact: ExactGrid, found: GridPoints, points: IntArray) -> Float
         areas[side == i, i] = 0.0
         areas[side == 3 + i] = np.eye(3)[i]
     areas = np.maximum(areas, 0.0)
-    return areas / areas.sum(axis=1, keepdims=True)
+    total = areas.sum(axis=1)
+    # A triangle may be so thin that it has no area in double precision.
+    thin = np.flatnonzero(~(total > 0))
+    areas[thin], total[thin] = _along_longest_side(offset[thin]), 1.0
+    return areas / total[:, None]
+
+
+def _along_longest_side(corners: FloatArray) -> FloatArray:
+    """Return (k, 3) barycentric coordinates of the point on the longest side of triangles nearest to the origin.
+
+    corners: (k, 3, 2) corners of the triangles.
+    """
+    sides = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
+    longest, row = dots(sides, sides).argmax(axis=1), np.arange(len(corners))
+    along, start = sides[row, longest], corners[row, (longest + 1) % 3]
+    share = np.clip(-dots(start, along) / np.maximum(dots(along, along), np.finfo(float).tiny), 0, 1)
+    weights = np.zeros((len(corners), 3))
+    weights[row, (longest + 1) % 3], weights[row, (longest + 2) % 3] = 1 - share, share
+    return weights
 
 
 def with_borders(quads: QuadMesh) -> QuadMesh:

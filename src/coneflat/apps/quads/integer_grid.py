@@ -27,6 +27,7 @@ from .extract import extract_quads
 from .features import edge_indices
 from .integer_map import IntegerGrid, joined_grids
 from .layout import GridLayout, aligned
+from .limits import NO_LIMIT, SquareLimit
 from .lines import grid_with_lines, with_sides
 from .options import QUADS, QuadOptions, flattening_defaults
 from .quad_mesh import CoarseGridError
@@ -74,7 +75,9 @@ def integer_grid(
         The map, with its cones and measures.
 
     Raises:
-        GridError: no grid of this size without flipped triangles was found.
+        GridError: no grid of this size without flipped triangles was found; or there would be more than 16 times as
+            many squares, or more than the triangles of the mesh can carry.
+        TooLargeError: the grid does not fit into the free memory.
         MeshError, CurvatureError, OptionError, SeamError, MetricError: as for `coneflat.flatten`.
 
     Warns:
@@ -110,6 +113,7 @@ class GridSearch:
         sizes: relative sizes of squares, or None.
         energy: the energy of the grid.
         sharp_angle: the dihedral angle of edges required on grid lines, or None.
+        limit: largest number of squares of a grid.
         boundary: the option of that name of `integer_grid`.
         options: the other options, those of the flattening.
         stages: the stopwatch.
@@ -124,6 +128,7 @@ class GridSearch:
     sizes: Any
     energy: StretchEnergy
     sharp_angle: float | None
+    limit: SquareLimit
     boundary: Any
     options: Mapping[str, Any]
     stages: Stopwatch
@@ -156,10 +161,13 @@ class GridSearch:
         source = Source(as_input(*((result.vertices, result.faces) if result else (mesh, faces))))
         boundary = parsed.boundary.tolist() if isinstance(parsed.boundary, np.ndarray) else parsed.boundary
         energy, boundary = StretchEnergy(o.stretch), "auto" if is_auto else boundary
-        found = cls(source, result, 1.0, sizes, energy, o.sharp_angle, boundary, rest, stages)
-        size = length or found.extent / float(np.sqrt(o.quads or QUADS))
+        found = cls(source, result, 1.0, sizes, energy, o.sharp_angle, NO_LIMIT, boundary, rest, stages)
+        size, extent = length or found.extent / float(np.sqrt(o.quads or QUADS)), found.extent
         # Sizes beyond this range, whose squares could overflow, fail as those at its ends.
-        return replace(found, size=min(max(size, 1e-75 * found.extent), 1e75 * found.extent))
+        size = min(max(size, 1e-75 * extent), 1e75 * extent)
+        squares = o.quads or (extent / size) ** 2
+        limit = SquareLimit.of(squares, len(found.checked.mesh.faces), extent)
+        return replace(found, size=size, limit=limit)
 
     def grid(self) -> IntegerGrid:
         """Return the grid, with the time of each stage; errors are those of `integer_grid`."""
@@ -179,8 +187,9 @@ class GridSearch:
             return self._as_given()
         except CoarseGridError as error:
             coarse, squares = error.with_traceback(None), error.grid.squares
-        finer = self.extent / float(np.sqrt(max(1.6 * squares, 32.0)))
-        if tries == 1 or (squares > 1000 and finer < 0.4 * self.size):
+        more = min(max(1.6 * squares, 32.0), self.limit.squares)
+        finer = self.extent / float(np.sqrt(more))
+        if tries == 1 or more < 1.2 * squares or (squares > 1000 and finer < 0.4 * self.size):
             raise coarse
         search = replace(self, size=finer)
         search.known.update(self.known)
@@ -259,6 +268,8 @@ class GridSearch:
                 why.append(
                     Unmet(f"No grid for a component of {plural(len(part.faces), 'triangle')}: {error}.")
                 )
+            if text := self.limit.excess(sum(grid.squares for grid in found)):
+                raise GridError(text)
         if not found:
             reason = why[0] if why else "they have no area."
             raise GridError(f"no grid was found for any of {mesh.components[0]} components: {reason}")
@@ -281,7 +292,7 @@ class GridSearch:
         key = price, price_factor > 1
         if key not in self.known:
             self.known[key] = aligned_flattening(
-                self.checked, *key, self.options, self.stages, self.sharp_angle, self.scales
+                self.checked, *key, self.options, self.stages, self.sharp_angle, self.scales, self.limit
             )
         return self.of_result(self.known[key], True, True)
 
@@ -355,7 +366,8 @@ class GridSearch:
         is_straight = result.settings.get("boundary") == "straight"
         self.stages.done = 1.0
         with self.stages("grid"), limit_threads(result.settings.get("threads", THREADS)):
-            layout = aligned(result, self.size, self._angle)
+            layout = replace(aligned(result, self.size, self._angle), limit=self.limit)
+            self.limit.check_cones(layout.node_quarters)
             sided, found, left = with_sides(layout) if is_straight else layout, None, ""
             if is_aligned or self.sharp_angle is not None:
                 lines = edge_indices(sided.mesh, sharp_ends(sided.mesh, self._angle))

@@ -27,6 +27,7 @@ from ...linalg import MultiGraph
 from ...mesh import NEXT, PREVIOUS, label_components, label_faces, point_vertices
 from .cross_field import SHARP_ANGLE, complex_sums, halfedge_angles, preferred_directions
 from .features import split_longest
+from .limits import NO_LIMIT, SquareLimit
 from .options import GRID_TOLERANCE
 
 
@@ -68,6 +69,7 @@ class GridLayout:
         cones: (s,) inner vertices.
         sides: straight sides of the boundary, along the axes.
         size: edge length of a square of the grid in model units.
+        limit: largest number of squares of a grid near this layout.
     """
 
     mesh: TriangleMesh
@@ -77,11 +79,18 @@ class GridLayout:
     cones: IntArray
     sides: Sides
     size: float
+    limit: SquareLimit = NO_LIMIT
 
     @property
     def nodes(self) -> IntArray:
         """Vertices that must lie on grid points: cones, and corners of straight sides."""
         return np.concatenate([self.cones, self.sides.corners])
+
+    @property
+    def node_quarters(self) -> IntArray:
+        """The angles at these vertices in quarter turns."""
+        z = self.points[self.corners]
+        return quarters_around(self.mesh, z[:, PREVIOUS] - z[:, NEXT])[self.nodes]
 
     @property
     def vertex(self) -> IntArray:

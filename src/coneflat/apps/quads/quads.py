@@ -6,15 +6,17 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base import Stopwatch, Unmet, plural, warns
-from ...errors import OptionError
+from ...errors import GridError, OptionError
 from ...options import read_options
 from .cross_field import sharp_ends
 from .extract import extract_quads, with_borders
 from .integer_grid import GridSearch
 from .integer_map import IntegerGrid
+from .limits import NO_LIMIT, SquareLimit
 from .options import QuadOptions
 from .quad_mesh import CoarseGridError, QuadMesh, least_jacobians
 from .simpler_mesh import SimplerMesh, simplified
@@ -50,7 +52,9 @@ def quads(
         The quad mesh, with the position of its vertices on the surface.
 
     Raises:
-        GridError: no grid of this size, or somewhat finer, without flipped triangles was found.
+        GridError: no grid of this size, or somewhat finer, without flipped triangles was found; or there would be more
+            than 16 times as many quads, or more than the triangles of the mesh can carry.
+        TooLargeError: the quads do not fit into the free memory.
         OptionError: an option is unknown or invalid.
         MeshError, CurvatureError, SeamError, MetricError: as for `coneflat.flatten`.
 
@@ -94,6 +98,7 @@ def quads(
             found, features = small.moved(found), sharp_ends(small.given)
         found = smooth_quads(found, smooth, features)
         found = found if small is None else small.completed(found)
+    _require_sound(found, search.limit if search else NO_LIMIT)
     notes = (
         *(() if small is None else small.notes),
         *grid.notes,
@@ -101,6 +106,14 @@ def quads(
         *map(Unmet, _notes(found, small)),
     )
     return replace(found, notes=notes, seconds={**grid.seconds, **stages.seconds}, grid=grid, source=source)
+
+
+def _require_sound(found: QuadMesh, limit: SquareLimit) -> None:
+    """Raise GridError for more quads than a limit, or coordinates that are not finite."""
+    if text := limit.excess(len(found.quads)):
+        raise GridError(text)
+    if bad := int((~np.isfinite(found.vertices).all(axis=1)).sum()):
+        raise GridError(f"{plural(bad, 'vertex', 'vertices')} of quads without a place: use fewer quads")
 
 
 def _notes(found: QuadMesh, small: SimplerMesh | None) -> Iterator[str]:

@@ -99,6 +99,8 @@ def _grid_near(rounding: Rounding, energy: StretchEnergy) -> tuple[IntegerGrid |
                 continue
             break
         points = _snapped(found, transitions, values)
+        if why := layout.limit.excess(replace(layout, points=points).area):
+            break
         if _folds_sides(layout, transitions, points):
             why = "sides of triangles on grid lines change their direction"
         elif (replace(layout, points=points).double_areas() > 0).all():

@@ -20,9 +20,9 @@ from ...options import declarations
 from ...source import Source
 from .aligned_cones import COARSE
 from .cross_field import sharp_ends
-from .extract import MAX_SQUARES
 from .features import edge_indices, lengths_along, split_edges, vertex_graph, without_pillows
 from .integer_grid import GridSearch
+from .limits import MAX_SQUARES, NO_LIMIT, SquareLimit
 from .nearest import Stars, TriangleTree, slide_near
 from .options import QUADS, QuadOptions
 from .quad_mesh import QuadMesh
@@ -35,6 +35,9 @@ MAX_COMPONENTS, MAX_HOLES, MAX_CORNERS = 64, 32, 400
 # A triangle is thin if its area is less than THIN times that of one with equal sides. If more than a tenth of them are,
 # as in files of CAD programs, few grids are found, so the surface is triangulated anew.
 THIN = 0.3
+# Largest number of new triangles for each thin one, in meshes of more than COARSE: the plane parts of a surface are not
+# better the finer they are.
+MAX_REFINEMENT = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +50,7 @@ class SimplerMesh:
         given: the given mesh, checked.
         is_filling: (m,) whether each of its triangles is in a filled hole.
         side: wanted edge length of quads.
+        limit: largest number of quads.
         notes: on the given mesh.
     """
 
@@ -55,6 +59,7 @@ class SimplerMesh:
     given: TriangleMesh
     is_filling: BoolArray
     side: float
+    limit: SquareLimit = NO_LIMIT
     notes: tuple[str, ...] = ()
 
     @classmethod
@@ -63,7 +68,7 @@ class SimplerMesh:
         checked, mesh = search.checked, search.checked.mesh
         mesh = mesh.moved_to(np.ldexp(mesh.vertices, -checked.exponent))
         every, none = np.arange(len(mesh.vertices)), np.zeros(len(mesh.faces), dtype=bool)
-        return cls(mesh, every, mesh, none, search.size)
+        return cls(mesh, every, mesh, none, search.size, search.limit)
 
     def moved(self, quads: QuadMesh) -> QuadMesh:
         """Return quads of the simpler mesh, or of a refinement of it, on the given mesh.
@@ -135,7 +140,8 @@ class SimplerMesh:
             coarse_mesh(part, max(16, int(count * _area(part))))[0] for part, _, _ in whole.split_components()
         ]
         small = without_pillows(joined(parts, np.cumsum([0, *(len(part.vertices) for part in parts)])))
-        small = _short_edges(small, 4 * side)[0]
+        # More would be refused.
+        small = _short_edges(small, 4 * side, self.limit.squares / 3)[0]
         n, middles = len(small.vertices), small.halfedge_edges.reshape(-1, 3)
         points = [small.vertices, *(small.vertices[ends].mean(axis=1) for ends in (small.edges, small.faces))]
         centres = n + len(small.edges) + np.arange(len(small.faces))
@@ -186,7 +192,8 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
         search = replace(search, boundary="free")
         notes.append(Unmet(f"The boundary cuts squares, because it has more than {MAX_CORNERS} corners."))
     if _is_thin(filled).mean() > 0.1 and len(without_pillows(filled).faces) == len(of):
-        simple, some, of = _retriangulated(filled, int(np.clip(4 * quads, COARSE // 6, count)))
+        finest = min(count, max(COARSE, MAX_REFINEMENT * len(of)))
+        simple, some, of = _retriangulated(filled, int(np.clip(4 * quads, COARSE // 6, finest)))
     if len(simple.faces) > 2 * count:
         simple, some, of = coarse_mesh(filled, int(count))
     elif simple is filled and is_kept.all() and not (loops or is_jagged):

@@ -29,6 +29,9 @@ ISOMETRIC, MAX_ENERGY = 4.0, 4.1
 #: The energy above that of an isometry, relative to the squared area distortion, of layouts with the least energy:
 #: 17 to 27 on seven models.
 ENERGY_PER_AREA = 20.0
+#: Bounds of the area distortion allowed. Below, the energy would be that of an isometry up to rounding; above, areas
+#: differ by factors that no number holds.
+MIN_AREA, MAX_AREA = 1e-6, 100.0
 
 
 @dataclass(frozen=True)
@@ -61,15 +64,15 @@ class TextureOptions:
         max_energy: Largest symmetric Dirichlet energy of each component, averaged by area: the sum of the squares of
             the singular values and of their inverses, 4 if nothing is stretched. A smaller value needs longer seams.
         area: Largest area distortion of each component instead of an energy: the standard deviation of the log scale,
-            weighted by area.
-        texel_density: Texels per unit of length of the model, at least, instead of a resolution, which is then the
-            smallest multiple of 4 that suffices.
+            weighted by area; from 1e-6 to 100.
+        texel_density: Texels per unit of length of the model, at least, instead of a resolution, which is then a
+            multiple of 4 that suffices, while 4 texels less do not.
         stack: mirrored: the two halves of a model that is mirrored vertex by vertex share their texels. It is cut along
             the mirror plane, which no face may cross.
     """
 
     max_energy: float = option(MAX_ENERGY, Number(is_positive=True))
-    area: float | None = option(None, Number(is_positive=True, optional=True))
+    area: float | None = option(None, Number(MIN_AREA, MAX_AREA, optional=True))
     texel_density: float | None = option(None, Number(is_positive=True, optional=True))
     stack: str = option("none", Choice(("none", "mirrored")))
 

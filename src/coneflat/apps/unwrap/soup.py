@@ -15,8 +15,9 @@ from ...io import stored_in_glb
 from ...layout import rest_sides
 from ...mesh import EdgeGroups, end_corners, glue_layers, label_faces, split_vertices, weld
 from ...options import read_options
+from .density import MAX_RESOLUTION
 from .options import UnwrapOptions
-from .unwrap import MAX_RESOLUTION, unwrap
+from .unwrap import unwrap
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from ... import Distortion, Flattening
 from ...base import TYPED_TOLERANCE, FloatArray, Stopwatch, Unmet, limit_threads, plural, warns
-from ...errors import ConvergenceError, OptionError
-from ...evaluate import evaluate
+from ...errors import ConvergenceError
+from ...evaluate import evaluate, packed_scale
 from ...flatten import Method, lay_out_flat_parts, with_copies
 from ...geometry import dihedral_angles, double_areas
 from ...io import as_input
@@ -21,6 +21,7 @@ from ...metric import find_metric
 from ...options import Options, declarations, read_options, takes
 from ...source import Part, Source, find_copies
 from ...stages import ConeSolution, FlatMetric, MetricSpec, RelaxSpec, Surface
+from .density import MAX_RESOLUTION, expected_resolution, least_resolution
 from .free import measured, seam_edges
 from .minor import MinorParts
 from .mirror import both_halves, half_of
@@ -36,8 +37,6 @@ MINOR_SHARE = 0.03
 SHARP, CREASES = np.radians(40), 0.3
 # Options that the flattening does not have, or with other values.
 OWN = (*declarations(TextureOptions), "charts", "seams")
-# Fraction of a texture that charts cover, roughly, and the largest resolution.
-COVERED, MAX_RESOLUTION = 0.65, 2**16
 # Triangles of a part from which several threads are faster than one.
 PARALLEL = 20_000
 # Newton steps of the exact metric: most meshes take 10, bad ones 100 and more.
@@ -80,8 +79,11 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         (True, 0, 0)
     """
     o = read_options(options, UnwrapOptions)
+    common = {name: getattr(o, name) for name in declarations(UnwrapOptions) if name not in OWN}
+    if o.texel_density is not None:  # the padding is limited by the largest resolution
+        common["resolution"] = MAX_RESOLUTION
     shared = Options(
-        **{name: getattr(o, name) for name in declarations(UnwrapOptions) if name not in OWN},
+        **common,
         seams=o.marked,
         charts="one" if o.charts == "one" else "atlas",
     )
@@ -96,8 +98,8 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     areas, sizes = np.array([(double_areas(part.lengths).sum(), len(part.faces)) for part in parts]).T
     is_minor = areas < MINOR_SHARE * areas.sum()
     if o.texel_density is not None:
-        side = np.sqrt(areas.sum() / 2 / COVERED / o.tiles) / 2.0**prepared.checked.exponent
-        shared = replace(shared, resolution=_resolution(o.texel_density, side, o.padding))
+        own = np.ldexp(areas / 2, -2 * prepared.checked.exponent)
+        shared = replace(shared, resolution=expected_resolution(o.texel_density, own, o.padding, o.tiles))
     with limit_threads(o.threads if sizes.max() > PARALLEL else 1):
         flat = lay_out_flat_parts(parts, watch)
         found.update((i, Candidate(layout, ISOMETRIC, 0.0, 0.0, True)) for i, layout in flat.items())
@@ -148,16 +150,12 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
                 if len(one.seams)
             ]
     shared = replace(shared, method=FREE)
-    result = evaluate(prepared, layouts, shared, watch)
-    has_risen = False
-    while o.texel_density is not None:
-        # The padding, and with it the scale, depends on the resolution.
-        resolution = _resolution(o.texel_density, 1 / result.uv_scale, o.padding)
-        if resolution == shared.resolution or (has_risen and resolution < shared.resolution):
-            break
-        has_risen |= resolution > shared.resolution
+    if o.texel_density is not None:
+        with watch("pack"):
+            scale_at = packed_scale(prepared, layouts, shared)
+            resolution = least_resolution(o.texel_density, o.padding, shared.resolution, scale_at)
         shared = replace(shared, resolution=resolution)
-        result = evaluate(prepared, layouts, shared, watch)
+    result = evaluate(prepared, layouts, shared, watch)
     notes = (
         *result.notes,
         *map(Unmet, _notes(o, [one.energy for one in found.values()], int(sum(cut)), result.distortion)),
@@ -202,18 +200,6 @@ def along_sharp_edges(parts: Sequence[Part]) -> list[Part]:
         part if strength == part.seams.creases else replace(part, seams=replace(part.seams, creases=strength))
         for strength, part in zip(creases, parts, strict=True)
     ]
-
-
-def _resolution(density: float, side: float, padding: float) -> int:
-    """Return the resolution for a number of texels per unit of length, and the length of the side of a texture."""
-    # Charts need some space next to the padding.
-    resolution = 4 * int(np.ceil(min(max(density * side / 4, 4 * padding), MAX_RESOLUTION)))
-    if resolution > MAX_RESOLUTION:
-        raise OptionError(
-            f"texel_density is too large: it needs a texture of {density * side:.3g} texels per side, and "
-            f"{MAX_RESOLUTION} are possible; expected less, or more tiles"
-        )
-    return resolution
 
 
 def _notes(o: UnwrapOptions, energies: Sequence[float], cut: int, measured: Distortion) -> Iterator[str]:
