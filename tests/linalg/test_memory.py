@@ -8,7 +8,7 @@ import shapes
 import coneflat
 from coneflat.errors import ConeflatError, TooLargeError
 from coneflat.linalg import memory
-from coneflat.linalg.memory import BYTES_PER_TRIANGLE, CHECKED_TRIANGLES, check_memory, free_memory
+from coneflat.linalg.memory import BYTES_PER_TRIANGLE, CHECKED_BYTES, check_memory, free_memory
 
 
 def free(monkeypatch, count):
@@ -17,12 +17,13 @@ def free(monkeypatch, count):
 
 def test_small_meshes_are_not_asked(monkeypatch):
     free(monkeypatch, 0)
-    check_memory(CHECKED_TRIANGLES - 1)
+    check_memory(CHECKED_BYTES // BYTES_PER_TRIANGLE)
 
 
 def test_what_fits_is_taken(monkeypatch):
-    free(monkeypatch, BYTES_PER_TRIANGLE * CHECKED_TRIANGLES)
-    check_memory(CHECKED_TRIANGLES)
+    count = CHECKED_BYTES // BYTES_PER_TRIANGLE + 1
+    free(monkeypatch, BYTES_PER_TRIANGLE * count)
+    check_memory(count)
 
 
 def test_what_does_not_fit(monkeypatch):
@@ -36,7 +37,7 @@ def test_what_does_not_fit(monkeypatch):
 
 def test_a_flattening_is_refused(monkeypatch):
     free(monkeypatch, 1e5)
-    monkeypatch.setattr(memory, "CHECKED_TRIANGLES", 100)
+    monkeypatch.setattr(memory, "CHECKED_BYTES", 100)
     with pytest.raises(TooLargeError, match="320 triangles"):
         coneflat.flatten(*shapes.sphere(2))
 

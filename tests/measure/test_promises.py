@@ -174,7 +174,7 @@ def test_needles_are_named():
     vertices, faces = shapes.sphere(2)
     one, two, _ = faces[0]
     vertices = vertices.copy()
-    vertices[one] = vertices[two] + 1e-8 * (vertices[one] - vertices[two])
+    vertices[one] = vertices[two] + 1e-10 * (vertices[one] - vertices[two])
     result = flatten(vertices, faces, relax="off")
     assert result.distortion.qc_max > 1000
     assert any(note.startswith("2 triangles with a QC distortion above 1000: 0, 4") for note in result.notes)

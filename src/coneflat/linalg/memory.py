@@ -6,12 +6,10 @@ from pathlib import Path
 
 from ..errors import TooLargeError
 
-# Number of triangles from which the memory is checked.
-CHECKED_TRIANGLES = 1_000_000
 # Peak memory of a flattening in bytes per triangle, measured on five and ten million triangles. A search that tries
 # many cones needs more, so the check accepts some meshes that do not fit.
 BYTES_PER_TRIANGLE = 1400
-# Number of bytes from which the memory is checked.
+# Number of bytes from which the memory is checked: small meshes are not slowed down.
 CHECKED_BYTES = 10**9
 CGROUP = Path("/sys/fs/cgroup")
 
@@ -22,8 +20,6 @@ def check_memory(triangles: int) -> None:
     Raises:
         TooLargeError: the message has both sizes.
     """
-    if triangles < CHECKED_TRIANGLES:
-        return
     require_memory(triangles * BYTES_PER_TRIANGLE, f"{triangles:,} triangles need")
 
 

@@ -171,7 +171,7 @@ def test_an_area_distortion_that_no_cut_reaches_gives_a_note():
         ({"seams": "none", "area": 0.1}, "seams none and area cannot be combined"),
         ({"seams": ("none", [(0, 1)]), "max_energy": 4.2}, "seams none and max_energy cannot be combined"),
         ({"stack": "mirrored", "lengths": np.ones((1, 3))}, "stack mirrored and lengths cannot be combined"),
-        ({"area": 0.0}, "area must be a number above 0, got 0"),
+        ({"area": 0.0}, "area must be a number from 1e-06 to 100, got 0"),
         ({"charts": 0}, "charts must be atlas, one or an integer from 1 to 10,000, got 0"),
         ({"charts": 2.5}, "charts must be an integer, got 2.5"),
         ({"charts": "many"}, "charts must be atlas, one or an integer from 1 to 10,000, got 'many'"),
