@@ -14,7 +14,7 @@ from ..base.arrays import FloatArray, IntArray
 from ..base.notes import Unmet
 from ..base.text import plural, short_repr
 from ..errors import OptionError
-from ..measure.guarantees import DOUBLE, SINGLE, remeasured
+from ..measure.guarantees import DOUBLE, SINGLE, first_faces, remeasured
 from ..mesh.polygons import polygon_of
 from ..options.declared import FORMATS
 from ..result import Flattening
@@ -182,7 +182,7 @@ def _in_single_precision(result: Flattening) -> Flattening:
     is_stored = np.array_equal(stored_in_glb(result.uv), result.uv)
     if is_stored and np.array_equal(vertices, result.vertices, equal_nan=True):
         return result
-    uv, overlaps = round_safely(result.uv, result.uv_faces, stored_in_glb)
+    uv, overlaps = round_safely(result.uv, result.uv_faces[first_faces(result)], stored_in_glb)
     stored = remeasured(result, replace(result, vertices=vertices, uv=uv), SINGLE, overlaps=overlaps)
     flattened = stored.distortion.degenerate_input - result.distortion.degenerate_input
     if flattened <= 0:

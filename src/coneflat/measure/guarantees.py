@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.arrays import FloatArray, unit_exponent
+from ..base.arrays import BoolArray, FloatArray, mask_of, unit_exponent
 from ..base.notes import Unmet
 from ..base.text import list_some, plural
 from ..geometry.overlap import Overlaps
@@ -82,10 +82,8 @@ def remeasured(
     old = result.distortion
     # Scaling by a power of two avoids underflow and overflow of squared lengths.
     exponent = -unit_exponent(changed.vertices[changed.faces])
-    # Two halves that share their texels do not overlap each other, so one of them is measured.
-    plane = result.settings.get("mirror_plane")
-    middles = changed.vertices[changed.faces].mean(axis=1)
-    own = slice(None) if plane is None else middles @ plane[:3] > plane[3]
+    own = first_faces(changed)
+    is_stacked = not own.all()
     points = np.ldexp(changed.vertices, exponent)
     distortion = measure(
         TriangleMesh(points, changed.faces[own]),
@@ -93,16 +91,30 @@ def remeasured(
         (old.curvature_error, old.curvature_error_max),
         changed.cones,
         changed.prescribed,
-        overlaps if plane is None else None,
+        None if is_stacked else overlaps,
         None if changed.lengths is None else np.ldexp(changed.lengths, exponent),
     )
-    if plane is not None:
+    if is_stacked:
         each = measure_map(TriangleMesh(points, changed.faces), changed.corner_uv)
         distortion = replace(distortion, qc=each.qc, log_area_scale=each.log_area_scale)
     distortion = distortion.rescaled(exponent * float(np.log(2)))
     changed = replace(changed, distortion=distortion, rotations=_rotations(result, changed))
     kept = tuple(note for note in result.notes if note not in old_notes)
     return replace(changed, notes=(*kept, *unmet_guarantees(changed, unit), *notes))
+
+
+def first_faces(result: Flattening) -> BoolArray:
+    """Return (m,) True for the faces that are measured: of several that share their texels, the first.
+
+    Halves and copies of a model that share texels by choice do not overlap each other.
+    """
+    plane, is_first = result.settings.get("mirror_plane"), np.ones(len(result.faces), dtype=bool)
+    if plane is not None:
+        is_first = result.vertices[result.faces].mean(axis=1) @ plane[:3] > plane[3]
+    elif result.settings.get("stack") == "copies":
+        _, first = np.unique(np.sort(result.uv_faces, axis=1), axis=0, return_index=True)
+        is_first = mask_of(len(is_first), first)
+    return np.asarray(is_first)
 
 
 def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:

@@ -68,13 +68,14 @@ class TextureOptions:
         texel_density: Texels per unit of length of the model, at least, instead of a resolution, which is then a
             multiple of 4 that suffices, while 4 texels less do not.
         stack: mirrored: the two halves of a model that is mirrored vertex by vertex share their texels. It is cut along
-            the mirror plane, which no face may cross.
+            the mirror plane, which no face may cross. copies: components that are copies of each other share their
+            texels, as do the two sides of cloth.
     """
 
     max_energy: float = option(MAX_ENERGY, Number(is_positive=True))
     area: float | None = option(None, Number(MIN_AREA, MAX_AREA, optional=True))
     texel_density: float | None = option(None, Number(is_positive=True, optional=True))
-    stack: str = option("none", Choice(("none", "mirrored")))
+    stack: str = option("none", Choice(("none", "mirrored", "copies")))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +105,7 @@ class UnwrapOptions(TextureOptions, SeamOptions, AtlasOptions, RunOptions):
             ("area", "max_energy", self._differs("area") and self._differs("max_energy")),
             ("seams none", "max_energy", not math.isfinite(self.bound) and self._differs("max_energy")),
             ("seams none", "area", not math.isfinite(self.bound) and self._differs("area")),
-            ("stack mirrored", "lengths", self._differs("stack") and self.lengths is not None),
+            (f"stack {self.stack}", "lengths", self._differs("stack") and self.lengths is not None),
         ):
             if are_both:
                 raise OptionError(f"{one} and {other} cannot be combined: leave out one of them")
