@@ -12,8 +12,8 @@ from ..base.arrays import BoolArray, FloatArray, mask_of, unit_exponent
 from ..base.notes import Unmet
 from ..base.text import list_some, plural
 from ..geometry.overlap import Overlaps
-from ..geometry.planar import sides_between
-from ..mesh.connectivity import TriangleMesh
+from ..geometry.planar import sides_between, signed_double_areas
+from ..mesh.connectivity import TriangleMesh, label_faces
 from .distortion import angle_sum_errors, measure, measure_map
 from .report import MAP_MEASURES
 from .seam_data import Rotations, seam_rotations
@@ -37,6 +37,8 @@ NEEDLE_QC = 1e3
 # Tolerance of the turning angle of a round boundary at a vertex: radians, as it is solved iteratively, plus a fraction
 # of the turning angle of a circle, which is not visible.
 NOT_ROUND, NOT_ROUND_SHARE = 1e-6, 0.02
+# Relative difference of the areas of the front and the back of a chart.
+SAME_AREA = 1e-6
 # Tolerated relative difference of the sides of marked seams for methods without a flat metric.
 ROUGH_TOLERANCE = 0.01
 
@@ -113,8 +115,21 @@ def first_faces(result: Flattening) -> BoolArray:
         is_first = result.vertices[result.faces].mean(axis=1) @ plane[:3] > plane[3]
     elif result.settings.get("stack") == "copies":
         _, first = np.unique(np.sort(result.uv_faces, axis=1), axis=0, return_index=True)
-        is_first = mask_of(len(is_first), first)
+        is_first = mask_of(len(is_first), first) & ~_is_back(result)
     return np.asarray(is_first)
+
+
+def _is_back(result: Flattening) -> BoolArray:
+    """Return (m,) True for the faces that are the back of others, at the same points with the opposite orientation.
+
+    Polygons of the back may be split along other diagonals, so whole charts are compared: half of their area is
+    flipped.
+    """
+    count, chart = label_faces(result.uv_faces, len(result.uv))
+    areas = signed_double_areas(result.corner_uv)
+    sizes, sums = (np.bincount(chart, values, count) for values in (np.abs(areas), areas))
+    is_doubled = np.abs(sums) <= SAME_AREA * sizes
+    return np.asarray(is_doubled[chart] & (areas < 0))
 
 
 def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:
