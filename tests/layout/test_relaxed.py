@@ -185,7 +185,7 @@ def test_small_components_are_relaxed_together_as_each_by_itself(options, monkey
         METHOD, "relax_layouts", lambda *some: sizes.append(len(some[0])) or relax_layouts(*some)
     )
     result = flatten(vertices, faces, **options)
-    assert sizes == [4, 1]
+    assert sizes[:2] == [4, 1]  # further ones are those of other cones
     assert result.distortion.flipped == 0
     alone = [flatten(*piece, **options) for piece in pieces]
     # Newton's method ends where little is left to gain, which does not say where to the last digits.

@@ -175,12 +175,12 @@ def test_a_flat_rectangle_keeps_its_shape():
 
 @pytest.mark.slow
 def test_a_grid_that_is_too_coarse_is_made_finer():
-    """A sphere with spikes and more than forty cones, in five squares."""
+    """A sphere with spikes and more than forty cones, in six squares."""
     result = flatten(*spiked(7, 0.8), quantise=np.pi / 2, charts="one", correct_handles=True)
     assert len(result.cones) > 40
-    grid = integer_grid(result, quads=5)
+    grid = integer_grid(result, quads=6)
     check_laws(grid)
-    assert any("squares, not 5." in note for note in grid.notes)
+    assert any("squares, not 6." in note for note in grid.notes)
 
 
 def test_a_note_says_what_cones_are_not_chosen_for(monkeypatch):

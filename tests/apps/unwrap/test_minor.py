@@ -59,8 +59,7 @@ def test_promises_hold_for_every_kind_of_component(name, every_part_is_minor):
         )
         area = double_areas(edge_lengths(vertices, faces[own])).sum() / 2
         assert energy.sum() < 4.1 * (1 + 1e-3) * area  # at the scale that all components share
-    if name == "box":
-        assert d.energy == pytest.approx(4)
+    assert d.energy < 4.1
 
 
 @pytest.mark.slow

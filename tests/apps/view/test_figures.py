@@ -117,7 +117,7 @@ class TestCommand:
         own = ["--color", "x.npy"] if kind == "color" else []
         code, out, _ = run("ball.obj", "--kind", kind, "--dpi", "50", *own)
         assert code == 0
-        assert re.fullmatch(rf"wrote ball_{kind}\.png\ntime .*, draw \S+\n", out)
+        assert re.fullmatch(rf"wrote ball_{kind}\.png\ntime .*, draw \S+, other \S+\n", out)
         assert (tmp_path / f"ball_{kind}.png").stat().st_size > 2000
 
     @pytest.mark.parametrize("kind", ["layout", "curve"])

@@ -85,7 +85,12 @@ class SquareLimit:
             f"the nearest grid has {squares:,.0f} squares, and at most {self.squares:,.0f} are possible for "
         )
         if squares > 2 * most_squares(self.triangles):
-            return f"{text}{plural(self.triangles, 'triangle')}: use fewer quads, or subdivide the mesh"
+            advice = (
+                "use fewer quads, or subdivide the mesh"
+                if self.wanted > self.triangles
+                else "subdivide the mesh"
+            )
+            return f"{text}{plural(self.triangles, 'triangle')}: {advice}"
         least = math.ceil(squares / MAX_TIMES)
         return f"{text}{plural(round(self.wanted), 'quad')}: use at least {least:,} quads"
 
