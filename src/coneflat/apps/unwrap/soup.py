@@ -10,7 +10,7 @@ import numpy as np
 from ...atlas import Packed, pack_charts, round_safely
 from ...base import FloatArray, IntArray, Unmet, plural
 from ...errors import ConeflatError, OptionError
-from ...geometry import as_pairs, edge_lengths
+from ...geometry import as_pairs, edge_lengths, signed_double_areas
 from ...io import stored_in_glb
 from ...layout import rest_sides
 from ...mesh import EdgeGroups, end_corners, glue_layers, label_faces, split_vertices, weld
@@ -85,6 +85,9 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
     if len(overlaps.pairs) > result.distortion.overlapping_pairs:
         count = plural(len(overlaps.pairs), "pair")
         notes.append(Unmet(f"{count} of triangles overlap in single precision."))
+    flipped = int(np.count_nonzero(signed_double_areas(uv[result.uv_faces]) < 0))
+    if flipped > result.distortion.flipped:
+        notes.append(Unmet(f"{plural(flipped, 'triangle is', 'triangles are')} flipped in single precision."))
     corner_uv[known], chart[known] = uv[result.uv_faces], label_faces(result.uv_faces, len(uv))[1]
     resolution = result.settings["resolution"]
     return UnwrappedSoup(
