@@ -1,12 +1,13 @@
-"""Comparison of two versions of the package by hashes and measures of results for many meshes and options.
+"""Comparison of two versions of the package by measures of results for many meshes and options.
 
     python benchmarks/same.py keep before.json
     python benchmarks/same.py keep after.json
     python benchmarks/same.py compare before.json after.json
 
 Meshes are the models of `../shared/meshes` and 50 deformed ones of them: noise, stretch, holes, slivers, other scales,
-other numberings. Each is flattened as one chart, as an atlas and in two of the other ways in turn; what comes out is
-hashed bit for bit (points, faces, cones, seams, scales, the report but for times), and so are the files written.
+other numberings. Each is flattened as one chart, as an atlas and in two of the other ways in turn, unwrapped, and every
+third one made into quads. Measures are compared with a tolerance for rounding, those of the published method as hashes
+of the points, bit for bit. The exit code of `compare` is 1 if any measure differs.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ import argparse
 import hashlib
 import json
 import sys
-import tempfile
 import time
+import warnings
+from collections.abc import Iterator
 from multiprocessing import Pool
 from pathlib import Path
 
@@ -48,6 +50,10 @@ WAYS: dict[str, dict[str, object]] = {
     "tiles": {"tiles": 2, "sharp_angle": 0.9, "charts": "atlas"},
     "linear": {"method": "linear", "charts": "one"},
 }
+#: Number of quads that are asked for, and each how many meshes are made into quads.
+QUADS, QUADS_EVERY = 1500, 3
+#: Relative difference of measures that rounding explains.
+ROUNDING = 1e-6
 
 
 def deformed(name: str, how: str) -> tuple[np.ndarray, np.ndarray]:
@@ -90,86 +96,102 @@ def cases() -> list[tuple[str, str, str]]:
     listed = []
     for i, (name, how) in enumerate(meshes):
         ways = ["one", "atlas", others[2 * i % len(others)], others[(2 * i + 1) % len(others)]]
+        ways += ["unwrap", *(["quads"] if i % QUADS_EVERY == 0 else [])]
         listed += [(name, how, way) for way in ways]
     return listed
 
 
-def digest(*arrays: object) -> str:
-    """Return a hash of arrays."""
-    one = hashlib.sha256()
-    for array in arrays:
-        values = np.ascontiguousarray(array)
-        one.update(f"{values.dtype.kind}{values.shape}".encode())
-        one.update(values.tobytes())
-    return one.hexdigest()[:16]
+def measures_of(case: tuple[str, str, str]) -> dict[str, object]:
+    """Return the measures of a case.
 
-
-def run(case: tuple[str, str, str]) -> tuple[str, dict[str, object]]:
-    """Return the hashes and measures of a case."""
+    Raises:
+        ConeflatError: the case is refused.
+    """
     import coneflat
 
     name, how, way = case
-    key = f"{name} {how or 'as it is'} {way}"
-    options = dict(WAYS[way])
-    if options.pop("PAPER", False):
-        options = {**coneflat.PAPER, **options}
-    start = time.perf_counter()
-    try:
-        source = MODELS / name if not how else None
-        if source is None:
-            given = deformed(name, how)
-            result = coneflat.flatten(*given, repair=True, **options)
-        else:
-            result = coneflat.flatten(source, repair=True, **options)
-    except Exception as error:
-        return key, {"error": f"{type(error).__name__}: {error}"}
-    seconds = time.perf_counter() - start
-    report = result.report()
-    for gone in ("seconds", "settings", "version", "total_seconds"):
-        report.pop(gone, None)
-    kept: dict[str, object] = {
-        "uv": digest(result.uv, result.uv_faces),
-        "mesh": digest(result.vertices, result.faces),
-        "cones": digest(result.cones, result.curvatures),
-        "scale": digest(result.log_scale, result.curvature_residual),
-        "seams": digest(result.seams),
-        "report": report,
-        "count": len(result.cones),
-        "seconds": round(seconds, 3),
-    }
-    if way in ("atlas", "sharp", "tiles"):
-        with tempfile.TemporaryDirectory() as folder:
-            for ending in (".obj", ".ply", ".glb"):
-                file = result.save(Path(folder) / f"flat{ending}")
-                kept[ending] = hashlib.sha256(file.read_bytes()).hexdigest()[:16]
-    return key, kept
+    vertices, faces = deformed(name, how) if how else (MODELS / name, None)
+    if way == "quads":
+        quad_mesh = coneflat.quads(vertices, faces, quads=QUADS, repair=True)
+        measured = coneflat.measure_quads(quad_mesh)
+        of_quads = (
+            "quads",
+            "irregular",
+            "euler_characteristic",
+            "angle_mean",
+            "edge_cv",
+            "jacobian_min",
+            "left_out",
+        )
+        return {name: getattr(measured, name) for name in of_quads} | {"notes": len(quad_mesh.notes)}
+    if way == "unwrap":
+        result = coneflat.unwrap(vertices, faces, repair=True)
+    else:
+        options = dict(WAYS[way])
+        published = coneflat.PAPER if options.pop("PAPER", False) else {}
+        result = coneflat.flatten(vertices, faces, repair=True, **published, **options)
+    names = (
+        "charts", "seam_length", "qc_mean", "qc_max", "area_std", "energy", "flipped", "degenerate",
+        "overlapping_pairs", "seam_mismatch_max", "angle_sum_error",
+    )  # fmt: skip
+    measures: dict[str, object] = {name: getattr(result.distortion, name) for name in names}
+    measures |= {"cones": len(result.cones), "packing": result.packing_efficiency, "notes": len(result.notes)}
+    if way == "paper":
+        points = np.ascontiguousarray(result.uv[result.uv_faces])
+        measures["points"] = hashlib.sha256(points.tobytes()).hexdigest()[:16]
+    return measures
 
 
-def compare(before: dict[str, dict], after: dict[str, dict]) -> int:
-    """Print the differences, and return the number of cases that differ."""
+def run(case: tuple[str, str, str]) -> tuple[str, dict[str, object]]:
+    """Return the name of a case, and its measures with the processor seconds, or why it is refused."""
+    name, how, way = case
+    key, start = f"{name} {how or 'as it is'} {way}", time.process_time()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            measures = measures_of(case)
+        except Exception as error:
+            return key, {"error": f"{type(error).__name__}: {error}"}
+    return key, measures | {"seconds": round(time.process_time() - start, 3)}
+
+
+def differences(before: dict[str, object], after: dict[str, object]) -> Iterator[str]:
+    """Yield the measures that differ by more than rounding, with both values."""
+    for name in sorted({*before, *after} - {"seconds"}):
+        values = before.get(name), after.get(name)
+        if all(isinstance(value, float) for value in values):
+            first, second = (float(str(value)) for value in values)
+            # Errors of rounding's size are no measures.
+            if abs(first - second) <= ROUNDING * max(1e-3, abs(first), abs(second)) or first == second:
+                continue
+        elif values[0] == values[1]:
+            continue
+        yield f"{name} {str(values[0])[:120]} -> {str(values[1])[:120]}"
+
+
+def compare(before: dict[str, dict[str, object]], after: dict[str, dict[str, object]]) -> int:
+    """Print the differences, sums and times by way, and return the number of cases that differ."""
     differing = 0
     for key in before:
-        one, two = dict(before[key]), dict(after.get(key, {}))
-        one.pop("seconds", None), two.pop("seconds", None)
-        one, two = json.loads(json.dumps(one)), json.loads(json.dumps(two))
-        if one == two:
-            continue
-        differing += 1
-        names = [name for name in sorted({*one, *two}) if one.get(name) != two.get(name)]
-        print(f"{key}: {', '.join(names)}")
-        if "error" in names:
-            print(f"    {one.get('error')}\n    {two.get('error')}")
-        first, second = one.get("report") or {}, two.get("report") or {}
-        if isinstance(first, dict) and isinstance(second, dict):
-            for name in sorted({*first, *second}):
-                if first.get(name) != second.get(name):
-                    print(f"    {name}: {str(first.get(name))[:150]} -> {str(second.get(name))[:150]}")
-    totals = [sum(one.get("count", 0) for one in each.values()) for each in (before, after)]
-    times = [sum(one.get("seconds", 0) for one in each.values()) for each in (before, after)]
+        found = list(differences(before[key], after[key]))
+        differing += bool(found)
+        if found:
+            print(f"{key}: {'; '.join(found)}")
+    print(f"\n{differing} of {len(before)} cases differ\n")
     print(
-        f"{differing} of {len(before)} cases differ; cones {totals[0]:,} -> {totals[1]:,}; "
-        f"seconds {times[0]:.0f} -> {times[1]:.0f}"
+        "| way | cases | cones | seams | irregular | CPU s | ratio |\n| --- | --- | --- | --- | --- | --- | --- |"
     )
+    for way in sorted({key.split()[-1] for key in before}):
+        keys = [
+            key for key in before if key.split()[-1] == way and "error" not in {**before[key], **after[key]}
+        ]
+        sums = {
+            name: [sum(float(str(cases[key].get(name, 0))) for key in keys) for cases in (before, after)]
+            for name in ("cones", "seam_length", "irregular", "seconds")
+        }
+        columns = [f"{first:.6g} -> {second:.6g}" for first, second in sums.values()]
+        ratio = sums["seconds"][1] / max(sums["seconds"][0], 1e-9)
+        print(f"| {way} | {len(keys)} | {' | '.join(columns)} | {ratio:.3f} |")
     return differing
 
 
@@ -185,12 +207,12 @@ def main() -> None:
     comparing.add_argument("after", type=Path)
     arguments = parser.parse_args()
     if arguments.command == "compare":
-        before, after = (json.loads(each.read_text()) for each in (arguments.before, arguments.after))
+        before, after = (json.loads(path.read_text()) for path in (arguments.before, arguments.after))
         sys.exit(bool(compare({key: before[key] for key in before if key in after}, after)))
     with Pool(arguments.jobs) as pool:
-        found = dict(pool.imap_unordered(run, cases()[:: arguments.every]))
-    arguments.file.write_text(json.dumps(found, indent=1, sort_keys=True, default=str))
-    print(f"{len(found)} cases, {sum('error' in one for one in found.values())} refused")
+        results = dict(pool.imap_unordered(run, cases()[:: arguments.every]))
+    arguments.file.write_text(json.dumps(results, indent=1, sort_keys=True, default=float))
+    print(f"{len(results)} cases, {sum('error' in measures for measures in results.values())} refused")
 
 
 if __name__ == "__main__":

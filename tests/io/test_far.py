@@ -13,6 +13,7 @@ from trials.offsets import READERS
 import coneflat
 from coneflat.errors import ConeflatError, MeshFileError
 from coneflat.io import local_positions, read_mesh, read_mesh_from
+from coneflat.source.rounding import coarse_step
 
 OFFSETS = ([1e6, -3e6, 7e5], [452345.1, 5411234.5, 300.0], [1e8, -1e8, 0.1])
 
@@ -181,3 +182,18 @@ def test_sizes_beyond_32_bits_are_refused():
     vertices, faces = shapes.hill(3, 3)
     with pytest.raises(MeshFileError, match=r"beyond the 32-bit numbers of \.glb"):
         coneflat.flatten(1e20 * vertices, faces).as_written(".glb")
+
+
+@pytest.mark.parametrize("height", [0.0, 1.5])
+def test_the_step_of_a_flat_map_is_that_of_its_extended_axes(height):
+    """A map rounded to metres, on a plane."""
+    vertices, faces = shapes.grid(12, 12)
+    vertices = np.round(vertices * 11 * 0.3 + [5e5, 5e6, 0])
+    vertices[:, 2] = height
+    step, count = coarse_step(vertices, faces)
+    assert step == 1.0
+    assert count > 0
+
+
+def test_a_point_at_the_origin_is_not_put_down_to_rounding():
+    assert coarse_step(np.zeros((3, 3)), np.array([[0, 1, 2]])) == (0.0, 0)

@@ -28,6 +28,8 @@ NEAREST = 9728
 _IMAGE_EXTENSIONS = ("EXT_texture_webp", "EXT_texture_avif")
 TRANSFORM = "KHR_texture_transform"
 SPECULAR = "KHR_materials_pbrSpecularGlossiness"
+#: A material without properties; that of glTF would be of metal.
+PLAIN: Item = {"pbrMetallicRoughness": {"metallicFactor": 0.0}}
 #: The properties of a material that refer to images, the most important one first.
 SLOTS = (
     "baseColorTexture", "normalTexture", "metallicRoughnessTexture", "occlusionTexture", "emissiveTexture",
@@ -87,7 +89,7 @@ def read_materials(mesh: MeshFile) -> Materials:
         # Without numbers, the first image is that of all faces.
         numbers = mesh.face_properties.get("texnumber", np.zeros(count))
         return _of_images(mesh.path, images, np.asarray(numbers, np.int64))
-    return Materials([{}], np.zeros(count, np.int64), _no_texture(mesh.path))
+    return Materials([PLAIN], np.zeros(count, np.int64), _no_texture(mesh.path))
 
 
 def slot_of(item: Item, name: str) -> Any:
@@ -207,7 +209,9 @@ def _of_obj(folder: Path, text: ObjText, count: int) -> Materials:
     if unknown:
         notes.append(f"Materials that are in no library are white: {list_some(unknown)}.")
     textures: dict[tuple[Path, bool], ImageTexture] = {}
-    items = [_as_item(name, *found[name], textures) if name in found else {"name": name} for name in names]
+    items = [
+        _as_item(name, *found[name], textures) if name in found else {"name": name, **PLAIN} for name in names
+    ]
     for name in names:
         material = found[name][1] if name in found else MtlMaterial()
         if material.left_out:
@@ -215,7 +219,7 @@ def _of_obj(folder: Path, text: ObjText, count: int) -> Materials:
         if material.image is not None and not any(material.colour):
             notes.append(f"The material {name} is black (Kd 0 0 0), and so is its image {material.image}.")
     listed = list(textures.values())
-    return Materials([*items, {}], polygon % (len(items) + 1), listed.__getitem__, tuple(notes), unknown)
+    return Materials([*items, PLAIN], polygon % (len(items) + 1), listed.__getitem__, tuple(notes), unknown)
 
 
 def _as_item(
@@ -269,4 +273,4 @@ def _of_images(path: Path, names: tuple[str, ...], image: IntArray) -> Materials
     unused = [name for number, name in enumerate(names) if number not in image]
     if unused:
         notes.append(f"No face of {path.name} has the texture {list_some(unused)}.")
-    return Materials([*items, {}], np.where(is_known, image, len(names)), texture, tuple(notes))
+    return Materials([*items, PLAIN], np.where(is_known, image, len(names)), texture, tuple(notes))

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 
 from ..base.arrays import IntArray
-from ..errors import MeshFileError
 from .obj import ObjText
 
 #: Options of maps, with the largest number of their values. Of -o, -s and -t, all values but the first are optional.
@@ -49,11 +48,7 @@ class MtlMaterial:
 
 
 def parse_mtl(path: Path, content: bytes) -> dict[str, MtlMaterial]:
-    """Return the materials of an MTL file by name.
-
-    Raises:
-        MeshFileError: a colour or an option is not a number, or a line is before the first material.
-    """
+    """Return the materials of an MTL file by name; lines that cannot be read are left out."""
     materials: dict[str, MtlMaterial] = {}
     name: str | None = None
     for number, line in enumerate(content.removeprefix(b"\xef\xbb\xbf").splitlines(), 1):
@@ -66,7 +61,7 @@ def parse_mtl(path: Path, content: bytes) -> dict[str, MtlMaterial]:
             try:
                 materials[name] = _with_line(materials[name], keyword, text)
             except ValueError as error:
-                raise MeshFileError(f"{path}, line {number}: {keyword}: {error}") from error
+                materials[name] = _without(materials[name], f"{keyword} in line {number} ({error})")
     return materials
 
 

@@ -37,13 +37,19 @@ class Copy:
     scale: float
 
 
-def find_copies(parts: Sequence[Part], others: Container[int] = ()) -> list[Copy | None]:
+def find_copies(
+    parts: Sequence[Part], others: Container[int] = (), rounding: float | None = None
+) -> list[Copy | None]:
     """Return for each part the part of which it is a copy, None for the first of a kind.
 
     Copies have the same connectivity with the same numbering and the same options for vertices and edges; a rotation, a
     translation and a uniform scaling map one to the other.
 
-    others: indices of parts that are not compared.
+    Args:
+        parts: the parts.
+        others: indices of parts that are not compared.
+        rounding: largest distance of the vertices of a copy from those of the first, relative to the largest
+            coordinates; None for copies that are exact up to the rounding of doubles.
     """
     found: list[Copy | None] = [None] * len(parts)
     if len(parts) == 1:
@@ -52,9 +58,10 @@ def find_copies(parts: Sequence[Part], others: Container[int] = ()) -> list[Copy
     for i, part in enumerate(parts):
         if i in others or _has_vertex_options(part):
             continue
-        alike = kinds.setdefault(_copy_key(part), [])
+        key = _copy_key(part) if rounding is None else (part.mesh.faces.tobytes(),)
+        alike = kinds.setdefault(key, [])
         for first in alike[:MAX_COMPARED]:
-            scale = _scale_of_copy(parts[first], part)
+            scale = _scale_of_copy(parts[first], part, rounding)
             if scale is not None:
                 found[i] = Copy(first, scale)
                 break
@@ -91,8 +98,10 @@ def _copy_key(part: Part) -> tuple[object, ...]:
     return (part.mesh.faces.tobytes(), *(each.tobytes() for each in flags), *shape)
 
 
-def _scale_of_copy(first: Part, part: Part) -> float | None:
+def _scale_of_copy(first: Part, part: Part, rounding: float | None) -> float | None:
     """Return the size of a component relative to the component of which it is a copy; None if it is not a copy.
+
+    rounding: as of `find_copies`.
 
     References:
         W. Kabsch, "A solution for the best rotation to relate two sets of vectors", 1976.
@@ -107,5 +116,7 @@ def _scale_of_copy(first: Part, part: Part) -> float | None:
     off: FloatArray = np.abs((one @ ((left * handed) @ right)) * scale - two).max(axis=1)
     reach = float(np.abs(part.mesh.vertices).max() + scale * np.abs(first.mesh.vertices).max())
     sides = np.abs(scale * first.lengths - part.lengths)
+    if rounding is not None:
+        return scale if off.max() <= rounding * reach else None
     is_copy = off.max() <= COPY_ROUNDING * reach and (sides <= SIDE_TOLERANCE * part.lengths).all()
     return scale if is_copy else None

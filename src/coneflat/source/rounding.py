@@ -37,6 +37,10 @@ def coarse_step(vertices: FloatArray, faces: IntArray) -> tuple[float, int]:
     if not faces.size or not vertices.size or not np.isfinite(vertices[np.unique(faces)]).all():
         return 0.0, 0
     used = vertices[np.unique(faces)]
+    has_extent = np.ptp(used, axis=0) > 0
+    used = used[:, has_extent if has_extent.any() else used.any(axis=0)]
+    if not used.size:
+        return 0.0, 0
     step = _single_step(used) or _decimal_step(used)
     # Scaling by a power of two avoids underflow and overflow of squared lengths.
     exponent = unit_exponent(used)
@@ -49,7 +53,7 @@ def coarse_step(vertices: FloatArray, faces: IntArray) -> tuple[float, int]:
 
 
 def _single_step(points: FloatArray) -> float:
-    """Return the largest step of the coordinates (n, 3) if they are rounded to 32-bit numbers, else 0."""
+    """Return the largest step of the coordinates (n, k) if they are rounded to 32-bit numbers, else 0."""
     with np.errstate(over="ignore"):
         rounded = points.astype(np.float32)
     if not np.array_equal(rounded, points):
@@ -62,7 +66,7 @@ def _single_step(points: FloatArray) -> float:
 
 
 def _decimal_step(points: FloatArray) -> float:
-    """Return the step of the coordinates (n, 3) if they are rounded to decimal places, else 0."""
+    """Return the step of the coordinates (n, k) if they are rounded to decimal places, else 0."""
     largest = float(np.abs(points).max())
     for places in range(MAX_PLACES):
         step = 10.0**-places

@@ -333,15 +333,26 @@ class TestObj:
     @pytest.mark.parametrize(
         ("library", "message"),
         [
-            ("newmtl a\nmap_Kd missing.png\n", r"missing\.png: there is no such file"),
-            ("newmtl a\nKd 1 x 1\n", r"old\.mtl, line 2: kd: could not convert"),
-            ("newmtl a\nKd nan 1 1\n", "line 2: kd: nan is not a finite number"),
-            ("newmtl a\nmap_Kd -s 1 1\n", "line 2: map_kd: there is no file name"),
+            ("Kd 1 x 1", "kd in line 2 (could not convert"),
+            ("Kd nan 1 1", "kd in line 2 (nan is not a finite number)"),
+            ("map_Kd -s 1 1", "map_kd in line 2 (there is no file name)"),
+            ("d 0.5 y", "d in line 2 ("),
+            ("Tr", "tr in line 2 ("),
+            ("Ke spectral x.rfl", "ke in line 2 ("),
         ],
     )
-    def test_invalid_libraries_are_named(self, tmp_path, library, message):
-        with pytest.raises(errors.MeshFileError, match=message):
-            transfer(painted_obj(tmp_path, library), two_squares(tmp_path), resolution=4)
+    def test_lines_that_cannot_be_read_are_named(self, tmp_path, library, message):
+        old = painted_obj(tmp_path, f"newmtl a\n{library}\nnewmtl b\nKd 1 0 0\n")
+        baked = transfer(old, two_squares(tmp_path), resolution=4)
+        assert any(
+            note.startswith("Not read of the material a: ") and message in note for note in baked.notes
+        )
+
+    def test_missing_images_are_named(self, tmp_path):
+        with pytest.raises(errors.MeshFileError, match=r"missing\.png: there is no such file"):
+            transfer(
+                painted_obj(tmp_path, "newmtl a\nmap_Kd missing.png\n"), two_squares(tmp_path), resolution=4
+            )
 
     def test_vertex_colours_and_missing_uvs(self, tmp_path):
         """A scan has the same colours at vertices and in its image, which are not multiplied."""

@@ -6,6 +6,7 @@ import shapes
 
 import coneflat
 from coneflat import errors, unwrap
+from coneflat.geometry import signed_double_areas
 
 
 def turned_copies(count):
@@ -77,10 +78,32 @@ def test_copies_of_another_size_have_their_own_texels():
     np.testing.assert_allclose(
         result.distortion.log_area_scale.mean(), result.distortion.log_area_scale, atol=0.2
     )
-    assert not any("share" in note for note in result.notes)
+    assert any("No component shares" in note for note in result.notes)
 
 
 def test_lengths_cannot_be_given_for_copies():
     vertices, faces = shapes.hill(8, 6)
     with pytest.raises(errors.OptionError, match="stack copies and lengths cannot be combined"):
         unwrap(vertices, faces, stack="copies", lengths=np.ones(faces.shape))
+
+
+@pytest.mark.parametrize("order", ["A B A2 B2", "A A2 B B2", "A B B2", "A A2 B2", "B2 A2 A B"])
+def test_copies_of_doubled_cloth_share_the_texels_of_one_side(order):
+    vertices, front = shapes.hill(8, 6)
+    pieces = {"A": (vertices, front), "B": (vertices, front[:, [0, 2, 1]])}
+    pieces |= {
+        f"{name}2": (vertices + np.array([10.0, 0, 0]), faces) for name, (vertices, faces) in pieces.items()
+    }
+    names = order.split()
+    result = unwrap(*shapes.join(*(pieces[name] for name in names)), stack="copies")
+    assert result.uv_faces.min() >= 0
+    assert len(result.uv) == len(unwrap(*pieces[names[0]]).uv)
+    assert any(f"{len(names) - 1} components share" in note for note in result.notes)
+    areas = np.abs(signed_double_areas(result.corner_uv)).reshape(len(names), -1)
+    np.testing.assert_array_equal(areas, np.tile(areas[0], (len(names), 1)))
+
+
+def test_copies_with_positions_in_single_precision_share_texels():
+    vertices, faces = turned_copies(4)
+    result = unwrap(vertices.astype(np.float32), faces, stack="copies")
+    assert any("3 components share" in note for note in result.notes)

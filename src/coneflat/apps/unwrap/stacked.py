@@ -13,7 +13,8 @@ from ...mesh import weld
 from ...source import Part, Prepared, find_copies, result_numbering
 
 # Largest relative difference of the sizes of copies that share texels: those of other sizes would have another density.
-SAME_SIZE = 1e-6
+# And of their positions: files have six digits or more.
+SAME_SIZE, SAME_PLACE = 1e-4, 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,21 +37,23 @@ def without_copies(prepared: Prepared) -> tuple[Stacked, Prepared]:
     parts = prepared.parts
     corners, partners, left_out = list[IntArray](), list[IntArray](), set[int]()
     places = weld(prepared.checked.mesh.vertices)[1]
-    sides = dict[bytes, tuple[int, IntArray]]()
-    for i, (part, copy) in enumerate(zip(parts, find_copies(parts), strict=True)):
-        if copy is not None and abs(copy.scale - 1) <= SAME_SIZE:
-            first, order = copy.first, np.arange(3 * len(part.faces))
-        else:
-            key, order = _ordered_corners(places[part.vertices][part.mesh.faces])
-            first, order_of_first = sides.setdefault(key, (i, order))
-            if first == i:
-                continue
-            matched = np.empty_like(order)
-            matched[order] = order_of_first
-            order = matched
-        left_out.add(i)
-        corners.append(_corners_of(part))
-        partners.append(_corners_of(parts[first])[order])
+    sides = dict[bytes, int]()
+    # The corners, in an order of its own, that have the UV points of each part: its own, or those of an earlier part.
+    shown, orders = list[IntArray](), list[IntArray]()
+    for i, (part, copy) in enumerate(zip(parts, find_copies(parts, rounding=SAME_PLACE), strict=True)):
+        key, order = _ordered_corners(places[part.vertices][part.mesh.faces])
+        side, matched = sides.setdefault(key, i), _corners_of(part)
+        if side != i:
+            matched = np.empty_like(matched)
+            matched[order] = shown[side][orders[side]]
+        elif copy is not None and abs(copy.scale - 1) <= SAME_SIZE:
+            matched = shown[copy.first]
+        shown.append(matched)
+        orders.append(order)
+        if matched[0] != _corners_of(part)[0]:
+            left_out.add(i)
+            corners.append(_corners_of(part))
+            partners.append(matched)
     remaining = tuple(part for i, part in enumerate(parts) if i not in left_out)
     stacked = Stacked(_joined(corners), _joined(partners), len(left_out))
     return stacked, replace(prepared, parts=remaining)
@@ -106,7 +109,9 @@ def with_copies_stacked(alone: Flattening, stacked: Stacked, prepared: Prepared)
 
 def _notes(stacked: Stacked) -> tuple[str, ...]:
     if not stacked.count:
-        return ()
+        return (
+            "No component shares the texels of another: copies have the same vertices in the same order.",
+        )
     verb = "shares" if stacked.count == 1 else "share"
     return (
         f"{plural(stacked.count, 'component')} {verb} the texels of others; all measures are those without them.",
