@@ -1,5 +1,7 @@
 """Laws of thin triangles: none is distorted beyond use unless the model's own is thinner than a millionth."""
 
+from importlib import import_module
+
 import numpy as np
 import pytest
 import shapes
@@ -8,6 +10,7 @@ from needles import with_caps, with_needles
 import coneflat
 from coneflat.geometry import edge_lengths
 from coneflat.geometry.opening import thickness
+from coneflat.mesh.check import weld
 
 WORST_QC, THINNEST = 1e3, 1e-6
 
@@ -46,3 +49,33 @@ def test_neighbouring_needles_and_caps_of_all_heights_do_not_spoil_one_another(m
         split = (with_caps, with_needles)[rng.integers(2)]
         vertices, faces = split(vertices, faces, 10.0 ** rng.uniform(-14, -3), 40, rng)
     check_thin(method(vertices, faces))
+
+
+def test_a_grid_of_steps_is_flattened_though_most_of_its_triangles_are_thin():
+    """A map whose coordinates are rounded to 32-bit numbers, with steps of half the distance of its vertices."""
+    vertices, faces = shapes.grid(9, 9)
+    vertices = 0.09 * vertices + [5e5, 5.3e6, 200]
+    vertices[:, 2] += np.random.default_rng(0).random(len(vertices)) * 0.01
+    rounded = vertices.astype(np.float32).astype(float)
+    kept, place = weld(rounded)
+    faces = place[faces]
+    is_face = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    result = coneflat.flatten(rounded[kept], faces[is_face], repair=True)
+    assert result.distortion.flipped == 0
+    assert np.isfinite(result.uv).all()
+
+
+def test_an_attempt_that_fails_leaves_the_finished_layout(monkeypatch):
+    method = import_module("coneflat.flatten")
+    lay_out_parts, calls = method.lay_out_parts, []
+
+    def fails_later(parts, how):
+        calls.append(len(parts))
+        if len(calls) > 1 and parts:
+            raise coneflat.errors.ConvergenceError("no metric")
+        return lay_out_parts(parts, how)
+
+    monkeypatch.setattr(method, "lay_out_parts", fails_later)
+    result = coneflat.flatten(*shapes.box(1, (1.0, 2.0, 0.5)))
+    assert len(calls) > 1
+    assert np.isfinite(result.uv).all()

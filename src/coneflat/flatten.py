@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeAlias
@@ -26,9 +26,10 @@ from .cones import (
     leaves_flat_disks,
     with_corners,
 )
-from .errors import CurvatureError, MetricError, OptionError, SeamError
+from .errors import ConvergenceError, CurvatureError, MetricError, OptionError, SeamError
 from .evaluate import evaluate
 from .geometry import dihedral_angles
+from .geometry.opening import RISKY_AREA, thickness, with_slack
 from .geometry.operators import weighted_areas
 from .geometry.overlap import UNKNOWN_OVERLAPS
 from .io.packages import as_input
@@ -218,7 +219,10 @@ def cut_along_sharp_edges(
         return prepared, layouts
     pieces_of = sharp.pieces_of(prepared, distorted)
     pieces = [piece for i in distorted for piece in pieces_of[i]]
-    flat = iter(flatten_parts(pieces, method))
+    try:
+        flat = iter(flatten_parts(pieces, method))
+    except (CurvatureError, MetricError, SeamError):
+        return prepared, layouts
     replaced = {}
     for i in distorted:
         part, cut = prepared.parts[i], [next(flat) for _ in pieces_of[i]]
@@ -304,6 +308,19 @@ def lay_out_parts(parts: Mapping[int, Part], method: Method) -> dict[int, Layout
 def lay_out_part(part: Part, method: Method) -> Layout:
     """Return the layout of a part in one chart.
 
+    If no metric is found because of thin triangles, such as those that rounded coordinates leave, all are opened more.
+    """
+    try:
+        return lay_out_with_lengths(part, method)
+    except ConvergenceError:
+        if not (thickness(part.lengths) < RISKY_AREA).any():
+            raise
+    return lay_out_with_lengths(replace(part, lengths=with_slack(part.lengths)), method)
+
+
+def lay_out_with_lengths(part: Part, method: Method) -> Layout:
+    """Return the layout of a part in one chart.
+
     The triangles around a cone may be unable to hold its angle, which is known only after the layout. Then other cones
     are searched for: each search forbids the cones that were infeasible before. A later search may have more infeasible
     cones, so the best layout of all searches is returned.
@@ -386,8 +403,7 @@ def finish_within_bound(
     A polyhedron with few corners, or one that is too distorted, opens at all of them, where that is better.
     """
     finished = finish_parts(parts, layouts, method)
-    polyhedra = with_corners_as_cones(parts, finished)
-    _keep_better(finished, finish_parts(polyhedra, lay_out_parts(polyhedra, method), method), parts)
+    _try(with_corners_as_cones(parts, finished), finished, parts, method)
     beyond = {i: part for i, part in parts.items() if excess([part], [finished[i]]) > TOLERATED_EXCESS}
     if len(beyond) > 0 and not method.relax.is_off and method.relax.stretch < CORRECTING_STRETCH:
         method = replace(method, relax=replace(method.relax, stretch=CORRECTING_STRETCH))
@@ -400,9 +416,25 @@ def finish_within_bound(
             for i in beyond
             if factors[i] > TOLERATED_EXCESS and factors[i] * len(finished[i].cones) <= MAX_SEARCHED
         }
-        better = _keep_better(finished, finish_parts(beyond, lay_out_parts(beyond, method), method), parts)
-        beyond = {i: beyond[i] for i in better}
+        beyond = {i: beyond[i] for i in _try(beyond, finished, parts, method)}
     return finished
+
+
+def _try(
+    attempts: Mapping[int, Part], finished: dict[int, Layout], parts: Mapping[int, Part], method: Method
+) -> list[int]:
+    """Replace finished layouts by those of parts with other cones where these are better; return their indices.
+
+    An attempt that fails leaves the finished layout as it is.
+    """
+    better = []
+    for group in _groups(attempts, method.relax):
+        chosen = {i: attempts[i] for i in group}
+        with suppress(CurvatureError, MetricError, SeamError):
+            better += _keep_better(
+                finished, finish_parts(chosen, lay_out_parts(chosen, method), method), parts
+            )
+    return better
 
 
 def with_corners_as_cones(parts: Mapping[int, Part], finished: Mapping[int, Layout]) -> dict[int, Part]:

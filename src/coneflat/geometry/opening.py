@@ -20,6 +20,9 @@ OPENED_AREA, MAX_OPENED = 4e-6, 0.25
 # Length that an edge of a triangle without any length gets, and height of an opened triangle, relative to the mean
 # edge: a million roundings of coordinates in the plane.
 POINT_SIZE, MIN_HEIGHT = 1e-5, 1e-10
+# Thickness of triangles that may keep a solve from converging, and length added to all edges then, relative to the
+# mean.
+RISKY_AREA, SLACK = 1e-4, 1e-5
 # Relative difference of lengths that count as equal.
 EQUAL_LENGTHS = 1e-9
 # Rounds of lengthening, and of those the number after which all triangles grow alike: each may thin a neighbour.
@@ -72,6 +75,15 @@ def mollify(
         f"{change:.1e} of the mean edge."
     )
     return opened, note
+
+
+def with_slack(lengths: FloatArray) -> FloatArray:
+    """Return (m, 3) lengths of a mesh that has thin triangles, all longer by the same small length, which opens them.
+
+    For meshes of so many thin triangles that a metric cannot be solved for otherwise. Thin triangles become thicker
+    than by `mollify`, a thousandth of their length, and are distorted as much more.
+    """
+    return np.asarray(lengths + SLACK * lengths.mean())
 
 
 def thickness(lengths: FloatArray) -> FloatArray:

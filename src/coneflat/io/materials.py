@@ -197,7 +197,7 @@ def _of_obj(folder: Path, text: ObjText, count: int) -> Materials:
     notes = []
     for library in libraries_of(text, folder) if names else []:
         try:
-            materials = parse_mtl(library, read_bytes(library))
+            materials = parse_mtl(read_bytes(library))
         except ConeflatError as error:
             if library.is_file():
                 raise

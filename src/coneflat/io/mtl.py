@@ -47,7 +47,7 @@ class MtlMaterial:
     left_out: tuple[str, ...] = ()
 
 
-def parse_mtl(path: Path, content: bytes) -> dict[str, MtlMaterial]:
+def parse_mtl(content: bytes) -> dict[str, MtlMaterial]:
     """Return the materials of an MTL file by name; lines that cannot be read are left out."""
     materials: dict[str, MtlMaterial] = {}
     name: str | None = None
