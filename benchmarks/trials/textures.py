@@ -18,7 +18,7 @@ from .topology import Topology
 Random = np.random.Generator
 
 #: Notes after which energies may be larger; those of triangles that had to be opened are of other lengths.
-EXCUSES = "The energy of|There (is|are) .*(flipped|degenerate)|Opened "
+EXCUSES = "The energy (of|is)|There (is|are) .*(flipped|degenerate)|Opened "
 
 
 def texture_case(rng: Random, outcome: Outcome) -> None:

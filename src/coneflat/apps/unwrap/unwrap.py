@@ -100,7 +100,8 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     areas, sizes = np.array([(double_areas(part.lengths).sum(), len(part.faces)) for part in parts]).T
     is_minor = areas < MINOR_SHARE * areas.sum()
     if o.texel_density is not None:
-        own = np.ldexp(areas / 2, -2 * prepared.checked.exponent)
+        with np.errstate(over="ignore"):  # a model that is too large for any texture
+            own = np.ldexp(areas / 2, -2 * prepared.checked.exponent)
         shared = replace(shared, resolution=expected_resolution(o.texel_density, own, o.padding, o.tiles))
     with limit_threads(o.threads if sizes.max() > PARALLEL else 1):
         flat = lay_out_flat_parts(parts, watch)
