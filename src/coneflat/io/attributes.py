@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 # Characters of a name that a note shows, and names of a kind.
 MAX_NAME, MAX_NAMES = 40, 20
-# Largest value of a colour in bytes, and the value of sRGB up to which its curve is a line.
-BYTE, LINEAR_BELOW = 255, 0.04045
+# Largest value of a colour in bytes.
+BYTE = 255
 
 
 #: The kind of attributes that are names of images.
@@ -93,12 +93,6 @@ def colour_shades(values: FloatArray) -> FloatArray:
     """Return the parts of colours as 0 to 1: numbers above 1 mean that they are bytes."""
     numbers = np.asarray(values, np.float64)
     return numbers / BYTE if np.nanmax(numbers, initial=0.0) > 1 else numbers
-
-
-def to_linear(shades: FloatArray) -> FloatArray:
-    """Return the linear values of parts of colours in sRGB, both from 0 to 1."""
-    curve = ((shades + 0.055) / 1.055) ** 2.4
-    return np.where(shades <= LINEAR_BELOW, shades / 12.92, curve)
 
 
 def as_bytes(shades: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:

@@ -26,11 +26,11 @@ from ...errors import ConeflatError, MeshFileError
 from ...geometry.triangles import vertex_normals
 from ...mesh.polygons import COLOURS
 from ...result import Flattening
-from ..attributes import ALPHA, MAX_NAME, VERTEX_COLOURS, Attribute, colour_shades, old_textures, to_linear
+from ..attributes import ALPHA, MAX_NAME, VERTEX_COLOURS, Attribute, colour_shades, old_textures
 from ..files import moved_path, read_bytes
 from ..mesh_file import MeshFile
 from ..split import distinct_pairs, input_vertices, shading_normals, source_normals, split_at_seams
-from ..texture import Texture, image_kind
+from ..texture import Texture, image_kind, to_linear
 from .data import COMPRESSED, GltfData, Item
 from .positions import local_positions
 from .read import DRACO, GltfScene, Mode, ScenePart
