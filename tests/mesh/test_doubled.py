@@ -10,6 +10,7 @@ import shapes
 
 from coneflat import check_mesh, flatten, unwrap
 from coneflat.io import read_mesh
+from coneflat.mesh.check import weld
 
 V, F = shapes.hill(7, 6)
 BACK = F[:, [0, 2, 1]]
@@ -123,9 +124,8 @@ def test_two_triangles_back_to_back_are_a_closed_surface(second):
 
 def test_single_sheets_at_an_edge_are_separated():
     vertices = np.array([[0, 0, 0], [0, 0, 1], [1, 0, 0], [-1, 1, 0], [-1, -1, 0], [1, 1, 0.0]])
-    for count in (3, 4):
-        faces = np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4], [1, 0, 5]])[:count]
-        assert len(layers_of(vertices, faces)[0]) == count
+    faces = np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]])
+    assert len(layers_of(vertices, faces)[0]) == 3
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -172,3 +172,33 @@ def test_no_primitive_of_a_file_is_lost(tmp_path):
         assert len(file.offsets) - 1 == 2 * len(F)
         assert file.uv is not None
         assert (file.texture >= 0).all()
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e6])
+def test_two_sides_with_other_diagonals_are_two_sheets(shift):
+    """Quads that each side splits from its own first corner."""
+    vertices, _ = shapes.grid(6, 6, lambda x, y: 0.2 * np.sin(3 * x) * np.cos(2 * y))
+    number = np.arange(49).reshape(7, 7)
+    a, b, c, d = (
+        corner.ravel() for corner in (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:])
+    )
+    front = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    back = np.concatenate([np.stack([b, a, d], axis=1), np.stack([b, d, c], axis=1)])
+    checked = check_mesh(vertices + shift, np.concatenate([front, back]), repair=True)
+    assert checked.mesh.components[0] == 2
+    assert len(checked.mesh.faces) == len(front) + len(back)
+
+
+def test_solids_that_touch_along_an_edge_stay_apart():
+    vertices, faces = shapes.box(1, (1.0, 1.0, 1.0))
+    both = shapes.join((vertices, faces), (vertices + np.array([1.0, 1.0, 0.0]), faces))
+    kept, place = weld(np.round(both[0], 9))
+    checked = check_mesh(np.round(both[0], 9)[kept], place[both[1]], repair=True)
+    assert checked.mesh.components[0] == 2
+
+
+def test_sheets_that_cross_are_two_sheets():
+    vertices = np.array([[0, 0, 0], [0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]], dtype=float)
+    faces = [[0, 1, 2], [1, 0, 3], [0, 1, 4], [1, 0, 5]]
+    checked = check_mesh(vertices, faces, repair=True)
+    assert checked.mesh.components[0] == 2

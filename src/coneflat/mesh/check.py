@@ -177,7 +177,7 @@ class _Check:
                 f"{plural(len(crowded), 'edge')} with more than two faces "
                 f"(vertex pairs {list_some(edges, len(crowded))}); {REPAIR_ADVICE} to separate the faces there"
             )
-        glued = glue_layers(self.faces, groups)
+        glued = glue_layers(self.vertices, self.faces, groups)
         self.pairs = glued.pairs
         if glued.stacked:
             what = plural(glued.stacked, "face")

@@ -3,7 +3,8 @@
 An edge with more than two faces is crowded. Faces on the same three vertices are twins: the two sides of a sheet, or a
 face that is given twice. At a crowded edge, a half-edge continues into one of the opposite direction whose face is not
 its twin. If all candidates are twins of each other, with one orientation, the choice is unambiguous. In this way the
-front of a doubled sheet is glued to the front, and the back to the back.
+front of a doubled sheet is glued to the front, and the back to the back. Where the two sides have other diagonals, they
+have no twins; then two layers continue where the surface bends least, if that is clear.
 """
 
 from __future__ import annotations
@@ -12,8 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.arrays import BoolArray, IntArray, mask_of
+from ..base.arrays import BoolArray, FloatArray, IntArray, dots, mask_of
 from .connectivity import NEXT, PREVIOUS, corner_fans, end_corners, sort_pairs
+
+# Difference of the sums of two cosines, each 1 where a surface continues straight on and -1 where it folds back, from
+# which one of two ways to connect two layers is clear.
+CLEAR_BEND = 1.0
+# Cosine of the angle between two faces, 18 degrees, below which one is folded back onto the other.
+FOLDED = 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +71,13 @@ class GluedLayers:
     stacked: int
 
 
-def glue_layers(faces: IntArray, groups: EdgeGroups) -> GluedLayers:
+def glue_layers(vertices: FloatArray, faces: IntArray, groups: EdgeGroups) -> GluedLayers:
     """Return which half-edges are glued: those of edges with two faces, and layers that continue at crowded edges.
 
     Each half-edge is in one pair at most. After `split_vertices`, no edge has more than two faces.
 
     Args:
+        vertices: (n, 3) positions.
         faces: (m, 3) vertex indices, three different ones in each face.
         groups: the half-edges of each edge.
     """
@@ -78,6 +86,12 @@ def glue_layers(faces: IntArray, groups: EdgeGroups) -> GluedLayers:
     plain, between_twins = pairs[~are_twins], pairs[are_twins]
     crowded = CrowdedEdges.of(faces, groups)
     continued = crowded.opposed_pairs()
+    straight = crowded.straight_pairs(continued, vertices)
+    if len(straight):
+        # The two sides end at the border of the sheet, where one folds back onto the other.
+        away = [away_from_edge(vertices, faces, halfedges) for halfedges in plain.T]
+        plain = plain[dots(*away) < FOLDED]
+    continued = np.concatenate([continued, straight])
     continued = np.concatenate([continued, crowded.turned_pairs(continued)])
     continued = continued[~crowded.closes_again(plain, continued)]
     glued = np.concatenate([plain, continued])
@@ -149,6 +163,35 @@ class CrowdedEdges:
         low, high = np.divmod(np.unique(low * count + high), max(count, 1))
         return _zipped(self.halfedges, first[low], first[high], np.minimum(sizes[low], sizes[high]))
 
+    def straight_pairs(self, pairs: IntArray, vertices: FloatArray) -> IntArray:
+        """Return (p, 2) half-edges, two of each direction left over at an edge, that continue with the least bend.
+
+        Args:
+            pairs: (q, 2) half-edges that are paired already.
+            vertices: (n, 3) positions.
+        """
+        rest = np.flatnonzero(~np.isin(self.halfedges, pairs))
+        forward, backward = rest[self.is_forward[rest]], rest[~self.is_forward[rest]]
+        count = int(self.edge.max(initial=-1)) + 1
+        has_two = (np.bincount(self.edge[forward], minlength=count) == 2) & (
+            np.bincount(self.edge[backward], minlength=count) == 2
+        )
+        # Sorted by edge, so that the two of an edge follow one another.
+        forward, backward = (some[has_two[self.edge[some]]] for some in (forward, backward))
+        ahead, back = forward.reshape(-1, 2), backward.reshape(-1, 2)
+        away = away_from_edge(vertices, self.faces, self.halfedges)
+        straight, crossed = (
+            -dots(away[ahead[:, 0]], away[back[:, k]]) - dots(away[ahead[:, 1]], away[back[:, 1 - k]])
+            for k in (0, 1)
+        )
+        is_straight, is_crossed = straight >= crossed + CLEAR_BEND, crossed >= straight + CLEAR_BEND
+        chosen = [
+            np.stack([ahead[is_clear, i], back[is_clear, i ^ k]], axis=1)
+            for k, is_clear in ((0, is_straight), (1, is_crossed))
+            for i in (0, 1)
+        ]
+        return self.halfedges[np.concatenate(chosen)]
+
     def turned_pairs(self, pairs: IntArray) -> IntArray:
         """Return (p, 2) half-edges of one direction that are left over at edges between two apexes.
 
@@ -194,6 +237,17 @@ class CrowdedEdges:
     def _apex_counts(self) -> IntArray:
         """Return (e,) the number of apexes of each edge."""
         return np.bincount(self.edge[_run_starts(self.edge, self.apex)])
+
+
+def away_from_edge(vertices: FloatArray, faces: IntArray, halfedges: IntArray) -> FloatArray:
+    """Return (k, 3) unit vectors in the face of each half-edge (k,), at right angles to it, from it to the apex."""
+    start, end = (vertices[faces.ravel()[corners]] for corners in end_corners(halfedges))
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        along = end - start
+        across = vertices[faces.ravel()[halfedges]] - start
+        across = across - along * (dots(across, along) / dots(along, along))[:, None]
+        across = across / np.sqrt(dots(across, across))[:, None]
+    return np.nan_to_num(across, nan=0.0, posinf=0.0, neginf=0.0)
 
 
 def _run_starts(*columns: IntArray | BoolArray) -> IntArray:

@@ -66,7 +66,7 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
         notes.append(Unmet(f"{plural(left_out, 'face')} without area: the UVs of each are one point."))
     if not len(chosen):
         return UnwrappedSoup(corner_uv, chart, 0.0, 0.0, o.resolution, tuple(notes))
-    origin, corner = _oriented(place[faces[chosen]])
+    origin, corner = _oriented(vertices[first], place[faces[chosen]])
     points = vertices[first[origin]]
     try:
         result = unwrap(points, corner, repair=True, **options)
@@ -113,12 +113,12 @@ def _packed_separately(points: FloatArray, corner: IntArray, options: UnwrapOpti
     return packed, resolution
 
 
-def _oriented(faces: IntArray) -> tuple[IntArray, IntArray]:
+def _oriented(vertices: FloatArray, faces: IntArray) -> tuple[IntArray, IntArray]:
     """Return the vertex of each vertex of oriented surfaces that faces form, and the surfaces as (m, 3) faces.
 
     Faces are glued as a repair glues them, where they have opposite directions along an edge.
     """
-    pairs = glue_layers(faces, EdgeGroups.of(faces, int(faces.max()) + 1)).pairs
+    pairs = glue_layers(vertices, faces, EdgeGroups.of(faces, int(faces.max()) + 1)).pairs
     (start_one, _), (_, end_two) = (end_corners(halfedges) for halfedges in pairs.T)
     opposed = faces.ravel()[start_one] == faces.ravel()[end_two]
     return split_vertices(faces, int(faces.max()) + 1, *pairs[opposed].T)
