@@ -56,7 +56,8 @@ def extract_quads(grid: IntegerGrid, leave_out: bool = False) -> QuadMesh:
         raise GridError(f"{len(darts):,} quads cover a grid of {area:.3f} squares: some are missing")
     if not len(darts):
         raise GridError(
-            f"no complete square of the grid lies on the surface, of {area:.1f} squares: use more quads"
+            f"no complete square of the grid lies on the surface, of {area:.1f} squares: use more quads, or a smaller "
+            "size"
         )
     origin, quads, edges = _split_fans(darts, mates, ports.points)
     notes: tuple[str, ...] = ()

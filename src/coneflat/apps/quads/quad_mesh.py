@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ... import TriangleMesh
-from ...base import BoolArray, FloatArray, IntArray, dots, mask_of
+from ...base import BoolArray, FloatArray, IntArray, dots, mask_of, plural
 from ...errors import GridError
 from ...mesh import label_components, sort_pairs
 
@@ -123,6 +123,10 @@ class QuadMesh:
             faces=self.faces[origin],
             barycentric=self.barycentric[origin],
         )
+
+    def __repr__(self) -> str:
+        irregular = plural(len(self.irregular), "irregular vertex", "irregular vertices")
+        return f"<QuadMesh: {plural(len(self.quads), 'quad')}, {irregular}>"
 
     @property
     def irregular(self) -> IntArray:

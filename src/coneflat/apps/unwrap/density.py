@@ -114,5 +114,5 @@ class _Search:
 def _too_large(possible: float) -> OptionError:
     return OptionError(
         f"texel_density is too large: textures of at most {MAX_RESOLUTION:,} texels per side have about "
-        f"{possible:.3g} texels per unit of length; expected less, or more tiles"
+        f"{possible:.3g} texels per unit of length; expected a smaller density"
     )
