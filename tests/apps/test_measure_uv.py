@@ -231,9 +231,6 @@ class TestTextures:
         assert note == (
             "Materials that are in no library that can be read count as one texture: one, the other."
         )
-        (note,) = self.together(pair_of_materials(tmp_path, "newmtl one\nKd red\n"))
-        assert "All materials count as one texture" in note
-        assert "line 2" in note
 
     def test_images_of_primitives(self, tmp_path):
         self.apart(pair_of_primitives(tmp_path, (0, 1)))
