@@ -197,3 +197,8 @@ def test_the_step_of_a_flat_map_is_that_of_its_extended_axes(height):
 
 def test_a_point_at_the_origin_is_not_put_down_to_rounding():
     assert coarse_step(np.zeros((3, 3)), np.array([[0, 1, 2]])) == (0.0, 0)
+
+
+def test_errors_of_float_faces_are_those_of_integer_faces():
+    with pytest.raises(ConeflatError, match="3 faces with the same vertex twice"):
+        coneflat.flatten(np.eye(3), np.zeros((3, 3)))

@@ -91,7 +91,7 @@ def _is_step(step: float, values: FloatArray) -> bool:
 
 def rounding_notes(vertices: ArrayLike, faces: ArrayLike) -> list[Unmet]:
     """Return a note on triangles that rounding of the input has left without area, if there are any."""
-    step, count = coarse_step(np.asarray(vertices, dtype=np.float64), np.asarray(faces))
+    step, count = coarse_step(np.asarray(vertices, dtype=np.float64), np.asarray(faces).astype(np.int64))
     if not count:
         return []
     verb = "has" if count == 1 else "have"
@@ -113,7 +113,7 @@ def named_rounding(vertices: ArrayLike, faces: ArrayLike) -> Iterator[None]:
     try:
         yield
     except (DegenerateFaceError, EmptyMeshError) as error:
-        step, _ = coarse_step(np.asarray(vertices, dtype=np.float64), np.asarray(faces))
+        step, _ = coarse_step(np.asarray(vertices, dtype=np.float64), np.asarray(faces).astype(np.int64))
         if not step:
             raise
         raise type(error)(
