@@ -386,7 +386,8 @@ def test_no_more_cones_are_searched_for_than_a_search_can_find(monkeypatch):
     searches, once = [], pipeline.lay_out_part
     monkeypatch.setattr(pipeline, "lay_out_part", lambda *given: searches.append(0) or once(*given))
     monkeypatch.setattr(pipeline, "MAX_SEARCHED", 5)
-    monkeypatch.setattr(pipeline, "excess", lambda *_: 2.0)
+    for module in (pipeline, import_module("coneflat.bounds")):
+        monkeypatch.setattr(module, "excess", lambda *_: 2.0)
     result = coneflat.flatten(coneflat.sample_path())
     assert len(searches) == 1
     assert any("above the 0.2 allowed" in note for note in result.notes)

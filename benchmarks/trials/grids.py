@@ -10,6 +10,7 @@ import shapes
 
 from . import changes, meshes, surfaces
 from .choices import in_short
+from .meshes import TINY
 from .outcome import Outcome
 from .surfaces import Random
 from .topology import Topology
@@ -116,17 +117,8 @@ def grid_of_mesh(
 
 #: Surfaces of the trial of few triangles, and the numbers of quads asked for.
 FEW = (
-    surfaces.needle,
-    surfaces.needle,
-    surfaces.needle,
-    surfaces.pillow,
-    surfaces.one_or_two,
-    surfaces.fan,
-    surfaces.crate,
-    surfaces.ball,
-    surfaces.ring,
-    surfaces.tube,
-    surfaces.cone,
+    *[surfaces.needle] * 3,
+    *dict.fromkeys(TINY),
     surfaces.spikes,
     surfaces.random_hull,
     surfaces.handles,

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from .base.arrays import FloatArray
+from .base.notes import Unmet
 from .cones import uses_sparse_search
 from .geometry.operators import area_distortion
 from .geometry.planar import mean_energy, signed_double_areas
 from .layout import mean_qc
 from .measure.guarantees import EXTREME_QC
+from .options import Options
 from .source.parts import Part
 from .stages import Layout
 
@@ -82,3 +84,20 @@ def border_length(part: Part) -> float:
     """Return the length of the border of a part on the surface, model units."""
     sides = part.mesh.edge_halfedges[part.mesh.is_boundary_edge, 0]
     return float(part.lengths.ravel()[sides].sum())
+
+
+def bound_notes(parts: Sequence[Part], layouts: Sequence[Layout], o: Options) -> Iterator[Unmet]:
+    """Yield a note if the area distortion of a component, or of all of them together, is above the one allowed."""
+    pairs = zip(parts, layouts, strict=True)
+    curved = [(part, layout) for part, layout in pairs if layout.statistics.area_distortion > 0]
+    alone = max((excess([part], [layout]) for part, layout in curved), default=0.0)
+    together = excess(parts, layouts)
+    if (beyond := max(alone, together)) > TOLERATED_EXCESS:
+        reached = beyond * o.distortion
+        advice = f"allow {np.ceil(100 * reached) / 100:g}"
+        if o.max_cones is not None:
+            advice += ", or more cones"
+        yield Unmet(
+            f"The triangles of {'a component' if alone == beyond else 'all components'} have an area distortion of "
+            f"{reached:.3g}, above the {o.distortion:g} allowed, and none with less was found: {advice}."
+        )

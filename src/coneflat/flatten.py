@@ -12,23 +12,28 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .atlas import separate_overlaps
+from .attempts import SHARP_ANGLE, is_machined, with_corners_as_cones
 from .base.arrays import FloatArray, IntArray
 from .base.notes import Unmet, warns
 from .base.progress import Stopwatch
 from .base.text import list_some, plural
 from .base.threads import concurrently, limit_threads
-from .bounds import TOLERATED_EXCESS, borders_and_distortion, excess, is_too_distorted, rank
+from .bounds import (
+    TOLERATED_EXCESS,
+    borders_and_distortion,
+    bound_notes,
+    excess,
+    is_too_distorted,
+    rank,
+)
 from .cones import (
-    MAX_POLYHEDRON_CORNERS,
     MAX_SEARCHED,
     close_search,
     find_cones,
     leaves_flat_disks,
-    with_corners,
 )
 from .errors import ConvergenceError, CurvatureError, MetricError, OptionError, SeamError
 from .evaluate import evaluate
-from .geometry import dihedral_angles
 from .geometry.opening import RISKY_AREA, thickness, with_slack
 from .geometry.operators import weighted_areas
 from .geometry.overlap import UNKNOWN_OVERLAPS
@@ -56,10 +61,6 @@ MAX_SEARCHES = 4
 # A part beyond the allowed area distortion is relaxed with this stretch, then flattened with tighter bounds of the
 # search: at most so often, and by at most this factor each time.
 MAX_CORRECTIONS, MAX_TIGHTENING, CORRECTING_STRETCH = 2, 2.0, 0.1
-# Dihedral angle, radians, above which edges are cut where a solid is too distorted otherwise. The edges between half of
-# it and itself then bend the surface by at most this share of what sharper ones do: 0 to 0.07 of it on plates, gears
-# and rings, 0.15 and more on noise.
-SHARP_ANGLE, MAX_BETWEEN = np.radians(40), 0.1
 # Curvature error of an infeasible cone, radians: ideally a full turn; rounding and untangled neighbours reduce it.
 INFEASIBLE_ERROR = 1.0
 # A log scale that varies by less is constant: the surface is a polyhedron with vertices as cones, cut along its edges.
@@ -165,7 +166,7 @@ def flatten_source(
         show = None if on_preview is None else partial(_preview, prepared, o, on_preview)
         layouts = flatten_parts(prepared.parts, method, show)
         prepared, layouts = cut_along_sharp_edges(source, prepared, layouts, o, method)
-    layouts[0] = layouts[0].with_notes(*_bound_notes(prepared.parts, layouts, o))
+    layouts[0] = layouts[0].with_notes(*bound_notes(prepared.parts, layouts, o))
     return evaluate(prepared, layouts, o, watch)
 
 
@@ -240,38 +241,6 @@ def cut_along_sharp_edges(
     return prepared.with_pieces(sharp, {i: pieces_of[i] for i in replaced}), [
         layout for several in together for layout in several
     ]
-
-
-def is_machined(mesh: TriangleMesh) -> bool:
-    """Return whether a mesh is a solid whose edges are either sharp or nearly flat.
-
-    On noise, which bends at all angles, sharp edges would cut a surface into hundreds of charts, and a sheet is rarely
-    meant to fall apart.
-    """
-    if mesh.is_boundary_vertex.any():
-        return False
-    angles = np.abs(dihedral_angles(mesh))
-    ends = mesh.vertices[mesh.edges]
-    bending = angles * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    is_between = (angles > SHARP_ANGLE / 2) & (angles <= SHARP_ANGLE)
-    return bool(bending[is_between].sum() < MAX_BETWEEN * bending[angles > SHARP_ANGLE].sum())
-
-
-def _bound_notes(parts: Sequence[Part], layouts: Sequence[Layout], o: Options) -> Iterator[Unmet]:
-    """Yield a note if the area distortion of a component, or of all of them together, is above the one allowed."""
-    pairs = zip(parts, layouts, strict=True)
-    curved = [(part, layout) for part, layout in pairs if layout.statistics.area_distortion > 0]
-    alone = max((excess([part], [layout]) for part, layout in curved), default=0.0)
-    together = excess(parts, layouts)
-    if (beyond := max(alone, together)) > TOLERATED_EXCESS:
-        reached = beyond * o.distortion
-        advice = f"allow {np.ceil(100 * reached) / 100:g}"
-        if o.max_cones is not None:
-            advice += ", or more cones"
-        yield Unmet(
-            f"The triangles of {'a component' if alone == beyond else 'all components'} have an area distortion of "
-            f"{reached:.3g}, above the {o.distortion:g} allowed, and none with less was found: {advice}."
-        )
 
 
 def lay_out_flat_parts(parts: Sequence[Part], watch: Stopwatch) -> dict[int, Layout]:
@@ -403,7 +372,8 @@ def finish_within_bound(
     A polyhedron with few corners, or one that is too distorted, opens at all of them, where that is better.
     """
     finished = finish_parts(parts, layouts, method)
-    _try(with_corners_as_cones(parts, finished), finished, parts, method)
+    distorted = {i for i, part in parts.items() if is_too_distorted(part, finished[i])}
+    _try(with_corners_as_cones(parts, finished, distorted), finished, parts, method)
     beyond = {i: part for i, part in parts.items() if excess([part], [finished[i]]) > TOLERATED_EXCESS}
     if len(beyond) > 0 and not method.relax.is_off and method.relax.stretch < CORRECTING_STRETCH:
         method = replace(method, relax=replace(method.relax, stretch=CORRECTING_STRETCH))
@@ -435,26 +405,6 @@ def _try(
                 finished, finish_parts(chosen, lay_out_parts(chosen, method), method), parts
             )
     return better
-
-
-def with_corners_as_cones(parts: Mapping[int, Part], finished: Mapping[int, Layout]) -> dict[int, Part]:
-    """Return the polyhedra among parts that may open better at all their corners, with these as cones.
-
-    Args:
-        parts: the parts.
-        finished: their layouts with searched cones. Where these are too distorted, any number of corners will do; an
-            open part that needs no cone gets none.
-    """
-    polyhedra = {}
-    for i, part in parts.items():
-        is_distorted = is_too_distorted(part, finished[i])
-        if not is_distorted and not len(finished[i].cones) and part.mesh.is_boundary_vertex.any():
-            continue
-        most = MAX_SEARCHED if is_distorted else MAX_POLYHEDRON_CORNERS
-        cones = with_corners(part.mesh, part.lengths, part.cones, most)
-        if cones is not None:
-            polyhedra[i] = replace(part, cones=cones)
-    return polyhedra
 
 
 def _keep_better(

@@ -50,8 +50,8 @@ def counted_notes(notes: Iterable[Iterable[str]]) -> list[str]:
             similar.setdefault((type(note), _NUMBER.sub("#", note)), []).append(note)
     counted = []
     for first, *others in similar.values():
-        more = f" (and similarly {plural(len(others), 'component')} more)."
-        counted.append(type(first)(first.rstrip(".") + more) if others else first)
+        ending = f" (and similarly {plural(len(others), 'component')} more)."
+        counted.append(type(first)(first.rstrip(".") + ending) if others else first)
     return counted
 
 

@@ -78,7 +78,7 @@ def _with_line(material: MtlMaterial, keyword: str, text: str) -> MtlMaterial:
             return _without(material, f"Kd {text.split()[0]}")
         numbers = [_number(word) for word in text.split()[:3]]
         if not numbers:
-            raise ValueError("there is no number")
+            raise ValueError("a number is missing")
         # One number is a grey.
         red, green, blue = (numbers * 3)[:3] if len(numbers) == 1 else (*numbers, 0.0)[:3]
         return replace(material, colour=(red, green, blue))

@@ -84,12 +84,12 @@ def remeasured(
     old = result.distortion
     # Scaling by a power of two avoids underflow and overflow of squared lengths.
     exponent = -unit_exponent(changed.vertices[changed.faces])
-    own = first_faces(changed)
-    is_stacked = not own.all()
+    is_measured = first_faces(changed)
+    is_stacked = not is_measured.all()
     points = np.ldexp(changed.vertices, exponent)
     distortion = measure(
-        TriangleMesh(points, changed.faces[own]),
-        changed.corner_uv[own],
+        TriangleMesh(points, changed.faces[is_measured]),
+        changed.corner_uv[is_measured],
         (old.curvature_error, old.curvature_error_max),
         changed.cones,
         changed.prescribed,

@@ -170,14 +170,14 @@ class CrowdedEdges:
             pairs: (q, 2) half-edges that are paired already.
             vertices: (n, 3) positions.
         """
-        rest = np.flatnonzero(~np.isin(self.halfedges, pairs))
-        forward, backward = rest[self.is_forward[rest]], rest[~self.is_forward[rest]]
+        unpaired = np.flatnonzero(~np.isin(self.halfedges, pairs))
+        forward, backward = unpaired[self.is_forward[unpaired]], unpaired[~self.is_forward[unpaired]]
         count = int(self.edge.max(initial=-1)) + 1
         has_two = (np.bincount(self.edge[forward], minlength=count) == 2) & (
             np.bincount(self.edge[backward], minlength=count) == 2
         )
         # Sorted by edge, so that the two of an edge follow one another.
-        forward, backward = (some[has_two[self.edge[some]]] for some in (forward, backward))
+        forward, backward = (side[has_two[self.edge[side]]] for side in (forward, backward))
         ahead, back = forward.reshape(-1, 2), backward.reshape(-1, 2)
         away = away_from_edge(vertices, self.faces, self.halfedges)
         straight, crossed = (
@@ -200,12 +200,12 @@ class CrowdedEdges:
         Args:
             pairs: (q, 2) half-edges that are paired already.
         """
-        rest = np.flatnonzero(~np.isin(self.halfedges, pairs))
-        first = _run_starts(self.edge[rest], self.apex[rest])
-        sizes, edge = np.diff(np.append(first, len(rest))), self.edge[rest][first]
+        unpaired = np.flatnonzero(~np.isin(self.halfedges, pairs))
+        first = _run_starts(self.edge[unpaired], self.apex[unpaired])
+        sizes, edge = np.diff(np.append(first, len(unpaired))), self.edge[unpaired][first]
         run = np.flatnonzero((edge[1:] == edge[:-1]) & (self._apex_counts()[edge[1:]] == 2))
         counts = np.minimum(sizes[run], sizes[run + 1])
-        return _zipped(self.halfedges[rest], first[run], first[run + 1], counts)
+        return _zipped(self.halfedges[unpaired], first[run], first[run + 1], counts)
 
     def closes_again(self, plain: IntArray, pairs: IntArray) -> BoolArray:
         """Return (p,) whether more than two half-edges would lie between the same two vertices after `split_vertices`.

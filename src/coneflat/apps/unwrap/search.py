@@ -140,16 +140,19 @@ class CutSearch:
             return self._with_fewest_seams()
         if self._has_coarse:
             return self._from_coarse()
-        found, reach = self._by_distortion(), self.max_energy + MAX_EXCESS * (self.max_energy - ISOMETRIC)
-        if all(len(one.layout.seams) or one.energy > self.max_energy for one in found):
-            found = [*found, *self._at_corners()]
-        near = [self.separated(one) for one in found if one.energy <= reach]
+        candidates, reach = (
+            self._by_distortion(),
+            self.max_energy + MAX_EXCESS * (self.max_energy - ISOMETRIC),
+        )
+        if all(len(candidate.layout.seams) or candidate.energy > self.max_energy for candidate in candidates):
+            candidates = [*candidates, *self._at_corners()]
+        near = [self.separated(candidate) for candidate in candidates if candidate.energy <= reach]
         near.sort(key=self._expected_cost)
         if near and near[0].energy > self.max_energy:
             near.append(self.shortened(near[0]))
         close_search(self._surface)
-        within = [one for one in near if one.energy <= self.max_energy]
-        least = min([*near, *found], key=lambda one: one.energy)
+        within = [candidate for candidate in near if candidate.energy <= self.max_energy]
+        least = min([*near, *candidates], key=lambda candidate: candidate.energy)
         return self.separated(min(within, key=self._expected_cost, default=least))
 
     def shortened(self, start: Candidate, layout: Layout | None = None) -> Candidate:

@@ -75,9 +75,9 @@ def with_copies_stacked(alone: Flattening, stacked: Stacked, prepared: Prepared)
     of_corners[stacked.corners] = of_corners[stacked.partners]
     partner = np.arange(len(faces))
     partner[stacked.corners // 3] = stacked.partners // 3
-    known = np.full(len(faces), -1)
-    known[chosen] = np.arange(len(chosen))
-    row = known[partner]
+    row_of_face = np.full(len(faces), -1)
+    row_of_face[chosen] = np.arange(len(chosen))
+    row = row_of_face[partner]
     # The vertex of the first component for each vertex of a copy.
     source = np.arange(len(alone.vertices))
     source[faces.ravel()[stacked.corners]] = faces.ravel()[stacked.partners]

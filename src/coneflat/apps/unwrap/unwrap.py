@@ -101,8 +101,10 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     is_minor = areas < MINOR_SHARE * areas.sum()
     if o.texel_density is not None:
         with np.errstate(over="ignore"):  # a model that is too large for any texture
-            own = np.ldexp(areas / 2, -2 * prepared.checked.exponent)
-        shared = replace(shared, resolution=expected_resolution(o.texel_density, own, o.padding, o.tiles))
+            model_areas = np.ldexp(areas / 2, -2 * prepared.checked.exponent)
+        shared = replace(
+            shared, resolution=expected_resolution(o.texel_density, model_areas, o.padding, o.tiles)
+        )
     with limit_threads(o.threads if sizes.max() > PARALLEL else 1):
         flat = lay_out_flat_parts(parts, watch)
         found.update((i, Candidate(layout, ISOMETRIC, 0.0, 0.0, True)) for i, layout in flat.items())
