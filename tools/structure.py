@@ -40,6 +40,8 @@ HOLDS = {
     "source": "from the input to connected parts",
     "flatten": "the method, top to bottom",
     "evaluate": "from layouts to one result",
+    "bounds": "which of two layouts is better",
+    "attempts": "corners and sharp edges to try",
     "flattener": "one mesh again and again",
     "cone_curve": "distortion by number of cones",
     "apps.measure_uv": "measures of any mesh's UVs",
