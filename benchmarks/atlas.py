@@ -23,7 +23,7 @@ from common import models, shapes, with_cones_for
 from coneflat import Flattening, check_mesh, flatten, unwrap
 from coneflat.apps.peers import flatten_by
 from coneflat.apps.peers.packages import installed_peers, run_peer
-from coneflat.measure.distortion import Distortion
+from coneflat.measures.distortion import Distortion
 from coneflat.mesh.connectivity import TriangleMesh
 
 # Area distortions to try in this order, and the number of bisections of the interval of the stretch.

@@ -24,6 +24,8 @@ from pathlib import Path
 
 import numpy as np
 
+import coneflat
+
 MODELS = Path(__file__).resolve().parents[2] / "shared" / "meshes"
 BASES = (
     "3holes.off", "knight.off", "elephant.obj", "fandisk.obj", "spot.obj", "plane-holes.obj", "rocker-arm.obj",
@@ -34,7 +36,7 @@ RIGHT = np.pi / 2
 WAYS: dict[str, dict[str, object]] = {
     "one": {"charts": "one"},
     "atlas": {"charts": "atlas"},
-    "paper": {"PAPER": True, "charts": "one"},
+    "paper": {**coneflat.PAPER, "charts": "one"},
     "quantised": {"quantise": RIGHT, "charts": "atlas"},
     "handles": {"quantise": RIGHT, "correct_handles": True, "charts": "one"},
     "disk": {"boundary": "disk", "charts": "one"},
@@ -58,8 +60,6 @@ ROUNDING = 1e-6
 
 def deformed(name: str, how: str) -> tuple[np.ndarray, np.ndarray]:
     """Return a model with a deformation that depends only on the two names."""
-    import coneflat
-
     mesh = coneflat.read_mesh(MODELS / name)
     points = np.asarray(mesh.vertices, dtype=float).copy()
     faces = mesh.triangles.copy()
@@ -107,8 +107,6 @@ def measures_of(case: tuple[str, str, str]) -> dict[str, object]:
     Raises:
         ConeflatError: the case is refused.
     """
-    import coneflat
-
     name, how, way = case
     vertices, faces = deformed(name, how) if how else (MODELS / name, None)
     if way == "quads":
@@ -127,9 +125,7 @@ def measures_of(case: tuple[str, str, str]) -> dict[str, object]:
     if way == "unwrap":
         result = coneflat.unwrap(vertices, faces, repair=True)
     else:
-        options = dict(WAYS[way])
-        published = coneflat.PAPER if options.pop("PAPER", False) else {}
-        result = coneflat.flatten(vertices, faces, repair=True, **published, **options)
+        result = coneflat.flatten(vertices, faces, repair=True, **WAYS[way])
     names = (
         "charts", "seam_length", "qc_mean", "qc_max", "area_std", "energy", "flipped", "degenerate",
         "overlapping_pairs", "seam_mismatch_max", "angle_sum_error",

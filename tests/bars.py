@@ -6,7 +6,7 @@ import numpy as np
 
 from coneflat.geometry.triangulate import triangulate
 from coneflat.io import read_mesh
-from coneflat.measure.distortion import measure
+from coneflat.measures.distortion import measure
 from coneflat.mesh.connectivity import TriangleMesh
 from coneflat.result import Flattening
 

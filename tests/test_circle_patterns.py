@@ -19,7 +19,7 @@ from coneflat.geometry.delaunay import intrinsic_delaunay
 from coneflat.geometry.intrinsic import intrinsic_triangulation
 from coneflat.io import as_input
 from coneflat.linalg.newton import Point
-from coneflat.measure.distortion import measure
+from coneflat.measures.distortion import measure
 from coneflat.mesh.ties import tie_key
 from coneflat.options import Options
 from coneflat.source import Source

@@ -15,7 +15,7 @@ from coneflat.options import Options
 from coneflat.source import Part, Source
 from coneflat.source.copies import find_copies
 
-method = import_module("coneflat.flatten")
+method = import_module("coneflat.flattening")
 
 Mesh = tuple[FloatArray, IntArray]
 

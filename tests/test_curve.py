@@ -7,7 +7,7 @@ from click.testing import CliRunner
 
 import coneflat
 from coneflat.apps.cli.main import cli
-from coneflat.cone_curve import whole_curve
+from coneflat.curves import whole_curve
 from coneflat.errors import OptionError
 from coneflat.options import Options
 

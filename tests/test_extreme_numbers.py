@@ -10,10 +10,10 @@ import shapes
 
 import coneflat
 from coneflat import errors
-from coneflat.apps.quads.options import QuadOptions
-from coneflat.apps.unwrap.options import ChartNumber, UnwrapOptions
 from coneflat.options import Number, Options, declarations
 from coneflat.options.declared import CurveOptions, FindOptions
+from coneflat.quadmesh.options import QuadOptions
+from coneflat.textures.options import ChartNumber, UnwrapOptions
 
 EXTREMES = (1e-300, 1e-162, 1e155, 1e308, np.nan, np.inf, -np.inf, -1, 0)
 HILL = shapes.hill(5, 4)

@@ -66,7 +66,7 @@ def test_a_grid_of_steps_is_flattened_though_most_of_its_triangles_are_thin():
 
 
 def test_an_attempt_that_fails_leaves_the_finished_layout(monkeypatch):
-    method = import_module("coneflat.flatten")
+    method = import_module("coneflat.flattening")
     lay_out_parts, calls = method.lay_out_parts, []
 
     def fails_later(parts, how):

@@ -90,7 +90,7 @@ print(*sys.modules)
     command = [sys.executable, "-c", script, coneflat.sample_path(), tmp_path / "flat.obj"]
     printed = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split("\n")
     unused = {"trimesh", "matplotlib", "PIL", "rich", "scipy.spatial", "scipy.optimize", "pypardiso"}
-    assert "coneflat.flatten" in printed[-2].split()
+    assert "coneflat.flattening" in printed[-2].split()
     assert not unused & set(printed[-2].split())
 
 
@@ -134,8 +134,8 @@ def test_examples_of_public_names_run(name, tmp_path, monkeypatch):
         lambda result: import_module("coneflat.geometry").find_overlaps(
             result.uv, result.uv_faces, limit="x"
         ),
-        lambda result: import_module("coneflat.layout.relax").StretchEnergy("x"),
-        lambda result: import_module("coneflat.layout.relax").StretchEnergy(0.0, [1]),
+        lambda result: import_module("coneflat.optimise").StretchEnergy("x"),
+        lambda result: import_module("coneflat.optimise").StretchEnergy(0.0, [1]),
     ],
 )
 def test_values_of_a_wrong_type_are_errors_of_the_package(call):

@@ -382,7 +382,7 @@ def test_components_have_the_same_texel_density():
 
 def test_no_more_cones_are_searched_for_than_a_search_can_find(monkeypatch):
     """A distortion that needs more cones than the search allows is named at once: each search would take longest."""
-    pipeline = import_module("coneflat.flatten")
+    pipeline = import_module("coneflat.flattening")
     searches, once = [], pipeline.lay_out_part
     monkeypatch.setattr(pipeline, "lay_out_part", lambda *given: searches.append(0) or once(*given))
     monkeypatch.setattr(pipeline, "MAX_SEARCHED", 5)

@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 from coneflat.apps.cli.main import cli
 from coneflat.apps.cli.options import flag_name, shown_default
-from coneflat.apps.quads.options import QuadOptions
 from coneflat.options import declarations, kinds
 from coneflat.options.declared import (
     AtlasOptions,
@@ -17,6 +16,7 @@ from coneflat.options.declared import (
     RunOptions,
     SeamOptions,
 )
+from coneflat.quadmesh.options import QuadOptions
 
 #: As people think of them; each group's docstring is its title.
 GROUPS = (ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)

@@ -14,8 +14,8 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 import coneflat
-from coneflat.apps.quads.page import page_of_quads
 from coneflat.apps.view import write_page
+from coneflat.apps.view.quad_page import page_of_quads
 
 WIDE, NARROW = {"width": 1366, "height": 768}, {"width": 390, "height": 844}
 #: Name, size, theme, and actions on the page before the screenshot.

@@ -18,8 +18,8 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[1] / "src" / "coneflat"
 
-#: The stages, which do not import each other; only `flatten.py` combines them.
-STAGES = ("cones", "metric", "seams", "layout", "atlas", "measure")
+#: The stages, which do not import each other; only `flattening.py` combines them.
+STAGES = ("cones", "metric", "seams", "layout", "atlas", "measures")
 #: What a package or a file beside the packages holds, in about five words.
 HOLDS = {
     "": "what users import, by name",
@@ -32,23 +32,26 @@ HOLDS = {
     "cones": "where the curvature goes",
     "metric": "flat metrics: linear, exact",
     "seams": "costs of seams, the seam tree",
-    "layout": "unfolding, untangling, relaxing",
+    "layout": "flat triangles become points",
+    "optimise": "less distortion, no flipped triangle",
     "atlas": "overlaps separated, charts packed",
-    "measure": "distortion, guarantees, report",
+    "measures": "distortion, guarantees, report",
     "result": "what a flattening returns",
     "io": "OBJ, PLY, STL, OFF, glTF, NPZ",
     "source": "from the input to connected parts",
-    "flatten": "the method, top to bottom",
+    "flattening": "the method, top to bottom",
     "evaluate": "from layouts to one result",
     "bounds": "which of two layouts is better",
     "attempts": "corners and sharp edges to try",
     "flattener": "one mesh again and again",
-    "cone_curve": "distortion by number of cones",
-    "apps.measure_uv": "measures of any mesh's UVs",
+    "curves": "distortion by number of cones",
+    "apps.uv_measures": "measures of any mesh's UVs",
     "from_uv": "a file's own UVs as a flattening",
     "sample": "the model that ships",
     "warm_up": "compilation of all kernels",
-    "apps": "commands, page, studio, quads, peers",
+    "textures": "shortest seams for textures",
+    "quadmesh": "quads from an integer grid",
+    "apps": "commands, page, studio, peers",
     "xatlas": "the interface of xatlas",
     "__main__": "python -m coneflat",
 }
@@ -125,7 +128,7 @@ def imported_packages(modules: dict[str, Module]) -> dict[str, frozenset[str]]:
         others = {package_of(other) for other in module.imports | module.late_imports}
         if own == "":
             others = set()
-        if own == "result":  # Flattening.save and .view
+        if name in ("result", "quadmesh.quad_mesh"):  # their `save` and `view`
             others = {package_of(other) for other in module.imports}
         found.setdefault(own, set()).update(others - {own, ""})
     return {name: frozenset(others) for name, others in found.items()}

@@ -436,7 +436,7 @@ def _check_area(trial: Trial) -> None:
 
 def _check_report(trial: Trial) -> None:
     """Check that the report is JSON without NaN, and that its texts are readable."""
-    from coneflat.measure.report import as_rows
+    from coneflat.measures.report import as_rows
 
     json.dumps(trial.result.report(), allow_nan=False)
     repr(trial.result)

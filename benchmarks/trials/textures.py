@@ -39,8 +39,8 @@ def unwrap_mesh(
 ) -> None:
     """Unwrap a mesh with random options, beside fixed ones."""
     import coneflat
-    from coneflat.apps.unwrap.options import UnwrapOptions
     from coneflat.options import declarations
+    from coneflat.textures.options import UnwrapOptions
 
     given = make_options(rng, vertices, faces)
     options = {name: value for name, value in given.items() if name in declarations(UnwrapOptions)} | fixed

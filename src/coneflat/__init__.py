@@ -27,38 +27,36 @@ Examples:
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.2.0"
 
 # Module of each public name.
 _HOMES = {
-    "flatten": "flatten",
+    "flatten": "flattening",
     "Flattener": "flattener",
     "Flattening": "result",
-    "Distortion": "measure.distortion",
-    "SeamData": "measure.seam_data",
+    "Distortion": "measures.distortion",
+    "SeamData": "measures.seam_data",
     "PAPER": "options",
     "read_mesh": "io",
     "read_flattening": "io",
     "MeshFile": "io.mesh_file",
     "sample_path": "sample",
-    "find_cones": "cone_curve",
-    "cone_curve": "cone_curve",
-    "ConeCurve": "cone_curve",
+    "find_cones": "curves",
+    "cone_curve": "curves",
+    "ConeCurve": "curves",
     "check_mesh": "mesh.check",
     "TriangleMesh": "mesh.connectivity",
-    "measure": "measure.distortion",
-    "measure_uv": "apps.measure_uv",
-    "quads": "apps.quads.quads",
-    "unwrap": "apps.unwrap.unwrap",
-    "QuadMesh": "apps.quads.quad_mesh",
-    "measure_quads": "apps.quads.quality",
-    "integer_grid": "apps.quads.integer_grid",
-    "IntegerGrid": "apps.quads.integer_map",
+    "measure": "measures.distortion",
+    "measure_uv": "apps.uv_measures",
+    "quads": "quadmesh.quad_meshing",
+    "unwrap": "textures.unwrapping",
+    "QuadMesh": "quadmesh.quad_mesh",
+    "measure_quads": "quadmesh.quality",
+    "integer_grid": "quadmesh.grid_search",
+    "IntegerGrid": "quadmesh.integer_map",
     "make_figure": "apps.view",
     "save_figure": "apps.view",
     "studio": "apps.studio.notebook",
@@ -71,7 +69,7 @@ _HOMES = {
 _MODULES = {"errors": "errors"}
 _PACKAGES = {"peers": "apps.peers"} | {name: name for name in (
     "atlas", "cones", "geometry", "io", "layout", "linalg",
-    "mesh", "metric", "options", "seams", "stages",
+    "mesh", "metric", "optimise", "options", "seams", "stages",
 )}  # fmt: skip
 
 __all__ = [
@@ -108,41 +106,44 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:
-    from . import atlas, cones, errors, geometry, io, layout, linalg, mesh, metric, options, seams, stages  # noqa: F401
+    from . import (  # noqa: F401
+        atlas,
+        cones,
+        errors,
+        geometry,
+        io,
+        layout,
+        linalg,
+        mesh,
+        metric,
+        optimise,
+        options,
+        seams,
+        stages,
+    )
     from .apps import peers  # noqa: F401
-    from .apps.measure_uv import measure_uv
-    from .apps.quads.integer_grid import integer_grid
-    from .apps.quads.integer_map import IntegerGrid
-    from .apps.quads.quad_mesh import QuadMesh
-    from .apps.quads.quads import quads
-    from .apps.quads.quality import measure_quads
     from .apps.studio.notebook import studio
-    from .apps.unwrap.unwrap import unwrap
+    from .apps.uv_measures import measure_uv
     from .apps.view import make_figure, save_figure
-    from .cone_curve import ConeCurve, cone_curve, find_cones
+    from .curves import ConeCurve, cone_curve, find_cones
     from .errors import ConeflatError, GuaranteeWarning
-    from .flatten import flatten
     from .flattener import Flattener
+    from .flattening import flatten
     from .io import read_flattening, read_mesh
     from .io.mesh_file import MeshFile
-    from .measure.distortion import Distortion, measure
-    from .measure.seam_data import SeamData
+    from .measures.distortion import Distortion, measure
+    from .measures.seam_data import SeamData
     from .mesh.check import check_mesh
     from .mesh.connectivity import TriangleMesh
     from .options import PAPER
+    from .quadmesh.grid_search import integer_grid
+    from .quadmesh.integer_map import IntegerGrid
+    from .quadmesh.quad_mesh import QuadMesh
+    from .quadmesh.quad_meshing import quads
+    from .quadmesh.quality import measure_quads
     from .result import Flattening
     from .sample import sample_path
-
-
-class _Package(ModuleType):
-    """The package; `coneflat.flatten` remains the function when the module of the same name is imported."""
-
-    def __setattr__(self, name: str, value: object) -> None:
-        if not (name in _HOMES and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package
+    from .textures.unwrapping import unwrap
 
 
 def __getattr__(name: str) -> Any:

@@ -14,9 +14,9 @@ from .base.arrays import FloatArray, IntArray, rows_of
 from .base.notes import counted_notes
 from .base.progress import Stopwatch
 from .geometry.overlap import Overlaps
-from .measure.distortion import curvature_errors, measure
-from .measure.guarantees import unmet_guarantees
-from .measure.seam_data import Rotations, measure_rotations
+from .measures.distortion import curvature_errors, measure
+from .measures.guarantees import unmet_guarantees
+from .measures.seam_data import Rotations, measure_rotations
 from .mesh.connectivity import TriangleMesh
 from .options import Options, settings
 from .result import Flattening

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from .base.arrays import FloatArray
 from .base.notes import warns
 from .cones import close_search
-from .flatten import Preview, flatten_source
+from .flattening import Preview, flatten_source
 from .io.packages import as_input
 from .mesh.connectivity import TriangleMesh
 from .options import Options, read_options

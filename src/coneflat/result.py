@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     import trimesh
 
     from .io.mesh_file import MeshFile
-    from .measure.distortion import Distortion
-    from .measure.seam_data import Rotations, SeamData
+    from .measures.distortion import Distortion
+    from .measures.seam_data import Rotations, SeamData
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,13 +100,13 @@ class Flattening:
     @cached_property
     def seam_data(self) -> SeamData:
         """The cut as arrays: both sides of each seam edge and the motion between them, charts, cone angles, scales."""
-        from .measure.seam_data import seam_data
+        from .measures.seam_data import seam_data
 
         return seam_data(self)
 
     def report(self) -> dict[str, Any]:
         """Return all measures as plain Python values, ready for JSON."""
-        from .measure.report import as_dict
+        from .measures.report import as_dict
 
         return as_dict(self)
 

@@ -11,6 +11,6 @@ Examples:
     ((4, 3), dtype('float32'), True)
 """
 
-from .apps.unwrap.xatlas import Atlas, ChartOptions, PackOptions, export, parametrize
+from .apps.xatlas.interface import Atlas, ChartOptions, PackOptions, export, parametrize
 
 __all__ = ["Atlas", "ChartOptions", "PackOptions", "export", "parametrize"]

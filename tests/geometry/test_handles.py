@@ -11,7 +11,7 @@ import shapes
 from coneflat import check_mesh, errors, flatten
 from coneflat.geometry import corner_angles, edge_lengths
 from coneflat.geometry.handles import difference_from_multiple, handle_loops, loop_holonomy
-from coneflat.measure.seam_data import measure_rotations
+from coneflat.measures.seam_data import measure_rotations
 from coneflat.metric import exact_metric, find
 
 QUARTER = np.pi / 2

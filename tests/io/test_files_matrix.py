@@ -14,7 +14,7 @@ import coneflat
 from coneflat import check_mesh
 from coneflat.io import read_mesh
 from coneflat.io.write import as_written
-from coneflat.measure.distortion import measure
+from coneflat.measures.distortion import measure
 
 trimesh = pytest.importorskip("trimesh")
 meshio = pytest.importorskip("meshio")

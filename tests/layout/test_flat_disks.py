@@ -13,7 +13,7 @@ from coneflat.errors import CurvatureError
 from coneflat.geometry import edge_lengths, signed_double_areas
 from coneflat.layout import lay_out_flat_disks
 
-pipeline = import_module("coneflat.flatten")
+pipeline = import_module("coneflat.flattening")
 
 
 def laid_out(*parts):

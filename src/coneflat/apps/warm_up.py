@@ -13,8 +13,8 @@ import numpy as np
 from .. import flatten, sample_path, unwrap
 from ..base import FloatArray, IntArray, inner_calls
 from ..geometry import visible_share
-from .quads.quads import quads
-from .quads.quality import measure_quads
+from ..quadmesh.quad_meshing import quads
+from ..quadmesh.quality import measure_quads
 
 
 def steps() -> Iterator[tuple[str, Callable[[], object]]]:

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from ..base.arrays import FloatArray, IntArray
 from ..errors import MeshFileError
-from ..measure.distortion import Distortion
-from ..measure.report import MEASURES
-from ..measure.seam_data import Rotations
+from ..measures.distortion import Distortion
+from ..measures.report import MEASURES
+from ..measures.seam_data import Rotations
 from ..result import Flattening
 from ..stages import SolveStatistics
 from .files import PathName, as_path, read_bytes, readable

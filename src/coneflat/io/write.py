@@ -14,7 +14,7 @@ from ..base.arrays import FloatArray, IntArray
 from ..base.notes import Unmet
 from ..base.text import plural, short_repr
 from ..errors import OptionError
-from ..measure.guarantees import DOUBLE, SINGLE, first_faces, remeasured
+from ..measures.guarantees import DOUBLE, SINGLE, first_faces, remeasured
 from ..mesh.polygons import polygon_of
 from ..options.declared import FORMATS
 from ..result import Flattening

@@ -16,11 +16,11 @@ from ..geometry.overlap import has_overlaps
 from ..geometry.planar import layout_curvature
 from ..geometry.straight import FlatTriangles, straight_triangles
 from ..geometry.triangles import corner_angles
+from ..geometry.unfolding import unfold_from
 from ..mesh.connectivity import TriangleMesh
+from ..optimise.relaxed_layouts import joined
+from ..optimise.untangling import find_degenerate
 from ..stages import Layout, SolveStatistics
-from .relax_layouts import joined
-from .unfold import unfold_from
-from .untangle import find_degenerate
 
 # Largest curvature inside a flat disk, radians: the accuracy to which the exact metric is computed.
 FLAT_CURVATURE = 1e-10

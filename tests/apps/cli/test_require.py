@@ -13,7 +13,7 @@ from click.testing import CliRunner
 import coneflat
 from coneflat import errors
 from coneflat.apps.cli.main import cli
-from coneflat.measure.requirements import REPORTED, Requirement, breaches, parse_requirements
+from coneflat.measures.requirements import REPORTED, Requirement, breaches, parse_requirements
 
 
 @pytest.fixture

@@ -17,10 +17,10 @@ from coneflat.apps.studio.messages import CONTROLS, command_line, python_lines, 
 from coneflat.apps.studio.outputs import curve_options
 from coneflat.apps.studio.paint import Region
 from coneflat.apps.studio.project import Project, file_hash, read_project
-from coneflat.apps.unwrap.options import MAX_ENERGY, UnwrapOptions
 from coneflat.base import cancel_with
 from coneflat.errors import OptionError, StudioError
 from coneflat.options import declarations
+from coneflat.textures.options import MAX_ENERGY, UnwrapOptions
 
 CONES = (3, 60, 200, 410, 500)
 #: Options of `coneflat flatten` and `coneflat unwrap` that the studio does not set, by the reason.

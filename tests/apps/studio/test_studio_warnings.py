@@ -13,10 +13,10 @@ from coneflat.apps.studio.choices import DECLARED, Choices
 from coneflat.apps.studio.messages import CONTROLS, misplaced_warning, page_message
 from coneflat.apps.studio.page import studio_page
 from coneflat.apps.studio.paint import Region
-from coneflat.apps.unwrap.options import UnwrapOptions
 from coneflat.base.defaults import MAX_CONE_ANGLE
 from coneflat.errors import OptionError, StudioError
 from coneflat.options import read_options
+from coneflat.textures.options import UnwrapOptions
 
 SOURCES = Path(coneflat.__file__).parent
 

@@ -10,9 +10,9 @@ from command import command
 from scenes import SceneMaker
 
 import coneflat
-from coneflat.apps.quads.nearest import TriangleTree
 from coneflat.apps.transfer import transfer
 from coneflat.errors import MeshFileError, MissingUVError, OptionError
+from coneflat.geometry.nearest import TriangleTree
 
 Image = pytest.importorskip("PIL.Image")
 

@@ -19,7 +19,7 @@ from coneflat.apps.view.page.content import content_of, outline_halfedges
 from coneflat.apps.view.page.webpage import page_html
 from coneflat.errors import MeshError, MeshFileError, OptionError, UnknownFormatError
 from coneflat.io.texture import read_picture
-from coneflat.measure.report import as_rows
+from coneflat.measures.report import as_rows
 from coneflat.mesh.connectivity import end_corners
 
 TYPES = {"f4": "<f4", "u4": "<u4", "i4": "<i4", "u2": "<u2", "u1": "u1"}

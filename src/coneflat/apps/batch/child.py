@@ -17,7 +17,7 @@ def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
     """Flatten a mesh file, write the result, and return its row of the summary; errors give a row, too."""
     from ... import ConeflatError, flatten, unwrap
     from ...io import read_joined, write_measured
-    from ...measure import REPORTED, breaches, parse_requirements
+    from ...measures import REPORTED, breaches, parse_requirements
 
     start = time.perf_counter()
     row: dict[str, Any] = {"mesh": job["mesh"], "output": job["output"]}

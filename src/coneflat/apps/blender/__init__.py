@@ -15,9 +15,9 @@ from typing import Any
 from ... import __version__
 from ...io import atomic_write, checked_target
 from ...options import Options
+from ...quadmesh.options import QUADS, QuadOptions
+from ...textures.options import UnwrapOptions
 from ..controls import controls_of
-from ..quads.options import QUADS, QuadOptions
-from ..unwrap.options import UnwrapOptions
 
 #: The options of each command.
 COMMANDS: dict[str, type] = {"unwrap": UnwrapOptions, "flatten": Options, "quads": QuadOptions}

@@ -12,9 +12,9 @@ from scipy.sparse.csgraph import dijkstra
 from ...base import FloatArray, IntArray, check_cancelled
 from ...geometry import double_areas, edge_lengths, signed_double_areas
 from ...io import UVMesh
-from ...measure import Row
+from ...measures import Row
 from ...mesh import sort_pairs
-from ..measure_uv import UVMeasures, measure_mapped
+from ..uv_measures import UVMeasures, measure_mapped
 
 #: Distances are measured up to this many mean edge lengths, as far as the rings of neighbours of other tools reach.
 REACH = 7.0

@@ -12,7 +12,7 @@ import click
 
 from ...base import plural, printable
 from ...options import FORMATS, Options, declarations, read_options
-from ..unwrap.options import MAX_ENERGY, TextureOptions, UnwrapOptions
+from ...textures.options import MAX_ENERGY, TextureOptions, UnwrapOptions
 from .options import (
     check_combinations,
     flag,
@@ -81,7 +81,7 @@ def batch(
       coneflat batch models --out flat --dask tcp://10.0.0.1:8786
     """
     from ...io import make_folder
-    from ...measure import REPORTED, parse_requirements
+    from ...measures import REPORTED, parse_requirements
     from ..batch import find_jobs, run_batch
     from .run import Console
 

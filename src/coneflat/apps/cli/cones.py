@@ -17,7 +17,7 @@ from .shared import GroupedCommand, input_options, verbosity_options
 
 if TYPE_CHECKING:
     from ... import ConeCurve
-    from ...cone_curve import FoundCones
+    from ...curves import FoundCones
 
 
 @dataclass(frozen=True, kw_only=True)

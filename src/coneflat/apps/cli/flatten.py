@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...options import FORMATS, Options, declarations
-from ..unwrap.options import UnwrapOptions
+from ...textures.options import UnwrapOptions
 from .options import (
     check_combinations,
     flag,
@@ -125,7 +125,7 @@ def _flatten_and_save(
 ) -> None:
     """Flatten a file by a function with a group of options, and write the result and its report."""
     from ...io import PIPE, check_output, check_target
-    from ...measure import REPORTED, parse_requirements
+    from ...measures import REPORTED, parse_requirements
     from .run import Console, flatten_file, redirect_prints, require_distinct, save
 
     flags, add_notes = pop_flags(given, FileFlags), None

@@ -11,9 +11,9 @@ import click
 from .shared import QUIET, check_required, input_options, require_option, verbosity_options
 
 if TYPE_CHECKING:
-    from ...measure import Row
+    from ...measures import Row
     from ..brains import FlatMeasures
-    from ..measure_uv import UVMeasures
+    from ..uv_measures import UVMeasures
 
 
 @click.command(short_help="Measure the UVs of a file, made by any tool.")
@@ -43,9 +43,9 @@ def measure(
       coneflat measure asset.glb --require flipped=0,overlap=0 --require "qc_mean<=1.1"
     """
     from ...io import as_uv_mesh, check_target
-    from ...measure import parse_requirements
+    from ...measures import parse_requirements
     from ..brains import FLAT_MEASURES, measure_flat, read_flat
-    from ..measure_uv import MEASURED, measure_mapped
+    from ..uv_measures import MEASURED, measure_mapped
     from .run import Console, require_distinct, write_report
 
     if surface is not None and weld:
@@ -74,7 +74,7 @@ def measure(
 
 def rows_of_measures(measured: UVMeasures, flat: FlatMeasures | None = None) -> list[Row]:
     """Return the rows (name, value, meaning) of the table of measures of UVs, or of a flat map of a brain."""
-    from ...measure import map_rows, number_text, packing_row
+    from ...measures import map_rows, number_text, packing_row
     from .run import FIRST_ROWS
 
     counts, of_map = measured.counts, map_rows(measured.distortion)

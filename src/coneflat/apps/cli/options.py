@@ -15,7 +15,7 @@ from ... import PAPER
 from ... import options as declared
 from ...errors import OptionError
 from ...options import ConeOptions, Declaration, Kind, MetricOptions, Number, Options, declarations, option
-from ..quads.options import Sizes
+from ...quadmesh.options import Sizes
 from . import values
 from .shared import BRIEF, RARE_TITLE, Grouped, repair_keywords
 

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from ...options import ConeBounds, ConeNumber, declarations, read_options
-from ..quads.options import QuadOptions
+from ...quadmesh.options import QuadOptions
 from .options import is_given, keywords, option_flags, path_flag, pop_flags, refuse
 from .shared import GroupedCommand, input_options, verbosity_options
 
@@ -59,9 +59,8 @@ def quads(
     from ... import integer_grid, measure_quads
     from ... import quads as find_quads
     from ...io import check_target, read_joined
-    from ..quads.files import check_grid_output, check_quads_output, quads_left_out, read_grid
-    from ..quads.page import page_of_quads
-    from ..view import check_page, write_page
+    from ...quadmesh.files import check_grid_output, check_quads_output, quads_left_out, read_grid
+    from ..view import check_page, page_of_quads, write_page
     from .run import Console, require_distinct, write_report
 
     _check_combinations(context, mesh)

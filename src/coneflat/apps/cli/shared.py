@@ -11,7 +11,7 @@ import click
 from ...options import MAX_SHOWN_TRIANGLES, RARE
 
 if TYPE_CHECKING:
-    from ...measure import Requirement
+    from ...measures import Requirement
 
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -133,7 +133,7 @@ def check_required(requirements: Iterable[Requirement], measures: dict[str, Any]
 
     written: name of the file that has been written nevertheless.
     """
-    from ...measure import breaches
+    from ...measures import breaches
 
     lines = breaches(requirements, measures)
     if not lines:

@@ -74,9 +74,8 @@ def view(
     """
     from ... import flatten, unwrap
     from ...io import read_picture
-    from ..quads.files import holds_quads, read_quads
-    from ..quads.page import page_of_quads
-    from ..view import check_page, open_page, own_quantity, page_html, write_page
+    from ...quadmesh.files import holds_quads, read_quads
+    from ..view import check_page, open_page, own_quantity, page_html, page_of_quads, write_page
     from .run import Console, archive_path, open_result
 
     # Errors that writing would raise are reported before the work starts.

@@ -11,7 +11,8 @@ from ... import TriangleMesh
 from ...base import FloatArray, plural
 from ...errors import MetricError
 from ...geometry import double_areas
-from ...layout import far_pins, pinned_least_squares, rest_sides
+from ...layout import far_pins, pinned_least_squares
+from ...optimise import rest_sides
 from ...stages import ConeSolution, Cut, Embedding, FlatMetric
 
 

@@ -73,7 +73,7 @@ def quads_file(source: Joined, choices: Choices, count: int, ending: str, report
         report: called like `progress` of `coneflat.flatten`.
     """
     from ... import quads
-    from ..quads.files import write_quads_stream
+    from ...quadmesh.files import write_quads_stream
 
     words = choices.with_search().keywords()
     options = {name: words[name] for name in QUAD_OPTIONS if name in words}
@@ -91,7 +91,7 @@ def curve_data(source: Joined, choices: Choices, report: Progress) -> dict[str, 
     It is the distortion of the whole mesh with this number of cones in each part: components, and regions between
     marked seams.
     """
-    from ...cone_curve import whole_curve
+    from ...curves import whole_curve
     from ...options import read_options
 
     words = curve_options(choices)

@@ -18,9 +18,9 @@ from ... import MeshFile, io
 from ...base import FloatArray, IntArray, Unmet, check_cancelled, unit_exponent, warns
 from ...errors import NonFiniteError, OptionError
 from ...geometry import fill_nearest, signed_double_areas, unit_vectors
+from ...geometry.nearest import TriangleTree
 from ...io import UVMesh, as_path, to_srgb
 from ...options import Number
-from ..quads.nearest import TriangleTree
 from ..view import Barycentrics, uv_flattening
 from .materials import BASE, NORMAL, UNLIT, Channel, Painted
 

@@ -21,6 +21,7 @@ from .page.webpage import (
     page_html,
     write_page,
 )
+from .quad_page import page_of_quads
 from .quantity import Quantity, conformal_distortion, own_quantity
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "check_figure", "check_page", "compose", "conformal_distortion", "content_of", "demo_figure", "draw_checker",
     "draw_cones", "draw_layout", "draw_quantity", "eye_direction", "fill_layout", "head_and_block", "layout_aspect",
     "make_figure", "mark_handles", "mark_scale", "new_figure", "notebook_html", "open_address", "open_page",
-    "outline_halfedges", "own_flattening", "own_quantity", "pack", "page_around", "page_html", "save_figure",
+    "outline_halfedges", "own_flattening", "own_quantity", "pack", "page_around", "page_html", "page_of_quads",
+    "save_figure",
     "show_mesh", "shown_rows", "uv_flattening", "view_aspect", "write_figure", "write_page",
 ]  # fmt: skip

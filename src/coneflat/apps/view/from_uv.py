@@ -8,11 +8,11 @@ from ...base import unit_exponent
 from ...errors import MeshFileError, MissingUVError
 from ...geometry import double_areas, edge_lengths
 from ...io import Joined, UVMesh, cell_side, uv_mesh_of
-from ...measure import angle_sum_errors, as_rows
+from ...measures import angle_sum_errors, as_rows
 from ...mesh import uv_seams
 from ...result import Flattening
 from ...stages import SolveStatistics
-from ..measure_uv import measure_mapped, uv_points
+from ..uv_measures import measure_mapped, uv_points
 
 #: The `method` in the settings of a flattening that was read from the UVs of a file.
 FILE_UVS = "the file's own UVs"

@@ -14,7 +14,7 @@ from ...base import FloatArray, IntArray, mask_of, short_repr
 from ...errors import MeshFileError, OptionError
 from ...geometry import angle_defect, corner_angles, double_areas, edge_lengths
 from ...io import VALUES, read_vertex_values
-from ...measure import quantile
+from ...measures import quantile
 
 if TYPE_CHECKING:
     from ... import Flattening

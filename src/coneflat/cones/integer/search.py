@@ -18,7 +18,7 @@ from ...errors import CurvatureError
 from ...geometry.handles import difference_from_multiple
 from ...stages import ConeSolution
 from ..sparse.dense_model import MIN_RELATIVE_GAIN
-from ..sparse.exact_model import MAX_ROUNDS, MIN_PROMISED_GAIN
+from ..sparse.fine_model import MAX_ROUNDS, MIN_PROMISED_GAIN
 from ..sparse.search import COARSE_MODEL_ERROR, ConeSearch
 from .lattice import IndexedCones, Lattice
 from .moves import Quanta

@@ -32,7 +32,7 @@ from ...stages import ConeSolution
 from ..solution import TIE_TOLERANCE
 from .coarse_model import candidates
 from .dense_model import STALL_FACTOR, ConeSet, DenseModel
-from .exact_model import ExactModel
+from .fine_model import ExactModel
 from .limits import MAX_SEARCHED, Limits
 from .linear_model import LinearModel
 

@@ -9,7 +9,7 @@ import numpy as np
 from .... import TriangleMesh
 from ....base import FloatArray, IntArray
 from ....mesh import end_corners, label_faces, open_along
-from ...measure_uv import chart_tiles
+from ...uv_measures import chart_tiles
 from ..quantity import Quantity
 from .cone_marks import BOUNDARY_COLOR, SEAM_COLOR, draw_dots, mark_scale, pixels_of
 from .render import render_mesh

@@ -1,0 +1,166 @@
+"""What `coneflat.xatlas` computes: arrays of users, UVs of several meshes in one texture, its image, and OBJ files.
+
+These need NumPy and much more, so they are imported when they are called.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...base import FloatArray, IntArray, as_floats, as_indices
+from ...errors import ArrayShapeError, FaceIndexError, NonFiniteError, OptionError
+from ...geometry import fill_nearest
+from ...io import atomic_write
+from ...textures.soup import UnwrappedSoup, unwrap_soup
+
+if TYPE_CHECKING:
+    from .interface import PackOptions
+
+#: What xatlas returns for a mesh: (k,) the input vertex of each vertex, (m, 3) faces, and (k, 2) UVs.
+Mapped: TypeAlias = tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float32]]
+
+# Texels of an image that are computed at once: these take 16 MB.
+TEXELS_PER_BAND = 2**20
+
+
+@dataclass(frozen=True, eq=False)
+class MeshArrays:
+    """A mesh that was added: (n, 3) positions and (m, 3) faces."""
+
+    vertices: FloatArray
+    faces: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """Meshes that share a square texture.
+
+    Attributes:
+        soup: the UVs of all faces.
+        meshes: what is returned for each mesh.
+        side: texels along a side.
+    """
+
+    soup: UnwrappedSoup
+    meshes: tuple[Mapped, ...]
+    side: int
+
+    @property
+    def chart_count(self) -> int:
+        """Number of charts."""
+        return int(self.soup.chart.max(initial=-1)) + 1
+
+
+def read_arrays(
+    positions: ArrayLike, indices: ArrayLike, normals: ArrayLike | None, uvs: ArrayLike | None
+) -> MeshArrays:
+    """Return the arrays of a mesh, checked; see `coneflat.xatlas.Atlas.add_mesh`."""
+    vertices = as_rows("positions", positions, 3)
+    for name, values, width in (("normals", normals, 3), ("uvs", uvs, 2)):
+        if values is not None:
+            as_rows(name, values, width, len(vertices))
+    return MeshArrays(vertices, _read_faces(indices, len(vertices)))
+
+
+def as_rows(name: str, values: ArrayLike, width: int, count: int | None = None) -> FloatArray:
+    """Return an array (n, width) of numbers; with a `count`, n must be that.
+
+    Raises:
+        ArrayShapeError: the values have another shape or type.
+    """
+    rows = as_floats(name, values)
+    if rows.ndim != 2 or rows.shape[1] != width or count not in (None, len(rows)):
+        expected = "n" if count is None else count
+        raise ArrayShapeError(f"{name} must have the shape ({expected}, {width}), not {rows.shape}")
+    return rows
+
+
+def _read_faces(indices: ArrayLike, count: int) -> IntArray:
+    """Return (m, 3) indices of `count` vertices; m may be 0."""
+    faces = as_indices("indices", indices)
+    if faces.ndim != 2 or faces.shape[1] != 3:
+        raise ArrayShapeError(f"indices must have the shape (n, 3), not {faces.shape}")
+    if len(faces) and not 0 <= faces.min() <= faces.max() < count:
+        raise FaceIndexError(
+            f"indices must be from 0 to {count - 1:,}, and they are from {faces.min():,} to {faces.max():,}"
+        )
+    return faces
+
+
+def unwrap_meshes(meshes: list[MeshArrays], pack: PackOptions) -> Texture:
+    """Return the UVs of all meshes in one texture.
+
+    Raises:
+        OptionError: an option for packing is invalid, or leaves no space for charts.
+    """
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    vertices = np.concatenate([np.empty((0, 3)), *(mesh.vertices for mesh in meshes)])
+    shifted = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
+    faces = np.concatenate([np.empty((0, 3), dtype=np.int64), *shifted])
+    density = 0.0 if pack.resolution else pack.texels_per_unit
+    chosen = {"padding": pack.padding, "resolution": pack.resolution, "texel_density": density}
+    try:
+        soup = unwrap_soup(vertices, faces, **{name: value for name, value in chosen.items() if value})
+    except OptionError as error:
+        raise OptionError(str(error).replace("texel_density", "texels_per_unit")) from None
+    parts = np.split(soup.corner_uv, np.cumsum([len(mesh.faces) for mesh in meshes], dtype=np.int64)[:-1])
+    mapped = [_mapped(mesh.faces, part) for mesh, part in zip(meshes, parts, strict=False)]
+    return Texture(soup, tuple(mapped), soup.resolution)
+
+
+def _mapped(faces: IntArray, corner_uv: FloatArray) -> Mapped:
+    """Return a mesh with one vertex for each pair of an input vertex and a point."""
+    uv = corner_uv.reshape(-1, 2).astype(np.float32)
+    rows = np.column_stack([faces.ravel(), uv.view(np.int32)])
+    _, first, label = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    return faces.ravel()[first].astype(np.uint32), label.reshape(faces.shape).astype(np.uint32), uv[first]
+
+
+def draw_charts(texture: Texture) -> NDArray[np.uint8]:
+    """Return (side, side, 3) an image of charts; a texel has the colour of a triangle that contains its centre."""
+    soup, side = texture.soup, texture.side
+    points = np.pad(soup.corner_uv.reshape(-1, 2) * side, ((0, 0), (0, 1)))
+    corners = np.arange(len(points)).reshape(-1, 3)
+    random = np.random.default_rng(0)
+    colors = random.integers(64, 256, (max(texture.chart_count, 1), 3)).astype(np.uint8)
+    image, rows = np.zeros((side, side, 3), dtype=np.uint8), max(TEXELS_PER_BAND // side, 1)
+    for start in range(0, side, rows):
+        band = image[start : start + rows]
+        face, depth = np.full(band.shape[:2], -1), np.full(band.shape[:2], np.inf)
+        fill_nearest(points - [0, start, 0], corners, depth, face)
+        is_covered = face >= 0
+        band[is_covered] = colors[soup.chart[face[is_covered]]]
+    return image
+
+
+def write_obj(
+    path: str | PathLike[str],
+    positions: ArrayLike,
+    indices: ArrayLike | None,
+    uvs: ArrayLike | None,
+    normals: ArrayLike | None,
+) -> None:
+    """Write a mesh as OBJ; see `coneflat.xatlas.export`."""
+    vertices = as_rows("positions", positions, 3)
+    arrays = {"v": vertices}
+    for keyword, name, values, width in (("vt", "uvs", uvs, 2), ("vn", "normals", normals, 3)):
+        if values is not None:
+            arrays[keyword] = as_rows(name, values, width, len(vertices))
+    for keyword, rows in arrays.items():
+        if not np.isfinite(rows).all():
+            name = {"v": "positions", "vt": "uvs", "vn": "normals"}[keyword]
+            raise NonFiniteError(f"{name} must be finite, but some are NaN or infinite: no file was written")
+    if indices is None and len(vertices) % 3:
+        raise ArrayShapeError(f"positions without indices must be three for each face, not {len(vertices):,}")
+    corners = np.arange(len(vertices)).reshape(-1, 3) if indices is None else indices
+    faces = _read_faces(corners, len(vertices)) + 1
+    form = "/".join(["{0}", "{0}" if "vt" in arrays else "", "{0}" if "vn" in arrays else ""]).rstrip("/")
+    with atomic_write(path, "w") as file:
+        for keyword, rows in arrays.items():
+            file.writelines(f"{keyword} {' '.join(map(repr, row))}\n" for row in rows.tolist())
+        file.writelines(f"f {' '.join(map(form.format, row))}\n" for row in faces.tolist())

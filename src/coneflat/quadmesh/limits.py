@@ -1,0 +1,134 @@
+"""Limits of the number of quads: what was asked for, what triangles can carry, and what fits into memory."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base import FloatArray, IntArray, plural
+from ..errors import GridError
+from ..geometry import signed_double_areas
+from ..linalg import require_memory
+
+#: Largest number of squares of a grid, relative to the number wanted.
+MAX_TIMES = 16
+#: Largest number of squares wanted of any mesh, of one of few triangles, and for each triangle of larger meshes.
+#: Beyond, quads are those of single flat triangles, and smoothing takes over ten seconds.
+MAX_SQUARES, FEW_SQUARES, SQUARES_PER_TRIANGLE = 20_000_000, 100_000, 1_000
+#: Largest number of crossings of grid lines with edges, relative to these numbers. There are about as many as squares
+#: and triangles, but many more where a map distorts a surface to long thin triangles.
+MAX_CROSSINGS = 10
+#: Peak memory of the extraction in bytes, for each square and for each crossing.
+BYTES_PER_SQUARE, BYTES_PER_CROSSING = 850, 600
+
+
+def most_squares(triangles: int) -> int:
+    """Return the largest number of squares that may be wanted of a mesh with a number of triangles."""
+    return min(max(FEW_SQUARES, SQUARES_PER_TRIANGLE * triangles), MAX_SQUARES)
+
+
+@dataclass(frozen=True)
+class SquareLimit:
+    """The largest number of squares of a grid, and of quads made of it.
+
+    A grid may have more squares than wanted, because cones and seams must be some squares apart.
+
+    Attributes:
+        wanted: the number wanted, at least 1.
+        triangles: number of triangles of the mesh.
+    """
+
+    wanted: float = math.inf
+    triangles: int = MAX_SQUARES
+
+    @classmethod
+    def of(cls, wanted: float, triangles: int, extent: float) -> SquareLimit:
+        """Return the limit for a number of squares, which must not be too large for the mesh or the memory.
+
+        Args:
+            wanted: the number of squares.
+            triangles: that of the mesh.
+            extent: the root of the area of the mesh, in model units.
+
+        Raises:
+            GridError: there are too many squares.
+            TooLargeError: they do not fit into the free memory.
+        """
+        most = most_squares(triangles)
+        if wanted > most:
+            # The size is rounded up.
+            size = float(f"{1.005 * extent / math.sqrt(most):.3g}")
+            raise GridError(
+                f"{wanted:,.10g} quads are too many for {plural(triangles, 'triangle')}: use at most {most:,} quads, "
+                f"of size {size:.3g}, or subdivide the mesh"
+            )
+        require_memory(wanted * BYTES_PER_SQUARE, f"a grid of {wanted:,.0f} squares needs")
+        return cls(max(wanted, 1.0), triangles)
+
+    @property
+    def squares(self) -> float:
+        """The limit itself."""
+        return min(MAX_TIMES * self.wanted, 2 * most_squares(self.triangles))
+
+    def excess(self, squares: float) -> str:
+        """Return what is wrong with a number of squares above the limit; "" if nothing.
+
+        The number is NaN or infinite where a map is not finite.
+        """
+        if squares <= self.squares:
+            return ""
+        if not math.isfinite(squares):
+            return "the nearest grid is not finite"
+        text = (
+            f"the nearest grid has {squares:,.0f} squares, and at most {self.squares:,.0f} are possible for "
+        )
+        if squares > 2 * most_squares(self.triangles):
+            advice = (
+                "use fewer quads, or subdivide the mesh"
+                if self.wanted > self.triangles
+                else "subdivide the mesh"
+            )
+            return f"{text}{plural(self.triangles, 'triangle')}: {advice}"
+        least = math.ceil(squares / MAX_TIMES)
+        return f"{text}{plural(round(self.wanted), 'quad')}: use at least {least:,} quads"
+
+    def check_cones(self, quarters: IntArray) -> None:
+        """Raise GridError if a grid with some cones and corners has more squares than the limit.
+
+        Each of its squares has four corners, so it has a quarter of the sum of their angles at least.
+
+        quarters: (k,) the angles in quarter turns.
+        """
+        if text := self.excess(float(quarters.sum()) / 4):
+            raise GridError(f"{plural(len(quarters), 'cone')} of the surface: {text}")
+
+
+#: The limit of a grid that no number of squares was wanted of.
+NO_LIMIT = SquareLimit()
+
+
+def check_extraction(corner_grid: FloatArray) -> None:
+    """Raise an error if a map has too many squares, or too many crossings of grid lines with edges, to extract quads.
+
+    corner_grid: (m, 3, 2) grid coordinates of every triangle corner.
+
+    Raises:
+        GridError: there are too many.
+        TooLargeError: they do not fit into the free memory.
+    """
+    area = float(signed_double_areas(corner_grid).sum()) / 2
+    crossings = float(np.abs(corner_grid - np.roll(corner_grid, 1, axis=1)).sum()) / 2
+    if not area <= MAX_SQUARES:
+        raise GridError(
+            f"a grid of {area:,.0f} squares is too fine: at most {MAX_SQUARES:,} quads can be extracted"
+        )
+    most = MAX_CROSSINGS * most_squares(len(corner_grid))
+    if not crossings <= most:
+        raise GridError(
+            f"a grid of {area:,.0f} squares is too distorted: its lines cross edges {crossings:,.0f} times, of at most "
+            f"{most:,} that are possible: use fewer quads, or subdivide the mesh"
+        )
+    needed = area * BYTES_PER_SQUARE + crossings * BYTES_PER_CROSSING
+    require_memory(needed, f"a grid of {area:,.0f} squares needs")

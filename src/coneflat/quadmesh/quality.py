@@ -1,0 +1,167 @@
+"""Measures of quad meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base import FloatArray, dots, short_repr
+from ..errors import ArrayShapeError
+from ..geometry import edge_lengths
+from ..geometry.nearest import surface_distances
+from ..mesh.connectivity import TriangleMesh
+from .quad_mesh import QuadMesh, least_jacobians
+
+
+@dataclass(frozen=True)
+class QuadMeasures:
+    """Measures of a quad mesh.
+
+    Attributes:
+        vertices, quads: numbers of vertices and quads.
+        irregular: number of inner vertices with a valence other than 4.
+        irregular_valences: number of irregular vertices for each valence.
+        euler_characteristic: vertices minus edges plus quads.
+        surface_euler: Euler characteristic of the surface, which is the same unless squares were left out.
+        angle_mean, angle_p95, angle_max: deviation of all corner angles from 90 degrees, in degrees.
+        edge_mean, edge_cv: mean edge length, and the standard deviation of edge lengths divided by the mean.
+        jacobian_mean, jacobian_min: mean and minimum of the least scaled Jacobian of each quad, 1 for rectangles,
+            negative if a quad is flipped at a corner.
+        hausdorff: largest distance between quads and surface, model units; see `hausdorff_distance`.
+        left_out, area_left_out: see `QuadMesh`.
+    """
+
+    vertices: int
+    quads: int
+    irregular: int
+    irregular_valences: dict[int, int]
+    euler_characteristic: int
+    surface_euler: int
+    angle_mean: float
+    angle_p95: float
+    angle_max: float
+    edge_mean: float
+    edge_cv: float
+    jacobian_mean: float
+    jacobian_min: float
+    hausdorff: float
+    left_out: int
+    area_left_out: float
+
+    def report(self) -> dict[str, Any]:
+        """Return the measures by name, ready for JSON."""
+        return asdict(self)
+
+    def rows(self) -> Iterator[tuple[str, str, str]]:
+        """Yield table rows (measure, value, meaning)."""
+        valences = ", ".join(f"{count:,} of {valence}" for valence, count in self.irregular_valences.items())
+        holds = self.euler_characteristic == self.surface_euler
+        euler = "same as the surface" if holds else f"the surface has {self.surface_euler}"
+        yield "quads", f"{self.quads:,}", f"Euler characteristic {self.euler_characteristic}, {euler}"
+        irregular = f"inner vertices with a valence other than 4: {valences or 'none'}"
+        yield "irregular", f"{self.irregular:,}", irregular
+        off = f"mean; 95% below {self.angle_p95:.1f}, worst {self.angle_max:.1f}"
+        yield "off 90 deg", f"{self.angle_mean:.2f}", off
+        spread = f"standard deviation of edge lengths divided by their mean, {self.edge_mean:.4g}"
+        yield "edge cv", f"{self.edge_cv:.3f}", spread
+        least = f"scaled, mean of each quad's minimum; minimum {self.jacobian_min:.3f}"
+        yield "Jacobian", f"{self.jacobian_mean:.3f}", least
+        edges = self.hausdorff / self.edge_mean
+        distance = f"largest between quads and surface, at samples; {edges:.2f} edges"
+        yield "distance", f"{self.hausdorff:.3g}", distance
+
+
+def measure_quads(quads: QuadMesh) -> QuadMeasures:
+    """Return the measures of a quad mesh on a surface.
+
+    Angles are in degrees, lengths and distances in model units; Jacobians and `edge_cv` are ratios. Distances to and
+    from the surface are the largest at samples, see `hausdorff_distance`.
+
+    Args:
+        quads: p quads, at least one, with q vertices on their surface, as `coneflat.quads` returns them or
+            `QuadMesh.load` reads them; not modified.
+
+    Returns:
+        The measures as Python numbers, see `QuadMeasures`.
+
+    Raises:
+        ArrayShapeError: `quads` is not a `QuadMesh`.
+
+    Examples:
+        >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
+        >>> measures = coneflat.measure_quads(coneflat.quads(*square, quads=4))
+        >>> measures.quads, measures.irregular, round(measures.edge_mean, 6)
+        (4, 0, 0.5)
+        >>> round(measures.angle_max, 6), round(measures.jacobian_min, 6)
+        (0.0, 1.0)
+    """
+    if not isinstance(quads, QuadMesh):
+        raise ArrayShapeError(
+            f"quads must be a QuadMesh, as `coneflat.quads` returns, not {short_repr(quads)}"
+        )
+    points = quads.vertices
+    off = np.abs(corner_angles_of(quads) - 90.0)
+    length = np.linalg.norm(points[quads.edges[:, 0]] - points[quads.edges[:, 1]], axis=1)
+    least = least_jacobians(points, quads.quads)
+    which, many = np.unique(quads.valences[quads.irregular], return_counts=True)
+    return QuadMeasures(
+        vertices=len(points),
+        quads=len(quads.quads),
+        irregular=len(quads.irregular),
+        irregular_valences=dict(zip(which.tolist(), many.tolist(), strict=True)),
+        euler_characteristic=quads.euler_characteristic,
+        surface_euler=quads.surface_euler,
+        angle_mean=float(off.mean()),
+        angle_p95=float(np.percentile(off, 95)),
+        angle_max=float(off.max()),
+        edge_mean=float(length.mean()),
+        edge_cv=float(length.std() / length.mean()),
+        jacobian_mean=float(least.mean()),
+        jacobian_min=float(least.min()),
+        hausdorff=hausdorff_distance(quads),
+        left_out=quads.left_out,
+        area_left_out=quads.area_left_out,
+    )
+
+
+def corner_angles_of(quads: QuadMesh) -> FloatArray:
+    """Return (p, 4) the corner angles of quads, degrees."""
+    corners = quads.vertices[quads.quads]
+    one, two = np.roll(corners, 1, axis=1) - corners, np.roll(corners, -1, axis=1) - corners
+    scale = np.maximum(np.sqrt(dots(one, one) * dots(two, two)), np.finfo(float).tiny)
+    return np.degrees(np.arccos(np.clip(dots(one, two) / scale, -1.0, 1.0)))
+
+
+def hausdorff_distance(quads: QuadMesh) -> float:
+    """Return the largest sampled distance from the quads to the surface, or from the surface to the quads.
+
+    Distances are exact, but measured at samples: at 5 x 5 points of the bilinear patch of each quad, and at points of
+    each triangle with a spacing of at most half the mean edge of the quads. Distances to quads are those to their two
+    triangles on both sides of the shorter diagonal.
+    """
+    mesh, corners = quads.surface, quads.vertices[quads.quads]
+    u, v = np.indices((5, 5)).reshape(2, -1) / 4
+    patch = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
+    # Corners are shared by several quads, so they are sampled once.
+    inner = np.einsum("si,pix->psx", patch[patch.max(axis=1) < 1], corners).reshape(-1, 3)
+    there = surface_distances(mesh.vertices, mesh.faces, np.concatenate([quads.vertices, inner]))
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    back = surface_distances(quads.vertices, quads.triangles, _samples(mesh, float(sides.mean()) / 2))
+    return float(max(there.max(), back.max()))
+
+
+def _samples(mesh: TriangleMesh, spacing: float) -> FloatArray:
+    """Return (s, 3) sample points of triangles: their vertices, and rows with a given spacing, at most 64 rows each."""
+    parts = [mesh.vertices[np.unique(mesh.faces)]]
+    longest = edge_lengths(mesh.vertices, mesh.faces).max(axis=1)
+    rows = np.minimum(np.ceil(longest / spacing), 64).astype(np.int64)
+    for count in np.unique(rows[rows > 1]):
+        i, j = np.indices((count, count)).reshape(2, -1)
+        # Centroids of the small triangles with the orientation of the large one.
+        u, v = ((x[i + j < count] + 1 / 3) / count for x in (i, j))
+        corners = mesh.vertices[mesh.faces[rows == count]]
+        parts.append(np.einsum("si,fix->fsx", np.stack([1 - u - v, u, v], axis=1), corners).reshape(-1, 3))
+    return np.concatenate(parts)

@@ -1,0 +1,129 @@
+"""Options of `coneflat.unwrap`: its own, and those of the flattening that apply to it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from ..base import short_repr
+from ..errors import OptionError
+from ..options import (
+    AtlasOptions,
+    Choice,
+    Edges,
+    Kind,
+    Number,
+    RunOptions,
+    SeamOptions,
+    as_integer,
+    declarations,
+    option,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+#: The symmetric Dirichlet energy of an isometry, and the default bound.
+ISOMETRIC, MAX_ENERGY = 4.0, 4.1
+#: The energy above that of an isometry, relative to the squared area distortion, of layouts with the least energy:
+#: 17 to 27 on seven models.
+ENERGY_PER_AREA = 20.0
+#: Bounds of the area distortion allowed. Below, the energy would be that of an isometry up to rounding; above, areas
+#: differ by factors that no number holds.
+MIN_AREA, MAX_AREA = 1e-6, 100.0
+
+
+@dataclass(frozen=True)
+class ChartNumber(Kind):
+    """A word, or a number of charts; a text may be a number, too."""
+
+    words: tuple[str, ...] = ("atlas", "one")
+    metavar: ClassVar[str] = "atlas|one|NUMBER"
+    most: int = 10_000
+
+    def parse(self, name: str, value: Any) -> str | int:
+        text = value if isinstance(value, str) else ""
+        if text in self.words:
+            return text
+        given = int(text) if text.isdecimal() and len(text) < 19 else 0
+        number = given if text else as_integer(name, value)
+        if not 1 <= number <= self.most:
+            expected = ", ".join(self.words)
+            raise OptionError(
+                f"{name} must be {expected} or an integer from 1 to {self.most:,}, got {short_repr(value)}"
+            )
+        return number
+
+
+@dataclass(frozen=True, kw_only=True)
+class TextureOptions:
+    """Texture.
+
+    Attributes:
+        max_energy: Largest symmetric Dirichlet energy of each component, averaged by area: the sum of the squares of
+            the singular values and of their inverses, 4 if nothing is stretched. A smaller value needs longer seams.
+        area: Largest area distortion of each component instead of an energy: the standard deviation of the log scale,
+            weighted by area; from 1e-6 to 100.
+        texel_density: Texels per unit of length of the model, at least, instead of a resolution, which is then a
+            multiple of 4 that suffices, while 4 texels less do not.
+        stack: mirrored: the two halves of a model that is mirrored vertex by vertex share their texels. It is cut along
+            the mirror plane, which no face may cross. copies: components that are copies of each other share their
+            texels, as do the two sides of cloth.
+    """
+
+    max_energy: float = option(MAX_ENERGY, Number(is_positive=True))
+    area: float | None = option(None, Number(MIN_AREA, MAX_AREA, optional=True))
+    texel_density: float | None = option(None, Number(is_positive=True, optional=True))
+    stack: str = option("none", Choice(("none", "mirrored", "copies")))
+
+
+@dataclass(frozen=True, kw_only=True)
+class UnwrapOptions(TextureOptions, SeamOptions, AtlasOptions, RunOptions):
+    """Texture.
+
+    Attributes:
+        seams: Edges that must be cut, as pairs of vertices; input, for the seams of the UVs in the file; or none, for
+            no seams but those that open each component to a disk, whatever the energy. In Python, ("input", pairs)
+            and ("none", pairs) combine a word with edges.
+        charts: atlas: move seams and add cuts until no triangles overlap. one: a single chart per component, which may
+            overlap itself. Or a number of charts: they are cut where they are narrow until there are as many.
+    """
+
+    seams: ArrayLike | str | tuple[str, ArrayLike] | None = option(
+        None, Edges(("input", "none")), one_mesh=True
+    )
+    charts: str | int = option("atlas", ChartNumber())  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        if not self.max_energy > ISOMETRIC:
+            raise OptionError(
+                f"max_energy must be above 4, the energy of an isometry, got {self.max_energy:g}"
+            )
+        for one, other, are_both in (
+            ("resolution", "texel_density", self._differs("texel_density") and self._differs("resolution")),
+            ("area", "max_energy", self._differs("area") and self._differs("max_energy")),
+            ("seams none", "max_energy", not math.isfinite(self.bound) and self._differs("max_energy")),
+            ("seams none", "area", not math.isfinite(self.bound) and self._differs("area")),
+            (f"stack {self.stack}", "lengths", self._differs("stack") and self.lengths is not None),
+        ):
+            if are_both:
+                raise OptionError(f"{one} and {other} cannot be combined: leave out one of them")
+
+    def _differs(self, name: str) -> bool:
+        """Return whether an option is not its default."""
+        return bool(getattr(self, name) != declarations(UnwrapOptions)[name].default)
+
+    @property
+    def marked(self) -> Any:
+        """The option `seams` for the flattening, which does not know the word none."""
+        if isinstance(self.seams, tuple) and self.seams[0] == "none":
+            return self.seams[1]
+        return None if isinstance(self.seams, str) and self.seams == "none" else self.seams
+
+    @property
+    def bound(self) -> float:
+        """The largest energy, or the energy that belongs to the largest area distortion; infinite without a bound."""
+        if self.marked is not self.seams:
+            return math.inf
+        return self.max_energy if self.area is None else ISOMETRIC + ENERGY_PER_AREA * self.area**2

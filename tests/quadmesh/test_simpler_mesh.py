@@ -1,0 +1,331 @@
+"""Meshes of many triangles, holes or components: the grid is that of a simpler mesh; quads lie on the given one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components
+
+import coneflat
+from coneflat import TriangleMesh, check_mesh
+from coneflat.errors import GridError
+from coneflat.quadmesh import simpler_mesh as module
+from coneflat.quadmesh.cross_field import SHARP_ANGLE, sharp_ends
+from coneflat.quadmesh.grid_search import GridSearch
+from coneflat.quadmesh.quad_mesh import QuadMesh
+from coneflat.quadmesh.simpler_mesh import simplified
+
+
+@pytest.fixture
+def coarser(monkeypatch):
+    """Meshes of more than 2,000 triangles are made coarse."""
+    monkeypatch.setattr(module, "COARSE", 1000)
+
+
+MODELS = {
+    "ball": lambda: shapes.sphere(4, bumps=0.2),
+    "two": lambda: shapes.join(shapes.sphere(4), (shapes.sphere(3)[0] + 3, shapes.sphere(3)[1])),
+    "hill": lambda: shapes.hill(60),
+    "box": lambda: shapes.box(14, (1.0, 0.7, 0.4)),
+}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_quads_lie_on_the_given_surface(coarser, name):
+    vertices, faces = MODELS[name]()
+    assert len(faces) > 2000
+    found = coneflat.quads(vertices, faces, quads=300)
+    np.testing.assert_array_equal(found.surface.vertices, vertices)
+    assert len(found.grid.faces) < 0.9 * len(faces)
+    on = np.einsum("qi,qix->qx", found.barycentric, vertices[found.surface.faces[found.faces]])
+    np.testing.assert_allclose(on, found.vertices, atol=1e-12)
+    measures = coneflat.measure_quads(found)
+    assert measures.euler_characteristic == measures.surface_euler
+    assert measures.jacobian_min > 0
+    assert measures.hausdorff < 0.5 * measures.edge_mean
+    # Borders lie on borders.
+    weights = found.barycentric[found.is_boundary_vertex]
+    sides = found.surface.is_boundary_edge[found.surface.halfedge_edges].reshape(-1, 3)
+    at = found.faces[found.is_boundary_vertex]
+    assert ((weights <= 1e-12) & (sides[at] | (weights.max(axis=1) > 1 - 1e-12)[:, None])).any(axis=1).all()
+
+
+def test_vertices_stay_on_their_component_where_borders_touch(coarser):
+    """Two hills, one of them upside down, have the same border."""
+    vertices, faces = shapes.grid(60, 50, lambda x, y: x * (1 - x) * y * (1 - y))
+    both = shapes.join((vertices, faces), (vertices * [1, 1, -1], faces[:, ::-1]))
+    found = coneflat.quads(*both, quads=300)
+    of_quads = (found.faces >= len(faces))[found.quads]
+    assert (of_quads == of_quads[:, :1]).all()
+    assert len(np.unique(of_quads)) == 2
+
+
+def test_vertices_slide_along_the_surface():
+    """In a narrow channel, whose meshes have common vertices on one wall only, those of the other wall stay there."""
+
+    def channel(columns, rows):
+        points, faces = shapes.grid(columns, rows)
+        along = 3 * points[:, 0]
+        depth = np.maximum(1 - along, along - 2).clip(0)
+        return TriangleMesh(np.stack([0.1 * (along - 1).clip(0, 1), points[:, 1], depth], axis=1), faces)
+
+    given, finer = channel(3, 2), channel(12, 8)
+    common, rest = np.array([0, 4, 8]), np.setdiff1d(np.arange(len(finer.vertices)), [0, 4, 8])
+    order = np.append(common, rest)
+    surface = TriangleMesh(finer.vertices[order], np.argsort(order)[finer.faces])
+    one, two = surface.faces.reshape(2, -1, 3)
+    at = np.argsort(surface.faces.ravel())[
+        np.searchsorted(np.sort(surface.faces.ravel()), np.arange(len(order)))
+    ]
+    quads = QuadMesh(
+        surface.vertices, np.column_stack([one, two[:, 2]]), at // 3, np.eye(3)[at % 3], 0, 0.0, surface
+    )
+    is_filling = np.zeros(len(surface.faces), dtype=bool)
+    np.testing.assert_array_equal(given.vertices[[0, 1, 2]], surface.vertices[[0, 1, 2]])
+    moved = module.SimplerMesh(surface, np.array([0, 1, 2]), given, is_filling, 0.1).moved(quads)
+    np.testing.assert_allclose(moved.vertices, quads.vertices, atol=1e-12)
+
+
+def test_creases_are_kept(coarser):
+    vertices, faces = MODELS["box"]()
+    found = coneflat.quads(vertices, faces, quads=300)
+    # Vertices on two sides of the box are on its edges.
+    off = np.minimum(np.abs(found.vertices), np.abs(found.vertices - vertices.max(axis=0)))
+    assert ((off < 1e-12).sum(axis=1) >= 2).sum() > 70
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"cones": {0: np.pi}},
+        {"weights": "area"},
+        {"forbidden_cones": [1]},
+        {"sharp_angle": 1.0},
+        {"quads": 100_000},
+    ],
+)
+def test_options_for_which_the_given_mesh_is_used(coarser, options):
+    vertices, faces = MODELS["ball"]()
+    own = {"quads": 300, **{name: options.pop(name) for name in ("quads", "sharp_angle") if name in options}}
+    assert simplified(GridSearch.of(vertices, faces, {"quads": 300}, {}))[1] is not None
+    search = GridSearch.of(vertices, faces, own, options)
+    assert simplified(search) == (search, None)
+
+
+def test_sizes_are_those_of_the_given_mesh(coarser):
+    vertices, faces = MODELS["ball"]()
+    sizes = np.linspace(1, 2, len(vertices))
+    search, small = simplified(GridSearch.of(vertices, faces, {"quads": 300, "size": sizes}, {}))
+    np.testing.assert_allclose(search.sizes, sizes[small.kept])
+    np.testing.assert_array_equal(small.mesh.vertices, vertices[small.kept])
+
+
+def components_of(found):
+    """The number of components of quads, and of their surface."""
+    quads = csr_matrix((np.ones(len(found.edges)), found.edges.T), shape=(len(found.vertices),) * 2)
+    return connected_components(quads)[0], found.surface.components[0]
+
+
+@pytest.mark.slow
+def test_all_but_the_largest_components_are_divided(monkeypatch):
+    monkeypatch.setattr(module, "MAX_COMPONENTS", 2)
+    cube, (ball, faces) = shapes.box(1, (1.0, 1.0, 1.0)), shapes.sphere(3)
+    parts = [(4.0 * k + size * cube[0], cube[1]) for k, size in enumerate((3, 1, 2, 0.1))]
+    found = coneflat.quads(*shapes.join(*parts, (ball - 9, faces)), quads=300)
+    assert components_of(found) == (5, 5)
+    assert any("of 3 components without a grid" in note for note in found.notes)
+    on = np.einsum("qi,qix->qx", found.barycentric, found.surface.vertices[found.surface.faces[found.faces]])
+    np.testing.assert_allclose(on, found.vertices, atol=1e-12)
+    measures = coneflat.measure_quads(found)
+    assert measures.euler_characteristic == measures.surface_euler == 10
+    assert measures.jacobian_min > 0
+    assert measures.hausdorff < measures.edge_mean
+    # The unit cube has about as many quads as its area needs, or up to four times as many.
+    corners = found.vertices[found.quads].mean(axis=1)
+    is_unit = (np.abs(corners - 4.5).max(axis=1) < 0.6).sum()
+    assert 0.8 < is_unit / (300 * 6 / (14.01 * 6 + 4 * np.pi)) < 4
+
+
+def with_holes(count, corners=((20, 20), (60, 20), (20, 60), (60, 60))):
+    """A flat grid without some of its squares, and the sides of these."""
+    vertices, faces = shapes.grid(count, count)
+    middle = vertices[faces].mean(axis=1) * count
+    gone = np.any([(np.abs(middle[:, :2] - corner - 0.5) < 0.5).all(axis=1) for corner in corners], axis=0)
+    return vertices, faces[~gone]
+
+
+@pytest.mark.slow
+def test_holes_smaller_than_quads_are_filled():
+    found = coneflat.quads(*with_holes(80), quads=100)
+    assert (len(found.quads), found.euler_characteristic, len(found.irregular)) == (100, 1, 0)
+    assert any(note.startswith("Filled 4 holes: small ones") for note in found.notes)
+    assert found.surface.euler_characteristic == -3
+
+
+def test_quads_over_filled_holes_are_left_out(monkeypatch):
+    monkeypatch.setattr(module, "MAX_HOLES", 1)
+    found = coneflat.quads(*with_holes(20, ((3, 3), (15, 3), (3, 15), (15, 15))), quads=1600)
+    assert any(note.startswith("Filled 3 holes") for note in found.notes)
+    assert found.euler_characteristic == found.surface_euler == -3
+    places = found.vertices[found.quads].mean(axis=1)[:, None, :2] * 20 - [[3.5, 3.5], [15.5, 3.5]]
+    assert (np.abs(places).max(axis=2) > 0.4).all()
+    assert coneflat.measure_quads(found).jacobian_min > 0
+
+
+@pytest.mark.slow
+def test_round_holes_that_are_filled_give_no_flipped_quads(monkeypatch):
+    monkeypatch.setattr(module, "MAX_HOLES", 1)
+    vertices, faces = shapes.grid(60, 60)
+    middle = vertices[faces].mean(axis=1)[:, :2]
+    centres = np.array([[0.2, 0.25], [0.7, 0.3], [0.35, 0.7], [0.75, 0.75]])
+    is_gone = (np.linalg.norm(middle[:, None] - centres, axis=2) < 0.07).any(axis=1)
+    found = coneflat.quads(vertices, faces[~is_gone], quads=1000)
+    assert found.euler_characteristic == found.surface_euler == -3
+    assert coneflat.measure_quads(found).jacobian_min > 0
+
+
+def test_a_boundary_with_very_many_corners_is_free(monkeypatch):
+    monkeypatch.setattr(module, "MAX_CORNERS", 3)
+    found = coneflat.quads(*shapes.grid(8, 8), quads=50)
+    assert "The boundary cuts squares, because it has more than 3 corners." in found.notes
+    assert found.euler_characteristic == 1
+    asked = coneflat.quads(*shapes.grid(8, 8), quads=50, boundary="straight")
+    assert len(asked.irregular) == 0
+    assert not any("corners" in note for note in asked.notes)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["as given", "coarse", "filled", "few"])
+def test_components_for_which_no_grid_is_found_are_divided(monkeypatch, name):
+    """Each triangle of the cube becomes three quads, and the surface is the given one."""
+    search = GridSearch.of_any_size
+
+    def fail_for_cubes(self):
+        mesh = self.checked.mesh
+        if mesh.components[0] == 1 and not mesh.is_boundary_edge.any() and len(mesh.faces) <= 12:
+            raise GridError("none")
+        return search(self)
+
+    monkeypatch.setattr(GridSearch, "of_any_size", fail_for_cubes)
+    (sheet, faces), cube = with_holes(40, ((20, 20),)), shapes.box(1, (1.0, 1.0, 1.0))
+    parts = [(20 * sheet, faces), (cube[0] + 30, cube[1])]
+    if name == "coarse":
+        monkeypatch.setattr(module, "COARSE", 1000)
+    if name == "few":
+        monkeypatch.setattr(module, "MAX_COMPONENTS", 4)
+        parts += [(0.1 * cube[0] - 5 * k, cube[1]) for k in range(1, 4)]
+    vertices, triangles = shapes.join(*parts)
+    found = coneflat.quads(vertices, triangles, quads=2000 if name == "as given" else 200)
+    assert components_of(found) == (len(parts), len(parts))
+    assert any(note.startswith("No grid for a component of 12 triangles: none.") for note in found.notes)
+    assert any(note.startswith("Made three quads of each triangle") for note in found.notes)
+    assert len(found.surface.faces) == len(triangles)
+    on = np.einsum("qi,qix->qx", found.barycentric, found.surface.vertices[found.surface.faces[found.faces]])
+    np.testing.assert_allclose(on, found.vertices, atol=1e-12)
+    assert any("Filled 1 hole" in note for note in found.notes) == (name != "as given")
+
+
+def test_two_sided_triangles_are_divided(monkeypatch):
+    """Splitting edges of two triangles with the same vertices would join two vertices twice."""
+    monkeypatch.setattr(module, "MAX_COMPONENTS", 1)
+    pillow = np.array([[5.0, 0, 0], [6, 0, 0], [5, 1, 0]]), np.array([[0, 1, 2], [0, 2, 1]])
+    found = coneflat.quads(*shapes.join(shapes.sphere(3), pillow), quads=2000)
+    assert components_of(found) == (2, 2)
+    assert found.euler_characteristic == 4
+    tails, heads = found.quads.ravel(), np.roll(found.quads, -1, axis=1).ravel()
+    assert len(np.unique(np.stack([tails, heads], axis=1), axis=0)) == len(tails)
+
+
+@pytest.mark.parametrize("size", [1e160, 1e-170])
+def test_extreme_sizes_are_refused(size):
+    with pytest.raises(GridError):
+        coneflat.quads(*shapes.grid(8, 8), size=size)
+
+
+@pytest.mark.slow
+def test_noise_is_not_a_crease():
+    """Of a noisy sphere there are no sharp edges, and not more irregular vertices; those of a noisy box are kept."""
+    rng = np.random.default_rng(0)
+    vertices, faces = shapes.sphere(4)
+    noisy = vertices + 0.02 * rng.standard_normal(vertices.shape)
+    mesh = check_mesh(noisy, faces).mesh
+    assert (np.abs(coneflat.geometry.dihedral_angles(mesh)) > SHARP_ANGLE).sum() > 400
+    assert len(sharp_ends(mesh)) <= 20
+    assert len(coneflat.quads(noisy, faces, quads=1000).irregular) <= 16
+    vertices, faces = MODELS["box"]()
+    mesh = check_mesh(vertices + 0.002 * rng.standard_normal(vertices.shape), faces).mesh
+    assert len(sharp_ends(mesh)) >= len(sharp_ends(check_mesh(vertices, faces).mesh))
+    assert len(sharp_ends(mesh)) < 1.5 * len(sharp_ends(check_mesh(vertices, faces).mesh))
+
+
+@pytest.mark.parametrize("cells", [10, 32])
+def test_edges_of_a_small_part_are_no_noise(cells):
+    """A pin of one cell, two cells high, on a plate of voxels: convex and concave edges meet at its foot."""
+    solid = np.zeros((cells + 2, cells + 2, 5), dtype=bool)
+    solid[1:-1, 1:-1, 1] = solid[cells // 2, cells // 2, 2:4] = True
+    rows, turns = [], {0: (1, 2), 1: (2, 0), 2: (0, 1)}
+    for axis, (one, two) in turns.items():
+        for up in (True, False):
+            other = np.roll(solid, -1 if up else 1, axis=axis)
+            for cell in np.argwhere(solid & ~other):
+                a = cell + up * np.eye(3, dtype=int)[axis]
+                b, c = np.eye(3, dtype=int)[[one, two]]
+                square = [a, a + b, a + b + c, a + c]
+                rows.append(square if up else square[::-1])
+    points, index = np.unique(np.array(rows).reshape(-1, 3), axis=0, return_inverse=True)
+    square = index.reshape(-1, 4)
+    mesh = check_mesh(points.astype(float), np.concatenate([square[:, :3], square[:, [0, 2, 3]]])).mesh
+    assert len(sharp_ends(mesh)) == 4 + 8 + 4 + 8 * cells + 4
+
+
+@pytest.mark.slow
+def test_meshes_of_thin_triangles_are_triangulated_anew():
+    """As in files of CAD programs: a pipe of strips as long as it, and a cap with a fan around its centre."""
+    count = 60
+    turn = np.arange(count) * 2 * np.pi / count
+    ring = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    vertices = np.concatenate([ring, ring + np.array([0, 0, 5.0]), [[0, 0, 5]]])
+    low, high = np.arange(count), np.arange(count) + count
+    after, above = np.roll(low, -1), np.roll(high, -1)
+    fans = [[low, after, above], [low, above, high], [high, above, 0 * low + 2 * count]]
+    faces = np.concatenate([np.stack(fan, axis=1) for fan in fans])
+    given = check_mesh(vertices, faces).mesh
+    assert module._is_thin(given).all()
+    new, some, of = module._retriangulated(given, 4000)
+    common = some[some < len(vertices)]
+    assert (np.diff(some) >= 0).all()
+    np.testing.assert_array_equal(new.vertices[: len(common)], given.vertices[common])
+    assert (new.euler_characteristic, len(new.faces)) == (1, len(of))
+    assert module._is_thin(new).mean() < 0.2
+    found = coneflat.quads(vertices, faces, quads=600)
+    np.testing.assert_array_equal(found.surface.vertices, vertices)
+    assert (found.left_out, found.euler_characteristic) == (0, 1)
+    assert coneflat.measure_quads(found).jacobian_min > 0.2
+    assert not any("Cones are not chosen" in note for note in found.notes)
+    np.testing.assert_allclose(found.vertices[found.is_boundary_vertex][:, 2], 0, atol=1e-9)
+
+
+def test_meshes_whose_triangles_stay_thin_are_taken_as_given():
+    vertices, faces = shapes.grid(40, 2)
+    mesh = check_mesh(vertices * [0.2, 8, 1], faces).mesh
+    new, some, of = module._retriangulated(mesh, 400)
+    np.testing.assert_array_equal(new.faces, mesh.faces)
+    assert (some.tolist(), of.tolist()) == (list(range(len(mesh.vertices))), list(range(len(mesh.faces))))
+
+
+@pytest.mark.slow
+def test_triangles_that_stay_thin_are_not_split_without_bound(monkeypatch):
+    """The triangles of a cylinder of many sides are thin at their tips, however often they are split."""
+    most, coarse = [], module.coarse_mesh
+
+    def watched(mesh, count):
+        most.append(len(mesh.faces) / count)
+        return coarse(mesh, count)
+
+    monkeypatch.setattr(module, "coarse_mesh", watched)
+    vertices, faces = shapes.cylinder(300, 1, 9.0, caps=True)
+    found = coneflat.quads(vertices, faces, quads=1000, repair=True)
+    assert 1 < most[0] < 12
+    assert len(found.grid.faces) < 3 * len(faces)

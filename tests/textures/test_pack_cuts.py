@@ -1,0 +1,162 @@
+"""Cuts that let charts be packed more tightly."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapes
+
+from coneflat import TriangleMesh
+from coneflat.atlas import pack_charts
+from coneflat.base import Stopwatch
+from coneflat.flattening import Method, lay_out_part
+from coneflat.geometry import signed_double_areas
+from coneflat.io import as_input
+from coneflat.mesh import label_faces
+from coneflat.metric import find_metric
+from coneflat.options import Options
+from coneflat.source import Source
+from coneflat.stages import RelaxSpec, Surface
+from coneflat.textures.pack_cuts import MIN_PIECE, SHARE, cut_for_packing
+
+GAP = 2 / 1024
+
+
+def grid(inside, count=48):
+    """The triangles of a flat grid of the square [0, 1]^2 whose middles are inside."""
+    at = np.arange((count + 1) ** 2).reshape(count + 1, count + 1)
+    one = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:]], axis=-1).reshape(-1, 3)
+    two = np.stack([at[:-1, :-1], at[1:, 1:], at[:-1, 1:]], axis=-1).reshape(-1, 3)
+    x, y = np.divmod(np.arange(at.size), count + 1)
+    points = np.column_stack([x, y, 0 * x]) / count
+    faces = np.concatenate([one, two])
+    middle = points[faces].mean(axis=1)
+    faces = faces[inside(middle[:, 0], middle[:, 1])]
+    used, faces = np.unique(faces, return_inverse=True)
+    return points[used], faces.reshape(-1, 3)
+
+
+def plus(x, y):
+    return (np.abs(x - 0.5) < 0.1) | (np.abs(y - 0.5) < 0.1)
+
+
+def square(x, y):
+    return x < 2
+
+
+def starfish(x, y):
+    angle, radius = np.angle(x - 0.5 + 1j * (y - 0.5)), np.hypot(x - 0.5, y - 0.5)
+    return radius < 0.12 + 0.35 * np.cos(2.5 * angle) ** 6
+
+
+def layout_of(vertices, faces):
+    """The layout of a mesh in one chart, and the costs of its edges."""
+    part = Source(as_input(vertices, faces)).prepared(Options()).parts[0]
+    method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
+    layout = lay_out_part(part, method)
+    mesh = layout.mesh
+    return layout, np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
+
+
+def seam_length(layout, costs):
+    keys = np.sort(layout.mesh.edges, axis=1) @ [len(layout.mesh.vertices), 1]
+    return costs[np.isin(keys, np.sort(layout.seams, axis=1) @ [len(layout.mesh.vertices), 1])].sum()
+
+
+def efficiency(*layouts):
+    flat = np.concatenate([one.points[one.corners] for one in layouts])
+    before = np.cumsum([0, *(one.chart.max() + 1 for one in layouts)])
+    return pack_charts(
+        flat, np.concatenate([one.chart + n for one, n in zip(layouts, before, strict=False)])
+    ).efficiency
+
+
+@pytest.fixture(scope="module", params=[plus, starfish], ids=["plus", "starfish"])
+def branching(request):
+    layout, costs = layout_of(*grid(request.param))
+    return layout, costs, cut_for_packing([layout], [costs].__getitem__, GAP)[0]
+
+
+def test_a_branching_chart_is_cut_and_packs_more_tightly(branching):
+    layout, _, found = branching
+    assert found.chart.max() > layout.chart.max()
+    assert efficiency(found) > 1.2 * efficiency(layout)
+
+
+def test_pieces_are_connected_and_large_and_are_only_moved_apart(branching):
+    layout, _, found = branching
+    np.testing.assert_array_equal(found.points[found.corners], layout.points[layout.corners])
+    count, label = label_faces(found.corners, len(found.points))
+    assert count == found.chart.max() + 1
+    np.testing.assert_array_equal(
+        np.unique(np.column_stack([label, found.chart]), axis=0)[:, 1], np.arange(count)
+    )
+    for chart in range(count):
+        piece = TriangleMesh(*compact(found.points, found.corners[found.chart == chart]))
+        assert (piece.euler_characteristic, piece.components[0]) == (1, 1)
+    areas = np.bincount(found.chart, signed_double_areas(found.points[found.corners]))
+    assert areas.min() >= MIN_PIECE * areas.sum() * (1 - 1e-9)
+
+
+def compact(points, corners):
+    used, corners = np.unique(corners, return_inverse=True)
+    return points[used], corners.reshape(-1, 3)
+
+
+def test_the_added_seams_are_bounded(branching):
+    layout, costs, found = branching
+    present, after = (seam_length(one, costs) for one in (layout, found))
+    borders = costs[layout.mesh.is_boundary_edge].sum() + 2 * present
+    assert present < after <= present + SHARE * borders * (1 + 1e-9)
+
+
+def test_edges_of_infinite_cost_are_not_cut(branching):
+    layout, costs, found = branching
+    cut = np.isin(
+        np.sort(layout.mesh.edges, axis=1) @ [len(layout.mesh.vertices), 1],
+        np.sort(found.seams, axis=1) @ [len(layout.mesh.vertices), 1],
+    )
+    other = cut_for_packing([layout], [np.where(cut, np.inf, costs)].__getitem__, GAP)[0]
+    assert np.isfinite(seam_length(other, np.where(cut, np.inf, costs)))
+    assert cut_for_packing([layout], [np.full(len(costs), np.inf)].__getitem__, GAP)[0] is layout
+
+
+def test_a_square_is_not_cut():
+    layout, costs = layout_of(*grid(square, 24))
+    assert cut_for_packing([layout], [costs].__getitem__, GAP)[0] is layout
+
+
+@pytest.mark.slow
+def test_only_large_charts_of_several_layouts_are_cut():
+    (large, large_costs), (small, small_costs) = layout_of(*grid(plus)), layout_of(*grid(plus, 20))
+    small = replace(small, points=small.points / 20)
+    one, other = cut_for_packing([large, small], [large_costs, small_costs].__getitem__, GAP)
+    assert one.chart.max() > large.chart.max()
+    assert other is small
+
+
+@pytest.mark.slow
+def test_scale_motion_and_numbering_change_nothing():
+    vertices, faces = grid(lambda x, y: starfish(1.1 * x + 0.1 * y**2, y))
+    # Without equal paths, among which the numbering would choose.
+    vertices = vertices + np.random.default_rng(0).uniform(-0.2, 0.2, vertices.shape) / 48 * [1, 1, 0]
+    layout, costs = layout_of(vertices, faces)
+    found = cut_for_packing([layout], [costs].__getitem__, GAP)[0]
+    other_vertices, other_faces, _ = shapes.renumber(vertices, faces)
+    turned = other_vertices @ shapes.rotation().T * 7 + 3
+    other, other_costs = layout_of(turned, other_faces)
+    again = cut_for_packing([other], [other_costs].__getitem__, GAP)[0]
+    assert again.chart.max() == found.chart.max()
+    relative = [
+        seam_length(one, cost) / np.sqrt(one.area) for one, cost in ((found, costs), (again, other_costs))
+    ]
+    assert relative[1] == pytest.approx(relative[0], rel=1e-6)
+    assert cut_for_packing([layout], [costs].__getitem__, GAP)[0].chart.tolist() == found.chart.tolist()
+
+
+@pytest.mark.slow
+def test_with_a_gap_that_leaves_no_space_nothing_is_cut():
+    layout, costs = layout_of(*grid(plus, 20))
+    assert cut_for_packing([layout, layout, layout], lambda _: costs, 0.6)[0] is layout
