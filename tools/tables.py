@@ -298,7 +298,7 @@ def quads_table(measured: Measured, body: str) -> str:
             f"{m.hausdorff / m.edge_mean:.2f}",
         ]
     headings = (
-        "model | quads | irregular vertices | degrees off 90: mean, 95% below | edge lengths, cv | "
+        "model | quads | irregular vertices | angle deviation: mean, 95th percentile | edge lengths, cv | "
         "scaled Jacobian: mean, least | distance, edges"
     )
     return _table(headings, list(_each(QUADS, body, made)))
