@@ -20,7 +20,7 @@ from ..atlas import ChartLayout, Seams, with_charts
 from ..base import BoolArray, FloatArray, IntArray, has_any, mask_of
 from ..cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, close_search, with_corners
 from ..errors import MetricError, SeamError
-from ..flattening import Method, lay_out_once
+from ..flattening import Steps, lay_out_component
 from ..geometry import (
     coarse_mesh,
     double_areas,
@@ -96,7 +96,7 @@ class CutSearch:
     """
 
     def __init__(
-        self, part: Part, max_energy: float, method: Method, is_coarse: bool = False, by_area: bool = False
+        self, part: Part, max_energy: float, method: Steps, is_coarse: bool = False, by_area: bool = False
     ) -> None:
         self.part, self.max_energy, self._method, self._by_area = part, max_energy, method, by_area
         self._has_coarse = len(part.faces) > 2 * COARSE and not (is_coarse or part.seams.is_forbidden.any())
@@ -238,7 +238,7 @@ class CutSearch:
     def _with_fewest_seams(self) -> Candidate:
         """Return a candidate cut between the fewest cones, and only along closed curves where there are handles."""
         mesh, spec = self.part.mesh, replace(self.part.cones, distortion=ANY_DISTORTION)
-        layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
+        layout = lay_out_component(self._surface, replace(self.part, cones=spec), self._method)
         close_search(self._surface)
         if len(layout.cones) and mesh.euler_characteristic < 2 and not mesh.is_boundary_edge.any():
             is_cut = mask_of(len(mesh.edges), seam_edges(layout))
@@ -254,7 +254,7 @@ class CutSearch:
         best = CutSearch(coarse, bound, self._method, True, self._by_area).best()
         given = VertexCurvatures(kept[best.layout.cones], np.full(len(best.layout.cones), np.nan))
         spec = replace(self.part.cones, strategy="given", given=given)
-        layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
+        layout = lay_out_component(self._surface, replace(self.part, cones=spec), self._method)
         one = self._candidate(layout, layout.statistics.area_distortion_linear)
         if 0 < one.energy - self.max_energy <= MAX_EXCESS * allowed:
             one = self.shortened(one)
@@ -274,7 +274,7 @@ class CutSearch:
                 break
             spec = replace(self.part.cones, distortion=distortion)
             # Cones that their triangles cannot hold are no problem for free seams.
-            layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
+            layout = lay_out_component(self._surface, replace(self.part, cones=spec), self._method)
             same = [i for i, each in enumerate(found) if np.array_equal(each.layout.cones, layout.cones)]
             known = found.pop(same[0]) if same else self._candidate(layout, distortion)
             reached, is_within = layout.statistics.area_distortion_linear, known.energy <= self.max_energy
@@ -290,7 +290,7 @@ class CutSearch:
         spec = with_corners(part.mesh, part.lengths, part.cones, MAX_POLYHEDRON_CORNERS)
         if spec is None:
             return []
-        layout, _ = lay_out_once(self._surface, part, spec, self._method)
+        layout = lay_out_component(self._surface, replace(part, cones=spec), self._method)
         return [self._candidate(layout, 0.0)]
 
     def _next_distortion(self, tried: int) -> float | None:
