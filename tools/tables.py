@@ -258,7 +258,7 @@ def atlases_table(measured: Measured, body: str) -> str:
         ]
     headings = (
         "model | triangles | charts: coneflat, with more cones, xatlas, uvunwrap | seam length | "
-        "QC distortion | packed"
+        "QC distortion | packing efficiency"
     )
     return _table(headings, [*rows, mean])
 
@@ -298,8 +298,8 @@ def quads_table(measured: Measured, body: str) -> str:
             f"{m.hausdorff / m.edge_mean:.2f}",
         ]
     headings = (
-        "model | quads | irregular vertices | degrees off 90: mean, 95% below | edge lengths, cv | "
-        "scaled Jacobian: mean, least | distance, edges"
+        "model | quads | irregular vertices | angle deviation, degrees: mean, p95 | edge lengths, cv | "
+        "scaled Jacobian: mean, minimum | distance, edges"
     )
     return _table(headings, list(_each(QUADS, body, made)))
 
