@@ -116,7 +116,8 @@ def readings_table(measured: Measured, body: str) -> str:
             row += [f"{paper:.3f}"] if paper else []
             row.append(f"{result.distortion.qc_mean:.4f}")
     headings = (
-        "model | CP: paper | here | with flips | LABF: paper | here | cones held | CF: paper | here | exact"
+        "model | CP: paper | here | with flips | LABF: paper | here | cone angles prescribed | "
+        "CF: paper | here | exact"
     )
     return _table(headings, list(_each(tuple(PAPERS), body, made)))
 
