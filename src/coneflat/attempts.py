@@ -10,7 +10,7 @@ import numpy as np
 from .cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, with_corners
 from .geometry import dihedral_angles
 from .mesh.connectivity import TriangleMesh
-from .source.parts import Part
+from .source.components import Component
 from .stages import Layout
 
 # Dihedral angle, radians, above which edges are cut where a solid is too distorted otherwise. The edges between half of
@@ -20,8 +20,8 @@ SHARP_ANGLE, MAX_BETWEEN = np.radians(40), 0.1
 
 
 def with_corners_as_cones(
-    parts: Mapping[int, Part], finished: Mapping[int, Layout], distorted: Container[int]
-) -> dict[int, Part]:
+    parts: Mapping[int, Component], finished: Mapping[int, Layout], distorted: Container[int]
+) -> dict[int, Component]:
     """Return the polyhedra among parts that may open better at all their corners, with these as cones.
 
     Args:

@@ -14,7 +14,7 @@ from .geometry.planar import mean_energy, signed_double_areas
 from .measures.guarantees import EXTREME_QC
 from .optimise import mean_qc
 from .options import Options
-from .source.parts import Part
+from .source.components import Component
 from .stages import Layout
 
 # A layout may exceed the allowed area distortion by this factor.
@@ -25,7 +25,7 @@ TOLERATED_EXCESS = 1.02
 SEAMS_PER_ENERGY = 20.0
 
 
-def rank(parts: Sequence[Part], layouts: Sequence[Layout]) -> tuple[int, float, float]:
+def rank(parts: Sequence[Component], layouts: Sequence[Layout]) -> tuple[int, float, float]:
     """Return what decides between layouts of a component, in one part or cut into several: the smaller is the better.
 
     Fewer notes are better, then a smaller excess over the allowed area distortion, and within that bound a smaller sum
@@ -35,14 +35,14 @@ def rank(parts: Sequence[Part], layouts: Sequence[Layout]) -> tuple[int, float, 
     return notes, max(excess(parts, layouts), TOLERATED_EXCESS), borders_and_distortion(parts, layouts)
 
 
-def is_too_distorted(part: Part, layout: Layout) -> bool:
+def is_too_distorted(part: Component, layout: Layout) -> bool:
     """Return whether a part of which no more than a bound is asked has more area or angle distortion than is usable."""
     if not is_bounded(part):
         return False
     return excess([part], [layout]) > TOLERATED_EXCESS or mean_qc(layout) > EXTREME_QC
 
 
-def excess(parts: Sequence[Part], layouts: Sequence[Layout]) -> float:
+def excess(parts: Sequence[Component], layouts: Sequence[Layout]) -> float:
     """Return the area distortion of the triangles of all layouts, divided by the one allowed; 0 without a bound."""
     bounded = [(part, layout) for part, layout in zip(parts, layouts, strict=True) if is_bounded(part)]
     if not bounded:
@@ -54,14 +54,14 @@ def excess(parts: Sequence[Part], layouts: Sequence[Layout]) -> float:
     return area_distortion(log_scale, areas[chosen]) / parts[0].cones.distortion
 
 
-def is_bounded(part: Part) -> bool:
+def is_bounded(part: Component) -> bool:
     """Return whether the area distortion of a part's layout is bounded by the options."""
     cones = part.cones
     is_free = cones.count is None and cones.weights is None and cones.quantum is None
     return part.is_exact and is_free and uses_sparse_search(part.mesh, cones)
 
 
-def borders_and_distortion(parts: Sequence[Part], layouts: Sequence[Layout]) -> float:
+def borders_and_distortion(parts: Sequence[Component], layouts: Sequence[Layout]) -> float:
     """Return the length of all borders and seams, relative to the square root of the area, and a cost of distortion.
 
     A seam counts once, the two borders of parts that it separates half each.
@@ -80,13 +80,13 @@ def seam_length(layout: Layout) -> float:
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
 
 
-def border_length(part: Part) -> float:
+def border_length(part: Component) -> float:
     """Return the length of the border of a part on the surface, model units."""
     sides = part.mesh.edge_halfedges[part.mesh.is_boundary_edge, 0]
     return float(part.lengths.ravel()[sides].sum())
 
 
-def bound_notes(parts: Sequence[Part], layouts: Sequence[Layout], o: Options) -> Iterator[Unmet]:
+def bound_notes(parts: Sequence[Component], layouts: Sequence[Layout], o: Options) -> Iterator[Unmet]:
     """Yield a note if the area distortion of a component, or of all of them together, is above the one allowed."""
     pairs = zip(parts, layouts, strict=True)
     curved = [(part, layout) for part, layout in pairs if layout.statistics.area_distortion > 0]

@@ -14,7 +14,7 @@ from .io.packages import as_input
 from .mesh.connectivity import TriangleMesh
 from .options import Options, read_options
 from .result import Flattening
-from .source.parts import Source
+from .source.components import Source
 from .stages import Surface
 
 
@@ -74,7 +74,7 @@ class Flattener:
         # The last digits of cached values depend on the number of threads.
         if options.threads != self._threads:
             self._surfaces, self._threads = {}, options.threads
-        meshes = {id(part.mesh) for part in self._source.prepared(options).parts}
+        meshes = {id(part.mesh) for part in self._source.prepared(options).components}
         self._surfaces = {key: surface for key, surface in self._surfaces.items() if key[0] in meshes}
         try:
             return flatten_source(self._source, options, self._surface, on_preview=on_preview)

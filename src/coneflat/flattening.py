@@ -34,8 +34,8 @@ from .optimise import mean_qc, relax_layouts, untangle_seams
 from .options import Options, read_options, takes
 from .result import Flattening
 from .seams import cut_to_disk, seam_costs
+from .source.components import Component, Prepared, Source
 from .source.copies import Copy, copied, find_copies
-from .source.parts import Part, Prepared, Source
 from .stages import ConeSolution, ConeSpec, FlatMetric, Layout, MetricSpec, RelaxSpec, Surface
 
 #: Receives the first layout, before triangles are relaxed and overlaps are separated.
@@ -147,15 +147,15 @@ def flatten_source(
     with watch("check"):
         prepared = source.prepared(o)
     relax = RelaxSpec(o.relax if o.method == "exact" else "off", o.stretch)
-    names_parts = len(prepared.parts) > 1
+    names_parts = len(prepared.components) > 1
     method = Method(
         relax, o.charts == "atlas", o.quantise, watch, surface_of, find_metric, names_parts=names_parts
     )
     with limit_threads(o.threads):
         show = None if on_preview is None else partial(_preview, prepared, o, on_preview)
-        layouts = flatten_parts(prepared.parts, method, show)
+        layouts = flatten_parts(prepared.components, method, show)
         prepared, layouts = cut_along_sharp_edges(source, prepared, layouts, o, method)
-    layouts[0] = layouts[0].with_notes(*bound_notes(prepared.parts, layouts, o))
+    layouts[0] = layouts[0].with_notes(*bound_notes(prepared.components, layouts, o))
     return evaluate(prepared, layouts, o, watch)
 
 
@@ -164,7 +164,7 @@ def _preview(prepared: Prepared, o: Options, on_preview: Preview, layouts: Seque
 
 
 def flatten_parts(
-    parts: Sequence[Part], method: Method, on_layouts: Callable[[list[Layout]], None] | None = None
+    parts: Sequence[Component], method: Method, on_layouts: Callable[[list[Layout]], None] | None = None
 ) -> list[Layout]:
     """Return the layouts of parts; of parts that are copies of each other, the layout of the first is copied.
 
@@ -197,7 +197,7 @@ def cut_along_sharp_edges(
     """
     if not method.separates or o.sharp_angle is not None:
         return prepared, layouts
-    pairs = enumerate(zip(prepared.parts, layouts, strict=True))
+    pairs = enumerate(zip(prepared.components, layouts, strict=True))
     distorted = [
         i for i, (part, layout) in pairs if is_machined(part.mesh) and is_too_distorted(part, layout)
     ]
@@ -215,12 +215,12 @@ def cut_along_sharp_edges(
         return prepared, layouts
     replaced = {}
     for i in distorted:
-        part, cut = prepared.parts[i], [next(flat) for _ in pieces_of[i]]
+        part, cut = prepared.components[i], [next(flat) for _ in pieces_of[i]]
         is_better = rank(pieces_of[i], cut) < rank([part], [layouts[i]])
         is_cheaper = borders_and_distortion(pieces_of[i], cut) < borders_and_distortion([part], [layouts[i]])
         if is_better and is_cheaper:
             note = (
-                f"Edges above {np.degrees(SHARP_ANGLE):g} degrees are seams {part.where}: without them its mean QC "
+                f"Edges above {np.degrees(SHARP_ANGLE):g} degrees are seams {part.location}: without them its mean QC "
                 f"distortion is {mean_qc(layouts[i]):.3g}."
             )
             replaced[i] = [cut[0].with_notes(note), *cut[1:]]
@@ -232,7 +232,7 @@ def cut_along_sharp_edges(
     ]
 
 
-def lay_out_flat_parts(parts: Sequence[Part], watch: Stopwatch) -> dict[int, Layout]:
+def lay_out_flat_parts(parts: Sequence[Component], watch: Stopwatch) -> dict[int, Layout]:
     """Return the finished layouts of the small parts that are flat disks and do not overlap themselves.
 
     An isometry is their only flat metric without cones, so nothing is searched, solved or relaxed.
@@ -249,12 +249,12 @@ def lay_out_flat_parts(parts: Sequence[Part], watch: Stopwatch) -> dict[int, Lay
     return {i: layout for i, layout in zip(chosen, layouts, strict=True) if layout is not None}
 
 
-def _may_be_flat(part: Part) -> bool:
+def _may_be_flat(part: Component) -> bool:
     """Return whether a part is laid out without cones and with a free shape if it is a flat disk."""
     return part.is_exact and part.metric.boundary in ("free", "lengths") and leaves_flat_disks(part.cones)
 
 
-def lay_out_parts(parts: Mapping[int, Part], method: Method) -> dict[int, Layout]:
+def lay_out_parts(parts: Mapping[int, Component], method: Method) -> dict[int, Layout]:
     """Return the layout of each part in one chart."""
     layouts, places = {}, _Places(parts, method, LAYING_OUT)
     for i, part in parts.items():
@@ -263,7 +263,7 @@ def lay_out_parts(parts: Mapping[int, Part], method: Method) -> dict[int, Layout
     return layouts
 
 
-def lay_out_part(part: Part, method: Method) -> Layout:
+def lay_out_part(part: Component, method: Method) -> Layout:
     """Return the layout of a part in one chart.
 
     If no metric is found because of thin triangles, such as those that rounded coordinates leave, all are opened more.
@@ -276,7 +276,7 @@ def lay_out_part(part: Part, method: Method) -> Layout:
     return lay_out_with_lengths(replace(part, lengths=with_slack(part.lengths)), method)
 
 
-def lay_out_with_lengths(part: Part, method: Method) -> Layout:
+def lay_out_with_lengths(part: Component, method: Method) -> Layout:
     """Return the layout of a part in one chart.
 
     The triangles around a cone may be unable to hold its angle, which is known only after the layout. Then other cones
@@ -298,7 +298,7 @@ def lay_out_with_lengths(part: Part, method: Method) -> Layout:
     return best
 
 
-def lay_out_once(surface: Surface, part: Part, wanted: ConeSpec, method: Method) -> tuple[Layout, bool]:
+def lay_out_once(surface: Surface, part: Component, wanted: ConeSpec, method: Method) -> tuple[Layout, bool]:
     """Return a layout of a part with the cones found for it, and whether the sparse search found them."""
     watch, mesh = method.watch, part.mesh
     with watch("cones", 0.5):
@@ -323,7 +323,7 @@ def lay_out_once(surface: Surface, part: Part, wanted: ConeSpec, method: Method)
 
 
 def finish_parts(
-    parts: Mapping[int, Part], layouts: Mapping[int, Layout], method: Method
+    parts: Mapping[int, Component], layouts: Mapping[int, Layout], method: Method
 ) -> dict[int, Layout]:
     """Return relaxed layouts without inverted triangles, and without overlaps if the method separates them."""
     watch, finished = method.watch, dict[int, Layout]()
@@ -339,7 +339,7 @@ def finish_parts(
     return finished
 
 
-def finish_part(part: Part, layout: Layout, method: Method) -> Layout:
+def finish_part(part: Component, layout: Layout, method: Method) -> Layout:
     """Return a relaxed layout without inverted triangles, and without overlaps if the method separates them."""
     if part.is_exact:
         with method.watch("relax", 0.2):
@@ -352,7 +352,7 @@ def finish_part(part: Part, layout: Layout, method: Method) -> Layout:
 
 
 def finish_within_bound(
-    parts: Mapping[int, Part], layouts: Mapping[int, Layout], method: Method
+    parts: Mapping[int, Component], layouts: Mapping[int, Layout], method: Method
 ) -> dict[int, Layout]:
     """Return finished layouts whose area distortion is at most the one allowed, as far as possible.
 
@@ -380,7 +380,10 @@ def finish_within_bound(
 
 
 def _try(
-    attempts: Mapping[int, Part], finished: dict[int, Layout], parts: Mapping[int, Part], method: Method
+    attempts: Mapping[int, Component],
+    finished: dict[int, Layout],
+    parts: Mapping[int, Component],
+    method: Method,
 ) -> list[int]:
     """Replace finished layouts by those of parts with other cones where these are better; return their indices.
 
@@ -397,7 +400,7 @@ def _try(
 
 
 def _keep_better(
-    finished: dict[int, Layout], others: Mapping[int, Layout], parts: Mapping[int, Part]
+    finished: dict[int, Layout], others: Mapping[int, Layout], parts: Mapping[int, Component]
 ) -> list[int]:
     """Replace finished layouts of parts by better ones, and return the indices of these parts."""
     better = [i for i in others if rank([parts[i]], [others[i]]) < rank([parts[i]], [finished[i]])]
@@ -416,7 +419,7 @@ def _failures(layout: Layout) -> tuple[int, int]:
     return len(layout.notes), len(infeasible_cones(layout))
 
 
-def _infeasible_notes(layout: Layout, part: Part) -> Iterator[Unmet]:
+def _infeasible_notes(layout: Layout, part: Component) -> Iterator[Unmet]:
     infeasible = sorted(infeasible_cones(layout), key=layout.target.item)
     if infeasible:
         shown = [f"vertex {part.cones.names[v]} ({2 - layout.target[v] / np.pi:.3g} pi)" for v in infeasible]
@@ -427,7 +430,7 @@ def _infeasible_notes(layout: Layout, part: Part) -> Iterator[Unmet]:
 
 
 def with_copies(
-    known: Mapping[int, Layout], parts: Sequence[Part], copies: Sequence[Copy | None]
+    known: Mapping[int, Layout], parts: Sequence[Component], copies: Sequence[Copy | None]
 ) -> list[Layout]:
     """Return the layouts of all parts; a missing layout is copied from the part of which it is a copy."""
     return [
@@ -436,7 +439,7 @@ def with_copies(
     ]
 
 
-def _groups(parts: Mapping[int, Part], relax: RelaxSpec) -> list[list[int]]:
+def _groups(parts: Mapping[int, Component], relax: RelaxSpec) -> list[list[int]]:
     """Return groups of part indices; small parts share a group and are relaxed together."""
     groups, small, capacity = list[list[int]](), list[int](), 0
     for i, part in parts.items():
@@ -461,13 +464,13 @@ class _Places:
         portion: fraction of the work.
     """
 
-    def __init__(self, parts: Mapping[int, Part], method: Method, portion: float) -> None:
+    def __init__(self, parts: Mapping[int, Component], method: Method, portion: float) -> None:
         self._watch, self._names_parts = method.watch, method.names_parts
         self._count, self._begun = len(parts), 0
         self._share = portion / max(sum(len(part.faces) for part in parts.values()), 1)
 
     @contextmanager
-    def at(self, part: Part) -> Iterator[None]:
+    def at(self, part: Component) -> Iterator[None]:
         """Run the work on the next part in the block."""
         self._begun += 1
         self._watch.share = self._share * len(part.faces)
@@ -478,5 +481,5 @@ class _Places:
         except (CurvatureError, MetricError, SeamError) as error:
             if not self._names_parts:
                 raise
-            raise type(error)(f"{part.where}: {error}") from error
+            raise type(error)(f"{part.location}: {error}") from error
         self._watch.end_component()

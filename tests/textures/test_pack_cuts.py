@@ -53,9 +53,9 @@ def starfish(x, y):
 
 def layout_of(vertices, faces):
     """The layout of a mesh in one chart, and the costs of its edges."""
-    part = Source(as_input(vertices, faces)).prepared(Options()).parts[0]
+    component = Source(as_input(vertices, faces)).prepared(Options()).components[0]
     method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
-    layout = lay_out_part(part, method)
+    layout = lay_out_part(component, method)
     mesh = layout.mesh
     return layout, np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
 
