@@ -12,7 +12,7 @@ import coneflat
 from coneflat.base.arrays import FloatArray, IntArray
 from coneflat.io import as_input
 from coneflat.options import Options
-from coneflat.source import Part, Source
+from coneflat.source import Component, Source
 from coneflat.source.copies import find_copies
 
 flattener, retries = import_module("coneflat.flattener"), import_module("coneflat.retries")
@@ -39,8 +39,8 @@ def bump() -> Mesh:
     return vertices * (1.0, 1.3, 0.8), faces
 
 
-def parts_of(mesh: Mesh, options: Options) -> tuple[Part, ...]:
-    return Source(as_input(*mesh)).prepared(options).parts
+def parts_of(mesh: Mesh, options: Options) -> tuple[Component, ...]:
+    return Source(as_input(*mesh)).prepared(options).components
 
 
 def sides_of(found: coneflat.Flattening) -> FloatArray:

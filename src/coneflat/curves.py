@@ -18,7 +18,7 @@ from .geometry import double_areas
 from .geometry.operators import area_distortion, weighted_areas
 from .io.packages import as_input
 from .options import CurveOptions, FindOptions, Options, read_options, takes
-from .source.parts import Part, Source
+from .source.components import Component, Source
 from .stages import ConeSolution, Surface
 
 if TYPE_CHECKING:
@@ -201,7 +201,7 @@ def whole_curve(mesh: Any, options: Options, most: int) -> WholeCurve:
     stages = Stopwatch(options.progress)
     with limit_threads(options.threads):
         with stages("check"):
-            parts = Source(as_input(mesh)).prepared(options).parts
+            parts = Source(as_input(mesh)).prepared(options).components
         total, curves = sum(len(part.faces) for part in parts), []
         for part in parts:
             stages.share = len(part.faces) / total
@@ -217,15 +217,17 @@ def whole_curve(mesh: Any, options: Options, most: int) -> WholeCurve:
     return WholeCurve(counts, whole, len(parts))
 
 
-def _largest(mesh: Any, faces: ArrayLike | None, options: Options, stages: Stopwatch) -> Part:
+def _largest(mesh: Any, faces: ArrayLike | None, options: Options, stages: Stopwatch) -> Component:
     """Return the largest component of a mesh; progress counts this component alone."""
     with stages("check"):
-        part = max(Source(as_input(mesh, faces)).prepared(options).parts, key=lambda each: len(each.faces))
+        part = max(
+            Source(as_input(mesh, faces)).prepared(options).components, key=lambda each: len(each.faces)
+        )
     stages.share = 1.0
     return part
 
 
-def _curve(part: Part, most: int, stages: Stopwatch) -> tuple[ConeCurve, float]:
+def _curve(part: Component, most: int, stages: Stopwatch) -> tuple[ConeCurve, float]:
     """Return the curve of a component and twice its area."""
     area, search = float(double_areas(part.lengths).sum()), _open(part, stages)
     if isinstance(search, FoundCones):
@@ -237,7 +239,7 @@ def _curve(part: Part, most: int, stages: Stopwatch) -> tuple[ConeCurve, float]:
     return ConeCurve(tuple(_found_cones(each.solution, each.distortion, part) for each in found)), area
 
 
-def _open(part: Part, stages: Stopwatch) -> ConeSearch | FoundCones:
+def _open(part: Component, stages: Stopwatch) -> ConeSearch | FoundCones:
     """Return a cone search on a component, or the only possible set of cones if there is nothing to search."""
     surface = Surface.of(part.mesh, part.lengths)
     only = coneless_solution(surface, part.cones)
@@ -248,5 +250,5 @@ def _open(part: Part, stages: Stopwatch) -> ConeSearch | FoundCones:
         return open_search(surface, part.cones)
 
 
-def _found_cones(solution: ConeSolution, distortion: float, part: Part) -> FoundCones:
+def _found_cones(solution: ConeSolution, distortion: float, part: Component) -> FoundCones:
     return FoundCones(part.cones.names[solution.cones], solution.curvatures, distortion)

@@ -25,8 +25,8 @@ from .metric import find_metric as conformal_metric
 from .options import Options, read_options, takes
 from .result import Flattening
 from .retries import cut_along_sharp_edges, finish_within_bound, lay_out_components
+from .source.components import Component, Prepared, Source
 from .source.copies import find_copies
-from .source.parts import Part, Prepared, Source
 from .stages import Layout, RelaxSpec, Surface
 
 #: Receives the first layout, before triangles are relaxed and overlaps are separated.
@@ -100,20 +100,20 @@ def flatten_source(
             RelaxSpec(options.relax if options.method == "exact" else "off", options.stretch),
             separates=options.charts == "atlas",
             quantum=options.quantise,
-            names_components=len(prepared.parts) > 1,
+            names_components=len(prepared.components) > 1,
         )
         show = None if on_preview is None else partial(_preview, prepared, options, on_preview)
         with limit_threads(options.threads):
-            layouts = flatten_components(prepared.parts, steps, show)
+            layouts = flatten_components(prepared.components, steps, show)
             prepared, layouts = cut_along_sharp_edges(
                 source, prepared, layouts, options, partial(flatten_components, steps=steps)
             )
-        layouts[0] = layouts[0].with_notes(*bound_notes(prepared.parts, layouts, options))
+        layouts[0] = layouts[0].with_notes(*bound_notes(prepared.components, layouts, options))
         return evaluate(prepared, layouts, options)
 
 
 def flatten_components(
-    components: Sequence[Part], steps: Steps, on_layouts: Callable[[list[Layout]], None] | None = None
+    components: Sequence[Component], steps: Steps, on_layouts: Callable[[list[Layout]], None] | None = None
 ) -> list[Layout]:
     """Return the layouts of components; of those that are copies of each other, the layout of the first is copied.
 
@@ -198,7 +198,7 @@ class Flattener:
         # The last digits of cached values depend on the number of threads.
         if options.threads != self._threads:
             self._surfaces, self._threads = {}, options.threads
-        meshes = {id(part.mesh) for part in self._source.prepared(options).parts}
+        meshes = {id(part.mesh) for part in self._source.prepared(options).components}
         self._surfaces = {key: surface for key, surface in self._surfaces.items() if key[0] in meshes}
         try:
             return flatten_source(self._source, options, self._surface, on_preview=on_preview)

@@ -24,7 +24,7 @@ from .mesh.connectivity import TriangleMesh
 from .metric import find_metric, loop_rotations
 from .optimise import relax_layouts, untangle_seams
 from .seams import cut_to_disk, seam_costs
-from .source.parts import Part
+from .source.components import Component
 from .stages import ConeSolution, FlatMetric, Layout, MetricSpec, RelaxSpec, Surface
 
 #: Returns a connected mesh with the operators of its (m, 3) lengths; the flag allows edge flips.
@@ -58,12 +58,12 @@ class Steps:
     untangles: bool = True
     names_components: bool = False
 
-    def surface(self, component: Part) -> Surface:
+    def surface(self, component: Component) -> Surface:
         """Return a component with the operators of its metric."""
         return self.surface_of(component.mesh, component.lengths, component.is_exact)
 
 
-def lay_out_component(surface: Surface, component: Part, steps: Steps) -> Layout:
+def lay_out_component(surface: Surface, component: Component, steps: Steps) -> Layout:
     """Return the layout of a component in one chart (Section 4 of the paper).
 
     Cones concentrate the curvature that a flat metric cannot have elsewhere. The lengths l_ij of the surface are scaled
@@ -90,13 +90,15 @@ def lay_out_component(surface: Surface, component: Part, steps: Steps) -> Layout
     return layout.with_area_distortion(cones.log_scale, areas).with_notes(*cones.notes)
 
 
-def relax_components(components: Sequence[Part], layouts: Sequence[Layout], steps: Steps) -> Sequence[Layout]:
+def relax_components(
+    components: Sequence[Component], layouts: Sequence[Layout], steps: Steps
+) -> Sequence[Layout]:
     """Return layouts, relaxed together: distorted triangles near cones by default, or all."""
     weights = [component.cones.weights for component in components]
     return relax_layouts(layouts, weights, steps.relax)
 
 
-def finish_component(component: Part, relaxed: Layout, steps: Steps) -> Layout:
+def finish_component(component: Component, relaxed: Layout, steps: Steps) -> Layout:
     """Return a relaxed layout without inverted triangles, and without overlaps if these are separated into charts."""
     layout = relaxed
     if component.is_exact:
@@ -114,7 +116,7 @@ def infeasible_cones(layout: Layout) -> IntArray:
     return layout.cones[np.abs(error) > INFEASIBLE_ERROR]
 
 
-def _infeasible_notes(layout: Layout, component: Part) -> Iterator[Unmet]:
+def _infeasible_notes(layout: Layout, component: Component) -> Iterator[Unmet]:
     infeasible = sorted(infeasible_cones(layout), key=layout.target.item)
     if infeasible:
         angles = [

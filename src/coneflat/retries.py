@@ -25,7 +25,7 @@ from .groups import ComponentProgress, groups_of_small
 from .mesh.connectivity import TriangleMesh
 from .optimise import mean_qc
 from .options import Options
-from .source.parts import Part, Prepared, Source
+from .source.components import Component, Prepared, Source
 from .stages import Layout
 
 # Largest number of cone searches per component.
@@ -43,7 +43,7 @@ LAYING_OUT = 0.8
 FAILURES = CurvatureError, MetricError, SeamError
 
 
-def lay_out_components(components: Mapping[int, Part], steps: Steps) -> dict[int, Layout]:
+def lay_out_components(components: Mapping[int, Component], steps: Steps) -> dict[int, Layout]:
     """Return the layout of each component in one chart."""
     progress = ComponentProgress(components, LAYING_OUT, steps.names_components)
     layouts = {}
@@ -53,7 +53,7 @@ def lay_out_components(components: Mapping[int, Part], steps: Steps) -> dict[int
     return layouts
 
 
-def lay_out_with_thick_triangles(component: Part, steps: Steps) -> Layout:
+def lay_out_with_thick_triangles(component: Component, steps: Steps) -> Layout:
     """Return the layout of a component in one chart.
 
     If no metric is found because of thin triangles, such as those that rounded coordinates leave, all are opened more.
@@ -66,7 +66,7 @@ def lay_out_with_thick_triangles(component: Part, steps: Steps) -> Layout:
     return lay_out_with_feasible_cones(replace(component, lengths=with_slack(component.lengths)), steps)
 
 
-def lay_out_with_feasible_cones(component: Part, steps: Steps) -> Layout:
+def lay_out_with_feasible_cones(component: Component, steps: Steps) -> Layout:
     """Return the layout of a component in one chart.
 
     The triangles around a cone may be unable to form the cone angle, which is known only after the layout. Then other
@@ -88,7 +88,7 @@ def lay_out_with_feasible_cones(component: Part, steps: Steps) -> Layout:
 
 
 def finish_components(
-    components: Mapping[int, Part], layouts: Mapping[int, Layout], steps: Steps
+    components: Mapping[int, Component], layouts: Mapping[int, Layout], steps: Steps
 ) -> dict[int, Layout]:
     """Return relaxed layouts without inverted triangles, and without overlaps if these are separated."""
     progress = ComponentProgress(components, 1 - LAYING_OUT, steps.names_components)
@@ -102,7 +102,7 @@ def finish_components(
 
 
 def finish_within_bound(
-    components: Mapping[int, Part], layouts: Mapping[int, Layout], steps: Steps
+    components: Mapping[int, Component], layouts: Mapping[int, Layout], steps: Steps
 ) -> dict[int, Layout]:
     """Return finished layouts whose area distortion is at most the one allowed, as far as possible.
 
@@ -121,7 +121,7 @@ def finish_within_bound(
 
 
 def open_at_corners(
-    components: Mapping[int, Part], finished: Mapping[int, Layout], steps: Steps
+    components: Mapping[int, Component], finished: Mapping[int, Layout], steps: Steps
 ) -> dict[int, Layout]:
     """Return the better layouts of polyhedra with all their corners as cones.
 
@@ -142,7 +142,10 @@ def open_at_corners(
 
 
 def relax_areas(
-    beyond: Mapping[int, Part], layouts: Mapping[int, Layout], finished: Mapping[int, Layout], steps: Steps
+    beyond: Mapping[int, Component],
+    layouts: Mapping[int, Layout],
+    finished: Mapping[int, Layout],
+    steps: Steps,
 ) -> dict[int, Layout]:
     """Return the better layouts of components beyond the bound, with all triangles relaxed with some weight on areas.
 
@@ -165,14 +168,14 @@ def with_relaxed_areas(steps: Steps) -> Steps:
 
 
 def search_more_cones(
-    beyond: Mapping[int, Part], finished: Mapping[int, Layout], steps: Steps
+    beyond: Mapping[int, Component], finished: Mapping[int, Layout], steps: Steps
 ) -> dict[int, Layout]:
     """Return the better layouts of components beyond the bound that a tighter bound of the cone search gives."""
     improved = dict[int, Layout]()
     attempts = dict(beyond)
     for _ in range(MAX_CORRECTIONS):
         latest = {**finished, **improved}
-        tightened = dict[int, Part]()
+        tightened = dict[int, Component]()
         for i, attempt in attempts.items():
             factor = min(excess([beyond[i]], [latest[i]]), MAX_TIGHTENING)
             # About that many times as many cones are needed; a search without enough of them takes longest.
@@ -185,8 +188,8 @@ def search_more_cones(
 
 
 def retried(
-    attempts: Mapping[int, Part],
-    components: Mapping[int, Part],
+    attempts: Mapping[int, Component],
+    components: Mapping[int, Component],
     finished: Mapping[int, Layout],
     steps: Steps,
 ) -> dict[int, Layout]:
@@ -208,7 +211,7 @@ def retried(
 
 
 def better_layouts(
-    candidates: Mapping[int, Layout], finished: Mapping[int, Layout], components: Mapping[int, Part]
+    candidates: Mapping[int, Layout], finished: Mapping[int, Layout], components: Mapping[int, Component]
 ) -> dict[int, Layout]:
     """Return the candidates that rank before the finished layouts of the same components."""
     return {
@@ -223,7 +226,7 @@ def cut_along_sharp_edges(
     prepared: Prepared,
     layouts: Sequence[Layout],
     options: Options,
-    flatten_pieces: Callable[[Sequence[Part]], list[Layout]],
+    flatten_pieces: Callable[[Sequence[Component]], list[Layout]],
 ) -> tuple[Prepared, list[Layout]]:
     """Return the input with sharp edges as seams in solids that are too distorted otherwise, and the layouts.
 
@@ -236,7 +239,7 @@ def cut_along_sharp_edges(
         return prepared, list(layouts)
     distorted = [
         i
-        for i, (component, layout) in enumerate(zip(prepared.parts, layouts, strict=True))
+        for i, (component, layout) in enumerate(zip(prepared.components, layouts, strict=True))
         if is_machined(component.mesh) and is_too_distorted(component, layout)
     ]
     if not distorted:
@@ -252,11 +255,11 @@ def cut_along_sharp_edges(
         return prepared, list(layouts)
     replaced = {}
     for i in distorted:
-        component, pieces = prepared.parts[i], pieces_of[i]
+        component, pieces = prepared.components[i], pieces_of[i]
         cut = [next(layouts_of_pieces) for _ in pieces]
         if is_worth_its_seams(pieces, cut, component, layouts[i]):
             note = (
-                f"Edges above {np.degrees(SHARP_ANGLE):g} degrees are seams {component.where}: without them its mean "
+                f"Edges above {np.degrees(SHARP_ANGLE):g} degrees are seams {component.location}: without them its mean "
                 f"QC distortion is {mean_qc(layouts[i]):.3g}."
             )
             replaced[i] = [cut[0].with_notes(note), *cut[1:]]
@@ -266,7 +269,9 @@ def cut_along_sharp_edges(
     return prepared, [layout for i, uncut in enumerate(layouts) for layout in replaced.get(i, [uncut])]
 
 
-def is_worth_its_seams(pieces: Sequence[Part], cut: Sequence[Layout], component: Part, uncut: Layout) -> bool:
+def is_worth_its_seams(
+    pieces: Sequence[Component], cut: Sequence[Layout], component: Component, uncut: Layout
+) -> bool:
     """Return whether layouts of pieces of a component are better than its layout, and cost less with their seams."""
     is_better = rank(pieces, cut) < rank([component], [uncut])
     return is_better and borders_and_distortion(pieces, cut) < borders_and_distortion([component], [uncut])

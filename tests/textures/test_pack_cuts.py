@@ -51,8 +51,8 @@ def starfish(x, y):
 
 def layout_of(vertices, faces):
     """The layout of a mesh in one chart, and the costs of its edges."""
-    part = Source(as_input(vertices, faces)).prepared(Options()).parts[0]
-    layout = lay_out_with_thick_triangles(part, Steps())
+    component = Source(as_input(vertices, faces)).prepared(Options()).components[0]
+    layout = lay_out_with_thick_triangles(component, Steps())
     mesh = layout.mesh
     return layout, np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
 

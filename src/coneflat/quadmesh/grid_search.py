@@ -321,7 +321,7 @@ class GridSearch:
         """The root of the area of the mesh, in model units."""
         checked, given = self.checked, self.result.lengths if self.result else self.options.get("lengths")
         options = read_options({"lengths": given, "repair": self.options.get("repair", False)}, Options)
-        own = None if given is None else self.source.prepared(options).own_lengths
+        own = None if given is None else self.source.prepared(options).user_lengths
         lengths = edge_lengths(checked.mesh.vertices, checked.mesh.faces) if own is None else own
         return float(np.ldexp(max(np.sqrt(double_areas(lengths).sum() / 2), 1e-150), -checked.exponent))
 
