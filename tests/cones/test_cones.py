@@ -8,7 +8,7 @@ import shapes
 
 from coneflat import TriangleMesh, errors
 from coneflat.cones import cones_at, cones_with_curvature, greedy_cones
-from coneflat.cones.given import fitted_cones
+from coneflat.cones.prescribed import fitted_cones
 from coneflat.cones.sparse.linear_model import LinearModel
 from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, edge_lengths
 from coneflat.geometry.operators import vertex_areas

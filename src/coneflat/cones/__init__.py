@@ -11,7 +11,7 @@ from .find import (
     unmet_requests,
     uses_sparse_search,
 )
-from .given import cones_at, cones_with_curvature
+from .prescribed import cones_at, cones_with_curvature
 from .greedy import greedy_cones
 from .solution import GroundedLaplacian
 from .sparse import SparseCones

@@ -17,7 +17,7 @@ from ..geometry.operators import weighted_areas
 from ..mesh.connectivity import TriangleMesh
 from ..mesh.ties import mesh_tie_key
 from ..stages import ConeSolution, ConeSpec, Surface
-from .given import cones_at, fitted_cones
+from .prescribed import cones_at, fitted_cones
 from .greedy import greedy_cones
 from .solution import check_enough, check_feasible
 from .sparse import ConeSearch, SparseCones
@@ -67,10 +67,10 @@ def find_cones(
         solution = greedy_cones(
             *given, max_cones=spec.max_count, tie_key=mesh_tie_key(mesh), progress=watch.report
         )
-    elif len(spec.given) or spec.searches_corners:
+    elif len(spec.prescribed) or spec.searches_corners:
         solution = _fit_given(surface, spec)
     else:  # "none", or no given cone is on this component
-        solution = cones_at(*given, spec.given.vertices)
+        solution = cones_at(*given, spec.prescribed.vertices)
     if spec.scale_at_cones:
         check_enough(len(solution.cones), mesh)
     else:
@@ -99,7 +99,7 @@ def leaves_flat_disks(spec: ConeSpec) -> bool:
     """Return whether a flat disk gets no cones by any search: none are requested, and its boundary is free."""
     requests = spec.count, spec.quantum
     is_free = not (spec.prescribes_boundary or spec.searches_corners or spec.strategy == "greedy")
-    return is_free and not (len(spec.given) or len(spec.required)) and all(one is None for one in requests)
+    return is_free and not (len(spec.prescribed) or len(spec.required)) and all(one is None for one in requests)
 
 
 def has_many_handles(mesh: TriangleMesh, spec: ConeSpec) -> bool:
@@ -199,8 +199,8 @@ def _fit_given(surface: Surface, spec: ConeSpec) -> ConeSolution:
     found = fitted_cones(
         linear_model(surface, spec),
         surface.mesh.euler_characteristic,
-        spec.given.vertices,
-        spec.given.curvatures,
+        spec.prescribed.vertices,
+        spec.prescribed.curvatures,
         min_cone_angle=spec.min_angle,
         max_cone_angle=spec.max_angle,
     )

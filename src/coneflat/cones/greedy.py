@@ -13,7 +13,7 @@ from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..errors import OptionError
 from ..mesh.ties import argmax_tied
 from ..stages import ConeSolution
-from .given import cones_at
+from .prescribed import cones_at
 from .solution import GroundedLaplacian, target_from_log_scale
 
 # Range of the log scale at which the search of the paper ends.

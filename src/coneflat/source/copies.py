@@ -80,7 +80,7 @@ def _has_vertex_options(part: Part) -> bool:
     cones = part.cones
     weights = cones.weights, part.seams.weights, part.seams.visibility
     return bool(
-        len(cones.given)
+        len(cones.prescribed)
         or len(part.metric.corners)
         or len(cones.required)
         or any(one is not None for one in weights)

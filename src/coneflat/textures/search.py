@@ -253,7 +253,7 @@ class CutSearch:
         bound = self.max_energy + COARSE_EXCESS * allowed
         best = CutSearch(coarse, bound, self._method, True, self._by_area).best()
         given = VertexCurvatures(kept[best.layout.cones], np.full(len(best.layout.cones), np.nan))
-        spec = replace(self.part.cones, strategy="given", given=given)
+        spec = replace(self.part.cones, strategy="prescribed", prescribed=given)
         layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
         one = self._candidate(layout, layout.statistics.area_distortion_linear)
         if 0 < one.energy - self.max_energy <= MAX_EXCESS * allowed:
