@@ -17,8 +17,8 @@ from ..geometry.operators import weighted_areas
 from ..mesh.connectivity import TriangleMesh
 from ..mesh.ties import mesh_tie_key
 from ..stages import ConeSolution, ConeSpec, Surface
-from .prescribed import cones_at, fitted_cones
 from .greedy import greedy_cones
+from .prescribed import cones_at, fitted_cones
 from .solution import check_enough, check_feasible
 from .sparse import ConeSearch, SparseCones
 from .sparse.limits import MAX_SEARCHED
@@ -61,16 +61,16 @@ def find_cones(
     too_many_handles = has_many_handles(mesh, spec)
     if uses_sparse_search(mesh, spec):
         return _search(surface, spec, watch, holonomy)
-    given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
+    operators = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
     is_greedy = spec.strategy == "greedy" or too_many_handles
     if is_greedy:
         solution = greedy_cones(
-            *given, max_cones=spec.max_count, tie_key=mesh_tie_key(mesh), progress=watch.report
+            *operators, max_cones=spec.max_count, tie_key=mesh_tie_key(mesh), progress=watch.report
         )
     elif len(spec.prescribed) or spec.searches_corners:
         solution = _fit_given(surface, spec)
     else:  # "none", or no given cone is on this component
-        solution = cones_at(*given, spec.prescribed.vertices)
+        solution = cones_at(*operators, spec.prescribed.vertices)
     if spec.scale_at_cones:
         check_enough(len(solution.cones), mesh)
     else:
@@ -99,7 +99,11 @@ def leaves_flat_disks(spec: ConeSpec) -> bool:
     """Return whether a flat disk gets no cones by any search: none are requested, and its boundary is free."""
     requests = spec.count, spec.quantum
     is_free = not (spec.prescribes_boundary or spec.searches_corners or spec.strategy == "greedy")
-    return is_free and not (len(spec.prescribed) or len(spec.required)) and all(one is None for one in requests)
+    return (
+        is_free
+        and not (len(spec.prescribed) or len(spec.required))
+        and all(request is None for request in requests)
+    )
 
 
 def has_many_handles(mesh: TriangleMesh, spec: ConeSpec) -> bool:
@@ -196,7 +200,7 @@ def linear_model(surface: Surface, spec: ConeSpec) -> LinearModel:
 
 def _fit_given(surface: Surface, spec: ConeSpec) -> ConeSolution:
     """Return the given cones; curvatures that are not given are fitted. On a straight boundary they are its corners."""
-    found = fitted_cones(
+    solution = fitted_cones(
         linear_model(surface, spec),
         surface.mesh.euler_characteristic,
         spec.prescribed.vertices,
@@ -204,37 +208,37 @@ def _fit_given(surface: Surface, spec: ConeSpec) -> ConeSolution:
         min_cone_angle=spec.min_angle,
         max_cone_angle=spec.max_angle,
     )
-    return replace(found, cones=found.cones[~surface.mesh.is_boundary_vertex[found.cones]])
+    return replace(solution, cones=solution.cones[~surface.mesh.is_boundary_vertex[solution.cones]])
 
 
 def _search(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holonomy | None) -> ConeSolution:
     """Return the fewest cones for the allowed distortion, or the best cones of the requested number."""
     mesh = surface.mesh
-    only = coneless_solution(surface, spec)
-    if only is not None:
-        return replace(only, notes=unmet_requests(mesh, only.cones, 0.0, spec))
+    coneless = coneless_solution(surface, spec)
+    if coneless is not None:
+        return replace(coneless, notes=unmet_requests(mesh, coneless.cones, 0.0, spec))
     if needs_no_cone(surface, spec):
         none = np.empty(0, dtype=np.int64)
         return replace(linear_model(surface, spec).solution_of(none, np.empty(0)), is_searched=True)
     search = open_search(surface, spec, watch)
-    distortion, count, most = spec.distortion, spec.count, spec.max_count
-    found: SparseCones | QuantisedCones
+    distortion, count, max_count = spec.distortion, spec.count, spec.max_count
+    search_result: SparseCones | QuantisedCones
     if spec.quantum is None:
-        found = search.fewest(distortion, most) if count is None else search.best_of(count)
+        search_result = search.fewest(distortion, max_count) if count is None else search.best_of(count)
     else:
         from ..geometry.handles import loop_holonomy
         from .integer.search import align_handles, quantise_cones
 
-        found = quantised = quantise_cones(
-            search, spec.quantum, distortion=distortion, count=count, most=most
+        search_result = quantised = quantise_cones(
+            search, spec.quantum, distortion=distortion, count=count, max_count=max_count
         )
         if holonomy is not None:
             bound = max(quantised.distortion * HOLONOMY_FACTOR, distortion if count is None else 0.0)
             by_scale = loop_holonomy(mesh).by_log_scale(surface.lengths)
-            found = align_handles(search, quantised, by_scale, holonomy, bound)
-    solution = found.solution
+            search_result = align_handles(search, quantised, by_scale, holonomy, bound)
+    solution = search_result.solution
     cones = solution.cones[~mesh.is_boundary_vertex[solution.cones]]
-    notes = unmet_requests(mesh, cones, found.distortion, spec)
+    notes = unmet_requests(mesh, cones, search_result.distortion, spec)
     return replace(solution, cones=cones, is_searched=True, notes=notes)
 
 
@@ -260,11 +264,11 @@ def unmet_requests(
         return (Unmet(note),)
     if distortion <= spec.distortion * (1 + RELATIVE_TOLERANCE):
         return ()
-    why = "no better cones were found within the given bounds"
+    reason = "no better cones were found within the given bounds"
     if spec.quantum is not None and genus and distortion <= spec.distortion * HOLONOMY_FACTOR:
-        why = "cones were moved to align the rotations along handles"
+        reason = "cones were moved to align the rotations along handles"
     note = (
         f"The area distortion is {distortion:.3g} with {plural(cone_count, 'cone')}, above the "
-        f"{spec.distortion:g} allowed: {why}."
+        f"{spec.distortion:g} allowed: {reason}."
     )
     return (Unmet(note),)

@@ -102,13 +102,13 @@ def checked_sum(curvatures: FloatArray, euler_characteristic: int | None) -> Flo
     if euler_characteristic is None:
         return curvatures
     needed = 2 * np.pi * euler_characteristic
-    found = float(np.sum(curvatures))
-    if abs(found - needed) > TYPED_TOLERANCE:
+    total = float(np.sum(curvatures))
+    if abs(total - needed) > TYPED_TOLERANCE:
         raise CurvatureError(
             f"cone curvatures must sum to 2 pi chi = {needed:.7g} ({2 * euler_characteristic} pi) on this "
-            f"closed surface, but sum to {found:.7g} ({found / np.pi:.6g} pi): off by {found - needed:.3g}"
+            f"closed surface, but sum to {total:.7g} ({total / np.pi:.6g} pi): off by {total - needed:.3g}"
         )
-    return curvatures + (needed - found) / len(curvatures) if len(curvatures) else curvatures
+    return curvatures + (needed - total) / len(curvatures) if len(curvatures) else curvatures
 
 
 def fitted_cones(
@@ -146,14 +146,19 @@ def fitted_cones(
     prescribed = curvatures[~is_free]
     total = np.nan if euler is None else 2 * np.pi * euler - prescribed.sum()
     count = int(is_free.sum())
-    own, rest = np.ascontiguousarray(gram[np.ix_(is_free, is_free)]), gram[np.ix_(is_free, ~is_free)]
-    least, most = np.full(count, limits.least), np.full(count, limits.most)
-    found, _, _ = fit_curvatures(own, slope[is_free] + rest @ prescribed, least, most, float(total))
+    gram_of_free, coupling = (
+        np.ascontiguousarray(gram[np.ix_(is_free, is_free)]),
+        gram[np.ix_(is_free, ~is_free)],
+    )
+    lower, upper = np.full(count, limits.lower), np.full(count, limits.upper)
+    fitted, _, _ = fit_curvatures(
+        gram_of_free, slope[is_free] + coupling @ prescribed, lower, upper, float(total)
+    )
     filled = curvatures.copy()
-    filled[is_free] = found
+    filled[is_free] = fitted
     return linear.solution_of(cones, checked_sum(filled, euler))
 
 
-def _covariances(one: FloatArray, other: FloatArray, areas: FloatArray) -> FloatArray:
+def _covariances(first: FloatArray, second: FloatArray, areas: FloatArray) -> FloatArray:
     """Return (k, l) the area-weighted covariances of functions (k, f) and (l, f)."""
-    return (one * areas) @ other.T - np.outer(one @ areas, other @ areas)
+    return (first * areas) @ second.T - np.outer(first @ areas, second @ areas)

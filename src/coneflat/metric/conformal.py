@@ -87,7 +87,7 @@ class ConformalProblem:
     last: State | None = None
     _pattern: HessianPattern | None = None
     _factor: Factor | None = None
-    _known: tuple[LaplacianInverse, FloatArray, LaplacianInverse] | None = None
+    _correction: tuple[LaplacianInverse, FloatArray, LaplacianInverse] | None = None
 
     @cached_property
     def is_bounded(self) -> bool:
@@ -117,8 +117,8 @@ class ConformalProblem:
         cots = np.empty(len(self.triangulation.tail))
         broken = self.sum_angles(log_scale, sums, cots)
         # The cotangents are needed anyway, and give a fast test for edges that need no flip.
-        found = np.empty(len(cots), dtype=np.int64)
-        suspects = found[: find_suspects(self.triangulation.twin, cots, found)]
+        edges = np.empty(len(cots), dtype=np.int64)
+        suspects = edges[: find_suspects(self.triangulation.twin, cots, edges)]
         if len(suspects):
             flipped = make_delaunay(self.triangulation, log_scale, suspects)
             if len(flipped):
@@ -143,7 +143,7 @@ class ConformalProblem:
         errors = np.bincount(self.triangulation.tail, np.repeat(triangles, 3))
         return min(LENGTH_ROUNDING * float(errors.max()), MAX_ROUNDING_ERROR)
 
-    def direction(self, here: State, exactly: bool) -> tuple[FloatArray, bool]:
+    def direction(self, point: State, exactly: bool) -> tuple[FloatArray, bool]:
         """Return (n,) the Newton direction of a state, 0 at fixed vertices, and whether the Hessian was factorized.
 
         exactly: factorize the Hessian even if there is a preconditioner.
@@ -152,12 +152,12 @@ class ConformalProblem:
             MetricError: the Hessian is singular in double precision.
         """
         # The Hessian needs the triangulation of its own metric.
-        state = here if here is self.last else self.evaluate(here.variables)
+        state = point if point is self.last else self.evaluate(point.variables)
         if exactly:
             self.preconditioner = None
         if self._pattern is None:
             self._pattern = HessianPattern(self.triangulation)
-        if self.preconditioner is not None and len(here.variables) >= MAX_DIRECT_VERTICES:
+        if self.preconditioner is not None and len(point.variables) >= MAX_DIRECT_VERTICES:
             accuracy = min(max(state.largest, GOAL_RESIDUAL / state.largest / 4), MAX_RELATIVE_RESIDUAL)
             hessian = self._pattern.matrix(state.cots, self.fixed)
             inverse = self._corrected(self.preconditioner, hessian, state.variables)
@@ -178,10 +178,10 @@ class ConformalProblem:
         self, inverse: LaplacianInverse, hessian: csc_matrix, log_scale: FloatArray
     ) -> LaplacianInverse:
         """Return an inverse corrected for the Hessian; reused while the Hessian has hardly changed."""
-        known = self._known
-        if known is None or known[0] is not inverse or np.ptp(log_scale - known[1]) > MAX_REUSE_CHANGE:
-            known = self._known = inverse, log_scale, corrected(inverse, hessian, self.fixed)
-        return known[2]
+        cached = self._correction
+        if cached is None or cached[0] is not inverse or np.ptp(log_scale - cached[1]) > MAX_REUSE_CHANGE:
+            cached = self._correction = inverse, log_scale, corrected(inverse, hessian, self.fixed)
+        return cached[2]
 
 
 def find_scale(
@@ -265,7 +265,7 @@ def sum_angles(
 
 
 @compiled
-def find_suspects(twin: IntArray, cots: FloatArray, found: IntArray) -> int:
+def find_suspects(twin: IntArray, cots: FloatArray, suspects: IntArray) -> int:
     """Write to `found` one half-edge of each edge that may not be Delaunay; return their number.
 
     Its cotangents have a negative sum, or it belongs to a triangle that breaks the triangle inequality.
@@ -281,6 +281,6 @@ def find_suspects(twin: IntArray, cots: FloatArray, found: IntArray) -> int:
             # All cotangents of a triangle whose inequality is broken are 0.
             is_suspect |= cots[base] == 0.0 and cots[base + 1] == 0.0 and cots[base + 2] == 0.0
         if is_suspect:
-            found[count] = h
+            suspects[count] = h
             count += 1
     return count

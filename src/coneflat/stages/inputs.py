@@ -224,8 +224,8 @@ class Surface:
         np.maximum.at(widest, mesh.faces.ravel(), angles.ravel())
         widest /= np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - curvature
         laplacian, areas = cotangent_laplacian(faces, cots, n), vertex_areas(faces, sides, n)
-        known = delaunay if len(faces) <= MEMORY_BOUND_TRIANGLES else None
-        return cls(mesh, lengths, laplacian, curvature, areas, widest, known_delaunay=known)
+        cached_delaunay = delaunay if len(faces) <= MEMORY_BOUND_TRIANGLES else None
+        return cls(mesh, lengths, laplacian, curvature, areas, widest, known_delaunay=cached_delaunay)
 
     @property
     def delaunay(self) -> tuple[IntrinsicTriangulation, IntArray]:

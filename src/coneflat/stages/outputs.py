@@ -112,16 +112,16 @@ class SolveStatistics:
     def of_all(cls, parts: Sequence[SolveStatistics], areas: Sequence[float]) -> SolveStatistics:
         """Return the combined statistics of components: sums of counts, maxima, and means weighted by area."""
         values = {}
-        for each in fields(cls):
-            every = np.array([getattr(part, each.name) for part in parts])
-            if each.name in ("newton_steps", "residual", "untangled_move", "qc_max_unrelaxed"):
-                values[each.name] = every.max().item()
-            elif each.name == "qc_mean_unrelaxed":
-                values[each.name] = float(np.average(every, weights=areas))
-            elif each.name.startswith("area_distortion"):
-                values[each.name] = float(np.sqrt(np.average(every**2, weights=areas)))
+        for statistic in fields(cls):
+            numbers = np.array([getattr(part, statistic.name) for part in parts])
+            if statistic.name in ("newton_steps", "residual", "untangled_move", "qc_max_unrelaxed"):
+                values[statistic.name] = numbers.max().item()
+            elif statistic.name == "qc_mean_unrelaxed":
+                values[statistic.name] = float(np.average(numbers, weights=areas))
+            elif statistic.name.startswith("area_distortion"):
+                values[statistic.name] = float(np.sqrt(np.average(numbers**2, weights=areas)))
             else:
-                values[each.name] = every.sum().item()
+                values[statistic.name] = numbers.sum().item()
         return cls(**values)
 
 

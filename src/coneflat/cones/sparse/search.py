@@ -103,11 +103,11 @@ class ConeSearch:
         self.progress: Callable[[str], None] = lambda _: None
         self._linear, self.operator, self._coarse_model = linear, linear.operator, linear.coarse
         vertices = self.operator.vertices
-        self._least = np.full(len(vertices), limits.least)
+        self._lower = np.full(len(vertices), limits.lower)
         if max_angles is not None:
-            self._least = np.maximum(self._least, np.minimum(math.tau - max_angles[vertices], 0.0))
+            self._lower = np.maximum(self._lower, np.minimum(math.tau - max_angles[vertices], 0.0))
         self._required = self.operator.unknowns_of(cones)
-        self.exact = ExactModel(linear, self._required, limits, self._least)
+        self.exact = ExactModel(linear, self._required, limits, self._lower)
         self._usable = np.empty(0, dtype=bool)
         # The exact model will need the score; it is computed while the coarse model is set up.
         with concurrently(lambda: linear.score, 2 * len(vertices)):
@@ -153,7 +153,7 @@ class ConeSearch:
         is_usable = usable[operator.vertices]
         is_usable[required] = False
         # On the coarse model, a neighbourhood is represented by a vertex that can hold a wide cone.
-        excess = np.maximum(-self._least, 0.0)
+        excess = np.maximum(-self._lower, 0.0)
         fitness = 0.5 + 0.5 * excess / excess.max() if 0 < excess.max(initial=0.0) < math.inf else 1.0
         self.places = np.concatenate([required, candidates(self._coarse_model, is_usable * fitness)])
         kernel, slope = self._coarse_model.at(self.places)
@@ -165,7 +165,7 @@ class ConeSearch:
             mask,
             np.arange(len(required)),
             self.limits,
-            self._least[self.places],
+            self._lower[self.places],
         )
         self.exact.restrict(is_usable)
         self._usable, self._refined, self._stalled = usable.copy(), dict[int, tuple[float, ...]](), set[int]()
@@ -173,15 +173,15 @@ class ConeSearch:
     @property
     def most_cones(self) -> int:
         """The largest number of cones searched for."""
-        most = min(MAX_SEARCHED + len(self._required), len(self.places))
-        return most if self.limits.largest is None else min(most, self.limits.largest)
+        largest = min(MAX_SEARCHED + len(self._required), len(self.places))
+        return largest if self.limits.largest is None else min(largest, self.limits.largest)
 
-    def fewest(self, distortion: float = DISTORTION, most: int | None = None) -> SparseCones:
+    def fewest(self, distortion: float = DISTORTION, max_count: int | None = None) -> SparseCones:
         """Return the fewest cones found with E <= distortion; if more than `most` are needed, the best `most` cones.
 
         Args:
             distortion: the allowed E, positive.
-            most: largest number of cones; None for no limit.
+            max_count: largest number of cones; None for no limit.
 
         Raises:
             OptionError: `distortion` or `most` is not valid.
@@ -189,16 +189,20 @@ class ConeSearch:
         """
         if not 0 < distortion < math.inf:
             raise OptionError(f"the distortion allowed must be a positive number, got {distortion:g}")
-        if most is not None:
-            self.limits.check_count(most, len(self._required))
-        most = self.most_cones if most is None else min(most, self.most_cones)
+        if max_count is not None:
+            self.limits.check_count(max_count, len(self._required))
+        max_count = self.most_cones if max_count is None else min(max_count, self.most_cones)
         goal = distortion * distortion
-        count = self._find_sufficient(self._search_coarse(goal, most), goal, most)
+        count = self._find_sufficient(self._search_coarse(goal, max_count), goal, max_count)
         while count > max(self.limits.fewest, len(self._required)) and self._refine(count - 1) <= goal:
             count -= 1
         # If it is not reached, few cones that are nearly as good as more.
-        least = self.exact.best.fewest(goal, most).energy
-        return self._cones(self.exact.best.fewest(goal if least <= goal else least / STALL_FACTOR, most))
+        smallest_energy = self.exact.best.fewest(goal, max_count).energy
+        return self._cones(
+            self.exact.best.fewest(
+                goal if smallest_energy <= goal else smallest_energy / STALL_FACTOR, max_count
+            )
+        )
 
     def best_of(self, count: int) -> SparseCones:
         """Return the cones of smallest E that were found, at most `count` of them.
@@ -215,56 +219,56 @@ class ConeSearch:
         self._climb(0.0, count + 1, count)
         self.coarse.descend(count - 2, count + 1)
         self._refine(max(size for size in self.coarse.best.sizes if size <= count))
-        some = 2 * count // 3
-        if self._refine(some) < math.inf:
-            self.exact.refine(self.exact.extended(self.exact.best[some].members, 0.0, count))
+        fewer = 2 * count // 3
+        if self._refine(fewer) < math.inf:
+            self.exact.refine(self.exact.extended(self.exact.best[fewer].members, 0.0, count))
         return self._cones(self.exact.best.fewest(-1.0, count))
 
-    def curve(self, most: int) -> list[SparseCones]:
+    def curve(self, max_count: int) -> list[SparseCones]:
         """Return the best cones found for each number up to `most`, if their E is below that of fewer cones.
 
         Args:
-            most: largest number of cones.
+            max_count: largest number of cones.
         """
-        most = min(most, self.most_cones)
-        self.coarse.climb(0.0, most)
-        self.coarse.descend(1, most)
+        max_count = min(max_count, self.most_cones)
+        self.coarse.climb(0.0, max_count)
+        self.coarse.descend(1, max_count)
         # First upwards, then downwards: the best set may be the next larger set without one of its cones.
-        for count in (*range(most + 1), *range(most, -1, -1)):
+        for count in (*range(max_count + 1), *range(max_count, -1, -1)):
             self._refine(count)
-        found: list[SparseCones] = []
+        curve: list[SparseCones] = []
         for count in self.exact.best.sizes:
             cones = self._cones(self.exact.best[count])
-            if count <= most and (not found or cones.distortion < found[-1].distortion - TIE_TOLERANCE):
-                found.append(cones)
-        return found
+            if count <= max_count and (not curve or cones.distortion < curve[-1].distortion - TIE_TOLERANCE):
+                curve.append(cones)
+        return curve
 
-    def _search_coarse(self, goal: float, most: int) -> int:
+    def _search_coarse(self, goal: float, max_count: int) -> int:
         """Find good sets on the coarse model, of all sizes up to slightly more than needed; return the needed size."""
-        self._climb(goal / COARSE_MODEL_ERROR, most, most)
-        count = len(self.coarse.best.fewest(goal, most))
+        self._climb(goal / COARSE_MODEL_ERROR, max_count, max_count)
+        count = len(self.coarse.best.fewest(goal, max_count))
         self.coarse.descend(count - 3, count + 1)
-        return len(self.coarse.best.fewest(goal, most))
+        return len(self.coarse.best.fewest(goal, max_count))
 
-    def _find_sufficient(self, count: int, goal: float, most: int) -> int:
+    def _find_sufficient(self, count: int, goal: float, max_count: int) -> int:
         """Return how many cones reach E^2 <= goal on the mesh, or gain as much as more; `count` are tried first."""
         exact, best = self.exact, self.exact.best
         self._refine(count)
-        while best.fewest(goal, most).energy > goal:
-            start = max(size for size in best.sizes if size <= most)
-            if start in {most, *self._stalled}:
+        while best.fewest(goal, max_count).energy > goal:
+            start = max(size for size in best.sizes if size <= max_count)
+            if start in {max_count, *self._stalled}:
                 break
-            added = exact.extended(best[start].members, goal, most)
+            added = exact.extended(best[start].members, goal, max_count)
             if not exact.refine(added) < STALL_FACTOR * best.energy(start):
                 self._stalled |= {start, len(added)}
-        return len(best.fewest(goal, most))
+        return len(best.fewest(goal, max_count))
 
-    def _climb(self, bound: float, most: int, count: int) -> None:
+    def _climb(self, bound: float, max_count: int, count: int) -> None:
         """Find sets of at most `most` cones on the coarse model; raise CurvatureError if none has at most `count`."""
         best = self.coarse.best
-        known = [size for size in best.sizes if size <= most]
-        if all(best.energy(size) > bound for size in known):
-            self.coarse.climb(bound, most, max(known, default=None))
+        known_sizes = [size for size in best.sizes if size <= max_count]
+        if all(best.energy(size) > bound for size in known_sizes):
+            self.coarse.climb(bound, max_count, max(known_sizes, default=None))
         if min(self.coarse.best.sizes, default=count + 1) > count:
             raise CurvatureError(
                 f"no set of {count} cones was found that carries a total curvature of "
@@ -295,18 +299,20 @@ class ConeSearch:
             exact.refine(min(starts, key=exact.energy))
         return exact.best.energy(count)
 
-    def _cones(self, found: ConeSet) -> SparseCones:
+    def _cones(self, best: ConeSet) -> SparseCones:
         """Return the cones of a set on the mesh; cones of zero curvature are left out unless they are required."""
         unknowns, required = self.exact.unknowns, len(self._required)
-        members = found.members[self.exact.in_order(found.members)]
+        members = best.members[self.exact.in_order(best.members)]
         curvatures = self.exact.fit(members).curvatures
-        keep = np.abs(curvatures) > TIE_TOLERANCE
-        keep[:required] = True
-        kept = curvatures[keep]
-        if self.limits.has_sum and len(kept):
+        is_kept = np.abs(curvatures) > TIE_TOLERANCE
+        is_kept[:required] = True
+        kept_curvatures = curvatures[is_kept]
+        if self.limits.has_sum and len(kept_curvatures):
             # Correct the sum for rounding and for the cones left out: a metric must have exactly this sum.
-            kept += (self.limits.total - kept.sum()) / len(kept)
-        return SparseCones(self.solution_of(unknowns[members[keep]], kept), math.sqrt(found.energy))
+            kept_curvatures += (self.limits.total - kept_curvatures.sum()) / len(kept_curvatures)
+        return SparseCones(
+            self.solution_of(unknowns[members[is_kept]], kept_curvatures), math.sqrt(best.energy)
+        )
 
     def solution_of(self, unknowns: IntArray, curvatures: FloatArray) -> ConeSolution:
         """Return the solution of cones at unknowns (s,) with given curvatures (s,), radians."""
