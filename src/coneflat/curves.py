@@ -32,7 +32,7 @@ class FoundCones:
     Attributes:
         vertices: (s,) in the input's numbering.
         curvatures: (s,) radians.
-        distortion: area distortion E of the linear model: standard deviation of the log scale, weighted by area.
+        distortion: area distortion E: area-weighted standard deviation of the linear log conformal factor.
         notes: unmet requests, one sentence each.
     """
 
@@ -53,7 +53,7 @@ class ConeCurve:
         >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
         >>> faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
         >>> curve = coneflat.cone_curve(vertices, faces)
-        >>> curve.counts  # no fewer cones carry the curvature of a sphere
+        >>> curve.counts  # no fewer cones absorb the curvature of a sphere
         array([3, 4])
         >>> curve.sets[-1].vertices
         array([0, 1, 2, 3])
@@ -73,7 +73,7 @@ class ConeCurve:
 
     @property
     def knee(self) -> int:
-        """The number of cones beyond which more of them gain least: farthest below the chord of the curve."""
+        """The number of cones beyond which additional cones reduce E little: farthest below the chord of the curve."""
         return _knee(self.counts, self.distortions)
 
 
@@ -93,7 +93,7 @@ class WholeCurve:
 
     @property
     def knee(self) -> int:
-        """The number of cones beyond which more of them gain least: farthest below the chord of the curve."""
+        """The number of cones beyond which additional cones reduce E little: farthest below the chord of the curve."""
         return _knee(self.counts, self.distortions)
 
 
@@ -118,7 +118,7 @@ def find_cones(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Fou
     Raises:
         MeshError: the mesh cannot be flattened; see `coneflat.errors` for its kinds.
         MeshFileError: its file cannot be read.
-        CurvatureError: no cones that are allowed carry the curvature of the surface.
+        CurvatureError: no cones that are allowed absorb the curvature of the surface.
         OptionError: an option is unknown or invalid.
         MetricError: the computation found no finite result.
         TooLargeError: the mesh does not fit into the free memory.
@@ -163,7 +163,7 @@ def cone_curve(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Con
     Raises:
         MeshError: the mesh cannot be flattened; see `coneflat.errors` for its kinds.
         MeshFileError: its file cannot be read.
-        CurvatureError: no cones that are allowed carry the curvature of the surface.
+        CurvatureError: no cones that are allowed absorb the curvature of the surface.
         OptionError: an option is unknown or invalid, or no set of up to `most` cones has the required total curvature.
         MetricError: the computation found no finite result.
         TooLargeError: the mesh does not fit into the free memory.
@@ -237,7 +237,7 @@ def _curve(part: Part, max_count: int, stages: Stopwatch) -> tuple[ConeCurve, fl
     with stages("cones"):
         curve = search.curve(max_count)
     if not curve:
-        raise OptionError(f"no set of up to {max_count} cones carries this surface's curvature; allow more")
+        raise OptionError(f"no set of up to {max_count} cones absorbs this surface's curvature; allow more")
     return ConeCurve(tuple(_found_cones(cones.solution, cones.distortion, part) for cones in curve)), area
 
 

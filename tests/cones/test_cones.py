@@ -164,7 +164,7 @@ def test_curvatures_must_satisfy_gauss_bonnet():
         cones_with_curvature(*operators, np.array([1, 2]), np.array([0.5, 0.5]) * np.pi)
     with pytest.raises(errors.CurvatureError, match="has none"):
         cones_at(*operators, np.array([], dtype=int))
-    with pytest.raises(errors.CurvatureError, match="needs cones to carry it"):
+    with pytest.raises(errors.CurvatureError, match="needs cones to absorb it"):
         greedy_cones(*operators, max_cones=0)
     for epsilon in (0, -1, float("nan")):
         with pytest.raises(errors.OptionError, match="epsilon"):

@@ -27,12 +27,12 @@ from .sparse.linear_model import LinearModel
 if TYPE_CHECKING:
     from .integer.search import QuantisedCones
 
-# Cone angle per triangle around a cone, radians, up to which the triangles can hold the angle with straight sides. It
+# Cone angle per triangle around a cone, radians, up to which the triangles can realise it with straight sides. It
 # is less than pi, since the angle cannot be distributed evenly over the triangles.
 CONE_ANGLE_PER_TRIANGLE = 0.6 * np.pi
 # On meshes with this number of vertices, a neighbouring vertex is as good for a cone. The corners at a cone, all
 # widened by the same factor, must then not exceed this angle. Otherwise a triangle with straight sides may be unable to
-# hold its corner, and the search has to be repeated, which takes 14% of the time on a horse of 97,000 triangles.
+# realise its corner, and the search has to be repeated, which takes 14% of the time on a horse of 97,000 triangles.
 FINE_VERTICES, MAX_CORNER = 30_000, 0.95 * np.pi
 # Relative excess of the distortion over the requested one up to which there is no note.
 RELATIVE_TOLERANCE = 1e-3
@@ -46,7 +46,7 @@ Holonomy: TypeAlias = Callable[[ConeSolution], FloatArray]
 def find_cones(
     surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holonomy | None = None
 ) -> ConeSolution:
-    """Return cones with their curvatures and linear log scale.
+    """Return cones with their curvatures and linear log conformal factor.
 
     Args:
         surface: the mesh.

@@ -16,7 +16,7 @@ from ..stages import ConeSolution
 from .prescribed import cones_at
 from .solution import GroundedLaplacian, target_from_log_scale
 
-# Range of the log scale at which the search of the paper ends.
+# Range of the log conformal factor at which the search of the paper ends.
 EPSILON = 1.0
 
 

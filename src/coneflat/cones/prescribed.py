@@ -27,8 +27,8 @@ def cones_at(
 ) -> ConeSolution:
     """Return cones at given vertices of a connected mesh with curvatures that follow from phi = 0 (Section 3.1).
 
-    The section is that of the paper. The log scale solves a Dirichlet problem: phi = 0 at cones and boundary, and
-    L phi = -K elsewhere. The target curvature is then K + L phi.
+    The section is that of the paper. The log conformal factor solves a Dirichlet problem: phi = 0 at cones and
+    boundary, and L phi = -K elsewhere. The target curvature is then K + L phi.
 
     Args:
         laplacian: (n, n) cotangent Laplacian L.
@@ -47,7 +47,7 @@ def cones_at(
         if euler_characteristic != 0:
             raise CurvatureError(
                 f"a closed surface of Euler characteristic {euler_characteristic} has a total curvature of "
-                f"{2 * euler_characteristic} pi and needs cones to carry it, but has none: give or allow some"
+                f"{2 * euler_characteristic} pi and needs cones to absorb it, but has none: give or allow some"
             )
         grounded[0] = True
     phi = GroundedLaplacian(laplacian, grounded).solve(-curvature)
@@ -63,7 +63,7 @@ def cones_with_curvature(
     cones: IntArray,
     curvatures: FloatArray,
 ) -> ConeSolution:
-    """Return the log scale of cones with given curvatures (Eq. 1 of the paper) on a connected mesh.
+    """Return the log conformal factor of cones with given curvatures (Eq. 1 of the paper) on a connected mesh.
 
     On a mesh with boundary, phi = 0 on the boundary, which absorbs the remaining curvature.
 
@@ -122,8 +122,8 @@ def fitted_cones(
 ) -> ConeSolution:
     """Return cones with given curvatures; those that are not given minimise E.
 
-    With the Green's functions g_i of the cones, the linear log scale is phi_0 + sum k_i g_i, and E is its area-weighted
-    standard deviation. This is a convex quadratic program in the curvatures that are not given.
+    With the Green's functions g_i of the cones, the linear log conformal factor is phi_0 + sum k_i g_i, and E is its
+    area-weighted standard deviation. This is a convex quadratic program in the curvatures that are not given.
 
     Args:
         linear: the linear model of the connected mesh.

@@ -30,7 +30,7 @@ MAX_STEP = 5.0
 MAX_RELATIVE_RESIDUAL = 0.05
 # Number of vertices below which a factorization takes less time than the function calls of conjugate gradients.
 MAX_DIRECT_VERTICES = 200
-# Largest difference of log scales whose Hessians are nearly the same.
+# Largest difference of log conformal factors whose Hessians are nearly the same.
 MAX_REUSE_CHANGE = 0.05
 # Largest number of halvings of a step on surfaces with a boundary: instead of taking tiny steps past triangles that
 # nearly break the triangle inequality, the surface is doubled.
@@ -39,7 +39,7 @@ HALVINGS_BOUNDED = 6
 
 @dataclass(eq=False)
 class State(Point):
-    """Curvature for a log scale, on the triangulation that is Delaunay for it.
+    """Curvature for a log conformal factor, on the triangulation that is Delaunay for it.
 
     Attributes:
         curvature: (n,) radians; the residual is the target minus this.
@@ -54,7 +54,7 @@ class State(Point):
 
 
 def centred(log_scale: FloatArray) -> FloatArray:
-    """Return a log scale shifted so that the middle of its range is 0, which avoids overflow and keeps all angles."""
+    """Return a log conformal factor with the middle of its range shifted to 0: no overflow, and the same angles."""
     return log_scale - (log_scale.max() + log_scale.min()) / 2
 
 
@@ -112,7 +112,7 @@ class ConformalProblem:
         return sum_angles(self.triangulation.tail, self.triangulation.length, scale, sums, cots)
 
     def evaluate(self, log_scale: FloatArray) -> State:
-        """Return the state of a log scale (n,); the triangulation is flipped to Delaunay in the scaled metric."""
+        """Return the state of a log conformal factor (n,); the triangulation is flipped to Delaunay in its metric."""
         sums = np.empty(len(log_scale))
         cots = np.empty(len(self.triangulation.tail))
         broken = self.sum_angles(log_scale, sums, cots)
@@ -192,8 +192,7 @@ def find_scale(
 ) -> tuple[State, int]:
     """Return the state with the smallest residual that Newton's method reaches, and the number of steps.
 
-    The search starts from a given log scale (n,). On a surface with a boundary it starts from 0 if the given one breaks
-    triangles.
+    The search starts from `log_scale` (n,). On a surface with a boundary it starts from 0 if this breaks triangles.
     """
     start = problem.evaluate(log_scale)
     if not start.is_admissible:

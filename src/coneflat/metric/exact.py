@@ -89,8 +89,8 @@ def exact_metric(
         lengths: (m, 3) side lengths, column i opposite corner i, model units: those of `edge_lengths`, or any others
             whose triangles have area.
         target: (n,) curvature in radians, or one number for all vertices; not used at fixed vertices.
-        fixed: (n,) True for vertices whose log scale is given and whose curvature is computed: cones with phi = 0, or
-            a free boundary. None: all curvatures are prescribed, and phi, which is then unique up to a constant, is
+        fixed: (n,) True for vertices whose phi is prescribed and whose curvature is computed: cones with phi = 0, or a
+            free boundary. None: all curvatures are prescribed, and phi, which is then unique up to a constant, is
             chosen to preserve the total area.
         fixed_log_scale: (n,) or one number, phi at the fixed vertices.
         start: (n,) initial phi; the linear solution is a good choice.
@@ -246,7 +246,7 @@ def checked_target(mesh: TriangleMesh, target: FloatArray, fixed: BoolArray) -> 
     Args:
         mesh: the mesh.
         target: (n,) curvature, radians; not used at fixed vertices.
-        fixed: (n,) vertices whose log scale is given.
+        fixed: (n,) vertices whose log conformal factor is given.
 
     Returns:
         (n,) the corrected target, and (n,) True at one vertex of each component without fixed vertices.

@@ -51,7 +51,7 @@ def find_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec, step
 
     Args:
         surface: the mesh with its side lengths.
-        solution: cones, target curvatures and the linear log scale.
+        solution: cones, target curvatures and the linear log conformal factor.
         spec: the options of the metric.
         steps: maximum number of Newton steps of each attempt at an exact metric without a quantum.
 
@@ -121,7 +121,7 @@ def corrected_flat_metric(
 
     Args:
         lengths: (m, 3) side lengths.
-        solution: cones, target curvatures and the linear log scale.
+        solution: cones, target curvatures and the linear log conformal factor.
         solve: returns the exact metric of other side lengths for cones.
         holonomy: of loops along the handles, and around the holes if the boundary is free.
         quantum: radians.

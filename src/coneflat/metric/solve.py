@@ -62,7 +62,7 @@ class ExactSolver:
 
         Args:
             lengths: (m, 3) side lengths, model units.
-            solution: cones, target curvatures and the linear log scale.
+            solution: cones, target curvatures and the linear log conformal factor.
             flipped: the intrinsic Delaunay triangulation and the half-edges flipped for it, if known.
             steps: maximum number of Newton steps of each attempt.
 

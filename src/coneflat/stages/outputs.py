@@ -34,15 +34,15 @@ class LaplacianInverse:
 
 @dataclass(frozen=True, eq=False)
 class ConeSolution:
-    """Cones of a mesh with n vertices, their curvatures, and the log scale that produces them to first order.
+    """Cones of a mesh with n vertices, their curvatures, and the log conformal factor of the linear model.
 
     Attributes:
         cones: (s,) cone vertices, in the order in which they were chosen.
         target: (n,) target curvature, radians: 0 except at cones and on the boundary.
         log_scale: (n,) phi with L phi = target - curvature; constant on cones and boundary where their curvature was
             not prescribed.
-        inverse: the factorized Laplacian that gave the log scale, if it still exists: solutions are zero on the
-            boundary, or have zero mean without one.
+        inverse: the factorized Laplacian that gave phi, if it still exists: solutions are zero on the boundary,
+            or have zero mean without one.
         is_searched: the sparse search chose the cones, so that others can be tried.
         notes: unmet requests, one sentence each.
     """
@@ -236,7 +236,7 @@ class Layout:
         """Return the layout with the area distortion of its metric, and of the linear model of its cones.
 
         Args:
-            linear: (n,) log scale of that model.
+            linear: (n,) log conformal factor of that model.
             areas: (n,) weight of each vertex.
         """
         of_linear, reached = (area_distortion(phi, areas) for phi in (linear, self.log_scale))

@@ -45,7 +45,7 @@ class Lattice:
 
     @property
     def fewest(self) -> int:
-        """The smallest number of cones that can carry the total curvature."""
+        """The smallest number of cones that can absorb the total curvature."""
         if not self.total:
             return 0
         return -(-self.total // (self.quanta.upper if self.total > 0 else self.quanta.lower))
@@ -132,7 +132,7 @@ class Lattice:
         """Return cones with indices from rounding the best curvatures of members (s,); None if the sum is wrong.
 
         The curvature nearest to a multiple is rounded first, and the others are refitted: this is Babai's nearest plane
-        algorithm in a special order. Members that are rounded to 0 are left out unless they are required.
+        algorithm in a special order. Members that are rounded to 0 are removed unless they are required.
         """
         model, (quantum, lower, upper, _) = self.model, self.quanta
         indices, is_open = np.zeros(len(members), dtype=np.int64), np.ones(len(members), dtype=bool)

@@ -53,7 +53,7 @@ def align_handles(
     Args:
         search: the search that found the cones.
         quantised: the cones.
-        by_scale: (2 genus, n) derivative of the rotation along loops by the log scale.
+        by_scale: (2 genus, n) derivative of the rotation along loops by the log conformal factor.
         holonomy: function that returns (2 genus,) the rotations along loops in the metric with given cones, radians.
         bound: the allowed E.
     """
@@ -108,7 +108,7 @@ def moved_cones(
             2 * moved_curvatures * (score[targets] - score[origins])
             + penalty * moved_curvatures**2 * distances
         )
-        # Moves that no other makes cheap enough are left out. The last entry represents no move.
+        # Moves that are too costly even together with another one are removed. The last entry represents no move.
         may = np.flatnonzero(costlier + min(costlier.min(), 0.0) <= max(slack, 0.0))
         turns = np.vstack(
             [(moved_curvatures[:, None] * (by_curvature[targets] - by_curvature[origins]))[may], 0 * off]
@@ -188,7 +188,8 @@ def quantise_cones(
     sizes = [size for size in lattice.best.sizes if size <= max_count]
     if not sizes:
         raise CurvatureError(
-            f"{max_count} cones cannot carry the total curvature in multiples of {lattice.quanta.quantum / np.pi:.4g} pi: "
+            f"{max_count} cones cannot absorb the total curvature in multiples of "
+            f"{lattice.quanta.quantum / np.pi:.4g} pi: "
             f"{min(lattice.best.sizes, default=lattice.fewest)} or more are needed"
         )
     first = next(

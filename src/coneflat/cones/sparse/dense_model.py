@@ -79,7 +79,7 @@ class BestSets(Generic[SetT]):
         return is_better
 
     def fewest(self, goal: float, max_size: float = math.inf) -> SetT:
-        """Return the smallest set of at most `most` cones with E^2 <= goal; if there is none, that of smallest E^2."""
+        """Return the smallest set of at most `max_size` cones with E^2 <= goal; if there is none, that of smallest E^2."""
         small_enough = [cones for cones in self if len(cones) <= max_size]
         good = [cones for cones in small_enough if cones.energy <= goal]
         return min(good, key=len) if good else min(small_enough, key=lambda cones: (cones.energy, len(cones)))
@@ -176,7 +176,7 @@ class DenseModel:
         """Return (s,) the change of E^2 by the best replacement of each member, and (s,) this replacement.
 
         Removing a member is a rank-one change of the inverse, so scoring all candidates for all members costs little
-        more than scoring the candidates once. Members at a bound and required members are left out: their change is
+        more than scoring the candidates once. Members at a bound and required members are not replaced: their change is
         infinite and their replacement -1.
         """
         change, which = np.full(len(members), np.inf), np.full(len(members), -1)
@@ -233,11 +233,11 @@ class DenseModel:
         if not is_open.any():
             return None
         missing = self.limits.total - self.lower[members].sum()
-        if missing < 0:  # too few to carry the total: prefer candidates that can carry the rest
+        if missing < 0:  # too few to absorb the total: prefer candidates that can absorb the remainder
             for bound in (missing, 0.0):
-                can_carry = is_open & (self.lower <= bound) & (self.lower < 0)
-                if can_carry.any():
-                    is_open = can_carry
+                can_absorb = is_open & (self.lower <= bound) & (self.lower < 0)
+                if can_absorb.any():
+                    is_open = can_absorb
                     break
         candidates = np.flatnonzero(is_open)
         return np.append(members, candidates[argmin_tied(self.additions(members)[candidates])])
@@ -292,7 +292,7 @@ class DenseModel:
             members = self.grown(self.best[size].members if size in self.best else improved.members)
 
     def descend(self, min_size: int, max_size: int) -> None:
-        """Remove cones one at a time, from the best set of `most` cones to one of `least`."""
+        """Remove cones one at a time, from the best set of `max_size` cones to one of `min_size`."""
         for size in range(max_size, max(min_size, len(self.fixed)), -1):
             shrunk = self.shrunk(self.best[size].members) if size in self.best else None
             if shrunk is not None:

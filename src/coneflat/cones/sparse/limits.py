@@ -67,7 +67,7 @@ class Limits:
             kind = "positive" if total < 0 else "negative"
             raise CurvatureError(
                 f"a surface of Euler characteristic {euler_characteristic:g} has a total curvature of "
-                f"{2 * euler_characteristic:g} pi, which cones of {kind} curvature alone cannot carry"
+                f"{2 * euler_characteristic:g} pi, which cones of {kind} curvature alone cannot absorb"
             )
         return cls(lower, upper, total)
 
@@ -78,7 +78,7 @@ class Limits:
 
     @property
     def fewest(self) -> int:
-        """The smallest number of cones that can carry the total curvature."""
+        """The smallest number of cones that can absorb the total curvature."""
         if not self.has_sum or abs(self.total) < TIE_TOLERANCE:
             return 0
         bound = self.upper if self.total > 0 else self.lower
@@ -98,7 +98,7 @@ class Limits:
         return f"{self.lower / math.pi:.4g} pi to {self.upper / math.pi:.4g} pi"
 
     def check_available(self, usable: BoolArray, required: IntArray) -> None:
-        """Raise CurvatureError if cones at the usable (n,) and the required vertices cannot carry the curvature."""
+        """Raise CurvatureError if cones at the usable (n,) and the required vertices cannot absorb the curvature."""
         if self.fewest > MAX_SEARCHED + len(required):
             raise CurvatureError(
                 f"a total curvature of {self.total / np.pi:.4g} pi needs {self.fewest:,} cones or more within these "
@@ -113,7 +113,7 @@ class Limits:
             )
 
     def check_count(self, count: int, required: int) -> None:
-        """Raise an error if `count` cones, of which `required` are given, cannot carry the curvature."""
+        """Raise an error if `count` cones, of which `required` are given, cannot absorb the curvature."""
         if isinstance(count, bool) or count != int(count) or count < 0:
             raise OptionError(f"the number of cones must be an integer and not negative, got {count!r}")
         if count < required:
@@ -122,6 +122,6 @@ class Limits:
             bound = self.upper if self.total > 0 else self.lower
             share = f" of at most {abs(bound) / np.pi:.4g} pi each" if np.isfinite(bound) else ""
             raise CurvatureError(
-                f"{plural(count, 'cone')}{share} cannot carry this surface's total curvature of "
+                f"{plural(count, 'cone')}{share} cannot absorb this surface's total curvature of "
                 f"{self.total / np.pi:.4g} pi: {self.fewest} or more are needed"
             )

@@ -46,7 +46,7 @@ class SparseCones:
 
     Attributes:
         solution: the cones.
-        distortion: E of the linear model, the area-weighted standard deviation of its log scale.
+        distortion: E of the linear model, the area-weighted standard deviation of its log conformal factor.
     """
 
     solution: ConeSolution
@@ -56,8 +56,8 @@ class SparseCones:
 class ConeSearch:
     """A search for cones on a connected mesh; the Laplacian is factorized once for any number of queries.
 
-    It is made by `from_mesh`. The distortion E is the area-weighted standard deviation of the linear log scale. A
-    boundary has phi = 0 and absorbs the remaining curvature.
+    It is made by `from_mesh`. The distortion E is the area-weighted standard deviation of the linear log conformal
+    factor. A boundary has phi = 0 and absorbs the remaining curvature.
 
         search = ConeSearch.from_mesh(mesh)
         search.fewest(0.2).solution.cones
@@ -144,7 +144,7 @@ class ConeSearch:
         """Restrict the search to the usable vertices (n,); if they are the same as before, sets found stay known.
 
         Raises:
-            CurvatureError: cones at these vertices cannot carry the curvature.
+            CurvatureError: cones at these vertices cannot absorb the curvature.
         """
         required, operator = self._required, self.operator
         if np.array_equal(usable, self._usable):
@@ -152,7 +152,7 @@ class ConeSearch:
         self.limits.check_available(usable, operator.vertices[required])
         is_usable = usable[operator.vertices]
         is_usable[required] = False
-        # On the coarse model, a neighbourhood is represented by a vertex that can hold a wide cone.
+        # On the coarse model, a neighbourhood is represented by a vertex that can have a wide cone angle.
         excess = np.maximum(-self._lower, 0.0)
         fitness = 0.5 + 0.5 * excess / excess.max() if 0 < excess.max(initial=0.0) < math.inf else 1.0
         self.places = np.concatenate([required, candidates(self._coarse_model, is_usable * fitness)])
@@ -177,15 +177,15 @@ class ConeSearch:
         return largest if self.limits.largest is None else min(largest, self.limits.largest)
 
     def fewest(self, distortion: float = DISTORTION, max_count: int | None = None) -> SparseCones:
-        """Return the fewest cones found with E <= distortion; if more than `most` are needed, the best `most` cones.
+        """Return the fewest cones found with E <= distortion; if more than `max_count` are needed, the best `max_count` cones.
 
         Args:
             distortion: the allowed E, positive.
             max_count: largest number of cones; None for no limit.
 
         Raises:
-            OptionError: `distortion` or `most` is not valid.
-            CurvatureError: `most` cones cannot carry the curvature.
+            OptionError: `distortion` or `max_count` is not valid.
+            CurvatureError: `max_count` cones cannot absorb the curvature.
         """
         if not 0 < distortion < math.inf:
             raise OptionError(f"the distortion allowed must be a positive number, got {distortion:g}")
@@ -196,7 +196,7 @@ class ConeSearch:
         count = self._find_sufficient(self._search_coarse(goal, max_count), goal, max_count)
         while count > max(self.limits.fewest, len(self._required)) and self._refine(count - 1) <= goal:
             count -= 1
-        # If it is not reached, few cones that are nearly as good as more.
+        # If it is not reached: the fewest cones that are nearly as good as the best set.
         smallest_energy = self.exact.best.fewest(goal, max_count).energy
         return self._cones(
             self.exact.best.fewest(
@@ -212,7 +212,7 @@ class ConeSearch:
 
         Raises:
             OptionError: `count` is not valid.
-            CurvatureError: `count` cones cannot carry the curvature.
+            CurvatureError: `count` cones cannot absorb the curvature.
         """
         self.limits.check_count(count, len(self._required))
         count = min(count, self.most_cones)
@@ -225,7 +225,7 @@ class ConeSearch:
         return self._cones(self.exact.best.fewest(-1.0, count))
 
     def curve(self, max_count: int) -> list[SparseCones]:
-        """Return the best cones found for each number up to `most`, if their E is below that of fewer cones.
+        """Return the best cones found for each number up to `max_count`, if their E is below that of fewer cones.
 
         Args:
             max_count: largest number of cones.
@@ -251,7 +251,7 @@ class ConeSearch:
         return len(self.coarse.best.fewest(goal, max_count))
 
     def _find_sufficient(self, count: int, goal: float, max_count: int) -> int:
-        """Return how many cones reach E^2 <= goal on the mesh, or gain as much as more; `count` are tried first."""
+        """Return how many cones reach E^2 <= goal on the mesh, or stall; the search starts with `count`."""
         exact, best = self.exact, self.exact.best
         self._refine(count)
         while best.fewest(goal, max_count).energy > goal:
@@ -264,14 +264,14 @@ class ConeSearch:
         return len(best.fewest(goal, max_count))
 
     def _climb(self, bound: float, max_count: int, count: int) -> None:
-        """Find sets of at most `most` cones on the coarse model; raise CurvatureError if none has at most `count`."""
+        """Find sets of at most `max_count` cones on the coarse model; raise CurvatureError if none has at most `count`."""
         best = self.coarse.best
         known_sizes = [size for size in best.sizes if size <= max_count]
         if all(best.energy(size) > bound for size in known_sizes):
             self.coarse.climb(bound, max_count, max(known_sizes, default=None))
         if min(self.coarse.best.sizes, default=count + 1) > count:
             raise CurvatureError(
-                f"no set of {count} cones was found that carries a total curvature of "
+                f"no set of {count} cones was found that absorbs a total curvature of "
                 f"{self.limits.total / np.pi:.4g} pi within their bounds: allow more cones or other angles, or choose "
                 "the greedy search (--cones greedy), which has no bounds"
             )
@@ -300,7 +300,7 @@ class ConeSearch:
         return exact.best.energy(count)
 
     def _cones(self, best: ConeSet) -> SparseCones:
-        """Return the cones of a set on the mesh; cones of zero curvature are left out unless they are required."""
+        """Return the cones of a set on the mesh; cones of zero curvature are removed unless they are required."""
         unknowns, required = self.exact.unknowns, len(self._required)
         members = best.members[self.exact.in_order(best.members)]
         curvatures = self.exact.fit(members).curvatures
@@ -308,7 +308,7 @@ class ConeSearch:
         is_kept[:required] = True
         kept_curvatures = curvatures[is_kept]
         if self.limits.has_sum and len(kept_curvatures):
-            # Correct the sum for rounding and for the cones left out: a metric must have exactly this sum.
+            # Correct the sum for rounding and for the removed cones: a metric must have exactly this sum.
             kept_curvatures += (self.limits.total - kept_curvatures.sum()) / len(kept_curvatures)
         return SparseCones(
             self.solution_of(unknowns[members[is_kept]], kept_curvatures), math.sqrt(best.energy)
@@ -326,7 +326,7 @@ def required_vertices(required: Iterable[int], is_boundary: BoolArray) -> IntArr
     if len(bad):
         raise OptionError(f"required cones are not vertices of the mesh: {list_some(bad)}")
     if len(np.unique(cones)) < len(cones):
-        raise OptionError("a required cone is given twice")
+        raise OptionError("a required cone is repeated")
     if is_boundary[cones].any():
         raise OptionError(f"required cones lie on the boundary: {list_some(cones[is_boundary[cones]])}")
     return cones
