@@ -27,7 +27,7 @@ def require_memory(needed: float, purpose: str) -> None:
     """Raise TooLargeError if a number of bytes does not fit into the free memory; not for less than a gigabyte.
 
     Raises:
-        TooLargeError: the message has both sizes after `what`, such as "a grid needs".
+        TooLargeError: the message has both sizes after `purpose`, such as "a grid needs".
     """
     if needed > CHECKED_BYTES and needed > (free := free_memory()):
         raise TooLargeError(f"{purpose} about {_size(needed)} of memory, but {_size(free)} are free")

@@ -265,7 +265,7 @@ def sum_angles(
 
 @compiled
 def find_suspects(twin: IntArray, cots: FloatArray, suspects: IntArray) -> int:
-    """Write to `found` one half-edge of each edge that may not be Delaunay; return their number.
+    """Write to `suspects` one half-edge of each edge that may not be Delaunay; return their number.
 
     Its cotangents have a negative sum, or it belongs to a triangle that breaks the triangle inequality.
     """

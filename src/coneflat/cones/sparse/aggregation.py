@@ -79,7 +79,7 @@ def _indicators(labels: IntArray, number: int) -> csr_matrix:
 def _smoothed_aggregates(
     level: csr_matrix, order: IntArray, size: float, max_count: int | None, min_coupling: float
 ) -> csr_matrix:
-    """Return basis functions of about `size` vertices each, and about `most` functions if that is possible.
+    """Return basis functions of about `size` vertices each, and about `max_count` functions if that is possible.
 
     Couplings below the fraction `min_coupling` do not join vertices.
     """

@@ -79,7 +79,7 @@ class BestSets(Generic[SetT]):
         return is_better
 
     def fewest(self, goal: float, max_size: float = math.inf) -> SetT:
-        """Return the smallest set of at most `max_size` cones with E^2 <= goal; if there is none, that of smallest E^2."""
+        """Return the smallest set with E^2 <= goal, or that of smallest E^2, of at most `max_size` cones."""
         small_enough = [cones for cones in self if len(cones) <= max_size]
         good = [cones for cones in small_enough if cones.energy <= goal]
         return min(good, key=len) if good else min(small_enough, key=lambda cones: (cones.energy, len(cones)))
@@ -277,7 +277,7 @@ class DenseModel:
         return ConeSet(fitted.energy, members)
 
     def climb(self, bound: float, max_size: int, start: int | None = None) -> None:
-        """Add cones one at a time until E^2 <= bound or there are `most`.
+        """Add cones one at a time until E^2 <= bound or there are `max_size`.
 
         It starts from the required cones, or from the best set of the size `start`.
         """

@@ -177,7 +177,7 @@ class ConeSearch:
         return largest if self.limits.largest is None else min(largest, self.limits.largest)
 
     def fewest(self, distortion: float = DISTORTION, max_count: int | None = None) -> SparseCones:
-        """Return the fewest cones found with E <= distortion; if more than `max_count` are needed, the best `max_count` cones.
+        """Return the fewest cones found with E <= distortion, or the best `max_count` cones if more are needed.
 
         Args:
             distortion: the allowed E, positive.
@@ -264,7 +264,7 @@ class ConeSearch:
         return len(best.fewest(goal, max_count))
 
     def _climb(self, bound: float, max_count: int, count: int) -> None:
-        """Find sets of at most `max_count` cones on the coarse model; raise CurvatureError if none has at most `count`."""
+        """Find sets of up to `max_count` cones on the coarse model; raise CurvatureError if all exceed `count`."""
         best = self.coarse.best
         known_sizes = [size for size in best.sizes if size <= max_count]
         if all(best.energy(size) > bound for size in known_sizes):
