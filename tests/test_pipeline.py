@@ -130,7 +130,7 @@ def test_cones_of_the_users_own():
         ({"max_cones": -1}, errors.OptionError, "max_cones"),
         ({"max_cones": 2.5}, errors.OptionError, "max_cones must be an integer"),
         ({"cones": "greedy", "max_cones": 0}, errors.CurvatureError, "allow some"),
-        ({"cones": "greedy", "max_cones": 2}, errors.CurvatureError, "2 cones cannot carry"),
+        ({"cones": "greedy", "max_cones": 2}, errors.CurvatureError, "2 cones cannot absorb"),
         ({"cones": "greedy", "max_cones": 2, "method": "linear"}, errors.CurvatureError, "2 pi or more"),
         ({"cones": "none"}, errors.CurvatureError, "has none"),
         ({"cones": [1, 2, 3, 3]}, errors.OptionError, "vertex 3 is given as a cone twice"),

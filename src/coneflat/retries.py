@@ -259,8 +259,8 @@ def cut_along_sharp_edges(
         cut = [next(layouts_of_pieces) for _ in pieces]
         if is_worth_its_seams(pieces, cut, component, layouts[i]):
             note = (
-                f"Edges above {np.degrees(SHARP_ANGLE):g} degrees are seams {component.location}: without them its mean "
-                f"QC distortion is {mean_qc(layouts[i]):.3g}."
+                f"Edges above {np.degrees(SHARP_ANGLE):g} degrees are seams {component.location}: without them its "
+                f"mean QC distortion is {mean_qc(layouts[i]):.3g}."
             )
             replaced[i] = [cut[0].with_notes(note), *cut[1:]]
     if not replaced:

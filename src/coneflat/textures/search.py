@@ -260,7 +260,7 @@ class CutSearch:
         bound = self.max_energy + COARSE_EXCESS * allowed
         best = CutSearch(coarse, bound, self._steps, True, self._by_area).best()
         given = VertexCurvatures(kept[best.layout.cones], np.full(len(best.layout.cones), np.nan))
-        spec = replace(self.component.cones, strategy="given", given=given)
+        spec = replace(self.component.cones, strategy="prescribed", prescribed=given)
         layout = lay_out_component(self._surface, replace(self.component, cones=spec), self._steps)
         one = self._candidate(layout, layout.statistics.area_distortion_linear)
         if 0 < one.energy - self.max_energy <= MAX_EXCESS * allowed:
