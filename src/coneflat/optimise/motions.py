@@ -206,8 +206,8 @@ class _Builder:
         if not len(points):
             return
         rows = self._basis[variables]
-        found = (rows + 1j * self._basis[variables + 1] if is_complex else rows).tocoo()
-        row, column, coefficient = found.row, found.col, found.data * factors[found.row]
+        entries = (rows + 1j * self._basis[variables + 1] if is_complex else rows).tocoo()
+        row, column, coefficient = entries.row, entries.col, entries.data * factors[entries.row]
         self.entries.append(
             (points[row], np.where(column == self._basis.shape[1] - 1, -1, column), coefficient)
         )
@@ -230,12 +230,14 @@ class _Builder:
         self._add_offset(right, self._gaps(left, right, chain))
         on_line = np.isin(left, self.constraints.on_line)
         self._add_on_lines(left[on_line], right[on_line], turn[on_line])
-        one, two, turning = left[~on_line], right[~on_line], turn[~on_line]
-        unknown = self.count + 2 * np.arange(len(one))
-        self.count += 2 * len(one)
+        left_free, right_free, turning = left[~on_line], right[~on_line], turn[~on_line]
+        unknown = self.count + 2 * np.arange(len(left_free))
+        self.count += 2 * len(left_free)
         for axis, direction in enumerate((1.0, 1j)):
-            self.entries.append((one, unknown + axis, np.full(len(one), direction, dtype=np.complex128)))
-            self.entries.append((two, unknown + axis, direction * turning))
+            self.entries.append(
+                (left_free, unknown + axis, np.full(len(left_free), direction, dtype=np.complex128))
+            )
+            self.entries.append((right_free, unknown + axis, direction * turning))
         moves = self.of_chain[chain] >= 0
         ones = np.ones(int(moves.sum()), dtype=np.complex128)
         self._add(right[moves], self.of_chain[chain[moves]], ones, is_complex=True)
@@ -254,8 +256,8 @@ class _Builder:
         shifts = self.of_line[line] >= 0
         unknown = self.count + np.arange(len(left))
         self.count += len(left)
-        same: ComplexArray = np.ones_like(turn)
-        for points, factor in ((left, same), (right, turn)):
+        unturned: ComplexArray = np.ones_like(turn)
+        for points, factor in ((left, unturned), (right, turn)):
             self.entries.append((points, unknown, factor * direction))
             self._add_offset(points, factor * off)
             self._add(points[shifts], self.of_line[line[shifts]], (factor * normal)[shifts], is_complex=False)
@@ -263,22 +265,22 @@ class _Builder:
     def _add_ordinary(self) -> None:
         """Add the motions of all other points: free, along a line, or to their prescribed positions."""
         c = self.constraints
-        rest = self.is_free & ~self.is_special
+        is_ordinary = self.is_free & ~self.is_special
         if len(c.pinned) or len(c.on_line):
-            self._add_constrained(rest)
-        free = np.flatnonzero(rest)
+            self._add_constrained(is_ordinary)
+        free = np.flatnonzero(is_ordinary)
         for axis, step in enumerate((1.0, 1j)):
             directions = np.full(len(free), step, dtype=np.complex128)
             self.entries.append((free, self.count + 2 * np.arange(len(free)) + axis, directions))
         self.count += 2 * len(free)
 
-    def _add_constrained(self, rest: BoolArray) -> None:
+    def _add_constrained(self, is_ordinary: BoolArray) -> None:
         """Add the motions of pinned points and points on lines that are in `rest` (u,), and remove them from it."""
         c = self.constraints
-        pins = np.flatnonzero(rest[c.pinned])
+        pins = np.flatnonzero(is_ordinary[c.pinned])
         self._add_offset(c.pinned[pins], as_complex(c.places[pins]) - self.points[c.pinned[pins]])
-        rest[c.pinned] = False
-        on = np.flatnonzero(rest[c.on_line])
+        is_ordinary[c.pinned] = False
+        on = np.flatnonzero(is_ordinary[c.on_line])
         points, line = c.on_line[on], c.line[on]
         direction = as_complex(c.directions)[line]
         self.entries.append((points, self.count + np.arange(len(points)), direction))
@@ -287,7 +289,7 @@ class _Builder:
         self._add_offset(points, normal * self._off_line(points, line))
         shifts = self.of_line[line] >= 0
         self._add(points[shifts], self.of_line[line[shifts]], normal[shifts], is_complex=False)
-        rest[c.on_line] = False
+        is_ordinary[c.on_line] = False
 
     def _off_line(self, points: IntArray, line: IntArray) -> FloatArray:
         """Return (q,) the signed distance of each point to its line, positive to the left of its direction.
@@ -321,13 +323,13 @@ class _Builder:
 
         def add(terms: list[tuple[int, complex]], value: complex) -> None:
             """Add the equation "sum of factors times complex variables = value" as two real equations."""
-            both = np.zeros((2, self.size))
+            equations = np.zeros((2, self.size))
             for variable, factor in terms:
-                both[0, variable] += factor.real
-                both[0, variable + 1] -= factor.imag
-                both[1, variable] += factor.imag
-                both[1, variable + 1] += factor.real
-            rows.extend(both)
+                equations[0, variable] += factor.real
+                equations[0, variable + 1] -= factor.imag
+                equations[1, variable] += factor.imag
+                equations[1, variable + 1] += factor.real
+            rows.extend(equations)
             right.extend([value.real, value.imag])
 
         for point, place in zip(c.pinned.tolist(), as_complex(c.places).tolist(), strict=True):
@@ -355,8 +357,13 @@ class _Builder:
         edge, end = np.nonzero(chains.is_node[chains.vertices])
         chain, left, right = chains.chain[edge], chains.left[edge, end], chains.right[edge, end]
         variables = np.stack([self.of_point[right], self.of_point[left], self.of_chain[chain]], axis=1)
-        some = (variables >= 0).any(axis=1)
-        variables, chain, left, right = variables[some], chain[some], left[some], right[some]
+        is_relevant = (variables >= 0).any(axis=1)
+        variables, chain, left, right = (
+            variables[is_relevant],
+            chain[is_relevant],
+            left[is_relevant],
+            right[is_relevant],
+        )
         factors = np.full(variables.shape, 1.0 + 0.0j)
         factors[:, 1], factors[:, 2] = -chains.rotation[chain], -1.0
         equation, which = np.nonzero(variables >= 0)
@@ -364,8 +371,10 @@ class _Builder:
         entries = np.concatenate([factor.real, -factor.imag, factor.imag, factor.real])
         row = np.concatenate([2 * equation, 2 * equation, 2 * equation + 1, 2 * equation + 1])
         column = np.concatenate([variable, variable + 1, variable, variable + 1])
-        some = entries != 0
-        rows = csr_matrix((entries[some], (row[some], column[some])), shape=(2 * len(chain), self.size))
+        is_relevant = entries != 0
+        rows = csr_matrix(
+            (entries[is_relevant], (row[is_relevant], column[is_relevant])), shape=(2 * len(chain), self.size)
+        )
         gaps = self._gaps(left, right, chain)
         return rows, np.stack([gaps.real, gaps.imag], axis=1).ravel()
 
@@ -380,5 +389,5 @@ class _Builder:
         if self.of_chain[chain] < 0:
             raise OptionError(f"tied half-edge {side} is on a seam with a fixed translation")
         turn = complex(chains.rotation[chain])
-        wanted = shift if is_right else -turn * shift
-        return chain, wanted - complex(self.translation[chain])
+        translation = shift if is_right else -turn * shift
+        return chain, translation - complex(self.translation[chain])
