@@ -14,7 +14,7 @@ from coneflat.optimise import Lines, PointConstraints, StretchEnergy, relax
 from coneflat.optimise.constraints import check_constraints
 from coneflat.optimise.elements import Elements
 from coneflat.optimise.energies import UntanglingEnergy
-from coneflat.optimise.motions import find_motions
+from coneflat.optimise.motions import find_motions, find_restrictions
 from coneflat.optimise.relaxing import rest_sides
 from coneflat.optimise.seam_chains import find_chains
 
@@ -85,9 +85,9 @@ def test_the_minimum_of_the_energy_is_one_at_isometries():
 def test_the_gradient_of_a_cut_surface_is_that_of_its_energy(energy):
     mesh, uv, corners, _ = laid_out(shapes.sphere(2), cones="greedy", max_cones=5)
     z = uv[:, 0] + 1j * uv[:, 1]
-    motions = find_motions(
-        mesh, corners, z, np.ones(len(mesh.vertices), dtype=bool), check_constraints(PointConstraints(), uv)
-    )
+    is_free = np.ones(len(mesh.vertices), dtype=bool)
+    restrictions = find_restrictions(mesh, corners, z, is_free, check_constraints(PointConstraints(), uv))
+    motions = find_motions(z, restrictions)
     target_shapes = rest_sides(edge_lengths(mesh.vertices, mesh.faces))
     elements = Elements(motions, corners, target_shapes, 1.0, np.ones(len(corners)))
 

@@ -81,25 +81,26 @@ class Elements:
             unit: factor of these sides.
             weight: (m,) weights of the triangles.
         """
-        moves = np.diff(motions.start) > 0
+        matrix = motions.matrix
+        moves = np.diff(matrix.indptr) > 0
         self.faces = np.flatnonzero(has_any(moves, corners))
         self.count, self.weight = motions.count, weight[self.faces]
         corners = corners[self.faces]
         self._corners = corners
         self._a_of, self._b_of = map_factors(unit * rest_sides[self.faces])
         # The unknowns of an element are those of its corners in order; an unknown may occur twice.
-        sizes = np.diff(motions.start)[corners.ravel()]
+        sizes = np.diff(matrix.indptr)[corners.ravel()]
         ends = np.cumsum(sizes)
         self._start = np.concatenate([[0], ends[2::3]])
         entry = np.arange(len(sizes)).repeat(sizes)
         at = (
-            motions.start[corners.ravel()].repeat(sizes)
+            matrix.indptr[corners.ravel()].repeat(sizes)
             + np.arange(int(sizes.sum()))
             - (ends - sizes).repeat(sizes)
         )
-        self._unknown = motions.unknown[at]
-        self._alpha = self._a_of.ravel()[entry] * motions.coefficient[at]
-        self._beta = self._b_of.ravel()[entry] * motions.coefficient[at]
+        self._unknown = matrix.indices[at].astype(np.int64)
+        self._alpha = self._a_of.ravel()[entry] * matrix.data[at]
+        self._beta = self._b_of.ravel()[entry] * matrix.data[at]
         self._find_pattern()
 
     def of_parts(self, chosen: BoolArray) -> tuple[Elements, IntArray]:

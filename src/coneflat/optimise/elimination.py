@@ -31,6 +31,8 @@ def solutions_of(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, Float
         column; and (d,) the remaining transformed right-hand sides, rounding errors if the equations are consistent,
         else about as large as their contradictions.
     """
+    if not len(right):
+        return eye(rows.shape[1], rows.shape[1] + 1, format="csr"), right
     # Up to a hundred equations are solved faster as a dense system, and so are those that connect most variables, of
     # which few can be eliminated at once.
     equations, variables = _independent_pivots(rows) if len(right) > 100 else (np.empty(0, np.int64),) * 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
 from ..errors import MetricError
@@ -71,7 +72,8 @@ class Patches:
         start = np.concatenate([[0], np.cumsum(2 * is_loose.ravel())])
         unknown = 2 * self.corners[is_loose].repeat(2) + np.tile([0, 1], int(is_loose.sum()))
         coefficient = np.stack([self.shift[is_loose], 1j * self.shift[is_loose]], axis=1).ravel()
-        motions = Motions(2 * len(self.vertices), start, unknown, coefficient)
+        shape = self.corners.size, 2 * len(self.vertices) + 1
+        motions = Motions(csr_matrix((coefficient, unknown, start), shape=shape))
         corners = np.arange(self.corners.size).reshape(-1, 3)
         self.elements = Elements(motions, corners, target_shapes, 1.0, np.ones(len(target_shapes)))
         self.count, self.patch = self.elements.parts, self.elements.unknown_part[::2]

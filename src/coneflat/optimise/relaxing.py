@@ -29,7 +29,7 @@ from .constraints import PointConstraints, check_constraints
 from .descent import RELATIVE_ROUNDING, descend
 from .elements import Elements
 from .energies import Energy, StretchEnergy
-from .motions import find_motions
+from .motions import close_seams, find_motions, find_restrictions
 
 # The last step is the first one whose predicted decrease is at most this fraction of the energy minus its lower bound;
 # and the maximum number of steps.
@@ -142,7 +142,8 @@ def relax(
         return Relaxed(places, 0.0, 0.0, 0, is_free)
     unit = 1.0 if to_scale else float(np.sqrt(np.abs(doubled).sum() / (2 * areas.sum())))
     z = as_complex(places)
-    motions = find_motions(mesh, corner, z, is_free, checked)
+    restrictions = find_restrictions(mesh, corner, z, is_free, checked)
+    motions = find_motions(z, restrictions)
     elements = Elements(motions, corner, target_shapes, unit, share)
     if not elements.count and not motions.has_offset:
         return Relaxed(places, 0.0, 0.0, 0, is_free)
@@ -154,7 +155,7 @@ def relax(
             f"is left after {plural(descent.steps, 'step')}"
         )
     total = float(elements.weight.sum())
-    moved = as_pairs(motions.closed(descent.points))
+    moved = as_pairs(close_seams(descent.points, restrictions))
     return Relaxed(moved, descent.before / total, descent.after / total, descent.steps, is_free)
 
 
