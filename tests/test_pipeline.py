@@ -255,8 +255,8 @@ def test_notes_name_every_cone_and_vertex_where_triangles_fail():
     notes = flatten(vertices, faces, cones=cones).notes
     cannot = next(note for note in notes if "surrounding triangles cannot form" in note)
     assert f"form: vertex {wide[0]} (5.1 pi), vertex {wide[1]} (5.1 pi), vertex" in cannot
-    no_room = next(note for note in notes if "had no room" in note)
-    assert re.search(r"next to vertex \d+, vertex \d+.*: they are positively oriented", no_room)
+    unmatched = next(note for note in notes if "could not be untangled" in note)
+    assert re.search(r"next to vertex \d+, vertex \d+.*: they are positively oriented", unmatched)
 
 
 def test_bounds_of_angles_count_for_the_sparse_search():
