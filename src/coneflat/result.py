@@ -217,9 +217,10 @@ class Flattening:
 
         if path is not None:
             check_page(path)
-        most = MAX_SHOWN_TRIANGLES if most_triangles is None else most_triangles
+        max_triangles = MAX_SHOWN_TRIANGLES if most_triangles is None else most_triangles
         page = write_page(
-            page_html(self, texture=texture, up=up, show=show, most_triangles=most, color=color), path
+            page_html(self, texture=texture, up=up, show=show, most_triangles=max_triangles, color=color),
+            path,
         )
         if path is None:
             open_page(page)

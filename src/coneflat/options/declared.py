@@ -100,27 +100,33 @@ class Declaration:
     doc: str = ""
 
 
-def option(default: Any, kind: Kind, **more: Any) -> Any:
+def option(default: Any, kind: Kind, **properties: Any) -> Any:
     """Return a dataclass field with the declaration of an option."""
-    return field(default=default, metadata={"declared": Declaration(kind, **more)})
+    return field(default=default, metadata={"declared": Declaration(kind, **properties)})
 
 
 @cache
 def declarations(group: Any) -> dict[str, Declaration]:
     """Return the options of a group by name: its own fields, then those of its base classes, in their order."""
-    known = {each.name: each for each in fields(group)}
-    found: dict[str, Declaration] = {}
+    fields_by_name = {option_field.name: option_field for option_field in fields(group)}
+    declared: dict[str, Declaration] = {}
     for base in group.__mro__:
         text = inspect.cleandoc(base.__doc__ or "")
         title = re.split(r"\W", text)[0]
         docs = dict(re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", text, re.MULTILINE))
         for name in inspect.get_annotations(base):
-            if name in known and name not in found:
-                of = known[name]
+            if name in fields_by_name and name not in declared:
+                declared_field = fields_by_name[name]
                 doc = " ".join(docs.get(name, "").split())
-                data = {"name": name, "group": title, "doc": doc, "type": of.type, "default": of.default}
-                found[name] = replace(of.metadata["declared"], **data)
-    return found
+                data = {
+                    "name": name,
+                    "group": title,
+                    "doc": doc,
+                    "type": declared_field.type,
+                    "default": declared_field.default,
+                }
+                declared[name] = replace(declared_field.metadata["declared"], **data)
+    return declared
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -113,7 +113,7 @@ class TestJoining:
         monkeypatch.chdir(tmp_path)
         vertices, faces = soup(*shapes.sphere(1))
         path = shapes.write_obj(tmp_path / "soup.obj", vertices, faces)
-        used = read_joined(path).used
+        used = read_joined(path).representative
         merged = np.flatnonzero(used != np.arange(len(used)))
         words = [word for v in merged[[5, 40, 80]] for word in ("--required-cones", v)]
         done = run("flatten", path, "-q", "-o", "a.obj", "--report", "a.json", *words)

@@ -78,7 +78,7 @@ def figure(
     repair: bool,
     weld: bool | None,
     verbosity: str | None,
-    **given: Any,
+    **params: Any,
 ) -> None:
     """Draw a figure of MESH and its UVs for print.
 
@@ -95,7 +95,7 @@ def figure(
     from ..view import Look, check_figure, make_figure, new_figure, own_quantity, save_figure
     from .run import Console, archive_path, open_result
 
-    flags = pop_flags(given, FigureFlags)
+    flags = pop_flags(params, FigureFlags)
     kind = "color" if color is not None and not is_given(context, "kind") else flags.kind
     if color is None and kind == "color":
         raise click.UsageError("--kind color needs --color", context)

@@ -142,9 +142,9 @@ def _open_streams() -> list[IO[Any]]:
             setattr(sys, name, opened[-1])
     is_replaced = sys.stdout is not sys.__stdout__  # By a test.
     if not is_replaced and not (os.name == "nt" and sys.stdout.isatty()):
-        own = os.dup(1)
+        stdout = os.dup(1)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        sys.stdout = open(own, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)  # noqa: SIM115
+        sys.stdout = open(stdout, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)  # noqa: SIM115
         opened.append(sys.stdout)
     return opened
 

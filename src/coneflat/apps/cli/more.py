@@ -58,7 +58,7 @@ class BrainFlags:
 @option_flags(BrainOptions)
 @verbosity_options
 @click.pass_context
-def brain(context: click.Context, /, surface: Path, verbosity: str | None, **given: Any) -> None:
+def brain(context: click.Context, /, surface: Path, verbosity: str | None, **params: Any) -> None:
     """Make a flat map of SURFACE, the cortex of one hemisphere (.gii, or FreeSurfer's lh.pial).
 
     \b
@@ -72,7 +72,7 @@ def brain(context: click.Context, /, surface: Path, verbosity: str | None, **giv
     from ..brains import FLAT_FORMATS, flatten_cortex, kept_in_flat, measure_flat
     from .run import Console, require_distinct, write_report
 
-    flags, options = pop_flags(given, BrainFlags), keywords({**given, "repair": True}, BrainOptions)
+    flags, options = pop_flags(params, BrainFlags), keywords({**params, "repair": True}, BrainOptions)
     outputs = flags.output or (Path(f"{surface.name}.flat.gii"),)
     formats = (*FLAT_FORMATS, *(f".{name}" for name in FORMATS))
     for path in outputs:
@@ -81,35 +81,35 @@ def brain(context: click.Context, /, surface: Path, verbosity: str | None, **giv
         check_target(flags.report)
     require_distinct({"surface": surface, "report": flags.report, **{str(path): path for path in outputs}})
     with Console(verbosity) as console:
-        found = flatten_cortex(
+        cortex = flatten_cortex(
             surface, remove=flags.remove_label, keep=flags.keep_label, progress=console.part(), **options
         )
-        console.seconds.update(found.result.seconds)
+        console.seconds.update(cortex.result.seconds)
         with console.stage("write"):
             for path in outputs:
-                (found if path.suffix.lower() in FLAT_FORMATS else found.result).save(path)
+                (cortex if path.suffix.lower() in FLAT_FORMATS else cortex.result).save(path)
         # The file for FreeSurfer leaves out the most triangles.
         smallest = next((path for path in outputs if path.suffix.lower() == ".3d"), Path(".gii"))
         with console.stage("measure"):
-            measured = measure_flat(found.uv_mesh(smallest))
+            measured = measure_flat(cortex.uv_mesh(smallest))
         if flags.report is not None:
             write_report(flags.report, {**measured.report(), "seconds": dict(console.seconds)})
-        left_out = len(found.result.faces) - int(measured.uv.counts["triangles"])
+        left_out = len(cortex.result.faces) - int(measured.uv.counts["triangles"])
         along = [f"{plural(left_out, 'triangle')} along cuts left out of the flat map."] if left_out else []
-        notes = [*found.result.notes, *measured.uv.notes, *along]
+        notes = [*cortex.result.notes, *measured.uv.notes, *along]
         for ending in dict.fromkeys(path.suffix.lower() for path in outputs):
             if ending in FLAT_FORMATS:
-                notes += losses(found.surface, ending, kept_in_flat(found.surface, ending))
+                notes += losses(cortex.surface, ending, kept_in_flat(cortex.surface, ending))
             else:
-                notes += as_written(found.result, ending).notes
+                notes += as_written(cortex.result, ending).notes
         console.say(f"note: {note}" for note in dict.fromkeys(notes))
         console.finish([*outputs, *([] if flags.report is None else [flags.report])])
         console.table(rows_of_measures(measured.uv, measured))
 
 
 @click.command(short_help="Bake the textures of a model into other UVs.")
-@click.argument("old", type=_PATH)
-@click.argument("new", type=_PATH)
+@click.argument("source", metavar="OLD", type=_PATH)
+@click.argument("target", metavar="NEW", type=_PATH)
 @click.option(
     "-o", "--output", type=_PATH, help="File to write: .glb or .png.  [default: NEW's name with _baked]"
 )
@@ -117,7 +117,12 @@ def brain(context: click.Context, /, surface: Path, verbosity: str | None, **giv
 @click.option("--texture", type=_PATH, help="Image of the UVs of OLD, instead of its materials.")
 @verbosity_options
 def transfer(
-    old: Path, new: Path, output: Path | None, resolution: int, texture: Path | None, verbosity: str | None
+    source: Path,
+    target: Path,
+    output: Path | None,
+    resolution: int,
+    texture: Path | None,
+    verbosity: str | None,
 ) -> None:
     """Bake the textures or vertex colours of OLD into the UVs of NEW, a model of the same shape.
 
@@ -133,12 +138,12 @@ def transfer(
     from ..transfer import transfer as bake
     from .run import Console, require_distinct
 
-    output = output or Path(f"{new.stem}_baked.glb")
+    output = output or Path(f"{target.stem}_baked.glb")
     io.checked_target(output, ENDINGS, "textures are written as")
-    require_distinct({"old model": old, "new model": new, "texture": texture, "output": output})
+    require_distinct({"old model": source, "new model": target, "texture": texture, "output": output})
     with Console(verbosity) as console:
         with console.stage("bake", 0.0):
-            baked = bake(old, new, resolution=resolution, texture=texture)
+            baked = bake(source, target, resolution=resolution, texture=texture)
         with console.stage("write"):
             baked.save(output)
         losses = (*baked.losses(output), *_not_baked(baked, output))

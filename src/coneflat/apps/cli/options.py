@@ -41,20 +41,20 @@ class ClickKind(Kind):
     """The kind of an option of a command that click converts from text.
 
     Attributes:
-        more: further arguments of `click.option`.
+        arguments: further arguments of `click.option`.
     """
 
-    more: Mapping[str, Any]
+    arguments: Mapping[str, Any]
 
 
-def flag(default: Any = None, **more: Any) -> Any:
-    """Return a field of an option that only a command has; more: arguments of `click.option`."""
-    return option(default, ClickKind(more))
+def flag(default: Any = None, **arguments: Any) -> Any:
+    """Return a field of an option that only a command has; `arguments`: those of `click.option`."""
+    return option(default, ClickKind(arguments))
 
 
-def path_flag(default: Path | None = None, **more: Any) -> Any:
+def path_flag(default: Path | None = None, **arguments: Any) -> Any:
     """Return a field of an option that only a command has and that is a path."""
-    return flag(default, type=click.Path(path_type=Path), **more)
+    return flag(default, type=click.Path(path_type=Path), **arguments)
 
 
 def _angle(value: Any) -> float:
@@ -81,10 +81,10 @@ def _direction(value: Any) -> tuple[float, float, float]:
         length = -1.0 if text[0] == "-" else 1.0
         return (length * (axis == 0), length * (axis == 1), length * (axis == 2))
     try:
-        one, two, three = (float(word) for word in text.split(","))
+        x, y, z = (float(word) for word in text.split(","))
     except ValueError as error:
         raise click.BadParameter(f"{value!r} is not a direction; write z, -y or 0,0.5,1") from error
-    return (one, two, three)
+    return (x, y, z)
 
 
 def parse_eye(value: Any) -> Any:
@@ -105,11 +105,15 @@ def option_flags(group: type, *, one_mesh: bool = True) -> Callable[[Command], C
 
     one_mesh: also add options that refer to vertices of one mesh.
     """
-    added = [each for each in declarations(group).values() if each.flag and each.name not in INPUT_NAMES]
+    shown = [
+        declaration
+        for declaration in declarations(group).values()
+        if declaration.flag and declaration.name not in INPUT_NAMES
+    ]
 
     def decorate(command: Command) -> Command:
-        for each in reversed(added):
-            command = _flag(each)(command) if one_mesh or _may_fit_any_mesh(each) else command
+        for declaration in reversed(shown):
+            command = _flag(declaration)(command) if one_mesh or _may_fit_any_mesh(declaration) else command
         return command
 
     return decorate
@@ -123,44 +127,47 @@ def _may_fit_any_mesh(declaration: Declaration) -> bool:
 def _flag(declaration: Declaration) -> Callable[[Command], Command]:
     """Return a decorator that adds one option; its value is None, or an empty tuple, if it is not given."""
     kind, name = declaration.kind, declaration.name
-    more, spelled, doc = dict[str, Any](), flag_name(name), declaration.doc
+    arguments, spelled, doc = dict[str, Any](), flag_name(name), declaration.doc
     if declaration.default is True:
         spelled += f"/--no-{spelled[2:]}"
     match kind:
         case ClickKind():
-            more = dict(kind.more)
+            arguments = dict(kind.arguments)
         case _ if kind.metavar:
-            more = {"metavar": kind.metavar}
+            arguments = {"metavar": kind.metavar}
         case declared.Flag():
-            more = {"is_flag": True, "default": None}
+            arguments = {"is_flag": True, "default": None}
         case declared.Choice():
-            more = {"type": click.Choice(kind.words)}
+            arguments = {"type": click.Choice(kind.words)}
             if len(kind.words) > 5:
-                more["metavar"] = "NAME"
+                arguments["metavar"] = "NAME"
                 doc += f" One of {', '.join(kind.words)}."
         case Number(is_angle=True):
-            more = {"type": _angle, "metavar": "ANGLE"}
+            arguments = {"type": _angle, "metavar": "ANGLE"}
         case Number(is_strength=True):
-            more = {"type": _strength, "is_flag": False, "flag_value": 1.0, "metavar": "STRENGTH"}
+            arguments = {"type": _strength, "is_flag": False, "flag_value": 1.0, "metavar": "STRENGTH"}
         case Number():
-            more = {"type": int if kind.is_integer else float}
+            arguments = {"type": int if kind.is_integer else float}
         case declared.Direction():
-            more = {"type": _direction, "metavar": "DIRECTION"}
+            arguments = {"type": _direction, "metavar": "DIRECTION"}
         case declared.Vertices() | declared.VerticesOrEdges():
-            more = {"multiple": True, "metavar": "VERTICES|FILE"}
+            arguments = {"multiple": True, "metavar": "VERTICES|FILE"}
         case declared.WordOrVertices():
-            more = {"multiple": True, "metavar": "|".join((*kind.words, "VERTEX[:CURVATURE],...", "FILE"))}
+            arguments = {
+                "multiple": True,
+                "metavar": "|".join((*kind.words, "VERTEX[:CURVATURE],...", "FILE")),
+            }
         case declared.Edges():
-            more = {"multiple": True, "metavar": "|".join((*kind.words, "FILE"))}
+            arguments = {"multiple": True, "metavar": "|".join((*kind.words, "FILE"))}
         case declared.Weights():
-            more = {"metavar": "NAME|FILE"}
+            arguments = {"metavar": "NAME|FILE"}
     title = RARE_TITLE if name in declared.RARE else declaration.group
     if name in BRIEF:
         doc = doc.split(". ")[0].rstrip(".") + "."
     shown = shown_default(declaration)
     doc += f"  [default: {shown}]" if shown else ""
     names = (spelled, *SPELLINGS.get(name, ()), name)
-    return click.option(*names, cls=Grouped, group=title, help=doc, **more)
+    return click.option(*names, cls=Grouped, group=title, help=doc, **arguments)
 
 
 def shown_default(declaration: Declaration) -> str:
@@ -187,18 +194,18 @@ def keywords(params: Mapping[str, Any], group: type = Options) -> dict[str, Any]
         OptionError: a value cannot be parsed.
         MeshFileError: a file of them cannot be read.
     """
-    given = dict(PAPER) if params.get("paper") else {}
+    options = dict(PAPER) if params.get("paper") else {}
     for name, declaration in declarations(group).items():
         value = params.get(name)
         if name not in INPUT_NAMES and value is not None and value != ():
-            given[name] = _value(declaration, value)
-    return {**given, **repair_keywords(params["repair"])}
+            options[name] = _value(declaration, value)
+    return {**options, **repair_keywords(params["repair"])}
 
 
 def pop_flags(params: dict[str, Any], group: type[G]) -> G:
     """Remove the options of a group from the parameters of a command, and return the group."""
-    given = {name: params.pop(name) for name in declarations(cast(type, group))}
-    return group(**{name: value for name, value in given.items() if value is not None and value != ()})
+    flags = {name: params.pop(name) for name in declarations(cast(type, group))}
+    return group(**{name: value for name, value in flags.items() if value is not None and value != ()})
 
 
 def _value(declaration: Declaration, value: Any) -> Any:
@@ -239,14 +246,17 @@ def check_combinations(context: click.Context) -> None:
     params = context.params
     cones = params["cones"][0] if params["cones"] else "auto"
     method = params["method"] or "exact"
-    known = declarations(Options)
+    declared_options = declarations(Options)
     search = [name for name in declarations(ConeOptions) if name != "cones"]
     of_method = [*search, "cones", *declarations(MetricOptions)]
-    only = {what: [name for name in known if known[name].only == what] for what in ("sparse", "exact")}
-    given = cones not in declared.CONES
+    only = {
+        choice: [name for name in declared_options if declared_options[name].only == choice]
+        for choice in ("sparse", "exact")
+    }
+    are_given = cones not in declared.CONES
     rules = [
         (params["paper"], of_method, "--paper fixes the method"),
-        (given, search, "there is no search if the cones are given"),
+        (are_given, search, "there is no search if the cones are given"),
         (cones == "none", search, "there is no search with --cones none"),
         (cones == "greedy", only["sparse"], "--cones greedy does not take this option"),
         (params["cone_count"] is not None, ("distortion", "max_cones"), "--cone-count is given"),

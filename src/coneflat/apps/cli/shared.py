@@ -35,8 +35,8 @@ class ExitCode(IntEnum):
 class Grouped(click.Option):
     """An option that the help lists under the title of a group."""
 
-    def __init__(self, *args: Any, group: str, **more: Any) -> None:
-        super().__init__(*args, **more)
+    def __init__(self, *args: Any, group: str, **options: Any) -> None:
+        super().__init__(*args, **options)
         self.group = group
 
 

@@ -35,7 +35,7 @@ def read_vertex_map(flag: str, noun: str, texts: Sequence[str]) -> dict[int, flo
         OptionError: a text cannot be parsed, or a vertex is given twice.
         MeshFileError: the file cannot be read.
     """
-    given: dict[int, float | None] = {}
+    curvatures: dict[int, float | None] = {}
     for text, where in _entries(flag, noun, texts):
         parts = re.split(r"[\s,:;]+", text, maxsplit=1)
         try:
@@ -44,10 +44,10 @@ def read_vertex_map(flag: str, noun: str, texts: Sequence[str]) -> dict[int, flo
             raise OptionError(
                 f"{where} {text!r} is not VERTEX or VERTEX:CURVATURE, and there is no such file"
             ) from error
-        if vertex in given:
+        if vertex in curvatures:
             raise OptionError(f"{where} vertex {vertex} is given as a {noun} twice")
-        given[vertex] = parse_curvature(parts[1], f"{where} {text!r}") if len(parts) > 1 else None
-    return given
+        curvatures[vertex] = parse_curvature(parts[1], f"{where} {text!r}") if len(parts) > 1 else None
+    return curvatures
 
 
 def _entries(flag: str, noun: str, texts: Sequence[str]) -> Iterator[tuple[str, str]]:

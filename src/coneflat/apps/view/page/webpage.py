@@ -69,9 +69,9 @@ def page_html(
     if not isinstance(show, str) or (show not in SHOWS and (show != "own" or color is None)):
         raise OptionError(f"unknown show {short_repr(show)}: choose from {', '.join(SHOWS)}")
     picture = None if texture is None else read_picture(texture)
-    most = as_integer("most_triangles", most_triangles)
-    own = color if color is None or isinstance(color, Quantity) else own_quantity(result, color)
-    content = content_of(result, most, own=own)
+    max_triangles = as_integer("most_triangles", most_triangles)
+    quantity = color if color is None or isinstance(color, Quantity) else own_quantity(result, color)
+    content = content_of(result, max_triangles, quantity=quantity)
     if name is None:
         name = "Flattening" if result.source is None else result.source.path.name
     head, arrays = as_payload(*head_and_block(result, content, picture, name, up, show, text))
@@ -138,8 +138,8 @@ def _template() -> tuple[str, str, str]:
     data = """<script type="application/json" id="head">{{head}}</script>
 <script type="text/plain" id="arrays">{{arrays}}</script>"""
     page = page_around(POLICY, data, script=_read("from_page.js"))
-    before, rest = page.split("{{head}}")
-    between, after = rest.split("{{arrays}}")
+    before, body = page.split("{{head}}")
+    between, after = body.split("{{arrays}}")
     return before, between, after
 
 
