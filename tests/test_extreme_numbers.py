@@ -59,7 +59,7 @@ def test_an_extreme_number_leads_to_a_finite_result_or_to_one_of_our_errors(func
 
 
 @pytest.mark.parametrize(("function", "name"), NUMBERS)
-def test_what_is_not_a_number_is_refused_by_name(function, name):
+def test_values_that_are_not_numbers_are_refused_by_name(function, name):
     noun = name.replace("_", " ").removeprefix("min ").removeprefix("max ")
     text = outcome(FUNCTIONS[function][1], **with_size(function, name, np.nan))
     assert name in text or noun in text

@@ -49,7 +49,7 @@ class TestForm:
             ("beauty=1", "unknown measure 'beauty': choose from .*area_std, .*flipped, .*overlap, "),
         ],
     )
-    def test_what_is_none(self, text, message):
+    def test_invalid_requirements_are_refused(self, text, message):
         with pytest.raises(errors.OptionError, match=message):
             parse_requirements([text], REPORTED)
 
@@ -75,7 +75,7 @@ class TestMeeting:
 
 
 class TestFlatten:
-    def test_not_met_is_exit_code_3_and_the_file_is_written(self, folder):
+    def test_an_unmet_requirement_gives_exit_code_3_and_the_file_is_written(self, folder):
         done = run("flatten", "hill.obj", "-q", "-o", "a.obj", "--require", "flipped=0,qc_mean<=1,charts>5")
         assert done.exit_code == 3
         lines = done.stderr.splitlines()
@@ -97,7 +97,7 @@ def test_measure(folder):
 
 
 @pytest.mark.slow
-def test_batch_counts_what_is_not_met_as_failed(folder):
+def test_batch_counts_unmet_requirements_as_failures(folder):
     done = run("batch", "ball.obj", "hill.obj", "--out", "flat", "--jobs", "1", "--require", "triangles=60")
     assert done.exit_code == 1
     with open("flat/summary.csv", newline="") as file:
