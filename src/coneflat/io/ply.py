@@ -492,7 +492,7 @@ def ply_has_textures(source: MeshFile) -> bool:
 
 
 def _kept_properties(source: MeshFile) -> list[str]:
-    """Return the names of the vertex properties that `write_ply` keeps: all but UVs and what it writes anew."""
+    """Return the names of the vertex properties that `write_ply` keeps: except UVs and those that it computes."""
     replaced = (*_WRITTEN, *(() if source.ply is None else source.ply.uv))
     return [name for name in source.properties if name not in replaced]
 

@@ -158,8 +158,8 @@ class ConeNumber:
     """Cones: their number.
 
     Attributes:
-        distortion: Largest area distortion allowed: the standard deviation of the log scale, weighted by area. A
-            smaller value needs more cones.
+        distortion: Largest area distortion allowed: the standard deviation of the log conformal factor,
+            weighted by area. A smaller value needs more cones.
         cone_count: Number of cones per component, instead of a distortion. They are placed for the least area
             distortion.
     """
@@ -170,7 +170,7 @@ class ConeNumber:
 
 @dataclass(frozen=True, kw_only=True)
 class ConeQuanta:
-    """Cones: quantised curvatures.
+    """Cones: quantised curvatures (integer cones).
 
     Attributes:
         quantise: Cone curvatures are multiples of this angle, for example pi/2. Rotations across seams are then
@@ -232,9 +232,10 @@ class SeamOptions:
 
     Attributes:
         seams: Edges that must be cut, as pairs of vertices; or input, for the seams of the UVs in the file. In Python,
-            ("input", pairs) gives both. They act like a boundary. A single edge without a neighbouring seam is not cut.
+            ("input", pairs) combines both. Marked edges act as boundaries. A single edge without a neighbouring seam is
+            not cut.
         no_seams: Edges that must not be cut, as pairs of vertices; or vertices, for all edges between two of them.
-            This also excludes sharp edges and seams of the file. No search puts a cone where no seam can reach it.
+            This also excludes sharp edges and seams of the file. Cones are placed only where seams can reach them.
             Cuts that are added later to remove overlaps avoid these edges if possible.
         sharp_angle: Cut edges with a larger dihedral angle, for example 40deg for CAD parts. Other seams prefer
             sharp edges: the cost of an edge is its length up to 20 degrees, and falls to a tenth of it at 60 degrees.
@@ -259,7 +260,7 @@ class AtlasOptions:
         charts: atlas: move seams and add cuts until no triangles overlap. one: a single chart per component, as in the
             paper, which may overlap itself; PAPER and --paper use it.
         resolution: Texels along a side of the texture. Padding is measured in these.
-        padding: Least distance between charts, and between charts and the border, in texels; at most a quarter of a
+        padding: Smallest distance between charts, and between charts and the border, in texels; at most a quarter of a
             side.
         tiles: Number of textures (UDIM tiles) over which charts are distributed, all at one scale.
         up: Upward direction of the model; charts are rotated so that it points up in the texture. Without it, charts

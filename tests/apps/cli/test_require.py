@@ -80,8 +80,8 @@ class TestFlatten:
         assert done.exit_code == 3
         lines = done.stderr.splitlines()
         assert [line.split(" is ")[0] for line in lines] == [
-            "coneflat: not met: qc_mean",
-            "coneflat: not met: charts",
+            "coneflat: requirement failed: qc_mean",
+            "coneflat: requirement failed: charts",
             "coneflat: a.obj",
         ]
         assert (folder / "a.obj").exists()
@@ -92,7 +92,7 @@ def test_measure(folder):
     assert run("measure", "a.obj", "--require", "flipped=0,overlap=0,corners_without_uv=0").exit_code == 0
     done = run("measure", "a.obj", "-q", "--require", "packing_efficiency>=1")
     assert done.exit_code == 3
-    assert done.stderr.startswith("coneflat: not met: packing_efficiency is 0.")
+    assert done.stderr.startswith("coneflat: requirement failed: packing_efficiency is 0.")
     assert done.stderr.count("\n") == 1
 
 

@@ -150,7 +150,7 @@ def _open_streams() -> list[IO[Any]]:
 
 
 def _close_streams(opened: list[IO[Any]], code: int) -> int:
-    """Print what is left, close the streams that were opened, and return the exit code; 1 if it cannot be printed."""
+    """Print buffered output, close the opened streams, and return the exit code; 1 if it cannot be printed."""
     error = _flush(sys.stdout)
     if error is not None and code == 0:
         code = _fail_to_print(error)
@@ -161,7 +161,7 @@ def _close_streams(opened: list[IO[Any]], code: int) -> int:
 
 
 def _flush(stream: IO[Any]) -> OSError | None:
-    """Print what is left in a stream; return the error if that fails, after what is left has been discarded."""
+    """Print the buffered output of a stream; if that fails, discard it and return the error."""
     try:
         stream.flush()
     except OSError as error:
@@ -171,7 +171,7 @@ def _flush(stream: IO[Any]) -> OSError | None:
 
 
 def _discard(stream: IO[Any]) -> None:
-    """Connect a stream to the null device, so that Python can print what is left at its exit."""
+    """Connect a stream to the null device, so that Python can flush it at its exit."""
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, stream.fileno())
     os.close(null)

@@ -153,7 +153,7 @@ class Console:
 
     def _time_text(self) -> str:
         elapsed = self.elapsed
-        # Loading modules and printing are no stages.
+        # Loading modules and printing are not stages.
         seconds = {**self.seconds, "other": max(elapsed - sum(self.seconds.values()), 0.0)}
         stages = ", ".join(f"{stage} {taken:.2f}" for stage, taken in seconds.items())
         return f"{elapsed:.2f} s: {stages}"

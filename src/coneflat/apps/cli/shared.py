@@ -129,9 +129,9 @@ require_option = click.option(
 
 
 def check_required(requirements: Iterable[Requirement], measures: dict[str, Any], written: str = "") -> None:
-    """Print the requirements that are not met, if any, and exit with code `ExitCode.NOT_MET`.
+    """Print the requirements that failed, if any, and exit with code `ExitCode.NOT_MET`.
 
-    written: name of the file that has been written nevertheless.
+    written: name of the file that has been written anyway.
     """
     from ...measures import breaches
 
@@ -139,9 +139,9 @@ def check_required(requirements: Iterable[Requirement], measures: dict[str, Any]
     if not lines:
         return
     for line in lines:
-        click.echo(f"coneflat: not met: {line}", err=True)
+        click.echo(f"coneflat: requirement failed: {line}", err=True)
     if written:
-        click.echo(f"coneflat: {written} is written nevertheless", err=True)
+        click.echo(f"coneflat: {written} is written anyway", err=True)
     raise click.exceptions.Exit(ExitCode.NOT_MET)
 
 

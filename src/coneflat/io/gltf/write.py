@@ -168,9 +168,9 @@ def write_glb(result: Flattening, stream: IO[bytes], texture: Texture | None, fo
     For a mesh that was read from a glTF scene, the scene is written with new UVs. Otherwise the file has one mesh, with
     a two-sided material that is plain or has a texture. Every vertex has its UV as TEXCOORD_0 (with v pointing down, as
     glTF defines it), the input's normal or else that of the uncut surface, its colour as COLOR_0 if the input has
-    colours and there is no texture, and its vertex in the input as _SOURCE_VERTEX. All but colours are 32-bit floats,
-    the only type that glTF has for them: source vertices are exact up to 2^24. Positions of a model far from the origin
-    are relative to its node, whose translation is in doubles.
+    colours and there is no texture, and its vertex in the input as _SOURCE_VERTEX. All these except colours are 32-bit
+    floats, the only type that glTF has for them: source vertices are exact up to 2^24. Positions of a model far from
+    the origin are relative to its node, whose translation is in doubles.
 
     Args:
         result: the result to write.
@@ -255,7 +255,7 @@ def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: 
     """Return a glTF scene with the UVs of a result.
 
     In each primitive, TEXCOORD_0 is new, and every vertex is repeated for each of its UVs; all other attributes and
-    morph targets are copied bit for bit, but for tangents of the old UVs, which are those of the normal map. A mesh
+    morph targets are copied bit for bit, except tangents of the old UVs, which are those of the normal map. A mesh
     that several nodes show is copied for each node. Image files are embedded in the buffer. All other data is
     unchanged.
 
