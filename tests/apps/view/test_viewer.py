@@ -182,7 +182,7 @@ class TestThinning:
 class TestFiles:
     def test_without_a_path_it_is_opened(self, result, monkeypatch):
         opened = []
-        monkeypatch.setattr("coneflat.apps.view.open_page", opened.append)
+        monkeypatch.setattr("coneflat.apps.view.page.webpage.open_page", opened.append)
         path = result.view()
         assert opened == [path]
         assert path.read_text(encoding="utf-8").startswith("<!doctype html>")

@@ -11,7 +11,7 @@ from functools import cache
 from importlib.resources import files
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ....base import short_repr
 from ....errors import OptionError
@@ -103,6 +103,22 @@ def write_page(page: str, path: str | PathLike[str] | None) -> Path:
     with atomic_write(path, "w") as stream:
         stream.write(page)
     return path
+
+
+def show_page(
+    result: Flattening, path: str | PathLike[str] | None, *, most_triangles: int | None, **look: Any
+) -> Path:
+    """Write the page of a flattening, and open it in the browser if no path is given; see `Flattening.view`.
+
+    look: further arguments of `page_html`.
+    """
+    if path is not None:
+        check_page(path)
+    max_triangles = MAX_SHOWN_TRIANGLES if most_triangles is None else most_triangles
+    page = write_page(page_html(result, most_triangles=max_triangles, **look), path)
+    if path is None:
+        open_page(page)
+    return page
 
 
 def open_page(path: Path) -> bool:
