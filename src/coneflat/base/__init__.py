@@ -35,8 +35,8 @@ __all__ = [
     "BoolArray", "ComplexArray", "DISTORTION", "EntryPoint", "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE",
     "MAX_LISTED", "MIN_CONE_ANGLE", "Progress", "Stopwatch", "THREADS", "TYPED_TOLERANCE", "Unmet", "as_floats",
     "as_indices", "cache_folder", "cancel_with", "check_cancelled", "compilation", "compiled", "dots", "exit_text",
-    "has_any", "inner_calls", "limit_threads", "list_some", "mask_of", "plural", "printable", "short_repr", "unit_exponent",
-    "warn_of", "warns",
+    "has_any", "inner_calls", "limit_threads", "list_some", "mask_of", "plural", "printable", "short_repr",
+    "unit_exponent", "warn_of", "warns",
 ]  # fmt: skip
 
 
