@@ -80,7 +80,7 @@ def test_the_ends_of_the_range_of_area_distortions_are_valid(area):
 def test_extreme_numbers_for_a_cortex(tmp_path):
     nibabel = pytest.importorskip("nibabel")
     from coneflat.apps.brains import flatten_cortex
-    from coneflat.apps.cli.more import BrainOptions
+    from coneflat.apps.cli.brain_command import BrainOptions
 
     nibabel.freesurfer.write_geometry(tmp_path / "lh.pial", *shapes.sphere(2))
     names = [name for name, one in declarations(BrainOptions).items() if isinstance(one.kind, Number)]

@@ -21,7 +21,7 @@ from command import command as run
 import coneflat
 from coneflat import errors, flatten, read_mesh
 from coneflat.apps.cli.main import main
-from coneflat.apps.cli.values import parse_curvature
+from coneflat.options.texts import parse_curvature
 
 #: A line of progress, which comes by the clock.
 PROGRESS = re.compile(r" *\d+\.\d s +\d+%  .*")

@@ -16,7 +16,7 @@ from coneflat.errors import OptionError
 
 pytest.importorskip("matplotlib")
 
-from coneflat.apps.cli import figure as figure_command
+from coneflat.apps.cli import figure_commands
 from coneflat.apps.view.figures.kinds import KINDS
 from coneflat.apps.view.figures.uv_layout import chart_paths
 
@@ -107,7 +107,7 @@ class TestCommand:
         return call
 
     def test_the_kinds_are_those_of_the_package(self):
-        assert figure_command.KINDS == KINDS
+        assert figure_commands.KINDS == KINDS
 
     @pytest.mark.slow
     @pytest.mark.parametrize("kind", KINDS)

@@ -16,17 +16,19 @@ import click
 
 from ... import ConeflatError, __version__
 from ...base import inner_calls
-from .batch import batch
-from .cones import cones
-from .figure import demo, figure
-from .flatten import flatten, unwrap
-from .measure import measure
-from .more import blender, brain, transfer
+from .batch_command import batch
+from .blender_command import blender
+from .brain_command import brain
+from .cones_command import cones
+from .figure_commands import demo, figure
+from .flags import ExitCode
+from .flatten_commands import flatten, unwrap
+from .measure_command import measure
 from .peers import compare
-from .quads import quads
-from .shared import ExitCode
-from .view import studio, view
-from .warm_up import warm_up
+from .quads_command import quads
+from .transfer_command import transfer
+from .view_commands import studio, view
+from .warm_up_command import warm_up
 
 
 class Interrupted(KeyboardInterrupt):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .shared import QUIET, check_required, input_options, require_option, verbosity_options
+from .flags import QUIET, check_required, input_options, require_option, verbosity_options
 
 if TYPE_CHECKING:
     from ...measures import Row

@@ -8,8 +8,21 @@ from typing import Any
 
 import click
 
-from .options import flag, flag_name, is_given, option_flags, parse_eye, path_flag, pop_flags
-from .shared import again_option, color_option, input_options, repair_keywords, up_option, verbosity_options
+from .flags import (
+    again_option,
+    color_option,
+    flag,
+    flag_name,
+    input_options,
+    is_given,
+    option_flags,
+    parse_eye,
+    path_flag,
+    pop_flags,
+    repair_keywords,
+    up_option,
+    verbosity_options,
+)
 
 KINDS = ("layout", "checker", "quality", "cones", "curvature", "color", "curve")
 

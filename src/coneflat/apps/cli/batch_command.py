@@ -13,17 +13,20 @@ import click
 from ...base import plural, printable
 from ...options import FORMATS, Options, declarations, read_options
 from ...textures.options import MAX_ENERGY, TextureOptions, UnwrapOptions
-from .options import (
+from .flags import (
+    GroupedCommand,
     check_combinations,
     flag,
     flag_name,
+    input_options,
     keywords,
     option_flags,
     paper_option,
     path_flag,
     pop_flags,
+    require_option,
+    verbosity_options,
 )
-from .shared import GroupedCommand, input_options, require_option, verbosity_options
 
 
 @dataclass(frozen=True, kw_only=True)

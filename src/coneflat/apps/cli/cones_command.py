@@ -12,8 +12,17 @@ import click
 
 from ...base import DISTORTION, MAX_CONES, plural
 from ...options import FindOptions
-from .options import flag, is_given, keywords, option_flags, path_flag, pop_flags
-from .shared import GroupedCommand, input_options, verbosity_options
+from .flags import (
+    GroupedCommand,
+    flag,
+    input_options,
+    is_given,
+    keywords,
+    option_flags,
+    path_flag,
+    pop_flags,
+    verbosity_options,
+)
 
 if TYPE_CHECKING:
     from ... import ConeCurve

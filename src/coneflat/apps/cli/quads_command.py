@@ -10,8 +10,17 @@ import click
 
 from ...options import ConeBounds, ConeNumber, declarations, read_options
 from ...quadmesh.options import QuadOptions
-from .options import is_given, keywords, option_flags, path_flag, pop_flags, refuse
-from .shared import GroupedCommand, input_options, verbosity_options
+from .flags import (
+    GroupedCommand,
+    input_options,
+    is_given,
+    keywords,
+    option_flags,
+    path_flag,
+    pop_flags,
+    refuse,
+    verbosity_options,
+)
 
 
 @dataclass(frozen=True, kw_only=True)

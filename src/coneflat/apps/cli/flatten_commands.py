@@ -11,18 +11,22 @@ import click
 
 from ...options import FORMATS, Options, declarations
 from ...textures.options import UnwrapOptions
-from .options import (
+from .flags import (
+    GroupedCommand,
     check_combinations,
+    check_required,
     flag,
     flag_name,
+    input_options,
     is_given,
     keywords,
     option_flags,
     paper_option,
     path_flag,
     pop_flags,
+    require_option,
+    verbosity_options,
 )
-from .shared import GroupedCommand, check_required, input_options, require_option, verbosity_options
 
 if TYPE_CHECKING:
     from ... import Flattening

@@ -1,12 +1,13 @@
-"""The options of the commands, created from the declarations of the options."""
+"""The flags of the commands, created from the declarations of the options; those that commands share; their help."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 from click.core import ParameterSource
@@ -14,26 +15,78 @@ from click.core import ParameterSource
 from ... import PAPER
 from ... import options as declared
 from ...errors import OptionError
-from ...options import ConeOptions, Declaration, Kind, MetricOptions, Number, Options, declarations, option
+from ...options import (
+    MAX_SHOWN_TRIANGLES,
+    RARE,
+    ConeOptions,
+    Declaration,
+    Kind,
+    MetricOptions,
+    Number,
+    Options,
+    declarations,
+    option,
+    parse_angle,
+    read_edges,
+    read_numbers,
+    read_vertices,
+    read_vertices_or_pairs,
+    read_word_or_vertex_map,
+)
 from ...quadmesh.options import Sizes
-from . import values
-from .shared import BRIEF, RARE_TITLE, Grouped, repair_keywords
+
+if TYPE_CHECKING:
+    from ...measures import Requirement
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 G = TypeVar("G")
 
-#: Names of the options that `shared.input_options` adds.
+#: Names of the options that `input_options` adds.
 INPUT_NAMES = ("repair", "strict")
+#: Words of a choice that the help lists in place of a value; of more, it lists them in the description.
+MAX_LISTED_WORDS = 5
 #: Further spellings of options.
 SPELLINGS = {"quantise": ("--quantize",), "quads": ("--faces",), "output": ("-o",)}
 
-paper_option = click.option(
-    "--paper",
-    cls=Grouped,
-    group="Metric",
-    is_flag=True,
-    help="The published method (Ben-Chen et al. 2008), one chart per component.",
-)
+
+class ExitCode(IntEnum):
+    """Exit codes of the commands."""
+
+    INTERNAL_ERROR = 1
+    USER_ERROR = 2
+    NOT_MET = 3  # a condition of --require
+    SIGNALLED = 128  # to which the number of the signal is added, as shells do
+
+
+#: Options of which the help shows only the first sentence of the description.
+BRIEF = (*RARE, "distortion", "cone_count", "stretch", "seams", "sharp_angle", "resolution", "up")
+RARE_TITLE = "Less common options (all details: docs/reference/command-line.md)"
+#: Titles of groups of options in the help.
+GROUPS = ("Texture", "Quads", "Cones", "Metric", "Seams", "Atlas", "Input", "Output", RARE_TITLE)
+
+
+class Grouped(click.Option):
+    """An option that the help lists under the title of a group."""
+
+    def __init__(self, *args: Any, group: str, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.group = group
+
+
+class GroupedCommand(click.Command):
+    """A command whose help lists its options in groups; options without a group are listed under Output."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the options, group by group."""
+        groups: dict[str, list[tuple[str, str]]] = {title: [] for title in GROUPS}
+        for param in self.get_params(ctx):
+            record = param.get_help_record(ctx) if isinstance(param, click.Option) else None
+            if record is not None:
+                groups[getattr(param, "group", "Output")].append(record)
+        for title, records in groups.items():
+            if records:
+                with formatter.section(title):
+                    formatter.write_dl(records, col_max=24)
 
 
 @dataclass(frozen=True)
@@ -60,7 +113,7 @@ def path_flag(default: Path | None = None, **arguments: Any) -> Any:
 def _angle(value: Any) -> float:
     """Return an angle in radians from 1.57, pi/2, 0.1pi, 90deg, inf, or none, which is inf."""
     try:
-        return math.inf if value.strip().lower() in ("inf", "none") else values.parse_angle(value)
+        return math.inf if value.strip().lower() in ("inf", "none") else parse_angle(value)
     except OptionError as error:
         raise click.BadParameter(str(error)) from error
 
@@ -126,48 +179,51 @@ def _may_fit_any_mesh(declaration: Declaration) -> bool:
 
 def _flag(declaration: Declaration) -> Callable[[Command], Command]:
     """Return a decorator that adds one option; its value is None, or an empty tuple, if it is not given."""
-    kind, name = declaration.kind, declaration.name
-    arguments, spelled, doc = dict[str, Any](), flag_name(name), declaration.doc
+    kind, name, doc = declaration.kind, declaration.name, declaration.doc
+    spelling = flag_name(name)
     if declaration.default is True:
-        spelled += f"/--no-{spelled[2:]}"
-    match kind:
-        case ClickKind():
-            arguments = dict(kind.arguments)
-        case _ if kind.metavar:
-            arguments = {"metavar": kind.metavar}
-        case declared.Flag():
-            arguments = {"is_flag": True, "default": None}
-        case declared.Choice():
-            arguments = {"type": click.Choice(kind.words)}
-            if len(kind.words) > 5:
-                arguments["metavar"] = "NAME"
-                doc += f" One of {', '.join(kind.words)}."
-        case Number(is_angle=True):
-            arguments = {"type": _angle, "metavar": "ANGLE"}
-        case Number(is_strength=True):
-            arguments = {"type": _strength, "is_flag": False, "flag_value": 1.0, "metavar": "STRENGTH"}
-        case Number():
-            arguments = {"type": int if kind.is_integer else float}
-        case declared.Direction():
-            arguments = {"type": _direction, "metavar": "DIRECTION"}
-        case declared.Vertices() | declared.VerticesOrEdges():
-            arguments = {"multiple": True, "metavar": "VERTICES|FILE"}
-        case declared.WordOrVertices():
-            arguments = {
-                "multiple": True,
-                "metavar": "|".join((*kind.words, "VERTEX[:CURVATURE],...", "FILE")),
-            }
-        case declared.Edges():
-            arguments = {"multiple": True, "metavar": "|".join((*kind.words, "FILE"))}
-        case declared.Weights():
-            arguments = {"metavar": "NAME|FILE"}
-    title = RARE_TITLE if name in declared.RARE else declaration.group
+        spelling += f"/--no-{spelling[2:]}"
+    if isinstance(kind, declared.Choice) and len(kind.words) > MAX_LISTED_WORDS:
+        doc += f" One of {', '.join(kind.words)}."
+    title = RARE_TITLE if name in RARE else declaration.group
     if name in BRIEF:
         doc = doc.split(". ")[0].rstrip(".") + "."
-    shown = shown_default(declaration)
-    doc += f"  [default: {shown}]" if shown else ""
-    names = (spelled, *SPELLINGS.get(name, ()), name)
-    return click.option(*names, cls=Grouped, group=title, help=doc, **arguments)
+    default = shown_default(declaration)
+    doc += f"  [default: {default}]" if default else ""
+    names = (spelling, *SPELLINGS.get(name, ()), name)
+    return click.option(*names, cls=Grouped, group=title, help=doc, **_click_arguments(kind))
+
+
+def _click_arguments(kind: Kind) -> dict[str, Any]:
+    """Return the arguments of `click.option` for the texts of a kind of options; `_value` returns what they mean."""
+    match kind:
+        case ClickKind():
+            return dict(kind.arguments)
+        case _ if kind.metavar:
+            return {"metavar": kind.metavar}
+        case declared.Flag():
+            return {"is_flag": True, "default": None}
+        case declared.Choice():
+            metavar = {"metavar": "NAME"} if len(kind.words) > MAX_LISTED_WORDS else {}
+            return {"type": click.Choice(kind.words), **metavar}
+        case Number(is_angle=True):
+            return {"type": _angle, "metavar": "ANGLE"}
+        case Number(is_strength=True):
+            return {"type": _strength, "is_flag": False, "flag_value": 1.0, "metavar": "STRENGTH"}
+        case Number():
+            return {"type": int if kind.is_integer else float}
+        case declared.Direction():
+            return {"type": _direction, "metavar": "DIRECTION"}
+        case declared.Vertices() | declared.VerticesOrEdges():
+            return {"multiple": True, "metavar": "VERTICES|FILE"}
+        case declared.WordOrVertices():
+            forms = (*kind.words, "VERTEX[:CURVATURE],...", "FILE")
+            return {"multiple": True, "metavar": "|".join(forms)}
+        case declared.Edges():
+            return {"multiple": True, "metavar": "|".join((*kind.words, "FILE"))}
+        case declared.Weights():
+            return {"metavar": "NAME|FILE"}
+    return {}
 
 
 def shown_default(declaration: Declaration) -> str:
@@ -181,6 +237,102 @@ def shown_default(declaration: Declaration) -> str:
     if value is True:
         return "yes"
     return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+paper_option = click.option(
+    "--paper",
+    cls=Grouped,
+    group="Metric",
+    is_flag=True,
+    help="The published method (Ben-Chen et al. 2008), one chart per component.",
+)
+
+
+up_option = click.option(
+    "--up",
+    type=click.Choice(["x", "y", "z"]),
+    default="y",
+    show_default=True,
+    help="Upward axis of the model in pictures.",
+)
+
+_INPUT = (
+    click.option(
+        "--repair/--strict",
+        "repair",
+        cls=Grouped,
+        group=RARE_TITLE,
+        default=True,
+        help="Repair a mesh that is not manifold, with a note; or reject it, and triangles without area, too.  "
+        "[default: repair]",
+    ),
+    click.option(
+        "--weld/--no-weld",
+        cls=Grouped,
+        group=RARE_TITLE,
+        default=None,
+        help="Merge all vertices at the same position, or none.  [default: all in STL and glTF; in other formats "
+        "those on boundaries that coincide]",
+    ),
+)
+
+
+def input_options(command: Command) -> Command:
+    """Add the options `repair` and `weld` of meshes with defects to a command."""
+    for add_option in reversed(_INPUT):
+        command = add_option(command)
+    return command
+
+
+color_option = click.option(
+    "--color",
+    metavar="NAME|FILE",
+    help="Your own values, shown as colours with a scale: the name of a vertex property of a .ply or of an array in a "
+    "result (.npz); or FILE.npy, FILE.npz:NAME, or values of a brain such as lh.sulc, with one value per vertex or "
+    "triangle.",
+)
+
+most_option = click.option(
+    "--most-triangles",
+    type=click.IntRange(1),
+    default=MAX_SHOWN_TRIANGLES,
+    show_default=True,
+    help="Number of triangles to which a larger mesh is reduced, for display only.",
+)
+
+again_option = click.option(
+    "--again", is_flag=True, help="Also flatten a mesh that has UVs, instead of showing these."
+)
+
+
+require_option = click.option(
+    "--require",
+    "required",
+    metavar="MEASURE=VALUE",
+    multiple=True,
+    help=f"Exit with code {ExitCode.NOT_MET} if the report does not meet this condition; examples: flipped=0,overlap=0 "
+    "and qc_mean<=1.05; also <, >, >=.",
+)
+
+
+QUIET, VERBOSE = "quiet", "verbose"
+
+
+def verbosity_options(command: Command) -> Command:
+    """Add -v and -q to a command, whose `verbosity` is then VERBOSE, QUIET or None; the last one given applies."""
+    for short, long, value, meaning in (
+        ("-q", "--quiet", QUIET, "Print errors only."),
+        ("-v", "--verbose", VERBOSE, "Print each step, and all measures."),
+    ):
+        command = click.option(short, long, "verbosity", flag_value=value, default=None, help=meaning)(
+            command
+        )
+    return command
+
+
+def repair_keywords(repair: bool) -> dict[str, Any]:
+    """Return the keyword arguments of `coneflat.flatten` for `--repair` or `--strict`."""
+    return {"repair": repair, "strict": not repair}
 
 
 def keywords(params: Mapping[str, Any], group: type = Options) -> dict[str, Any]:
@@ -213,32 +365,16 @@ def _value(declaration: Declaration, value: Any) -> Any:
     kind, flag = declaration.kind, flag_name(declaration.name)
     match kind:
         case declared.Vertices():
-            return tuple(dict.fromkeys(v for text in value for v in values.read_vertices(flag, text)))
+            return tuple(dict.fromkeys(v for text in value for v in read_vertices(flag, text)))
         case declared.VerticesOrEdges():
-            return values.read_vertices_or_pairs(flag, value)
+            return read_vertices_or_pairs(flag, value)
         case declared.WordOrVertices():
-            words = [text for text in value if text.replace("-", "").isalpha() and not values.is_file(text)]
-            if words and len(value) > 1:
-                raise OptionError(f"{flag} takes one choice, got {value[0]} and {value[1]}")
-            return words[0] if words else values.read_vertex_map(flag, kind.noun, value)
+            return read_word_or_vertex_map(flag, kind.noun, value)
         case declared.Edges():
-            return _edges(flag, kind, value)
+            return read_edges(flag, kind.words, value)
         case declared.Weights() | Sizes():
-            return values.read_numbers("sizes" if isinstance(kind, Sizes) else "weights", value)
+            return read_numbers("sizes" if isinstance(kind, Sizes) else "weights", value)
     return value
-
-
-def _edges(flag: str, kind: declared.Edges, texts: Sequence[str]) -> Any:
-    import numpy as np
-
-    words = [text for text in texts if text in kind.words]
-    files = [text for text in texts if text not in kind.words]
-    if len(words) > 1:
-        raise OptionError(f"{flag} {words[0]} is given twice")
-    pairs = np.concatenate([values.read_pairs(text) for text in files]) if files else None
-    if words and pairs is not None:
-        return words[0], pairs
-    return words[0] if words else pairs
 
 
 def check_combinations(context: click.Context) -> None:
@@ -276,3 +412,20 @@ def refuse(context: click.Context, rules: Iterable[tuple[Any, Iterable[str], str
 def is_given(context: click.Context, name: str) -> bool:
     """Return whether an option is given on the command line."""
     return context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+
+
+def check_required(requirements: Iterable[Requirement], measures: dict[str, Any], written: str = "") -> None:
+    """Print the requirements that failed, if any, and exit with code `ExitCode.NOT_MET`.
+
+    written: name of the file that has been written anyway.
+    """
+    from ...measures import breaches
+
+    lines = breaches(requirements, measures)
+    if not lines:
+        return
+    for line in lines:
+        click.echo(f"coneflat: requirement failed: {line}", err=True)
+    if written:
+        click.echo(f"coneflat: {written} is written anyway", err=True)
+    raise click.exceptions.Exit(ExitCode.NOT_MET)

@@ -9,13 +9,16 @@ from typing import Any
 import click
 
 from ...options import SHOWS
-from .options import flag, option_flags, path_flag, pop_flags
-from .shared import (
+from .flags import (
     QUIET,
     again_option,
     color_option,
+    flag,
     input_options,
     most_option,
+    option_flags,
+    path_flag,
+    pop_flags,
     up_option,
     verbosity_options,
 )

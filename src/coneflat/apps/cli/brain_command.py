@@ -1,23 +1,17 @@
-"""The commands of further applications: `coneflat brain`, `coneflat transfer` and `coneflat blender`."""
+"""`coneflat brain`."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from ...base import plural
 from ...options import FORMATS, ConeNumber, Direction, RunOptions, option, strength
-from .measure import rows_of_measures
-from .options import flag, keywords, option_flags, path_flag, pop_flags
-from .shared import GroupedCommand, verbosity_options
-
-if TYPE_CHECKING:
-    from ..transfer import Baked
-
-_PATH = click.Path(path_type=Path)
+from .flags import GroupedCommand, flag, keywords, option_flags, path_flag, pop_flags, verbosity_options
+from .measure_command import rows_of_measures
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,88 +99,3 @@ def brain(context: click.Context, /, surface: Path, verbosity: str | None, **par
         console.say(f"note: {note}" for note in dict.fromkeys(notes))
         console.finish([*outputs, *([] if flags.report is None else [flags.report])])
         console.table(rows_of_measures(measured.uv, measured))
-
-
-@click.command(short_help="Bake the textures of a model into other UVs.")
-@click.argument("source", metavar="OLD", type=_PATH)
-@click.argument("target", metavar="NEW", type=_PATH)
-@click.option(
-    "-o", "--output", type=_PATH, help="File to write: .glb or .png.  [default: NEW's name with _baked]"
-)
-@click.option("--resolution", type=int, default=2048, show_default=True, help="Texels along a side.")
-@click.option("--texture", type=_PATH, help="Image of the UVs of OLD, instead of its materials.")
-@verbosity_options
-def transfer(
-    source: Path,
-    target: Path,
-    output: Path | None,
-    resolution: int,
-    texture: Path | None,
-    verbosity: str | None,
-) -> None:
-    """Bake the textures or vertex colours of OLD into the UVs of NEW, a model of the same shape.
-
-    Colours continue around the charts. A .png gets the base colour only.
-
-    \b
-    Examples:
-      coneflat unwrap chair.glb -o chair_uv.glb
-      coneflat transfer chair.glb chair_uv.glb -o chair_baked.glb
-    """
-    from ... import io
-    from ..transfer import ENDINGS
-    from ..transfer import transfer as bake
-    from .run import Console, require_distinct
-
-    output = output or Path(f"{target.stem}_baked.glb")
-    io.checked_target(output, ENDINGS, "textures are written as")
-    require_distinct({"old model": source, "new model": target, "texture": texture, "output": output})
-    with Console(verbosity) as console:
-        with console.stage("bake", 0.0):
-            baked = bake(source, target, resolution=resolution, texture=texture)
-        with console.stage("write"):
-            baked.save(output)
-        losses = (*baked.losses(output), *_not_baked(baked, output))
-        console.say(f"note: {note}" for note in (*baked.notes, *losses))
-        console.finish([output])
-
-
-def _not_baked(baked: Baked, output: Path) -> tuple[str, ...]:
-    """Return a note on data of a model that its file with baked textures does not keep; a picture is not the model."""
-    from ... import io
-
-    source, ending = baked.uv_mesh.source, output.suffix.lower()
-    if source is None or ending not in io.KEPT:
-        return ()
-    # Baked textures replace them.
-    replaced = {
-        io.MATERIALS,
-        io.Attribute("textures"),
-        io.VERTEX_COLOURS,
-        io.Attribute("vertex attributes", "COLOR_0"),
-    }
-    return io.losses(source, ending, io.KEPT[ending](source) | replaced | set(io.texture_files(source)))
-
-
-@click.command(short_help="Write the Blender extension.")
-@click.option(
-    "-o",
-    "--output",
-    type=_PATH,
-    default="coneflat_blender.zip",
-    show_default=True,
-    help="File to write, .zip.",
-)
-def blender(output: Path) -> None:
-    """Write the extension for Blender 4.2 or later as a zip.
-
-    Blender installs it by Edit > Preferences > Get Extensions > Install from Disk, or when it is dropped on its window.
-    The commands are then in the menu UV, and in the tab coneflat of the sidebar.
-
-    \b
-    Example:
-      coneflat blender -o coneflat_blender.zip
-    """
-    from ..blender import build_extension
-
-    click.echo(f"wrote {build_extension(output)}")
