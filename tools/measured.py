@@ -13,9 +13,8 @@ from typing import Any
 from markers import ROOT
 
 import coneflat
-from coneflat.apps.cli.values import parse_angle
 from coneflat.apps.peers import Comparison, flatten_by
-from coneflat.options import Options, declarations
+from coneflat.options import Options, declarations, parse_angle
 
 sys.path.insert(0, str(ROOT / "tests"))
 sys.path.insert(0, str(ROOT / "benchmarks"))

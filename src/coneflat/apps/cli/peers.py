@@ -10,8 +10,20 @@ import click
 
 from ... import PAPER
 from ...options import FindOptions, declarations
-from .options import flag, is_given, keywords, option_flags, parse_eye, path_flag, pop_flags, refuse
-from .shared import GroupedCommand, input_options, up_option, verbosity_options
+from .flags import (
+    GroupedCommand,
+    flag,
+    input_options,
+    is_given,
+    keywords,
+    option_flags,
+    parse_eye,
+    path_flag,
+    pop_flags,
+    refuse,
+    up_option,
+    verbosity_options,
+)
 
 #: Files that `compare` writes.
 COMPARED = ("compare.md", "compare.csv", "layouts.png", "quality.png")
