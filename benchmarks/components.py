@@ -20,9 +20,9 @@ from typing import Any, cast
 
 import numpy as np
 from common import peak_memory, shapes
+from comparisons.atlases import ATLAS_BASELINES
 
 import coneflat
-from coneflat.apps.peers.packages import PEERS
 
 #: The components, and their largest number.
 KINDS = {"triangles": 100_000, "cards": 100_000, "bent cards": 1_000, "spheres": 1_000}
@@ -84,8 +84,8 @@ def measured(name: str, kind: str, count: int) -> tuple[float, float, int]:
 
 def function(name: str) -> Callable[[Any, Any], object]:
     """Return a function of vertices and faces."""
-    if name in PEERS and name != "unwrap":
-        run = PEERS[name].run
+    if name in ATLAS_BASELINES and name != "unwrap":
+        run = ATLAS_BASELINES[name].run
         return lambda vertices, faces: run(cast(Any, SimpleNamespace(vertices=vertices, faces=faces)))
     return getattr(coneflat, name)
 

@@ -20,7 +20,7 @@ from pathlib import Path
 import common  # noqa: F401 - finds the shapes of the tests
 import numpy as np
 import shapes
-from methods import circle_patterns
+from comparisons.patterns import circle_patterns
 
 from coneflat.cones import cones_with_curvature
 from coneflat.geometry import (

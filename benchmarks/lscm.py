@@ -12,9 +12,9 @@ import argparse
 import igl
 import numpy as np
 from common import cases, model
+from comparisons.disk_maps import least_squares_conformal
 
 from coneflat import flatten
-from coneflat.apps.peers.disk_maps import least_squares_conformal
 from coneflat.geometry import edge_lengths
 from coneflat.layout import far_pins
 from coneflat.mesh.connectivity import TriangleMesh

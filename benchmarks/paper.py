@@ -18,16 +18,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from common import MODELS as MODEL_FOLDER
-from methods import compare_all
+from comparisons import Comparison, compare_methods, pictures
+from comparisons.tables import as_cell, as_csv, as_markdown
 
 from coneflat import PAPER, ConeflatError, read_mesh
-from coneflat.apps.peers import pictures
-from coneflat.apps.peers.run import (
-    Comparison,
-    as_cell,
-    as_csv,
-    markdown,
-)
 from coneflat.apps.view import (
     Look,
     Panel,
@@ -211,7 +205,7 @@ class Reproduction:
             ("Table 1: curvature error", TABLE_1, self.table_1(), FORMS_1),
             ("Table 2: quasi-conformal distortion", TABLE_2, self.table_2(), FORMS_2),
         ):
-            lines += [f"## {title}", "", markdown(headings, _cells(rows, forms))]
+            lines += [f"## {title}", "", as_markdown(headings, _cells(rows, forms))]
         lines += [self.notes()]
         return "\n".join(lines)
 
@@ -238,7 +232,7 @@ class Reproduction:
             label = f"{model.name}: {plural(len(model.linear.cones), 'cone')}"
             cones += look.views(model.linear, draw_cones, label)
             shown = model.comparison.drawn
-            scale = pictures.same_scale(shown)
+            scale = pictures.on_common_scale(shown)
             quality.append(_row(pictures.quality_panels(shown, scale, look), scale))
             aligned = pictures.aligned_layouts([result for _, result in shown])
             pairs = zip(shown, aligned, strict=True)
@@ -246,7 +240,7 @@ class Reproduction:
                 _row([layout_panel(result, f"{model.name}, {method}") for (method, _), result in pairs])
             )
             linear = tuple(each for each in shown if each[0] == "linear")
-            own = pictures.same_scale(linear)
+            own = pictures.on_common_scale(linear)
             texture = look.views(model.linear, draw_checker, model.name)
             textures.append(_row([*texture, *pictures.quality_panels(linear, own, look)], own))
         rows = (pictures.in_rows(cones), quality, layouts, textures)
@@ -297,7 +291,7 @@ def reproduce(
 
         tell("read", 0.0)
         try:
-            compared = compare_all(read_mesh(file), methods=methods, progress=tell, **PAPER)
+            compared = compare_methods(read_mesh(file), methods=methods, atlases=(), progress=tell, **PAPER)
         except ConeflatError as error:
             failed.append((file.name, " ".join(str(error).split())))
             continue

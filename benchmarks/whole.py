@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 from common import best_time, cases, model, peak_memory, shapes
+from comparisons.atlases import ATLAS_BASELINES, installed_baselines
 from scipy.sparse import csc_matrix
 
 from coneflat import Flattening, TriangleMesh, flatten
-from coneflat.apps.peers.packages import PEERS, installed_peers
 from coneflat.geometry import (
     cotangent_laplacian,
     cotangents,
@@ -41,12 +41,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--models", default="fandisk,bunny,horse")
     parser.add_argument("--largest", type=int, default=1_600_000, help="triangles")
-    parser.add_argument("--peers", type=int, default=100_000, help="triangles up to which others run, too")
+    parser.add_argument(
+        "--baselines", type=int, default=100_000, help="triangles up to which baselines run, too"
+    )
     parser.add_argument("--runs", type=int, default=2, help="the best counts")
     parser.add_argument("--one", nargs=2, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.one:
-        print(json.dumps(measured(arguments.one[0], int(arguments.one[1]), arguments.runs, arguments.peers)))
+        print(
+            json.dumps(measured(arguments.one[0], int(arguments.one[1]), arguments.runs, arguments.baselines))
+        )
         return
     rows = []
     print(
@@ -55,14 +59,14 @@ def main() -> None:
     print("| --- " * (len(STAGES) + 8) + "|")
     for name, rounds in cases(arguments.models.split(","), arguments.largest):
         command = [sys.executable, __file__, "--one", name, str(rounds)]
-        command += ["--runs", str(arguments.runs), "--peers", str(arguments.peers)]
+        command += ["--runs", str(arguments.runs), "--baselines", str(arguments.baselines)]
         rows.append(json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout))
         print(line(rows[-1]), flush=True)
     print(f"\nStages in units of the factorization.{growth(rows)}\n")
-    print_peers([row for row in rows if row["peers"]])
+    print_baselines([row for row in rows if row["baselines"]])
 
 
-def measured(name: str, rounds: int, runs: int, largest_of_peers: int) -> dict:
+def measured(name: str, rounds: int, runs: int, largest_of_baselines: int) -> dict:
     """Return the row of a mesh."""
     vertices, faces = model(name, rounds)
     flatten(*shapes.sphere(2))  # This compiles or loads the kernels.
@@ -86,13 +90,13 @@ def measured(name: str, rounds: int, runs: int, largest_of_peers: int) -> dict:
         "total": min(times),
         "stages": best.seconds,
         "memory": peak_memory(),
-        "peers": peers(best) if len(faces) <= largest_of_peers else {},
+        "baselines": baseline_seconds(best) if len(faces) <= largest_of_baselines else {},
     }
 
 
-def peers(best: Flattening) -> dict[str, float]:
-    """Return the seconds of the installed other packages for the same mesh."""
-    runs = {name: PEERS[name].run for name in installed_peers()}
+def baseline_seconds(best: Flattening) -> dict[str, float]:
+    """Return the seconds of the installed baselines for the same mesh."""
+    runs = {name: ATLAS_BASELINES[name].run for name in installed_baselines()}
     if find_spec("igl") is not None:
         runs["libigl LSCM"] = libigl_lscm
     return {name: best_time(partial(run, best), 1) for name, run in runs.items()}
@@ -135,15 +139,17 @@ def growth(rows: list[dict]) -> str:
     return f" Time grows with the number of triangles to the power of: {', '.join(found)}." if found else ""
 
 
-def print_peers(rows: list[dict]) -> None:
-    names = list(dict.fromkeys(name for row in rows for name in row["peers"]))
+def print_baselines(rows: list[dict]) -> None:
+    names = list(dict.fromkeys(name for row in rows for name in row["baselines"]))
     if not names:
         return
     print(f"| model | triangles | coneflat, s | {', s | '.join(names)}, s |")
     print("| --- " * (len(names) + 3) + "|")
     for row in rows:
-        others = " | ".join(f"{row['peers'][name]:.2f}" if name in row["peers"] else "" for name in names)
-        print(f"| {row['model']} | {row['triangles']:,} | {row['total']:.2f} | {others} |")
+        seconds = " | ".join(
+            f"{row['baselines'][name]:.2f}" if name in row["baselines"] else "" for name in names
+        )
+        print(f"| {row['model']} | {row['triangles']:,} | {row['total']:.2f} | {seconds} |")
 
 
 if __name__ == "__main__":

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapes
-from methods import compare_all, flatten_with
-from methods.abf import angle_conditions, linear_angles, nearest_angles, wanted_angles
+from comparisons import compare_methods, flatten_by
+from comparisons.abf import angle_conditions, linear_angles, nearest_angles, wanted_angles
 
 from coneflat import PAPER, errors, flatten
 from coneflat.geometry import angle_defect, corner_angles, edge_lengths
@@ -97,7 +97,7 @@ def test_nearest_angles_are_a_minimum():
 @pytest.mark.parametrize("method", BOTH)
 @pytest.mark.parametrize("shape", [shapes.grid(9, 5), shapes.box(), shapes.cylinder(), shapes.grid(5, 1)])
 def test_developable_meshes_come_back_as_they_are(method, shape):
-    d = flatten_with(method, *shape).distortion
+    d = flatten_by(method, *shape).distortion
     assert d.qc_max < 1 + 1e-9
     assert d.area_std < 1e-9
     assert d.seam_mismatch_max < 1e-9
@@ -106,7 +106,7 @@ def test_developable_meshes_come_back_as_they_are(method, shape):
 @pytest.mark.parametrize("shape", (CLOSED | OPEN).values(), ids=CLOSED | OPEN)
 def test_abf_has_the_cones_and_seams_that_close(shape):
     """Around handles and holes, too: nothing is cut but what is unfolded."""
-    result = flatten_with("abf++", *shape)
+    result = flatten_by("abf++", *shape)
     d = result.distortion
     assert d.flipped == 0
     assert d.curvature_error_max < 1e-8
@@ -123,29 +123,29 @@ def test_a_cone_without_room_is_refused():
             errors.CurvatureError,
             match=r"1 cone with angles too large .* 5 of them cannot hold an angle of 5.5 pi",
         ):
-            flatten_with(method, *shapes.sphere(3), cones=cones)
+            flatten_by(method, *shapes.sphere(3), cones=cones)
 
 
 def test_what_did_not_converge_is_refused(monkeypatch):
-    monkeypatch.setattr("methods.abf.STEPS", 1)
+    monkeypatch.setattr("comparisons.abf.STEPS", 1)
     with pytest.raises(errors.ConvergenceError, match=r"off by .* after 1 step; method 'exact'"):
-        flatten_with("abf++", *shapes.sphere(2))
+        flatten_by("abf++", *shapes.sphere(2))
 
 
 def test_free_cones_are_another_method():
     mesh = shapes.sphere(3)
-    free = flatten_with("linear-abf/free", *mesh)
-    held = flatten_with("linear-abf", *mesh)
+    free = flatten_by("linear-abf/free", *mesh)
+    held = flatten_by("linear-abf", *mesh)
     assert free.distortion.qc_mean < held.distortion.qc_mean - 0.01
     with pytest.raises(errors.OptionError, match="unknown method 'abf/free'"):
-        flatten_with("abf/free", *mesh)
+        flatten_by("abf/free", *mesh)
     with pytest.raises(errors.OptionError, match=r"unknown method 'abf\+\+'"):
         flatten(*mesh, method="abf++")
 
 
 def test_they_agree_with_the_exact_metric_on_the_same_cones_and_cut():
     names = ("exact", "linear-abf", "abf++")
-    found = compare_all(shapes.sphere(3), methods=names)
+    found = compare_methods(*shapes.sphere(3), methods=names, atlases=())
     for entry in found.entries:
         assert np.array_equal(entry.result.cones, found["exact"].result.cones)
         assert "other edges" not in entry.note
@@ -155,14 +155,14 @@ def test_they_agree_with_the_exact_metric_on_the_same_cones_and_cut():
 def test_scale_motion_and_numbering():
     vertices, faces = shapes.sphere(3)
     other_vertices, other_faces, new = shapes.renumber(vertices, faces)
-    base = flatten_with("abf++", vertices, faces, cones="greedy")
+    base = flatten_by("abf++", vertices, faces, cones="greedy")
     for mesh in (
         (vertices * 1e-6, faces),
         (vertices * 1e6, faces),
         (vertices @ shapes.rotation().T, faces),
         (other_vertices, other_faces),
     ):
-        other = flatten_with("abf++", *mesh, cones="greedy")
+        other = flatten_by("abf++", *mesh, cones="greedy")
         assert other.distortion.qc_mean == pytest.approx(base.distortion.qc_mean, rel=1e-7)
         assert other.distortion.qc_max == pytest.approx(base.distortion.qc_max, rel=1e-6)
     np.testing.assert_array_equal(other.cones, new[base.cones])
@@ -174,6 +174,8 @@ def test_scale_motion_and_numbering():
 )
 def test_the_figures_of_table_2(shared, name, free, held):
     """The paper has 1.007 and 1.027 for linear ABF, which left cones free."""
-    found = compare_all(shared(name), methods=("linear", "linear-abf/free", "linear-abf"), **PAPER)
+    found = compare_methods(
+        shared(name), methods=("linear", "linear-abf/free", "linear-abf"), atlases=(), **PAPER
+    )
     assert found["linear-abf/free"].result.distortion.qc_mean == pytest.approx(free, abs=0.0002)
     assert found["linear-abf"].result.distortion.qc_mean == pytest.approx(held, abs=0.0002)

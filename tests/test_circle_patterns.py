@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapes
-from methods import circle_patterns, compare_all, flatten_with
-from methods.pattern_angles import MIN_ANGLE_FRACTION, MIN_MEETING, coherent_angles
-from methods.pattern_radii import RadiiProblem, circle_pattern
+from comparisons import compare_methods, flatten_by
+from comparisons.pattern_angles import MIN_ANGLE_FRACTION, MIN_MEETING, coherent_angles
+from comparisons.pattern_radii import RadiiProblem, circle_pattern
+from comparisons.patterns import circle_patterns
 from scipy.optimize import minimize
 from scipy.special import spence
 from shapes import laid_out, lengths_of
@@ -134,7 +135,7 @@ class TestRadii:
     "shape", [shapes.sphere(3), shapes.torus(), shapes.hill(), shapes.annulus(), shapes.genus(2)]
 )
 def test_the_curvature_is_the_one_prescribed(shape):
-    result = flatten_with("circle-patterns", *shape)
+    result = flatten_by("circle-patterns", *shape)
     assert result.solve.residual < 1e-9
     assert np.abs(result.curvature_residual).max() < 1e-9
     assert result.distortion.flipped == 0
@@ -144,14 +145,14 @@ def test_the_curvature_is_the_one_prescribed(shape):
 def test_scale_motion_and_numbering():
     vertices, faces = shapes.sphere(3)
     other_vertices, other_faces, new = shapes.renumber(vertices, faces)
-    base = flatten_with("circle-patterns", vertices, faces, cones="greedy")
+    base = flatten_by("circle-patterns", vertices, faces, cones="greedy")
     for mesh in (
         (vertices * 1e-6, faces),
         (vertices * 1e6, faces),
         (vertices @ shapes.rotation().T, faces),
         (other_vertices, other_faces),
     ):
-        other = flatten_with("circle-patterns", *mesh, cones="greedy")
+        other = flatten_by("circle-patterns", *mesh, cones="greedy")
         assert other.distortion.qc_mean == pytest.approx(base.distortion.qc_mean, rel=1e-7)
         assert other.distortion.qc_max == pytest.approx(base.distortion.qc_max, rel=1e-6)
     np.testing.assert_array_equal(other.cones, new[base.cones])
@@ -160,7 +161,7 @@ def test_scale_motion_and_numbering():
 
 def test_they_are_compared_with_the_same_cones_and_cut():
     names = ("circle-patterns/fixed", "linear", "circle-patterns", "exact")
-    found = compare_all(shapes.sphere(3), methods=names)
+    found = compare_methods(*shapes.sphere(3), methods=names, atlases=())
     assert [entry.method for entry in found.entries] == list(names)
     for entry in found.entries:
         assert np.array_equal(entry.result.cones, found["exact"].result.cones)
@@ -200,5 +201,5 @@ def test_the_figures_of_table_2(shared, name, published, with_flips):
     solution = greedy_cones(*given, epsilon=1.0, tie_key=tie_key(mesh.vertices))
     layout = laid_out(circle_patterns(mesh, part.lengths, solution, delaunay=False))
     assert measure(mesh, layout.points[layout.corners]).qc_mean == pytest.approx(published, abs=0.001)
-    result = flatten_with("circle-patterns", shared(name), cones="greedy")
+    result = flatten_by("circle-patterns", shared(name), cones="greedy")
     assert result.distortion.qc_mean == pytest.approx(with_flips, abs=0.0005)

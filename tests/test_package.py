@@ -22,10 +22,10 @@ def test_every_public_name_is_there():
 
 
 def test_packages_for_experts_are_there_and_not_public():
-    assert {"cones", "stages", "peers"} <= set(coneflat._PACKAGES)
+    assert {"cones", "stages"} <= set(coneflat._PACKAGES)
     assert not set(coneflat._PACKAGES) & set(coneflat.__all__)
-    for name, home in coneflat._PACKAGES.items():
-        assert getattr(coneflat, name) is import_module(f"coneflat.{home}")
+    for name in coneflat._PACKAGES:
+        assert getattr(coneflat, name) is import_module(f"coneflat.{name}")
 
 
 def test_import_and_help_load_nothing_heavy():
@@ -95,7 +95,7 @@ print(*sys.modules)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*coneflat.__all__, "peers"])
+@pytest.mark.parametrize("name", coneflat.__all__)
 def test_examples_of_public_names_run(name, tmp_path, monkeypatch):
     """Those of its own docstring; plain values have none, and theirs are in the docstring of the package."""
     documented = getattr(coneflat, name)

@@ -85,16 +85,6 @@ CALLS = {
         "degenerate triangles",
         lambda: RINGS.as_written(".npz"),
     ),
-    "flatten_by": (
-        lambda: coneflat.peers.flatten_by("lscm", *SQUARE, cone_count=5),
-        NO_CONES,
-        lambda: coneflat.peers.flatten_by("lscm", *SQUARE),
-    ),
-    "compare_methods": (
-        lambda: coneflat.peers.compare_methods(*SQUARE, peers=(), cone_count=5),
-        f"exact: {NO_CONES}",
-        lambda: coneflat.peers.compare_methods(*SQUARE, peers=()),
-    ),
 }
 RINGS = coneflat.flatten(*rings())
 UNMET = pytest.mark.parametrize(("call", "text"), [case[:2] for case in CALLS.values()], ids=CALLS)

@@ -13,14 +13,12 @@ from typing import Any
 from markers import ROOT
 
 import coneflat
-from coneflat.apps.cli.values import parse_angle
-from coneflat.apps.peers import Comparison, flatten_by
-from coneflat.options import Options, declarations
 
 sys.path.insert(0, str(ROOT / "tests"))
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import shapes
-from methods import compare_all
+from common import parse_options
+from comparisons import Comparison, compare_methods, flatten_by
 
 Report = dict[str, Any]
 
@@ -82,7 +80,7 @@ class Measured:
         key = (model, methods, str(options))
         if key not in self._comparisons:
             print(f"  {model} by {len(methods)} methods", flush=True)
-            self._comparisons[key] = compare_all(self.path(model), methods=methods, **options)
+            self._comparisons[key] = compare_methods(self.path(model), methods=methods, atlases=(), **options)
         return self._comparisons[key]
 
 
@@ -90,20 +88,7 @@ def number_text(measured: Measured, what: str, was: str) -> str:
     """Return what a number is now: by its name, and as it stands there."""
     model, *words = what.split()
     form = words.pop() if words[-1][0] in ".," else ","
-    options = dict(word.split("=", 1) for word in words if "=" in word)
+    options = parse_options(word for word in words if "=" in word)
     (key,) = (word for word in words if "=" not in word)
-    report = measured.report(model, **{name: _value(name, text) for name, text in options.items()})
+    report = measured.report(model, **options)
     return was if report is None else format(report[key], form)
-
-
-def _value(name: str, text: str) -> Any:
-    """Return what the text of an option means."""
-    if name == "by":
-        return text
-    kind = declarations(Options)[name].kind
-    if getattr(kind, "is_angle", False):
-        return parse_angle(text)
-    try:
-        return float(text) if "." in text else int(text)
-    except ValueError:
-        return text

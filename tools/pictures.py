@@ -22,8 +22,6 @@ from scipy.sparse import csr_matrix, identity
 from tables import ALLOWED, GALLERY, TRADED, TRADEOFF, tradeoff
 
 import coneflat
-from coneflat.apps.peers import METHODS
-from coneflat.apps.peers.pictures import draw_layouts
 from coneflat.apps.view import (
     Panel,
     Quantity,
@@ -46,6 +44,8 @@ from coneflat.geometry.operators import vertex_areas
 sys.path.insert(0, str(ROOT / "tests"))
 import shapes
 from chromium import browser_path
+from comparisons import COMPARED_METHODS
+from comparisons.pictures import draw_layouts
 
 DPI = 170.0
 GALLERY_DPI = 110.0
@@ -304,7 +304,7 @@ def atlases_figure(measured: Measured) -> Any:
 
 def methods_figure(measured: Measured) -> Any:
     """Return a figure of the layouts of one model by all methods."""
-    return draw_layouts(measured.comparison("rocker-arm", METHODS))
+    return draw_layouts(measured.comparison("rocker-arm", COMPARED_METHODS))
 
 
 #: What is drawn of the trade: the largest number shown for each.

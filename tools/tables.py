@@ -16,11 +16,10 @@ from measured import Measured, number_text
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
 
+from comparisons import COMPARED_METHODS, Entry, label_of
 from paper import MODELS as PUBLISHED
 
 import coneflat
-from coneflat.apps.peers import METHODS, Entry
-from coneflat.apps.peers.methods import label_of
 from coneflat.options import PAPER
 
 GALLERY = (
@@ -189,10 +188,10 @@ def methods_table(measured: Measured, body: str) -> str:
     """Return the measures of all methods on ten models with the same cones and cut."""
     if not measured.has(*COMPARED):
         return body
-    comparisons = {model: measured.comparison(model, METHODS) for model in COMPARED}
+    comparisons = {model: measured.comparison(model, COMPARED_METHODS) for model in COMPARED}
     was = _rows_of(body)
     rows = []
-    for name in METHODS:
+    for name in COMPARED_METHODS:
         found = np.array([_compared(model, comparison[name]) for model, comparison in comparisons.items()])
         error, _, _, flipped, _, mismatch = found.T
         qc, std, overlap = found[:, [1, 2, 4]].mean(axis=0)

@@ -38,7 +38,6 @@ COMMANDS = {
     "measure": 8,
     "view": 5,
     "figure": 3,
-    "compare": 2,
     "batch": 1,
     "nonsense": 1,
 }
@@ -65,7 +64,6 @@ def make_command(rng: Random, folder: Path) -> list[str]:
     outputs = {
         "view": ["page.html"],
         "figure": ["picture.png", "picture.svg"],
-        "compare": ["table"],
         "batch": ["out"],
     }
     own = outputs.get(name, ["out.obj", "out.glb", "out.ply", "out.npz", "out.xyz", "nowhere/out.obj", "."])

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapes
+from comparisons import flatten_by
 
 from coneflat import flatten
-from coneflat.apps.peers import flatten_by
 from coneflat.atlas.pack import turns_of_quantum
 from coneflat.errors import ArrayShapeError, FaceIndexError
 from coneflat.geometry import edge_lengths

@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 import shapes
+from comparisons import flatten_by
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
@@ -34,7 +35,7 @@ LOOSE = {
 def flattened(name):
     mesh, options = (RIGID | LOOSE)[name]
     if name == "least squares":
-        return coneflat.peers.flatten_by("lscm", *mesh)
+        return flatten_by("lscm", *mesh)
     return coneflat.flatten(*mesh, **options)
 
 

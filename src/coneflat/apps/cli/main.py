@@ -22,7 +22,6 @@ from .figure import demo, figure
 from .flatten import flatten, unwrap
 from .measure import measure
 from .more import blender, brain, transfer
-from .peers import compare
 from .quads import quads
 from .shared import ExitCode
 from .view import studio, view
@@ -42,7 +41,7 @@ def cli(context: click.Context) -> None:
 
 
 for command in (
-    flatten, unwrap, transfer, batch, brain, quads, measure, cones, figure, view, studio, blender, compare, demo,
+    flatten, unwrap, transfer, batch, brain, quads, measure, cones, figure, view, studio, blender, demo,
     warm_up,
 ):  # fmt: skip
     cli.add_command(command)

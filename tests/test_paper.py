@@ -12,7 +12,7 @@ import shapes
 
 from coneflat import PAPER, flatten
 
-BENCHMARKS = Path(__file__).resolve().parents[3] / "benchmarks"
+BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
 
 from paper import METHODS, MODELS, model_of, reproduce  # noqa: E402

@@ -15,7 +15,6 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags, vstack
 
 from coneflat import TriangleMesh
-from coneflat.apps.peers.disk_maps import embedding_metric
 from coneflat.base import FloatArray, IntArray, plural
 from coneflat.base.text import error_text
 from coneflat.errors import ConvergenceError, CurvatureError
@@ -26,6 +25,8 @@ from coneflat.layout import far_pins, pinned_least_squares
 from coneflat.linalg import factorize
 from coneflat.mesh import NEXT, PREVIOUS
 from coneflat.stages import ConeSolution, Cut, Embedding, FlatMetric, SolveStatistics
+
+from .disk_maps import embedding_metric
 
 # Lower bound of angles, radians: those of needles can be rounded to 0, but their logs and relative squares must be
 # finite.

@@ -9,24 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapes
-from click.testing import CliRunner
-from command import command
+from compare import main
+from comparisons import COMPARED_METHODS, Comparison, Entry, compare_methods, flatten_by
+from comparisons.atlases import ATLAS_BASELINES, AtlasBaseline, installed_baselines, run_baseline
+from comparisons.methods import CONE_BASELINES
+from comparisons.pictures import aligned_layouts, draw_layouts, draw_qualities
+from comparisons.tables import COLUMNS, comparison_csv, comparison_markdown, numbers
 
 import coneflat
 from coneflat import errors, flatten
-from coneflat.apps.cli.main import cli
-from coneflat.apps.peers import METHODS, compare_methods, flatten_by
-from coneflat.apps.peers.methods import PEERS as METHODS_OF_OTHERS
-from coneflat.apps.peers.packages import PEERS, Peer, installed_peers, run_peer
-from coneflat.apps.peers.pictures import aligned_layouts, draw_layouts, draw_qualities
-from coneflat.apps.peers.run import (
-    COLUMNS,
-    Comparison,
-    Entry,
-    comparison_csv,
-    comparison_markdown,
-    numbers,
-)
 from coneflat.apps.view import Look
 
 
@@ -37,11 +28,11 @@ def ball():
 
 @pytest.fixture(scope="module")
 def compared(ball):
-    return compare_methods(*ball, peers=())
+    return compare_methods(*ball, atlases=())
 
 
 def test_every_method_has_the_same_cones_and_cut(compared):
-    assert [entry.method for entry in compared.entries] == list(METHODS)
+    assert [entry.method for entry in compared.entries] == list(COMPARED_METHODS)
     first = compared["exact"].result
     for entry in compared.entries:
         assert entry.result is not None, entry.note
@@ -59,12 +50,12 @@ def test_conformal_methods_agree(compared):
 
 def test_tables_hold_what_was_measured(compared):
     table = comparison_markdown(compared)
-    assert table.count("| ") >= (len(METHODS) + 2) * len(COLUMNS)
+    assert table.count("| ") >= (len(COMPARED_METHODS) + 2) * len(COLUMNS)
     assert "- lscm: " in table
     assert "| bff (reimplemented here) |" in table
     assert "| exact |" in table
     rows = list(csv.DictReader(io.StringIO(comparison_csv(compared))))
-    assert [row["method"] for row in rows] == list(METHODS)
+    assert [row["method"] for row in rows] == list(COMPARED_METHODS)
     assert set(COLUMNS) < set(rows[0])
     assert float(rows[0]["QC mean"]) == compared["exact"].result.distortion.qc_mean
 
@@ -73,26 +64,26 @@ def test_a_method_that_fails_is_named_with_its_reason(ball, monkeypatch):
     def fail(*_):
         raise errors.ConvergenceError("bff did not converge")
 
-    monkeypatch.setitem(METHODS_OF_OTHERS, "bff", fail)
-    found = compare_methods(*ball, methods=("exact", "bff"), peers=())
+    monkeypatch.setitem(CONE_BASELINES, "bff", fail)
+    found = compare_methods(*ball, methods=("exact", "bff"), atlases=())
     assert found["bff"].result is None
     assert found["bff"].note == "bff did not converge"
     assert "bff did not converge" in comparison_markdown(found)
     assert [method for method, _ in found.drawn] == ["exact"]
 
 
-@pytest.mark.parametrize("name", PEERS)
-def test_peers_are_measured_like_us(ball, name):
-    if name not in installed_peers():
+@pytest.mark.parametrize("name", ATLAS_BASELINES)
+def test_baselines_are_measured_as_our_results(ball, name):
+    if name not in installed_baselines():
         pytest.skip(f"{name} is not installed")
-    found = compare_methods(*ball, methods=("exact",), peers=(name,))
+    found = compare_methods(*ball, methods=("exact",), atlases=(name,))
     assert found[name].result is not None, found[name].note
     assert found[name].result.distortion.qc_mean < 1.5
 
 
 @pytest.mark.slow
 def test_the_map_for_textures_is_a_row_with_its_energy(ball):
-    found = compare_methods(*ball, methods=("exact",), peers=("unwrap",))
+    found = compare_methods(*ball, methods=("exact",), atlases=("unwrap",))
     expected = coneflat.unwrap(*ball).distortion
     energy, charts = (list(COLUMNS).index(name) for name in ("energy", "charts"))
     row = numbers(found["unwrap"])
@@ -104,25 +95,42 @@ def test_the_map_for_textures_is_a_row_with_its_energy(ball):
 
 def test_uvs_of_others_are_welded_and_measured(ball, monkeypatch):
     ours = flatten(*ball)
-    monkeypatch.setitem(PEERS, "larger", Peer("numpy", lambda base: base.corner_uv * 3 - 1, ""))
-    theirs, _ = run_peer("larger", ours)
+    monkeypatch.setitem(
+        ATLAS_BASELINES, "larger", AtlasBaseline("numpy", lambda base: base.corner_uv * 3 - 1, "")
+    )
+    theirs, _ = run_baseline("larger", ours)
     assert len(theirs.uv) == len(ours.uv)
     assert theirs.distortion.qc_mean == pytest.approx(ours.distortion.qc_mean)
     assert {tuple(edge) for edge in np.sort(theirs.seams)} == {tuple(edge) for edge in np.sort(ours.seams)}
     assert len(theirs.cones) == 0
 
 
+def run_script(monkeypatch, *words):
+    """Run `compare.py` in this process and return its exit code; 0 if it does not exit."""
+    monkeypatch.setattr("sys.argv", ["compare.py", *map(str, words)])
+    try:
+        main()
+    except SystemExit as stopped:
+        return stopped.code
+    return 0
+
+
 @pytest.mark.slow
-def test_commands(tmp_path, ball):
+def test_the_script_prints_and_writes_tables_and_pictures(tmp_path, ball, monkeypatch, capsys):
     pytest.importorskip("matplotlib")
     mesh = shapes.write_obj(tmp_path / "ball.obj", *ball)
-    run = CliRunner().invoke(
-        cli,
-        ["compare", str(mesh), "-o", str(tmp_path / "out"), "--methods", "exact,linear", "--no-peers"],
-        catch_exceptions=False,
+    words = (
+        mesh,
+        "-o",
+        tmp_path / "out",
+        "--methods",
+        "exact,linear",
+        "--no-atlases",
+        "--options",
+        "max_cones=8",
     )
-    assert run.exit_code == 0
-    assert "exact" in run.output
+    assert run_script(monkeypatch, *words) == 0
+    assert "exact" in capsys.readouterr().out
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert names == {"compare.md", "compare.csv", "layouts.png", "quality.png"}
 
@@ -130,32 +138,34 @@ def test_commands(tmp_path, ball):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["compare", "missing.obj", "-o", "out"], "there is no such file"),
-        (["compare", "ball.obj", "--methods", "exact,"], "unknown method ''"),
-        (
-            ["compare", "ball.obj", "--eye", "front"],
-            "--eye has no effect without -o: add -o",
-        ),
-        (["compare", "ball.obj", "-o", "out", "--eye", "nowhere"], "unknown eye 'nowhere'"),
-        (["compare", "ball.obj", "-o", "busy"], "it is a folder"),
+        (["missing.obj", "-o", "out"], "there is no such file"),
+        (["ball.obj", "--methods", "exact,"], "unknown method ''"),
+        (["ball.obj", "-o", "out", "--eye", "nowhere"], "unknown eye 'nowhere'"),
+        (["ball.obj", "-o", "busy"], "it is a folder"),
     ],
 )
-def test_what_cannot_work_is_refused_before_the_work(words, message, tmp_path, ball, monkeypatch):
+def test_the_script_refuses_invalid_arguments_before_the_work(
+    words, message, tmp_path, ball, monkeypatch, capsys
+):
     pytest.importorskip("matplotlib")
     monkeypatch.chdir(tmp_path)
     shapes.write_obj(tmp_path / "ball.obj", *ball)
-    for name in ("compare.md",):
-        (tmp_path / "busy" / name).mkdir(parents=True)
+    (tmp_path / "busy" / "compare.md").mkdir(parents=True)
 
     def work(*_, **__):
         raise AssertionError("went to work")
 
-    monkeypatch.setattr("coneflat.apps.peers.run.flatten_by", work)
-    done = command(*words)
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert done.stderr.count("\n") == 1
-    assert not (tmp_path / "out").exists()
+    monkeypatch.setattr("comparisons.methods.flatten_source", work)
+    assert run_script(monkeypatch, *words) == 2
+    printed = capsys.readouterr()
+    assert message in printed.err
+    assert printed.err.count("\n") == 1
+
+
+def test_the_script_names_unknown_options(tmp_path, ball, monkeypatch, capsys):
+    mesh = shapes.write_obj(tmp_path / "ball.obj", *ball)
+    assert run_script(monkeypatch, mesh, "--options", "max_cone=3") == 2
+    assert "unknown option max_cone" in capsys.readouterr().err
 
 
 def test_scale_motion_and_numbering():

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapes
+from comparisons import flatten_by
+from comparisons.bff import HarmonicExtension, best_fit_lengths, boundary_first
+from comparisons.disk_maps import conformal_equations, least_squares_conformal
 from shapes import laid_out, lengths_of
 
 from coneflat import TriangleMesh, errors
-from coneflat.apps.peers import flatten_by
-from coneflat.apps.peers.bff import HarmonicExtension, best_fit_lengths, boundary_first
-from coneflat.apps.peers.disk_maps import conformal_equations, least_squares_conformal
 from coneflat.cones import cones_at, cones_with_curvature
 from coneflat.geometry import edge_lengths
 from coneflat.layout import far_pins

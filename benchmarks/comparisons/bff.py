@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ... import TriangleMesh
-from ...base import ComplexArray, FloatArray, IntArray
-from ...cones import GroundedLaplacian
-from ...geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
-from ...layout import closed_chain
-from ...metric import linear_flat_metric
-from ...stages import ConeSolution, Cut, Embedding, FlatMetric
+from coneflat import TriangleMesh
+from coneflat.base import ComplexArray, FloatArray, IntArray
+from coneflat.cones import GroundedLaplacian
+from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
+from coneflat.layout import closed_chain
+from coneflat.metric import linear_flat_metric
+from coneflat.stages import ConeSolution, Cut, Embedding, FlatMetric
+
 from .disk_maps import embedding_metric
 
 # Largest relative change of lengths, root mean square, for which both sides of a seam get equal lengths. Equal lengths
