@@ -74,13 +74,13 @@ def measured(name: str, rounds: int, runs: int, largest_of_baselines: int) -> di
     laplacian = csc_matrix(cotangent_laplacian(faces, cotangents(lengths), len(vertices))[1:][:, 1:])
     solver = type(factorize(laplacian)).__name__.removesuffix("Factor").lower()  # This loads the solver.
     bare = best_time(lambda: factorize(laplacian), runs)
-    found: list[Flattening] = []
+    results: list[Flattening] = []
     times = []
     for _ in range(runs):
         start = time.perf_counter()
-        found.append(flatten(vertices, faces, charts="one"))
+        results.append(flatten(vertices, faces, charts="one"))
         times.append(time.perf_counter() - start)
-    best = found[int(np.argmin(times))]
+    best = results[int(np.argmin(times))]
     return {
         "model": name,
         "triangles": len(faces),
@@ -111,8 +111,8 @@ def libigl_lscm(base: Flattening) -> np.ndarray:
     corner_uv, right = np.empty((len(base.faces), 3, 2)), 0.0
     for chart, _, faces in TriangleMesh(points, base.uv_faces).split_components():
         pins = np.array([0, int(np.argmax(((chart.vertices - chart.vertices[0]) ** 2).sum(axis=1)))])
-        found: Any = igl.lscm(chart.vertices, chart.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))
-        uv = np.asarray(found[0] if isinstance(found, tuple) else found, dtype=np.float64)[chart.faces]
+        answer: Any = igl.lscm(chart.vertices, chart.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))
+        uv = np.asarray(answer[0] if isinstance(answer, tuple) else answer, dtype=np.float64)[chart.faces]
         space = double_areas(edge_lengths(chart.vertices, chart.faces)).sum()
         uv *= np.sqrt(space / np.abs(signed_double_areas(uv)).sum())
         corner_uv[faces] = uv + np.array([right - uv[..., 0].min(), 0.0])
@@ -130,13 +130,17 @@ def line(row: dict) -> str:
 
 def growth(rows: list[dict]) -> str:
     """Return the exponents of growth of models with at least two large sizes."""
-    found = []
+    exponents = []
     for name in dict.fromkeys(row["model"] for row in rows):
         large = [row for row in rows if row["model"] == name and row["triangles"] >= FITTED_FROM]
         if len(large) > 1:
             sizes, times = (np.log([row[key] for row in large]) for key in ("triangles", "total"))
-            found.append(f"{name} {np.polyfit(sizes, times, 1)[0]:.2f}")
-    return f" Time grows with the number of triangles to the power of: {', '.join(found)}." if found else ""
+            exponents.append(f"{name} {np.polyfit(sizes, times, 1)[0]:.2f}")
+    return (
+        f" Time grows with the number of triangles to the power of: {', '.join(exponents)}."
+        if exponents
+        else ""
+    )
 
 
 def print_baselines(rows: list[dict]) -> None:

@@ -65,32 +65,32 @@ def test_a_method_that_fails_is_named_with_its_reason(ball, monkeypatch):
         raise errors.ConvergenceError("bff did not converge")
 
     monkeypatch.setitem(CONE_BASELINES, "bff", fail)
-    found = compare_methods(*ball, methods=("exact", "bff"), atlases=())
-    assert found["bff"].result is None
-    assert found["bff"].note == "bff did not converge"
-    assert "bff did not converge" in comparison_markdown(found)
-    assert [method for method, _ in found.drawn] == ["exact"]
+    comparison = compare_methods(*ball, methods=("exact", "bff"), atlases=())
+    assert comparison["bff"].result is None
+    assert comparison["bff"].note == "bff did not converge"
+    assert "bff did not converge" in comparison_markdown(comparison)
+    assert [method for method, _ in comparison.drawn] == ["exact"]
 
 
 @pytest.mark.parametrize("name", ATLAS_BASELINES)
 def test_baselines_are_measured_as_our_results(ball, name):
     if name not in installed_baselines():
         pytest.skip(f"{name} is not installed")
-    found = compare_methods(*ball, methods=("exact",), atlases=(name,))
-    assert found[name].result is not None, found[name].note
-    assert found[name].result.distortion.qc_mean < 1.5
+    comparison = compare_methods(*ball, methods=("exact",), atlases=(name,))
+    assert comparison[name].result is not None, comparison[name].note
+    assert comparison[name].result.distortion.qc_mean < 1.5
 
 
 @pytest.mark.slow
 def test_the_map_for_textures_is_a_row_with_its_energy(ball):
-    found = compare_methods(*ball, methods=("exact",), atlases=("unwrap",))
+    comparison = compare_methods(*ball, methods=("exact",), atlases=("unwrap",))
     expected = coneflat.unwrap(*ball).distortion
     energy, charts = (list(COLUMNS).index(name) for name in ("energy", "charts"))
-    row = numbers(found["unwrap"])
+    row = numbers(comparison["unwrap"])
     assert row[energy] == pytest.approx(expected.energy, rel=1e-9)
-    assert row[energy] <= 4.1 < numbers(found["exact"])[energy]
+    assert row[energy] <= 4.1 < numbers(comparison["exact"])[energy]
     assert row[charts] == expected.charts
-    assert "unwrap: short seams with free sides" in comparison_markdown(found)
+    assert "unwrap: short seams with free sides" in comparison_markdown(comparison)
 
 
 def test_uvs_of_others_are_welded_and_measured(ball, monkeypatch):
@@ -170,19 +170,19 @@ def test_the_script_names_unknown_options(tmp_path, ball, monkeypatch, capsys):
 
 def test_scale_motion_and_numbering():
     vertices, faces = shapes.sphere(3)
-    other_vertices, other_faces, new = shapes.renumber(vertices, faces)
+    renumbered_vertices, renumbered_faces, numbers = shapes.renumber(vertices, faces)
     base = flatten_by("bff", vertices, faces, cones="greedy")
     for mesh in (
         (vertices * 1e-6, faces),
         (vertices * 1e6, faces),
         (vertices @ shapes.rotation().T, faces),
-        (other_vertices, other_faces),
+        (renumbered_vertices, renumbered_faces),
     ):
-        other = flatten_by("bff", *mesh, cones="greedy")
-        assert other.distortion.qc_mean == pytest.approx(base.distortion.qc_mean, rel=1e-7)
-        assert other.distortion.qc_max == pytest.approx(base.distortion.qc_max, rel=1e-6)
-    np.testing.assert_array_equal(other.cones, new[base.cones])
-    np.testing.assert_allclose(other.log_scale[new], base.log_scale, atol=1e-6)
+        result = flatten_by("bff", *mesh, cones="greedy")
+        assert result.distortion.qc_mean == pytest.approx(base.distortion.qc_mean, rel=1e-7)
+        assert result.distortion.qc_max == pytest.approx(base.distortion.qc_max, rel=1e-6)
+    np.testing.assert_array_equal(result.cones, numbers[base.cones])
+    np.testing.assert_allclose(result.log_scale[numbers], base.log_scale, atol=1e-6)
 
 
 LONG = "a method with a long name"
@@ -200,17 +200,17 @@ def rotated(result, angle, factor=1.0, shift=0.0):
 
 @pytest.mark.parametrize("angle", [0.3, np.pi / 2, -2.9])
 def test_layouts_are_turned_back_to_lie_as_the_first(hill, angle):
-    others = [rotated(hill, angle), rotated(hill, angle, 0.4, 3.0)]
-    first, second, third = aligned_layouts([hill, *others])
+    turned = [rotated(hill, angle), rotated(hill, angle, 0.4, 3.0)]
+    first, second, third = aligned_layouts([hill, *turned])
     assert first is hill
-    sides = [np.diff(each.uv[each.uv_faces], axis=1) for each in (first, second, third)]
+    sides = [np.diff(layout.uv[layout.uv_faces], axis=1) for layout in (first, second, third)]
     np.testing.assert_allclose(sides[1], sides[0], atol=1e-12)
     np.testing.assert_allclose(sides[2], 0.4 * sides[0], atol=1e-12)
 
 
 def test_layouts_of_other_charts_stay(hill):
-    other = coneflat.flatten(*shapes.box(3), sharp_angle=1.0)
-    assert aligned_layouts([hill, other])[1] is other
+    box = coneflat.flatten(*shapes.box(3), sharp_angle=1.0)
+    assert aligned_layouts([hill, box])[1] is box
 
 
 @pytest.mark.slow
@@ -230,7 +230,7 @@ def test_no_text_runs_into_another_or_over_the_edge(stretch):
             assert box.x0 >= 0
             assert box.x1 <= width + 1
             assert 0 <= box.y0 <= box.y1 <= height + 1
-        for k, one in enumerate(labels):
-            for other in labels[k + 1 :]:
-                assert not one.overlaps(other)
+        for k, label in enumerate(labels):
+            for next_label in labels[k + 1 :]:
+                assert not label.overlaps(next_label)
         assert min(text.get_fontsize() for text in figure.texts) > 5

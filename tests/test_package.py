@@ -107,16 +107,16 @@ def test_examples_of_public_names_run(name, tmp_path, monkeypatch):
         pytest.importorskip("starlette")
         pytest.importorskip("uvicorn")
     monkeypatch.chdir(tmp_path)
-    found = doctest.DocTestFinder(recurse=False).find(
+    doctests = doctest.DocTestFinder(recurse=False).find(
         documented, name, globs={"coneflat": coneflat, "np": np}
     )
-    examples = [example for test in found for example in test.examples]
+    examples = [example for test in doctests for example in test.examples]
     run = [example.source for example in examples if not example.options.get(doctest.SKIP)]
     about = [source for source in run if name in source] if documented is coneflat else run
     assert about
     printed = []
     runner = doctest.DocTestRunner(verbose=False)
-    for test in found:
+    for test in doctests:
         runner.run(test, out=printed.append)
     assert "".join(printed) == ""
     assert list(tmp_path.iterdir()) == []

@@ -38,11 +38,11 @@ class Measured:
         """Return the path of a model; None, with one message, if it is missing."""
         if model == "sample":
             return coneflat.sample_path()
-        found = sorted(self._folder.glob(f"{model}.*"))
-        if not found and model not in self._missing:
+        paths = sorted(self._folder.glob(f"{model}.*"))
+        if not paths and model not in self._missing:
             self._missing.add(model)
             print(f"{model} is not in {self._folder}: what is said of it is left as it is", flush=True)
-        return found[0] if found else None
+        return paths[0] if paths else None
 
     def has(self, *models: str) -> bool:
         """Return whether all given models exist."""
@@ -84,11 +84,11 @@ class Measured:
         return self._comparisons[key]
 
 
-def number_text(measured: Measured, what: str, was: str) -> str:
+def number_text(measured: Measured, definition: str, present: str) -> str:
     """Return what a number is now: by its name, and as it stands there."""
-    model, *words = what.split()
+    model, *words = definition.split()
     form = words.pop() if words[-1][0] in ".," else ","
     options = parse_options(word for word in words if "=" in word)
     (key,) = (word for word in words if "=" not in word)
     report = measured.report(model, **options)
-    return was if report is None else format(report[key], form)
+    return present if report is None else format(report[key], form)
