@@ -22,7 +22,7 @@ import numpy as np
 
 from ..base import THREADS, Unmet, limit_threads, plural
 from ..errors import ConvergenceError, GridError, OptionError
-from ..flattening import flatten_source
+from ..flattener import flatten_source
 from ..geometry import coarse_mesh, double_areas, edge_lengths
 from ..io import as_input
 from ..measures import unmet_guarantees

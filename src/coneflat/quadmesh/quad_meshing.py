@@ -113,7 +113,7 @@ def _quads_of_grid(grid: IntegerGrid, rounds: int, stages: Stopwatch) -> QuadMes
 def _quads_of_request(request: GridRequest, rounds: int) -> QuadMesh:
     """Return the smoothed quads that are asked for: of a simpler mesh if this is needed, moved to the given one."""
     stages = request.stages
-    source = request.flattening.source if request.flattening else request.source.given.source
+    source = request.flattening.source if request.flattening else request.source.input_mesh.source
     with stages("coarsen"):
         request, simpler = on_coarse_mesh(request)
     stages.done = 0.0

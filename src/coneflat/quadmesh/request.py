@@ -132,7 +132,7 @@ class GridRequest:
         options = read_options(
             {"lengths": side_lengths, "repair": self.options.get("repair", False)}, Options
         )
-        lengths = None if side_lengths is None else self.source.prepared(options).own_lengths
+        lengths = None if side_lengths is None else self.source.prepared(options).user_lengths
         if lengths is None:
             lengths = edge_lengths(checked.mesh.vertices, checked.mesh.faces)
         area = double_areas(lengths).sum() / 2

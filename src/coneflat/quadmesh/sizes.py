@@ -33,7 +33,7 @@ def target_scales(source: Source, checked: CheckedMesh, sizes: Any) -> FloatArra
     """
     if isinstance(sizes, str) and sizes == "curvature":
         return _scales_of_curvature(checked.mesh)
-    numbers = vertex_numbers("sizes", sizes, source.given, checked.vertex_origin)
+    numbers = vertex_numbers("sizes", sizes, source.input_mesh, checked.vertex_origin)
     if numbers is None or not numbers.min() > 0:
         raise OptionError("sizes must be positive; there are some of 0")
     return -np.log(numbers)
