@@ -129,8 +129,6 @@ def imported_packages(modules: dict[str, Module]) -> dict[str, frozenset[str]]:
         others = {package_of(other) for other in module.imports | module.late_imports}
         if own == "":
             others = set()
-        if name == "quadmesh.quad_mesh":  # its `save` and `view`
-            others = {package_of(other) for other in module.imports}
         found.setdefault(own, set()).update(others - {own, ""})
     return {name: frozenset(others) for name, others in found.items()}
 

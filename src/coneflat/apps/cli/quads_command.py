@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from ...options import ConeBounds, ConeNumber, declarations, read_options
-from ...quadmesh.options import QuadOptions
+from ...quadmesh import QuadOptions
 from .flags import (
     GroupedCommand,
     input_options,
@@ -68,7 +68,7 @@ def quads(
     from ... import integer_grid, measure_quads
     from ... import quads as find_quads
     from ...io import check_target, read_joined
-    from ...quadmesh.files import check_grid_output, check_quads_output, quads_left_out, read_grid
+    from ...quadmesh import check_grid_output, check_quads_output, quads_left_out, read_grid
     from ..view import check_page, page_of_quads, write_page
     from .run import Console, require_distinct, write_report
 
