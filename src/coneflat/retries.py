@@ -181,9 +181,9 @@ def search_more_cones(
             # About that many times as many cones are needed; a search without enough of them takes longest.
             if factor > TOLERATED_EXCESS and factor * len(latest[i].cones) <= MAX_SEARCHED:
                 tightened[i] = attempt.with_distortion(TOLERATED_EXCESS / factor)
-        better = retried(tightened, beyond, latest, steps)
-        improved |= better
-        attempts = {i: tightened[i] for i in better}
+        improvements = retried(tightened, beyond, latest, steps)
+        improved |= improvements
+        attempts = {i: tightened[i] for i in improvements}
     return improved
 
 
@@ -201,13 +201,13 @@ def retried(
         finished: their layouts.
         steps: the functions of the stages.
     """
-    better = dict[int, Layout]()
+    improvements = dict[int, Layout]()
     for group in groups_of_small(attempts, steps.relax):
         members = {i: attempts[i] for i in group}
         with suppress(*FAILURES):
             candidates = finish_components(members, lay_out_components(members, steps), steps)
-            better |= better_layouts(candidates, finished, components)
-    return better
+            improvements |= better_layouts(candidates, finished, components)
+    return improvements
 
 
 def better_layouts(
