@@ -8,14 +8,13 @@ from numpy.typing import ArrayLike
 
 from .base.arrays import FloatArray
 from .base.notes import warns
-from .cones import close_search
+from .cones import ConeSurface
 from .flattening import Preview, flatten_source
 from .io.packages import as_input
 from .mesh.connectivity import TriangleMesh
 from .options import Options, read_options
 from .result import Flattening
 from .source.parts import Source
-from .stages import Surface
 
 
 class Flattener:
@@ -46,7 +45,7 @@ class Flattener:
 
     def __init__(self, mesh: Any, faces: ArrayLike | None = None) -> None:
         self._source = Source(as_input(mesh, faces))
-        self._surfaces: dict[tuple[int, bool], Surface] = {}
+        self._surfaces: dict[tuple[int, bool], ConeSurface] = {}
         self._threads: int | None = None
 
     @warns()
@@ -79,12 +78,17 @@ class Flattener:
         try:
             return flatten_source(self._source, options, self._surface, on_preview=on_preview)
         finally:
-            for surface in self._surfaces.values():
-                close_search(surface)
+            self._close_searches()
 
-    def _surface(self, mesh: TriangleMesh, lengths: FloatArray, flips: bool) -> Surface:
+    def _surface(self, mesh: TriangleMesh, lengths: FloatArray, flips: bool) -> ConeSurface:
+        self._close_searches()
         key = id(mesh), flips
         if key not in self._surfaces:
-            self._surfaces[key] = Surface.of(mesh, lengths, flips)
+            self._surfaces[key] = ConeSurface.of(mesh, lengths, flips)
             self._surfaces[key].is_reused = True
         return self._surfaces[key]
+
+    def _close_searches(self) -> None:
+        """Delete the searches for cones: the sets that they found must not affect later results."""
+        for surface in self._surfaces.values():
+            surface.close_search()

@@ -19,7 +19,7 @@ from .base.progress import Stopwatch
 from .base.text import list_some, plural
 from .base.threads import concurrently, limit_threads
 from .bounds import TOLERATED_EXCESS, borders_and_distortion, bound_notes, excess, is_too_distorted, rank
-from .cones import MAX_SEARCHED, close_search, find_cones, leaves_flat_disks
+from .cones import MAX_SEARCHED, ConeSurface, find_cones, leaves_flat_disks
 from .errors import ConvergenceError, CurvatureError, MetricError, OptionError, SeamError
 from .evaluate import evaluate
 from .geometry.opening import RISKY_AREA, thickness, with_slack
@@ -41,7 +41,7 @@ from .stages import ConeSolution, ConeSpec, FlatMetric, Layout, MetricSpec, Rela
 #: Receives the first layout, before triangles are relaxed and overlaps are separated.
 Preview: TypeAlias = Callable[[Flattening], object]
 #: Returns a connected mesh with the operators of its (m, 3) lengths; the flag allows edge flips.
-SurfaceOf: TypeAlias = Callable[[TriangleMesh, FloatArray, bool], Surface]
+SurfaceOf: TypeAlias = Callable[[TriangleMesh, FloatArray, bool], ConeSurface]
 #: Returns the flat metric of a connected mesh for its cones.
 FindMetric: TypeAlias = Callable[[Surface, ConeSolution, MetricSpec], FlatMetric]
 
@@ -126,7 +126,7 @@ class Method:
 def flatten_source(
     source: Source,
     o: Options,
-    surface_of: SurfaceOf = Surface.of,
+    surface_of: SurfaceOf = ConeSurface.of,
     find_metric: FindMetric = conformal_metric,
     on_preview: Preview | None = None,
 ) -> Flattening:
@@ -293,19 +293,19 @@ def lay_out_with_lengths(part: Part, method: Method) -> Layout:
         if not (was_searched and part.is_exact and len(infeasible)):
             break
         wanted = wanted.without(infeasible)
-    close_search(surface)
     assert best is not None
     return best
 
 
-def lay_out_once(surface: Surface, part: Part, wanted: ConeSpec, method: Method) -> tuple[Layout, bool]:
+def lay_out_once(surface: ConeSurface, part: Part, wanted: ConeSpec, method: Method) -> tuple[Layout, bool]:
     """Return a layout of a part with the cones found for it, and whether the sparse search found them."""
     watch, mesh = method.watch, part.mesh
     with watch("cones", 0.5):
-        holonomy = None if wanted.quantum is None else loop_rotations(surface, part.metric)
+        if wanted.quantum is not None:
+            wanted = replace(wanted, rotations=loop_rotations(surface, part.metric))
         # The second thread prepares what the metric needs from the surface alone.
         with concurrently(partial(surface.prepare, part.metric.method), len(mesh.faces)):
-            cones = find_cones(surface, wanted, watch, holonomy)
+            cones = find_cones(surface, wanted)
         is_polyhedron = bool(np.ptp(cones.log_scale) < CONSTANT_SCALE)
         costs = seam_costs(mesh, part.lengths, part.seams, is_polyhedron)
     # The cut depends on the cones alone. Computing it next to the metric saves 9% of the time with 97,000 triangles on

@@ -15,13 +15,14 @@ import coneflat
 from coneflat import errors, measure_uv, unwrap
 from coneflat.atlas import ChartLayout, with_charts
 from coneflat.base import Stopwatch
+from coneflat.cones import ConeSurface
 from coneflat.flattening import Method, lay_out_part
 from coneflat.geometry import corner_angles, signed_double_areas
 from coneflat.io import as_input
 from coneflat.metric import find_metric
 from coneflat.options import Options
 from coneflat.source import Source
-from coneflat.stages import RelaxSpec, Surface
+from coneflat.stages import RelaxSpec
 from coneflat.textures.free_seams import freed
 from coneflat.textures.search import CutSearch, coarse_part
 from coneflat.textures.unwrapping import along_sharp_edges
@@ -126,7 +127,7 @@ def test_freed_seams_lower_the_energy():
     source = Source(as_input(tied.vertices, tied.faces))
     cones = dict(zip(tied.cones.tolist(), tied.curvatures.tolist(), strict=True))
     part = source.prepared(Options(cones=cones)).parts[0]
-    method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
+    method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), ConeSurface.of, find_metric)
     free, energy = freed(lay_out_part(part, method))
     assert len(free.seams) == len(tied.seams)
     assert 4 < energy < tied.distortion.energy - 1e-3
@@ -135,7 +136,7 @@ def test_freed_seams_lower_the_energy():
 @pytest.mark.slow
 def test_a_flipped_start_is_replaced():
     part = Source(as_input(*shapes.hill())).prepared(Options()).parts[0]
-    method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
+    method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), ConeSurface.of, find_metric)
     layout = lay_out_part(part, method)
     points = layout.points.copy()
     inner = int(np.flatnonzero(~part.mesh.is_boundary_vertex)[0])
@@ -148,7 +149,7 @@ def test_a_flipped_start_is_replaced():
 def test_few_flipped_triangles_are_untangled_in_place(monkeypatch):
     """Embedding the whole chart anew takes many more steps."""
     part = Source(as_input(*shapes.hill(20, 20))).prepared(Options()).parts[0]
-    method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
+    method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), ConeSurface.of, find_metric)
     layout = lay_out_part(part, method)
     wanted, points = freed(layout)[1], layout.points.copy()
     at = layout.corners[part.mesh.faces == np.flatnonzero(~part.mesh.is_boundary_vertex)[150]]

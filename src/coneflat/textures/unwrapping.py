@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base import TYPED_TOLERANCE, FloatArray, Stopwatch, Unmet, limit_threads, plural, warns
+from ..cones import ConeSurface
 from ..errors import ConvergenceError
 from ..evaluate import evaluate, packed_scale
 from ..flattening import Method, lay_out_flat_parts, with_copies
@@ -96,7 +97,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
             mirror, prepared = half_of(prepared, source, shared)
         stacked, prepared = without_copies(prepared) if o.stack == "copies" else (None, prepared)
     relax, separates = RelaxSpec("off", 0.0), shared.charts == "atlas"
-    method = Method(relax, separates, None, Stopwatch(), Surface.of, quick_metric, untangles=False)
+    method = Method(relax, separates, None, Stopwatch(), ConeSurface.of, quick_metric, untangles=False)
     parts, found = along_sharp_edges(prepared.parts), dict[int, Candidate]()
     areas, sizes = np.array([(double_areas(part.lengths).sum(), len(part.faces)) for part in parts]).T
     is_minor = areas < MINOR_SHARE * areas.sum()

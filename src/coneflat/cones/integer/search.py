@@ -102,7 +102,7 @@ def moved_cones(
             break
         moved_curvatures, origins = curvatures[cones], places[cones]
         distances = np.concatenate(
-            [search.exact.squared_distances(places[c], targets[cones == c]) for c in np.unique(cones)]
+            [search.fine.squared_distances(places[c], targets[cones == c]) for c in np.unique(cones)]
         )
         costlier = (
             2 * moved_curvatures * (score[targets] - score[origins])
@@ -135,7 +135,7 @@ def _moves(search: ConeSearch, places: IntArray) -> tuple[IntArray, IntArray]:
     """Return the cone and the target of all moves to usable vertices nearby; required cones are not moved."""
     cones, targets = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     for i in range(len(search.coarse.fixed), len(places)):
-        neighbours = search.exact.neighbours(
+        neighbours = search.fine.neighbours(
             int(places[i]), min(MAX_NEIGHBOURS, 1 + MAX_COMPARED // len(places))
         )
         targets.append(neighbours[~np.isin(neighbours, places)])
@@ -182,9 +182,9 @@ def quantise_cones(
     """
     lattice = make_lattice(search, quantum)
     goal = 0.0 if count is not None else distortion * distortion
-    max_count = min(limit for limit in (count, max_count, search.most_cones) if limit is not None)
+    max_count = min(limit for limit in (count, max_count, search.max_cones) if limit is not None)
     search_coarse(search, lattice, goal, max_count)
-    exact = Lattice(search.exact, lattice.quanta, lattice.total)
+    fine = Lattice(search.fine, lattice.quanta, lattice.total)
     sizes = [size for size in lattice.best.sizes if size <= max_count]
     if not sizes:
         raise CurvatureError(
@@ -196,15 +196,15 @@ def quantise_cones(
         (size for size in sizes if lattice.best.energy(size) <= goal), min(sizes, key=lattice.best.energy)
     )
     for size in sizes[sizes.index(first) :]:
-        if refine(search, lattice, exact, size) <= goal:
+        if refine(search, lattice, fine, size) <= goal:
             break
     for size in reversed(sizes[: sizes.index(first)]):
         is_near = lattice.best.energy(size) <= goal * COARSE_MODEL_ERROR
-        if not is_near or not refine(search, lattice, exact, size) <= goal:
+        if not is_near or not refine(search, lattice, fine, size) <= goal:
             break
-    best = exact.best.fewest(goal)
+    best = fine.best.fewest(goal)
     order = _order_to_round_in(search, best.members)
-    places = search.exact.unknowns[best.members[order]]
+    places = search.fine.unknowns[best.members[order]]
     solution = search.solution_of(places, lattice.curvatures(best)[order])
     return QuantisedCones(solution, best.indices[order], lattice.quanta.quantum, math.sqrt(best.energy))
 
@@ -248,8 +248,8 @@ def _order_to_round_in(search: ConeSearch, members: IntArray) -> IntArray:
     the sample and a scan had grids of about the requested size. If slopes are equal up to rounding, the order is that
     of the vertices of the search.
     """
-    order, required = search.exact.in_order(members), len(search.exact.fixed)
-    slope = search.exact.slope[members[order[required:]]]
+    order, required = search.fine.in_order(members), len(search.fine.fixed)
+    slope = search.fine.slope[members[order[required:]]]
     steps = np.round(slope / max(MIN_RELATIVE_GAIN * np.abs(slope).max(initial=0.0), np.finfo(float).tiny))
     return np.append(order[:required], order[required:][np.argsort(-steps, kind="stable")])
 
@@ -258,7 +258,7 @@ def search_coarse(search: ConeSearch, lattice: Lattice, goal: float, max_count: 
     """Find good sets of cones on the coarse model, of all sizes up to slightly more than needed."""
     model, best = search.coarse, lattice.best
     fewest = max(lattice.fewest, len(model.fixed))
-    max_count = min(max_count + 1, search.most_cones)
+    max_count = min(max_count + 1, search.max_cones)
     model.climb(goal / COARSE_MODEL_ERROR, max_count)
     for cones in model.best:
         # Of many sizes, fewer are rounded: growing finds the others.
@@ -294,20 +294,20 @@ def _offer(lattice: Lattice, cones: IndexedCones | None, max_count: float = math
         lattice.best.offer(lattice.exchanged(cones))
 
 
-def refine(search: ConeSearch, lattice: Lattice, exact: Lattice, size: int) -> float:
+def refine(search: ConeSearch, lattice: Lattice, fine: Lattice, size: int) -> float:
     """Move the cones of the best coarse set of a size over the mesh until E converges; return E^2."""
-    model, start = search.exact, lattice.best[size]
+    model, start = search.fine, lattice.best[size]
     members = model.insert(search.places[start.members])
-    cones = exact.exchanged(exact.descended(members, start.indices))
+    cones = fine.exchanged(fine.descended(members, start.indices))
     for _ in range(MAX_ROUNDS):
         known_count = len(model.unknowns)
-        model.insert(model.targets(cones.members, exact.curvatures(cones), cones.energy))
+        model.insert(model.targets(cones.members, fine.curvatures(cones), cones.energy))
         if len(model.unknowns) == known_count:
             break
-        moved = exact.exchanged(exact.descended(cones.members, cones.indices))
+        moved = fine.exchanged(fine.descended(cones.members, cones.indices))
         stalled = not moved.energy < cones.energy * (1 - MIN_PROMISED_GAIN)
         cones = moved
         if stalled:
             break
-    exact.best.offer(cones)
+    fine.best.offer(cones)
     return cones.energy
