@@ -18,7 +18,7 @@ from .geometry import double_areas
 from .geometry.operators import area_distortion, weighted_areas
 from .io.packages import as_input
 from .options import CurveOptions, FindOptions, Options, read_options, takes
-from .source.parts import Part, Source
+from .source.components import Component, Source
 from .stages import ConeSolution
 
 if TYPE_CHECKING:
@@ -201,7 +201,7 @@ def whole_curve(mesh: Any, options: Options, max_count: int) -> WholeCurve:
     stages = Stopwatch(options.progress)
     with limit_threads(options.threads):
         with stages("check"):
-            parts = Source(as_input(mesh)).prepared(options).parts
+            parts = Source(as_input(mesh)).prepared(options).components
         total, curves = sum(len(part.faces) for part in parts), []
         for part in parts:
             stages.share = len(part.faces) / total
@@ -219,17 +219,18 @@ def whole_curve(mesh: Any, options: Options, max_count: int) -> WholeCurve:
     return WholeCurve(counts, distortions, len(parts))
 
 
-def _largest(mesh: Any, faces: ArrayLike | None, options: Options, stages: Stopwatch) -> Part:
+def _largest(mesh: Any, faces: ArrayLike | None, options: Options, stages: Stopwatch) -> Component:
     """Return the largest component of a mesh; progress counts this component alone."""
     with stages("check"):
         part = max(
-            Source(as_input(mesh, faces)).prepared(options).parts, key=lambda component: len(component.faces)
+            Source(as_input(mesh, faces)).prepared(options).components,
+            key=lambda component: len(component.faces),
         )
     stages.share = 1.0
     return part
 
 
-def _curve(part: Part, max_count: int, stages: Stopwatch) -> tuple[ConeCurve, float]:
+def _curve(part: Component, max_count: int, stages: Stopwatch) -> tuple[ConeCurve, float]:
     """Return the curve of a component and twice its area."""
     area, search = float(double_areas(part.lengths).sum()), _open(part, stages)
     if isinstance(search, FoundCones):
@@ -241,7 +242,7 @@ def _curve(part: Part, max_count: int, stages: Stopwatch) -> tuple[ConeCurve, fl
     return ConeCurve(tuple(_found_cones(cones.solution, cones.distortion, part) for cones in curve)), area
 
 
-def _open(part: Part, stages: Stopwatch) -> ConeSearch | FoundCones:
+def _open(part: Component, stages: Stopwatch) -> ConeSearch | FoundCones:
     """Return a cone search on a component, or the only possible set of cones if there is nothing to search."""
     surface = ConeSurface.of(part.mesh, part.lengths)
     coneless = coneless_solution(surface, part.cones)
@@ -252,5 +253,5 @@ def _open(part: Part, stages: Stopwatch) -> ConeSearch | FoundCones:
         return surface.search(part.cones)
 
 
-def _found_cones(solution: ConeSolution, distortion: float, part: Part) -> FoundCones:
+def _found_cones(solution: ConeSolution, distortion: float, part: Component) -> FoundCones:
     return FoundCones(part.cones.names[solution.cones], solution.curvatures, distortion)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from ..base.progress import stage
 from ..stages import ConeSolution, ConeSpec
 from .strategies.auto import place_automatically
 from .strategies.greedy import place_greedy
@@ -22,6 +23,7 @@ STRATEGIES: dict[str, Callable[[ConeSurface, ConeSpec], ConeSolution]] = {
 }
 
 
+@stage("cones")
 def find_cones(surface: ConeSurface, spec: ConeSpec) -> ConeSolution:
     """Return cones with their curvatures and linear log conformal factor.
 

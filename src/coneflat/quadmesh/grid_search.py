@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..base import THREADS, FloatArray, Stopwatch, Unmet, limit_threads, plural, warns
 from ..errors import ConvergenceError, CurvatureError, GridError, MetricError, OptionError, SeamError
-from ..flattening import flatten_source
+from ..flattener import flatten_source
 from ..geometry import double_areas, edge_lengths
 from ..io import as_input
 from ..measures import unmet_guarantees
@@ -321,7 +321,7 @@ class GridSearch:
         """The root of the area of the mesh, in model units."""
         checked, given = self.checked, self.result.lengths if self.result else self.options.get("lengths")
         options = read_options({"lengths": given, "repair": self.options.get("repair", False)}, Options)
-        own = None if given is None else self.source.prepared(options).own_lengths
+        own = None if given is None else self.source.prepared(options).user_lengths
         lengths = edge_lengths(checked.mesh.vertices, checked.mesh.faces) if own is None else own
         return float(np.ldexp(max(np.sqrt(double_areas(lengths).sum() / 2), 1e-150), -checked.exponent))
 

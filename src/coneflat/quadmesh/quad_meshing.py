@@ -77,7 +77,7 @@ def quads(
     else:
         search = replace(GridSearch.of(mesh, faces, own, options), for_quads=True)
         stages = search.stages
-        source = search.result.source if search.result else search.source.given.source
+        source = search.result.source if search.result else search.source.input_mesh.source
         with stages("coarsen"):
             search, small = simplified(search)
         try:

@@ -33,7 +33,7 @@ def wanted_scales(source: Source, checked: CheckedMesh, sizes: Any) -> FloatArra
     """
     if isinstance(sizes, str) and sizes == "curvature":
         return _scales_of_curvature(checked.mesh)
-    found = vertex_numbers("sizes", sizes, source.given, checked.vertex_origin)
+    found = vertex_numbers("sizes", sizes, source.input_mesh, checked.vertex_origin)
     if found is None or not found.min() > 0:
         raise OptionError("sizes must be positive; there are some of 0")
     return -np.log(found)
