@@ -67,7 +67,8 @@ def quantised_cones(
 ) -> QuantisedCones:
     """Return cones whose curvatures are multiples of a quantum; those on handles are moved to align rotations."""
     from ...geometry.handles import loop_holonomy
-    from ..integer.search import align_handles, quantise_cones
+    from ..integer.alignment import align_handles
+    from ..integer.search import quantise_cones
 
     quantised = quantise_cones(
         search, quantum, distortion=spec.distortion, count=spec.count, max_count=spec.max_count
