@@ -10,7 +10,7 @@ import numpy as np
 
 from .base.progress import stage
 from .bounds import TOLERATED_EXCESS, borders_and_distortion, excess, is_too_distorted, rank
-from .cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, close_search, uses_sparse_search, with_corners
+from .cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, uses_sparse_search, with_corners
 from .errors import ConvergenceError, CurvatureError, MetricError, OptionError, SeamError
 from .flattening import (
     Steps,
@@ -83,7 +83,6 @@ def lay_out_with_feasible_cones(component: Component, steps: Steps) -> Layout:
         if not (may_repeat and len(infeasible)):
             break
         component = replace(component, cones=component.cones.without(infeasible))
-    close_search(surface)
     return min(layouts, key=lambda layout: (len(layout.notes), len(infeasible_cones(layout))))
 
 
