@@ -54,7 +54,9 @@ class MinorComponents:
         """Return a candidate for each component; None for components with an energy above the bound."""
         candidates = self._candidates_from(self._first_cones())
         has_few = np.flatnonzero(self._corners_per_component() > 0).tolist()
-        polyhedra = [i for i in has_few if (one := candidates[i]) is None or len(one.layout.seams)]
+        polyhedra = [
+            i for i in has_few if (candidate := candidates[i]) is None or len(candidate.layout.seams)
+        ]
         if polyhedra:
             opened = MinorComponents([self._searches[i] for i in polyhedra])
             for i, at_corners in zip(polyhedra, opened._candidates_from(opened._corners()), strict=True):
@@ -86,24 +88,26 @@ class MinorComponents:
         own_places = np.split(places, np.flatnonzero(np.diff(self._of_face)) + 1)
         own_seams = np.split(seams, np.searchsorted(seams, self._first_edge[1:-1]))
         own_cones = np.split(vertices, np.searchsorted(vertices, self._first[1:-1]))
-        found = list[Candidate | None]()
+        candidates = list[Candidate | None]()
         for i, search in enumerate(self._searches):
             cut = own_seams[i] - self._first_edge[i], own_cones[i] - self._first[i]
             layout = laid_out(search.component.mesh, search.component.lengths, own_places[i], *cut)
             cost, alone = search.cost_of(layout), i not in overlapping
-            one = Candidate(layout, float(energies[i]), cost, float(distortion[i]), is_separated=alone)
-            one = one if alone else search.settled(search.separated(one))
-            found.append(one if one.energy <= bound else None)
-        return found
+            candidate = Candidate(layout, float(energies[i]), cost, float(distortion[i]), is_separated=alone)
+            candidate = candidate if alone else search.settled(search.separated(candidate))
+            candidates.append(candidate if candidate.energy <= bound else None)
+        return candidates
 
     def _lay_out(self, disk: TriangleMesh, places: FloatArray, is_open: BoolArray) -> FloatArray:
         """Change the corners (m, 3, 2) in the plane of open components, and return the energy of each component."""
         of, moved = self._of_face, np.flatnonzero(is_open[self._of_face])
-        used, corners = np.unique(disk.faces[moved], return_inverse=True)
-        some, lengths = TriangleMesh(disk.vertices[used], corners.reshape(-1, 3)), self._lengths[moved]
-        points = embedded_disks(some, of[moved], self._areas[moved])
-        found = relax(some, points, some.faces, StretchEnergy(1.0), lengths=lengths, tolerance=TOLERANCE)
-        places[moved] = found.points[some.faces]
+        vertices, corners = np.unique(disk.faces[moved], return_inverse=True)
+        submesh, lengths = TriangleMesh(disk.vertices[vertices], corners.reshape(-1, 3)), self._lengths[moved]
+        points = embedded_disks(submesh, of[moved], self._areas[moved])
+        relaxed = relax(
+            submesh, points, submesh.faces, StretchEnergy(1.0), lengths=lengths, tolerance=TOLERANCE
+        )
+        places[moved] = relaxed.points[submesh.faces]
         with np.errstate(all="ignore"):  # flipped triangles
             energies = self._searches[0].energies_of(self._lengths, places)
         energies[~(signed_double_areas(places) > 0)] = np.inf

@@ -49,12 +49,12 @@ def find_mirror(mesh: TriangleMesh) -> Mirror:
     """
     failures = list[tuple[float, str]]()
     for plane in _planes(mesh.vertices):
-        found = _mirror_at(plane, mesh)
-        if isinstance(found, Mirror):
-            return found
-        failures.append(found)
-    why = min(failures, key=lambda one: one[0])[1]
-    raise OptionError(f"stack mirrored needs a model that is mirrored vertex by vertex: {why}")
+        mirror = _mirror_at(plane, mesh)
+        if isinstance(mirror, Mirror):
+            return mirror
+        failures.append(mirror)
+    reason = min(failures, key=lambda failure: failure[0])[1]
+    raise OptionError(f"stack mirrored needs a model that is mirrored vertex by vertex: {reason}")
 
 
 def half_of(prepared: Prepared, source: Source, options: Options) -> tuple[Mirror, Prepared]:
@@ -78,11 +78,13 @@ def half_of(prepared: Prepared, source: Source, options: Options) -> tuple[Mirro
         seams = seams[0], np.concatenate([seams[1], pairs])
     else:
         seams = pairs if seams is None else np.concatenate([np.asarray(seams), pairs])
-    whole = source.prepared(replace(options, seams=seams))
+    cut_prepared = source.prepared(replace(options, seams=seams))
     components = [
-        _with_free(component, ends) for component in whole.components if mirror.is_half[component.faces[0]]
+        _with_free(component, ends)
+        for component in cut_prepared.components
+        if mirror.is_half[component.faces[0]]
     ]
-    return mirror, replace(whole, components=tuple(components))
+    return mirror, replace(cut_prepared, components=tuple(components))
 
 
 def both_halves(half: Flattening, mirror: Mirror, prepared: Prepared) -> Flattening:
@@ -102,9 +104,9 @@ def both_halves(half: Flattening, mirror: Mirror, prepared: Prepared) -> Flatten
     uv_faces.ravel()[mirror.images] = uv_faces.ravel()[mirror.corners] + len(half.uv)
 
     def of_faces(values: FloatArray) -> FloatArray:
-        found = np.empty(len(faces))
-        found[chosen] = found[partner] = values
-        return found
+        of_both = np.empty(len(faces))
+        of_both[chosen] = of_both[partner] = values
+        return of_both
 
     def of_vertices(values: FloatArray) -> FloatArray:
         return np.where(np.isnan(values), values[image], values)
@@ -139,8 +141,8 @@ def _planes(points: FloatArray) -> Iterator[FloatArray]:
         (np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2], points.mean(axis=0)),
     ):
         for normal in normals:
-            own = normal * np.sign(normal[np.abs(normal).argmax()]) + 0.0  # without -0
-            yield np.append(own, centre @ own)
+            signed_normal = normal * np.sign(normal[np.abs(normal).argmax()]) + 0.0  # without -0
+            yield np.append(signed_normal, centre @ signed_normal)
 
 
 def _mirror_at(plane: FloatArray, mesh: TriangleMesh) -> Mirror | tuple[float, str]:
@@ -159,37 +161,39 @@ def _mirror_at(plane: FloatArray, mesh: TriangleMesh) -> Mirror | tuple[float, s
             f"{plural(count, 'vertex', 'vertices')} of {len(positions):,} without an image about {name}",
         )
     # The corners of each face in order, and in the reverse order, from the smallest position.
-    own, turned = place.ravel()[mesh.faces], image[place.ravel()[mesh.faces]]
-    start = 3 * np.arange(len(own))[:, None]
-    here, there = (
+    face_places, image_places = place.ravel()[mesh.faces], image[place.ravel()[mesh.faces]]
+    start = 3 * np.arange(len(face_places))[:, None]
+    corners, image_corners = (
         start + (rows.argmin(axis=1)[:, None] + sign * np.arange(3)) % 3
-        for rows, sign in ((own, 1), (turned, -1))
+        for rows, sign in ((face_places, 1), (image_places, -1))
     )
-    rows = np.concatenate([own.ravel()[here], turned.ravel()[there]])
+    rows = np.concatenate([face_places.ravel()[corners], image_places.ravel()[image_corners]])
     key, back = np.split(np.unique(rows, axis=0, return_inverse=True)[1].ravel(), 2)
     # Of faces at the same place, which are layers of the surface, the first is the image of the first, and so on.
     order = np.argsort(key, kind="stable")
     layer = np.empty_like(order)
     layer[order] = np.arange(len(order)) - np.searchsorted(key[order], key[order])
     partner = order[np.minimum(np.searchsorted(key[order], back) + layer, len(key) - 1)]
-    is_missing = (key[partner] != back) | (partner[partner] != np.arange(len(own)))
+    is_missing = (key[partner] != back) | (partner[partner] != np.arange(len(face_places)))
     vertices = np.full(len(mesh.vertices), -1)
-    of_corners, known = mesh.faces.ravel(), np.flatnonzero(~is_missing)
-    vertices[of_corners[there[known]]] = of_corners[here[partner[known]]]
-    is_missing |= (vertices[of_corners[there]] != of_corners[here[partner]]).any(axis=1)
+    of_corners, with_image = mesh.faces.ravel(), np.flatnonzero(~is_missing)
+    vertices[of_corners[image_corners[with_image]]] = of_corners[corners[partner[with_image]]]
+    is_missing |= (vertices[of_corners[image_corners]] != of_corners[corners[partner]]).any(axis=1)
     if is_missing.any():
         count = int(is_missing.sum())
-        return count / len(own), f"{plural(count, 'face')} of {len(own):,} without an image about {name}"
-    low, high = height[own].min(axis=1), height[own].max(axis=1)
+        return count / len(
+            face_places
+        ), f"{plural(count, 'face')} of {len(face_places):,} without an image about {name}"
+    low, high = height[face_places].min(axis=1), height[face_places].max(axis=1)
     is_half = (low >= 0) & (high > 0)
     crosses = is_half == is_half[partner]
     if crosses.any():
         count = int(crosses.sum())
         verb = "crosses or lies" if count == 1 else "cross or lie"
-        return count / len(own), f"{plural(count, 'face')} of {len(own):,} {verb} in {name}"
+        return count / len(face_places), f"{plural(count, 'face')} of {len(face_places):,} {verb} in {name}"
     sides = is_half[np.maximum(mesh.edge_halfedges, 0) // 3]
     middle = np.flatnonzero((sides[:, 0] != sides[:, 1]) & ~mesh.is_boundary_edge)
-    return Mirror(plane, vertices, is_half, there[is_half], here[partner[is_half]], middle)
+    return Mirror(plane, vertices, is_half, image_corners[is_half], corners[partner[is_half]], middle)
 
 
 def _with_free(component: Component, ends: IntArray) -> Component:

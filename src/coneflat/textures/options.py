@@ -40,18 +40,18 @@ class ChartNumber(Kind):
 
     words: tuple[str, ...] = ("atlas", "one")
     metavar: ClassVar[str] = "atlas|one|NUMBER"
-    most: int = 10_000
+    limit: int = 10_000
 
     def parse(self, name: str, value: Any) -> str | int:
         text = value if isinstance(value, str) else ""
         if text in self.words:
             return text
-        given = int(text) if text.isdecimal() and len(text) < 19 else 0
-        number = given if text else as_integer(name, value)
-        if not 1 <= number <= self.most:
+        typed = int(text) if text.isdecimal() and len(text) < 19 else 0
+        number = typed if text else as_integer(name, value)
+        if not 1 <= number <= self.limit:
             expected = ", ".join(self.words)
             raise OptionError(
-                f"{name} must be {expected} or an integer from 1 to {self.most:,}, got {short_repr(value)}"
+                f"{name} must be {expected} or an integer from 1 to {self.limit:,}, got {short_repr(value)}"
             )
         return number
 
@@ -100,7 +100,7 @@ class UnwrapOptions(TextureOptions, SeamOptions, AtlasOptions, RunOptions):
             raise OptionError(
                 f"max_energy must be above 4, the energy of an isometry, got {self.max_energy:g}"
             )
-        for one, other, are_both in (
+        for first_option, second_option, are_both in (
             ("resolution", "texel_density", self._differs("texel_density") and self._differs("resolution")),
             ("area", "max_energy", self._differs("area") and self._differs("max_energy")),
             ("seams none", "max_energy", not math.isfinite(self.bound) and self._differs("max_energy")),
@@ -108,7 +108,9 @@ class UnwrapOptions(TextureOptions, SeamOptions, AtlasOptions, RunOptions):
             (f"stack {self.stack}", "lengths", self._differs("stack") and self.lengths is not None),
         ):
             if are_both:
-                raise OptionError(f"{one} and {other} cannot be combined: leave out one of them")
+                raise OptionError(
+                    f"{first_option} and {second_option} cannot be combined: leave out one of them"
+                )
 
     def _differs(self, name: str) -> bool:
         """Return whether an option is not its default."""

@@ -107,10 +107,10 @@ class CutSearch:
         self._has_coarse = len(component.faces) > 2 * COARSE and not (
             is_coarse or component.seams.is_forbidden.any()
         )
-        self._found = list[Candidate]()
+        self._candidates = list[Candidate]()
 
     @property
-    def _near(self) -> float:
+    def _settled_bound(self) -> float:
         """The energy up to which a candidate may be within the bound once it is settled."""
         return self.max_energy + 2 * TOLERANCE * (self.max_energy - ISOMETRIC)
 
@@ -153,14 +153,14 @@ class CutSearch:
         )
         if all(len(candidate.layout.seams) or candidate.energy > self.max_energy for candidate in candidates):
             candidates = [*candidates, *self._at_corners()]
-        near = [self.separated(candidate) for candidate in candidates if candidate.energy <= reach]
-        near.sort(key=self._expected_cost)
-        if near and near[0].energy > self.max_energy:
-            near.append(self.shortened(near[0]))
+        promising = [self.separated(candidate) for candidate in candidates if candidate.energy <= reach]
+        promising.sort(key=self._expected_cost)
+        if promising and promising[0].energy > self.max_energy:
+            promising.append(self.shortened(promising[0]))
         close_search(self._surface)
-        within = [candidate for candidate in near if candidate.energy <= self.max_energy]
-        least = min([*near, *candidates], key=lambda candidate: candidate.energy)
-        return self.separated(min(within, key=self._expected_cost, default=least))
+        within = [candidate for candidate in promising if candidate.energy <= self.max_energy]
+        lowest = min([*promising, *candidates], key=lambda candidate: candidate.energy)
+        return self.separated(min(within, key=self._expected_cost, default=lowest))
 
     def shortened(self, start: Candidate, layout: Layout | None = None) -> Candidate:
         """Return a candidate with the tips of its seams moved to where its energy is about the largest allowed.
@@ -172,72 +172,89 @@ class CutSearch:
         start, is_large = self.separated(start), len(self.component.faces) > MANY_TRIANGLES
         if layout is not None:
             start = replace(start, layout=layout, cost=self.cost_of(layout))
-        if (layout is not None and not is_large) or self.max_energy < start.energy <= self._near:
+        if (layout is not None and not is_large) or self.max_energy < start.energy <= self._settled_bound:
             start = self.settled(start)
         slack = self.max_energy - start.energy
-        if is_large or (self._has_coarse and 0 <= slack <= 5 * (self._near - self.max_energy)):
+        if is_large or (self._has_coarse and 0 <= slack <= 5 * (self._settled_bound - self.max_energy)):
             return start
-        for one in sorted(map(self.separated, self._moved(start)), key=lambda one: one.cost):
-            one = self.settled(one) if one.energy > self.max_energy else one
-            if one.energy <= self.max_energy and (one.cost < start.cost or start.energy > self.max_energy):
-                return one
+        for candidate in sorted(
+            map(self.separated, self._moved(start)), key=lambda candidate: candidate.cost
+        ):
+            candidate = self.settled(candidate) if candidate.energy > self.max_energy else candidate
+            if candidate.energy <= self.max_energy and (
+                candidate.cost < start.cost or start.energy > self.max_energy
+            ):
+                return candidate
         return start
 
-    def small_joined(self, one: Candidate) -> Candidate:
+    def small_joined(self, candidate: Candidate) -> Candidate:
         """Return a candidate in several charts, the smallest joined to others where they fit once their points move."""
-        seams, sizes = _chart_seams(one.layout), np.bincount(one.layout.chart, self.component.double_areas)
+        seams, sizes = (
+            _chart_seams(candidate.layout),
+            np.bincount(candidate.layout.chart, self.component.double_areas),
+        )
         stretch = seams.stretches(self.component.mesh)
         is_small = sizes[seams.charts].min(axis=1) < SMALL_AREA * sizes.sum()
         is_small &= seams.charts[:, 0] != seams.charts[:, 1]
         costs = np.bincount(stretch, self.seam_costs[seams.edges] * is_small)
         order = np.argsort(-costs, kind="stable")[: min(MAX_JOINS, np.count_nonzero(costs))]
-        for edges in [seams.edges[stretch == each] for each in order]:
+        for edges in [seams.edges[stretch == label] for label in order]:
             with suppress(MetricError, SeamError):
-                joined = self._joined(one, seams, np.isin(seams.edges, edges))
-                one, seams = (one, seams) if joined is None else (joined, _chart_seams(joined.layout))
-        return one
+                joined = self._joined(candidate, seams, np.isin(seams.edges, edges))
+                candidate, seams = (
+                    (candidate, seams) if joined is None else (joined, _chart_seams(joined.layout))
+                )
+        return candidate
 
-    def _joined(self, one: Candidate, seams: Seams, at: BoolArray) -> Candidate | None:
+    def _joined(self, candidate: Candidate, seams: Seams, at: BoolArray) -> Candidate | None:
         """Return a candidate joined across seam edges that are flagged (k,), or None if its triangles do not fit."""
-        layout, sizes = one.layout, np.bincount(one.layout.chart, self.component.double_areas)
+        layout, sizes = candidate.layout, np.bincount(candidate.layout.chart, self.component.double_areas)
         charts = np.unique(seams.charts[at])
         # Charts joined by an earlier seam: the edges are within one, closed from both ends, or beside a large one.
         if len(charts) < 2 or sizes[charts].min() >= SMALL_AREA * sizes.sum():
             return None
-        small, other = charts[np.argsort(sizes[charts], kind="stable")]
+        small, large = charts[np.argsort(sizes[charts], kind="stable")]
         is_own, is_small = (seams.charts[at] == small)[:, :1], layout.chart == small
         # The small chart is turned and moved so that its side of the seam is as close as possible to the other one.
-        points, sides = layout.points @ np.array([1, 1j]), np.stack([seams.here[at], seams.there[at]])
+        points, sides = (
+            layout.points @ np.array([1, 1j]),
+            np.stack([seams.first_points[at], seams.second_points[at]]),
+        )
         ends = np.where(is_own, sides, sides[::-1])
-        here, there = points[ends]
-        turn, moved = np.vdot(here - here.mean(), there - there.mean()), layout.corners[is_small]
-        points[moved] = (points[moved] - here.mean()) * turn / max(abs(turn), 1e-300) + there.mean()
+        small_side, large_side = points[ends]
+        turn, moved = (
+            np.vdot(small_side - small_side.mean(), large_side - large_side.mean()),
+            layout.corners[is_small],
+        )
+        points[moved] = (points[moved] - small_side.mean()) * turn / max(
+            abs(turn), 1e-300
+        ) + large_side.mean()
         points[ends] = points[ends].mean(axis=0)
-        chart = np.where(is_small, other, layout.chart)
-        whole = ChartLayout(points.view(np.float64).reshape(-1, 2), layout.corners, chart)
-        whole = whole.joined(ends.reshape(2, -1).T)
-        is_near, places = nearby(whole.corners, is_small, RINGS), whole.points[whole.corners]
-        near = np.flatnonzero(has_any(is_near, whole.corners))
+        chart = np.where(is_small, large, layout.chart)
+        joined = ChartLayout(points.view(np.float64).reshape(-1, 2), layout.corners, chart)
+        joined = joined.joined(ends.reshape(2, -1).T)
+        is_near, places = nearby(joined.corners, is_small, RINGS), joined.points[joined.corners]
+        surroundings = np.flatnonzero(has_any(is_near, joined.corners))
         # Only the triangles near the small chart are laid out anew.
-        patch = as_one_chart(replace(layout, points=whole.points, corners=whole.corners), near)
-        free = mask_of(len(patch.points), patch.corners[is_near[whole.corners[near]]])
+        patch = as_one_chart(replace(layout, points=joined.points, corners=joined.corners), surroundings)
+        free = mask_of(len(patch.points), patch.corners[is_near[joined.corners[surroundings]]])
         after, _ = freed(patch, free, TOLERANCE)
-        places[near] = after.points[patch.corners]
-        if not (signed_double_areas(places[near]) > 0).all():
+        places[surroundings] = after.points[patch.corners]
+        if not (signed_double_areas(places[surroundings]) > 0).all():
             return None
-        before = self.energies_of(patch.lengths, layout.points[layout.corners[near]])
-        rise = (self.energies_of(patch.lengths, places[near]) - before).sum()
-        energy = one.energy + float(rise) / layout.area
-        low, high = places[near].min(axis=(0, 1)), places[near].max(axis=(0, 1))
+        before = self.energies_of(patch.lengths, layout.points[layout.corners[surroundings]])
+        rise = (self.energies_of(patch.lengths, places[surroundings]) - before).sum()
+        energy = candidate.energy + float(rise) / layout.area
+        low, high = places[surroundings].min(axis=(0, 1)), places[surroundings].max(axis=(0, 1))
         meets = ((places.min(axis=1) < high) & (places.max(axis=1) > low)).all(axis=1)
-        meets &= chart == other
+        meets &= chart == large
         fits = np.array_equal(after.points[~free], patch.points[~free])
-        fits &= energy <= max(self.max_energy, one.energy)
+        fits &= energy <= max(self.max_energy, candidate.energy)
         if not fits or len(find_overlaps(places[meets], limit=1).pairs):
             return None
-        whole.points[whole.corners[near]] = places[near]
-        layout = with_charts(layout, whole.renumbered())
-        return Candidate(layout, energy, self.cost_of(layout), one.distortion, True)
+        joined.points[joined.corners[surroundings]] = places[surroundings]
+        layout = with_charts(layout, joined.renumbered())
+        return Candidate(layout, energy, self.cost_of(layout), candidate.distortion, True)
 
     def cost_of(self, layout: Layout) -> float:
         return float(self.seam_costs[seam_edges(layout)].sum())
@@ -256,40 +273,48 @@ class CutSearch:
 
     def _from_coarse(self) -> Candidate:
         """Return a candidate with the cones that are best on a coarse mesh, unless the mesh itself needs others."""
-        (coarse, kept), allowed = coarse_component(self.component, COARSE), self.max_energy - ISOMETRIC
+        (coarse, vertices), allowed = coarse_component(self.component, COARSE), self.max_energy - ISOMETRIC
         bound = self.max_energy + COARSE_EXCESS * allowed
         best = CutSearch(coarse, bound, self._method, True, self._by_area).best()
-        given = VertexCurvatures(kept[best.layout.cones], np.full(len(best.layout.cones), np.nan))
-        spec = replace(self.component.cones, strategy="given", given=given)
+        prescribed = VertexCurvatures(vertices[best.layout.cones], np.full(len(best.layout.cones), np.nan))
+        spec = replace(self.component.cones, strategy="given", given=prescribed)
         layout, _ = lay_out_once(self._surface, self.component, spec, self._method)
-        one = self._candidate(layout, layout.statistics.area_distortion_linear)
-        if 0 < one.energy - self.max_energy <= MAX_EXCESS * allowed:
-            one = self.shortened(one)
-        if one.energy > self.max_energy:
+        candidate = self._candidate(layout, layout.statistics.area_distortion_linear)
+        if 0 < candidate.energy - self.max_energy <= MAX_EXCESS * allowed:
+            candidate = self.shortened(candidate)
+        if candidate.energy > self.max_energy:
             # The bound is too low, or the surface too noisy, for the cones of a coarse mesh.
-            self._has_coarse, self._found = False, [one]
+            self._has_coarse, self._candidates = False, [candidate]
             return self.best()
         close_search(self._surface)
-        return self.separated(one)
+        return self.separated(candidate)
 
     def _by_distortion(self) -> list[Candidate]:
         """Return candidates, with energies around the bound among them, and those for earlier bounds."""
-        found = self._found
-        for tried in range(2 * MAX_CANDIDATES):
-            distortion = self._next_distortion(tried)
+        candidates = self._candidates
+        for count in range(2 * MAX_CANDIDATES):
+            distortion = self._next_distortion(count)
             if distortion is None:
                 break
             spec = replace(self.component.cones, distortion=distortion)
             # Cones that their triangles cannot hold are no problem for free seams.
             layout, _ = lay_out_once(self._surface, self.component, spec, self._method)
-            same = [i for i, each in enumerate(found) if np.array_equal(each.layout.cones, layout.cones)]
-            known = found.pop(same[0]) if same else self._candidate(layout, distortion)
-            reached, is_within = layout.statistics.area_distortion_linear, known.energy <= self.max_energy
-            distortion = min(distortion, reached) if same and not is_within else distortion
-            found.append(replace(known, distortion=distortion))
-            if same if is_within else (same or len(layout.cones) >= MAX_SEARCHED) and distortion < reached:
+            repeated = [
+                i
+                for i, earlier in enumerate(candidates)
+                if np.array_equal(earlier.layout.cones, layout.cones)
+            ]
+            candidate = candidates.pop(repeated[0]) if repeated else self._candidate(layout, distortion)
+            reached, is_within = layout.statistics.area_distortion_linear, candidate.energy <= self.max_energy
+            distortion = min(distortion, reached) if repeated and not is_within else distortion
+            candidates.append(replace(candidate, distortion=distortion))
+            if (
+                repeated
+                if is_within
+                else (repeated or len(layout.cones) >= MAX_SEARCHED) and distortion < reached
+            ):
                 break  # The search finds no others.
-        return found
+        return candidates
 
     def _at_corners(self) -> list[Candidate]:
         """Return a candidate that is open at all corners of a polyhedron with few of them, if it is one."""
@@ -300,24 +325,26 @@ class CutSearch:
         layout, _ = lay_out_once(self._surface, component, spec, self._method)
         return [self._candidate(layout, 0.0)]
 
-    def _next_distortion(self, tried: int) -> float | None:
+    def _next_distortion(self, count: int) -> float | None:
         """Return the area distortion of the next candidate, or None if enough are found."""
-        allowed, found = self.max_energy - ISOMETRIC, self._found
-        rising = sorted(found, key=lambda each: each.distortion)
-        low = next((each for each in rising[::-1] if each.energy <= self.max_energy), None)
-        high = next((each for each in rising if each.energy > self.max_energy), None)
+        allowed, candidates = self.max_energy - ISOMETRIC, self._candidates
+        rising = sorted(candidates, key=lambda candidate: candidate.distortion)
+        low = next((candidate for candidate in rising[::-1] if candidate.energy <= self.max_energy), None)
+        high = next((candidate for candidate in rising if candidate.energy > self.max_energy), None)
         # For another bound, at least one more is tried.
-        if low and tried and (tried >= MAX_CANDIDATES or not len(low.layout.seams)):
+        if low and count and (count >= MAX_CANDIDATES or not len(low.layout.seams)):
             return None
-        if low and high and tried:
+        if low and high and count:
             is_next = len(low.layout.cones) <= len(high.layout.cones) + 1
             is_similar = is_next or low.cost <= SIMILAR_COSTS * high.cost
             return None if is_similar else float(np.sqrt(low.distortion * high.distortion))
-        if not found:
+        if not candidates:
             return FIRST_DISTORTION
         # The energy above that of an isometry is about a multiple of the square of the distortion.
-        above = float(np.clip(found[-1].energy - ISOMETRIC, allowed / 16, allowed * 16))
-        return float(found[-1].distortion * np.sqrt(allowed / above) * (8 / 7 if low and not high else 7 / 8))
+        above = float(np.clip(candidates[-1].energy - ISOMETRIC, allowed / 16, allowed * 16))
+        return float(
+            candidates[-1].distortion * np.sqrt(allowed / above) * (8 / 7 if low and not high else 7 / 8)
+        )
 
     def _candidate(self, layout: Layout, distortion: float, free: BoolArray | None = None) -> Candidate:
         # What the cones or the metric do not meet does not matter where seams are free.
@@ -342,59 +369,59 @@ class CutSearch:
         areas, flat = double_areas(lengths), signed_double_areas(places)
         return (ISOMETRIC + ENERGY_PER_AREA * np.log(flat / areas) ** 2 / 4) * areas / 2
 
-    def separated(self, one: Candidate) -> Candidate:
+    def separated(self, candidate: Candidate) -> Candidate:
         """Return a candidate whose overlaps are separated."""
-        if one.is_separated or not self._method.separates:
-            return one
-        layout = separate_charts(one.layout, self.seam_costs, self.component.seams)
-        return replace(one, layout=layout, cost=self.cost_of(layout), is_separated=True)
+        if candidate.is_separated or not self._method.separates:
+            return candidate
+        layout = separate_charts(candidate.layout, self.seam_costs, self.component.seams)
+        return replace(candidate, layout=layout, cost=self.cost_of(layout), is_separated=True)
 
-    def settled(self, one: Candidate) -> Candidate:
+    def settled(self, candidate: Candidate) -> Candidate:
         """Return a candidate with the least energy without overlaps: its separating cuts are free, too."""
-        is_free = np.ones(len(one.layout.points), dtype=bool)
+        is_free = np.ones(len(candidate.layout.points), dtype=bool)
         for _ in range(MAX_TRIES):
-            layout, energy = self._freed(one.layout, is_free)
+            layout, energy = self._freed(candidate.layout, is_free)
             pairs = find_overlaps(side_by_side(layout).points[layout.corners]).pairs
             if not (len(pairs) and self._method.separates):
-                return replace(one, layout=layout, energy=energy)
+                return replace(candidate, layout=layout, energy=energy)
             # Points where charts would touch themselves stay.
-            corners = one.layout.corners
+            corners = candidate.layout.corners
             is_free &= ~nearby(corners, mask_of(len(corners), pairs), RINGS)
-        return one
+        return candidate
 
-    def _expected_cost(self, one: Candidate) -> float:
+    def _expected_cost(self, candidate: Candidate) -> float:
         """Return the cost of the seams at which the energy would be the largest allowed, roughly."""
-        excess = (one.energy - self.max_energy) / (self.max_energy - ISOMETRIC)
-        return one.cost + excess * COST_PER_ENERGY * float(np.sqrt(one.layout.area))
+        excess = (candidate.energy - self.max_energy) / (self.max_energy - ISOMETRIC)
+        return candidate.cost + excess * COST_PER_ENERGY * float(np.sqrt(candidate.layout.area))
 
     def _moved(self, start: Candidate) -> list[Candidate]:
         """Return candidates with the tips of the seams moved, so that the energy is about the largest allowed."""
-        mesh, seams, found = self.component.mesh, seam_edges(start.layout), list[Candidate]()
+        mesh, seams, candidates = self.component.mesh, seam_edges(start.layout), list[Candidate]()
         tips = find_tips(start.layout, seams, self.costs)
         if not (np.isfinite(self.max_energy) and (tips.rates > 0).any()):
-            return found
-        allowed, slack, known = self.max_energy - ISOMETRIC, self.max_energy - start.energy, [seams]
+            return candidates
+        allowed, slack, cuts = self.max_energy - ISOMETRIC, self.max_energy - start.energy, [seams]
         for _ in range(MAX_TRIES // 2 if slack > 0 else MAX_TRIES):
             moved, cones = moved_tips(start.layout, seams, tips, moves_for(start.layout, tips, slack))
-            if any(np.array_equal(moved, each) for each in known):
+            if any(np.array_equal(moved, earlier) for earlier in cuts):
                 # The tips move by whole edges.
                 slack += np.sign(slack) * allowed / 4
                 continue
             if not (len(moved) or mesh.is_boundary_edge.any()):
                 break  # not a disk
-            known.append(moved)
+            cuts.append(moved)
             cut = replace(recut(start.layout, moved), cones=cones)
             changed = mask_of(len(mesh.vertices), mesh.edges[np.setxor1d(seams, moved)])
             # Most of what moves is near: more rings change the seams by less than 1%.
             is_free = nearby(cut.corners, has_any(changed, mesh.faces), 4 * RINGS)
-            one = self._candidate(cut, start.distortion, is_free)
-            excess = one.energy - self.max_energy
-            found += [one] if one.energy <= self._near else []
+            candidate = self._candidate(cut, start.distortion, is_free)
+            excess = candidate.energy - self.max_energy
+            candidates += [candidate] if candidate.energy <= self._settled_bound else []
             # A start beyond the bound only has to get within it: the tips move again after the cuts for packing.
             if excess <= 0 and (excess >= -2 * TOLERANCE * allowed or start.energy > self.max_energy):
                 break
             slack = slack - excess if (slack - excess) * slack > 0 else slack / 2
-        return found
+        return candidates
 
 
 def _chart_seams(layout: Layout) -> Seams:
@@ -403,15 +430,17 @@ def _chart_seams(layout: Layout) -> Seams:
 
 def coarse_component(component: Component, count: int) -> tuple[Component, IntArray]:
     """Return a component with about `count` triangles, and (k,) the vertices of the given component that it keeps."""
-    coarse, kept, faces = coarse_mesh(component.mesh, count)
-    own, none = edge_lengths(coarse.vertices, coarse.faces), np.zeros(len(coarse.edges), dtype=bool)
+    coarse, vertices, faces = coarse_mesh(component.mesh, count)
+    lengths, no_edges = edge_lengths(coarse.vertices, coarse.faces), np.zeros(len(coarse.edges), dtype=bool)
 
     def of_kept(spec: Any, *names: str) -> Any:
-        given = [name for name in names if getattr(spec, name) is not None]
-        return replace(spec, **{name: getattr(spec, name)[kept] for name in given})
+        names_set = [name for name in names if getattr(spec, name) is not None]
+        return replace(spec, **{name: getattr(spec, name)[vertices] for name in names_set})
 
     cones = of_kept(component.cones, "is_allowed", "absorbs_curvature", "names")
     metric = of_kept(component.metric, "keeps_length", "names")
-    seams = replace(of_kept(component.seams, "visibility", "weights"), is_avoided=none, is_forbidden=none)
-    near = coarse, component.vertices[kept], faces, mollify(own, coarse)[0], double_areas(own)
-    return Component(*near, cones, metric, seams), kept
+    seams = replace(
+        of_kept(component.seams, "visibility", "weights"), is_avoided=no_edges, is_forbidden=no_edges
+    )
+    arrays = coarse, component.vertices[vertices], faces, mollify(lengths, coarse)[0], double_areas(lengths)
+    return Component(*arrays, cones, metric, seams), vertices

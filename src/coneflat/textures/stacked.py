@@ -84,8 +84,8 @@ def with_copies_stacked(alone: Flattening, stacked: Stacked, prepared: Prepared)
     source = np.arange(len(alone.vertices))
     source[faces.ravel()[stacked.corners]] = faces.ravel()[stacked.partners]
     is_cone = mask_of(len(source), alone.cones)
-    used = mask_of(len(source), faces)
-    cones = np.flatnonzero(is_cone[source] & used)
+    is_vertex = mask_of(len(source), faces)
+    cones = np.flatnonzero(is_cone[source] & is_vertex)
     curvature = np.zeros(len(source))
     curvature[alone.cones] = alone.curvatures
 
@@ -126,10 +126,10 @@ def _seams_of_all(seams: IntArray, faces: IntArray, stacked: Stacked) -> IntArra
     partner[stacked.corners] = stacked.partners
     corners = stacked.corners.reshape(-1, 3)
     ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
-    own, of_first = (np.sort(faces.ravel()[at], axis=1) for at in (ends, partner[ends]))
+    copy_edges, partner_edges = (np.sort(faces.ravel()[at], axis=1) for at in (ends, partner[ends]))
     seams, unit = np.sort(seams, axis=1), int(faces.max()) + 1
-    is_seam = np.isin(of_first @ [unit, 1], seams @ [unit, 1])
-    return np.unique(np.concatenate([seams, own[is_seam]]), axis=0)
+    is_seam = np.isin(partner_edges @ [unit, 1], seams @ [unit, 1])
+    return np.unique(np.concatenate([seams, copy_edges[is_seam]]), axis=0)
 
 
 def _corners_of(component: Component) -> IntArray:

@@ -97,7 +97,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         stacked, prepared = without_copies(prepared) if o.stack == "copies" else (None, prepared)
     relax, separates = RelaxSpec("off", 0.0), shared.charts == "atlas"
     method = Method(relax, separates, None, Stopwatch(), Surface.of, quick_metric, untangles=False)
-    components, found = along_sharp_edges(prepared.components), dict[int, Candidate]()
+    components, candidates = along_sharp_edges(prepared.components), dict[int, Candidate]()
     areas, sizes = np.array(
         [(double_areas(component.lengths).sum(), len(component.faces)) for component in components]
     ).T
@@ -110,7 +110,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         )
     with limit_threads(o.threads if sizes.max() > PARALLEL else 1):
         flat = lay_out_flat_parts(components, watch)
-        found.update((i, Candidate(layout, ISOMETRIC, 0.0, 0.0, True)) for i, layout in flat.items())
+        candidates.update((i, Candidate(layout, ISOMETRIC, 0.0, 0.0, True)) for i, layout in flat.items())
         # Copies cannot have different numbers of charts.
         with watch("check"):
             copies = [None] * len(components) if isinstance(o.charts, int) else find_copies(components, flat)
@@ -123,17 +123,21 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
             watch.share = float(0.8 * sizes[group].sum() / sizes.sum())
             with watch("search", 1.0):
                 together = MinorComponents([searches[i] for i in group]).candidates()
-                found.update((i, one) for i, one in zip(group, together, strict=True) if one is not None)
+                candidates.update(
+                    (i, candidate)
+                    for i, candidate in zip(group, together, strict=True)
+                    if candidate is not None
+                )
             watch.end_component()
-        joined = set(found)
+        joined = set(candidates)
         alone = [i for i in searches if i not in joined]
         for number, i in enumerate(alone):
             watch.component = f"component {number + 1:,} of {len(alone):,}" if len(alone) > 1 else ""
             watch.share = float(0.8 * sizes[i] / sizes.sum())
             with watch("search", 1.0):
-                found[i] = searches[i].best()
+                candidates[i] = searches[i].best()
             watch.end_component()
-        layouts = [found[i].layout for i in searches]
+        layouts = [candidates[i].layout for i in searches]
         with watch("pack"):
             in_order = list(searches.values())
 
@@ -146,18 +150,26 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
                 layouts = cut_for_packing(layouts, costs, o.padding / shared.resolution)
             for (i, search), layout in zip(searches.items(), layouts, strict=True):
                 # Joined components would each need a relaxation of their own.
-                one = replace(found[i], layout=layout) if i in joined else search.shortened(found[i], layout)
-                found[i] = search.small_joined(one) if o.charts == "atlas" and one.layout.chart.any() else one
+                candidate = (
+                    replace(candidates[i], layout=layout)
+                    if i in joined
+                    else search.shortened(candidates[i], layout)
+                )
+                candidates[i] = (
+                    search.small_joined(candidate)
+                    if o.charts == "atlas" and candidate.layout.chart.any()
+                    else candidate
+                )
         with watch("measure"):
-            known = {
-                i: one.layout if one.layout is flat.get(i) else measured(one.layout)
-                for i, one in found.items()
+            measured_layouts = {
+                i: candidate.layout if candidate.layout is flat.get(i) else measured(candidate.layout)
+                for i, candidate in candidates.items()
             }
-            layouts = with_copies(known, components, copies)
+            layouts = with_copies(measured_layouts, components, copies)
             cut = [
-                component.seams.is_forbidden[seam_edges(one)].sum()
-                for component, one in zip(components, layouts, strict=True)
-                if len(one.seams)
+                component.seams.is_forbidden[seam_edges(candidate)].sum()
+                for component, candidate in zip(components, layouts, strict=True)
+                if len(candidate.seams)
             ]
     shared = replace(shared, method=FREE)
     if o.texel_density is not None:
@@ -168,12 +180,17 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     result = evaluate(prepared, layouts, shared, watch)
     notes = (
         *result.notes,
-        *map(Unmet, _notes(o, [one.energy for one in found.values()], int(sum(cut)), result.distortion)),
+        *map(
+            Unmet,
+            _notes(
+                o, [candidate.energy for candidate in candidates.values()], int(sum(cut)), result.distortion
+            ),
+        ),
     )
-    own = {name: getattr(o, name) for name in OWN if name != "seams"}
+    texture_settings = {name: getattr(o, name) for name in OWN if name != "seams"}
     if o.marked is not o.seams:
-        own["seams"] = "none" if o.marked is None else ["none", result.settings["seams"]]
-    result = replace(result, settings={**result.settings, **own}, notes=notes)
+        texture_settings["seams"] = "none" if o.marked is None else ["none", result.settings["seams"]]
+    result = replace(result, settings={**result.settings, **texture_settings}, notes=notes)
     if stacked is not None:
         return with_copies_stacked(result, stacked, prepared)
     return result if mirror is None else both_halves(result, mirror, prepared)
@@ -226,11 +243,11 @@ def _notes(o: UnwrapOptions, energies: Sequence[float], cut: int, measured: Dist
         yield f"{plural(cut, 'forbidden edge')} had to be cut to separate overlaps."
     above, charts = [energy for energy in energies if energy > o.bound], measured.charts
     if above:
-        name, most, reached = "energy", o.bound, max(above)
+        name, limit, reached = "energy", o.bound, max(above)
         if o.area is not None:
-            name, most, reached = "area distortion", o.area, ((reached - ISOMETRIC) / ENERGY_PER_AREA) ** 0.5
+            name, limit, reached = "area distortion", o.area, ((reached - ISOMETRIC) / ENERGY_PER_AREA) ** 0.5
         yield (
-            f"The {name} of {plural(len(above), 'component')} is up to {reached:.6g}, above the {most:.6g} allowed: "
+            f"The {name} of {plural(len(above), 'component')} is up to {reached:.6g}, above the {limit:.6g} allowed: "
             "refine the mesh, or allow more."
         )
     elif o.area is None and measured.energy > (1 + TYPED_TOLERANCE) * o.bound:
@@ -239,7 +256,7 @@ def _notes(o: UnwrapOptions, energies: Sequence[float], cut: int, measured: Dist
             "nearly no area: remesh there."
         )
     if isinstance(o.charts, int) and charts != o.charts:
-        why = (
+        reason = (
             "no further cut divides one" if charts < o.charts else "components, seams and overlaps need them"
         )
-        yield f"The texture has {plural(charts, 'chart')} instead of {o.charts:,}: {why}."
+        yield f"The texture has {plural(charts, 'chart')} instead of {o.charts:,}: {reason}."
