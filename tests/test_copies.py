@@ -15,7 +15,7 @@ from coneflat.options import Options
 from coneflat.source import Component, Source
 from coneflat.source.copies import find_copies
 
-method = import_module("coneflat.flattening")
+flattener, retries = import_module("coneflat.flattener"), import_module("coneflat.retries")
 
 Mesh = tuple[FloatArray, IntArray]
 
@@ -88,13 +88,13 @@ def test_creases_of_the_same_lengths_are_no_copies() -> None:
 def test_copies_are_laid_out_as_each_by_itself(mesh: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
     model = joined(mesh, turned(mesh, 1), turned(mesh, 2, 2.5), turned(mesh, 3, 0.3))
     calls = []
-    lay_out_part = method.lay_out_part
+    lay_out = retries.lay_out_with_thick_triangles
     monkeypatch.setattr(
-        method, "lay_out_part", lambda *arguments: calls.append(arguments) or lay_out_part(*arguments)
+        retries, "lay_out_with_thick_triangles", lambda *inputs: calls.append(inputs) or lay_out(*inputs)
     )
     result = coneflat.flatten(*model)
     assert len(calls) == 1
-    monkeypatch.setattr(method, "find_copies", lambda parts, _: [None] * len(parts))
+    monkeypatch.setattr(flattener, "find_copies", lambda components, _: [None] * len(components))
     alone = coneflat.flatten(*model)
     assert len(calls) == 1 + 4
     assert np.array_equal(result.cones, alone.cones)

@@ -382,11 +382,13 @@ def test_components_have_the_same_texel_density():
 
 def test_no_more_cones_are_searched_for_than_a_search_can_find(monkeypatch):
     """A distortion that needs more cones than the search allows is named at once: each search would take longest."""
-    pipeline = import_module("coneflat.flattening")
-    searches, once = [], pipeline.lay_out_part
-    monkeypatch.setattr(pipeline, "lay_out_part", lambda *given: searches.append(0) or once(*given))
-    monkeypatch.setattr(pipeline, "MAX_SEARCHED", 5)
-    for module in (pipeline, import_module("coneflat.bounds")):
+    retries = import_module("coneflat.retries")
+    searches, lay_out = [], retries.lay_out_with_thick_triangles
+    monkeypatch.setattr(
+        retries, "lay_out_with_thick_triangles", lambda *arguments: searches.append(0) or lay_out(*arguments)
+    )
+    monkeypatch.setattr(retries, "MAX_SEARCHED", 5)
+    for module in (retries, import_module("coneflat.bounds")):
         monkeypatch.setattr(module, "excess", lambda *_: 2.0)
     result = coneflat.flatten(coneflat.sample_path())
     assert len(searches) == 1

@@ -247,7 +247,7 @@ def _open(part: Component, stages: Stopwatch) -> ConeSearch | FoundCones:
         share = weighted_areas(surface.areas, part.cones.weights)
         return _found_cones(only, area_distortion(only.log_scale, share), part)
     with stages("cones", 0.3):
-        return open_search(surface, part.cones, stages)
+        return open_search(surface, part.cones)
 
 
 def _found_cones(solution: ConeSolution, distortion: float, part: Component) -> FoundCones:

@@ -12,7 +12,7 @@ import numpy as np
 from .atlas import arrange_charts, separate_touching
 from .base.arrays import FloatArray, IntArray, rows_of
 from .base.notes import counted_notes
-from .base.progress import Stopwatch
+from .base.progress import stage, stage_seconds
 from .geometry.overlap import Overlaps
 from .measures.distortion import curvature_errors, measure
 from .measures.guarantees import unmet_guarantees
@@ -79,7 +79,6 @@ def evaluate(
     prepared: Prepared,
     layouts: Sequence[Layout],
     options: Options,
-    watch: Stopwatch,
     overlaps: Overlaps | None = None,
 ) -> Flattening:
     """Return the result of a flattening: packed, in the input's numbering, measured, with notes on unmet guarantees.
@@ -88,14 +87,13 @@ def evaluate(
         prepared: the input.
         layouts: the layouts of its parts.
         options: the options; the result records them.
-        watch: the stopwatch; the result records its times.
         overlaps: overlapping pairs of the result's triangles; None to compute them.
     """
     checked = prepared.checked
-    with watch("pack"):
+    with stage("pack"):
         numbering, order, mesh = _result_mesh(prepared)
         layout = _pack(layouts, order, mesh, options)
-    with watch("measure"):
+    with stage("measure"):
         source, face_corners = prepared.input_mesh.source, prepared.input_mesh.face_corners
         if face_corners is not None and source is not None:
             face_corners = reorder_corners(checked, face_corners)
@@ -140,7 +138,7 @@ def evaluate(
             [numbering.of_checked[prepared.seams], numbering.renumber([one.seams for one in layouts])]
         ),
         distortion=distortion.rescaled(checked.exponent * np.log(2)),
-        seconds=dict(watch.seconds),
+        seconds=stage_seconds(),
         notes=(
             *checked.notes,
             *prepared.notes,

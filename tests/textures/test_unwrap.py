@@ -14,14 +14,12 @@ from stored import at_hand, noisy
 import coneflat
 from coneflat import errors, measure_uv, unwrap
 from coneflat.atlas import ChartLayout, with_charts
-from coneflat.base import Stopwatch
-from coneflat.flattening import Method, lay_out_part
+from coneflat.flattening import Steps
 from coneflat.geometry import corner_angles, signed_double_areas
 from coneflat.io import as_input
-from coneflat.metric import find_metric
 from coneflat.options import Options
+from coneflat.retries import lay_out_with_thick_triangles
 from coneflat.source import Source
-from coneflat.stages import RelaxSpec, Surface
 from coneflat.textures.free_seams import freed
 from coneflat.textures.search import CutSearch, coarse_component
 from coneflat.textures.unwrapping import along_sharp_edges
@@ -126,8 +124,7 @@ def test_freed_seams_lower_the_energy():
     source = Source(as_input(tied.vertices, tied.faces))
     cones = dict(zip(tied.cones.tolist(), tied.curvatures.tolist(), strict=True))
     component = source.prepared(Options(cones=cones)).components[0]
-    method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
-    free, energy = freed(lay_out_part(component, method))
+    free, energy = freed(lay_out_with_thick_triangles(component, Steps()))
     assert len(free.seams) == len(tied.seams)
     assert 4 < energy < tied.distortion.energy - 1e-3
 
@@ -135,8 +132,7 @@ def test_freed_seams_lower_the_energy():
 @pytest.mark.slow
 def test_a_flipped_start_is_replaced():
     component = Source(as_input(*shapes.hill())).prepared(Options()).components[0]
-    method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
-    layout = lay_out_part(component, method)
+    layout = lay_out_with_thick_triangles(component, Steps())
     points = layout.points.copy()
     inner = int(np.flatnonzero(~component.mesh.is_boundary_vertex)[0])
     points[layout.corners[component.mesh.faces == inner][0]] += 100.0
@@ -148,8 +144,7 @@ def test_a_flipped_start_is_replaced():
 def test_few_flipped_triangles_are_untangled_in_place(monkeypatch):
     """Embedding the whole chart anew takes many more steps."""
     component = Source(as_input(*shapes.hill(20, 20))).prepared(Options()).components[0]
-    method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
-    layout = lay_out_part(component, method)
+    layout = lay_out_with_thick_triangles(component, Steps())
     expected, points = freed(layout)[1], layout.points.copy()
     at = layout.corners[component.mesh.faces == np.flatnonzero(~component.mesh.is_boundary_vertex)[150]]
     points[at[0]] += 2 * np.ptp(points[layout.corners[(layout.corners == at[0]).any(axis=1)]], axis=(0, 1))

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.arrays import FloatArray, IntArray
 from ..base.notes import Unmet
-from ..base.progress import Stopwatch
+from ..base.progress import report_detail, stage
 from ..base.text import plural
 from ..base.threads import MEMORY_BOUND_TRIANGLES
 from ..geometry.operators import weighted_areas
@@ -43,15 +43,13 @@ HOLONOMY_FACTOR = 1.15
 Holonomy: TypeAlias = Callable[[ConeSolution], FloatArray]
 
 
-def find_cones(
-    surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holonomy | None = None
-) -> ConeSolution:
+@stage("cones")
+def find_cones(surface: Surface, spec: ConeSpec, holonomy: Holonomy | None = None) -> ConeSolution:
     """Return cones with their curvatures and linear log scale.
 
     Args:
         surface: the mesh.
         spec: the options of the cones.
-        watch: receives the progress.
         holonomy: measures rotations along handles; used if curvatures are quantised on a mesh with handles.
 
     Raises:
@@ -60,12 +58,12 @@ def find_cones(
     mesh = surface.mesh
     too_many_handles = has_many_handles(mesh, spec)
     if uses_sparse_search(mesh, spec):
-        return _search(surface, spec, watch, holonomy)
+        return _search(surface, spec, holonomy)
     given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
     is_greedy = spec.strategy == "greedy" or too_many_handles
     if is_greedy:
         solution = greedy_cones(
-            *given, max_cones=spec.max_count, tie_key=mesh_tie_key(mesh), progress=watch.report
+            *given, max_cones=spec.max_count, tie_key=mesh_tie_key(mesh), progress=report_detail
         )
     elif len(spec.given) or spec.searches_corners:
         solution = _fit_given(surface, spec)
@@ -136,13 +134,12 @@ def needs_no_cone(surface: Surface, spec: ConeSpec) -> bool:
     return linear_model(surface, spec).distortion <= spec.distortion
 
 
-def open_search(surface: Surface, spec: ConeSpec, watch: Stopwatch) -> ConeSearch:
+def open_search(surface: Surface, spec: ConeSpec) -> ConeSearch:
     """Return a search for cones; a cached search of the surface is reused, restricted to the allowed vertices.
 
     Args:
         surface: connected mesh with its operators.
         spec: what is required of the cones.
-        watch: measures time and reports progress.
     """
     mesh = surface.mesh
     search: ConeSearch | None = surface.memo.get("search")
@@ -166,7 +163,7 @@ def open_search(surface: Surface, spec: ConeSpec, watch: Stopwatch) -> ConeSearc
         allowed=spec.is_allowed,
         max_angles=max_angles.astype(np.float64),
     )
-    search.progress = watch.report
+    search.progress = report_detail
     if len(mesh.faces) <= MEMORY_BOUND_TRIANGLES:  # else it would use too much memory
         surface.memo["search"] = search
     return search
@@ -207,7 +204,7 @@ def _fit_given(surface: Surface, spec: ConeSpec) -> ConeSolution:
     return replace(found, cones=found.cones[~surface.mesh.is_boundary_vertex[found.cones]])
 
 
-def _search(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holonomy | None) -> ConeSolution:
+def _search(surface: Surface, spec: ConeSpec, holonomy: Holonomy | None) -> ConeSolution:
     """Return the fewest cones for the allowed distortion, or the best cones of the requested number."""
     mesh = surface.mesh
     only = coneless_solution(surface, spec)
@@ -216,7 +213,7 @@ def _search(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holono
     if needs_no_cone(surface, spec):
         none = np.empty(0, dtype=np.int64)
         return replace(linear_model(surface, spec).solution_of(none, np.empty(0)), is_searched=True)
-    search = open_search(surface, spec, watch)
+    search = open_search(surface, spec)
     distortion, count, most = spec.distortion, spec.count, spec.max_count
     found: SparseCones | QuantisedCones
     if spec.quantum is None:

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.sparse import csc_matrix
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, mask_of
+from ..base.progress import stage
 from ..errors import ConvergenceError
 from ..geometry import corner_angles, double_areas
 from ..geometry.handles import (
@@ -46,6 +47,7 @@ SCALING_WEIGHT = 1e-3
 CONE_RINGS = 3
 
 
+@stage("metric")
 def find_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec, steps: int = 200) -> FlatMetric:
     """Return the flat metric of a connected mesh for its cones.
 

@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..base import ComplexArray, FloatArray, IntArray, Stopwatch, limit_threads
 from ..errors import CurvatureError
-from ..flattening import flatten
+from ..flattener import flatten
 from ..geometry import coarse_mesh
 from ..mesh import CheckedMesh
 from ..mesh.connectivity import TriangleMesh

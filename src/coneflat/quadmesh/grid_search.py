@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..base import THREADS, FloatArray, Stopwatch, Unmet, limit_threads, plural, warns
 from ..errors import ConvergenceError, CurvatureError, GridError, MetricError, OptionError, SeamError
-from ..flattening import flatten_source
+from ..flattener import flatten_source
 from ..geometry import double_areas, edge_lengths
 from ..io import as_input
 from ..measures import unmet_guarantees

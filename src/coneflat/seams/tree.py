@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of
+from ..base.progress import stage
 from ..base.text import plural
 from ..errors import OptionError, SeamError
 from ..geometry.operators import at_safe_scale
@@ -72,6 +73,7 @@ def find_seams(
     return np.flatnonzero(seams)
 
 
+@stage("cut")
 def cut_to_disk(mesh: TriangleMesh, cones: IntArray, costs: FloatArray, spec: SeamSpec) -> Cut:
     """Return a connected mesh cut open to a disk with the cones on its border (Section 4.2 of the paper).
 

@@ -14,6 +14,9 @@ from ..geometry.operators import area_distortion
 from ..geometry.straight import FlatTriangles
 from ..mesh.connectivity import TriangleMesh
 
+# A log conformal factor that varies by less is constant.
+CONSTANT_SCALE = 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class LaplacianInverse:
@@ -53,6 +56,11 @@ class ConeSolution:
     inverse: LaplacianInverse | None = None
     is_searched: bool = False
     notes: tuple[str, ...] = ()
+
+    @property
+    def is_polyhedral(self) -> bool:
+        """Whether lengths are not scaled: the surface is a polyhedron with the cones as corners."""
+        return bool(np.ptp(self.log_scale) < CONSTANT_SCALE)
 
     @property
     def curvatures(self) -> FloatArray:

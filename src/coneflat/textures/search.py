@@ -20,7 +20,7 @@ from ..atlas import ChartLayout, Seams, with_charts
 from ..base import BoolArray, FloatArray, IntArray, has_any, mask_of
 from ..cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, close_search, with_corners
 from ..errors import MetricError, SeamError
-from ..flattening import Method, lay_out_once
+from ..flattening import Steps, lay_out_component
 from ..geometry import (
     coarse_mesh,
     double_areas,
@@ -33,7 +33,7 @@ from ..geometry import (
 from ..mesh import nearby
 from ..seams import seam_costs, without_loose_ends
 from ..source import Component
-from ..stages import Layout, Surface, VertexCurvatures
+from ..stages import ConeSpec, Layout, Surface, VertexCurvatures
 from .free_seams import as_one_chart, freed, recut, seam_edges, separate_charts, side_by_side
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .tips import RINGS, find_tips, moved_tips, moves_for
@@ -90,7 +90,7 @@ class CutSearch:
         component: a connected part of the input.
         max_energy: largest symmetric Dirichlet energy; infinite for no seams but those that are necessary. It may be
             changed, and candidates for other bounds are used again.
-        method: how the component is laid out.
+        steps: the functions that lay it out.
         is_coarse: whether the component is a coarse mesh already.
         by_area: whether the bound is the energy that belongs to an area distortion, see `ENERGY_PER_AREA`.
     """
@@ -99,11 +99,11 @@ class CutSearch:
         self,
         component: Component,
         max_energy: float,
-        method: Method,
+        steps: Steps,
         is_coarse: bool = False,
         by_area: bool = False,
     ) -> None:
-        self.component, self.max_energy, self._method, self._by_area = component, max_energy, method, by_area
+        self.component, self.max_energy, self._steps, self._by_area = component, max_energy, steps, by_area
         self._has_coarse = len(component.faces) > 2 * COARSE and not (
             is_coarse or component.seams.is_forbidden.any()
         )
@@ -256,13 +256,16 @@ class CutSearch:
         layout = with_charts(layout, joined.renumbered())
         return Candidate(layout, energy, self.cost_of(layout), candidate.distortion, True)
 
+    def _laid_out(self, cones: ConeSpec) -> Layout:
+        return lay_out_component(self._surface, replace(self.component, cones=cones), self._steps)
+
     def cost_of(self, layout: Layout) -> float:
         return float(self.seam_costs[seam_edges(layout)].sum())
 
     def _with_fewest_seams(self) -> Candidate:
         """Return a candidate cut between the fewest cones, and only along closed curves where there are handles."""
         mesh, spec = self.component.mesh, replace(self.component.cones, distortion=ANY_DISTORTION)
-        layout, _ = lay_out_once(self._surface, self.component, spec, self._method)
+        layout = self._laid_out(spec)
         close_search(self._surface)
         if len(layout.cones) and mesh.euler_characteristic < 2 and not mesh.is_boundary_edge.any():
             is_cut = mask_of(len(mesh.edges), seam_edges(layout))
@@ -275,10 +278,10 @@ class CutSearch:
         """Return a candidate with the cones that are best on a coarse mesh, unless the mesh itself needs others."""
         (coarse, vertices), allowed = coarse_component(self.component, COARSE), self.max_energy - ISOMETRIC
         bound = self.max_energy + COARSE_EXCESS * allowed
-        best = CutSearch(coarse, bound, self._method, True, self._by_area).best()
+        best = CutSearch(coarse, bound, self._steps, True, self._by_area).best()
         prescribed = VertexCurvatures(vertices[best.layout.cones], np.full(len(best.layout.cones), np.nan))
         spec = replace(self.component.cones, strategy="given", given=prescribed)
-        layout, _ = lay_out_once(self._surface, self.component, spec, self._method)
+        layout = self._laid_out(spec)
         candidate = self._candidate(layout, layout.statistics.area_distortion_linear)
         if 0 < candidate.energy - self.max_energy <= MAX_EXCESS * allowed:
             candidate = self.shortened(candidate)
@@ -298,7 +301,7 @@ class CutSearch:
                 break
             spec = replace(self.component.cones, distortion=distortion)
             # Cones that their triangles cannot hold are no problem for free seams.
-            layout, _ = lay_out_once(self._surface, self.component, spec, self._method)
+            layout = self._laid_out(spec)
             repeated = [
                 i
                 for i, earlier in enumerate(candidates)
@@ -322,7 +325,7 @@ class CutSearch:
         spec = with_corners(component.mesh, component.lengths, component.cones, MAX_POLYHEDRON_CORNERS)
         if spec is None:
             return []
-        layout, _ = lay_out_once(self._surface, component, spec, self._method)
+        layout = self._laid_out(spec)
         return [self._candidate(layout, 0.0)]
 
     def _next_distortion(self, count: int) -> float | None:
@@ -371,7 +374,7 @@ class CutSearch:
 
     def separated(self, candidate: Candidate) -> Candidate:
         """Return a candidate whose overlaps are separated."""
-        if candidate.is_separated or not self._method.separates:
+        if candidate.is_separated or not self._steps.separates:
             return candidate
         layout = separate_charts(candidate.layout, self.seam_costs, self.component.seams)
         return replace(candidate, layout=layout, cost=self.cost_of(layout), is_separated=True)
@@ -382,7 +385,7 @@ class CutSearch:
         for _ in range(MAX_TRIES):
             layout, energy = self._freed(candidate.layout, is_free)
             pairs = find_overlaps(side_by_side(layout).points[layout.corners]).pairs
-            if not (len(pairs) and self._method.separates):
+            if not (len(pairs) and self._steps.separates):
                 return replace(candidate, layout=layout, energy=energy)
             # Points where charts would touch themselves stay.
             corners = candidate.layout.corners

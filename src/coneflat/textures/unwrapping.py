@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base import TYPED_TOLERANCE, FloatArray, Stopwatch, Unmet, limit_threads, plural, warns
+from ..base import TYPED_TOLERANCE, FloatArray, Stopwatch, Unmet, limit_threads, plural, timing, warns
 from ..errors import ConvergenceError
 from ..evaluate import evaluate, packed_scale
-from ..flattening import Method, lay_out_flat_parts, with_copies
+from ..flattening import Steps
 from ..geometry import dihedral_angles, double_areas
+from ..groups import lay_out_flat_components, with_copies
 from ..io import as_input
 from ..measures.distortion import Distortion
 from ..metric import find_metric
@@ -21,7 +22,7 @@ from ..optimise import joined as joined_meshes
 from ..options import Options, declarations, read_options, takes
 from ..result import Flattening
 from ..source import Component, Source, find_copies
-from ..stages import ConeSolution, FlatMetric, MetricSpec, RelaxSpec, Surface
+from ..stages import ConeSolution, FlatMetric, MetricSpec, Surface
 from .density import MAX_RESOLUTION, expected_resolution, least_resolution
 from .free_seams import measured, seam_edges
 from .minor import MinorComponents
@@ -80,7 +81,12 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         >>> result.distortion.energy < 4.1, result.distortion.flipped, result.distortion.overlapping_pairs
         (True, 0, 0)
     """
-    o = read_options(options, UnwrapOptions)
+    parsed = read_options(options, UnwrapOptions)
+    with timing(parsed.progress) as watch:
+        return _unwrapped(Source(as_input(mesh, faces)), parsed, watch)
+
+
+def _unwrapped(source: Source, o: UnwrapOptions, watch: Stopwatch) -> Flattening:
     common = {name: getattr(o, name) for name in declarations(UnwrapOptions) if name not in OWN}
     if o.texel_density is not None:  # the padding is limited by the largest resolution
         common["resolution"] = MAX_RESOLUTION
@@ -89,14 +95,12 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         seams=o.marked,
         charts="one" if o.charts == "one" else "atlas",
     )
-    watch, source = Stopwatch(o.progress), Source(as_input(mesh, faces))
     with watch("check"):
         prepared, mirror = source.prepared(shared), None
         if o.stack == "mirrored":
             mirror, prepared = half_of(prepared, source, shared)
         stacked, prepared = without_copies(prepared) if o.stack == "copies" else (None, prepared)
-    relax, separates = RelaxSpec("off", 0.0), shared.charts == "atlas"
-    method = Method(relax, separates, None, Stopwatch(), Surface.of, quick_metric, untangles=False)
+    steps = Steps(find_metric=quick_metric, separates=shared.charts == "atlas", untangles=False)
     components, candidates = along_sharp_edges(prepared.components), dict[int, Candidate]()
     areas, sizes = np.array(
         [(double_areas(component.lengths).sum(), len(component.faces)) for component in components]
@@ -109,14 +113,15 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
             shared, resolution=expected_resolution(o.texel_density, model_areas, o.padding, o.tiles)
         )
     with limit_threads(o.threads if sizes.max() > PARALLEL else 1):
-        flat = lay_out_flat_parts(components, watch)
+        with watch("layout"):
+            flat = lay_out_flat_components(components)
         candidates.update((i, Candidate(layout, ISOMETRIC, 0.0, 0.0, True)) for i, layout in flat.items())
         # Copies cannot have different numbers of charts.
         with watch("check"):
             copies = [None] * len(components) if isinstance(o.charts, int) else find_copies(components, flat)
         originals = [i for i, copy in enumerate(copies) if copy is None]
         searches = {
-            i: CutSearch(components[i], o.bound, method, by_area=o.area is not None) for i in originals
+            i: CutSearch(components[i], o.bound, steps, by_area=o.area is not None) for i in originals
         }
         minor = [i for i, search in searches.items() if is_minor[i] and i not in flat and search.may_join]
         for group in _groups(minor, sizes):
@@ -146,7 +151,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
 
             if isinstance(o.charts, int):
                 layouts = cut_into(layouts, costs, o.charts)
-            elif method.separates and o.up is None and np.isfinite(o.bound):
+            elif steps.separates and o.up is None and np.isfinite(o.bound):
                 layouts = cut_for_packing(layouts, costs, o.padding / shared.resolution)
             for (i, search), layout in zip(searches.items(), layouts, strict=True):
                 # Joined components would each need a relaxation of their own.
@@ -177,7 +182,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
             scale_at = packed_scale(prepared, layouts, shared)
             resolution = least_resolution(o.texel_density, o.padding, shared.resolution, scale_at)
         shared = replace(shared, resolution=resolution)
-    result = evaluate(prepared, layouts, shared, watch)
+    result = evaluate(prepared, layouts, shared)
     notes = (
         *result.notes,
         *map(
