@@ -1,4 +1,4 @@
-"""Assembly of the result from the layouts of all parts: numbering, packing and measures."""
+"""Assembly of the result from the layouts of all components: numbering, packing and measures."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def evaluate(
 
     Args:
         prepared: the input.
-        layouts: the layouts of its parts.
+        layouts: the layouts of its components.
         options: the options; the result records them.
         overlaps: overlapping pairs of the result's triangles; None to compute them.
     """
@@ -149,7 +149,7 @@ def evaluate(
         rotations=rotations,
         vertex_origin=numbering.vertex_origin,
         face_origin=checked.face_origin[
-            np.sort(np.concatenate([part.faces for part in prepared.components]))
+            np.sort(np.concatenate([component.faces for component in prepared.components]))
         ],
         face_corners=face_corners,
         source=source,
@@ -178,9 +178,9 @@ def _result_mesh(prepared: Prepared) -> tuple[_Numbering, IntArray, TriangleMesh
     Triangles are sorted in the order of the input's faces.
     """
     checked, numbering = prepared.checked, _number_vertices(prepared)
-    origin = np.concatenate([part.faces for part in prepared.components])
+    origin = np.concatenate([component.faces for component in prepared.components])
     order = np.argsort(origin, kind="stable")
-    faces = rows_of(numbering.renumber([part.mesh.faces for part in prepared.components]), order)
+    faces = rows_of(numbering.renumber([part.mesh.faces for component in prepared.components]), order)
     points = np.ldexp(numbering.positions, checked.exponent)
     return numbering, order, _known_or_new(checked.mesh, points, faces)
 
@@ -189,7 +189,7 @@ def _number_vertices(prepared: Prepared) -> _Numbering:
     """Return the numbering of the result's vertices."""
     points = np.asarray(prepared.input_mesh.vertices, dtype=np.float64)
     number, vertex_origin = result_numbering(prepared.checked, len(points))
-    of_parts = [number[part.vertices] for part in prepared.components]
+    of_parts = [number[component.vertices] for component in prepared.components]
     return _Numbering(points[vertex_origin], vertex_origin, number, of_parts)
 
 
