@@ -180,7 +180,7 @@ def _result_mesh(prepared: Prepared) -> tuple[_Numbering, IntArray, TriangleMesh
     checked, numbering = prepared.checked, _number_vertices(prepared)
     origin = np.concatenate([component.faces for component in prepared.components])
     order = np.argsort(origin, kind="stable")
-    faces = rows_of(numbering.renumber([part.mesh.faces for component in prepared.components]), order)
+    faces = rows_of(numbering.renumber([component.mesh.faces for component in prepared.components]), order)
     points = np.ldexp(numbering.positions, checked.exponent)
     return numbering, order, _known_or_new(checked.mesh, points, faces)
 
