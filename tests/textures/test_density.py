@@ -10,7 +10,8 @@ import shapes
 
 from coneflat import errors, unwrap
 from coneflat.errors import OptionError
-from coneflat.textures.density import MAX_PACKINGS, MAX_RESOLUTION, expected_resolution, least_resolution
+from coneflat.textures.density import MAX_PACKINGS, expected_resolution, least_resolution
+from coneflat.textures.options import MAX_RESOLUTION
 
 
 class Packer:

@@ -12,7 +12,6 @@ from coneflat import unwrap
 from coneflat.geometry import double_areas, edge_lengths, triangle_energies
 from coneflat.mesh import label_faces
 from coneflat.textures import unwrapping as unwrap_module
-from coneflat.textures.search import CutSearch
 
 KINDS = {
     "icosphere": shapes.sphere(2),
@@ -41,7 +40,7 @@ def crumbs(kinds, count: int, seed: int = 0):
 @pytest.fixture
 def every_part_is_minor(monkeypatch):
     monkeypatch.setattr(unwrap_module, "MINOR_SHARE", 1.0)
-    monkeypatch.setattr(CutSearch, "best", lambda self: pytest.fail("a part is searched alone"))
+    monkeypatch.setattr(unwrap_module, "best_cut", lambda _: pytest.fail("a component is searched alone"))
 
 
 @pytest.mark.slow

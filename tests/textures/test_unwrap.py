@@ -20,9 +20,11 @@ from coneflat.io import as_input
 from coneflat.options import Options
 from coneflat.retries import lay_out_with_thick_triangles
 from coneflat.source import Source
+from coneflat.textures import unwrapping
+from coneflat.textures.coarse import coarse_component
+from coneflat.textures.creases import along_sharp_edges
 from coneflat.textures.free_seams import freed
-from coneflat.textures.search import CutSearch, coarse_component
-from coneflat.textures.unwrapping import along_sharp_edges
+from coneflat.textures.small_charts import join_small_charts
 
 CLOSED = {"sphere": shapes.sphere(3), "two handles": shapes.genus(2), "box": shapes.box()}
 OPEN = {"hill": shapes.hill(), "annulus": shapes.annulus(), "cylinder": shapes.cylinder()}
@@ -267,7 +269,7 @@ def test_a_chart_with_short_seams_is_cut_as_well(shared, fandisk, monkeypatch):
 def test_small_charts_are_joined_to_others_where_they_fit(shared, monkeypatch):
     path, bound = shared("spot.obj"), 4.02
     result = unwrap(path, max_energy=bound)
-    monkeypatch.setattr("coneflat.textures.search.CutSearch.small_joined", lambda _, candidate: candidate)
+    monkeypatch.setattr("coneflat.textures.unwrapping.join_small_charts", lambda _, candidate: candidate)
     joined, apart = result.distortion, unwrap(path, max_energy=bound).distortion
     assert joined.charts <= apart.charts - 2
     assert joined.seam_length < 0.99 * apart.seam_length
@@ -383,13 +385,13 @@ def test_the_search_for_a_loose_bound_on_a_coarse_mesh_tries_other_cones(
 def test_small_charts_inside_another_one_are_joined(monkeypatch):
     """The second join closes edges of the third seam as well."""
     searches = []
-    best = CutSearch.best
+    best_cut = unwrapping.best_cut
     monkeypatch.setattr(
-        CutSearch, "best", lambda self: searches.append((self, best(self))) or searches[-1][1]
+        unwrapping, "best_cut", lambda model: searches.append((model, best_cut(model))) or searches[-1][1]
     )
     vertices, faces = shapes.grid(40, 40)
     unwrap(vertices, faces)
-    ((search, candidate),) = searches
+    ((model, candidate),) = searches
     layout = candidate.layout
     inner = np.flatnonzero(~layout.mesh.is_boundary_vertex)
     offsets = np.abs(layout.mesh.vertices - layout.mesh.vertices.mean(axis=0)).sum(axis=1)
@@ -398,6 +400,6 @@ def test_small_charts_inside_another_one_are_joined(monkeypatch):
     chart = layout.chart.copy()
     chart[around], chart[around[0]] = 1, 2
     charts = ChartLayout(layout.points, layout.corners, layout.chart).split(chart).renumbered()
-    joined = search.small_joined(replace(candidate, layout=with_charts(layout, charts)))
+    joined = join_small_charts(model, replace(candidate, layout=with_charts(layout, charts)))
     assert joined.layout.chart.max() == 0
     assert joined.energy == pytest.approx(4)

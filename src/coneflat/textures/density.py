@@ -9,9 +9,10 @@ import numpy as np
 
 from ..base import FloatArray
 from ..errors import OptionError
+from .options import MAX_RESOLUTION
 
-#: Largest number of texels along a side. Resolutions are multiples of STEP texels.
-MAX_RESOLUTION, STEP = 2**16, 4
+#: Resolutions are multiples of it, in texels.
+STEP = 4
 #: Rough fraction of a texture that charts and their padding cover.
 COVERED = 0.65
 #: Largest number of packings of a search. It ends after 4 to 8 unless the density is not monotone.

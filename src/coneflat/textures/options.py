@@ -14,6 +14,7 @@ from ..options import (
     Edges,
     Kind,
     Number,
+    Options,
     RunOptions,
     SeamOptions,
     as_integer,
@@ -29,6 +30,8 @@ ISOMETRIC, MAX_ENERGY = 4.0, 4.1
 #: The energy above that of an isometry, relative to the squared area distortion, of layouts with the least energy:
 #: 17 to 27 on seven models.
 ENERGY_PER_AREA = 20.0
+#: Largest number of texels along a side.
+MAX_RESOLUTION = 2**16
 #: Bounds of the area distortion allowed. Below, the energy would be that of an isometry up to rounding; above, areas
 #: differ by factors that no number holds.
 MIN_AREA, MAX_AREA = 1e-6, 100.0
@@ -124,8 +127,25 @@ class UnwrapOptions(TextureOptions, SeamOptions, AtlasOptions, RunOptions):
         return None if isinstance(self.seams, str) and self.seams == "none" else self.seams
 
     @property
+    def has_no_bound(self) -> bool:
+        """Whether the option `seams` contains the word none."""
+        return self.marked is not self.seams
+
+    @property
     def bound(self) -> float:
         """The largest energy, or the energy that belongs to the largest area distortion; infinite without a bound."""
-        if self.marked is not self.seams:
+        if self.has_no_bound:
             return math.inf
         return self.max_energy if self.area is None else ISOMETRIC + ENERGY_PER_AREA * self.area**2
+
+
+#: Options that the flattening does not have, or with other values.
+OWN_NAMES = (*declarations(TextureOptions), "charts", "seams")
+
+
+def options_of_stages(options: UnwrapOptions) -> Options:
+    """Return the options of the flattening that the stages get."""
+    common = {name: getattr(options, name) for name in declarations(UnwrapOptions) if name not in OWN_NAMES}
+    if options.texel_density is not None:  # the padding is limited by the largest resolution
+        common["resolution"] = MAX_RESOLUTION
+    return Options(**common, seams=options.marked, charts="one" if options.charts == "one" else "atlas")

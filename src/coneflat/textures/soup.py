@@ -15,8 +15,7 @@ from ..io import stored_in_glb
 from ..mesh import EdgeGroups, end_corners, glue_layers, label_faces, split_vertices, weld
 from ..optimise import rest_sides
 from ..options import read_options
-from .density import MAX_RESOLUTION
-from .options import UnwrapOptions
+from .options import MAX_RESOLUTION, UnwrapOptions
 from .unwrapping import unwrap
 
 
