@@ -26,7 +26,7 @@ SEAMS_PER_ENERGY = 20.0
 
 
 def rank(components: Sequence[Component], layouts: Sequence[Layout]) -> tuple[int, float, float]:
-    """Return what decides between layouts of a component, in one component or cut into several: the smaller is the better.
+    """Return the rank of layouts of a component, uncut or cut into pieces; of two, the smaller is better.
 
     Fewer notes are better, then a smaller excess over the allowed area distortion, and within that bound a smaller sum
     of seams and distortion.
@@ -40,7 +40,7 @@ def rank(components: Sequence[Component], layouts: Sequence[Layout]) -> tuple[in
 
 
 def is_too_distorted(component: Component, layout: Layout) -> bool:
-    """Return whether a component of which no more than a bound is asked has more area or angle distortion than is usable."""
+    """Return whether a layout has too much area or angle distortion, where only a bound is requested."""
     if not is_bounded(component):
         return False
     return excess([component], [layout]) > TOLERATED_EXCESS or mean_qc(layout) > EXTREME_QC

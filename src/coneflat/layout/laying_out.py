@@ -74,8 +74,8 @@ def _unfolded(metric: FlatMetric, triangles: FlatTriangles, cut: Cut, rings: int
     on_seam = mask_of(len(mesh.vertices), mesh.edges[cut.seams])
     angles = np.where(on_boundary, np.pi, 2 * np.pi) - metric.target
     masks = stays | on_seam | on_boundary, stays | on_boundary, stays
-    rest = rest_sides(metric.lengths)
-    untangled = untangle(triangles, mesh.faces, angles, on_boundary, masks, rest, rings)
+    target_shapes = rest_sides(metric.lengths)
+    untangled = untangle(triangles, mesh.faces, angles, on_boundary, masks, target_shapes, rings)
     points = unfold(untangled.flat, cut.mesh.faces) * metric.scale
     curvature = layout_curvature(mesh, rows_of(points, cut.mesh.faces))
     statistics = replace(

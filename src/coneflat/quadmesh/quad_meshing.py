@@ -95,7 +95,7 @@ def quads(
         small = None if has_all else SimplerMesh.of(search)
     with stages("smooth"):
         if small is not None:
-            found, features = small.moved(found), sharp_ends(small.given)
+            found, features = small.moved(found), sharp_ends(small.surface)
         found = smooth_quads(found, smooth, features)
         found = found if small is None else small.completed(found)
     _require_sound(found, search.limit if search else NO_LIMIT)

@@ -318,7 +318,7 @@ def _component(
         max_angle=options.max_cone_angle,
         positive_only=options.positive_only,
         quantum=options.quantise,
-        given=limits.cones,
+        prescribed=limits.cones,
         required=limits.required.vertices,
         is_allowed=limits.is_allowed,
         weights=limits.weights,

@@ -80,7 +80,7 @@ def _has_vertex_options(component: Component) -> bool:
     cones = component.cones
     weights = cones.weights, component.seams.weights, component.seams.visibility
     return bool(
-        len(cones.given)
+        len(cones.prescribed)
         or len(component.metric.corners)
         or len(cones.required)
         or any(per_vertex is not None for per_vertex in weights)

@@ -84,7 +84,7 @@ def _from_coarse(model: CutModel) -> Candidate:
     best = _best_of_searched(CutModel(coarse, bound, model.steps))
     cones = vertices[best.layout.cones]
     prescribed = VertexCurvatures(cones, np.full(len(cones), np.nan))
-    layout = model.laid_out(replace(model.component.cones, strategy="given", given=prescribed))
+    layout = model.laid_out(replace(model.component.cones, strategy="prescribed", prescribed=prescribed))
     candidate = model.candidate(layout, layout.statistics.area_distortion_linear)
     excess = candidate.energy - model.bound.largest
     if 0 < excess <= MAX_EXCESS * model.bound.allowed:
