@@ -39,11 +39,12 @@ HOLDS = {
     "result": "what a flattening returns",
     "io": "OBJ, PLY, STL, OFF, glTF, NPZ",
     "source": "from the input to connected parts",
-    "flattening": "the method, top to bottom",
+    "flattening": "the method on one component",
+    "groups": "copies, flat disks, small ones together",
     "evaluate": "from layouts to one result",
     "bounds": "which of two layouts is better",
-    "attempts": "corners and sharp edges to try",
-    "flattener": "one mesh again and again",
+    "retries": "what is laid out again, why",
+    "flattener": "flatten: from input to result",
     "curves": "distortion by number of cones",
     "apps.uv_measures": "measures of any mesh's UVs",
     "from_uv": "a file's own UVs as a flattening",
@@ -51,7 +52,7 @@ HOLDS = {
     "warm_up": "compilation of all kernels",
     "textures": "shortest seams for textures",
     "quadmesh": "quads from an integer grid",
-    "apps": "commands, page, studio, peers",
+    "apps": "commands, page, studio, batch",
     "xatlas": "the interface of xatlas",
     "__main__": "python -m coneflat",
 }
@@ -128,10 +129,32 @@ def imported_packages(modules: dict[str, Module]) -> dict[str, frozenset[str]]:
         others = {package_of(other) for other in module.imports | module.late_imports}
         if own == "":
             others = set()
-        if name in ("result", "quadmesh.quad_mesh"):  # their `save` and `view`
+        if name == "quadmesh.quad_mesh":  # its `save` and `view`
             others = {package_of(other) for other in module.imports}
         found.setdefault(own, set()).update(others - {own, ""})
     return {name: frozenset(others) for name, others in found.items()}
+
+
+def file_circles(modules: dict[str, Module]) -> list[list[str]]:
+    """Return the groups of modules that import each other in circles, late imports counted.
+
+    A group is a strongly connected component with several modules. What only type checkers import does not count, nor
+    do names of modules in text: public names of a package's `__init__`, and `EntryPoint`.
+    """
+    reached = {name: _reached(name, modules) for name in modules}
+    circles = {tuple(sorted(other for other in reached[name] if name in reached[other])) for name in modules}
+    return [list(circle) for circle in sorted(circles) if circle]
+
+
+def _reached(name: str, modules: dict[str, Module]) -> set[str]:
+    """Return the modules that a module imports, directly or through others."""
+    reached, waiting = set[str](), [name]
+    while waiting:
+        module = modules[waiting.pop()]
+        unvisited = (module.imports | module.late_imports) & modules.keys() - reached
+        reached |= unvisited
+        waiting += unvisited
+    return reached
 
 
 def levels(modules: dict[str, Module]) -> dict[str, int]:

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import shapes
 
-from coneflat import TriangleMesh, errors
-from coneflat.flattening import flatten
+from coneflat import TriangleMesh, errors, flatten
 from coneflat.geometry import edge_lengths
 from coneflat.geometry.planar import sides_between, signed_double_areas
 from coneflat.optimise import Lines, PointConstraints, StretchEnergy, relax

@@ -244,8 +244,8 @@ class TestMarkedSeams:
     @pytest.mark.parametrize("boundary", ["free", pytest.param("lengths", marks=pytest.mark.slow)])
     def test_seams_whose_lengths_cannot_be_equal_are_reported(self, boundary, monkeypatch):
         """Where triangles at a seam are too coarse for the curvature beside it, there is no metric with their sides."""
-        monkeypatch.setattr(import_module("coneflat.flattening"), "MAX_SEARCHES", 1)  # other cones may help
-        monkeypatch.setattr(import_module("coneflat.flattening"), "MAX_CORRECTIONS", 0)
+        monkeypatch.setattr(import_module("coneflat.retries"), "MAX_SEARCHES", 1)  # other cones may help
+        monkeypatch.setattr(import_module("coneflat.retries"), "MAX_CORRECTIONS", 0)
         result = coneflat.flatten(*folded(0.3), boundary=boundary, seams=self.seams())
         assert result.distortion.seam_mismatch_max > 0.1
         assert any("could not keep their lengths" in note for note in result.notes)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.arrays import FloatArray, mask_of, rows_of
+from ..base.progress import stage
 from ..base.text import plural
 from ..errors import MetricError
 from ..geometry import angle_defect, corner_angles, double_areas
@@ -19,6 +20,7 @@ from ..stages import Cut, Embedding, FlatMetric, Layout
 from .least_squares import least_squares_layout
 
 
+@stage("layout")
 def lay_out(metric: FlatMetric, cut: Cut, untangles: bool = True) -> Layout:
     """Return the layout of a flat metric on a mesh that is cut open (Section 4.3 of the paper).
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, mask_of, rows_of
 from ..base.notes import Unmet
+from ..base.progress import report_detail, stage
 from ..errors import LengthError, MetricError, SeamError
 from ..geometry import double_areas
 from ..geometry.operators import MIN_WEIGHT, area_distortion, at_unit_scale, vertex_areas, weighted_areas
@@ -36,11 +37,11 @@ RETRY_SHARPNESS = 2.0
 RELATIVE_TOLERANCE = 1e-9
 
 
+@stage("relax")
 def relax_layouts(
     layouts: Sequence[Layout],
     weights: Sequence[FloatArray | None],
     spec: RelaxSpec,
-    report: Callable[[str], None],
 ) -> list[Layout]:
     """Return layouts with less distortion, the same cones and the same seams, relaxed as one mesh.
 
@@ -51,7 +52,6 @@ def relax_layouts(
         layouts: layouts of connected meshes.
         weights: for each layout the (n,) importance of its vertices, or None.
         spec: the options for relaxing.
-        report: called after each step with a description of it.
 
     Returns:
         The relaxed layouts, in the same order.
@@ -62,11 +62,11 @@ def relax_layouts(
     if spec.is_off or not layouts:
         return list(layouts)
     try:
-        return _relaxed(LayoutGroup(layouts, weights), spec, report)
+        return _relaxed(LayoutGroup(layouts, weights), spec)
     except (SeamError, LengthError, MetricError) as error:  # a metric that did not converge
         if len(layouts) > 1:
             return [
-                relax_layouts([layout], [layout_weights], spec, report)[0]
+                relax_layouts([layout], [layout_weights], spec)[0]
                 for layout, layout_weights in zip(layouts, weights, strict=True)
             ]
         if isinstance(error, MetricError):
@@ -80,7 +80,7 @@ def mean_qc(layout: Layout) -> float:
     return float(group.means(group.ratios(group.points))[0])
 
 
-def _relaxed(group: LayoutGroup, spec: RelaxSpec, report: Callable[[str], None]) -> list[Layout]:
+def _relaxed(group: LayoutGroup, spec: RelaxSpec) -> list[Layout]:
     mesh, points = group.mesh, group.points
     before = group.ratios(points)
     is_free = group.is_free
@@ -99,7 +99,7 @@ def _relaxed(group: LayoutGroup, spec: RelaxSpec, report: Callable[[str], None])
             weights=group.weights,
             free=is_free,
             tolerance=TOLERANCE,
-            progress=lambda step, _: report(f"step {step}"),
+            progress=lambda step, _: report_detail(f"step {step}"),
         ).points
 
     if spec.stretch:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of
 from ..base.notes import Unmet
+from ..base.progress import stage
 from ..base.text import list_some, plural
 from ..geometry.intrinsic import halfedge_twins
 from ..geometry.operators import cotangent_laplacian
@@ -21,6 +22,7 @@ from .relaxing import relax, rest_sides
 from .untangling import MAX_RINGS, find_degenerate, untangle
 
 
+@stage("relax")
 def untangle_seams(layout: Layout, spec: ConeSpec, stretch: float, quantum: float | None) -> Layout:
     """Return a layout whose inverted triangles are positively oriented, while seams near them may become unequal.
 

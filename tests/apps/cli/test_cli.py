@@ -21,7 +21,7 @@ from command import command as run
 import coneflat
 from coneflat import errors, flatten, read_mesh
 from coneflat.apps.cli.main import main
-from coneflat.apps.cli.values import parse_curvature
+from coneflat.options.texts import parse_curvature
 
 #: A line of progress, which comes by the clock.
 PROGRESS = re.compile(r" *\d+\.\d s +\d+%  .*")
@@ -83,7 +83,7 @@ def test_paper_is_the_published_method(model, tmp_path):
         (["model.obj", "-o", "z.obj", "--report", "model.obj"], "is both the input and the report"),
         (["model.obj", "-o", "z.obj", "--report", "./z.obj"], "is both the output and the report"),
         (["model.obj", "--distortion", "few"], "not a valid float"),
-        (["model.obj", "--max-cones", "0"], "0 cones of at most 1.5 pi each cannot carry"),
+        (["model.obj", "--max-cones", "0"], "0 cones of at most 1.5 pi each cannot absorb"),
         (["model.obj", "--cones", "magic"], "magic"),
         (["model.obj", "--boundary", "1:pi,2"], "vertex 2 has none"),
         (["model.obj", "--cones", "1:pi", "--cones", "2:pi"], "sum to 6.283185 (2 pi)"),
@@ -136,12 +136,12 @@ def test_cones_from_a_file(model, tmp_path):
     [("1.5", 1.5), ("pi", np.pi), ("-pi/2", -np.pi / 2), ("0.5pi", np.pi / 2), ("3pi/2", 1.5 * np.pi),
      ("90deg", np.pi / 2), ("1e-1", 0.1), ("π", np.pi), ("-.25 pi", -np.pi / 4), ("2 * pi", 2 * np.pi)],
 )  # fmt: skip
-def test_curvatures_as_people_write_them(text, value):
+def test_forms_of_curvatures(text, value):
     assert parse_curvature(text, "here") == pytest.approx(value)
 
 
 @pytest.mark.parametrize("text", ["", "x", "pi/0", "1..2", "pipi", "-", "deg", "nan", "1 2"])
-def test_what_is_no_curvature(text):
+def test_invalid_curvatures_are_refused(text):
     with pytest.raises(errors.OptionError, match="here"):
         parse_curvature(text, "here")
 

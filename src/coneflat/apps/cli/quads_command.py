@@ -1,0 +1,142 @@
+"""`coneflat quads`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ...options import ConeBounds, ConeNumber, declarations, read_options
+from ...quadmesh.options import QuadOptions
+from .flags import (
+    GroupedCommand,
+    input_options,
+    is_given,
+    keywords,
+    option_flags,
+    path_flag,
+    pop_flags,
+    refuse,
+    verbosity_options,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class QuadFlags:
+    """Output.
+
+    Attributes:
+        output: File for the quads: .obj, .ply, .glb or .npz; by meshio .vtk, .vtu, .inp or .msh.  [default: MESH's name
+            with _quads, as .obj; none if --grid or --view is given]
+        grid: File for the integer grid that the quads are extracted from: .obj, with texture coordinates in units of
+            grid squares, or .npz.
+        view: Page (.html) that shows the quads, their irregular vertices, and the rectangles that they form.
+        report: JSON file for all measures.
+    """
+
+    output: Path | None = path_flag()
+    grid: Path | None = path_flag()
+    view: Path | None = path_flag()
+    report: Path | None = path_flag()
+
+
+@click.command(cls=GroupedCommand, short_help="Convert a mesh to a quad mesh.")
+@click.argument("mesh", type=click.Path(path_type=Path))
+@option_flags(QuadOptions)
+@option_flags(QuadFlags)
+@input_options
+@verbosity_options
+@click.pass_context
+def quads(
+    context: click.Context, /, mesh: Path, weld: bool | None, verbosity: str | None, **params: Any
+) -> None:
+    """Convert MESH to a mesh of quads only, with few irregular vertices.
+
+    MESH is a file (.obj, .ply, .stl, .off, .gltf, .glb, .gii, lh.pial), or an integer grid (.npz) that --grid has
+    written.
+
+    \b
+    Examples:
+      coneflat quads horse.ply -o horse_quads.obj
+      coneflat quads hand.obj --quads 3000 --stretch 0.5
+      coneflat quads sheet.obj --boundary straight -o sheet_quads.glb
+      coneflat quads bunny.obj --grid bunny_grid.obj
+      coneflat quads hand.obj -o hand.npz --view hand.html
+    """
+    from ... import integer_grid, measure_quads
+    from ... import quads as find_quads
+    from ...io import check_target, read_joined
+    from ...quadmesh.files import check_grid_output, check_quads_output, quads_left_out, read_grid
+    from ..view import check_page, page_of_quads, write_page
+    from .run import Console, require_distinct, write_report
+
+    _check_combinations(context, mesh)
+    flags, options = pop_flags(params, QuadFlags), keywords(params, QuadOptions)
+    read_options(options, QuadOptions)
+    if "quads" in options and isinstance(options.get("size"), float):
+        raise click.UsageError("--quads (--faces) and a length as --size exclude each other: leave out one")
+    output, grid, view = flags.output, flags.grid, flags.view
+    if output is None and grid is None and view is None:
+        output = Path(f"{mesh.stem}_quads.obj")
+    # Errors that writing would raise are reported before the work starts.
+    files = {"output": output, "grid": grid, "view": view, "report": flags.report}
+    checks = (check_quads_output, check_grid_output, check_page, check_target)
+    for path, check in zip(files.values(), checks, strict=True):
+        if path is not None:
+            check(path)
+    require_distinct({"input": mesh, **files})
+    rounds = {"smooth": options.pop("smooth")} if "smooth" in options else {}
+    with Console(verbosity) as console:
+        with console.stage("read", 0.0):
+            joined = None if mesh.suffix.lower() == ".npz" else read_joined(mesh, weld)
+            source: Any = read_grid(mesh) if joined is None else joined.mesh
+        options = {**({} if joined is None else joined.map_options(options)), "progress": console.part()}
+        quad_mesh = measures = None
+        if output is None and view is None:
+            done = grid_map = source if joined is None else integer_grid(source, **options)
+        else:
+            done = quad_mesh = find_quads(source, **options, **rounds)
+            grid_map = quad_mesh.grid
+            with console.stage("measure"):
+                measures = measure_quads(quad_mesh)
+        console.seconds.update(done.seconds)
+        with console.stage("write"):
+            if grid is not None:
+                grid_map.save(grid)
+            if quad_mesh is not None and output is not None:
+                quad_mesh.save(output)
+            if quad_mesh is not None and view is not None:
+                write_page(page_of_quads(quad_mesh, name=mesh.name), view)
+        notes = list(done.notes if joined is None else joined.all_notes(done.notes))
+        endings = [path.suffix.lower() for path in (output, grid) if path is not None]
+        for ending in dict.fromkeys(endings):
+            notes += quads_left_out(None if joined is None else joined.mesh, ending)
+        if flags.report is not None:
+            measured = {} if measures is None else measures.report()
+            run = {"grid": {"size": grid_map.size}, "seconds": dict(console.seconds), "notes": notes}
+            write_report(flags.report, {**measured, **run})
+        console.say(f"note: {note}" for note in notes)
+        console.finish([path for path in files.values() if path is not None])
+        square = "square", f"{grid_map.size:.4g}", "side of a grid square in model units"
+        console.table([square, *(() if measures is None else measures.rows())])
+
+
+def _check_combinations(context: click.Context, mesh: Path) -> None:
+    """Raise an error if an option would have no effect."""
+    searched = [*declarations(ConeBounds), *declarations(ConeNumber), "max_cones"]
+    are_given = context.params["cones"] not in ((), ("auto",), ("sparse",))
+    refuse(
+        context,
+        [
+            (is_given(context, "cone_count"), ["distortion", "max_cones"], "--cone-count is given"),
+            (are_given, searched, "there is no search if the cones are given"),
+        ],
+    )
+    if mesh.suffix.lower() != ".npz":
+        return
+    for parameter in context.command.params:
+        allowed = ("mesh", "output", "grid", "view", "smooth", "report", "verbosity")
+        if parameter.name not in allowed and parameter.name is not None and is_given(context, parameter.name):
+            raise click.UsageError(f"{mesh} is a grid: leave out {parameter.opts[0]}", context)
