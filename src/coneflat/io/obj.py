@@ -22,7 +22,8 @@ from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..errors import ConeflatError, FaceIndexError, MeshFileError
 from ..mesh.polygons import COLOURS, first_bad_corner
 from ..result import Flattening
-from .attributes import GROUPS, MATERIALS, OBJECTS, VERTEX_COLOURS, Attribute, colour_shades
+from .attributes import GROUPS, MATERIALS, OBJECTS, VERTEX_COLOURS, Attribute
+from .colours import colour_shades
 from .convex_pieces import find_pieces
 from .files import inner_path, moved_path, read_bytes
 from .mesh_file import MeshFile, check_filled, offsets_of

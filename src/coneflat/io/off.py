@@ -12,7 +12,8 @@ import numpy as np
 from ..base.arrays import FloatArray, IntArray
 from ..errors import MeshFileError
 from ..mesh.polygons import COLOURS
-from .attributes import ALPHA, VERTEX_COLOURS, Attribute, colour_shades
+from .attributes import ALPHA, VERTEX_COLOURS, Attribute
+from .colours import colour_shades
 from .mesh_file import MeshFile, offsets_of
 from .text import Growing, TextBlock, text_blocks
 

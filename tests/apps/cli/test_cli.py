@@ -75,7 +75,7 @@ def test_paper_is_the_published_method(model, tmp_path):
         (["model.obj", "-o", "x.fbx"], "'.fbx'"),
         (["model.obj", "-o", "missing/x.obj"], "missing"),
         (["model.obj", "--report", "missing/x.json"], "missing"),
-        (["model.obj", "--texture", "checker"], "only .glb files carry a texture"),
+        (["model.obj", "--texture", "checker"], "only .glb files contain a texture"),
         (["model.obj", "-o", "x.glb", "--texture", "none.png"], "none.png: there is no such file"),
         (["."], "coneflat batch"),
         (["model.obj", "-o", "x.glb", "--texture", "text.ply"], "text.ply is not a readable image"),

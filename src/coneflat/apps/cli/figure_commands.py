@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from ...base import CHECKER_CELLS, DOTS_PER_INCH, MAX_CONES
 from .flags import (
     again_option,
     color_option,
@@ -64,11 +65,11 @@ class FigureFlags:
     output: Path | None = path_flag()
     eye: tuple[Any, ...] = flag((), type=parse_eye, metavar="EYE", multiple=True)
     size: tuple[float, float] | None = flag(type=float, nargs=2, metavar="WIDTH HEIGHT")
-    dpi: float = flag(300.0, type=float)
+    dpi: float = flag(DOTS_PER_INCH, type=float)
     colors: str | None = flag(metavar="NAME")
-    cells: float = flag(36.0, type=float)
+    cells: float = flag(float(CHECKER_CELLS), type=float)
     color_charts: bool = flag(False, is_flag=True)
-    most: int = flag(30, type=int)
+    most: int = flag(MAX_CONES, type=int)
     title: str = flag("")
 
 

@@ -24,13 +24,13 @@ from ...base.arrays import FloatArray, IntArray
 from ...base.text import list_some, plural, printable
 from ...errors import ConeflatError, MeshFileError
 from ...geometry.triangles import vertex_normals
-from ...mesh.polygons import COLOURS
 from ...result import Flattening
-from ..attributes import ALPHA, MAX_NAME, VERTEX_COLOURS, Attribute, colour_shades, old_textures
+from ..attributes import ALPHA, MAX_NAME, VERTEX_COLOURS, Attribute, old_textures
+from ..colours import linear_colours, stored_shades
 from ..files import moved_path, read_bytes
 from ..mesh_file import MeshFile
 from ..split import distinct_pairs, input_vertices, shading_normals, source_normals, split_at_seams
-from ..texture import Texture, image_kind, to_linear
+from ..texture import Texture, image_kind
 from .data import COMPRESSED, GltfData, Item
 from .positions import local_positions
 from .read import DRACO, GltfScene, Mode, ScenePart
@@ -194,7 +194,7 @@ def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
         normals = shading_normals(vertex_normals(result.vertices, result.faces))[split.vertex]
     places, colours = local_positions(split.vertices), None
     if texture is None and result.source is not None and result.face_corners is not None:
-        colours = linear_colours(result.source, input_vertices(result)[split.vertex])
+        colours = linear_colours(result.source)
     primitive: Item = {"attributes": {}, "indices": 0, "material": 0}
     glb = Glb(
         {
@@ -217,9 +217,10 @@ def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
         form = {"componentType": 5126, "type": kind} | (bounds(stored) if name == "POSITION" else {})
         primitive["attributes"][name] = glb.add_array(stored, form)
     if colours is not None:
+        # 16 bits keep all of the 256 steps of sRGB.
+        stored = stored_shades(colours[input_vertices(result)[split.vertex]], "<u2")
         form = {"componentType": 5123, "type": "VEC4", "normalized": True}
-        primitive["attributes"][COLOUR] = glb.add_array(colours, form, FOR_VERTICES)
-    if colours is not None:
+        primitive["attributes"][COLOUR] = glb.add_array(stored, form, FOR_VERTICES)
         # The material multiplies the colours.
         plain = MATERIAL["pbrMetallicRoughness"] | {"baseColorFactor": [1.0] * 4}
         glb.add("materials", MATERIAL | {"pbrMetallicRoughness": plain})
@@ -228,20 +229,6 @@ def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
     else:
         glb.add_material(texture)
     return glb
-
-
-def linear_colours(source: MeshFile, vertices: IntArray) -> NDArray[np.uint16] | None:
-    """Return (k, 4) the linear colours and alphas of vertices of a file, 0 to 65535; None if it has none.
-
-    Colours of files are sRGB; 16 bits keep all of their 256 steps.
-    """
-    if not source.has_colours:
-        return None
-    shades = np.stack([source.properties[name][vertices] for name in COLOURS], axis=1)
-    linear = to_linear(np.clip(np.nan_to_num(shades), 0, 1))
-    alpha = colour_shades(source.properties.get(ALPHA.name, np.ones(len(source.vertices))))[vertices]
-    rows = np.column_stack([linear, np.clip(np.nan_to_num(alpha), 0, 1)])
-    return np.rint(np.iinfo(np.uint16).max * rows).astype("<u2")
 
 
 def kept_in_glb(source: MeshFile) -> set[Attribute]:

@@ -14,6 +14,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
+from ....base import DOTS_PER_INCH
 from ....errors import OptionError
 from ....io import atomic_write, checked_target, imported
 from ..quantity import Quantity
@@ -97,7 +98,7 @@ def compose(
     title: str = "",
     marks: Sequence[Any] = (),
     size: tuple[float, float] | None = None,
-    dpi: float = 300.0,
+    dpi: float = DOTS_PER_INCH,
     width: float = Inches.WIDTH,
 ) -> Figure:
     """Return a figure of rows of panels.

@@ -18,7 +18,7 @@ from ..quantity import ColorScale, Quantity, angle_defects, conformal_distortion
 if TYPE_CHECKING:
     from .... import Flattening
 
-CELLS = 4095
+GRID_CELLS = 4095
 """Largest number of cells along an axis, so that the five indices of a cell fit into 60 bits."""
 
 
@@ -52,7 +52,7 @@ def simplify(
     for _ in range(60):
         unmerged = fixed
         while True:
-            corners = _representatives(coordinates, unmerged, max(size, extent / CELLS))[faces]
+            corners = _representatives(coordinates, unmerged, max(size, extent / GRID_CELLS))[faces]
             remain = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
             folded = np.flatnonzero(remain)
             folded = folded[signed_double_areas(uv[corners[folded]]) * areas[folded] <= 0]
@@ -86,7 +86,7 @@ def _representatives(coordinates: FloatArray, fixed: BoolArray, size: float) -> 
     cells = np.floor(coordinates[free] / size).astype(np.int64)
     key = np.zeros(len(free), dtype=np.int64)
     for column in cells.T:
-        key = key * (CELLS + 1) + column
+        key = key * (GRID_CELLS + 1) + column
     _, cell = np.unique(key, return_inverse=True)
     cell = cell.reshape(-1)
     members = np.bincount(cell)

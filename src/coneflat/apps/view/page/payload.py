@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ....base import CHECKER_CELLS
 from ....geometry import CREASE_COSINE, double_areas, edge_lengths
-from ....io import CELLS, Texture
+from ....io import Texture
 from ....mesh import end_corners
 from ..figures.camera import fit_camera
 from ..figures.kinds import title
@@ -61,7 +62,7 @@ class PageText:
 
     title: str
     rows: Sequence[tuple[str, str, str]]
-    squares: float = CELLS
+    squares: float = CHECKER_CELLS
 
 
 def as_payload(head: dict[str, Any], block: bytes) -> tuple[str, str]:
