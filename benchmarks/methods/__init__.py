@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from coneflat import ConeflatError, Flattening
 from coneflat.apps.peers.run import Comparison, Entry, compare_methods, entry_of
-from coneflat.flattening import flatten_source
+from coneflat.flattener import flatten_source
 from coneflat.io import as_input
 from coneflat.options import Choice, Options, option, read_options
 from coneflat.source import Source

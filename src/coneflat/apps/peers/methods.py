@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ... import Flattening, TriangleMesh
 from ...base import FloatArray, warns
-from ...flattening import flatten_source
+from ...flattener import flatten_source
 from ...io import as_input
 from ...metric import find_metric
 from ...options import Choice, Options, option, read_options
