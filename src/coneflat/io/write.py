@@ -38,7 +38,7 @@ class OutputFormat(NamedTuple):
 
     Attributes:
         write: writes a result to a stream; further arguments are the folder of the file, and a texture or None.
-        kept: returns the attributes of a source file that the format keeps.
+        kept_attributes: returns those of a source file that the format keeps.
         stored: returns a result with the numbers and the triangles of the file, measured again.
         is_rounded: the numbers of `stored` are rounded, and are those that `write` gets instead of the result's.
         takes_texture: a texture can be embedded.
@@ -47,7 +47,7 @@ class OutputFormat(NamedTuple):
     """
 
     write: Callable[[Flattening, IO[bytes], Path, Texture | None], None]
-    kept: Callable[[MeshFile], set[Attribute]]
+    kept_attributes: Callable[[MeshFile], set[Attribute]]
     stored: Callable[[Flattening], Flattening] = lambda result: result
     is_rounded: bool = False
     takes_texture: bool = False
@@ -245,9 +245,11 @@ def left_out(result: Flattening, ending: str, has_texture: bool = False) -> tupl
         return ()
     # A texture would be multiplied by colours of vertices.
     hidden = {VERTEX_COLOURS, ALPHA} if has_texture and source.scene is None else set()
-    kept_attributes = form.kept(source) - hidden
+    kept_attributes = form.kept_attributes(source) - hidden
     lost_attributes = set(source.attributes) - kept_attributes
-    complete_endings = (name for name, other in _FORMATS.items() if lost_attributes <= other.kept(source))
+    complete_endings = (
+        name for name, form in _FORMATS.items() if lost_attributes <= form.kept_attributes(source)
+    )
     return (
         *losses(source, ending, kept_attributes, next(complete_endings, "")),
         *([old_textures("the file")] if form.keeps_old_textures(source) else []),
@@ -257,30 +259,30 @@ def left_out(result: Flattening, ending: str, has_texture: bool = False) -> tupl
 
 def kept_attributes(source: MeshFile, ending: str) -> set[Attribute]:
     """Return the attributes of a source file that a file of a format in `OUTPUT_FORMATS` keeps."""
-    return _FORMATS[ending].kept(source)
+    return _FORMATS[ending].kept_attributes(source)
 
 
 _FORMATS = {
     ".obj": OutputFormat(
         write=lambda result, stream, folder, _: write_obj(result, stream, folder),
-        kept=kept_in_obj,
+        kept_attributes=kept_in_obj,
         stored=_in_fans,
         keeps_old_textures=obj_has_textures,
     ),
     ".ply": OutputFormat(
         write=lambda result, stream, folder, _: write_ply(result, stream, folder),
-        kept=kept_in_ply,
+        kept_attributes=kept_in_ply,
         keeps_old_textures=ply_has_textures,
     ),
     ".glb": OutputFormat(
         write=lambda result, stream, folder, texture: write_glb(result, stream, texture, folder),
-        kept=kept_in_glb,
+        kept_attributes=kept_in_glb,
         stored=_in_single_precision,
         is_rounded=True,
         takes_texture=True,
         changes=scene_losses,
     ),
     ".npz": OutputFormat(
-        write=lambda result, stream, *_: write_npz(result, stream), kept=lambda source: set()
+        write=lambda result, stream, *_: write_npz(result, stream), kept_attributes=lambda source: set()
     ),
 }

@@ -292,9 +292,8 @@ def scene_losses(result: Flattening, has_texture: bool = False) -> tuple[str, ..
     source = result.source
     if source is None or source.scene is None or result.face_corners is None:
         return ()
-    notes = []
     data, parts = source.scene.data, source.scene.parts
-    tree = data.tree
+    notes = []
     dropped = sum(len(part.corners) for part in parts) // 3 - len(result.faces)
     if dropped:
         notes.append(f"Triangles that the repair dropped are not in the file: {dropped:,}.")
@@ -304,7 +303,7 @@ def scene_losses(result: Flattening, has_texture: bool = False) -> tuple[str, ..
         notes.append(
             f"Meshes of several nodes were copied, to have UVs for each node: {plural(copies, 'copy', 'copies')}."
         )
-    primitives = [tree["meshes"][part.mesh]["primitives"][part.primitive] for part in parts]
+    primitives = [data.tree["meshes"][part.mesh]["primitives"][part.primitive] for part in parts]
     bare = sum("material" not in primitive for primitive in primitives)
     if bare and not has_texture:
         notes.append(
@@ -313,23 +312,32 @@ def scene_losses(result: Flattening, has_texture: bool = False) -> tuple[str, ..
         )
     if any("TANGENT" in item["attributes"] and "TANGENT" in _replaced(data, item) for item in primitives):
         notes.append("Tangents of the old UVs are not in the file: viewers compute them from the new ones.")
+    notes += _image_notes(data)
+    painted = _painted_materials(data.tree, primitives)
+    if painted and not has_texture:
+        notes.append(old_textures(plural(painted, "material")))
+    return tuple(notes)
+
+
+def _image_notes(data: GltfData) -> list[str]:
+    """Return a note on image files of a scene that cannot be embedded, if there are any."""
     unread_images = [
         printable(image["uri"])[:MAX_NAME]
-        for image in image_files(tree)
+        for image in image_files(data.tree)
         if not _content_of(data, image["uri"])
     ]
-    if unread_images:
-        notes.append(
-            f"{plural(len(unread_images), 'image file is', 'image files are')} not embedded, because nothing can be "
-            f"read there, or because it is outside the folder of the scene: {list_some(unread_images)}."
-        )
-    shown_materials = {item["material"] for item in primitives if "material" in item}
-    painted = [
-        i for i in shown_materials if any(name.endswith("Texture") for name in keys_of(tree["materials"][i]))
+    if not unread_images:
+        return []
+    return [
+        f"{plural(len(unread_images), 'image file is', 'image files are')} not embedded, because nothing can be "
+        f"read there, or because it is outside the folder of the scene: {list_some(unread_images)}."
     ]
-    if painted and not has_texture:
-        notes.append(old_textures(plural(len(painted), "material")))
-    return tuple(notes)
+
+
+def _painted_materials(tree: Item, primitives: list[Item]) -> int:
+    """Return the number of materials of primitives that have textures."""
+    materials = {primitive["material"] for primitive in primitives if "material" in primitive}
+    return sum(any(name.endswith("Texture") for name in keys_of(tree["materials"][i])) for i in materials)
 
 
 def _own_primitives(tree: Item, scene: GltfScene) -> list[Item]:

@@ -96,6 +96,7 @@ def head_and_block(
     quantity, arrays = content.quantity, _arrays(content)
     if picture is not None:
         arrays["picture"] = np.frombuffer(picture.content, dtype=np.uint8)
+    titles = TITLES if quantity is None else {**TITLES, "own": quantity.label}
     listed, block = pack(arrays)
     head = {
         "name": name,
@@ -115,10 +116,7 @@ def head_and_block(
         "sizes": _sizes(result, content),
         "squares": text.squares,
         "crease_cosine": CREASE_COSINE,
-        "scales": {
-            key: _plain_scale(TITLES[key] if quantity is None or key != "own" else quantity.label, scale)
-            for key, scale in content.scales.items()
-        },
+        "scales": {key: _plain_scale(titles[key], scale) for key, scale in content.scales.items()},
         "own": None if quantity is None else "faces" if quantity.corners is None else "vertices",
         "picture": None if picture is None else picture.kind,
         "show": show,
