@@ -2,7 +2,7 @@
 
 The first table has a row for each model and package, the second one, that of the README, a row for each package. The
 models are the ten of the gallery, as far as they are here (`common.MODELS`). The packages are coneflat with its
-default cones, with more of them, and its maps for textures; boundary first flattening (BFF) as `coneflat.peers`
+default cones, with more of them, and its maps for textures; boundary first flattening (BFF) as `comparisons`
 implements it, not the program of its authors, with the default cones and one chart; xatlas and uvunwrap with their
 defaults, where they are installed. All results are measured by `coneflat.measure` on the UV points that the packages
 return; seam lengths are divided by the square root of the area.
@@ -19,10 +19,10 @@ from collections.abc import Iterator
 
 import numpy as np
 from common import models, shapes, with_cones_for
+from comparisons import flatten_by
+from comparisons.atlases import installed_baselines, run_baseline
 
 from coneflat import Flattening, check_mesh, flatten, unwrap
-from coneflat.apps.peers import flatten_by
-from coneflat.apps.peers.packages import installed_peers, run_peer
 from coneflat.measures.distortion import Distortion
 from coneflat.mesh.connectivity import TriangleMesh
 
@@ -100,17 +100,17 @@ def flattened(mesh: TriangleMesh, more: float) -> Iterator[tuple[str, Flattening
     boundary_first = flatten_by("bff", mesh.vertices, mesh.faces)
     yield "BFF (reimplemented here), on coneflat's cones and cut", boundary_first, time.perf_counter() - start
     for name in ("xatlas", "uvunwrap"):
-        if name in installed_peers():
-            yield name, *run_peer(name, ours)
+        if name in installed_baselines():
+            yield name, *run_baseline(name, ours)
 
 
 def matched(mesh: TriangleMesh) -> Iterator[tuple[str, Flattening, float]]:
     """Yield the results of other packages on a mesh, and that of coneflat at the same area distortion."""
     default = flatten(mesh.vertices, mesh.faces, charts="atlas")
     for name in ("xatlas", "uvunwrap"):
-        if name not in installed_peers():
+        if name not in installed_baselines():
             continue
-        theirs, seconds = run_peer(name, default)
+        theirs, seconds = run_baseline(name, default)
         yield name, theirs, seconds
         std = theirs.distortion.area_std
         start = time.perf_counter()

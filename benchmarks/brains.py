@@ -127,11 +127,11 @@ def write_folded_patch(path: Path, vertices: np.ndarray, faces: np.ndarray) -> N
     path.write_bytes(np.array([-1, len(rows)], ">i4").tobytes() + rows.tobytes())
 
 
-def line(surface: str, name: str, found: FlatMeasures, seconds: float) -> str:
-    d = found.uv.distortion
+def line(surface: str, name: str, flat: FlatMeasures, seconds: float) -> str:
+    d = flat.uv.distortion
     cells = [
-        surface, name, f"{len(found.uv.mesh.faces):,}", f"{d.qc_mean:.3f}", f"{d.area_std:.3f}", f"{found.metric:.2f}",
-        f"{found.areal:.3f}", f"{found.inverted}", f"{d.charts}", f"{seconds:.1f}" if seconds else "",
+        surface, name, f"{len(flat.uv.mesh.faces):,}", f"{d.qc_mean:.3f}", f"{d.area_std:.3f}", f"{flat.metric:.2f}",
+        f"{flat.areal:.3f}", f"{flat.inverted}", f"{d.charts}", f"{seconds:.1f}" if seconds else "",
     ]  # fmt: skip
     return f"| {' | '.join(cells)} |"
 
@@ -156,27 +156,27 @@ def main() -> None:
         flatten_cortex(folder / surfaces[0][1], remove=[str(folder / surfaces[0][2])])  # loads the kernels
         for side, surface, wall in surfaces:
             start = time.perf_counter()
-            found = flatten_cortex(
+            flat = flatten_cortex(
                 folder / surface, remove=[str(folder / wall)], distortion=arguments.distortion
             )
             seconds = time.perf_counter() - start
             for ending in (".gii", ".3d"):
-                path = found.save(folder / f"flat{ending}")
+                path = flat.save(folder / f"flat{ending}")
                 print(
-                    line(surface, f"coneflat {ending}", measure_flat(found.uv_mesh(path)), seconds),
+                    line(surface, f"coneflat {ending}", measure_flat(flat.uv_mesh(path)), seconds),
                     flush=True,
                 )
             if side:
                 theirs = measure_flat(read_flat(folder / f"{side}.flat.gii", folder / surface))
                 print(line(surface, "FreeSurfer", theirs, 0.0), flush=True)
             if side and arguments.autoflatten:
-                faces = found.uv_mesh(Path("flat.3d")).faces
+                faces = flat.uv_mesh(Path("flat.3d")).faces
                 run_autoflatten(folder, surface, faces, arguments.autoflatten)
             if side and arguments.figures is not None:
                 arguments.figures.mkdir(parents=True, exist_ok=True)
-                depth = own_quantity(found.result, str(folder / f"{side}.sulc.gii"))
+                depth = own_quantity(flat.result, str(folder / f"{side}.sulc.gii"))
                 eyes = ("left", "right")
-                figure = make_figure(found.result, "color", own=depth, up="z", eyes=eyes, dpi=110.0)
+                figure = make_figure(flat.result, "color", own=depth, up="z", eyes=eyes, dpi=110.0)
                 save_figure(figure, arguments.figures / f"{surface}.png")
 
 

@@ -32,8 +32,8 @@ def commands(folder: Path) -> Iterator[tuple[str, list[str]]]:
     coneflat = [sys.executable, "-m", "coneflat"]
 
     def command(name: str, *options: object, ending: str = ".obj") -> list[str]:
-        kind, *rest = map(str, options)
-        return [*coneflat, kind, str(CASES / name), "-o", str(folder / f"out{ending}"), *rest]
+        kind, *flags = map(str, options)
+        return [*coneflat, kind, str(CASES / name), "-o", str(folder / f"out{ending}"), *flags]
 
     def script(name: str, *arguments: object) -> list[str]:
         return [sys.executable, str(CASES / name), *map(str, arguments)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,6 +20,7 @@ import stored  # noqa: E402
 
 from coneflat import ConeflatError, Flattening, check_mesh, flatten, read_mesh  # noqa: E402
 from coneflat.mesh.connectivity import TriangleMesh  # noqa: E402
+from coneflat.options import Options, declarations, parse_angle  # noqa: E402
 
 #: The folder of models: `../shared/meshes`, or those of `tests/data`.
 MODELS = stored.model_folder()
@@ -65,6 +66,24 @@ def with_cones_for(vertices: np.ndarray, faces: np.ndarray, std: float) -> Flatt
         if result.distortion.area_std <= 1.01 * std or allowed < std / 10:
             return result
         allowed *= min(0.97, std / result.distortion.area_std)
+
+
+def parse_options(words: Iterable[str]) -> dict[str, object]:
+    """Return the options of `coneflat.flatten` in texts such as "max_cones=20"; those it does not have are texts."""
+    return {name: _parse_value(name, text) for name, _, text in (word.partition("=") for word in words)}
+
+
+def _parse_value(name: str, text: str) -> object:
+    """Return what the text of an option means."""
+    declaration = declarations(Options).get(name)
+    if declaration is None:
+        return text
+    if getattr(declaration.kind, "is_angle", False):
+        return parse_angle(text)
+    try:
+        return float(text) if "." in text else int(text)
+    except ValueError:
+        return text
 
 
 def peak_memory() -> float:

@@ -20,9 +20,9 @@ from typing import Any, cast
 
 import numpy as np
 from common import peak_memory, shapes
+from comparisons.atlases import ATLAS_BASELINES
 
 import coneflat
-from coneflat.apps.peers.packages import PEERS
 
 #: The components, and their largest number.
 KINDS = {"triangles": 100_000, "cards": 100_000, "bent cards": 1_000, "spheres": 1_000}
@@ -49,7 +49,7 @@ def main() -> None:
         for method in chosen.methods.split(","):
             if method not in ("flatten", "unwrap") and find_spec(method) is None:
                 continue
-            before = 0.0
+            previous = 0.0
             for count in map(int, chosen.counts.split(",")):
                 if count > min(KINDS[kind], METHODS[method]):
                     continue
@@ -57,19 +57,19 @@ def main() -> None:
                 seconds, memory, triangles = json.loads(
                     subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout
                 )
-                each = 1000 * seconds / count
+                milliseconds = 1000 * seconds / count
                 cells = (
                     kind,
                     triangles,
                     f"{count:,}",
                     method,
                     f"{seconds:.1f}",
-                    f"{each:.2f}",
+                    f"{milliseconds:.2f}",
                     f"{memory:.0f}",
                 )
-                ratio = f"{each / before:.2f}" if before else ""
+                ratio = f"{milliseconds / previous:.2f}" if previous else ""
                 print(f"| {' | '.join(map(str, cells))} | {ratio} |", flush=True)
-                before = each
+                previous = milliseconds
 
 
 def measured(name: str, kind: str, count: int) -> tuple[float, float, int]:
@@ -84,8 +84,8 @@ def measured(name: str, kind: str, count: int) -> tuple[float, float, int]:
 
 def function(name: str) -> Callable[[Any, Any], object]:
     """Return a function of vertices and faces."""
-    if name in PEERS and name != "unwrap":
-        run = PEERS[name].run
+    if name in ATLAS_BASELINES and name != "unwrap":
+        run = ATLAS_BASELINES[name].run
         return lambda vertices, faces: run(cast(Any, SimpleNamespace(vertices=vertices, faces=faces)))
     return getattr(coneflat, name)
 

@@ -20,7 +20,7 @@ from pathlib import Path
 import common  # noqa: F401 - finds the shapes of the tests
 import numpy as np
 import shapes
-from methods import circle_patterns
+from comparisons.patterns import circle_patterns
 
 from coneflat.cones import cones_with_curvature
 from coneflat.geometry import (
@@ -65,11 +65,11 @@ def flat_lengths(mesh: TriangleMesh) -> list[np.ndarray]:
         names=np.arange(len(mesh.vertices)),
     )
     metrics = circle_patterns(mesh, lengths, solution), ExactSolver(mesh, spec).metric(lengths, solution)
-    found = []
+    logs = []
     for metric in metrics:
         assert metric.triangles is not None
-        found.append(np.log(np.abs(metric.triangles.sides.reshape(-1, 3)) * metric.scale))
-    return found
+        logs.append(np.log(np.abs(metric.triangles.sides.reshape(-1, 3)) * metric.scale))
+    return logs
 
 
 def differences(rounds: int, bumps: float, away: float) -> tuple[int, float, np.ndarray]:
@@ -81,13 +81,13 @@ def differences(rounds: int, bumps: float, away: float) -> tuple[int, float, np.
     distance = np.linalg.norm(middle[:, :, None] - vertices[CONES], axis=-1).min(axis=-1)
     area = double_areas(lengths)
     flat = flat_lengths(mesh)
-    found = []
-    for one, two in PAIRS:
-        difference = np.abs(flat[one] - flat[two])
-        found.append(
+    gaps = []
+    for first, second in PAIRS:
+        difference = np.abs(flat[first] - flat[second])
+        gaps.append(
             (float(np.average(difference.mean(axis=1), weights=area)), difference[distance > away].max())
         )
-    return len(faces), float(lengths.mean()), np.array(found)
+    return len(faces), float(lengths.mean()), np.array(gaps)
 
 
 def measured(largest: int, bumps: float, away: float) -> Iterator[tuple[int, float, np.ndarray]]:
@@ -106,10 +106,10 @@ def plot(rows: list[tuple[int, float, np.ndarray]], path: Path) -> None:
     import matplotlib.pyplot as plt
 
     size = np.array([edge for _, edge, _ in rows])
-    values = np.stack([found for *_, found in rows])
+    values = np.stack([gaps for *_, gaps in rows])
     figure, axes = plt.subplots(figsize=(6, 4.5))
-    for k, (one, two) in enumerate(PAIRS):
-        name = f"{METHODS[one]} and {METHODS[two]}"
+    for k, (first, second) in enumerate(PAIRS):
+        name = f"{METHODS[first]} and {METHODS[second]}"
         axes.loglog(size, values[:, k, 0], "o-", color=COLORS[k], label=f"{name}, mean")
         axes.loglog(size, values[:, k, 1], "s--", color=COLORS[k], label=f"{name}, largest off cones")
     guide = values[:, :, 0].min() / 2 * (size / size.min()) ** 2
@@ -131,22 +131,22 @@ def main() -> None:
     parser.add_argument("--away", type=float, default=0.4, help="distance from cones")
     parser.add_argument("-o", "--output", type=Path, help="a picture of the table, PNG, PDF or SVG")
     arguments = parser.parse_args()
-    names = [f"{METHODS[one]}-{METHODS[two]}" for one, two in PAIRS]
+    names = [f"{METHODS[first]}-{METHODS[second]}" for first, second in PAIRS]
     print("| triangles | edge | " + " | ".join(f"{n} mean | order | {n} max | order" for n in names) + " |")
     print("| --- " * (2 + 4 * len(names)) + "|")
     rows: list[tuple[int, float, np.ndarray]] = []
-    for count, edge, found in measured(arguments.largest, arguments.bumps, arguments.away):
+    for count, edge, gaps in measured(arguments.largest, arguments.bumps, arguments.away):
         orders = [["-"] * 2] * len(PAIRS)
         if rows:
             step = np.log(edge / rows[-1][1])
-            orders = [[f"{o:.2f}" for o in pair] for pair in np.log(found / rows[-1][2]) / step]
+            orders = [[f"{o:.2f}" for o in pair] for pair in np.log(gaps / rows[-1][2]) / step]
         cells = [
             f"{v:.2e} | {o}"
-            for pair, order in zip(found, orders, strict=True)
+            for pair, order in zip(gaps, orders, strict=True)
             for v, o in zip(pair, order, strict=True)
         ]
         print(f"| {count:,} | {edge:.4f} | " + " | ".join(cells) + " |", flush=True)
-        rows.append((count, edge, found))
+        rows.append((count, edge, gaps))
     if arguments.output:
         plot(rows, arguments.output)
 

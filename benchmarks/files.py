@@ -51,10 +51,10 @@ def main() -> None:
         return
     *_, (name, rounds) = cases([arguments.model], arguments.largest)
     with TemporaryDirectory() as folder:
-        whole = child("flatten", folder, name, str(rounds))
+        flattening = child("flatten", folder, name, str(rounds))
         print(
-            f"{name}, {whole['triangles']:,} triangles: the flattening takes {whole['seconds']:.1f} s and "
-            f"{whole['memory']:.0f} MB.\n"
+            f"{name}, {flattening['triangles']:,} triangles: the flattening takes {flattening['seconds']:.1f} s and "
+            f"{flattening['memory']:.0f} MB.\n"
         )
         print(
             "| format | input, MB | read, s | of the flattening | peak, MB | output, MB | write, s | of it | peak, MB |"
@@ -62,12 +62,12 @@ def main() -> None:
         print("| --- " * 9 + "|")
         for label, (source, ending) in FORMATS.items():
             cells = [label]
-            for task, what in (("read", source), ("write", ending)):
-                if what is None:
+            for task, argument in (("read", source), ("write", ending)):
+                if argument is None:
                     cells += [""] * 4
                     continue
-                row = child(task, folder, what, str(arguments.runs))
-                share = row["seconds"] / whole["seconds"]
+                row = child(task, folder, argument, str(arguments.runs))
+                share = row["seconds"] / flattening["seconds"]
                 cells += [
                     f"{row['size']:.0f}",
                     f"{row['seconds']:.2f}",
@@ -84,7 +84,7 @@ def child(*task: str) -> dict:
 
 def flattened(folder: str, name: str, rounds: str) -> dict:
     """Write a model and a small one in all formats, flatten both, and store the results."""
-    found = {}
+    costs = {}
     for size, mesh in (("small", shapes.sphere(5)), ("large", model(name, int(rounds)))):
         place = Path(folder) / size
         place.mkdir()
@@ -92,13 +92,13 @@ def flattened(folder: str, name: str, rounds: str) -> dict:
         source = read_mesh(place / "mesh.obj")
         start = time.perf_counter()
         result = flatten(source)
-        found = {
+        costs = {
             "triangles": len(result.faces),
             "seconds": time.perf_counter() - start,
             "memory": peak_memory(),
         }
         (place / "result.pickle").write_bytes(pickle.dumps(result))
-    return found
+    return costs
 
 
 def read(folder: str, name: str, runs: str) -> dict:
@@ -147,8 +147,8 @@ def write_inputs(folder: Path, vertices: np.ndarray, faces: np.ndarray) -> None:
     facet = "facet normal 0 0 1\nouter loop\n" + 3 * "vertex %.6e %.6e %.6e\n" + "endloop\nendfacet\n"
     with open(folder / "text.stl", "w") as file:
         file.write("solid mesh\n")
-        for some in np.array_split(vertices[faces].reshape(-1, 9), 1 + len(faces) // 100_000):
-            file.write(facet * len(some) % tuple(some.ravel().tolist()))
+        for block in np.array_split(vertices[faces].reshape(-1, 9), 1 + len(faces) // 100_000):
+            file.write(facet * len(block) % tuple(block.ravel().tolist()))
         file.write("endsolid mesh\n")
     scene = trimesh.Scene(trimesh.Trimesh(vertices, faces, process=False))
     (folder / "mesh.glb").write_bytes(scene.export(file_type="glb"))

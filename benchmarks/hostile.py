@@ -60,15 +60,15 @@ def summary(outcomes: list[Outcome]) -> str:
         + "   median    99%   worst   peak"
     ]
     for kind in (*KINDS, "all"):
-        own = [one for one in outcomes if kind in (one.kind, "all")]
-        if not own:
+        of_kind = [outcome for outcome in outcomes if kind in (outcome.kind, "all")]
+        if not of_kind:
             continue
-        count = Counter(one.status for one in own)
-        seconds = np.array([one.seconds for one in own])
+        count = Counter(outcome.status for outcome in of_kind)
+        seconds = np.array([outcome.seconds for outcome in of_kind])
         times = f"{np.median(seconds):7.2f} s {np.quantile(seconds, 0.99):4.1f} s {seconds.max():5.1f} s"
-        peak = max(one.memory for one in own)
+        peak = max(outcome.memory for outcome in of_kind)
         row = "".join(f"{count[state]:9,}" for state in STATES)
-        lines.append(f"{kind:10}{len(own):8,}{row} {times} {peak:4.0f} MB")
+        lines.append(f"{kind:10}{len(of_kind):8,}{row} {times} {peak:4.0f} MB")
     for title, groups in (
         ("breaches", _breaches(outcomes)),
         ("noted", _noted(outcomes)),
@@ -76,11 +76,11 @@ def summary(outcomes: list[Outcome]) -> str:
     ):
         lines += ["", f"{title}:"] if groups else []
         ranked = sorted(groups.items(), key=lambda item: -len(item[1]))
-        for cause, found in ranked if title == "breaches" else ranked[:25]:
-            first = ", ".join(f"{one.kind}:{one.seed}" for one, _ in found[:4])
-            lines.append(f"{len(found):6,}  {cause}  [{first}]")
+        for cause, examples in ranked if title == "breaches" else ranked[:25]:
+            first = ", ".join(f"{outcome.kind}:{outcome.seed}" for outcome, _ in examples[:4])
+            lines.append(f"{len(examples):6,}  {cause}  [{first}]")
             if title == "breaches":
-                lines.append(f"        {found[0][0].recipe[:300]}: {found[0][1][:300]}")
+                lines.append(f"        {examples[0][0].recipe[:300]}: {examples[0][1][:300]}")
     return "\n".join(lines)
 
 
@@ -89,26 +89,26 @@ Groups = dict[str, list[tuple[Outcome, str]]]
 
 def _breaches(outcomes: list[Outcome]) -> Groups:
     groups: Groups = defaultdict(list)
-    for one in outcomes:
-        for cause, details in one.breaches:
-            groups[cause].append((one, details))
+    for outcome in outcomes:
+        for cause, details in outcome.breaches:
+            groups[cause].append((outcome, details))
     return groups
 
 
 def _noted(outcomes: list[Outcome]) -> Groups:
     groups: Groups = defaultdict(list)
-    for one in outcomes:
-        for promise in dict.fromkeys(one.noted):
-            groups[promise].append((one, ""))
+    for outcome in outcomes:
+        for promise in dict.fromkeys(outcome.noted):
+            groups[promise].append((outcome, ""))
     return groups
 
 
 def _refusals(outcomes: list[Outcome]) -> Groups:
     """Return the counts of errors by their message without numbers."""
     groups: Groups = defaultdict(list)
-    for one in outcomes:
-        if one.status == "refused":
-            groups[re.sub(r"[-+]?\d[\d,.e+-]*", "#", one.message)[:140]].append((one, ""))
+    for outcome in outcomes:
+        if outcome.status == "refused":
+            groups[re.sub(r"[-+]?\d[\d,.e+-]*", "#", outcome.message)[:140]].append((outcome, ""))
     return groups
 
 
@@ -163,7 +163,11 @@ def main() -> int:
 
     todo = cases(chosen.cases, chosen.seed, tuple(chosen.kinds.split(",")))
     if chosen.again:
-        todo = [(one["kind"], one["seed"]) for one in json.loads(chosen.again.read_text()) if one["breaches"]]
+        todo = [
+            (record["kind"], record["seed"])
+            for record in json.loads(chosen.again.read_text())
+            if record["breaches"]
+        ]
     try:
         run_all(todo, chosen.jobs, say)
     except KeyboardInterrupt:
@@ -171,8 +175,8 @@ def main() -> int:
     text = summary(outcomes)
     print(f"\n{text}\n\n{len(outcomes):,} cases in {time.perf_counter() - began:.0f} s")
     if chosen.out:
-        chosen.out.write_text(json.dumps([one.__dict__ for one in outcomes], indent=1))
-    return int(any(one.breaches for one in outcomes))
+        chosen.out.write_text(json.dumps([outcome.__dict__ for outcome in outcomes], indent=1))
+    return int(any(outcome.breaches for outcome in outcomes))
 
 
 if __name__ == "__main__":

@@ -12,9 +12,9 @@ import argparse
 import igl
 import numpy as np
 from common import cases, model
+from comparisons.disk_maps import least_squares_conformal
 
 from coneflat import flatten
-from coneflat.apps.peers.disk_maps import least_squares_conformal
 from coneflat.geometry import edge_lengths
 from coneflat.layout import far_pins
 from coneflat.mesh.connectivity import TriangleMesh
@@ -44,8 +44,8 @@ def difference(disk: TriangleMesh) -> float:
     lengths = edge_lengths(disk.vertices, disk.faces)
     ours = least_squares_conformal(disk, lengths)
     pins = far_pins(disk, lengths)
-    found = igl.lscm(disk.vertices, disk.faces, pins, ours[pins])
-    theirs = np.asarray(found[0] if isinstance(found, tuple) else found)
+    answer = igl.lscm(disk.vertices, disk.faces, pins, ours[pins])
+    theirs = np.asarray(answer[0] if isinstance(answer, tuple) else answer)
     return float(np.linalg.norm(theirs - ours, axis=1).max() / np.ptp(ours, axis=0).max())
 
 

@@ -41,7 +41,7 @@ def plate() -> Mesh:
     ]
     slot = [*arc((0.4, 0), 0.2, -np.pi / 2, np.pi / 2), *arc((-0.4, 0), 0.2, np.pi / 2, 1.5 * np.pi)]
     holes = [arc(corner * (1.15, 0.65), 0.12) for corner in CORNERS]
-    return extruded([polygon(one) for one in (outer, slot, *holes)], 0.35)
+    return extruded([polygon(loop) for loop in (outer, slot, *holes)], 0.35)
 
 
 def gear() -> Mesh:
@@ -76,7 +76,7 @@ def wedge() -> Mesh:
 
 
 SHAPES: dict[str, Callable[[], Mesh]] = {
-    one.__name__: one for one in (bracket, gear, plate, ribs, shaft, wedge)
+    maker.__name__: maker for maker in (bracket, gear, plate, ribs, shaft, wedge)
 }
 CORNERS = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
 #: Edge length of the meshes.
@@ -87,9 +87,9 @@ def arc(
     centre: tuple[float, float] | np.ndarray, radius: float, start: float = 0.0, end: float = 2 * np.pi
 ) -> list:
     """Return points on an arc; a full circle has no point twice."""
-    whole = abs(end - start) > 6.2
+    is_circle = abs(end - start) > 6.2
     count = max(5, int(np.ceil(abs(end - start) * radius / SPACING)))
-    angle = np.linspace(start, end, count, endpoint=not whole)
+    angle = np.linspace(start, end, count, endpoint=not is_circle)
     return (np.asarray(centre) + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)).tolist()
 
 
@@ -97,9 +97,9 @@ def polygon(corners: list | np.ndarray) -> np.ndarray:
     """Return points along a closed polygon at most SPACING apart."""
     points = np.asarray(corners, dtype=np.float64)
     parts = []
-    for one, two in zip(points, np.roll(points, -1, axis=0), strict=True):
-        count = max(1, int(np.ceil(np.linalg.norm(two - one) / SPACING - 1e-9)))
-        parts.append(one + (two - one) * (np.arange(count) / count)[:, None])
+    for start, end in zip(points, np.roll(points, -1, axis=0), strict=True):
+        count = max(1, int(np.ceil(np.linalg.norm(end - start) / SPACING - 1e-9)))
+        parts.append(start + (end - start) * (np.arange(count) / count)[:, None])
     return np.concatenate(parts)
 
 
@@ -108,11 +108,11 @@ def extruded(loops: list[np.ndarray], height: float) -> Mesh:
     border = np.concatenate(loops)
     flat = np.concatenate([border, _inner_points(loops)])
     faces = Delaunay(flat).simplices
-    one, two, three = (flat[faces[:, i]] for i in range(3))
-    turn = _cross(two - one, three - one)
+    first_corner, second_corner, third_corner = (flat[faces[:, i]] for i in range(3))
+    turn = _cross(second_corner - first_corner, third_corner - first_corner)
     # Three points on a line make triangles without area.
-    kept = _is_inside(flat[faces].mean(axis=1), loops) & (np.abs(turn) > 1e-9)
-    faces = np.where((turn > 0)[:, None], faces, faces[:, ::-1])[kept]
+    is_inside = _is_inside(flat[faces].mean(axis=1), loops) & (np.abs(turn) > 1e-9)
+    faces = np.where((turn > 0)[:, None], faces, faces[:, ::-1])[is_inside]
     layers, count = int(np.ceil(height / SPACING)), len(flat)
     vertices = [np.column_stack([flat, np.full(count, z)]) for z in (0.0, height)]
     levels = height * np.arange(1, layers) / layers
@@ -122,12 +122,12 @@ def extruded(loops: list[np.ndarray], height: float) -> Mesh:
     for low, high in pairwise(starts):
         first = 0
         for loop in loops:
-            here = first + np.arange(len(loop))
-            after = np.roll(here, -1)
+            ring = first + np.arange(len(loop))
+            after = np.roll(ring, -1)
             first += len(loop)
             area = _cross(loop, np.roll(loop, -1, axis=0)).sum()
             outer = area > 0 if loop is loops[0] else area < 0
-            a, b = (here, after) if outer else (after, here)
+            a, b = (ring, after) if outer else (after, ring)
             sides += [np.stack([low + a, low + b, high + b], 1), np.stack([low + a, high + b, high + a], 1)]
     return np.concatenate(vertices), np.concatenate([faces[:, ::-1], faces + count, *sides])
 
@@ -147,18 +147,18 @@ def _inner_points(loops: list[np.ndarray]) -> np.ndarray:
     return flat[gaps > 0.6 * SPACING]
 
 
-def _cross(one: np.ndarray, two: np.ndarray) -> np.ndarray:
-    return one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
 def _is_inside(points: np.ndarray, loops: list[np.ndarray]) -> np.ndarray:
     """Return whether each point is inside an odd number of loops."""
     inside = np.zeros(len(points), dtype=bool)
     for loop in loops:
-        for one, two in zip(loop, np.roll(loop, -1, axis=0), strict=True):
-            crosses = (one[1] > points[:, 1]) != (two[1] > points[:, 1])
+        for start, end in zip(loop, np.roll(loop, -1, axis=0), strict=True):
+            crosses = (start[1] > points[:, 1]) != (end[1] > points[:, 1])
             with np.errstate(divide="ignore", invalid="ignore"):
-                x = one[0] + (points[:, 1] - one[1]) / (two[1] - one[1]) * (two[0] - one[0])
+                x = start[0] + (points[:, 1] - start[1]) / (end[1] - start[1]) * (end[0] - start[0])
             inside ^= crosses & (points[:, 0] < x)
     return inside
 
@@ -167,9 +167,9 @@ def turned(profile: list, around: int = 96) -> Mesh:
     """Return the solid of revolution of a profile (radius, z) that starts and ends on the axis."""
     points = np.asarray(profile, dtype=np.float64)
     inner = [
-        one + (two - one) * t
-        for one, two in pairwise(points)
-        for count in [max(1, int(np.ceil(np.linalg.norm(two - one) / SPACING - 1e-9)))]
+        start + (end - start) * t
+        for start, end in pairwise(points)
+        for count in [max(1, int(np.ceil(np.linalg.norm(end - start) / SPACING - 1e-9)))]
         for t in np.arange(count) / count
     ][1:]
     rings = np.array(inner)

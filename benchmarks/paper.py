@@ -18,16 +18,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from common import MODELS as MODEL_FOLDER
-from methods import compare_all
+from comparisons import Comparison, compare_methods, pictures
+from comparisons.tables import as_cell, as_csv, as_markdown
 
 from coneflat import PAPER, ConeflatError, read_mesh
-from coneflat.apps.peers import pictures
-from coneflat.apps.peers.run import (
-    Comparison,
-    as_cell,
-    as_csv,
-    markdown,
-)
 from coneflat.apps.view import (
     Look,
     Panel,
@@ -156,19 +150,32 @@ class Reproduction:
     @property
     def missing(self) -> tuple[str, ...]:
         """The paper's models that were not given."""
-        found = {model.name for model in self.models}
-        return tuple(name for name in MODELS if name not in found)
+        names = {model.name for model in self.models}
+        return tuple(name for name in MODELS if name not in names)
 
     def table_1(self) -> list[list[object]]:
         """Return the rows of Table 1, curvature errors."""
         rows: list[list[object]] = []
         for model in self.models:
-            here, there = model.linear.distortion.curvature_error, math.nan
+            error, published_error = model.linear.distortion.curvature_error, math.nan
             thousands: float | str = ""
             if model.published is not None:
-                there, thousands = model.published.curvature_error, f"{model.published.thousands:g}K"
+                published_error, thousands = (
+                    model.published.curvature_error,
+                    f"{model.published.thousands:g}K",
+                )
             cones = len(model.linear.cones)
-            rows.append([model.name, len(model.linear.faces), thousands, cones, here, there, here / there])
+            rows.append(
+                [
+                    model.name,
+                    len(model.linear.faces),
+                    thousands,
+                    cones,
+                    error,
+                    published_error,
+                    error / published_error,
+                ]
+            )
         return rows
 
     def table_2(self) -> list[list[object]]:
@@ -200,18 +207,18 @@ class Reproduction:
             "those from the cones to the layout; the paper's are for a processor of 1.4 GHz.",
             "",
         ]
-        other = [model for model in self.models if model.published is not None and not model.is_same]
-        if other:
-            listed = ", ".join(f"{m.name} ({len(m.linear.faces):,})" for m in other)
+        different = [model for model in self.models if model.published is not None and not model.is_same]
+        if different:
+            listed = ", ".join(f"{m.name} ({len(m.linear.faces):,})" for m in different)
             lines += [f"In another resolution than in the paper, so that numbers differ: {listed}.", ""]
         if self.missing:
             lines += [f"Not among the files: {', '.join(self.missing)}.", ""]
-        lines += [f"Could not be flattened: {name}: {why}\n" for name, why in self.failed]
+        lines += [f"Could not be flattened: {name}: {reason}\n" for name, reason in self.failed]
         for title, headings, rows, forms in (
             ("Table 1: curvature error", TABLE_1, self.table_1(), FORMS_1),
             ("Table 2: quasi-conformal distortion", TABLE_2, self.table_2(), FORMS_2),
         ):
-            lines += [f"## {title}", "", markdown(headings, _cells(rows, forms))]
+            lines += [f"## {title}", "", as_markdown(headings, _cells(rows, forms))]
         lines += [self.notes()]
         return "\n".join(lines)
 
@@ -228,8 +235,8 @@ class Reproduction:
 
     def texts(self) -> dict[str, str]:
         """Return the tables as Markdown and as comma-separated values, by file name."""
-        one, two = as_csv(TABLE_1, self.table_1()), as_csv(TABLE_2, self.table_2())
-        return dict(zip(TEXTS, (self.markdown(), one, two), strict=True))
+        curvature_table, quality_table = as_csv(TABLE_1, self.table_1()), as_csv(TABLE_2, self.table_2())
+        return dict(zip(TEXTS, (self.markdown(), curvature_table, quality_table), strict=True))
 
     def figures(self, look: Look) -> dict[str, Figure]:
         """Return the paper's figures by file name."""
@@ -238,22 +245,24 @@ class Reproduction:
             label = f"{model.name}: {plural(len(model.linear.cones), 'cone')}"
             cones += look.views(model.linear, draw_cones, label)
             shown = model.comparison.drawn
-            scale = pictures.same_scale(shown)
+            scale = pictures.on_common_scale(shown)
             quality.append(_row(pictures.quality_panels(shown, scale, look), scale))
             aligned = pictures.aligned_layouts([result for _, result in shown])
             pairs = zip(shown, aligned, strict=True)
             layouts.append(
                 _row([layout_panel(result, f"{model.name}, {method}") for (method, _), result in pairs])
             )
-            linear = tuple(each for each in shown if each[0] == "linear")
-            own = pictures.same_scale(linear)
+            linear = tuple(drawn for drawn in shown if drawn[0] == "linear")
+            linear_scale = pictures.on_common_scale(linear)
             texture = look.views(model.linear, draw_checker, model.name)
-            textures.append(_row([*texture, *pictures.quality_panels(linear, own, look)], own))
+            textures.append(
+                _row([*texture, *pictures.quality_panels(linear, linear_scale, look)], linear_scale)
+            )
         rows = (pictures.in_rows(cones), quality, layouts, textures)
         marks = (mark_handles(self.models[0].linear), (), (), ())
         return {
-            name: compose(each, marks=marked, dpi=pictures.DPI, width=10.0)
-            for name, each, marked in zip(FIGURES, rows, marks, strict=True)
+            name: compose(row, marks=marked, dpi=pictures.DPI, width=10.0)
+            for name, row, marked in zip(FIGURES, rows, marks, strict=True)
         }
 
 
@@ -291,21 +300,21 @@ def reproduce(
     models, failed = [], []
     for number, file in enumerate(files):
 
-        def tell(what: str, fraction: float, number: int = number, name: str = file.stem) -> None:
+        def tell(step: str, fraction: float, number: int = number, name: str = file.stem) -> None:
             if progress is not None:
-                progress(f"{name}: {what}", (number + fraction) / len(files))
+                progress(f"{name}: {step}", (number + fraction) / len(files))
 
         tell("read", 0.0)
         try:
-            compared = compare_all(read_mesh(file), methods=methods, progress=tell, **PAPER)
+            compared = compare_methods(read_mesh(file), methods=methods, atlases=(), progress=tell, **PAPER)
         except ConeflatError as error:
             failed.append((file.name, " ".join(str(error).split())))
             continue
         name = model_of(file)
         models.append(Model(name or file.stem, MODELS[name] if name else None, compared))
     if not models:
-        why = "; ".join(f"{name}: {reason}" for name, reason in failed)
-        raise MeshError(f"no mesh could be flattened: {why}")
+        reasons = "; ".join(f"{name}: {reason}" for name, reason in failed)
+        raise MeshError(f"no mesh could be flattened: {reasons}")
     return Reproduction(tuple(models), tuple(failed))
 
 
@@ -347,9 +356,13 @@ def main() -> None:
     )
     arguments = parser.parse_args()
     pictures.open_folder(arguments.output, FILES)
-    found = reproduce(arguments.meshes, progress=lambda what, done: print(f"{done:4.0%} {what}", end="\r"))
-    pictures.write_folder(arguments.output, {**found.texts(), **found.figures(Look(dpi=pictures.DPI))})
-    print(found.tables().rstrip())
+    reproduction = reproduce(
+        arguments.meshes, progress=lambda step, fraction: print(f"{fraction:4.0%} {step}", end="\r")
+    )
+    pictures.write_folder(
+        arguments.output, {**reproduction.texts(), **reproduction.figures(Look(dpi=pictures.DPI))}
+    )
+    print(reproduction.tables().rstrip())
 
 
 if __name__ == "__main__":

@@ -95,9 +95,9 @@ def print_command(folder: Path, runs: int) -> None:
     model = next(iter(MODELS.glob("fandisk.*")), None) or write(folder / "sphere.obj", shapes.sphere(5))
     for words in (["--help"], ["flatten", str(model), "-o", str(folder / "flat.obj")]):
         costs([*COMMAND, *words])  # The first run compiles the bytecode.
-        found = zip(*(costs([*COMMAND, *words]) for _ in range(runs)), strict=True)
-        wall, used, memory = (statistics.median(each) for each in found)
-        print(f"| {words[0]} | {wall:.2f} | {used:.2f} | {memory:.0f} |")
+        columns = zip(*(costs([*COMMAND, *words]) for _ in range(runs)), strict=True)
+        wall, processor, memory = (statistics.median(column) for column in columns)
+        print(f"| {words[0]} | {wall:.2f} | {processor:.2f} | {memory:.0f} |")
 
 
 def print_batches(meshes: list[Path], folder: Path) -> None:
@@ -106,18 +106,16 @@ def print_batches(meshes: list[Path], folder: Path) -> None:
     alone = subprocess.run(
         [sys.executable, "-c", SINGLE], input="\n".join(jobs), stdout=subprocess.PIPE, text=True
     )
-    wall, used = json.loads(alone.stdout)
+    wall, processor = json.loads(alone.stdout)
     print("\n| meshes | | wall, s | processor, s | each, ms | cores | throughput | peak of a process, MB |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
 
     def print_row(count: int, name: str, taken: float, all_used: float, memory: float) -> None:
-        gain, each = wall * count / len(meshes) / taken, 1000 * all_used / count
-        cells = (
-            f"{taken:.1f} | {all_used:.1f} | {each:.1f} | {all_used / taken:.2f} | {gain:.2f} | {memory:.0f}"
-        )
+        gain, each_ms = wall * count / len(meshes) / taken, 1000 * all_used / count
+        cells = f"{taken:.1f} | {all_used:.1f} | {each_ms:.1f} | {all_used / taken:.2f} | {gain:.2f} | {memory:.0f}"
         print(f"| {count} | {name} | {cells} |", flush=True)
 
-    print_row(len(meshes), "one after the other, loaded", wall, used, 0.0)
+    print_row(len(meshes), "one after the other, loaded", wall, processor, 0.0)
     for count, processes in ((len(meshes), 1), (len(meshes), 2), (len(meshes) // 5, 2)):
         words = ["batch", *map(str, meshes[:count]), "--out", str(folder / f"{count}-{processes}")]
         print_row(
@@ -137,14 +135,14 @@ def print_components(count: int, file: Path) -> None:
     for kind in (*PIECES, "copies of a sphere"):
         pieces = [piece(kind, seed) for seed in range(count)]
         starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])
-        faces = [own + start for (_, own), start in zip(pieces, starts, strict=False)]
-        vertices = np.concatenate([np.add(own, (4.0 * i, 0, 0)) for i, (own, _) in enumerate(pieces)])
+        faces = [part + start for (_, part), start in zip(pieces, starts, strict=False)]
+        vertices = np.concatenate([np.add(part, (4.0 * i, 0, 0)) for i, (part, _) in enumerate(pieces)])
         np.savez(file, vertices=vertices, faces=np.concatenate(faces), some=np.concatenate(faces[:5]))
-        found = subprocess.run(
+        printed = subprocess.run(
             [sys.executable, "-c", MANY, str(file)], check=True, stdout=subprocess.PIPE, text=True
         )
-        each = 1000 * float(found.stdout) / count
-        print(f"| {count:,} {kind} | {len(faces[0])} | {each:.1f} |")
+        milliseconds = 1000 * float(printed.stdout) / count
+        print(f"| {count:,} {kind} | {len(faces[0])} | {milliseconds:.1f} |")
 
 
 PIECES = "sheets", "spheres", "tori", "tetrahedra"
@@ -182,8 +180,8 @@ def costs(command: list[str]) -> tuple[float, float, float]:
         "print(json.dumps([taken, used.ru_utime + used.ru_stime, used.ru_maxrss]))"
     )
     printed = subprocess.run([sys.executable, "-c", script, *command], check=True, stdout=subprocess.PIPE)
-    wall, used, memory = json.loads(printed.stdout)
-    return wall, used, memory * (1 if sys.platform == "darwin" else 1024) / 1e6
+    wall, processor, memory = json.loads(printed.stdout)
+    return wall, processor, memory * (1 if sys.platform == "darwin" else 1024) / 1e6
 
 
 def small_mesh(seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -92,10 +92,10 @@ def cases() -> list[tuple[str, str, str]]:
     """Return the model, deformation and options of each case."""
     meshes = [(path.name, "") for path in sorted(MODELS.glob("*.*")) if path.suffix != ".md"]
     meshes += [(base, how) for base in BASES for how in DEFORMATIONS]
-    others = [way for way in WAYS if way not in ("one", "atlas")]
+    rare_ways = [way for way in WAYS if way not in ("one", "atlas")]
     listed = []
     for i, (name, how) in enumerate(meshes):
-        ways = ["one", "atlas", others[2 * i % len(others)], others[(2 * i + 1) % len(others)]]
+        ways = ["one", "atlas", rare_ways[2 * i % len(rare_ways)], rare_ways[(2 * i + 1) % len(rare_ways)]]
         ways += ["unwrap", *(["quads"] if i % QUADS_EVERY == 0 else [])]
         listed += [(name, how, way) for way in ways]
     return listed
@@ -169,10 +169,10 @@ def compare(before: dict[str, dict[str, object]], after: dict[str, dict[str, obj
     """Print the differences, sums and times by way, and return the number of cases that differ."""
     differing = 0
     for key in before:
-        found = list(differences(before[key], after[key]))
-        differing += bool(found)
-        if found:
-            print(f"{key}: {'; '.join(found)}")
+        changes = list(differences(before[key], after[key]))
+        differing += bool(changes)
+        if changes:
+            print(f"{key}: {'; '.join(changes)}")
     print(f"\n{differing} of {len(before)} cases differ\n")
     print(
         "| way | cases | cones | seams | irregular | CPU s | ratio |\n| --- | --- | --- | --- | --- | --- | --- |"

@@ -42,23 +42,27 @@ def main() -> None:
         work, name = arguments.one
         system = work == "system"
         with limit_threads():
-            print(json.dumps(systems(name, arguments.runs) if system else whole(work, name, arguments.runs)))
+            print(
+                json.dumps(
+                    systems(name, arguments.runs) if system else timed_work(work, name, arguments.runs)
+                )
+            )
         return
     names = arguments.solvers.split(",")
     print("| model | unknowns | solver | factorization, s | again | 60 solves | in blocks | MB |")
     print("| --- " * 8 + "|")
-    for each in filter(None, arguments.models.split(",")):
+    for words in filter(None, arguments.models.split(",")):
         for name in names:
-            row = measured(name, "system", each, arguments.runs)
+            row = measured(name, "system", words, arguments.runs)
             print(
-                f"| {each} | {row[0]:,} | {name} | {' | '.join(f'{x:.3f}' for x in row[1:-1])} | {row[-1]:.0f} |"
+                f"| {words} | {row[0]:,} | {name} | {' | '.join(f'{x:.3f}' for x in row[1:-1])} | {row[-1]:.0f} |"
             )
     print(f"\n| | {', s | '.join(names)}, s |")
     print("| --- " * (len(names) + 1) + "|")
-    for each in filter(None, arguments.whole.split(",")):
-        work, _, mesh = each.partition(" ")
+    for words in filter(None, arguments.whole.split(",")):
+        work, _, mesh = words.partition(" ")
         times = [measured(name, work, mesh, arguments.runs)[0] for name in names]
-        print(f"| {each} | {' | '.join(f'{t:.2f}' for t in times)} |")
+        print(f"| {words} | {' | '.join(f'{t:.2f}' for t in times)} |")
 
 
 def measured(forced: str, work: str, name: str, runs: int) -> list[float]:
@@ -97,7 +101,7 @@ def systems(name: str, runs: int) -> list[float]:
     ]
 
 
-def whole(work: str, name: str, runs: int) -> list[float]:
+def timed_work(work: str, name: str, runs: int) -> list[float]:
     """Return the processor time of a flattening, or of a texture."""
     vertices, faces = split(name)
     call: Callable[..., object] = flatten if work == "flatten" else unwrap

@@ -36,11 +36,11 @@ def main() -> None:
         result, unit = timed(vertices, faces)
         print(line(name, 1.0, [(result, unit)], unit, len(faces)), flush=True)
         for factor in (float(word) for word in arguments.factors.split(",")):
-            found = []
+            runs = []
             for axis in range(3):
                 stretch = np.where(np.arange(3) == axis, factor, 1.0)
-                found.append(timed(vertices * stretch, faces))
-            print(line(name, factor, found, unit, len(faces)), flush=True)
+                runs.append(timed(vertices * stretch, faces))
+            print(line(name, factor, runs, unit, len(faces)), flush=True)
 
 
 def timed(vertices: Any, faces: Any) -> tuple[Flattening, float]:
@@ -52,23 +52,23 @@ def timed(vertices: Any, faces: Any) -> tuple[Flattening, float]:
     return result, time.process_time() - start
 
 
-def line(name: str, factor: float, found: list[tuple[Flattening, float]], unit: float, count: int) -> str:
+def line(name: str, factor: float, runs: list[tuple[Flattening, float]], unit: float, count: int) -> str:
     """Return the row of a model stretched by a factor: the worst values of several results and their seconds."""
-    results = [result for result, _ in found]
+    results = [result for result, _ in runs]
     measures = [result.distortion for result in results]
     cells = [
         name,
         f"{count:,}",
         f"{factor:g}",
-        f"{max(one.flipped for one in measures)}",
-        f"{max(one.degenerate for one in measures)}",
-        f"{max(one.qc_mean for one in measures):.3f}",
-        f"{max(one.qc_max for one in measures):.3g}",
-        f"{max(seconds for _, seconds in found) / unit:.1f}",
+        f"{max(distortion.flipped for distortion in measures)}",
+        f"{max(distortion.degenerate for distortion in measures)}",
+        f"{max(distortion.qc_mean for distortion in measures):.3f}",
+        f"{max(distortion.qc_max for distortion in measures):.3g}",
+        f"{max(seconds for _, seconds in runs) / unit:.1f}",
         f"{max(len(result.cones) for result in results)}",
         f"{max(result.solve.area_distortion for result in results):.2f}",
-        f"{max(one.seam_mismatch_max for one in measures):.0e}",
-        f"{max(one.angle_sum_error for one in measures):.0e}",
+        f"{max(distortion.seam_mismatch_max for distortion in measures):.0e}",
+        f"{max(distortion.angle_sum_error for distortion in measures):.0e}",
     ]
     return f"| {' | '.join(cells)} |"
 

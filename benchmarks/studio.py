@@ -51,8 +51,8 @@ class Seconds:
 
 def worker_process() -> int:
     """Return the id of the worker process."""
-    (found,) = (each for each in psutil.Process().children() if COMMAND[-1] in each.cmdline())
-    return found.pid
+    (worker,) = (child for child in psutil.Process().children() if COMMAND[-1] in child.cmdline())
+    return worker.pid
 
 
 def moves(page: object, session: Session, count: int) -> Seconds:
@@ -113,7 +113,8 @@ def measure(browser: object, name: str, splits: int, count: int, folder: Path) -
         thread.join()
     medians = map(statistics.median, (seconds.metric, seconds.sight, seconds.took))
     numbers = " | ".join(
-        f"{each:.2f}" for each in (*medians, max(seconds.took), statistics.median(seconds.processor))
+        f"{seconds_of_step:.2f}"
+        for seconds_of_step in (*medians, max(seconds.took), statistics.median(seconds.processor))
     )
     return f"| {name} | {len(faces):,} | {count} | {numbers} | {first:.0f} | {last:.0f} |"
 

@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 from common import best_time, cases, model, peak_memory, shapes
+from comparisons.atlases import ATLAS_BASELINES, installed_baselines
 from scipy.sparse import csc_matrix
 
 from coneflat import Flattening, TriangleMesh, flatten
-from coneflat.apps.peers.packages import PEERS, installed_peers
 from coneflat.geometry import (
     cotangent_laplacian,
     cotangents,
@@ -41,12 +41,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--models", default="fandisk,bunny,horse")
     parser.add_argument("--largest", type=int, default=1_600_000, help="triangles")
-    parser.add_argument("--peers", type=int, default=100_000, help="triangles up to which others run, too")
+    parser.add_argument(
+        "--baselines", type=int, default=100_000, help="triangles up to which baselines run, too"
+    )
     parser.add_argument("--runs", type=int, default=2, help="the best counts")
     parser.add_argument("--one", nargs=2, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.one:
-        print(json.dumps(measured(arguments.one[0], int(arguments.one[1]), arguments.runs, arguments.peers)))
+        print(
+            json.dumps(measured(arguments.one[0], int(arguments.one[1]), arguments.runs, arguments.baselines))
+        )
         return
     rows = []
     print(
@@ -55,14 +59,14 @@ def main() -> None:
     print("| --- " * (len(STAGES) + 8) + "|")
     for name, rounds in cases(arguments.models.split(","), arguments.largest):
         command = [sys.executable, __file__, "--one", name, str(rounds)]
-        command += ["--runs", str(arguments.runs), "--peers", str(arguments.peers)]
+        command += ["--runs", str(arguments.runs), "--baselines", str(arguments.baselines)]
         rows.append(json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout))
         print(line(rows[-1]), flush=True)
     print(f"\nStages in units of the factorization.{growth(rows)}\n")
-    print_peers([row for row in rows if row["peers"]])
+    print_baselines([row for row in rows if row["baselines"]])
 
 
-def measured(name: str, rounds: int, runs: int, largest_of_peers: int) -> dict:
+def measured(name: str, rounds: int, runs: int, largest_of_baselines: int) -> dict:
     """Return the row of a mesh."""
     vertices, faces = model(name, rounds)
     flatten(*shapes.sphere(2))  # This compiles or loads the kernels.
@@ -70,13 +74,13 @@ def measured(name: str, rounds: int, runs: int, largest_of_peers: int) -> dict:
     laplacian = csc_matrix(cotangent_laplacian(faces, cotangents(lengths), len(vertices))[1:][:, 1:])
     solver = type(factorize(laplacian)).__name__.removesuffix("Factor").lower()  # This loads the solver.
     bare = best_time(lambda: factorize(laplacian), runs)
-    found: list[Flattening] = []
+    results: list[Flattening] = []
     times = []
     for _ in range(runs):
         start = time.perf_counter()
-        found.append(flatten(vertices, faces, charts="one"))
+        results.append(flatten(vertices, faces, charts="one"))
         times.append(time.perf_counter() - start)
-    best = found[int(np.argmin(times))]
+    best = results[int(np.argmin(times))]
     return {
         "model": name,
         "triangles": len(faces),
@@ -86,13 +90,13 @@ def measured(name: str, rounds: int, runs: int, largest_of_peers: int) -> dict:
         "total": min(times),
         "stages": best.seconds,
         "memory": peak_memory(),
-        "peers": peers(best) if len(faces) <= largest_of_peers else {},
+        "baselines": baseline_seconds(best) if len(faces) <= largest_of_baselines else {},
     }
 
 
-def peers(best: Flattening) -> dict[str, float]:
-    """Return the seconds of the installed other packages for the same mesh."""
-    runs = {name: PEERS[name].run for name in installed_peers()}
+def baseline_seconds(best: Flattening) -> dict[str, float]:
+    """Return the seconds of the installed baselines for the same mesh."""
+    runs = {name: ATLAS_BASELINES[name].run for name in installed_baselines()}
     if find_spec("igl") is not None:
         runs["libigl LSCM"] = libigl_lscm
     return {name: best_time(partial(run, best), 1) for name, run in runs.items()}
@@ -107,8 +111,8 @@ def libigl_lscm(base: Flattening) -> np.ndarray:
     corner_uv, right = np.empty((len(base.faces), 3, 2)), 0.0
     for chart, _, faces in TriangleMesh(points, base.uv_faces).split_components():
         pins = np.array([0, int(np.argmax(((chart.vertices - chart.vertices[0]) ** 2).sum(axis=1)))])
-        found: Any = igl.lscm(chart.vertices, chart.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))
-        uv = np.asarray(found[0] if isinstance(found, tuple) else found, dtype=np.float64)[chart.faces]
+        answer: Any = igl.lscm(chart.vertices, chart.faces, pins, np.array([[0.0, 0.0], [1.0, 0.0]]))
+        uv = np.asarray(answer[0] if isinstance(answer, tuple) else answer, dtype=np.float64)[chart.faces]
         space = double_areas(edge_lengths(chart.vertices, chart.faces)).sum()
         uv *= np.sqrt(space / np.abs(signed_double_areas(uv)).sum())
         corner_uv[faces] = uv + np.array([right - uv[..., 0].min(), 0.0])
@@ -126,24 +130,30 @@ def line(row: dict) -> str:
 
 def growth(rows: list[dict]) -> str:
     """Return the exponents of growth of models with at least two large sizes."""
-    found = []
+    exponents = []
     for name in dict.fromkeys(row["model"] for row in rows):
         large = [row for row in rows if row["model"] == name and row["triangles"] >= FITTED_FROM]
         if len(large) > 1:
             sizes, times = (np.log([row[key] for row in large]) for key in ("triangles", "total"))
-            found.append(f"{name} {np.polyfit(sizes, times, 1)[0]:.2f}")
-    return f" Time grows with the number of triangles to the power of: {', '.join(found)}." if found else ""
+            exponents.append(f"{name} {np.polyfit(sizes, times, 1)[0]:.2f}")
+    return (
+        f" Time grows with the number of triangles to the power of: {', '.join(exponents)}."
+        if exponents
+        else ""
+    )
 
 
-def print_peers(rows: list[dict]) -> None:
-    names = list(dict.fromkeys(name for row in rows for name in row["peers"]))
+def print_baselines(rows: list[dict]) -> None:
+    names = list(dict.fromkeys(name for row in rows for name in row["baselines"]))
     if not names:
         return
     print(f"| model | triangles | coneflat, s | {', s | '.join(names)}, s |")
     print("| --- " * (len(names) + 3) + "|")
     for row in rows:
-        others = " | ".join(f"{row['peers'][name]:.2f}" if name in row["peers"] else "" for name in names)
-        print(f"| {row['model']} | {row['triangles']:,} | {row['total']:.2f} | {others} |")
+        seconds = " | ".join(
+            f"{row['baselines'][name]:.2f}" if name in row["baselines"] else "" for name in names
+        )
+        print(f"| {row['model']} | {row['triangles']:,} | {row['total']:.2f} | {seconds} |")
 
 
 if __name__ == "__main__":

@@ -74,7 +74,7 @@ def visit(open_visit):
     """The page of `viewed` as it is when it has just been opened; it is opened once for all."""
     open_visit.page.mouse.move(1, 1)
     open_visit.run(RESET)
-    open_visit.rest()
+    open_visit.wait_until_drawn()
     yield open_visit
     open_visit.check()
 
@@ -93,15 +93,15 @@ class Visit:
         self.page.route("**/*", lambda route: self._request(route, path.as_uri()))
         self.page.goto(path.as_uri())
         self.page.wait_for_selector("html[data-ready]", timeout=PATIENCE)
-        self.rest()
+        self.wait_until_drawn()
 
     def _hear(self, message):
         # Drivers may warn of slow readbacks, which is no fault of the page.
         if message.type == "error":
             self.troubles.append(message.text)
 
-    def _request(self, route, own):
-        if route.request.url == own:
+    def _request(self, route, address):
+        if route.request.url == address:
             route.continue_()
         else:
             self.requests.append(route.request.url)
@@ -118,7 +118,7 @@ class Visit:
         )
         assert seen, f"it never came that {condition}"
 
-    def rest(self):
+    def wait_until_drawn(self):
         """Wait until everything is drawn finely; pages without a viewer have nothing to draw."""
         self.wait(f"!window.coneflat || ({AT_REST})")
 
@@ -129,7 +129,7 @@ class Visit:
         """(h, w, 3) what the page, or a pane, looks like."""
         from PIL import Image
 
-        self.rest()
+        self.wait_until_drawn()
         clip = {} if pane is None else {"clip": self.box(pane)}
         return np.asarray(Image.open(io.BytesIO(self.page.screenshot(**clip))).convert("RGB")).astype(int)
 
@@ -154,10 +154,10 @@ class Visit:
 
     def check(self):
         """Nothing was complained of, and nothing asked for."""
-        found = [*self.troubles, *self.requests]
+        problems = [*self.troubles, *self.requests]
         self.troubles.clear()
         self.requests.clear()
-        assert not found, found
+        assert not problems, problems
 
     def close(self):
         self.context.close()

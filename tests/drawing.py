@@ -53,7 +53,10 @@ def count_dots(group):
     if group is None:
         return 0
     drawn = [
-        each for part in group.iter(f"{SVG}g") for each in part if each.tag in (f"{SVG}path", f"{SVG}use")
+        element
+        for part in group.iter(f"{SVG}g")
+        for element in part
+        if element.tag in (f"{SVG}path", f"{SVG}use")
     ]
     return len(drawn)
 

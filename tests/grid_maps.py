@@ -19,8 +19,8 @@ def with_motions(vertices, faces, corner_grid, cones=None):
     mesh = TriangleMesh(np.asarray(vertices, dtype=float), faces)
     turns, shifts = np.full(faces.size, -1), np.zeros((faces.size, 2), dtype=int)
     z = corner_grid @ [1, 1j]
-    for one, two in mesh.edge_halfedges[~mesh.is_boundary_edge]:
-        for h, t in ((one, two), (two, one)):
+    for first, second in mesh.edge_halfedges[~mesh.is_boundary_edge]:
+        for h, t in ((first, second), (second, first)):
             a, b = (z[h // 3, (h % 3 + k) % 3] for k in (1, 2))
             c, d = (z[t // 3, (t % 3 + k) % 3] for k in (2, 1))
             turns[h] = round(np.angle((b - a) / (d - c)) / (np.pi / 2)) % 4

@@ -44,7 +44,7 @@ def measures(vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray, pixels: in
     chart_areas = np.bincount(chart, flat_areas * is_mapped)
     sides = uv.reshape(-1, 2).max(axis=0) - uv.reshape(-1, 2).min(axis=0)
     lengths = np.array([length for length, _, _ in seams])
-    here, there = np.array([flat for _, *flat in seams]).T
+    first_lengths, second_lengths = np.array([flat for _, *flat in seams]).T
     return {
         "qc_mean": weights @ ratio / weights.sum(),
         "qc_p95": ratio[order][np.searchsorted(reached, 0.95)],
@@ -56,7 +56,9 @@ def measures(vertices: np.ndarray, faces: np.ndarray, uv: np.ndarray, pixels: in
         "degenerate_input": np.count_nonzero(is_flat),
         "charts": len(chart_areas),
         "seam_length": lengths.sum() / np.sqrt(areas.sum()),
-        "seam_mismatch": lengths @ (np.abs(here - there) / (here + there) * 2) / lengths.sum(),
+        "seam_mismatch": lengths
+        @ (np.abs(first_lengths - second_lengths) / (first_lengths + second_lengths) * 2)
+        / lengths.sum(),
         "box_efficiency": np.abs(flat_areas).sum() / sides.max() ** 2,
         "overlap": _overlap(uv, pixels),
     }
@@ -87,20 +89,22 @@ def _edges(
 ) -> tuple[list[tuple[float, float, float]], list[tuple[int, int]]]:
     """Return the seam edges by their lengths in space and in the plane on either side, and the joined faces."""
     sides = defaultdict(list)
-    for face, corners in enumerate(faces.tolist()):
+    for first, corners in enumerate(faces.tolist()):
         for k in range(3):
             start, end = corners[k], corners[(k + 1) % 3]
-            places = {start: uv[face, k], end: uv[face, (k + 1) % 3]}
-            sides[min(start, end), max(start, end)].append((face, places))
+            places = {start: uv[first, k], end: uv[first, (k + 1) % 3]}
+            sides[min(start, end), max(start, end)].append((first, places))
     seams, joined = [], []
-    for (start, end), found in sides.items():
-        if len(found) != 2:
+    for (start, end), faces_of_edge in sides.items():
+        if len(faces_of_edge) != 2:
             continue
-        (face, here), (other, there) = found
-        lengths = [float(np.linalg.norm(places[end] - places[start])) for places in (here, there)]
-        gap = max(np.linalg.norm(here[vertex] - there[vertex]) for vertex in (start, end))
+        (first, first_places), (second, second_places) = faces_of_edge
+        lengths = [
+            float(np.linalg.norm(places[end] - places[start])) for places in (first_places, second_places)
+        ]
+        gap = max(np.linalg.norm(first_places[vertex] - second_places[vertex]) for vertex in (start, end))
         if gap <= SAME_POINT * max(lengths):
-            joined.append((face, other))
+            joined.append((first, second))
         else:
             seams.append((float(np.linalg.norm(vertices[end] - vertices[start])), *lengths))
     return seams, joined
@@ -115,8 +119,8 @@ def _charts(count: int, joined: list[tuple[int, int]]) -> np.ndarray:
             root[face] = face = root[root[face]]
         return face
 
-    for one, other in joined:
-        root[find(one)] = find(other)
+    for first, second in joined:
+        root[find(first)] = find(second)
     return np.unique([find(face) for face in range(count)], return_inverse=True)[1]
 
 

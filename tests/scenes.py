@@ -26,16 +26,16 @@ class SceneMaker:
         }
         self.binary = bytearray()
 
-    def view(self, content, **more):
+    def view(self, content, **properties):
         self.binary += bytes(-len(self.binary) % 4)
         start = len(self.binary)
         self.binary += content
         self.tree["bufferViews"].append(
-            {"buffer": 0, "byteOffset": start, "byteLength": len(content), **more}
+            {"buffer": 0, "byteOffset": start, "byteLength": len(content), **properties}
         )
         return len(self.tree["bufferViews"]) - 1
 
-    def accessor(self, values, code=5126, kind=None, **more):
+    def accessor(self, values, code=5126, kind=None, **properties):
         values = np.asarray(values).astype(FORMS[code])
         values = values.reshape(len(values), -1)
         kind = kind or {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}[values.shape[1]]
@@ -43,7 +43,7 @@ class SceneMaker:
         content = np.pad(values.view("u1").reshape(len(values), size), ((0, 0), (0, -size % 4)))
         stride = {"byteStride": content.shape[1]} if size % 4 else {}
         view = self.view(content.tobytes(), **stride)
-        item = {"bufferView": view, "componentType": code, "count": len(values), "type": kind, **more}
+        item = {"bufferView": view, "componentType": code, "count": len(values), "type": kind, **properties}
         if kind == "VEC3" and code == 5126:
             item |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
         self.tree["accessors"].append(item)
@@ -80,11 +80,14 @@ def rich_scene():
     }
     moved = make.accessor(rng.normal(size=(count, 3)))
     # Some vertices alone are moved, by a sparse array.
-    where, new = make.view(np.array([1, 3], "<u2").tobytes()), make.view(np.ones((2, 3), "<f4").tobytes())
+    where, replacement = (
+        make.view(np.array([1, 3], "<u2").tobytes()),
+        make.view(np.ones((2, 3), "<f4").tobytes()),
+    )
     sparse = {
         "count": 2,
         "indices": {"bufferView": where, "componentType": 5123},
-        "values": {"bufferView": new},
+        "values": {"bufferView": replacement},
     }
     make.tree["accessors"].append({"componentType": 5126, "count": count, "type": "VEC3", "sparse": sparse})
     targets = [{"POSITION": moved}, {"POSITION": len(make.tree["accessors"]) - 1}]

@@ -156,13 +156,16 @@ def join(*parts):
 def renumber(vertices, faces, seed: int = 1):
     """The same mesh with vertices, faces and corners in another order, and the new number of each vertex."""
     rng = np.random.default_rng(seed)
-    new = rng.permutation(len(vertices))
+    numbers = rng.permutation(len(vertices))
     shuffled = np.empty_like(vertices)
-    shuffled[new] = vertices
+    shuffled[numbers] = vertices
     turned = np.stack(
-        [np.roll(face, shift) for face, shift in zip(new[faces], rng.integers(0, 3, len(faces)), strict=True)]
+        [
+            np.roll(face, shift)
+            for face, shift in zip(numbers[faces], rng.integers(0, 3, len(faces)), strict=True)
+        ]
     )
-    return shuffled, turned[rng.permutation(len(faces))], new
+    return shuffled, turned[rng.permutation(len(faces))], numbers
 
 
 def rotation(seed: int = 2):
@@ -225,8 +228,8 @@ def bottle(around: int = 48, along: int = 60):
         ]
     lid.append(np.stack([rings[-1], np.full(around, count), np.roll(rings[-1], -1)], 1))
     middle = side[faces].mean(axis=1)
-    kept = ~((np.abs(middle[:, 2] - 1) < 0.3) & (middle[:, 0] > 0.85))
-    return np.concatenate([side, *floor, [[0.0, 0.0, 0.0]]]), np.concatenate([faces[kept], *lid])
+    is_wall = ~((np.abs(middle[:, 2] - 1) < 0.3) & (middle[:, 0] > 0.85))
+    return np.concatenate([side, *floor, [[0.0, 0.0, 0.0]]]), np.concatenate([faces[is_wall], *lid])
 
 
 def tube(around: int = 48, along: int = 12):

@@ -50,8 +50,8 @@ class StudioVisit(Visit):
         self.studio = studio
         super().__init__(browser, Address(), **options)
 
-    def _request(self, route, own):
-        if route.request.url.startswith(own.split("?")[0]):
+    def _request(self, route, address):
+        if route.request.url.startswith(address.split("?")[0]):
             route.continue_()
         else:
             self.requests.append(route.request.url)
@@ -63,7 +63,7 @@ class StudioVisit(Visit):
         assert self.studio.session.wait_until_idle(60)
         version = self.studio.session.version
         self.wait(f"studio.news.version >= {version} && studio.news.layout === studio.layout")
-        self.rest()
+        self.wait_until_drawn()
 
     def cones(self):
         return self.run("studio.coneRows().map((row) => row.vertex)")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapes
-from methods import compare_all, flatten_with
-from methods.abf import angle_conditions, linear_angles, nearest_angles, wanted_angles
+from comparisons import compare_methods, flatten_by
+from comparisons.abf import angle_conditions, linear_angles, nearest_angles, target_angles
 
 from coneflat import PAPER, errors, flatten
 from coneflat.geometry import angle_defect, corner_angles, edge_lengths
@@ -39,7 +39,7 @@ def problem(shape, curvature=None):
     """Return conditions and wanted angles on a mesh."""
     mesh, angles, _ = metric_of(shape)
     curvature = np.zeros(len(mesh.vertices)) if curvature is None else curvature
-    return angle_conditions(mesh, curvature), wanted_angles(mesh, angles, curvature)
+    return angle_conditions(mesh, curvature), target_angles(mesh, angles, curvature)
 
 
 @pytest.mark.parametrize("shape", SMALL)
@@ -58,46 +58,46 @@ def test_angles_of_a_metric_fulfil_the_conditions(shape):
 def test_linear_angles_are_the_least_norm_solution():
     """As the paper of linear ABF has it, literally: a wheel after the other, and a dense pseudo-inverse."""
     mesh = check_mesh(*shapes.hill(5, 4)).mesh
-    conditions, wanted = problem(shapes.hill(5, 4))
+    conditions, targets = problem(shapes.hill(5, 4))
     rows, right = [], []
     for face in range(len(mesh.faces)):
         rows.append(np.isin(np.arange(mesh.faces.size), 3 * face + np.arange(3)) * 1.0)
-        right.append(np.pi - wanted[3 * face : 3 * face + 3].sum())
+        right.append(np.pi - targets[3 * face : 3 * face + 3].sum())
     for vertex in np.flatnonzero(~mesh.is_boundary_vertex):
         around = np.flatnonzero(mesh.faces.ravel() == vertex)
         after, before = (around - around % 3 + (around + step) % 3 for step in (1, 2))
         rows.append(np.isin(np.arange(mesh.faces.size), around) * 1.0)
-        right.append(2 * np.pi - wanted[around].sum())
+        right.append(2 * np.pi - targets[around].sum())
         wheel = np.zeros(mesh.faces.size)
-        wheel[after] += 1 / np.tan(wanted[after])
-        wheel[before] -= 1 / np.tan(wanted[before])
+        wheel[after] += 1 / np.tan(targets[after])
+        wheel[before] -= 1 / np.tan(targets[before])
         rows.append(wheel)
-        right.append(np.log(np.sin(wanted[before])).sum() - np.log(np.sin(wanted[after])).sum())
-    relative = np.linalg.pinv(np.array(rows) * wanted) @ np.array(right)
-    found, *_ = linear_angles(conditions, wanted)
-    np.testing.assert_allclose(found, wanted * (1 + relative), atol=1e-10)
+        right.append(np.log(np.sin(targets[before])).sum() - np.log(np.sin(targets[after])).sum())
+    relative = np.linalg.pinv(np.array(rows) * targets) @ np.array(right)
+    angles, *_ = linear_angles(conditions, targets)
+    np.testing.assert_allclose(angles, targets * (1 + relative), atol=1e-10)
 
 
 def test_nearest_angles_are_a_minimum():
     """The gradient is a sum of the conditions' (Lagrange), and the conditions hold."""
     for shape in (shapes.hill(8, 6), shapes.annulus(12, 4)):
-        conditions, wanted = problem(shape)
-        found, _, converged = nearest_angles(conditions, wanted)
+        conditions, targets = problem(shape)
+        angles, _, converged = nearest_angles(conditions, targets)
         assert converged
-        assert conditions.residual(found) < 1e-9
-        gradient = (found - wanted) / wanted**2
-        triangles = np.repeat(np.eye(len(wanted) // 3), 3, axis=1)
-        normals = np.vstack([triangles, conditions.slopes(found).toarray()]).T
+        assert conditions.residual(angles) < 1e-9
+        gradient = (angles - targets) / targets**2
+        triangles = np.repeat(np.eye(len(targets) // 3), 3, axis=1)
+        normals = np.vstack([triangles, conditions.slopes(angles).toarray()]).T
         left = gradient - normals @ np.linalg.lstsq(normals, gradient, rcond=None)[0]
         assert np.abs(left).max() < 1e-4 * np.abs(gradient).max()
-        linear, *_ = linear_angles(conditions, wanted)
-        assert np.abs(linear - found).max() < 0.2 * np.abs(found - wanted).max()
+        linear, *_ = linear_angles(conditions, targets)
+        assert np.abs(linear - angles).max() < 0.2 * np.abs(angles - targets).max()
 
 
 @pytest.mark.parametrize("method", BOTH)
 @pytest.mark.parametrize("shape", [shapes.grid(9, 5), shapes.box(), shapes.cylinder(), shapes.grid(5, 1)])
 def test_developable_meshes_come_back_as_they_are(method, shape):
-    d = flatten_with(method, *shape).distortion
+    d = flatten_by(method, *shape).distortion
     assert d.qc_max < 1 + 1e-9
     assert d.area_std < 1e-9
     assert d.seam_mismatch_max < 1e-9
@@ -106,7 +106,7 @@ def test_developable_meshes_come_back_as_they_are(method, shape):
 @pytest.mark.parametrize("shape", (CLOSED | OPEN).values(), ids=CLOSED | OPEN)
 def test_abf_has_the_cones_and_seams_that_close(shape):
     """Around handles and holes, too: nothing is cut but what is unfolded."""
-    result = flatten_with("abf++", *shape)
+    result = flatten_by("abf++", *shape)
     d = result.distortion
     assert d.flipped == 0
     assert d.curvature_error_max < 1e-8
@@ -123,49 +123,49 @@ def test_a_cone_without_room_is_refused():
             errors.CurvatureError,
             match=r"1 cone with angles too large .* 5 of them cannot hold an angle of 5.5 pi",
         ):
-            flatten_with(method, *shapes.sphere(3), cones=cones)
+            flatten_by(method, *shapes.sphere(3), cones=cones)
 
 
 def test_what_did_not_converge_is_refused(monkeypatch):
-    monkeypatch.setattr("methods.abf.STEPS", 1)
+    monkeypatch.setattr("comparisons.abf.STEPS", 1)
     with pytest.raises(errors.ConvergenceError, match=r"off by .* after 1 step; method 'exact'"):
-        flatten_with("abf++", *shapes.sphere(2))
+        flatten_by("abf++", *shapes.sphere(2))
 
 
 def test_free_cones_are_another_method():
     mesh = shapes.sphere(3)
-    free = flatten_with("linear-abf/free", *mesh)
-    held = flatten_with("linear-abf", *mesh)
+    free = flatten_by("linear-abf/free", *mesh)
+    held = flatten_by("linear-abf", *mesh)
     assert free.distortion.qc_mean < held.distortion.qc_mean - 0.01
     with pytest.raises(errors.OptionError, match="unknown method 'abf/free'"):
-        flatten_with("abf/free", *mesh)
+        flatten_by("abf/free", *mesh)
     with pytest.raises(errors.OptionError, match=r"unknown method 'abf\+\+'"):
         flatten(*mesh, method="abf++")
 
 
 def test_they_agree_with_the_exact_metric_on_the_same_cones_and_cut():
     names = ("exact", "linear-abf", "abf++")
-    found = compare_all(shapes.sphere(3), methods=names)
-    for entry in found.entries:
-        assert np.array_equal(entry.result.cones, found["exact"].result.cones)
+    comparison = compare_methods(*shapes.sphere(3), methods=names, atlases=())
+    for entry in comparison.entries:
+        assert np.array_equal(entry.result.cones, comparison["exact"].result.cones)
         assert "other edges" not in entry.note
-    assert np.ptp([found[name].result.distortion.qc_mean for name in names]) < 1e-3
+    assert np.ptp([comparison[name].result.distortion.qc_mean for name in names]) < 1e-3
 
 
 def test_scale_motion_and_numbering():
     vertices, faces = shapes.sphere(3)
-    other_vertices, other_faces, new = shapes.renumber(vertices, faces)
-    base = flatten_with("abf++", vertices, faces, cones="greedy")
+    renumbered_vertices, renumbered_faces, numbers = shapes.renumber(vertices, faces)
+    base = flatten_by("abf++", vertices, faces, cones="greedy")
     for mesh in (
         (vertices * 1e-6, faces),
         (vertices * 1e6, faces),
         (vertices @ shapes.rotation().T, faces),
-        (other_vertices, other_faces),
+        (renumbered_vertices, renumbered_faces),
     ):
-        other = flatten_with("abf++", *mesh, cones="greedy")
-        assert other.distortion.qc_mean == pytest.approx(base.distortion.qc_mean, rel=1e-7)
-        assert other.distortion.qc_max == pytest.approx(base.distortion.qc_max, rel=1e-6)
-    np.testing.assert_array_equal(other.cones, new[base.cones])
+        result = flatten_by("abf++", *mesh, cones="greedy")
+        assert result.distortion.qc_mean == pytest.approx(base.distortion.qc_mean, rel=1e-7)
+        assert result.distortion.qc_max == pytest.approx(base.distortion.qc_max, rel=1e-6)
+    np.testing.assert_array_equal(result.cones, numbers[base.cones])
 
 
 @pytest.mark.slow
@@ -174,6 +174,8 @@ def test_scale_motion_and_numbering():
 )
 def test_the_figures_of_table_2(shared, name, free, held):
     """The paper has 1.007 and 1.027 for linear ABF, which left cones free."""
-    found = compare_all(shared(name), methods=("linear", "linear-abf/free", "linear-abf"), **PAPER)
-    assert found["linear-abf/free"].result.distortion.qc_mean == pytest.approx(free, abs=0.0002)
-    assert found["linear-abf"].result.distortion.qc_mean == pytest.approx(held, abs=0.0002)
+    comparison = compare_methods(
+        shared(name), methods=("linear", "linear-abf/free", "linear-abf"), atlases=(), **PAPER
+    )
+    assert comparison["linear-abf/free"].result.distortion.qc_mean == pytest.approx(free, abs=0.0002)
+    assert comparison["linear-abf"].result.distortion.qc_mean == pytest.approx(held, abs=0.0002)

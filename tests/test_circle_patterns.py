@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapes
-from methods import circle_patterns, compare_all, flatten_with
-from methods.pattern_angles import MIN_ANGLE_FRACTION, MIN_MEETING, coherent_angles
-from methods.pattern_radii import RadiiProblem, circle_pattern
+from comparisons import compare_methods, flatten_by
+from comparisons.pattern_angles import MIN_ANGLE_FRACTION, MIN_MEETING, coherent_angles
+from comparisons.pattern_radii import RadiiProblem, circle_pattern
+from comparisons.patterns import circle_patterns
 from scipy.optimize import minimize
 from scipy.special import spence
 from shapes import laid_out, lengths_of
@@ -56,38 +57,38 @@ def angles_for(mesh, solution):
 def test_angles_are_the_nearest_as_another_solver_finds_them():
     mesh = noisy(shapes.sphere(0), 0.25)
     solution = even_cones(mesh, 12)
-    triangulation, angles, found = angles_for(mesh, solution)
-    assert found.converged
-    one = np.flatnonzero(triangulation.twin > np.arange(len(angles)))
+    triangulation, angles, coherent = angles_for(mesh, solution)
+    assert coherent.converged
+    first_halves = np.flatnonzero(triangulation.twin > np.arange(len(angles)))
     corner = np.arange(len(angles))
     rows = np.zeros((len(mesh.faces) + len(mesh.vertices), len(angles)))
     rows[corner // 3, corner] = rows[len(mesh.faces) + mesh.faces.ravel(), corner] = 1
-    wanted = np.concatenate([np.full(len(mesh.faces), np.pi), 2 * np.pi - solution.target])
-    meeting = np.eye(len(angles))[one] + np.eye(len(angles))[triangulation.twin[one]]
+    sums = np.concatenate([np.full(len(mesh.faces), np.pi), 2 * np.pi - solution.target])
+    meeting = np.eye(len(angles))[first_halves] + np.eye(len(angles))[triangulation.twin[first_halves]]
     best = minimize(
         lambda x: ((x - angles) ** 2).sum() / 2,
         angles,
         jac=lambda x: x - angles,
         bounds=[(min(MIN_ANGLE_FRACTION * a, 0.02), None) for a in angles],
         constraints=[
-            {"type": "eq", "fun": lambda x: (rows @ x - wanted)[:-1], "jac": lambda x: rows[:-1]},
+            {"type": "eq", "fun": lambda x: (rows @ x - sums)[:-1], "jac": lambda x: rows[:-1]},
             {"type": "ineq", "fun": lambda x: np.pi - MIN_MEETING - meeting @ x, "jac": lambda x: -meeting},
         ],
         method="SLSQP",
         options={"maxiter": 300, "ftol": 1e-14},
     )
     assert best.success
-    np.testing.assert_allclose(found.angles, best.x, atol=1e-6)
-    assert (meeting @ found.angles > np.pi - MIN_MEETING - 1e-9).any()
+    np.testing.assert_allclose(coherent.angles, best.x, atol=1e-6)
+    assert (meeting @ coherent.angles > np.pi - MIN_MEETING - 1e-9).any()
 
 
 class TestRadii:
     def test_the_residual_is_the_slope_of_the_papers_energy(self):
         mesh = noisy(shapes.hill(5, 4), 0.1)
         triangulation, _ = intrinsic_delaunay(mesh, lengths_of(mesh))
-        own = corner_angles(triangulation.length.reshape(-1, 3)).ravel()
+        mesh_angles = corner_angles(triangulation.length.reshape(-1, 3)).ravel()
         full = np.full(len(mesh.vertices), 2 * np.pi)
-        angles = coherent_angles(triangulation, own, full, ~mesh.is_boundary_vertex)
+        angles = coherent_angles(triangulation, mesh_angles, full, ~mesh.is_boundary_vertex)
         problem = RadiiProblem(triangulation.twin, angles)
         twin = triangulation.twin
         inner = np.flatnonzero(twin > np.arange(len(twin)))
@@ -95,11 +96,11 @@ class TestRadii:
         theta = np.pi - angles.angles[inner] - angles.angles[twin[inner]]
 
         def energy(rho):
-            one, two = rho[inner // 3], rho[twin[inner] // 3]
+            first, second = rho[inner // 3], rho[twin[inner] // 3]
             total = 2 * np.pi * rho.sum() - 2 * (angles.angles[border] * rho[border // 3]).sum()
-            for x in (one - two, two - one):
+            for x in (first - second, second - first):
                 total += spence(1 - np.exp(x + 1j * theta)).imag.sum()
-            return total - ((np.pi - theta) * (one + two)).sum()
+            return total - ((np.pi - theta) * (first + second)).sum()
 
         rho = np.random.default_rng(1).normal(0, 0.3, len(mesh.faces))
         problem.base = np.zeros_like(rho)
@@ -120,8 +121,10 @@ class TestRadii:
         pattern = circle_pattern(triangulation.twin, angles)
         flat = corner_angles(pattern.lengths.reshape(-1, 3)).ravel()
         inner = np.flatnonzero(triangulation.twin >= 0)
-        for found in (flat, angles.angles):
-            assert (found[inner] + found[triangulation.twin[inner]]).max() < np.pi + 1e-9
+        for corner_angles_found in (flat, angles.angles):
+            assert (
+                corner_angles_found[inner] + corner_angles_found[triangulation.twin[inner]]
+            ).max() < np.pi + 1e-9
         opposite = triangulation.twin[inner]
         np.testing.assert_allclose(
             flat[inner] + flat[opposite], angles.angles[inner] + angles.angles[opposite], atol=1e-9
@@ -134,7 +137,7 @@ class TestRadii:
     "shape", [shapes.sphere(3), shapes.torus(), shapes.hill(), shapes.annulus(), shapes.genus(2)]
 )
 def test_the_curvature_is_the_one_prescribed(shape):
-    result = flatten_with("circle-patterns", *shape)
+    result = flatten_by("circle-patterns", *shape)
     assert result.solve.residual < 1e-9
     assert np.abs(result.curvature_residual).max() < 1e-9
     assert result.distortion.flipped == 0
@@ -143,30 +146,30 @@ def test_the_curvature_is_the_one_prescribed(shape):
 
 def test_scale_motion_and_numbering():
     vertices, faces = shapes.sphere(3)
-    other_vertices, other_faces, new = shapes.renumber(vertices, faces)
-    base = flatten_with("circle-patterns", vertices, faces, cones="greedy")
+    renumbered_vertices, renumbered_faces, numbers = shapes.renumber(vertices, faces)
+    base = flatten_by("circle-patterns", vertices, faces, cones="greedy")
     for mesh in (
         (vertices * 1e-6, faces),
         (vertices * 1e6, faces),
         (vertices @ shapes.rotation().T, faces),
-        (other_vertices, other_faces),
+        (renumbered_vertices, renumbered_faces),
     ):
-        other = flatten_with("circle-patterns", *mesh, cones="greedy")
-        assert other.distortion.qc_mean == pytest.approx(base.distortion.qc_mean, rel=1e-7)
-        assert other.distortion.qc_max == pytest.approx(base.distortion.qc_max, rel=1e-6)
-    np.testing.assert_array_equal(other.cones, new[base.cones])
-    np.testing.assert_allclose(other.log_scale[new], base.log_scale, atol=1e-7)
+        result = flatten_by("circle-patterns", *mesh, cones="greedy")
+        assert result.distortion.qc_mean == pytest.approx(base.distortion.qc_mean, rel=1e-7)
+        assert result.distortion.qc_max == pytest.approx(base.distortion.qc_max, rel=1e-6)
+    np.testing.assert_array_equal(result.cones, numbers[base.cones])
+    np.testing.assert_allclose(result.log_scale[numbers], base.log_scale, atol=1e-7)
 
 
 def test_they_are_compared_with_the_same_cones_and_cut():
     names = ("circle-patterns/fixed", "linear", "circle-patterns", "exact")
-    found = compare_all(shapes.sphere(3), methods=names)
-    assert [entry.method for entry in found.entries] == list(names)
-    for entry in found.entries:
-        assert np.array_equal(entry.result.cones, found["exact"].result.cones)
-        assert np.array_equal(entry.result.seams, found["exact"].result.seams)
+    comparison = compare_methods(*shapes.sphere(3), methods=names, atlases=())
+    assert [entry.method for entry in comparison.entries] == list(names)
+    for entry in comparison.entries:
+        assert np.array_equal(entry.result.cones, comparison["exact"].result.cones)
+        assert np.array_equal(entry.result.seams, comparison["exact"].result.seams)
         assert "other edges" not in entry.note
-    reached = [found[name].result.distortion.qc_mean for name in ("circle-patterns", "exact")]
+    reached = [comparison[name].result.distortion.qc_mean for name in ("circle-patterns", "exact")]
     assert np.ptp(reached) < 1e-3
 
 
@@ -196,9 +199,9 @@ def test_the_figures_of_table_2(shared, name, published, with_flips):
     """The cones of the paper's search; its circle patterns were made without intrinsic Delaunay triangulations."""
     part = Source(as_input(shared(name))).prepared(Options()).components[0]
     mesh, surface = part.mesh, Surface.of(part.mesh, part.lengths)
-    given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
-    solution = greedy_cones(*given, epsilon=1.0, tie_key=tie_key(mesh.vertices))
+    operators = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
+    solution = greedy_cones(*operators, epsilon=1.0, tie_key=tie_key(mesh.vertices))
     layout = laid_out(circle_patterns(mesh, part.lengths, solution, delaunay=False))
     assert measure(mesh, layout.points[layout.corners]).qc_mean == pytest.approx(published, abs=0.001)
-    result = flatten_with("circle-patterns", shared(name), cones="greedy")
+    result = flatten_by("circle-patterns", shared(name), cones="greedy")
     assert result.distortion.qc_mean == pytest.approx(with_flips, abs=0.0005)

@@ -60,14 +60,14 @@ def unknown_flags(text: str) -> list[str]:
         for part in re.split(r"&&|\|\||[|;#](?= )", line):
             script = re.search(r"python (\S+\.py)", part)
             command = re.search(r"coneflat ([a-z]+)", part)
-            known = ALL_FLAGS | HELP
+            possible = ALL_FLAGS | HELP
             if part.removeprefix("RUN ").lstrip().startswith(FOREIGN):
                 continue
             if script:
-                known = set(FLAG.findall((ROOT / script[1]).read_text(encoding="utf-8")))
+                possible = set(FLAG.findall((ROOT / script[1]).read_text(encoding="utf-8")))
             elif command and command[1] in cli.commands:
-                known = flags(cli.commands[command[1]])
-            unknown += [f"{flag} in {line.strip()!r}" for flag in FLAG.findall(part) if flag not in known]
+                possible = flags(cli.commands[command[1]])
+            unknown += [f"{flag} in {line.strip()!r}" for flag in FLAG.findall(part) if flag not in possible]
     return unknown
 
 
@@ -137,10 +137,10 @@ REPLACED_WORDS = [
 def test_private_words_are_replaced():
     pages = [*PAGES, ROOT / "CHANGELOG.md"]
     pages += [path for kind in ("py", "js", "html") for path in (ROOT / "src").rglob(f"*.{kind}")]
-    found = [
+    lines = [
         f"{path.relative_to(ROOT)}:{number}: {match[0]}"
         for path in pages
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
         for match in re.finditer("|".join(REPLACED_WORDS), line)
     ]
-    assert not found, "\n".join(found)
+    assert not lines, "\n".join(lines)

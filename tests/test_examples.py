@@ -83,8 +83,8 @@ def test_linear_functions_are_kept():
     np.testing.assert_allclose(vertices[: len(sheet)], sheet, atol=1e-15)
     corners = vertices[finer]
     np.testing.assert_allclose(np.ptp(corners, axis=1), [[0.5, 0.5, 0]] * len(finer), atol=1e-12)
-    one, two = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]
-    np.testing.assert_allclose(np.cross(one, two)[:, 2], 0.25)
+    across, up = corners[:, 1] - corners[:, 0], corners[:, 3] - corners[:, 0]
+    np.testing.assert_allclose(np.cross(across, up)[:, 2], 0.25)
 
 
 @pytest.mark.slow

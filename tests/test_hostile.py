@@ -40,26 +40,28 @@ def test_hostile_cases_break_no_promise():
     outcomes = outcomes_of(cases(SLICE, 0))
     assert len(outcomes) == SLICE
     broken = [
-        f"{one.kind}:{one.seed} {cause}: {details}" for one in outcomes for cause, details in one.breaches
+        f"{outcome.kind}:{outcome.seed} {cause}: {details}"
+        for outcome in outcomes
+        for cause, details in outcome.breaches
     ]
     assert not broken, "\n".join(broken)
     # Refusing everything is not a way to keep promises.
-    assert sum(one.status in ("ok", "noted") for one in outcomes) > SLICE / 2
+    assert sum(outcome.status in ("ok", "noted") for outcome in outcomes) > SLICE / 2
 
 
 def test_a_case_is_the_same_whenever_it_is_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    one, two = (run_case("mesh", 2) for _ in range(2))
-    assert (one.recipe, one.status, one.message) == (two.recipe, two.status, two.message)
+    first, second = (run_case("mesh", 2) for _ in range(2))
+    assert (first.recipe, first.status, first.message) == (second.recipe, second.status, second.message)
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow
 def test_crashes_hangs_and_swollen_memory_are_told_and_survived():
     kinds = ("crash", "swell", "mesh")
-    told = {one.kind: one for one in outcomes_of([(kind, 2) for kind in kinds])}
+    told = {outcome.kind: outcome for outcome in outcomes_of([(kind, 2) for kind in kinds])}
     assert set(told) == set(kinds)
-    told |= {one.kind: one for one in outcomes_of([("hang", 2)], most_work=2.0)}
+    told |= {outcome.kind: outcome for outcome in outcomes_of([("hang", 2)], most_work=2.0)}
     assert told["crash"].breaches[0][0].startswith("crash")
     assert told["hang"].breaches[0][0].startswith("out of time")
     assert told["swell"].breaches[0][0] == "out of memory"
@@ -155,36 +157,36 @@ def test_a_fault_that_its_own_note_names_is_no_breach(ball):
         (("There is 1 flipped triangle in the plane: refine the mesh there.",), False),
     ):
         assert (cause in breaches_of(replace(turned, notes=notes), options, *mesh)) == is_breach
-    other = replace(planted(result, "other cone"), notes=("The sum of curvatures is off at 1 cone.",))
-    assert "cones: sum of curvatures" in breaches_of(other, options, *mesh)
+    different = replace(planted(result, "other cone"), notes=("The sum of curvatures is off at 1 cone.",))
+    assert "cones: sum of curvatures" in breaches_of(different, options, *mesh)
 
 
 def test_seams_differ_only_where_and_as_much_as_their_note_says(ball):
     result, options, mesh = ball
     is_moved = (planted(result, "moved by a hair").corner_uv != result.corner_uv).any(axis=2)
-    here = int(result.faces[is_moved][0])
-    far = int(np.argmax(np.linalg.norm(result.vertices - result.vertices[here], axis=1)))
+    moved_vertex = int(result.faces[is_moved][0])
+    distant_vertex = int(np.argmax(np.linalg.norm(result.vertices - result.vertices[moved_vertex], axis=1)))
     room = (
         "1 triangle could not be untangled with matching seams, next to vertex {}: they are positively "
         "oriented, but the sides of seams near them are unequal."
     )
-    kept = (
+    unmatched = (
         "{} of 4 on the boundary or on marked seams could not keep their lengths, with relative errors of up to "
         "{}: the triangles there are too coarse for the curvature nearby."
     )
     marked = options | {"seams": result.seams}
     for fault, note, chosen, is_breach in (
-        ("moved by a hair", room.format(here), options, False),
-        ("moved by a hair", room.format(f"{far}, vertex {here}"), options, False),
-        ("moved by a hair", room.format(far), options, True),
-        ("moved a little", room.format(here), options, True),
-        ("moved by a hair", kept.format("2 edges", "1e-06"), marked, False),
-        ("moved by a hair", kept.format("1 edge", "1e-06"), marked, True),
-        ("moved by a hair", kept.format("2 edges", "1e-09"), marked, True),
-        ("moved by a hair", kept.format("2 edges", "1e-06"), options, True),
+        ("moved by a hair", room.format(moved_vertex), options, False),
+        ("moved by a hair", room.format(f"{distant_vertex}, vertex {moved_vertex}"), options, False),
+        ("moved by a hair", room.format(distant_vertex), options, True),
+        ("moved a little", room.format(moved_vertex), options, True),
+        ("moved by a hair", unmatched.format("2 edges", "1e-06"), marked, False),
+        ("moved by a hair", unmatched.format("1 edge", "1e-06"), marked, True),
+        ("moved by a hair", unmatched.format("2 edges", "1e-09"), marked, True),
+        ("moved by a hair", unmatched.format("2 edges", "1e-06"), options, True),
     ):
-        found = breaches_of(replace(planted(result, fault), notes=(note,)), chosen, *mesh)
-        assert any("sides of seams differ" in cause for cause in found) == is_breach
+        causes = breaches_of(replace(planted(result, fault), notes=(note,)), chosen, *mesh)
+        assert any("sides of seams differ" in cause for cause in causes) == is_breach
 
 
 def test_an_energy_above_the_bound_is_found(ball):
@@ -203,11 +205,11 @@ def test_an_energy_above_the_bound_is_found(ball):
 def test_a_file_of_another_layout_is_found(ball, tmp_path, ending):
     result = ball[0]
     path = result.save(tmp_path / f"ball{ending}")
-    sound, other = Outcome("file", 0), Outcome("file", 0)
+    sound, different = Outcome("file", 0), Outcome("file", 0)
     check_file(sound, result, path)
     assert not sound.breaches
-    check_file(other, replace(result, uv=0.99 * result.uv), path)
-    assert any("another layout" in cause or "differently" in cause for cause, _ in other.breaches)
+    check_file(different, replace(result, uv=0.99 * result.uv), path)
+    assert any("another layout" in cause or "differently" in cause for cause, _ in different.breaches)
 
 
 @pytest.mark.slow

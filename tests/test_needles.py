@@ -57,10 +57,10 @@ def test_a_grid_of_steps_is_flattened_though_most_of_its_triangles_are_thin():
     vertices = 0.09 * vertices + [5e5, 5.3e6, 200]
     vertices[:, 2] += np.random.default_rng(0).random(len(vertices)) * 0.01
     rounded = vertices.astype(np.float32).astype(float)
-    kept, place = weld(rounded)
+    welded, place = weld(rounded)
     faces = place[faces]
     is_face = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    result = coneflat.flatten(rounded[kept], faces[is_face], repair=True)
+    result = coneflat.flatten(rounded[welded], faces[is_face], repair=True)
     assert result.distortion.flipped == 0
     assert np.isfinite(result.uv).all()
 

@@ -22,10 +22,10 @@ def test_every_public_name_is_there():
 
 
 def test_packages_for_experts_are_there_and_not_public():
-    assert {"cones", "stages", "peers"} <= set(coneflat._PACKAGES)
+    assert {"cones", "stages"} <= set(coneflat._PACKAGES)
     assert not set(coneflat._PACKAGES) & set(coneflat.__all__)
-    for name, home in coneflat._PACKAGES.items():
-        assert getattr(coneflat, name) is import_module(f"coneflat.{home}")
+    for name in coneflat._PACKAGES:
+        assert getattr(coneflat, name) is import_module(f"coneflat.{name}")
 
 
 def test_import_and_help_load_nothing_heavy():
@@ -95,7 +95,7 @@ print(*sys.modules)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*coneflat.__all__, "peers"])
+@pytest.mark.parametrize("name", coneflat.__all__)
 def test_examples_of_public_names_run(name, tmp_path, monkeypatch):
     """Those of its own docstring; plain values have none, and theirs are in the docstring of the package."""
     documented = getattr(coneflat, name)
@@ -107,16 +107,16 @@ def test_examples_of_public_names_run(name, tmp_path, monkeypatch):
         pytest.importorskip("starlette")
         pytest.importorskip("uvicorn")
     monkeypatch.chdir(tmp_path)
-    found = doctest.DocTestFinder(recurse=False).find(
+    doctests = doctest.DocTestFinder(recurse=False).find(
         documented, name, globs={"coneflat": coneflat, "np": np}
     )
-    examples = [example for test in found for example in test.examples]
+    examples = [example for test in doctests for example in test.examples]
     run = [example.source for example in examples if not example.options.get(doctest.SKIP)]
     about = [source for source in run if name in source] if documented is coneflat else run
     assert about
     printed = []
     runner = doctest.DocTestRunner(verbose=False)
-    for test in found:
+    for test in doctests:
         runner.run(test, out=printed.append)
     assert "".join(printed) == ""
     assert list(tmp_path.iterdir()) == []

@@ -64,10 +64,10 @@ def test_scale_is_the_models_own():
     np.testing.assert_allclose(result.log_scale, 0, atol=1e-9)
 
 
-def same(one, two, rtol=1e-6):
-    for field in dataclasses.fields(one.distortion):
+def assert_same_measures(first, second, rtol=1e-6):
+    for field in dataclasses.fields(first.distortion):
         if field.name not in ("qc", "log_area_scale"):
-            value = getattr(one.distortion, field.name), getattr(two.distortion, field.name)
+            value = getattr(first.distortion, field.name), getattr(second.distortion, field.name)
             np.testing.assert_allclose(*value, rtol=rtol, atol=1e-8, err_msg=field.name)
 
 
@@ -77,17 +77,17 @@ def test_numbering_and_motion_change_nothing(name):
     base = flatten(vertices, faces, distortion=0.15)
     moved = flatten(vertices @ shapes.rotation().T + [5, -3, 2], faces, distortion=0.15)
     np.testing.assert_array_equal(moved.cones, base.cones)
-    same(moved, base)
-    new_vertices, new_faces, new = shapes.renumber(vertices, faces)
+    assert_same_measures(moved, base)
+    new_vertices, new_faces, numbers = shapes.renumber(vertices, faces)
     renumbered = flatten(new_vertices, new_faces, distortion=0.15)
-    np.testing.assert_array_equal(renumbered.cones, new[base.cones])
-    same(renumbered, base)
+    np.testing.assert_array_equal(renumbered.cones, numbers[base.cones])
+    assert_same_measures(renumbered, base)
 
 
 def test_same_input_same_bits():
-    one, two = flatten(*SHAPES["genus 2"]), flatten(*SHAPES["genus 2"])
-    np.testing.assert_array_equal(one.uv, two.uv)
-    np.testing.assert_array_equal(one.seams, two.seams)
+    first, second = flatten(*SHAPES["genus 2"]), flatten(*SHAPES["genus 2"])
+    np.testing.assert_array_equal(first.uv, second.uv)
+    np.testing.assert_array_equal(first.seams, second.seams)
 
 
 def test_cones_of_the_users_own():
@@ -95,8 +95,8 @@ def test_cones_of_the_users_own():
     computed = flatten(vertices, faces, cones=[1, 2, 3, 4, 100])
     assert computed.cones.tolist() == [1, 2, 3, 4, 100]
     np.testing.assert_allclose(computed.curvatures.sum(), 4 * np.pi)
-    given = dict(zip(computed.cones.tolist(), computed.curvatures.tolist(), strict=True))
-    again = flatten(vertices, faces, cones=given)
+    cones = dict(zip(computed.cones.tolist(), computed.curvatures.tolist(), strict=True))
+    again = flatten(vertices, faces, cones=cones)
     np.testing.assert_allclose(again.log_scale, computed.log_scale, atol=1e-9)
     np.testing.assert_allclose(again.uv, computed.uv, atol=1e-7)
     np.testing.assert_array_equal(
@@ -212,7 +212,7 @@ def test_components_without_area_do_not_spoil_the_rest():
 def test_any_unit_of_length_will_do(scale):
     vertices, faces = SHAPES["sphere"]
     base, scaled = flatten(vertices, faces), flatten(vertices * scale, faces)
-    same(scaled, base)
+    assert_same_measures(scaled, base)
     np.testing.assert_array_equal(scaled.vertices, vertices * scale)
     assert scaled.uv_scale == pytest.approx(base.uv_scale / scale, rel=1e-6)
 
@@ -225,10 +225,10 @@ def test_mirror_images_are_told_apart():
     )
     vertices[:, 1] = np.where(np.abs(vertices[:, 1]) < 1e-12, 0, vertices[:, 1])
     base = flatten(vertices, faces, distortion=0.15)
-    new_vertices, new_faces, new = shapes.renumber(vertices @ shapes.rotation().T, faces)
+    new_vertices, new_faces, numbers = shapes.renumber(vertices @ shapes.rotation().T, faces)
     turned = flatten(new_vertices, new_faces, distortion=0.15)
-    assert set(turned.cones.tolist()) == set(new[base.cones].tolist())
-    same(turned, base)
+    assert set(turned.cones.tolist()) == set(numbers[base.cones].tolist())
+    assert_same_measures(turned, base)
 
 
 def test_extreme_metrics_are_refused_in_one_line():
@@ -250,8 +250,8 @@ def test_notes_name_every_cone_and_vertex_where_triangles_fail():
     """Five triangles around a vertex cannot form an angle of 5.1 pi."""
     vertices, faces = shapes.sphere(2)
     wide = np.flatnonzero(np.bincount(faces.ravel()) == 5)[[0, -1]].tolist()
-    others = [v for v in range(len(vertices)) if v not in wide][::2]
-    cones = {**dict.fromkeys(others, 10.2 * np.pi / len(others)), **dict.fromkeys(wide, -3.1 * np.pi)}
+    narrow = [v for v in range(len(vertices)) if v not in wide][::2]
+    cones = {**dict.fromkeys(narrow, 10.2 * np.pi / len(narrow)), **dict.fromkeys(wide, -3.1 * np.pi)}
     notes = flatten(vertices, faces, cones=cones).notes
     cannot = next(note for note in notes if "surrounding triangles cannot form" in note)
     assert f"form: vertex {wide[0]} (5.1 pi), vertex {wide[1]} (5.1 pi), vertex" in cannot
@@ -398,8 +398,8 @@ def test_no_more_cones_are_searched_for_than_a_search_can_find(monkeypatch):
 def test_a_vertex_without_a_face_may_be_anywhere():
     """Heights of charts are those of faces: what is left out does not warn."""
     vertices, faces = shapes.sphere(2)
-    more = np.concatenate([vertices, [[np.nan, np.inf, 0.0]]])
+    further = np.concatenate([vertices, [[np.nan, np.inf, 0.0]]])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        found = flatten(more, faces, repair=True, up=(0, 0, 1))
-    np.testing.assert_array_equal(found.uv, flatten(vertices, faces, up=(0, 0, 1)).uv)
+        result = flatten(further, faces, repair=True, up=(0, 0, 1))
+    np.testing.assert_array_equal(result.uv, flatten(vertices, faces, up=(0, 0, 1)).uv)

@@ -39,10 +39,12 @@ def test_numbers_of_the_sample_are_those_of_today():
     for page in (ROOT / "README.md", ROOT / "docs" / "index.md", ROOT / "docs" / "reference" / "python.md"):
         text = page.read_text(encoding="utf-8")
         made = fill_page(text, measured)
-        for old, new in zip(text.splitlines(), made.splitlines(), strict=True):
-            for was, now in zip(numbers_in(old), numbers_in(new), strict=True):
-                same = was == now if now == int(now) and now else abs(was - now) <= 0.01 * abs(now)
-                assert same or max(abs(was), abs(now)) < 1e-10, f"{page.name}: {old!r} is {new!r} now"
+        for written, line in zip(text.splitlines(), made.splitlines(), strict=True):
+            for was, now in zip(numbers_in(written), numbers_in(line), strict=True):
+                is_equal = was == now if now == int(now) and now else abs(was - now) <= 0.01 * abs(now)
+                assert is_equal or max(abs(was), abs(now)) < 1e-10, (
+                    f"{page.name}: {written!r} is {line!r} now"
+                )
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     assert any(match["what"].startswith("sample ") for match in NUMBER.finditer(readme))
 
@@ -56,7 +58,9 @@ def test_what_stands_between_markers_is_filled():
     with pytest.raises(KeyError, match="there is no <!-- table z -->"):
         fill(page, "table z", "")
     cell = "| <!-- n hand cones -->14<!-- /n --> |"
-    assert fill_numbers(cell, lambda what, was: f"{what} {was}") == cell.replace("14", "hand cones 14")
+    assert fill_numbers(cell, lambda definition, was: f"{definition} {was}") == cell.replace(
+        "14", "hand cones 14"
+    )
 
 
 def test_numbers_of_models_that_are_not_there_stay(tmp_path, capsys):
@@ -80,9 +84,9 @@ def test_names_of_tables_and_numbers_are_known():
 def test_the_structure_is_drawn_from_imports(tmp_path):
     (tmp_path / "base.py").write_text('"""What every package uses."""\n')
     (tmp_path / "mesh.py").write_text('"""Meshes."""\n\nfrom . import base\n')
-    found = packages_by_level(tmp_path)
-    assert [[one.name for one in level] for level in found] == [["base"], ["mesh"]]
-    (mesh,) = found[1]
+    drawn = packages_by_level(tmp_path)
+    assert [[package.name for package in level] for level in drawn] == [["base"], ["mesh"]]
+    (mesh,) = drawn[1]
     assert (mesh.size.files, mesh.size.lines, mesh.below) == (1, 1, {"base"})
     drawing = draw_structure(tmp_path)
     assert packages_drawn(drawing) == [["base"], ["mesh"]]

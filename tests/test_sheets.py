@@ -67,12 +67,12 @@ class TestPolyhedra:
         turn = 2 * np.pi * np.arange(sides) / sides
         circle = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
         vertices = np.concatenate([circle, circle + np.array([0, 0, 2]), [[0, 0, 0], [0, 0, 2]]])
-        near, far = np.arange(sides), (np.arange(sides) + 1) % sides
-        bottom = np.stack([far, near, 0 * near + 2 * sides], axis=1)
-        top = np.stack([near + sides, far + sides, 0 * near + 2 * sides + 1], axis=1)
+        ring, next_ring = np.arange(sides), (np.arange(sides) + 1) % sides
+        bottom = np.stack([next_ring, ring, 0 * ring + 2 * sides], axis=1)
+        top = np.stack([ring + sides, next_ring + sides, 0 * ring + 2 * sides + 1], axis=1)
         wall = [
-            np.stack([near, far, far + sides], axis=1),
-            np.stack([near, far + sides, near + sides], axis=1),
+            np.stack([ring, next_ring, next_ring + sides], axis=1),
+            np.stack([ring, next_ring + sides, ring + sides], axis=1),
         ]
         return vertices, np.concatenate([bottom, top, *wall])
 
@@ -135,8 +135,11 @@ def test_smaller_triangles_lower_a_high_angle_distortion_as_a_note_says():
 
 
 def test_similar_notes_of_components_are_one_note_with_a_count():
-    note, other = Unmet("2 cones at vertex 3 (1.5 pi) are missed."), "Cut at 3 edges."
-    counted = counted_notes([[note], [Unmet("7 cones at vertex 91 (0.25 pi) are missed."), other], []])
-    assert counted == ["2 cones at vertex 3 (1.5 pi) are missed (and similarly 1 component more).", other]
+    note, plain_note = Unmet("2 cones at vertex 3 (1.5 pi) are missed."), "Cut at 3 edges."
+    counted = counted_notes([[note], [Unmet("7 cones at vertex 91 (0.25 pi) are missed."), plain_note], []])
+    assert counted == [
+        "2 cones at vertex 3 (1.5 pi) are missed (and similarly 1 component more).",
+        plain_note,
+    ]
     assert isinstance(counted[0], Unmet)
     assert not isinstance(counted[1], Unmet)

@@ -46,13 +46,13 @@ class Loads(HTMLParser):
         self.feed(path.read_text(encoding="utf-8"))
 
     def handle_starttag(self, tag, attrs):
-        given = dict(attrs)
-        self.parts.add(given.get("id"))
+        attributes = dict(attrs)
+        self.parts.add(attributes.get("id"))
         is_loaded = tag in ("script", "img", "iframe", "source")
-        if tag == "link" and given.get("rel") in ("stylesheet", "icon", "preconnect", "preload"):
+        if tag == "link" and attributes.get("rel") in ("stylesheet", "icon", "preconnect", "preload"):
             is_loaded = True
         if is_loaded:
-            self.loads += [given[name] for name in ("src", "href") if given.get(name)]
+            self.loads += [attributes[name] for name in ("src", "href") if attributes.get(name)]
 
 
 @pytest.mark.slow

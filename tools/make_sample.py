@@ -132,17 +132,17 @@ def flip_edges(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
         keys = np.minimum(tail, head) * len(vertices) + np.maximum(tail, head)
         pairs = np.argsort(keys, kind="stable").reshape(-1, 2)
         excess = opposite[pairs].sum(axis=1) - np.pi
-        existing, used, flipped = set(keys.tolist()), set(), 0
+        existing, flipped_faces, flipped = set(keys.tolist()), set(), 0
         for k in np.argsort(-excess, kind="stable"):
             if excess[k] < 1e-6:
                 break
             first, second = pairs[k]
             f, g, a, b = first % count, second % count, tip[first], tip[second]
             key = min(a, b) * len(vertices) + max(a, b)
-            if f in used or g in used or key in existing:
+            if f in flipped_faces or g in flipped_faces or key in existing:
                 continue
             faces[f], faces[g] = (a, tail[first], b), (b, head[first], a)
-            used |= {f, g}
+            flipped_faces |= {f, g}
             existing.add(key)
             flipped += 1
         if not flipped:

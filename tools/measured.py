@@ -13,13 +13,12 @@ from typing import Any
 from markers import ROOT
 
 import coneflat
-from coneflat.apps.peers import Comparison, flatten_by
-from coneflat.options import Options, declarations, parse_angle
 
 sys.path.insert(0, str(ROOT / "tests"))
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import shapes
-from methods import compare_all
+from common import parse_options
+from comparisons import Comparison, compare_methods, flatten_by
 
 Report = dict[str, Any]
 
@@ -39,11 +38,11 @@ class Measured:
         """Return the path of a model; None, with one message, if it is missing."""
         if model == "sample":
             return coneflat.sample_path()
-        found = sorted(self._folder.glob(f"{model}.*"))
-        if not found and model not in self._missing:
+        paths = sorted(self._folder.glob(f"{model}.*"))
+        if not paths and model not in self._missing:
             self._missing.add(model)
             print(f"{model} is not in {self._folder}: what is said of it is left as it is", flush=True)
-        return found[0] if found else None
+        return paths[0] if paths else None
 
     def has(self, *models: str) -> bool:
         """Return whether all given models exist."""
@@ -81,28 +80,15 @@ class Measured:
         key = (model, methods, str(options))
         if key not in self._comparisons:
             print(f"  {model} by {len(methods)} methods", flush=True)
-            self._comparisons[key] = compare_all(self.path(model), methods=methods, **options)
+            self._comparisons[key] = compare_methods(self.path(model), methods=methods, atlases=(), **options)
         return self._comparisons[key]
 
 
-def number_text(measured: Measured, what: str, was: str) -> str:
+def number_text(measured: Measured, definition: str, present: str) -> str:
     """Return what a number is now: by its name, and as it stands there."""
-    model, *words = what.split()
+    model, *words = definition.split()
     form = words.pop() if words[-1][0] in ".," else ","
-    options = dict(word.split("=", 1) for word in words if "=" in word)
+    options = parse_options(word for word in words if "=" in word)
     (key,) = (word for word in words if "=" not in word)
-    report = measured.report(model, **{name: _value(name, text) for name, text in options.items()})
-    return was if report is None else format(report[key], form)
-
-
-def _value(name: str, text: str) -> Any:
-    """Return what the text of an option means."""
-    if name == "by":
-        return text
-    kind = declarations(Options)[name].kind
-    if getattr(kind, "is_angle", False):
-        return parse_angle(text)
-    try:
-        return float(text) if "." in text else int(text)
-    except ValueError:
-        return text
+    report = measured.report(model, **options)
+    return present if report is None else format(report[key], form)

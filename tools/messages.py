@@ -19,10 +19,10 @@ def list_messages() -> str:
     """Return all templates, with the expressions that fill them in braces."""
     parts = [FIRST]
     for path in sorted(PACKAGE.rglob("*.py")):
-        found = dict.fromkeys(templates(ast.parse(path.read_text(encoding="utf-8"))))
-        if found:
+        messages = dict.fromkeys(templates(ast.parse(path.read_text(encoding="utf-8"))))
+        if messages:
             parts.append(
-                "\n".join([path.relative_to(PACKAGE).as_posix(), *(f"    {text}" for text in found)])
+                "\n".join([path.relative_to(PACKAGE).as_posix(), *(f"    {text}" for text in messages)])
             )
     return "\n\n".join(parts) + "\n"
 

@@ -44,9 +44,14 @@ def quad_keyword_table() -> str:
 
 def _flag_table(group: type, command: str = "flatten") -> str:
     rows = [
-        (_flags(each.name, command), _values(each.kind), _flag_default(each), each.doc)
-        for each in declarations(group).values()
-        if each.flag and not _is_shared(each, group)
+        (
+            _flags(declaration.name, command),
+            _values(declaration.kind),
+            _flag_default(declaration),
+            declaration.doc,
+        )
+        for declaration in declarations(group).values()
+        if declaration.flag and not _is_shared(declaration, group)
     ]
     return _table(
         group, "option", rows, lambda name: f"`{flag_name(name)}`" if declarations(group)[name].flag else ""
@@ -56,13 +61,13 @@ def _flag_table(group: type, command: str = "flatten") -> str:
 def _keyword_table(group: type) -> str:
     rows = [
         (
-            f"`{each.name}`",
-            "(m, 3) numbers" if each.name == "lengths" else _python_values(each.kind),
-            _python_default(each),
-            each.doc,
+            f"`{declaration.name}`",
+            "(m, 3) numbers" if declaration.name == "lengths" else _python_values(declaration.kind),
+            _python_default(declaration),
+            declaration.doc,
         )
-        for each in declarations(group).values()
-        if not _is_shared(each, group)
+        for declaration in declarations(group).values()
+        if not _is_shared(declaration, group)
     ]
     return _table(group, "keyword", rows, "`{}`".format)
 
@@ -74,10 +79,10 @@ def _table(group: type, noun: str, rows: list[tuple[str, ...]], spelled: Callabl
     for row in rows:
         assert not any("|" in cell for cell in row), row
         lines.append(f"| {' | '.join(row)} |".replace("  ", " "))
-    shared = [name for name, each in declarations(group).items() if _is_shared(each, group)]
+    shared = [name for name, declaration in declarations(group).items() if _is_shared(declaration, group)]
     if shared:
         lines += ["", f"As for `flatten`: {', '.join(filter(None, map(spelled, shared)))}."]
-    names = [name for name, each in declarations(group).items() if each.only == "sparse"]
+    names = [name for name, declaration in declarations(group).items() if declaration.only == "sparse"]
     if names and group in GROUPS:
         lines += ["", f"Only `sparse` cones take {', '.join(filter(None, map(spelled, names)))}."]
     return "\n".join(lines)
@@ -85,9 +90,12 @@ def _table(group: type, noun: str, rows: list[tuple[str, ...]], spelled: Callabl
 
 def _is_shared(declaration: Declaration, group: type) -> bool:
     """Return whether another group, of `flatten`, describes the option in the same words and with the same default."""
-    others = [declarations(other).get(declaration.name) for other in GROUPS if other is not group]
+    same_names = [
+        declarations(elsewhere).get(declaration.name) for elsewhere in GROUPS if elsewhere is not group
+    ]
     return group not in GROUPS and any(
-        other and (other.doc, other.default) == (declaration.doc, declaration.default) for other in others
+        elsewhere and (elsewhere.doc, elsewhere.default) == (declaration.doc, declaration.default)
+        for elsewhere in same_names
     )
 
 
@@ -96,7 +104,10 @@ def _flags(name: str, command: str) -> str:
         opts
         for param in cli.commands[command].params
         if param.name == name
-        for opts in (*param.opts, *(other for other in param.secondary_opts if other.startswith("--no-")))
+        for opts in (
+            *param.opts,
+            *(negation for negation in param.secondary_opts if negation.startswith("--no-")),
+        )
     ]
     return ", ".join(f"`{flag}`" for flag in spellings or [flag_name(name)])
 
@@ -147,11 +158,11 @@ def _python_values(kind: kinds.Kind) -> str:
             return "`True`, `False`"
         case kinds.Choice() | kinds.WordOrVertices() | kinds.Edges():
             words = ", ".join(f'`"{word}"`' for word in kind.words)
-            more = {
+            further = {
                 kinds.WordOrVertices: "a list of vertices, or a map to curvatures",
                 kinds.Edges: "(k, 2) pairs of vertices",
             }
-            return ", ".join(each for each in (words, more.get(type(kind), "")) if each)
+            return ", ".join(text for text in (words, further.get(type(kind), "")) if text)
         case kinds.Vertices():
             return "a list of vertices"
         case kinds.VerticesOrEdges():

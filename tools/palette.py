@@ -30,10 +30,10 @@ def save_small(picture: Image.Image, name: str, *, dither: bool = True) -> None:
     dither: for shaded models; flat grounds stay flat without.
     """
     path, full = IMAGES / f"{name}.png", picture.convert("RGB")
-    least = error_of(_with_palette(full, COLORS[-1], dither), full)
+    smallest = error_of(_with_palette(full, COLORS[-1], dither), full)
     for colors in COLORS:
         few = _with_palette(full, colors, dither)
-        if error_of(few, full) <= least + UNSEEN:
+        if error_of(few, full) <= smallest + UNSEEN:
             break
     few.save(path, optimize=True)
     for colors in (128, 64, 32):

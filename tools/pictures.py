@@ -22,8 +22,6 @@ from scipy.sparse import csr_matrix, identity
 from tables import ALLOWED, GALLERY, TRADED, TRADEOFF, tradeoff
 
 import coneflat
-from coneflat.apps.peers import METHODS
-from coneflat.apps.peers.pictures import draw_layouts
 from coneflat.apps.view import (
     Panel,
     Quantity,
@@ -46,6 +44,8 @@ from coneflat.geometry.operators import vertex_areas
 sys.path.insert(0, str(ROOT / "tests"))
 import shapes
 from chromium import browser_path
+from comparisons import COMPARED_METHODS
+from comparisons.pictures import draw_layouts
 
 DPI = 170.0
 GALLERY_DPI = 110.0
@@ -297,14 +297,14 @@ def atlases_figure(measured: Measured) -> Any:
         draw_checker(result, axes, up=up, cones=True, dpi=GALLERY_DPI)
         draw_layout(result, figure.add_axes((left + 0.01, 0.02, width - 0.02, 0.46)))
         charts = result.distortion.charts
-        what = f"{model}: {len(result.cones)} cones, {charts} chart{'s'[: charts > 1]}"
-        figure.text(left + width / 2, 0.975, what, size=9, ha="center", va="center")
+        title = f"{model}: {len(result.cones)} cones, {charts} chart{'s'[: charts > 1]}"
+        figure.text(left + width / 2, 0.975, title, size=9, ha="center", va="center")
     return figure
 
 
 def methods_figure(measured: Measured) -> Any:
     """Return a figure of the layouts of one model by all methods."""
-    return draw_layouts(measured.comparison("rocker-arm", METHODS))
+    return draw_layouts(measured.comparison("rocker-arm", COMPARED_METHODS))
 
 
 #: What is drawn of the trade: the largest number shown for each.
@@ -313,12 +313,12 @@ TOPS = {"cones": (0, 60), "qc_mean": (1, 1.15), "seam_length": (0, 8), "overlap"
 
 def tradeoff_figure(measured: Measured) -> Any:
     """Return a figure of what the number of cones does: a line per model, and the medians."""
-    found = tradeoff(measured)
-    assert found is not None
+    measures = tradeoff(measured)
+    assert measures is not None
     figure = new_figure(13.0, 3.6)
     for k, (key, (low, high)) in enumerate(TOPS.items()):
         factor = 100 if key == "overlap" else 1
-        values = factor * found[:, :, list(TRADEOFF).index(key)]
+        values = factor * measures[:, :, list(TRADEOFF).index(key)]
         axes = figure.add_axes((0.05 + 0.245 * k, 0.15, 0.19, 0.72))
         axes.plot(ALLOWED, values, color="#9db4c8", linewidth=0.8)
         red = {"color": "#b0413e", "linewidth": 2.2, "marker": "o", "markersize": 4}
@@ -356,9 +356,13 @@ def _draw_around(axes: Any, result: coneflat.Flattening, face: int, reach: float
     corners = result.corner_uv
     middle = corners[face].mean(axis=0)
     edge = float(np.median(np.linalg.norm(corners[:, 1] - corners[:, 0], axis=1)))
-    near = (np.abs(corners.mean(axis=1) - middle) < (reach + 2) * edge).all(axis=1)
+    is_near = (np.abs(corners.mean(axis=1) - middle) < (reach + 2) * edge).all(axis=1)
     shown = PolyCollection(
-        list(corners[near]), array=result.distortion.qc[near], cmap="YlOrRd", clim=(1, 3), edgecolor="#555555"
+        list(corners[is_near]),
+        array=result.distortion.qc[is_near],
+        cmap="YlOrRd",
+        clim=(1, 3),
+        edgecolor="#555555",
     )
     shown.set_linewidth(0.5)
     axes.add_collection(shown)

@@ -69,8 +69,8 @@ def subdivided_figure(measured: Measured) -> Any:
         quads = coneflat.quads(measured.path(model), quads=count)
         finer = subdivided(quads)
         panels = []
-        for each, label in ((quads, f"{len(quads.quads)} quads"), (finer, "subdivided once")):
-            drawn = partial(draw_quads, each, eye=eye, irregular=False, dpi=DPI)
+        for mesh, label in ((quads, f"{len(quads.quads)} quads"), (finer, "subdivided once")):
+            drawn = partial(draw_quads, mesh, eye=eye, irregular=False, dpi=DPI)
             panels.append(Panel(view_aspect(quads.vertices, eye), drawn, label))
         rows.append(Row(panels, tallest=TALLEST))
     return compose(rows, dpi=DPI, width=8.0)

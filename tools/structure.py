@@ -52,7 +52,7 @@ HOLDS = {
     "warm_up": "compilation of all kernels",
     "textures": "shortest seams for textures",
     "quadmesh": "quads from an integer grid",
-    "apps": "commands, page, studio, peers",
+    "apps": "commands, page, studio, batch",
     "xatlas": "the interface of xatlas",
     "__main__": "python -m coneflat",
 }

@@ -16,11 +16,10 @@ from measured import Measured, number_text
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
 
+from comparisons import COMPARED_METHODS, Entry, label_of
 from paper import MODELS as PUBLISHED
 
 import coneflat
-from coneflat.apps.peers import METHODS, Entry
-from coneflat.apps.peers.methods import label_of
 from coneflat.options import PAPER
 
 GALLERY = (
@@ -46,7 +45,7 @@ def fill_page(text: str, measured: Measured) -> str:
     """Return a page with its tables and numbers measured."""
     for name, body in list(blocks(text, "table")):
         text = fill(text, name, TABLES[name.split()[1]](measured, body))
-    return fill_numbers(text, lambda what, was: number_text(measured, what, was))
+    return fill_numbers(text, lambda definition, was: number_text(measured, definition, was))
 
 
 def _rows_of(body: str) -> Rows:
@@ -62,7 +61,9 @@ def _table(headings: str, rows: list[list[str]]) -> str:
     return "\n".join([*lines, *(f"| {' | '.join(row)} |" for row in rows)])
 
 
-def _each(models: tuple[str, ...], body: str, made: Mapping[str, list[str] | None]) -> Iterator[list[str]]:
+def _row_of_each(
+    models: tuple[str, ...], body: str, made: Mapping[str, list[str] | None]
+) -> Iterator[list[str]]:
     """Yield a row for each model: the new one, or the old one if the model is missing."""
     was = _rows_of(body)
     for model in models:
@@ -94,7 +95,7 @@ def paper_table(measured: Measured, body: str) -> str:
             else None
         )
     headings = "model | triangles | curvature error: paper | here | QC distortion: paper | here | cones"
-    return _table(headings, list(_each(tuple(PAPERS), body, made)))
+    return _table(headings, list(_row_of_each(tuple(PAPERS), body, made)))
 
 
 #: What the paper compares, and what it might have been instead: columns of its Table 2.
@@ -108,10 +109,10 @@ def readings_table(measured: Measured, body: str) -> str:
         if not measured.has(model):
             made[model] = None
             continue
-        found = measured.comparison(model, READINGS, **PAPER)
+        comparison = measured.comparison(model, READINGS, **PAPER)
         row = made[model] = [model]
         for method in READINGS:
-            paper, result = PUBLISHED[name].qc.get(method), found[method].result
+            paper, result = PUBLISHED[name].qc.get(method), comparison[method].result
             assert result is not None, method
             row += [f"{paper:.3f}"] if paper else []
             row.append(f"{result.distortion.qc_mean:.4f}")
@@ -119,7 +120,7 @@ def readings_table(measured: Measured, body: str) -> str:
         "model | CP: paper | here | with flips | LABF: paper | here | cone angles prescribed | "
         "CF: paper | here | exact"
     )
-    return _table(headings, list(_each(tuple(PAPERS), body, made)))
+    return _table(headings, list(_row_of_each(tuple(PAPERS), body, made)))
 
 
 def gallery_table(measured: Measured, body: str) -> str:
@@ -141,7 +142,7 @@ def gallery_table(measured: Measured, body: str) -> str:
             else None
         )
     headings = "model | triangles | cones | charts | QC distortion | area distortion | seam length, √area"
-    return _table(headings, list(_each(GALLERY, body, made)))
+    return _table(headings, list(_row_of_each(GALLERY, body, made)))
 
 
 #: Measures that depend on the number of cones: keys of the report, and their labels.
@@ -167,8 +168,8 @@ def tradeoff(measured: Measured) -> np.ndarray | None:
 
 def tradeoff_table(measured: Measured, body: str) -> str:
     """Return the effect of the number of cones, as medians over models."""
-    found = tradeoff(measured)
-    if found is None:
+    measures = tradeoff(measured)
+    if measures is None:
         return body
     rows = [
         [
@@ -180,7 +181,7 @@ def tradeoff_table(measured: Measured, body: str) -> str:
             f"{exact:.3f}",
         ]
         for allowed, (cones, distortion, length, overlap, exact) in zip(
-            ALLOWED, np.median(found, axis=1), strict=True
+            ALLOWED, np.median(measures, axis=1), strict=True
         )
     ]
     return _table(" | ".join(["E allowed", *TRADEOFF.values()]), rows)
@@ -190,13 +191,13 @@ def methods_table(measured: Measured, body: str) -> str:
     """Return the measures of all methods on ten models with the same cones and cut."""
     if not measured.has(*COMPARED):
         return body
-    comparisons = {model: measured.comparison(model, METHODS) for model in COMPARED}
+    comparisons = {model: measured.comparison(model, COMPARED_METHODS) for model in COMPARED}
     was = _rows_of(body)
     rows = []
-    for name in METHODS:
-        found = np.array([_compared(model, comparison[name]) for model, comparison in comparisons.items()])
-        error, _, _, flipped, _, mismatch = found.T
-        qc, std, overlap = found[:, [1, 2, 4]].mean(axis=0)
+    for name in COMPARED_METHODS:
+        numbers = np.array([_compared(model, comparison[name]) for model, comparison in comparisons.items()])
+        error, _, _, flipped, _, mismatch = numbers.T
+        qc, std, overlap = numbers[:, [1, 2, 4]].mean(axis=0)
         rows.append(
             [
                 label_of(name),
@@ -248,7 +249,7 @@ def atlases_table(measured: Measured, body: str) -> str:
             ", ".join([*(format(value, form) for value in values), *cell.split(", ")[2:]])
             for values, form, cell in zip(ours[-1], keys.values(), was[model][2:], strict=True)
         ]
-    rows = list(_each(ATLASES, body, made))
+    rows = list(_row_of_each(ATLASES, body, made))
     mean = was["mean"]
     if len(ours) == len(ATLASES):
         means = np.mean(ours, axis=0)
@@ -270,11 +271,11 @@ def convergence() -> str:
     sys.path.insert(0, str(ROOT / "benchmarks"))
     from convergence import METHODS, PAIRS, measured
 
-    pairs = [f"{METHODS[one]} and {METHODS[two]}" for one, two in PAIRS]
+    pairs = [f"{METHODS[first]} and {METHODS[second]}" for first, second in PAIRS]
     headings = ["triangles", *(f"{pair}, mean" for pair in pairs)]
     rows = [
-        [f"{count:,}", *(f"{value:.1e}".replace("e-0", "e-") for value in found[:, 0])]
-        for count, _, found in measured(100_000, 0.3, 0.4)
+        [f"{count:,}", *(f"{value:.1e}".replace("e-0", "e-") for value in gaps[:, 0])]
+        for count, _, gaps in measured(100_000, 0.3, 0.4)
     ]
     return _table(" | ".join(headings), rows)
 
@@ -302,7 +303,7 @@ def quads_table(measured: Measured, body: str) -> str:
         "model | quads | irregular vertices | angle deviation, degrees: mean, p95 | edge lengths, cv | "
         "scaled Jacobian: mean, minimum | distance, edges"
     )
-    return _table(headings, list(_each(QUADS, body, made)))
+    return _table(headings, list(_row_of_each(QUADS, body, made)))
 
 
 #: Function for each table, of the measured models and the old table.

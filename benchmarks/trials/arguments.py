@@ -126,8 +126,12 @@ class Calls:
             name = "check_mesh"  # these take long
         arguments = dict(self.good[name])
         signature = inspect.signature(self.function(name)).parameters.values()
-        every = [one.name for one in signature if one.kind in (one.POSITIONAL_OR_KEYWORD, one.KEYWORD_ONLY)]
-        every = [one for one in every if one != "progress"] or list(arguments)
+        every = [
+            parameter.name
+            for parameter in signature
+            if parameter.kind in (parameter.POSITIONAL_OR_KEYWORD, parameter.KEYWORD_ONLY)
+        ]
+        every = [parameter for parameter in every if parameter != "progress"] or list(arguments)
         odd = []
         for _ in range(1 + (rng.random() < 0.2)):
             which = every[int(rng.integers(len(every)))]

@@ -34,12 +34,12 @@ class Planted:
     Attributes:
         name: the data.
         words: pattern by which a note names it.
-        kept: by the ending of an output, how to find the data there; other outputs cannot have it.
+        checks: by the ending of an output, how to find the data there; other outputs cannot have it.
     """
 
     name: str
     words: str
-    kept: Mapping[str, Check] = field(default_factory=dict)
+    checks: Mapping[str, Check] = field(default_factory=dict)
 
 
 Made = tuple[bytes, list[Planted]]
@@ -57,7 +57,7 @@ def attribute_case(rng: Random, outcome: Outcome) -> None:
     line = [verb, str(path), "-o", str(out), "--report", "report.json"]
     line += ["--quads", "30"] if verb == "quads" else []
     outcome.recipe = (
-        f"{' '.join(line)} of {len(faces)} triangles with {', '.join(one.name for one in planted)}"
+        f"{' '.join(line)} of {len(faces)} triangles with {', '.join(data.name for data in planted)}"
     )
     code, _, err = run_command(line)
     if code != 0 or not out.exists():
@@ -65,21 +65,25 @@ def attribute_case(rng: Random, outcome: Outcome) -> None:
         return
     notes = json.loads(Path("report.json").read_text())["notes"]
     told = " ".join(note for note in notes if note.startswith(LOST + out.suffix))
-    for one in planted:
-        check = one.kept.get(out.suffix)
+    for attribute in planted:
+        check = attribute.checks.get(out.suffix)
         if verb == "quads":
-            check = check if ending == ".obj" and one.name in ("groups", "objects", "materials") else None
+            check = (
+                check if ending == ".obj" and attribute.name in ("groups", "objects", "materials") else None
+            )
         try:
             is_kept = check is not None and check(out)
         except Exception as error:
-            outcome.breach(f"attributes: {ending} to {out.suffix}: {one.name} cannot be read", repr(error))
+            outcome.breach(
+                f"attributes: {ending} to {out.suffix}: {attribute.name} cannot be read", repr(error)
+            )
             continue
-        is_named = re.search(one.words, told) is not None
-        what = f"{one.name} of {ending} in {out.suffix} by {verb}"
+        is_named = re.search(attribute.words, told) is not None
+        transfer = f"{attribute.name} of {ending} in {out.suffix} by {verb}"
         if not is_kept and not is_named:
-            outcome.breach(f"attributes: lost without a note: {what}", told)
+            outcome.breach(f"attributes: lost without a note: {transfer}", told)
         if is_kept and is_named:
-            outcome.breach(f"attributes: kept, but a note names it: {what}", told)
+            outcome.breach(f"attributes: kept, but a note names it: {transfer}", told)
 
 
 def _mesh(rng: Random) -> tuple[np.ndarray, np.ndarray]:
@@ -89,11 +93,11 @@ def _mesh(rng: Random) -> tuple[np.ndarray, np.ndarray]:
     return shapes.sphere(1) if kind == 1 else shapes.box(1)
 
 
-def _some(rng: Random, planted: list[Any]) -> list[Any]:
+def chosen_attributes(rng: Random, planted: list[Any]) -> list[Any]:
     """Return some of the data, in order, at least one."""
     chosen = rng.random(len(planted)) < 0.5
     chosen[rng.integers(len(planted))] = True
-    return [one for one, is_chosen in zip(planted, chosen, strict=True) if is_chosen]
+    return [attribute for attribute, is_chosen in zip(planted, chosen, strict=True) if is_chosen]
 
 
 def _has(pattern: bytes) -> Check:
@@ -102,7 +106,7 @@ def _has(pattern: bytes) -> Check:
 
 def make_obj(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
     shades = rng.integers(0, 256, (len(vertices), 3))
-    planted = _some(
+    planted = chosen_attributes(
         rng,
         [
             Planted("groups", r"\bgroups\b", {".obj": _has(rb"^g left arm\s*$")}),
@@ -113,7 +117,7 @@ def make_obj(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
             _colours(shades, {".obj": _obj_colours(shades)}),
         ],
     )
-    names = {one.name for one in planted}
+    names = {attribute.name for attribute in planted}
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in vertices.tolist()]
     if "colours" in names:
         lines = [
@@ -136,21 +140,21 @@ def _obj_colours(shades: np.ndarray) -> Check:
     return check
 
 
-def _colours(shades: np.ndarray, own: Mapping[str, Check]) -> Planted:
+def _colours(shades: np.ndarray, further: Mapping[str, Check]) -> Planted:
     """Colours (n, 3) of vertices, in bytes."""
 
     def in_ply(path: Path) -> bool:
         rows = read_ply(path)[0]
-        found = np.stack([rows[name] for name in ("red", "green", "blue")], axis=1)
-        return np.array_equal(found, shades[rows["source_vertex"]])
+        colours = np.stack([rows[name] for name in ("red", "green", "blue")], axis=1)
+        return np.array_equal(colours, shades[rows["source_vertex"]])
 
     def in_glb(path: Path) -> bool:
-        found, source = glb_rows(path, "COLOR_0"), glb_rows(path, "_SOURCE_VERTEX").astype(int)[:, 0]
-        linear = found[:, :3] / 65535
+        colours, source = glb_rows(path, "COLOR_0"), glb_rows(path, "_SOURCE_VERTEX").astype(int)[:, 0]
+        linear = colours[:, :3] / 65535
         back = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
         return np.array_equal(np.rint(255 * back), shades[source])
 
-    return Planted("colours", r"\bvertex colours\b", {".ply": in_ply, ".glb": in_glb, **own})
+    return Planted("colours", r"\bvertex colours\b", {".ply": in_ply, ".glb": in_glb, **further})
 
 
 def make_ply(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
@@ -168,7 +172,7 @@ def make_ply(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
         "area": ("float", rng.random(m).astype("f4")),
         "segment": ("short", rng.integers(-(2**15), 2**15, m)),
     }
-    planted = _some(
+    planted = chosen_attributes(
         rng,
         [
             _colours(shades, {}),
@@ -196,7 +200,7 @@ def make_ply(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
             Planted("face lists", r"face properties \([^)]*\bcurve\b"),
         ],
     )
-    names = {one.name for one in planted}
+    names = {attribute.name for attribute in planted}
     with_alpha = "colours" in names and rng.random() < 0.5
     if with_alpha:
         planted.append(
@@ -233,13 +237,14 @@ def make_ply(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
     text = "\n".join([*head, "end_header"]) + "\n"
     if form == "ascii":
         body = "".join(
-            " ".join(repr(one.item() if hasattr(one, "item") else one) for _, one in row) + "\n"
+            " ".join(repr(value.item() if hasattr(value, "item") else value) for _, value in row) + "\n"
             for row in rows
         )
         return (text + body).encode(), planted
     order = "<" if "little" in form else ">"
     return text.encode() + b"".join(
-        struct.pack(order + "".join(CODES[word] for word, _ in row), *(one for _, one in row)) for row in rows
+        struct.pack(order + "".join(CODES[word] for word, _ in row), *(value for _, value in row))
+        for row in rows
     ), planted
 
 
@@ -302,8 +307,8 @@ def glb_rows(path: Path, name: str) -> np.ndarray:
 
 def make_off(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
     shades = rng.integers(0, 256, (len(vertices), 3))
-    planted = _some(rng, [_colours(shades, {}), Planted("face colours", r"\bface colours\b")])
-    names = {one.name for one in planted}
+    planted = chosen_attributes(rng, [_colours(shades, {}), Planted("face colours", r"\bface colours\b")])
+    names = {attribute.name for attribute in planted}
     lines = ["COFF" if "colours" in names else "OFF", f"{len(vertices)} {len(faces)} 0"]
     for (x, y, z), shade in zip(vertices.tolist(), shades.tolist(), strict=True):
         lines.append(f"{x!r} {y!r} {z!r}" + (" {} {} {} 255".format(*shade) if "colours" in names else ""))
@@ -320,8 +325,12 @@ def make_stl(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
         content = bytes(80) + struct.pack("<I", len(rows)) + rows.tobytes()
         return content, [Planted("facet colours", "attributes of facets")]
     lines = ["solid left arm"]
-    for one in corners.tolist():
-        lines += ["facet normal 0 0 0", "outer loop", *("vertex {!r} {!r} {!r}".format(*p) for p in one)]
+    for corner_points in corners.tolist():
+        lines += [
+            "facet normal 0 0 0",
+            "outer loop",
+            *("vertex {!r} {!r} {!r}".format(*p) for p in corner_points),
+        ]
         lines += ["endloop", "endfacet"]
     return ("\n".join([*lines, "endsolid left arm"]) + "\n").encode(), [
         Planted("names of solids", r"\bsolids\b")
@@ -349,7 +358,7 @@ def make_glb(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
         "extension": r"extensions \([^)]*KHR_lights_punctual",
         "animations": r"\banimations\b",
     }
-    planted = _some(
+    planted = chosen_attributes(
         rng,
         [
             *(
@@ -363,14 +372,14 @@ def make_glb(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
             *(Planted(name, words, {".glb": _TREE_CHECKS[name]}) for name, words in entries.items()),
         ],
     )
-    names = {one.name for one in planted}
+    names = {attribute.name for attribute in planted}
     primitive: dict[str, Any] = {
         "attributes": {"POSITION": make.accessor(points)},
         "indices": make.accessor(faces.ravel(), 5125),
     }
-    for name, (values, code, more) in arrays.items():
+    for name, (values, code, options) in arrays.items():
         if name in names:
-            primitive["attributes"][name] = make.accessor(values, code, **more)
+            primitive["attributes"][name] = make.accessor(values, code, **options)
     primitives = [primitive]
     nodes: list[dict[str, Any]] = [{"mesh": 0, "name": "thing"}]
     if "materials" in names:
@@ -415,12 +424,12 @@ def make_gltf(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
 
 
 def _glb_check(name: str, points: np.ndarray, values: np.ndarray) -> Check:
-    known = {tuple(point): row for point, row in zip(points.tolist(), values.tolist(), strict=True)}
+    values_at = {tuple(point): row for point, row in zip(points.tolist(), values.tolist(), strict=True)}
 
     def check(path: Path) -> bool:
         rows = glb_rows(path, name)
-        wanted = np.array([known[tuple(point)] for point in glb_rows(path, "POSITION").tolist()])
-        return np.array_equal(rows, wanted.astype(rows.dtype))
+        expected = np.array([values_at[tuple(point)] for point in glb_rows(path, "POSITION").tolist()])
+        return np.array_equal(rows, expected.astype(rows.dtype))
 
     return check
 
@@ -430,7 +439,9 @@ def _tree(test: Callable[[dict[str, Any]], Any]) -> Check:
 
 
 def _has_paint(tree: dict[str, Any]) -> bool:
-    (name,) = {tree["materials"][one["material"]]["name"] for one in tree["meshes"][0]["primitives"][:1]}
+    (name,) = {
+        tree["materials"][primitive["material"]]["name"] for primitive in tree["meshes"][0]["primitives"][:1]
+    }
     return name == "paint"
 
 
@@ -439,7 +450,7 @@ _TREE_CHECKS: dict[str, Check] = {
     "cameras": _tree(lambda tree: tree["cameras"][0]["perspective"]["yfov"] == 0.7),
     "extras": _tree(lambda tree: tree["meshes"][0]["primitives"][0]["extras"] == {"part": 7}),
     "morph targets": _tree(lambda tree: len(tree["meshes"][0]["primitives"][0]["targets"]) == 1),
-    "lines": _tree(lambda tree: [one.get("mode") for one in tree["meshes"][0]["primitives"]][1:] == [1]),
+    "lines": _tree(lambda tree: [part.get("mode") for part in tree["meshes"][0]["primitives"]][1:] == [1]),
     "nodes": _tree(lambda tree: tree["nodes"][1]["translation"] == [1, 2, 3]),
     "extension": _tree(
         lambda tree: tree["extensions"]["KHR_lights_punctual"]["lights"] == [{"type": "point"}]
@@ -453,16 +464,16 @@ def make_gii(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
 
     gifti = nibabel.gifti
     meta = {"AnatomicalStructurePrimary": "CortexLeft", "AnatomicalStructureSecondary": "MidThickness"}
-    planted = _some(rng, [Planted(name, rf"metadata \([^)]*\b{name}\b") for name in meta])
-    chosen = gifti.GiftiMetaData({one.name: meta[one.name] for one in planted})
+    planted = chosen_attributes(rng, [Planted(name, rf"metadata \([^)]*\b{name}\b") for name in meta])
+    chosen = gifti.GiftiMetaData({attribute.name: meta[attribute.name] for attribute in planted})
     image = nibabel.GiftiImage()
-    for values, intent, kind, more in (
+    for values, intent, kind, options in (
         (vertices, "POINTSET", np.float32, {"meta": chosen}),
         (faces, "TRIANGLE", np.int32, {}),
     ):
         code = f"NIFTI_INTENT_{intent}"
         image.add_gifti_data_array(
-            gifti.GiftiDataArray(values.astype(kind), intent=code, datatype=kind, **more)
+            gifti.GiftiDataArray(values.astype(kind), intent=code, datatype=kind, **options)
         )
     return image.to_bytes(), planted
 

@@ -72,11 +72,11 @@ def warm_up() -> None:
 def _resident(name: str) -> float:
     """Return the resident memory of the process, or its peak since the last call, in MB; 0 if unknown."""
     try:
-        found = re.search(rf"{name}:\s+(\d+) kB", Path("/proc/self/status").read_text())
+        match = re.search(rf"{name}:\s+(\d+) kB", Path("/proc/self/status").read_text())
         Path("/proc/self/clear_refs").write_text("5")
     except OSError:
         return 0.0
-    return int(found[1]) / 1e3 if found else 0.0
+    return int(match[1]) / 1e3 if match else 0.0
 
 
 def _mesh(rng: Random, outcome: Outcome) -> None:
@@ -104,7 +104,7 @@ def _tiny(rng: Random, outcome: Outcome) -> None:
     _flatten(rng, outcome, lambda: coneflat.flatten(vertices, faces, **options), options, (vertices, faces))
 
 
-def _many(rng: Random, outcome: Outcome) -> None:
+def _many_components(rng: Random, outcome: Outcome) -> None:
     """Flatten a mesh of many tiny components with random options, or unwrap it."""
     import coneflat
 
@@ -145,15 +145,15 @@ def _file(rng: Random, outcome: Outcome) -> None:
     """Read and flatten an intact or damaged file, in Python or by the command line."""
     import coneflat
 
-    path, what = make_file(rng, Path())
-    outcome.recipe = what
+    path, recipe = make_file(rng, Path())
+    outcome.recipe = recipe
     weld = [None, None, True, False][int(rng.integers(4))]
     repair = bool(rng.random() < 0.7)
     if path.suffix == ".npz":
         result = None
         with outcome.guarded(expects_nan=True):
             result = coneflat.read_flattening(path)
-        if result is not None and "damaged" not in what:
+        if result is not None and "damaged" not in recipe:
             check(outcome, result, {}, result.vertices, result.faces[np.argsort(result.face_origin)])
         if result is not None:
             again = Path("again.obj")
@@ -221,9 +221,9 @@ def _argument(rng: Random, outcome: Outcome) -> None:
         and result is not None
         and arguments["faces"] is _calls.good["flatten"]["faces"]
     ):
-        given = {key: value for key, value in arguments.items() if key not in ("mesh", "faces")}
+        options = {key: value for key, value in arguments.items() if key not in ("mesh", "faces")}
         with outcome.guarded("checking: "):
-            check(outcome, result, _plain(given), arguments["mesh"], arguments["faces"])
+            check(outcome, result, _plain(options), arguments["mesh"], arguments["faces"])
 
 
 _calls: Calls | None = None
@@ -296,7 +296,7 @@ KINDS: dict[str, Callable[[Random, Outcome], None]] = {
     "argument": _argument,
     "command": _command,
     "tiny": _tiny,
-    "many": _many,
+    "many": _many_components,
     "process": _process,
     "texture": texture_case,
     "transfer": transfer_case,

@@ -69,11 +69,11 @@ def far_away(vertices: np.ndarray, faces: np.ndarray, rng: Random) -> Mesh:
 
 def two_parts(vertices: np.ndarray, faces: np.ndarray, rng: Random) -> Mesh:
     """Another surface next to this one, or glued to it at a point."""
-    other = MAKERS[int(rng.integers(7))][0](rng)
+    second = MAKERS[int(rng.integers(7))][0](rng)
     start = len(vertices)
-    merged = shapes.join((vertices, faces), (other[0] + np.array([5.0, 0, 0]), np.asarray(other[1])))
-    if rng.random() < 0.5 and len(faces) and len(other[1]):
-        merged[1][merged[1] == start + other[1][0, 0]] = faces[0, 0]
+    merged = shapes.join((vertices, faces), (second[0] + np.array([5.0, 0, 0]), np.asarray(second[1])))
+    if rng.random() < 0.5 and len(faces) and len(second[1]):
+        merged[1][merged[1] == start + second[1][0, 0]] = faces[0, 0]
     return merged
 
 
@@ -115,16 +115,16 @@ def wing(vertices: np.ndarray, faces: np.ndarray, rng: Random) -> Mesh:
 def flips(vertices: np.ndarray, faces: np.ndarray, rng: Random) -> Mesh:
     """Some edges replaced by the other diagonal, if the mesh remains a manifold."""
     faces = faces.copy()
-    known = {tuple(sorted((int(a), int(b)))) for f in faces for a, b in zip(f, np.roll(f, -1), strict=True)}
+    edges = {tuple(sorted((int(a), int(b)))) for f in faces for a, b in zip(f, np.roll(f, -1), strict=True)}
     for _ in range(int(rng.integers(1, max(2, len(faces) // 5)))):
         f = int(rng.integers(len(faces)))
         p, i, j = np.roll(faces[f], rng.integers(3)).tolist()
         for g in np.flatnonzero((faces == i).any(axis=1) & (faces == j).any(axis=1)):
-            rest = [v for v in faces[g].tolist() if v not in (i, j)]
-            if g == f or len(rest) != 1 or tuple(sorted((p, rest[0]))) in known or p == rest[0]:
+            opposite = [v for v in faces[g].tolist() if v not in (i, j)]
+            if g == f or len(opposite) != 1 or tuple(sorted((p, opposite[0]))) in edges or p == opposite[0]:
                 continue
-            known.add(tuple(sorted((p, rest[0]))))
-            faces[f], faces[g] = (p, i, rest[0]), (rest[0], j, p)
+            edges.add(tuple(sorted((p, opposite[0]))))
+            faces[f], faces[g] = (p, i, opposite[0]), (opposite[0], j, p)
             break
     return vertices, faces
 

@@ -32,13 +32,23 @@ def make_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> dict[s
         if rng.random() < chance:
             options[name] = values[int(rng.integers(len(values)))]
 
-    def some(pool: np.ndarray, most: int) -> list[int]:
-        count = min(len(pool), int(rng.integers(1, most + 1)))
+    def random_vertices(pool: np.ndarray, max_count: int) -> list[int]:
+        count = min(len(pool), int(rng.integers(1, max_count + 1)))
         return rng.choice(pool, count, replace=False).tolist() if count else []
 
     maybe(0.75, "charts", "atlas", "atlas", "one")
     maybe(0.1, "method", "linear")
-    maybe(0.25, "cones", "sparse", "sparse", "greedy", "none", "auto", some(inside, 4), some(inside, 4))
+    maybe(
+        0.25,
+        "cones",
+        "sparse",
+        "sparse",
+        "greedy",
+        "none",
+        "auto",
+        random_vertices(inside, 4),
+        random_vertices(inside, 4),
+    )
     if rng.random() < 0.06:
         options["cones"] = _given_curvatures(rng, inside, topology, faces if usable else faces[:0])
     maybe(0.2, "distortion", 0.02, 0.1, 0.5, 2.0)
@@ -48,8 +58,8 @@ def make_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> dict[s
     maybe(0.06, "max_cone_angle", None, 7.0, 9.0, 20.0)
     maybe(0.06, "positive_only", True)
     maybe(0.05, "weights", rng.random(size), 10 ** rng.uniform(-9, 9, size), np.eye(1, max(size, 1))[0])
-    maybe(0.05, "required_cones", some(inside, 3))
-    maybe(0.05, "forbidden_cones", some(np.arange(size), max(1, size // 2)))
+    maybe(0.05, "required_cones", random_vertices(inside, 3))
+    maybe(0.05, "forbidden_cones", random_vertices(np.arange(size), max(1, size // 2)))
     maybe(
         0.16,
         "quantise",
@@ -63,9 +73,19 @@ def make_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> dict[s
     )
     maybe(0.3 if "quantise" in options else 0, "correct_handles", True)
     if len(border):
-        maybe(0.3, "boundary", "lengths", "lengths", "disk", "disk", "straight", "straight", some(border, 6))
+        maybe(
+            0.3,
+            "boundary",
+            "lengths",
+            "lengths",
+            "disk",
+            "disk",
+            "straight",
+            "straight",
+            random_vertices(border, 6),
+        )
         if rng.random() < 0.05:
-            corners = some(border, 6)
+            corners = random_vertices(border, 6)
             turns = rng.dirichlet(np.ones(len(corners))) * 2 * math.pi if corners else []
             options["boundary"] = {v: float(k) for v, k in zip(corners, turns, strict=True)}
     else:
@@ -138,11 +158,11 @@ def _walk(rng: Random, edges: np.ndarray) -> np.ndarray:
     for number, (a, b) in enumerate(edges.tolist()):
         at.setdefault(a, []).append(number)
         at.setdefault(b, []).append(number)
-    here, taken = int(edges[rng.integers(len(edges)), 0]), []
+    vertex, taken = int(edges[rng.integers(len(edges)), 0]), []
     for _ in range(int(rng.integers(2, 12))):
-        number = at[here][int(rng.integers(len(at[here])))]
+        number = at[vertex][int(rng.integers(len(at[vertex])))]
         taken.append(number)
-        here = int(edges[number].sum()) - here
+        vertex = int(edges[number].sum()) - vertex
     return edges[np.unique(taken)]
 
 

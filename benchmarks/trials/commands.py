@@ -38,7 +38,6 @@ COMMANDS = {
     "measure": 8,
     "view": 5,
     "figure": 3,
-    "compare": 2,
     "batch": 1,
     "nonsense": 1,
 }
@@ -65,13 +64,14 @@ def make_command(rng: Random, folder: Path) -> list[str]:
     outputs = {
         "view": ["page.html"],
         "figure": ["picture.png", "picture.svg"],
-        "compare": ["table"],
         "batch": ["out"],
     }
-    own = outputs.get(name, ["out.obj", "out.glb", "out.ply", "out.npz", "out.xyz", "nowhere/out.obj", "."])
+    paths = outputs.get(name, ["out.obj", "out.glb", "out.ply", "out.npz", "out.xyz", "nowhere/out.obj", "."])
     if any("--output" in parameter.opts for parameter in command.params):
-        line += ["-o", own[int(rng.integers(len(own) if rng.random() < 0.3 else min(4, len(own))))]]
-    options = [one for one in command.params if isinstance(one, click.Option) and "--output" not in one.opts]
+        line += ["-o", paths[int(rng.integers(len(paths) if rng.random() < 0.3 else min(4, len(paths))))]]
+    options = [
+        flag for flag in command.params if isinstance(flag, click.Option) and "--output" not in flag.opts
+    ]
     for _ in range(int(rng.integers(0, 5))):
         option = options[int(rng.integers(len(options)))]
         if "--help" in option.opts or {"--jobs", "--scheduler", "--open"} & set(option.opts):

@@ -101,9 +101,9 @@ def write_stl(rng: Random, vertices: np.ndarray, polygons: list[list[int]]) -> b
     corners = vertices[_triangles(polygons)]
     if rng.random() < 0.5:
         rows = ["solid thing"]
-        for one in corners:
+        for triangle in corners:
             rows += ["facet normal 0 0 0", "outer loop"]
-            rows += ["vertex {:.9g} {:.9g} {:.9g}".format(*p) for p in one] + ["endloop", "endfacet"]
+            rows += ["vertex {:.9g} {:.9g} {:.9g}".format(*p) for p in triangle] + ["endloop", "endfacet"]
         return ("\n".join([*rows, "endsolid thing"]) + "\n").encode()
     facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
     facets = np.zeros(len(corners), facet)
@@ -187,9 +187,9 @@ def write_glb(rng: Random, vertices: np.ndarray, polygons: list[list[int]], dama
         scene = damaged_scene(rng, scene)
     text = json.dumps(scene).encode()
     text += b" " * (-len(text) % 4)
-    whole = 12 + 8 + len(text) + 8 + len(binary)
+    length = 12 + 8 + len(text) + 8 + len(binary)
     return (
-        struct.pack("<4sII", b"glTF", 2, whole)
+        struct.pack("<4sII", b"glTF", 2, length)
         + struct.pack("<I4s", len(text), b"JSON")
         + text
         + struct.pack("<I4s", len(binary), b"BIN\0")
@@ -230,14 +230,14 @@ def write_npz(rng: Random, vertices: np.ndarray, polygons: list[list[int]], dama
         parts[name] = _npy_header((4_000_000, 3)) + bytes(96_000_000)
     else:
         array = io.BytesIO()
-        other = [
+        arrays = [
             np.array([1e9]),
             np.full((3, 3), 10**9),
             np.full((4, 2), np.nan),
             np.array(["a"]),
             np.array(3),
         ]
-        np.save(array, other[int(rng.integers(len(other)))])
+        np.save(array, arrays[int(rng.integers(len(arrays)))])
         parts[name] = array.getvalue()
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as members:
@@ -306,15 +306,15 @@ def make_file(rng: Random, folder: Path) -> tuple[Path, str]:
     damage = rng.random() < 0.6
     structure = damage and ending in STRUCTURED and rng.random() < 0.6
     content = WRITERS[ending](rng, vertices, polygons, *([True] if structure else []))
-    what = f"{ending} of {len(vertices)} vertices, {len(polygons)} polygons"
+    recipe = f"{ending} of {len(vertices)} vertices, {len(polygons)} polygons"
     if damage and not structure:
-        content, what = damaged_bytes(rng, content), f"damaged {what}"
+        content, recipe = damaged_bytes(rng, content), f"damaged {recipe}"
     elif structure:
-        what = f"{what}, its structure damaged"
+        recipe = f"{recipe}, its structure damaged"
     if rng.random() < 0.03:
-        content, what = b"", f"empty {ending}"
+        content, recipe = b"", f"empty {ending}"
     if rng.random() < 0.03:
-        ending, what = str(rng.choice(list(WRITERS))), f"{what}, named otherwise"
+        ending, recipe = str(rng.choice(list(WRITERS))), f"{recipe}, named otherwise"
     path = folder / f"thing{ending}"
     path.write_bytes(content)
-    return path, what
+    return path, recipe

@@ -44,7 +44,7 @@ def make_tiny(rng: Random) -> tuple[np.ndarray, np.ndarray, str]:
     faces = np.zeros((0, 3), dtype=np.int64)
     while not 0 < len(faces) <= TINY_FACES:
         maker = TINY[int(rng.integers(len(TINY)))]
-        vertices, faces = (np.array(one) for one in maker(rng))
+        vertices, faces = (np.array(array) for array in maker(rng))
     vertices, faces, recipe = vertices.astype(np.float64), faces.astype(np.int64), [maker.__name__]
     if rng.random() < 0.3:
         change = CHANGES[int(rng.integers(len(CHANGES)))][0]

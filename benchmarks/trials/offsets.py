@@ -65,11 +65,11 @@ def offset_case(rng: Random, outcome: Outcome) -> None:
         if intact.all():
             outcome.breach(f"offsets: triangles of {ending} lost in {out.suffix}", notes)
         return
-    least = 4 * np.finfo(float).eps * np.abs(positions).max()
-    least += SINGLE * np.ptp(positions, axis=0).max() if out.suffix == ".glb" else 0.0
+    tolerance = 4 * np.finfo(float).eps * np.abs(positions).max()
+    tolerance += SINGLE * np.ptp(positions, axis=0).max() if out.suffix == ".glb" else 0.0
     error = np.abs(_sorted(after) - _sorted(before)).max()
-    if error > least and not re.search(NAMED, notes):
-        outcome.breach(f"offsets: {out.suffix} is another shape", f"{error:.3g} of {least:.3g}; {notes}")
+    if error > tolerance and not re.search(NAMED, notes):
+        outcome.breach(f"offsets: {out.suffix} is another shape", f"{error:.3g} of {tolerance:.3g}; {notes}")
     if (_areas(after)[_areas(after).argsort()] <= 0).any() and intact.all() and not re.search(NAMED, notes):
         outcome.breach(f"offsets: triangles without area in {out.suffix}", notes)
 
@@ -145,14 +145,14 @@ INPUTS = {
 def _read_glb(path: Path) -> np.ndarray:
     """Return the triangles of a GLB whose nodes have translations only."""
     tree, accessor, _ = scenes.opened(path.read_bytes())
-    found = []
+    triangles = []
     for node in tree["nodes"]:
         for primitive in tree["meshes"][node["mesh"]]["primitives"]:
             points = accessor(primitive["attributes"]["POSITION"]).astype(float) + node.get(
                 "translation", [0, 0, 0]
             )
-            found.append(points[scenes.corners_of(tree, accessor, primitive)])
-    return np.concatenate(found).reshape(-1, 3, 3)
+            triangles.append(points[scenes.corners_of(tree, accessor, primitive)])
+    return np.concatenate(triangles).reshape(-1, 3, 3)
 
 
 def _read_ply(path: Path) -> np.ndarray:

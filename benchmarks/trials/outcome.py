@@ -65,7 +65,7 @@ class Outcome:
             self.breach("message: internal error", message)
 
     @contextmanager
-    def guarded(self, what: str = "", expects_nan: bool = False) -> Iterator[None]:
+    def guarded(self, label: str = "", expects_nan: bool = False) -> Iterator[None]:
         """Run code that may raise an error of the package; any other error is a breach, and so is a warning."""
         from coneflat.errors import ConeflatError
 
@@ -76,11 +76,11 @@ class Outcome:
             except ConeflatError as error:
                 self.refuse(str(error), expects_nan)
             except Exception as error:
-                self.breach(f"{what}{where(error)}", f"{type(error).__name__}: {error}")
-        for each in caught:
-            if issubclass(each.category, RuntimeWarning) and str(PACKAGE) in each.filename:
-                place = f"{Path(each.filename).relative_to(PACKAGE)}:{each.lineno}"
-                self.breach(f"warning: {each.message} at {place}")
+                self.breach(f"{label}{where(error)}", f"{type(error).__name__}: {error}")
+        for warning in caught:
+            if issubclass(warning.category, RuntimeWarning) and str(PACKAGE) in warning.filename:
+                place = f"{Path(warning.filename).relative_to(PACKAGE)}:{warning.lineno}"
+                self.breach(f"warning: {warning.message} at {place}")
 
     def as_json(self) -> str:
         return json.dumps(self.__dict__)

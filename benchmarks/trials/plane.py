@@ -38,9 +38,11 @@ def charts_of(uv_faces: np.ndarray) -> np.ndarray:
     tails, heads = uv_faces.ravel(), np.roll(uv_faces, -1, axis=1).ravel()
     key = np.minimum(tails, heads) * (uv_faces.max() + 1) + np.maximum(tails, heads)
     order = np.argsort(key, kind="stable")
-    same = np.flatnonzero(key[order][1:] == key[order][:-1])
-    one, two = order[same] // 3, order[same + 1] // 3
-    return connected_components(coo_matrix((np.ones(len(one)), (one, two)), shape=(count, count)), False)[1]
+    is_repeated = np.flatnonzero(key[order][1:] == key[order][:-1])
+    first, second = order[is_repeated] // 3, order[is_repeated + 1] // 3
+    return connected_components(
+        coo_matrix((np.ones(len(first)), (first, second)), shape=(count, count)), False
+    )[1]
 
 
 def flipped(corners: np.ndarray, chart: np.ndarray) -> np.ndarray:

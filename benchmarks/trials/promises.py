@@ -56,7 +56,7 @@ class Trial:
         self, outcome: Outcome, result: Any, options: dict[str, Any], vertices: Any, faces: Any
     ) -> None:
         self.outcome, self.result, self.options = outcome, result, options
-        self.given = np.asarray(vertices, dtype=np.float64), np.asarray(faces)
+        self.mesh = np.asarray(vertices, dtype=np.float64), np.asarray(faces)
         self.corners = result.uv[result.uv_faces]
         self.topology = Topology.of(result.faces, len(result.vertices))
         self.method = options.get("method", "exact")
@@ -114,7 +114,7 @@ def _sound(outcome: Outcome, result: Any) -> bool:
 
 def _check_origin(trial: Trial) -> None:
     """Check that vertices and faces are those of the input."""
-    result, (vertices, faces) = trial.result, trial.given
+    result, (vertices, faces) = trial.result, trial.mesh
     if not np.array_equal(result.vertices, vertices[result.vertex_origin], equal_nan=True):
         trial.outcome.breach("origin: vertices are not the input's", "")
     named = np.sort(result.vertex_origin[result.faces], axis=1)
@@ -133,8 +133,8 @@ def _check_place(trial: Trial) -> None:
     """Check that points are in the unit square, or in the tiles."""
     uv, tiles = trial.result.uv, int(trial.options.get("tiles", 1))
     low, high = uv.min(axis=0), uv.max(axis=0)
-    most = np.array([min(tiles, 10), (tiles + 9) // 10])
-    if (low < 0).any() or (high > most).any():
+    limits = np.array([min(tiles, 10), (tiles + 9) // 10])
+    if (low < 0).any() or (high > limits).any():
         trial.outcome.breach("place: outside the texture", f"{low} to {high}")
 
 
@@ -163,17 +163,17 @@ def _check_overlap(trial: Trial) -> None:
     """Check that nothing overlaps in an atlas, and that the report measures overlaps correctly."""
     from coneflat.geometry.overlap import find_overlaps
 
-    found = find_overlaps(trial.corners)
+    overlap = find_overlaps(trial.corners)
     told = trial.result.distortion
-    if len(found.pairs) != told.overlapping_pairs:
+    if len(overlap.pairs) != told.overlapping_pairs:
         trial.outcome.breach(
-            "overlap: report differs", f"{told.overlapping_pairs} reported, {len(found.pairs)} measured"
+            "overlap: report differs", f"{told.overlapping_pairs} reported, {len(overlap.pairs)} measured"
         )
     if len(trial.corners) <= ALL_PAIRS:
         depth = plane.overlap_depths(trial.corners)
         extent = float(np.ptp(trial.result.uv, axis=0).max())
         is_found = np.zeros(depth.shape, dtype=bool)
-        is_found[tuple(found.pairs.T)] = True
+        is_found[tuple(overlap.pairs.T)] = True
         # The normals of shorter sides are not known well enough, nor is the orientation of what has hardly an area.
         short = trial.sides.min(axis=1) < plane.SHORT * extent
         short |= np.abs(plane.double_areas(trial.corners)) < plane.NO_AREA * extent**2
@@ -182,8 +182,8 @@ def _check_overlap(trial: Trial) -> None:
             trial.outcome.breach("overlap: missed by find_overlaps", "")
         if (is_found & (depth < -plane.DEEP * extent)).any():
             trial.outcome.breach("overlap: invented by find_overlaps", "")
-    if len(found.pairs) and trial.options.get("charts") == "atlas":
-        trial.broken("overlap", f"overlap in an atlas, {_method(trial)}", f"{len(found.pairs)} pairs")
+    if len(overlap.pairs) and trial.options.get("charts") == "atlas":
+        trial.broken("overlap", f"overlap in an atlas, {_method(trial)}", f"{len(overlap.pairs)} pairs")
 
 
 def _check_angles(trial: Trial) -> None:
@@ -216,10 +216,10 @@ def _check_sides(trial: Trial) -> None:
     """Check that the two sides of every seam have equal lengths."""
     if trial.method != "exact":
         return
-    one, two = trial.sides.ravel()[trial.topology.sides].T
+    first, second = trial.sides.ravel()[trial.topology.sides].T
     is_opened = any("without area" in note for note in trial.result.notes)
-    off = np.abs(one - two) / np.maximum(np.maximum(one, two), EPS)
-    off -= 8 * EPS / np.maximum(np.minimum(one, two), EPS)
+    off = np.abs(first - second) / np.maximum(np.maximum(first, second), EPS)
+    off -= 8 * EPS / np.maximum(np.minimum(first, second), EPS)
     cause = f"sides of seams differ, {_method(trial)}{', marked' if trial.is_marked else ''}"
     bad = off > (LOOSE_SIDES if is_opened else SIDES)
     is_named = bad & (off <= _named_differences(trial, bad))
@@ -238,15 +238,15 @@ def _named_differences(trial: Trial, bad: np.ndarray) -> np.ndarray:
     result, topology = trial.result, trial.topology
     named = np.zeros(len(topology.inner))
     for note in result.notes:
-        if found := NO_ROOM.match(note):
-            near = np.isin(result.vertex_origin, [int(name) for name in re.findall(r"\d+", found[1])])
+        if match := NO_ROOM.match(note):
+            is_named = np.isin(result.vertex_origin, [int(name) for name in re.findall(r"\d+", match[1])])
             for _ in range(NO_ROOM_RINGS):
-                near[result.faces[near[result.faces].any(axis=1)]] = True
-            named[near[topology.edges[topology.inner]].any(axis=1)] = LOOSE_SIDES
-        elif (found := NOT_KEPT.match(note)) and trial.is_marked:
+                is_named[result.faces[is_named[result.faces].any(axis=1)]] = True
+            named[is_named[topology.edges[topology.inner]].any(axis=1)] = LOOSE_SIDES
+        elif (match := NOT_KEPT.match(note)) and trial.is_marked:
             seams = np.flatnonzero(bad & topology.is_seam(result.uv_faces))
-            if len(seams) <= int(found[1].replace(",", "")):
-                named[seams] = np.maximum(named[seams], min(BOTH_SIDES * float(found[2]), LOOSE_SIDES))
+            if len(seams) <= int(match[1].replace(",", "")):
+                named[seams] = np.maximum(named[seams], min(BOTH_SIDES * float(match[2]), LOOSE_SIDES))
     return named
 
 
@@ -269,10 +269,10 @@ def _check_boundary_lengths(trial: Trial) -> None:
     border = np.isin(
         trial.topology.edge_of_halfedges(trial.result.faces), np.flatnonzero(trial.topology.count == 1)
     )
-    wanted = space[border] * np.ldexp(trial.result.uv_scale, exponent)
+    targets = space[border] * np.ldexp(trial.result.uv_scale, exponent)
     coarse = EPS * np.abs(at).max() / np.maximum(space[border], np.finfo(float).tiny)
-    off = np.abs(flat[border] - wanted) / np.maximum(wanted, np.finfo(float).tiny)
-    off -= 1e-7 + 8 * coarse + 8 * EPS / np.maximum(wanted, EPS)
+    off = np.abs(flat[border] - targets) / np.maximum(targets, np.finfo(float).tiny)
+    off -= 1e-7 + 8 * coarse + 8 * EPS / np.maximum(targets, EPS)
     if off.max() > 0:
         trial.broken(
             "lengths", "boundary lengths not kept", f"{(off > 0).sum()} edges, by up to {off.max():.3g}"
@@ -317,16 +317,16 @@ def _check_boundary_turns(trial: Trial) -> None:
             off = np.abs(curvature[sides]) - slack[sides]
             promise, cause = "angles", "straight sides not held"
         else:
-            wanted = curvature[loop].sum() * share[loop] / share[loop].sum()
-            off = np.abs(curvature[loop] - wanted) - slack[loop] - ROUND * np.abs(wanted)
+            targets = curvature[loop].sum() * share[loop] / share[loop].sum()
+            off = np.abs(curvature[loop] - targets) - slack[loop] - ROUND * np.abs(targets)
             promise, cause = "round", "round boundary not held"
         if off.max(initial=-1) > 0:
             trial.broken(
                 promise, cause, f"by {off.max():.3g} rad at {(off > 0).sum()} of {len(loop)} vertices"
             )
     if isinstance(named, dict) and any(k is not None for k in named.values()):
-        wanted = np.array([named[v] for v in result.vertex_origin[corner_at]], dtype=np.float64)
-        off = np.abs(curvature[corner_at] - wanted) - slack[corner_at] - 1e-6
+        targets = np.array([named[v] for v in result.vertex_origin[corner_at]], dtype=np.float64)
+        off = np.abs(curvature[corner_at] - targets) - slack[corner_at] - 1e-6
         if off.max(initial=-1) > 0:
             trial.broken("angles", "corners not held", f"by {off.max():.3g} rad")
 
@@ -336,22 +336,22 @@ def _check_rotations(trial: Trial) -> None:
     quantum = trial.options.get("quantise")
     if quantum is None:
         return
-    here, there = trial.topology.sides.T
+    half, twins = trial.topology.sides.T
     points = trial.corners[..., 0] + 1j * trial.corners[..., 1]
     steps = (np.roll(points, -1, axis=1) - points).ravel()
-    lengths = np.minimum(np.abs(steps[here]), np.abs(steps[there]))
+    lengths = np.minimum(np.abs(steps[half]), np.abs(steps[twins]))
     with np.errstate(divide="ignore", invalid="ignore"):
-        turn = np.angle(-steps[there] / steps[here])
+        turn = np.angle(-steps[twins] / steps[half])
     slack = ANGLE + 16 * EPS / np.maximum(lengths, EPS)
-    known = lengths > 1e-12
-    off = plane.difference_from_multiple(turn[known], quantum)
+    is_long = lengths > 1e-12
+    off = plane.difference_from_multiple(turn[is_long], quantum)
     worst = float(off.max(initial=0.0))
     told = None if trial.result.rotations is None else trial.result.rotations.worst
-    rounding = 2 * slack[known].max(initial=0.0)
+    rounding = 2 * slack[is_long].max(initial=0.0)
     # Across a marked seam nothing says how the sides are turned, and whether it counts is a matter of taste.
     if told is None or told > worst + rounding or (told < worst - rounding and not trial.is_marked):
         trial.outcome.breach("rotations: report differs", f"{told} reported, {worst:.3g} rad measured")
-    if (off > slack[known]).any() and trial.method == "exact" and _must_turn_by_quanta(trial):
+    if (off > slack[is_long]).any() and trial.method == "exact" and _must_turn_by_quanta(trial):
         trial.broken("rotations", "rotations are no multiples", f"off by {worst:.3g} rad")
 
 
@@ -362,9 +362,9 @@ def _must_turn_by_quanta(trial: Trial) -> bool:
     topology, faces = trial.topology, trial.result.faces
     loops = [int(topology.component[loop[0]]) for loop in topology.border_loops()]
     return all(
-        topology.euler(faces, one) == 2 - loops.count(one)
-        and loops.count(one) <= (0 if trial.boundary == "straight" else 1)
-        for one in np.unique(topology.component[topology.is_used]).tolist()
+        topology.euler(faces, component) == 2 - loops.count(component)
+        and loops.count(component) <= (0 if trial.boundary == "straight" else 1)
+        for component in np.unique(topology.component[topology.is_used]).tolist()
     )
 
 
@@ -375,18 +375,21 @@ def _check_cones(trial: Trial) -> None:
     names = result.vertex_origin[cones].tolist()
     if len(set(cones.tolist())) != len(cones):
         trial.outcome.breach("cones: one twice", cones)
-    for one in np.unique(topology.component[topology.is_used]).tolist():
-        own = topology.component == one
-        if trial.method == "exact" and not trial.is_marked and not (own & topology.is_border).any():
-            wanted, found = TURN * topology.euler(result.faces, one), curvatures[own[cones]].sum()
-            if abs(found - wanted) > ANGLE * max(1, len(cones)):
-                trial.breach("cones: sum of curvatures", f"{found:.6g} instead of {wanted:.6g}")
+    for component in np.unique(topology.component[topology.is_used]).tolist():
+        is_inside = topology.component == component
+        if trial.method == "exact" and not trial.is_marked and not (is_inside & topology.is_border).any():
+            expected, total = (
+                TURN * topology.euler(result.faces, component),
+                curvatures[is_inside[cones]].sum(),
+            )
+            if abs(total - expected) > ANGLE * max(1, len(cones)):
+                trial.breach("cones: sum of curvatures", f"{total:.6g} instead of {expected:.6g}")
     if not isinstance(options.get("cones", "auto"), str):
-        wanted = options["cones"]
-        if set(names) != {int(v) for v in wanted}:
-            trial.breach("cones: not those given", f"{names} instead of {list(wanted)}")
-        elif isinstance(wanted, dict):
-            off = max((abs(wanted[v] - k) for v, k in zip(names, curvatures, strict=True)), default=0)
+        expected = options["cones"]
+        if set(names) != {int(v) for v in expected}:
+            trial.breach("cones: not those given", f"{names} instead of {list(expected)}")
+        elif isinstance(expected, dict):
+            off = max((abs(expected[v] - k) for v, k in zip(names, curvatures, strict=True)), default=0)
             if off > ANGLE:
                 trial.breach("cones: not the curvatures given", f"off by {off:.3g}")
         return
@@ -398,9 +401,9 @@ def _check_cones(trial: Trial) -> None:
     is_one = len(np.unique(topology.component[topology.is_used])) == 1 and not trial.is_marked
     if count is not None and is_one and len(cones) != count and trial.boundary != "straight":
         inside = int((topology.is_used & ~topology.is_border).sum())
-        why = ", few inner vertices" if inside < count else ""
-        why = why if trial.boundary in ("free", "lengths") else ", prescribed boundary"
-        trial.broken("cone count", f"cones: not so many{why}", f"{len(cones)} instead of {count}")
+        reason = ", few inner vertices" if inside < count else ""
+        reason = reason if trial.boundary in ("free", "lengths") else ", prescribed boundary"
+        trial.broken("cone count", f"cones: not so many{reason}", f"{len(cones)} instead of {count}")
     if options.get("positive_only") and (curvatures < -ANGLE).any():
         trial.breach("cones: negative", curvatures.min())
     quantum = options.get("quantise")

@@ -67,8 +67,8 @@ def hemisphere(rng: Random) -> Mesh:
     vertices, faces = shapes.sphere(2, rng.uniform(0, 0.5), int(rng.integers(99)))
     if rng.random() < 0.4:
         vertices[:, 2] *= rng.uniform(-1, 3)
-    kept = vertices[faces][:, :, 2].mean(axis=1) > rng.uniform(-0.8, 0.5)
-    return vertices, faces[kept]
+    is_above = vertices[faces][:, :, 2].mean(axis=1) > rng.uniform(-0.8, 0.5)
+    return vertices, faces[is_above]
 
 
 def ring(rng: Random) -> Mesh:
@@ -138,10 +138,10 @@ def needle(rng: Random) -> Mesh:
     circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(around)], 1)
     up = np.linspace(0, end, rings)
     vertices = np.concatenate([circle * (1 - u) ** power + [0, 0, height * u] for u in up])
-    one = np.arange(around * (rings - 1))
-    two = one - one % around + (one + 1) % around
+    first = np.arange(around * (rings - 1))
+    second = first - first % around + (first + 1) % around
     faces = np.concatenate(
-        [np.stack([one, two, two + around], 1), np.stack([one, two + around, one + around], 1)]
+        [np.stack([first, second, second + around], 1), np.stack([first, second + around, first + around], 1)]
     )
     return vertices, faces
 
@@ -213,19 +213,19 @@ def patch(rng: Random) -> Mesh:
     if not files:
         return ball(rng)
     vertices, faces, at = _model(files[int(rng.integers(len(files)))])
-    wanted, queue = int(rng.integers(51, 702)), [int(rng.integers(len(vertices)))]
+    count, queue = int(rng.integers(51, 702)), [int(rng.integers(len(vertices)))]
     seen, taken = set(queue), dict[int, None]()
     for vertex in queue:
-        if len(taken) >= wanted:
+        if len(taken) >= count:
             break
         taken |= dict.fromkeys(at[vertex])
-        for other in np.unique(faces[at[vertex]]).tolist():
-            if other not in seen:
-                seen.add(other)
-                queue.append(other)
-    kept = faces[list(taken)[:wanted]]
-    used, numbered = np.unique(kept, return_inverse=True)
-    return vertices[used], numbered.reshape(-1, 3)
+        for face in np.unique(faces[at[vertex]]).tolist():
+            if face not in seen:
+                seen.add(face)
+                queue.append(face)
+    chosen = faces[list(taken)[:count]]
+    vertex_numbers, numbered = np.unique(chosen, return_inverse=True)
+    return vertices[vertex_numbers], numbered.reshape(-1, 3)
 
 
 MAKERS: tuple[tuple[Callable[[Random], Mesh], float], ...] = (

@@ -34,8 +34,8 @@ class Topology:
     def is_seam(self, uv_faces: np.ndarray) -> np.ndarray:
         """Return (k,) whether the sides of each inner edge have different points, (m, 3) those of the corners."""
         tails, heads = uv_faces.ravel(), np.roll(uv_faces, -1, axis=1).ravel()
-        here, there = self.sides.T
-        return (tails[here] != heads[there]) | (heads[here] != tails[there])
+        first, second = self.sides.T
+        return (tails[first] != heads[second]) | (heads[first] != tails[second])
 
     def edge_of_halfedges(self, faces: np.ndarray) -> np.ndarray:
         """Return (3m,) the edge of each half-edge of the faces."""
@@ -62,8 +62,12 @@ class Topology:
 
     def euler(self, faces: np.ndarray, component: int) -> int:
         """Return V - E + F of a component."""
-        own = self.component == component
-        return int((own & self.is_used).sum() - own[self.edges[:, 0]].sum() + own[faces[:, 0]].sum())
+        is_inside = self.component == component
+        return int(
+            (is_inside & self.is_used).sum()
+            - is_inside[self.edges[:, 0]].sum()
+            + is_inside[faces[:, 0]].sum()
+        )
 
     def border_loops(self) -> list[np.ndarray]:
         """Return the vertices of each loop of the boundary, in no order."""
@@ -71,4 +75,4 @@ class Topology:
         size = len(self.is_border)
         graph = coo_matrix((np.ones(len(border)), border.T), shape=(size, size))
         label = connected_components(graph, False)[1]
-        return [np.flatnonzero((label == one) & self.is_border) for one in np.unique(label[self.is_border])]
+        return [np.flatnonzero((label == loop) & self.is_border) for loop in np.unique(label[self.is_border])]

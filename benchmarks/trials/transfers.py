@@ -81,7 +81,7 @@ def transfer_case(rng: Random, outcome: Outcome) -> None:
     for (picture, _), name in zip(images, files, strict=True):
         picture.save(name)
     path = {"glb": _write_glb, "obj": _write_obj, "ply": _write_ply}[kind](rng, row, files)
-    outcome.recipe = f"transfer .{kind} of {[one[0].mode for one in images]} to {side} texels: {row}"
+    outcome.recipe = f"transfer .{kind} of {[image[0].mode for image in images]} to {side} texels: {row}"
     if rng.random() < 0.3:
         _try_damaged(rng, outcome, path)
         return
@@ -142,27 +142,27 @@ def _image(rng: Random) -> tuple[Any, np.ndarray]:
         return picture, eight
     if mode == "LA":
         return Image.merge("LA", [Image.fromarray(eight[..., i]) for i in (0, 3)]), eight
-    whole = Image.fromarray(eight)
-    return (whole if mode == "RGBA" else whole.convert("RGB").convert(mode)), eight
+    image = Image.fromarray(eight)
+    return (image if mode == "RGBA" else image.convert("RGB").convert(mode)), eight
 
 
 def _row(rng: Random, kind: str, images: int) -> Row:
     """Return a row of squares that a format can store."""
     materials = []
     for _ in range(int(rng.integers(1, 4))):
-        one = Material(None if rng.random() < 0.25 else int(rng.integers(images)))
+        material = Material(None if rng.random() < 0.25 else int(rng.integers(images)))
         if kind != "ply" and rng.random() < 0.5:
-            one.colour = tuple(np.round(rng.random(4), 3).tolist())
+            material.colour = tuple(np.round(rng.random(4), 3).tolist())
         if kind == "glb":
-            one.wraps = tuple(rng.choice([REPEAT, MIRRORED, CLAMP], 2).tolist())
-            one.is_nearest = bool(rng.random() < 0.3)
+            material.wraps = tuple(rng.choice([REPEAT, MIRRORED, CLAMP], 2).tolist())
+            material.is_nearest = bool(rng.random() < 0.3)
         if kind == "obj" and rng.random() < 0.3:
-            one.wraps = (CLAMP, CLAMP)
+            material.wraps = (CLAMP, CLAMP)
         if kind != "ply" and rng.random() < 0.4:
-            one.offset = tuple(np.round(rng.uniform(-2, 2, 2), 3).tolist())
-            one.scale = tuple(np.round(rng.uniform(-3, 3, 2), 3).tolist())
-            one.rotation = float(rng.uniform(-4, 4)) if kind == "glb" else 0.0
-        materials.append(one)
+            material.offset = tuple(np.round(rng.uniform(-2, 2, 2), 3).tolist())
+            material.scale = tuple(np.round(rng.uniform(-3, 3, 2), 3).tolist())
+            material.rotation = float(rng.uniform(-4, 4)) if kind == "glb" else 0.0
+        materials.append(material)
     count = int(rng.integers(1, 5))
     reach = 4 if rng.random() < 0.5 else 12
     boxes = [
@@ -185,19 +185,23 @@ def _corners(square: int) -> list[tuple[int, int]]:
 def _write_glb(rng: Random, row: Row, files: list[str]) -> Path:
     make = SceneMaker()
     primitives, textures, materials = [], [], []
-    for one in row.materials:
-        surface: dict[str, Any] = {"baseColorFactor": list(one.colour)}
-        if one.image is not None:
-            transform = {"offset": list(one.offset), "rotation": one.rotation, "scale": list(one.scale)}
+    for painted in row.materials:
+        surface: dict[str, Any] = {"baseColorFactor": list(painted.colour)}
+        if painted.image is not None:
+            transform = {
+                "offset": list(painted.offset),
+                "rotation": painted.rotation,
+                "scale": list(painted.scale),
+            }
             surface["baseColorTexture"] = {
                 "index": len(textures),
                 "extensions": {"KHR_texture_transform": transform},
             }
-            textures.append({"source": one.image, "sampler": len(textures)})
+            textures.append({"source": painted.image, "sampler": len(textures)})
         item: dict[str, Any] = {"pbrMetallicRoughness": surface}
         if rng.random() < 0.3:
             named = {"diffuseFactor": surface["baseColorFactor"]}
-            if one.image is not None:
+            if painted.image is not None:
                 named["diffuseTexture"] = surface["baseColorTexture"]
             item = {"extensions": {"KHR_materials_pbrSpecularGlossiness": named}}
         materials.append(item)
@@ -209,18 +213,18 @@ def _write_glb(rng: Random, row: Row, files: list[str]) -> Path:
             attributes["COLOR_0"] = make.accessor(np.tile(row.tints[square], (4, 1)))
         indices = make.accessor([0, 1, 2, 0, 2, 3], 5125)
         primitives.append({"attributes": attributes, "indices": indices, "material": material})
-    used = [one for one in row.materials if one.image is not None]
+    textured = [painted for painted in row.materials if painted.image is not None]
     make.tree |= {
         "images": [
             {"bufferView": make.view(Path(name).read_bytes()), "mimeType": "image/png"} for name in files
         ],
         "samplers": [
             {
-                "wrapS": one.wraps[0],
-                "wrapT": one.wraps[1],
-                "magFilter": NEAREST if one.is_nearest else LINEAR,
+                "wrapS": painted.wraps[0],
+                "wrapT": painted.wraps[1],
+                "magFilter": NEAREST if painted.is_nearest else LINEAR,
             }
-            for one in used
+            for painted in textured
         ],
         "textures": textures,
         "materials": materials,
@@ -235,17 +239,20 @@ def _write_glb(rng: Random, row: Row, files: list[str]) -> Path:
 
 def _write_obj(rng: Random, row: Row, files: list[str]) -> Path:
     lines, library = ["mtllib the library.mtl"], []
-    for number, one in enumerate(row.materials):
+    for number, painted in enumerate(row.materials):
         # The diffuse colour is in sRGB.
-        library += [f"newmtl material {number}", "Kd " + " ".join(str(_to_srgb(c)) for c in one.colour[:3])]
-        library += [f"d {one.colour[3]}"]
-        if one.image is not None:
+        library += [
+            f"newmtl material {number}",
+            "Kd " + " ".join(str(_to_srgb(c)) for c in painted.colour[:3]),
+        ]
+        library += [f"d {painted.colour[3]}"]
+        if painted.image is not None:
             # v points upwards.
-            up = 1 - one.scale[1] - one.offset[1]
-            options = [f"-o {one.offset[0]} {up!r}", f"-s {one.scale[0]} {one.scale[1]} 1"]
-            options += ["-clamp on"] if one.wraps[0] == CLAMP else []
+            up = 1 - painted.scale[1] - painted.offset[1]
+            options = [f"-o {painted.offset[0]} {up!r}", f"-s {painted.scale[0]} {painted.scale[1]} 1"]
+            options += ["-clamp on"] if painted.wraps[0] == CLAMP else []
             rng.shuffle(options)
-            library += [f"map_Kd {' '.join(options)} {files[one.image]}"]
+            library += [f"map_Kd {' '.join(options)} {files[painted.image]}"]
     for square, material in enumerate(row.squares):
         tint = " " + " ".join(str(_to_srgb(c)) for c in row.tints[square][:3]) if row.tints else ""
         lines += [f"v {x} {y} 0{tint}" for x, y in _corners(square)]
@@ -294,10 +301,12 @@ def _check_colours(outcome: Outcome, row: Row, images: list[np.ndarray], path: P
     count = len(row.squares)
     lines = [f"v {x} {y} 0\nvt {x / count} {y}" for x, y in ((0, 0), (count, 0), (count, 1), (0, 1))]
     Path("new.obj").write_text("\n".join([*lines, "f 1/1 2/2 3/3 4/4", ""]))
-    used = [row.materials[number] for number in set(row.squares)]
+    materials = [row.materials[number] for number in set(row.squares)]
     # A colour that is the same everywhere is not worth a texture, and vertex colours of an image are not shown.
     has_colours = (
-        any(one.image is not None for one in used) or len({one.colour for one in used}) > 1 or bool(row.tints)
+        any(material.image is not None for material in materials)
+        or len({material.colour for material in materials}) > 1
+        or bool(row.tints)
     )
     baked = None
     with outcome.guarded():
@@ -330,16 +339,19 @@ def _expected(
     row: Row, images: list[np.ndarray], ending: str, square: int, x: float, y: float
 ) -> list[np.ndarray]:
     """Return the RGBA of 0 to 255 that a place may have: one, or at the border of pixels several."""
-    one = row.materials[row.squares[square]]
+    material = row.materials[row.squares[square]]
     u, v = row.uv(square, x, y)
     colours = []
-    for du, dv in ((0, 0), *((NUDGE * i, NUDGE * j) for i in (-1, 1) for j in (-1, 1) if one.is_nearest)):
-        linear = np.array(one.colour)
-        if one.image is not None:
-            cos, sin = math.cos(one.rotation), math.sin(one.rotation)
-            p, q = u * one.scale[0], v * one.scale[1]
-            at = (p * cos + q * sin + one.offset[0] + du, q * cos - p * sin + one.offset[1] + dv)
-            linear = linear * _sample(images[one.image], *at, one)
+    for du, dv in (
+        (0, 0),
+        *((NUDGE * i, NUDGE * j) for i in (-1, 1) for j in (-1, 1) if material.is_nearest),
+    ):
+        linear = np.array(material.colour)
+        if material.image is not None:
+            cos, sin = math.cos(material.rotation), math.sin(material.rotation)
+            p, q = u * material.scale[0], v * material.scale[1]
+            at = (p * cos + q * sin + material.offset[0] + du, q * cos - p * sin + material.offset[1] + dv)
+            linear = linear * _sample(images[material.image], *at, material)
         if row.tints:
             tint = np.array(row.tints[square])
             tint = tint if ending != ".obj" else np.append(tint[:3], 1.0)
@@ -347,28 +359,32 @@ def _expected(
                 tint = np.append([_to_linear(round(255 * _to_srgb(c)) / 255) for c in tint[:3]], tint[3])
             if ending == ".glb":
                 linear = linear * tint
-            elif one.image is None:
+            elif material.image is None:
                 linear = tint
         colours.append(np.array([*(255 * _to_srgb(c) for c in linear[:3]), 255 * linear[3]]))
     return colours
 
 
-def _sample(pixels: np.ndarray, u: float, v: float, one: Material) -> np.ndarray:
+def _sample(pixels: np.ndarray, u: float, v: float, material: Material) -> np.ndarray:
     """Return the linear RGBA of an image at a point, v downwards: the mean of four pixels by their distances."""
     height, width = pixels.shape[:2]
     x, y = u * width, v * height
-    if one.is_nearest:
-        return _pixel(pixels, math.floor(x), math.floor(y), one)
+    if material.is_nearest:
+        return _pixel(pixels, math.floor(x), math.floor(y), material)
     left, top = math.floor(x - 0.5), math.floor(y - 0.5)
     s, t = x - 0.5 - left, y - 0.5 - top
-    upper = (1 - s) * _pixel(pixels, left, top, one) + s * _pixel(pixels, left + 1, top, one)
-    lower = (1 - s) * _pixel(pixels, left, top + 1, one) + s * _pixel(pixels, left + 1, top + 1, one)
+    upper = (1 - s) * _pixel(pixels, left, top, material) + s * _pixel(pixels, left + 1, top, material)
+    lower = (1 - s) * _pixel(pixels, left, top + 1, material) + s * _pixel(
+        pixels, left + 1, top + 1, material
+    )
     return (1 - t) * upper + t * lower
 
 
-def _pixel(pixels: np.ndarray, column: int, line: int, one: Material) -> np.ndarray:
+def _pixel(pixels: np.ndarray, column: int, line: int, material: Material) -> np.ndarray:
     height, width = pixels.shape[:2]
-    shade = pixels[_wrapped(line, height, one.wraps[1]), _wrapped(column, width, one.wraps[0])] / 255
+    shade = (
+        pixels[_wrapped(line, height, material.wraps[1]), _wrapped(column, width, material.wraps[0])] / 255
+    )
     return np.array([*map(_to_linear, shade[:3]), shade[3]])
 
 

@@ -143,8 +143,8 @@ class Worker:
     def _place(self) -> str:
         """Return the innermost function of the package in the last trace written by the process."""
         last = self.log.read_text(errors="replace").rpartition("most recent call first")[2]
-        found = re.search(r'File ".*?/coneflat/([^"]*)", line \d+ in (\w+)', last)
-        return "an unknown place" if found is None else f"{found[1]} {found[2]}"
+        match = re.search(r'File ".*?/coneflat/([^"]*)", line \d+ in (\w+)', last)
+        return "an unknown place" if match is None else f"{match[1]} {match[2]}"
 
     def close(self) -> None:
         if self.process.is_alive() and self.case is None and self.is_ready:
@@ -230,11 +230,11 @@ def _limit_memory() -> None:
     try:
         import resource
 
-        found = re.search(r"VmSize:\s+(\d+) kB", Path("/proc/self/status").read_text())
+        match = re.search(r"VmSize:\s+(\d+) kB", Path("/proc/self/status").read_text())
     except (ImportError, OSError):
         return
-    if found:
-        limit = int(found[1]) * 1024 + ADDRESSES
+    if match:
+        limit = int(match[1]) * 1024 + ADDRESSES
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 
 

@@ -64,13 +64,13 @@ def read_glb(path: Path) -> Read:
     scene, binary = json.loads(content[20 : 20 + length]), content[28 + length :]
 
     def accessor(number: int) -> np.ndarray:
-        one = scene["accessors"][number]
-        view = scene["bufferViews"][one["bufferView"]]
-        kind = {5121: "u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}[one["componentType"]]
-        width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}[one["type"]]
-        start = view.get("byteOffset", 0) + one.get("byteOffset", 0)
+        accessor = scene["accessors"][number]
+        view = scene["bufferViews"][accessor["bufferView"]]
+        kind = {5121: "u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}[accessor["componentType"]]
+        width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}[accessor["type"]]
+        start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
         stride = view.get("byteStride", np.dtype(kind).itemsize * width)
-        rows = np.ndarray((one["count"], width), kind, binary, start, (stride, np.dtype(kind).itemsize))
+        rows = np.ndarray((accessor["count"], width), kind, binary, start, (stride, np.dtype(kind).itemsize))
         return rows if width > 1 else rows[:, 0]
 
     space, flat = [], []
@@ -196,14 +196,14 @@ def _compare(
     if not np.isfinite(flat).all():
         outcome.breach(f"{name}: not finite", "")
         return
-    wanted = result.vertices[result.faces]
-    extent = np.abs(wanted).max()
+    expected = result.vertices[result.faces]
+    extent = np.abs(expected).max()
     fine = 1e-6 if ending in (".glb", ".obj") else 1e-12
     # At a size of one: squares of 32-bit numbers are soon none.
     exponent = int(np.frexp(extent)[1])
     sides = [
         np.sort(plane.side_lengths(np.ldexp(corners.astype(np.float64), -exponent)).ravel())
-        for corners in (space, wanted)
+        for corners in (space, expected)
     ]
     extent = float(np.ldexp(extent, -exponent))
     is_polygon = result.source is not None and len(result.source.offsets) - 1 < len(result.faces)

@@ -67,10 +67,9 @@ _HOMES = {
 #: Modules by name: first those in `__all__`, then the packages for experts, whose functions can be called directly
 #: and may change.
 _MODULES = {"errors": "errors"}
-_PACKAGES = {"peers": "apps.peers"} | {name: name for name in (
-    "atlas", "cones", "geometry", "io", "layout", "linalg",
-    "mesh", "metric", "optimise", "options", "seams", "stages",
-)}  # fmt: skip
+_PACKAGES = (
+    "atlas", "cones", "geometry", "io", "layout", "linalg", "mesh", "metric", "optimise", "options", "seams", "stages",
+)  # fmt: skip
 
 __all__ = [
     "ConeCurve",
@@ -121,7 +120,6 @@ if TYPE_CHECKING:
         seams,
         stages,
     )
-    from .apps import peers  # noqa: F401
     from .apps.studio.notebook import studio
     from .apps.uv_measures import measure_uv
     from .apps.view import make_figure, save_figure
@@ -149,7 +147,7 @@ def __getattr__(name: str) -> Any:
     if name in _MODULES:
         return import_module("." + _MODULES[name], __name__)
     if name in _PACKAGES:
-        return import_module("." + _PACKAGES[name], __name__)
+        return import_module("." + name, __name__)
     if name in _HOMES:
         return getattr(import_module("." + _HOMES[name], __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

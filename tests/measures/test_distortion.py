@@ -59,14 +59,14 @@ def test_seams_are_where_uvs_differ():
     assert d.seam_mismatch == d.seam_mismatch_max == pytest.approx(0.5 / 0.75)
 
 
-@pytest.mark.parametrize("other", [VERTICES, VERTICES @ [[2, 0, 1], [0, 0.5, 0], [0, 0, 1]]])
-def test_a_metric_given_by_its_lengths(other):
+@pytest.mark.parametrize("points", [VERTICES, VERTICES @ [[2, 0, 1], [0, 0.5, 0], [0, 0, 1]]])
+def test_a_metric_given_by_its_lengths(points):
     """It is measured as the surface that has these lengths, wherever the vertices are."""
     uv = FLAT.copy()
     right = VERTICES[FACES].mean(axis=1)[:, 0] > 0.5
     uv[right] = uv[right] * 0.5 + [3, 0]
-    lengths = edge_lengths(other, FACES)
-    found, expected = measure(MESH, uv, lengths=lengths), measure(TriangleMesh(other, FACES), uv)
+    lengths = edge_lengths(points, FACES)
+    measured, expected = measure(MESH, uv, lengths=lengths), measure(TriangleMesh(points, FACES), uv)
     for name in (
         "qc",
         "log_area_scale",
@@ -77,6 +77,6 @@ def test_a_metric_given_by_its_lengths(other):
         "flipped",
         "charts",
     ):
-        assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=1e-12, abs=1e-12)
+        assert getattr(measured, name) == pytest.approx(getattr(expected, name), rel=1e-12, abs=1e-12)
     with pytest.raises(errors.LengthError, match="not positive: 2"):
         measure(MESH, uv, lengths=np.where(np.arange(len(FACES))[:, None] == 2, -1, lengths))

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapes
+from comparisons import flatten_by
 
 from coneflat import flatten
-from coneflat.apps.peers import flatten_by
 from coneflat.atlas.pack import turns_of_quantum
 from coneflat.errors import ArrayShapeError, FaceIndexError
 from coneflat.geometry import edge_lengths
@@ -23,8 +23,8 @@ def seam_turns(result):
     mesh = TriangleMesh(result.vertices, result.faces)
     places = result.corner_uv @ np.array([1, 1j])
     sides = (places[:, [2, 0, 1]] - places[:, [1, 2, 0]]).ravel()
-    one, two = mesh.edge_halfedges[~mesh.is_boundary_edge].T
-    return np.angle(-sides[two] / sides[one])
+    first, second = mesh.edge_halfedges[~mesh.is_boundary_edge].T
+    return np.angle(-sides[second] / sides[first])
 
 
 def error_text(angles, quantum):
@@ -172,9 +172,9 @@ def test_a_round_boundary_that_is_none_is_told():
 
 def test_needles_are_named():
     vertices, faces = shapes.sphere(2)
-    one, two, _ = faces[0]
+    start, end, _ = faces[0]
     vertices = vertices.copy()
-    vertices[one] = vertices[two] + 1e-10 * (vertices[one] - vertices[two])
+    vertices[start] = vertices[end] + 1e-10 * (vertices[start] - vertices[end])
     result = flatten(vertices, faces, relax="off")
     assert result.distortion.qc_max > 1000
     assert any(note.startswith("2 triangles with a QC distortion above 1000: 0, 4") for note in result.notes)

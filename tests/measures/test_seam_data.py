@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 import shapes
+from comparisons import flatten_by
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
@@ -34,7 +35,7 @@ LOOSE = {
 def flattened(name):
     mesh, options = (RIGID | LOOSE)[name]
     if name == "least squares":
-        return coneflat.peers.flatten_by("lscm", *mesh)
+        return flatten_by("lscm", *mesh)
     return coneflat.flatten(*mesh, **options)
 
 
@@ -49,8 +50,8 @@ class TestEveryResult:
     def test_the_motion_takes_one_side_to_the_other(self, name):
         result = flattened(name)
         data = result.seam_data
-        one, other = (result.uv @ [1, 1j])[data.seam_points].transpose(1, 0, 2)
-        np.testing.assert_allclose(moved(data, one), other, atol=1e-14)
+        left, right = (result.uv @ [1, 1j])[data.seam_points].transpose(1, 0, 2)
+        np.testing.assert_allclose(moved(data, left), right, atol=1e-14)
         assert (np.abs(data.seam_rotation) <= np.pi).all()
         if name in RIGID:
             np.testing.assert_allclose(data.seam_scale, 1.0, atol=1e-12)
@@ -144,8 +145,8 @@ def test_rotations_around_a_vertex_sum_to_its_curvature(name):
     angles = np.abs(np.angle((np.roll(z, -1, 1) - z) / (np.roll(z, 1, 1) - z)))
     curvature = 2 * np.pi - np.bincount(result.faces.ravel(), angles.ravel(), len(result.vertices))
     border = TriangleMesh(result.vertices, result.faces).is_boundary_vertex
-    some = np.unique(np.concatenate([result.cones, result.seams.ravel()[:40]]))
-    for vertex in some[~border[some]]:
+    vertices = np.unique(np.concatenate([result.cones, result.seams.ravel()[:40]]))
+    for vertex in vertices[~border[vertices]]:
         assert abs(np.exp(1j * (turning(result, vertex) - curvature[vertex])) - 1) < 1e-10
     np.testing.assert_allclose(result.seam_data.cone_angles, 2 * np.pi - curvature[result.cones], atol=1e-12)
     np.testing.assert_allclose(curvature[result.cones], result.curvatures, atol=1e-10)
@@ -221,11 +222,11 @@ class TestArchives:
     def test_older_archives_do_without(self, tmp_path):
         result = flattened("quanta")
         with np.load(result.save(tmp_path / "out.npz")) as archive:
-            kept = ("seams", "cones", "log_area_scale")
+            older = ("seams", "cones", "log_area_scale")
             arrays = {
                 name: archive[name]
                 for name in archive.files
-                if name in kept or name not in result.seam_data.as_arrays()
+                if name in older or name not in result.seam_data.as_arrays()
             }
         np.savez(tmp_path / "old.npz", **arrays)
         old = coneflat.read_flattening(tmp_path / "old.npz").seam_data

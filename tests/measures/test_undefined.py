@@ -30,9 +30,9 @@ def test_measured_uvs_without_area_have_a_note(collapsed):
         vertices = vertices * [1, 0, 0]
     elif collapsed == "plane":
         uv = uv * [1, 0]
-    found = coneflat.measure_uv(vertices, faces, uv)
-    unknown = {name for name, value in found.values().items() if not np.isfinite(value)}
-    assert named(found.notes) == unknown
+    measures = coneflat.measure_uv(vertices, faces, uv)
+    unknown = {name for name, value in measures.values().items() if not np.isfinite(value)}
+    assert named(measures.notes) == unknown
     assert bool(unknown) == (collapsed != "nothing")
 
 

@@ -148,13 +148,13 @@ def measure(
     corner_uv = as_floats("corner_uv", corner_uv)
     prescribed = None if prescribed is None else as_floats("prescribed", prescribed)
     _check_arrays(mesh, corner_uv, cones, prescribed)
-    own = None if lengths is None else check_lengths(mesh, lengths, flat=True)
-    measured = measure_map(mesh, corner_uv, curvature_error, cones, own)
-    found = overlaps_of_mesh(mesh.edge_halfedges, corner_uv) if overlaps is None else overlaps
+    flat_lengths = None if lengths is None else check_lengths(mesh, lengths, flat=True)
+    measured = measure_map(mesh, corner_uv, curvature_error, cones, flat_lengths)
+    overlap = overlaps_of_mesh(mesh.edge_halfedges, corner_uv) if overlaps is None else overlaps
     if prescribed is not None:
         errors = np.abs(angle_sum_errors(mesh, corner_uv, prescribed)[0])
         measured = replace(measured, angle_sum_error=float(np.nanmax(errors, initial=0.0)))
-    return replace(measured, overlap=found.fraction, overlapping_pairs=len(found.pairs))
+    return replace(measured, overlap=overlap.fraction, overlapping_pairs=len(overlap.pairs))
 
 
 def _check_arrays(
@@ -172,12 +172,12 @@ def _check_arrays(
     if bad:
         raise OptionError(f"cones are not vertices of the mesh: {list_some(bad)}")
     count = (len(mesh.vertices),)
-    for name, found, wanted in (
+    for name, shape, expected in (
         ("corner_uv", np.shape(corner_uv), (*np.shape(mesh.faces), 2)),
         ("prescribed", count if prescribed is None else np.shape(prescribed), count),
     ):
-        if found != wanted:
-            raise ArrayShapeError(f"{name} must have the shape {wanted}, to match the mesh, got {found}")
+        if shape != expected:
+            raise ArrayShapeError(f"{name} must have the shape {expected}, to match the mesh, got {shape}")
 
 
 def angle_sum_errors(
@@ -276,21 +276,23 @@ def _seam_mismatch(
     mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return (k,) the length on the model of each seam edge, and (k,) the relative difference of its UV lengths."""
-    here, there = (_side_lengths(ends) for ends in both_sides(mesh, seams, corner_uv))
+    first, second = (_side_lengths(ends) for ends in both_sides(mesh, seams, corner_uv))
     ends = mesh.vertices[mesh.edges[seams]]
-    return _side_lengths(ends), np.abs(here - there) / np.maximum((here + there) / 2, np.finfo(float).tiny)
+    return _side_lengths(ends), np.abs(first - second) / np.maximum(
+        (first + second) / 2, np.finfo(float).tiny
+    )
 
 
 def _seam_motion_mismatch(
     mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray, cones: IntArray | None
 ) -> float:
     """Return the largest change of the rotation between the two sides of a seam along the seam, radians."""
-    here, there = both_sides(mesh, seams, corner_uv)
-    one = (here[:, 1] - here[:, 0]) @ np.array([1, 1j])
-    two = (there[:, 1] - there[:, 0]) @ np.array([1, 1j])
-    # `here` is the side of the first half-edge, which may be either side of the seam. The rotation of each edge is
+    sides, twin_sides = both_sides(mesh, seams, corner_uv)
+    first_step = (sides[:, 1] - sides[:, 0]) @ np.array([1, 1j])
+    second_step = (twin_sides[:, 1] - twin_sides[:, 0]) @ np.array([1, 1j])
+    # `sides` are those of the first half-edge, which may be either side of the seam. The rotation of each edge is
     # from its left side to its right side, in the direction of its first half-edge.
-    rotation = one * np.conj(two)
+    rotation = first_step * np.conj(second_step)
     rotation = rotation / np.maximum(np.abs(rotation), np.finfo(float).tiny)
     starts, ends = mesh.ends_of(mesh.edge_halfedges[seams, 0])
     degree = np.bincount(np.concatenate([starts, ends]), minlength=len(mesh.vertices))
@@ -354,20 +356,20 @@ def measure_triangles(
     count = len(faces)
     area, uv_area, ratio = np.empty(count), np.empty(count), np.empty(count)
     has_area, has_uv_area = np.empty(count, np.bool_), np.empty(count, np.bool_)
-    one, two, normal = np.empty(3), np.empty(3), np.empty(3)
+    first, second, normal = np.empty(3), np.empty(3), np.empty(3)
     for f in range(count):
         along, inner, across, opposite = 0.0, 0.0, 0.0, 0.0
         for x in range(3):
             start = vertices[faces[f, 0], x]
-            one[x], two[x] = vertices[faces[f, 1], x] - start, vertices[faces[f, 2], x] - start
-            along += one[x] * one[x]
-            inner += one[x] * two[x]
-            across += two[x] * two[x]
-            opposite += (two[x] - one[x]) ** 2
+            first[x], second[x] = vertices[faces[f, 1], x] - start, vertices[faces[f, 2], x] - start
+            along += first[x] * first[x]
+            inner += first[x] * second[x]
+            across += second[x] * second[x]
+            opposite += (second[x] - first[x]) ** 2
         square = 0.0
         for x in range(3):
             y, z = (x + 1) % 3, (x + 2) % 3
-            normal[x] = one[y] * two[z] - one[z] * two[y]
+            normal[x] = first[y] * second[z] - first[z] * second[y]
             square += normal[x] * normal[x]
         area[f] = math.sqrt(square)
         has_area[f] = area[f] > ZERO_AREA * max(along, across, opposite)

@@ -97,12 +97,12 @@ def remeasured(
         None if changed.lengths is None else np.ldexp(changed.lengths, exponent),
     )
     if is_stacked:
-        each = measure_map(TriangleMesh(points, changed.faces), changed.corner_uv)
-        distortion = replace(distortion, qc=each.qc, log_area_scale=each.log_area_scale)
+        local = measure_map(TriangleMesh(points, changed.faces), changed.corner_uv)
+        distortion = replace(distortion, qc=local.qc, log_area_scale=local.log_area_scale)
     distortion = distortion.rescaled(exponent * float(np.log(2)))
     changed = replace(changed, distortion=distortion, rotations=_rotations(result, changed))
-    kept = tuple(note for note in result.notes if note not in old_notes)
-    return replace(changed, notes=(*kept, *unmet_guarantees(changed, unit), *notes))
+    lasting = tuple(note for note in result.notes if note not in old_notes)
+    return replace(changed, notes=(*lasting, *unmet_guarantees(changed, unit), *notes))
 
 
 def first_faces(result: Flattening) -> BoolArray:
@@ -137,13 +137,16 @@ def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:
     before = result.rotations
     if before is None:
         return None
-    old, new = (TriangleMesh(each.vertices, each.faces) for each in (result, changed))
+    old_mesh, new_mesh = (TriangleMesh(layout.vertices, layout.faces) for layout in (result, changed))
     off, after = (
-        seam_rotations(mesh, each.corner_uv, before.quantum) for mesh, each in ((old, result), (new, changed))
+        seam_rotations(mesh, layout.corner_uv, before.quantum)
+        for mesh, layout in ((old_mesh, result), (new_mesh, changed))
     )
     # Polygons may have other diagonals, so edges are identified by their ends.
-    known, names = (mesh.edges[~mesh.is_boundary_edge] @ [len(result.vertices), 1] for mesh in (old, new))
-    bound = ~np.isin(names, known[~before.binds(off)])
+    names_before, names = (
+        mesh.edges[~mesh.is_boundary_edge] @ [len(result.vertices), 1] for mesh in (old_mesh, new_mesh)
+    )
+    bound = ~np.isin(names, names_before[~before.binds(off)])
     return replace(before, worst=float(after[bound].max(initial=0.0)))
 
 
@@ -180,12 +183,14 @@ def undefined_measures(values: Mapping[str, float], qc: FloatArray) -> tuple[Unm
 def _orientation(result: Flattening) -> Iterator[str]:
     measures = result.distortion
     kinds = ((measures.flipped, "flipped triangle"), (measures.degenerate, "degenerate triangle"))
-    parts = [plural(count, what) for count, what in kinds if count]
+    parts = [plural(count, noun) for count, noun in kinds if count]
     if parts:
         advice = "refine the mesh there" if _is_exact(result) else "method exact gives the fewest"
         verb, broken = "is" if parts[0].startswith("1 ") else "are", result.solve.broken
-        why = f" ({plural(broken, 'triangle')} broke the triangle inequality in the metric)" if broken else ""
-        yield f"There {verb} {' and '.join(parts)} in the plane{why}: {advice}."
+        reason = (
+            f" ({plural(broken, 'triangle')} broke the triangle inequality in the metric)" if broken else ""
+        )
+        yield f"There {verb} {' and '.join(parts)} in the plane{reason}: {advice}."
 
 
 def _overlaps(result: Flattening) -> Iterator[str]:
@@ -197,13 +202,13 @@ def _overlaps(result: Flattening) -> Iterator[str]:
 
 def _angle_sums(result: Flattening, unit: float) -> Iterator[str]:
     largest = result.distortion.angle_sum_error
-    most = EXACT_TOLERANCE if _is_exact(result) else WINDING_TOLERANCE
-    if not largest > most:
+    tolerance = EXACT_TOLERANCE if _is_exact(result) else WINDING_TOLERANCE
+    if not largest > tolerance:
         return
     mesh = TriangleMesh(result.vertices, result.faces)
     errors, change = angle_sum_errors(mesh, result.corner_uv, result.prescribed)
     with np.errstate(invalid="ignore"):
-        off = np.flatnonzero(np.abs(errors) > most + MAX_ROUNDINGS * unit * change)
+        off = np.flatnonzero(np.abs(errors) > tolerance + MAX_ROUNDINGS * unit * change)
     if len(off):
         worst = off[np.argmax(np.abs(errors[off]))]
         yield (
@@ -216,13 +221,15 @@ def _equal_sides(result: Flattening, unit: float) -> Iterator[str]:
     settings = result.settings
     is_marked = any(settings.get(name) is not None for name in ("seams", "sharp_angle"))
     is_tied = is_marked and settings.get("method") != "free seams"
-    most = EXACT_TOLERANCE if _is_exact(result) else ROUGH_TOLERANCE if is_tied else np.inf
-    if not result.distortion.seam_mismatch_max > most:
+    tolerance = EXACT_TOLERANCE if _is_exact(result) else ROUGH_TOLERANCE if is_tied else np.inf
+    if not result.distortion.seam_mismatch_max > tolerance:
         return
     mesh = TriangleMesh(result.vertices, result.faces)
-    one, two = np.abs(sides_between(result.corner_uv)).ravel()[mesh.edge_halfedges[~mesh.is_boundary_edge]].T
-    off, mean = np.abs(one - two), (one + two) / 2
-    beyond = off > most * mean + MAX_ROUNDINGS * unit
+    first, second = (
+        np.abs(sides_between(result.corner_uv)).ravel()[mesh.edge_halfedges[~mesh.is_boundary_edge]].T
+    )
+    off, mean = np.abs(first - second), (first + second) / 2
+    beyond = off > tolerance * mean + MAX_ROUNDINGS * unit
     if beyond.any():
         worst = (off[beyond] / mean[beyond]).max()
         yield f"The two sides of seams differ in length: relative difference up to {worst:.2g}."

@@ -84,8 +84,8 @@ def _rotation_rows(result: Flattening) -> list[Row]:
     rows = [("seam rotations", f"{rotations.worst:.1e}", f"largest deviation of a seam's rotation {quantum}")]
     if rotations.handles:
         handles = " ".join(f"{angle:+.1e}" for angle in rotations.handles[:6])
-        more = f"; and {len(rotations.handles) - 6} more" if len(rotations.handles) > 6 else ""
-        rows.append(("around handles", handles, f"the same along each generator{more}"))
+        omitted = f"; and {len(rotations.handles) - 6} more" if len(rotations.handles) > 6 else ""
+        rows.append(("around handles", handles, f"the same along each generator{omitted}"))
     return rows
 
 
@@ -99,7 +99,7 @@ def as_rows(result: Flattening) -> list[Row]:
     d = result.distortion
     curvatures = result.curvatures / np.pi
     solve = result.solve
-    used = np.count_nonzero(np.bincount(result.faces.ravel()))
+    vertex_count = np.count_nonzero(np.bincount(result.faces.ravel()))
     cones = f"{len(result.cones)}"
     if len(result.cones):
         cones += f"  ({curvatures.min():+.3f} to {curvatures.max():+.3f} pi)"
@@ -120,7 +120,7 @@ def as_rows(result: Flattening) -> list[Row]:
         name, value, meaning = of_map["QC distortion"]
         of_map["QC distortion"] = (name, value, meaning + relaxed)
     return [
-        ("triangles", f"{len(result.faces):,}", f"{used:,} vertices"),
+        ("triangles", f"{len(result.faces):,}", f"{vertex_count:,} vertices"),
         ("cones", cones, "singular vertices and their curvatures"),
         (
             "curvature error",

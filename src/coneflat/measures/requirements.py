@@ -65,33 +65,33 @@ class Requirement:
         return f"{self.name} is {value:.6g}, but {self} is required"
 
 
-def parse_requirements(texts: Iterable[str], known: Iterable[str]) -> tuple[Requirement, ...]:
+def parse_requirements(texts: Iterable[str], measures: Iterable[str]) -> tuple[Requirement, ...]:
     """Return requirements from texts such as "flipped=0,qc_mean<=1.05".
 
     Args:
         texts: each with one or more requirements, separated by commas.
-        known: names of measures.
+        measures: names of measures.
 
     Raises:
         OptionError: a text is not a requirement, or its measure is unknown.
     """
-    known = tuple(known)
-    found = []
+    measures = tuple(measures)
+    requirements = []
     for part in (part for text in texts for part in text.split(",")):
         match = _FORM.fullmatch(part)
         if match is None:
             raise OptionError(f"{part.strip()!r} is not a requirement; write flipped=0 or qc_mean<=1.05")
         name, relation = match["name"], "=" if match["relation"] == "==" else match["relation"]
-        if name not in known:
-            raise OptionError(f"unknown measure {name!r}: choose from {', '.join(sorted(known))}")
+        if name not in measures:
+            raise OptionError(f"unknown measure {name!r}: choose from {', '.join(sorted(measures))}")
         try:
             bound = float(match["bound"])
         except ValueError:
             bound = math.nan
         if math.isnan(bound):
             raise OptionError(f"{part.strip()!r}: {match['bound']!r} is not a number")
-        found.append(Requirement(name, relation, bound))
-    return tuple(found)
+        requirements.append(Requirement(name, relation, bound))
+    return tuple(requirements)
 
 
 def breaches(requirements: Iterable[Requirement], measures: Mapping[str, object]) -> tuple[str, ...]:

@@ -124,12 +124,12 @@ def _sides(mesh: TriangleMesh, seams: IntArray) -> IntArray:
     """Return (k, 2) the half-edges on the left and right of seams (k, 2); -1 where a side is missing."""
     count = len(mesh.vertices)
     # Edges are sorted by their ends.
-    keys, wanted = mesh.edges @ [count, 1], np.sort(seams, axis=1) @ [count, 1]
-    edge = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-    sides = np.where((keys[edge] == wanted)[:, None], mesh.edge_halfedges[edge], -1)
+    keys, seam_keys = mesh.edges @ [count, 1], np.sort(seams, axis=1) @ [count, 1]
+    edge = np.minimum(np.searchsorted(keys, seam_keys), len(keys) - 1)
+    sides = np.where((keys[edge] == seam_keys)[:, None], mesh.edge_halfedges[edge], -1)
     is_left = (sides >= 0) & (mesh.tails[sides] == seams[:, :1])
     is_right = (sides >= 0) & ~is_left
-    return np.stack([np.where(each, sides, -1).max(axis=1) for each in (is_left, is_right)], axis=1)
+    return np.stack([np.where(is_side, sides, -1).max(axis=1) for is_side in (is_left, is_right)], axis=1)
 
 
 def _ratios(mesh: TriangleMesh, corner_uv: FloatArray, halfedges: IntArray) -> ComplexArray:
@@ -137,11 +137,11 @@ def _ratios(mesh: TriangleMesh, corner_uv: FloatArray, halfedges: IntArray) -> C
     ratios = np.full(len(mesh.edges), np.nan, dtype=np.complex128)
     ratios[~mesh.is_boundary_edge] = ratios_across(mesh, corner_uv)
     edge = mesh.halfedge_edges[halfedges.max(axis=1)]
-    own = ratios[edge]
+    edge_ratios = ratios[edge]
     with np.errstate(divide="ignore", invalid="ignore"):
-        own = np.where(halfedges[:, 0] == mesh.edge_halfedges[edge, 0], own, 1 / own)
-    is_known = (halfedges >= 0).all(axis=1) & np.isfinite(own) & (own != 0)
-    return np.where(is_known, own, complex(np.nan, np.nan))
+        edge_ratios = np.where(halfedges[:, 0] == mesh.edge_halfedges[edge, 0], edge_ratios, 1 / edge_ratios)
+    is_known = (halfedges >= 0).all(axis=1) & np.isfinite(edge_ratios) & (edge_ratios != 0)
+    return np.where(is_known, edge_ratios, complex(np.nan, np.nan))
 
 
 def _vertex_scales(mesh: TriangleMesh, log_area_scale: FloatArray, lengths: FloatArray | None) -> FloatArray:
@@ -151,11 +151,11 @@ def _vertex_scales(mesh: TriangleMesh, log_area_scale: FloatArray, lengths: Floa
         lengths = edge_lengths(np.ldexp(mesh.vertices, -unit_exponent(mesh.vertices[mesh.faces])), mesh.faces)
     else:
         lengths = np.ldexp(lengths, -unit_exponent(lengths))
-    known = np.isfinite(log_area_scale)
-    corners, areas = mesh.faces[known].ravel(), np.repeat(double_areas(lengths[known]), 3)
-    largest = log_area_scale[known].max(initial=-np.inf)
-    flat = areas * np.exp(2 * np.repeat(log_area_scale[known] - largest, 3))
-    on_model, in_plane = (np.bincount(corners, each, len(mesh.vertices)) for each in (areas, flat))
+    is_finite = np.isfinite(log_area_scale)
+    corners, areas = mesh.faces[is_finite].ravel(), np.repeat(double_areas(lengths[is_finite]), 3)
+    largest = log_area_scale[is_finite].max(initial=-np.inf)
+    flat = areas * np.exp(2 * np.repeat(log_area_scale[is_finite] - largest, 3))
+    on_model, in_plane = (np.bincount(corners, weights, len(mesh.vertices)) for weights in (areas, flat))
     with np.errstate(divide="ignore", invalid="ignore"):
         scales: FloatArray = np.log(in_plane / on_model) / 2 + largest
     return np.where(np.isfinite(scales), scales, np.nan)

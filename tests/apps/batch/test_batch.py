@@ -130,10 +130,10 @@ def test_a_cluster_does_the_same_even_if_it_loses_a_worker(models, tmp_path, mon
     distributed = pytest.importorskip("distributed")
     for i in range(6):
         shapes.write_obj(models / f"ball{i}.obj", *shapes.sphere(2, seed=i))
-    here, there = tmp_path / "here", tmp_path / "there"
-    here.mkdir()
-    there.mkdir()
-    run_batch(find_jobs([str(models)], here, ".obj", {}, None), here)
+    local, remote = tmp_path / "here", tmp_path / "there"
+    local.mkdir()
+    remote.mkdir()
+    run_batch(find_jobs([str(models)], local, ".obj", {}, None), local)
     with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
     ) as cluster:
@@ -144,21 +144,21 @@ def test_a_cluster_does_the_same_even_if_it_loses_a_worker(models, tmp_path, mon
                 killed.append(next(iter(cluster.workers.values())).process.pid)
                 os.kill(killed[0], signal.SIGKILL)
 
-        found = run_batch(
-            find_jobs([str(models)], there, ".obj", {}, None),
-            there,
+        summary = run_batch(
+            find_jobs([str(models)], remote, ".obj", {}, None),
+            remote,
             dask=cluster.scheduler_address,
             limit=60,
             listener=listener,
         )
     assert killed
-    assert found.failed == 1
-    one, other = rows_of(here / "summary.csv"), rows_of(there / "summary.csv")
-    for name in one:
+    assert summary.failed == 1
+    local_rows, remote_rows = rows_of(local / "summary.csv"), rows_of(remote / "summary.csv")
+    for name in local_rows:
         for column in ("status", "error", "cones", "qc_mean", "seam_length", "curvature_error_max"):
-            assert one[name][column] == other[name][column]
-        if one[name]["status"] == "done":
-            assert (here / name).read_bytes() == (there / name).read_bytes()
+            assert local_rows[name][column] == remote_rows[name][column]
+        if local_rows[name]["status"] == "done":
+            assert (local / name).read_bytes() == (remote / name).read_bytes()
 
 
 @pytest.mark.slow
@@ -238,18 +238,18 @@ MESSAGE = b'{"level": 20, "message": "coneflat: compiling a kernel"}\n'
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("what", [b"", b"no JSON\n", b'{"half": ', MESSAGE])
+@pytest.mark.parametrize("printed", [b"", b"no JSON\n", b'{"half": ', MESSAGE])
 def test_a_worker_that_crashes_fails_its_mesh_alone_and_leaves_nothing_half_written(
-    models, tmp_path, monkeypatch, what
+    models, tmp_path, monkeypatch, printed
 ):
     """The process for ball.obj begins to write, says something, and kills itself."""
     monkeypatch.setattr(
-        "coneflat.apps.batch.process.COMMAND", [sys.executable, "-c", CRASHING, what.decode()]
+        "coneflat.apps.batch.process.COMMAND", [sys.executable, "-c", CRASHING, printed.decode()]
     )
     jobs = find_jobs([str(models / "ball.obj"), str(models / "hill.obj")], tmp_path, ".obj", {}, None)
-    found = run_batch(jobs, tmp_path, processes=1)
-    assert [row["status"] for row in found.rows] == ["failed", "done"]
-    assert "SIGKILL" in found.rows[0]["error"]
+    summary = run_batch(jobs, tmp_path, processes=1)
+    assert [row["status"] for row in summary.rows] == ["failed", "done"]
+    assert "SIGKILL" in summary.rows[0]["error"]
     assert not list(tmp_path.glob(".*.tmp"))
     assert not (tmp_path / "ball.obj").exists()
 

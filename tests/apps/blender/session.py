@@ -43,8 +43,8 @@ def settings():
     return bpy.context.scene.coneflat
 
 
-def add(kind, name, **more):
-    getattr(bpy.ops.mesh, f"primitive_{kind}_add")(**more)
+def add(kind, name, **properties):
+    getattr(bpy.ops.mesh, f"primitive_{kind}_add")(**properties)
     bpy.context.object.name = name
     return bpy.context.object
 
@@ -55,7 +55,7 @@ def select(*items):
     bpy.context.view_layer.objects.active = items[0] if items else None
 
 
-def run(command, **more):
+def run(command, **properties):
     """Run an operator, and return what it reports, one line each."""
     out = StringIO()
     descriptor = os.dup(1)
@@ -63,7 +63,7 @@ def run(command, **more):
     with path.open("w") as file:
         os.dup2(file.fileno(), 1)
         try:
-            getattr(bpy.ops.coneflat, command)("EXEC_DEFAULT", True, **more)
+            getattr(bpy.ops.coneflat, command)("EXEC_DEFAULT", True, **properties)
         except RuntimeError as error:
             out.write(str(error))
         finally:
@@ -93,11 +93,14 @@ def torn_edges(mesh):
     seen = {}
     for polygon in mesh.polygons:
         loops = list(polygon.loop_indices)
-        for one, two in zip(loops, loops[1:] + loops[:1], strict=True):
-            ends = {mesh.loops[one].vertex_index: uv[one], mesh.loops[two].vertex_index: uv[two]}
-            edge = mesh.loops[one].edge_index
-            other = seen.setdefault(edge, ends)
-            torn[edge] |= any((other[v] != ends[v]).any() for v in ends)
+        for loop, next_loop in zip(loops, loops[1:] + loops[:1], strict=True):
+            ends = {
+                mesh.loops[loop].vertex_index: uv[loop],
+                mesh.loops[next_loop].vertex_index: uv[next_loop],
+            }
+            edge = mesh.loops[loop].edge_index
+            first_ends = seen.setdefault(edge, ends)
+            torn[edge] |= any((first_ends[v] != ends[v]).any() for v in ends)
     return torn
 
 
@@ -476,17 +479,22 @@ class Layout:
 def panels():
     """The panels draw every option once, in the sidebars of both editors; the preferences have their rows."""
     add("cube", "cube")
-    known = module("settings").COMMANDS
+    expected_commands = module("settings").COMMANDS
     for panel in importlib.import_module(NAME).PANELS:
         drawn = []
         panel.draw(SimpleNamespace(layout=Layout(drawn)), bpy.context)
         assert len(set(drawn)) == len(drawn)
         command = panel.__name__.rpartition("_")[2]
-        expected = {f"coneflat.{command}", *(record["name"] for record in known.get(command, ()))}
+        expected = {f"coneflat.{command}", *(record["name"] for record in expected_commands.get(command, ()))}
         assert command == "coneflat" or expected <= set(drawn) <= expected | {"modifiers"}
     drawn = []
-    known = {"found": None, "reason": "", "layout": Layout(drawn), "bl_rna": preferences().bl_rna}
-    module("settings").Preferences.draw(type("Shown", (), known)(), bpy.context)
+    expected_commands = {
+        "environment": None,
+        "reason": "",
+        "layout": Layout(drawn),
+        "bl_rna": preferences().bl_rna,
+    }
+    module("settings").Preferences.draw(type("Shown", (), expected_commands)(), bpy.context)
     assert drawn == ["python", "wheels", "requirement", "coneflat.check", "coneflat.install"]
     properties = settings().unwrap.bl_rna.properties
     assert {"seams", "charts", "area", "stack", "threads"} <= set(properties.keys())
@@ -523,8 +531,8 @@ def escape():
     assert operator.invoke(context, event) == {"RUNNING_MODAL"}
     assert operator.modal(context, SimpleNamespace(type="A")) == {"RUNNING_MODAL"}
     assert operator.modal(context, SimpleNamespace(type="WHEELUPMOUSE")) == {"PASS_THROUGH"}
-    other = Unwrap()
-    assert other.invoke(context, event) == {"CANCELLED"}
+    second = Unwrap()
+    assert second.invoke(context, event) == {"CANCELLED"}
     while operator.progress[1] == 0:
         assert operator.modal(context, event) == {"PASS_THROUGH"}
         time.sleep(0.05)
@@ -546,10 +554,10 @@ def escape():
     assert lines[-1].startswith("Unwrap crashed or was ended by SIGKILL"), lines
     # And it ends well.
     settings().select = "SEAMS"
-    whole = Unwrap()
+    complete = Unwrap()
     context.tool_settings = bpy.context.tool_settings
-    assert whole.invoke(context, event) == {"RUNNING_MODAL"}
-    while (result := whole.modal(context, event)) == {"PASS_THROUGH"}:
+    assert complete.invoke(context, event) == {"RUNNING_MODAL"}
+    while (result := complete.modal(context, event)) == {"PASS_THROUGH"}:
         time.sleep(0.05)
     assert result == {"FINISHED"}, lines
     assert (torn_edges(ball.data) == flags(ball.data)).all()

@@ -84,11 +84,11 @@ def test_the_extension_imports_only_what_blender_has(archive):
             if not name.endswith(".py"):
                 continue
             for node in ast.walk(ast.parse(opened.read(name))):
-                found = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+                modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
                 if isinstance(node, ast.ImportFrom) and node.level == 0:
-                    found = [node.module]
+                    modules = [node.module]
                 assert node.level < 2 if isinstance(node, ast.ImportFrom) else True
-                roots = {each.split(".")[0] for each in found}
+                roots = {module.split(".")[0] for module in modules}
                 assert roots <= {"bpy", "numpy", *sys.stdlib_module_names}, name
 
 
@@ -96,22 +96,22 @@ def test_the_extension_imports_only_what_blender_has(archive):
 def test_every_option_of_a_command_is_shown_or_hidden_for_a_reason(name, extension):
     records = extension.environment.KNOWN["commands"][name]
     shown = [record["name"] for record in records]
-    hidden = {each.removeprefix(f"{name} ") for names in HIDDEN.values() for each in names}
-    params = {each.name for each in cli.commands[name].params}
+    hidden = {option.removeprefix(f"{name} ") for names in HIDDEN.values() for option in names}
+    params = {option.name for option in cli.commands[name].params}
     assert len(set(shown)) == len(shown)
     assert params - hidden == set(shown)
 
 
 def test_no_option_is_hidden_that_no_command_has():
-    known = {name for command in COMMANDS for each in cli.commands[command].params for name in
-        (each.name, f"{command} {each.name}")}  # fmt: skip
-    assert {name for names in HIDDEN.values() for name in names} - known == {"strict"}  # a word of repair
+    options = {name for command in COMMANDS for option in cli.commands[command].params for name in
+        (option.name, f"{command} {option.name}")}  # fmt: skip
+    assert {name for names in HIDDEN.values() for name in names} - options == {"strict"}  # a word of repair
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_the_groups_are_those_of_the_command(name, extension):
     records = extension.environment.KNOWN["commands"][name]
-    groups = {each.name: getattr(each, "group", "") for each in cli.commands[name].params}
+    groups = {option.name: getattr(option, "group", "") for option in cli.commands[name].params}
     assert all(groups[record["name"]].startswith(record["group"]) for record in records)
     order = [title for title, _ in itertools.groupby(record["group"] for record in records)]
     assert len(set(order)) == len(order)
@@ -120,14 +120,14 @@ def test_the_groups_are_those_of_the_command(name, extension):
 @pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_every_option_becomes_a_flag(name, extension):
     records = extension.environment.KNOWN["commands"][name]
-    flags = {flag for each in cli.commands[name].params for flag in each.opts}
+    flags = {flag for option in cli.commands[name].params for flag in option.opts}
     defaults = {record["name"]: record["default"] for record in records}
     assert extension.exchange.arguments(records, defaults) == []
     for record in records:
         kind = record["kind"]
-        other = record["default"] + 1 if kind in ("number", "integer", "angle") else "group"
-        found = extension.exchange.arguments(records, {**defaults, record["name"]: other})
-        assert [argument.split("=")[0] in flags for argument in found] == [True] * (kind != "vertices")
+        changed = record["default"] + 1 if kind in ("number", "integer", "angle") else "group"
+        arguments = extension.exchange.arguments(records, {**defaults, record["name"]: changed})
+        assert [argument.split("=")[0] in flags for argument in arguments] == [True] * (kind != "vertices")
 
 
 @pytest.mark.parametrize(
@@ -135,9 +135,11 @@ def test_every_option_becomes_a_flag(name, extension):
     [("", None), ("curvature", "curvature"), ("0.25", "0.25"), ("1e-3", "1e-3"), ("coarse.001", "size")],
 )
 def test_a_size_is_a_number_a_word_or_a_vertex_group(value, argument, extension):
-    (record,) = (each for each in extension.environment.KNOWN["commands"]["quads"] if each["name"] == "size")
-    found = extension.exchange.arguments([record], {"size": value})
-    assert found == ([] if argument is None else [f"--size={argument}"])
+    (record,) = (
+        option for option in extension.environment.KNOWN["commands"]["quads"] if option["name"] == "size"
+    )
+    arguments = extension.exchange.arguments([record], {"size": value})
+    assert arguments == ([] if argument is None else [f"--size={argument}"])
     assert extension.exchange.names_group(record, value) == (argument == "size")
 
 
@@ -145,8 +147,8 @@ def test_numbers_of_single_precision_are_written_as_they_were_typed(extension):
     records = extension.environment.KNOWN["commands"]["flatten"]
     values = {record["name"]: record["default"] for record in records}
     values |= {"distortion": float(np.float32(0.1)), "quantise": float(np.float32(np.pi / 2)), "up": "-x"}
-    found = extension.exchange.arguments(records, values)
-    assert set(found) == {"--distortion=0.1", "--quantise=90deg", "--up=-x"}
+    arguments = extension.exchange.arguments(records, values)
+    assert set(arguments) == {"--distortion=0.1", "--quantise=90deg", "--up=-x"}
     values["distortion"] = float(np.float32(0.2))
     assert "--distortion" not in " ".join(extension.exchange.arguments(records, values))
 
@@ -156,7 +158,7 @@ def test_maps_of_two_meshes_in_one_atlas(extension, tmp_path):
     """A mesh of quads with a marked loop and one of triangles: seams are where UVs differ, and densities agree."""
     exchange = extension.exchange
     around, across = 24, 12
-    i, j = (each.ravel() for each in np.mgrid[:around, :across])
+    i, j = (numbers.ravel() for numbers in np.mgrid[:around, :across])
     u, v = 2 * np.pi * i / around, 2 * np.pi * j / across
     ring = np.stack([(2 + np.cos(v)) * np.cos(u), (2 + np.cos(v)) * np.sin(u), np.sin(v)], axis=1)
     steps = ((0, 0), (1, 0), (1, 1), (0, 1))
@@ -179,18 +181,18 @@ def test_maps_of_two_meshes_in_one_atlas(extension, tmp_path):
     maps, report = exchange.read_maps(tmp_path, parts)
     assert report["flipped"] == 0
     densities = []
-    for part, found in zip(parts, maps, strict=True):
-        assert np.isfinite(found.uv).all()
-        assert found.torn == 0
+    for part, layout in zip(parts, maps, strict=True):
+        assert np.isfinite(layout.uv).all()
+        assert layout.torn == 0
         size = part.sizes[0]
-        corners, uv = part.corners.reshape(-1, size), found.uv.reshape(-1, size, 2)
+        corners, uv = part.corners.reshape(-1, size), layout.uv.reshape(-1, size, 2)
         seen, torn = {}, set()
         for polygon, at in zip(corners, uv, strict=True):
             for k in range(size):
                 ends = {int(polygon[k - 1]): tuple(at[k - 1]), int(polygon[k]): tuple(at[k])}
                 if seen.setdefault(frozenset(ends), ends) != ends:
                     torn.add(frozenset(ends))
-        assert torn == {frozenset(pair) for pair in found.seams.tolist()}
+        assert torn == {frozenset(pair) for pair in layout.seams.tolist()}
         d = uv[:, 2:] - uv[:, :1], uv[:, 1:-1] - uv[:, :1]
         flat = (d[1][..., 0] * d[0][..., 1] - d[1][..., 1] * d[0][..., 0]).sum(axis=1) / 2
         assert (flat > 0).all()
@@ -211,10 +213,10 @@ def test_a_mesh_that_is_repaired_keeps_its_corners(extension, tmp_path):
     part = exchange.Part("torus", points, faces.ravel(), np.full(len(faces), 3))
     arguments = exchange.write_parts(tmp_path, [part])
     assert command("flatten", *arguments, cwd=tmp_path).returncode == 0
-    (found,), _ = exchange.read_maps(tmp_path, [part])
-    uv = found.uv.reshape(-1, 3, 2)
-    one, two = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
-    flat = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+    (layout,), _ = exchange.read_maps(tmp_path, [part])
+    uv = layout.uv.reshape(-1, 3, 2)
+    first, second = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    flat = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
     assert (flat[[0, -1]] != 0).all()
     assert not np.isnan(flat).any()
     assert flat[5] < 0
@@ -277,10 +279,10 @@ def test_a_program_that_does_not_exist(extension):
         extension.job.Job("Work", ["missing"])
 
 
-def fake(folder, version, what="coneflat,"):
+def fake(folder, version, words="coneflat,"):
     """Return a program that prints a version, of coneflat by default."""
     program = folder / "python"
-    program.write_text(f"#!/bin/sh\necho {what} version {version}\n")
+    program.write_text(f"#!/bin/sh\necho {words} version {version}\n")
     program.chmod(0o755)
     return str(program)
 
@@ -289,21 +291,21 @@ def fake(folder, version, what="coneflat,"):
 def test_the_environment_is_found(extension, tmp_path, monkeypatch):
     environment, failure = extension.environment, extension.job.Failure
     monkeypatch.setenv("PYTHONPATH", str(Path(coneflat.__file__).parents[1]))
-    own = tmp_path / "own"
-    found = environment.find(sys.executable, own)
-    assert found.command == (sys.executable, "-m", "coneflat")
-    assert found.version == coneflat.__version__
+    folder = tmp_path / "own"
+    current = environment.find(sys.executable, folder)
+    assert current.command == (sys.executable, "-m", "coneflat")
+    assert current.version == coneflat.__version__
     with pytest.raises(failure, match="older than the extension"):
-        environment.find(fake(tmp_path, "0.1.0"), own)
+        environment.find(fake(tmp_path, "0.1.0"), folder)
     with pytest.raises(failure, match="does not run coneflat: other coneflat, licence version 3"):
-        environment.find(fake(tmp_path, "3", "other coneflat, licence"), own)
+        environment.find(fake(tmp_path, "3", "other coneflat, licence"), folder)
     fake(tmp_path, "99.0")
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert environment.find("", own).command == (str(tmp_path / "python"), "-m", "coneflat")
-    (own / "bin").mkdir(parents=True)
-    fake(own / "bin", "99.1")
-    assert environment.find("", own).version == "99.1"
-    assert environment.find(str(own), tmp_path).version == "99.1"
+    assert environment.find("", folder).command == (str(tmp_path / "python"), "-m", "coneflat")
+    (folder / "bin").mkdir(parents=True)
+    fake(folder / "bin", "99.1")
+    assert environment.find("", folder).version == "99.1"
+    assert environment.find(str(folder), tmp_path).version == "99.1"
     monkeypatch.setenv("PATH", "")
     with pytest.raises(failure, match="coneflat is not installed: .* name a Python that has coneflat"):
         environment.find("", tmp_path)

@@ -39,28 +39,28 @@ def write_gifti(path, *arrays, labels=None):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A folder with a ball as a left hemisphere, and labels of a cap, its "medial wall", and of another."""
-    here = tmp_path_factory.mktemp("brain")
+    brain = tmp_path_factory.mktemp("brain")
     vertices, faces = sphere(4)
     vertices = (60 * vertices).astype(np.float32)
-    nibabel.freesurfer.write_geometry(here / "lh.pial", vertices, faces)
-    write_gifti(here / "lh.pial.gii", (vertices, "POINTSET"), (faces, "TRIANGLE"))
+    nibabel.freesurfer.write_geometry(brain / "lh.pial", vertices, faces)
+    write_gifti(brain / "lh.pial.gii", (vertices, "POINTSET"), (faces, "TRIANGLE"))
     depth = vertices[:, 2].astype(np.float32)
     wall, patch = depth > 45, vertices[:, 0] > 40
     numbers = np.where(wall, 1, 2 * patch).astype(np.int32)
-    nibabel.freesurfer.write_morph_data(here / "lh.sulc", depth)
-    nibabel.save(nibabel.freesurfer.MGHImage(depth[:, None, None], np.eye(4)), here / "lh.depth.mgz")
-    write_gifti(here / "lh.sulc.gii", (depth, "SHAPE"))
-    write_gifti(here / "lh.parts.gii", (numbers, "LABEL"), labels={0: "rest", 1: "wall", 2: "patch"})
+    nibabel.freesurfer.write_morph_data(brain / "lh.sulc", depth)
+    nibabel.save(nibabel.freesurfer.MGHImage(depth[:, None, None], np.eye(4)), brain / "lh.depth.mgz")
+    write_gifti(brain / "lh.sulc.gii", (depth, "SHAPE"))
+    write_gifti(brain / "lh.parts.gii", (numbers, "LABEL"), labels={0: "rest", 1: "wall", 2: "patch"})
     table = np.array([[9, 9, 9, 0], [200, 0, 0, 0], [0, 200, 0, 0]])
     nibabel.freesurfer.write_annot(
-        here / "lh.aparc.annot", numbers, table, ["rest", "wall", "patch"], fill_ctab=True
+        brain / "lh.aparc.annot", numbers, table, ["rest", "wall", "patch"], fill_ctab=True
     )
     rows = [f"{v} 0 0 0 0" for v in np.flatnonzero(wall)]
-    (here / "lh.wall.label").write_text("\n".join(["#!ascii label", str(len(rows)), *rows]) + "\n")
+    (brain / "lh.wall.label").write_text("\n".join(["#!ascii label", str(len(rows)), *rows]) + "\n")
     rows = [f"{v} 0 0 0 0" for v in np.flatnonzero(vertices @ [0.6, 0.64, 0.48] < -45)]
     for name in ("lh.cap.label", "cap.label"):
-        (here / name).write_text("\n".join(["#!ascii label", str(len(rows)), *rows]) + "\n")
-    return here
+        (brain / name).write_text("\n".join(["#!ascii label", str(len(rows)), *rows]) + "\n")
+    return brain
 
 
 @pytest.fixture(scope="module")
@@ -141,11 +141,11 @@ def test_old_surfaces_of_quads_are_read_as_nibabel_reads_them(tmp_path, magic, k
 @pytest.mark.parametrize("up", [None, (0, 1, 0), (1, 0, 0.5)])
 def test_a_direction_of_the_surface_points_up_in_the_map(folder, flat, up):
     """Superior by default; by a fit of the map, without weights, it points up to some degrees."""
-    found = (
+    flat_map = (
         flat if up is None else flatten_cortex(folder / "lh.pial", remove=[f"{folder}/lh.cap.label"], up=up)
     )
-    used = np.unique(found.faces)
-    placed, points = found.surface.vertices[used], found.points[used]
+    laid_out = np.unique(flat_map.faces)
+    placed, points = flat_map.surface.vertices[laid_out], flat_map.points[laid_out]
     affine = np.linalg.lstsq(placed - placed.mean(axis=0), points - points.mean(axis=0), rcond=None)[0]
     x, y = np.array((0, 0, 1) if up is None else up) @ affine
     assert abs(np.degrees(np.arctan2(x, y))) < 10
@@ -166,8 +166,8 @@ def test_the_anatomical_structure_is_kept(folder, tmp_path):
         if meta:
             image.darrays[0].meta["AnatomicalStructurePrimary"] = meta
         nibabel.save(image, tmp_path / name)
-        found = flatten_cortex(tmp_path / name, remove=[f"{folder}/cap.label"], stretch=0, distortion=9.0)
-        written = nibabel.load(found.save(tmp_path / "flat.gii")).darrays[0].meta
+        flat = flatten_cortex(tmp_path / name, remove=[f"{folder}/cap.label"], stretch=0, distortion=9.0)
+        written = nibabel.load(flat.save(tmp_path / "flat.gii")).darrays[0].meta
         assert written.get("AnatomicalStructurePrimary") == expected, (name, meta)
     image = nibabel.load(folder / "lh.parts.gii")
     image.meta["AnatomicalStructurePrimary"] = "CortexLeft"
@@ -250,28 +250,28 @@ def test_a_patch_has_the_layout_of_freesurfer(flat, tmp_path):
 @pytest.mark.parametrize("ending", [".gii", ".3d"])
 def test_what_is_read_back_measures_the_same(folder, flat, tmp_path, ending):
     path = flat.save(tmp_path / f"lh.flat{ending}")
-    here, there = measure_flat(flat.uv_mesh(path)), measure_flat(read_flat(path, folder / "lh.pial"))
-    assert here.report() | {"input": ""} == there.report() | {"input": ""}
-    assert (here.inverted, here.uv.distortion.overlap) == (0, 0)
+    written, read_back = measure_flat(flat.uv_mesh(path)), measure_flat(read_flat(path, folder / "lh.pial"))
+    assert written.report() | {"input": ""} == read_back.report() | {"input": ""}
+    assert (written.inverted, written.uv.distortion.overlap) == (0, 0)
 
 
 def test_no_cut_crosses_a_label_that_is_kept(folder):
-    found = flatten_cortex(
+    flat = flatten_cortex(
         folder / "lh.pial",
         remove=[f"{folder}/lh.wall.label"],
         keep=[f"{folder}/lh.aparc.annot:patch"],
         distortion=0.05,
     )
     patch = read_label(f"{folder}/lh.aparc.annot:patch")
-    kept = np.zeros(len(found.surface.vertices), dtype=bool)
-    kept[patch] = True
-    origin = found.result.vertex_origin
-    assert len(found.result.seams) > 0
-    assert not kept[origin[found.result.seams]].all(axis=1).any()
+    is_uncut = np.zeros(len(flat.surface.vertices), dtype=bool)
+    is_uncut[patch] = True
+    origin = flat.result.vertex_origin
+    assert len(flat.result.seams) > 0
+    assert not is_uncut[origin[flat.result.seams]].all(axis=1).any()
     # Cones may be on the border of the label, where seams end.
-    faces = found.surface.triangles
-    border = np.unique(faces[~kept[faces].all(axis=1)])
-    assert not kept[np.setdiff1d(origin[found.result.cones], border)].any()
+    faces = flat.surface.triangles
+    border = np.unique(faces[~is_uncut[faces].all(axis=1)])
+    assert not is_uncut[np.setdiff1d(origin[flat.result.cones], border)].any()
 
 
 def test_separate_pieces_are_left_out(folder, tmp_path):
@@ -281,8 +281,8 @@ def test_separate_pieces_are_left_out(folder, tmp_path):
     values = np.zeros(faces.max() + 1, np.float32)
     values[wall] = 1
     nibabel.freesurfer.write_morph_data(tmp_path / "lh.curv", values)
-    found = flatten_cortex(folder / "lh.pial", remove=[f"{tmp_path}/lh.curv"])
-    assert found.result.distortion.charts == 1
+    flat = flatten_cortex(folder / "lh.pial", remove=[f"{tmp_path}/lh.curv"])
+    assert flat.result.distortion.charts == 1
 
 
 def test_metric_distortion_of_a_flat_sheet_is_small_and_has_no_scale():

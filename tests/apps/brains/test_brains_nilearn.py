@@ -61,9 +61,9 @@ def test_maps_lie_as_freesurfers_do(tmp_path, side):
     nibabel.freesurfer.write_morph_data(tmp_path / "wall.curv", missing)
     ours = flatten_cortex(tmp_path / "surface.pial.gii", remove=[f"{tmp_path}/wall.curv"])
 
-    def angles(points, used):
-        placed = np.column_stack([surface.vertices[used], np.ones(len(used))])
-        affine = np.linalg.lstsq(placed, points[used, :2], rcond=None)[0]
+    def angles(points, vertices):
+        placed = np.column_stack([surface.vertices[vertices], np.ones(len(vertices))])
+        affine = np.linalg.lstsq(placed, points[vertices, :2], rcond=None)[0]
         return np.degrees(np.arctan2(affine[1:3, 1], affine[1:3, 0]))
 
     off = angles(ours.points, np.unique(ours.faces)) - angles(theirs.vertices, np.unique(theirs.triangles))

@@ -16,7 +16,7 @@ from coneflat.apps.cli.main import cli
 from coneflat.io.join import join_borders
 from coneflat.io.read import read_joined
 
-TAKE_MESHES = ("flatten", "batch", "cones", "compare", "view", "figure", "measure")
+TAKE_MESHES = ("flatten", "batch", "cones", "view", "figure", "measure")
 
 
 def mesh_file(vertices, faces):
@@ -134,7 +134,6 @@ class TestRepair:
             ("view", ["-o", "out.html"]),
             ("figure", ["-o", "out.png", "--dpi", "50"]),
             ("figure", ["--kind", "curve", "-o", "out.png", "--dpi", "50", "--most", "6"]),
-            ("compare", ["--methods", "exact", "--no-peers"]),
         ],
     )
     def test_commands_repair_with_a_note_and_refuse_if_strict(self, tmp_path, monkeypatch, command, more):

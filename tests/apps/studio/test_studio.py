@@ -23,7 +23,7 @@ CONES = (3, 60, 200, 410, 500)
 
 def some_choices():
     chosen = Choices().placed(CONES).with_angle(60, math.radians(270)).locked(200, True)
-    return chosen.with_option("stretch", 0.25).cut((1, 2, 9)).with_kept((7, 8))
+    return chosen.with_option("stretch", 0.25).cut((1, 2, 9)).with_uncut((7, 8))
 
 
 class TestChoices:
@@ -46,14 +46,14 @@ class TestChoices:
         assert chosen.locked(9, False).cones == ()
 
     def test_edges_of_paths_are_pairs(self):
-        words = Choices().cut((4, 2, 9)).cut((2, 4)).with_kept((7, 8)).keywords()
+        words = Choices().cut((4, 2, 9)).cut((2, 4)).with_uncut((7, 8)).keywords()
         assert words["seams"].tolist() == [[2, 4], [2, 9]]
         assert words["no_seams"].tolist() == [[7, 8]]
 
     def test_a_path_is_erased_by_any_of_its_edges(self):
-        chosen = Choices().cut((4, 2, 9)).with_kept((7, 8))
+        chosen = Choices().cut((4, 2, 9)).with_uncut((7, 8))
         assert chosen.erased(9, 2).cuts == ()
-        assert chosen.erased(8, 7).kept == ()
+        assert chosen.erased(8, 7).uncut == ()
         with pytest.raises(StudioError, match="no path contains the edge 4-9"):
             chosen.erased(4, 9)
 
@@ -116,10 +116,10 @@ class TestProject:
         project = Project(tmp_path / "ball.obj", file_hash(tmp_path / "ball.obj"), some_choices())
         project.save(tmp_path / "sub" / "p.json")
         assert json.loads((tmp_path / "sub" / "p.json").read_text())["mesh"]["path"] == "../ball.obj"
-        found = read_project(tmp_path / "sub" / "p.json")
-        assert found == replace(project, mesh=found.mesh)
-        assert found.mesh.resolve() == project.mesh.resolve()
-        found.check_mesh()
+        read_back = read_project(tmp_path / "sub" / "p.json")
+        assert read_back == replace(project, mesh=read_back.mesh)
+        assert read_back.mesh.resolve() == project.mesh.resolve()
+        read_back.check_mesh()
 
     def test_another_mesh_is_noticed(self, tmp_path, mesh):
         project = Project(tmp_path / "ball.obj", file_hash(tmp_path / "ball.obj"), Choices())
@@ -168,9 +168,11 @@ class TestReplay:
         assert CliRunner().invoke(cli, [*words, "-o", "a.npz"]).exit_code == 0
         names: dict = {}
         exec(python_lines("ball.obj", chosen), names)
-        one, two = coneflat.read_flattening(tmp_path / "a.npz"), names["result"]
-        np.testing.assert_array_equal(one.uv, two.uv)
-        assert dict(zip(one.cones.tolist(), one.curvatures, strict=True))[60] == pytest.approx(math.pi / 2)
+        by_command, by_python = coneflat.read_flattening(tmp_path / "a.npz"), names["result"]
+        np.testing.assert_array_equal(by_command.uv, by_python.uv)
+        assert dict(zip(by_command.cones.tolist(), by_command.curvatures, strict=True))[60] == pytest.approx(
+            math.pi / 2
+        )
 
     def test_drawn_paths_are_in_the_project(self):
         assert command_line("b.obj", "b p.json", Choices().cut((1, 2))) == (
@@ -181,8 +183,13 @@ class TestReplay:
     def test_a_project_has_its_own_options(self, tmp_path, mesh):
         path = tmp_path / "p.json"
         Project(tmp_path / "ball.obj", file_hash(tmp_path / "ball.obj"), Choices()).save(path)
-        given = {"--stretch 1": "--stretch", "x.obj": "MESH", "--paper": "--paper", "--strict": "--repair"}
-        for more, what in given.items():
-            done = CliRunner().invoke(cli, ["flatten", "--project", str(path), *more.split()])
+        conflicts = {
+            "--stretch 1": "--stretch",
+            "x.obj": "MESH",
+            "--paper": "--paper",
+            "--strict": "--repair",
+        }
+        for words, conflict in conflicts.items():
+            done = CliRunner().invoke(cli, ["flatten", "--project", str(path), *words.split()])
             assert done.exit_code == 2
-            assert f"leave out {what}" in done.output
+            assert f"leave out {conflict}" in done.output

@@ -35,10 +35,10 @@ def with_a_fin():
 def two_balls_that_touch():
     vertices, faces = shapes.sphere(1)
     top = int(vertices[:, 2].argmax())
-    others = np.arange(len(vertices)) + len(vertices)
-    others[top] = top
+    copies = np.arange(len(vertices)) + len(vertices)
+    copies[top] = top
     low = vertices * [1, 1, -1] + [0, 0, 2 * vertices[top, 2]]
-    return np.concatenate([vertices, low]), np.concatenate([faces, others[faces][:, ::-1]])
+    return np.concatenate([vertices, low]), np.concatenate([faces, copies[faces][:, ::-1]])
 
 
 def moebius(count=24):
@@ -47,9 +47,9 @@ def moebius(count=24):
     radius = 1 + side * np.cos(angle / 2)
     places = np.stack([radius * np.cos(angle), radius * np.sin(angle), side * np.sin(angle / 2)], axis=-1)
     low, high = np.arange(count), np.arange(count) + count
-    one, two = np.roll(low, -1), np.roll(high, -1)
-    one[-1], two[-1] = high[0], low[0]
-    faces = np.concatenate([np.stack([low, one, high], 1), np.stack([one, two, high], 1)])
+    next_low, next_high = np.roll(low, -1), np.roll(high, -1)
+    next_low[-1], next_high[-1] = high[0], low[0]
+    faces = np.concatenate([np.stack([low, next_low, high], 1), np.stack([next_low, next_high, high], 1)])
     return places.reshape(-1, 3), faces
 
 
@@ -126,5 +126,5 @@ def test_a_sphere_without_cones_is_drawn_when_it_is_opened_again(open_mesh, tmp_
 def test_a_repaired_layout_is_that_of_the_library(open_mesh):
     vertices, faces = with_a_fin()
     session, _ = open_mesh(vertices, faces)
-    whole = coneflat.flatten(vertices, faces, repair=True)
-    assert session.picture()[0]["triangles"] == len(whole.faces)
+    result = coneflat.flatten(vertices, faces, repair=True)
+    assert session.picture()[0]["triangles"] == len(result.faces)

@@ -31,14 +31,14 @@ need_browser()
 def test_a_whole_story(visit, studio, tmp_path, browser):
     page = visit.page
     visit.settle()
-    first, title, found = visit.choices(), page.inner_text("#title"), visit.cones()
+    first, title, cones = visit.choices(), page.inner_text("#title"), visit.cones()
 
     # A cone more, which is dragged; the model does not turn.
     page.keyboard.press("a")
     vertex, target, *apart = visit.visible_vertices(40)
     page.mouse.click(*visit.place_of(vertex))
     visit.settle()
-    assert set(visit.cones()) == {*found, vertex}
+    assert set(visit.cones()) == {*cones, vertex}
     assert visit.run("studio.selectedNumber()") == vertex
     turn = visit.run("coneflat.panes[0].camera.turn.join()")
     page.mouse.move(*visit.place_of(vertex))
@@ -46,7 +46,7 @@ def test_a_whole_story(visit, studio, tmp_path, browser):
     page.mouse.move(*visit.place_of(target), steps=4)
     page.mouse.up()
     visit.settle()
-    assert set(visit.cones()) == {*found, target}
+    assert set(visit.cones()) == {*cones, target}
     assert visit.run("coneflat.panes[0].camera.turn.join()") == turn
 
     # Its angle is typed, and snaps.
@@ -204,10 +204,10 @@ def test_the_curve_offers_numbers_of_cones(visit):
     visit.settle()
     page.keyboard.press("q")
     visit.wait("studio.panel.curve.found")
-    found = visit.run("studio.panel.curve.found")
-    assert np.all(np.diff(found["distortions"]) < 0)
+    shown = visit.run("studio.panel.curve.found")
+    assert np.all(np.diff(shown["distortions"]) < 0)
     curve = coneflat.cone_curve(coneflat.sample_path())
-    assert found["counts"] == curve.counts.tolist()
+    assert shown["counts"] == curve.counts.tolist()
     assert "most is gained up to" in page.get_attribute("#curve", "aria-label")
     at = visit.run(f"studio.panel.curve.places().x({curve.knee})")
     box = page.locator("#curve").bounding_box()
@@ -268,10 +268,10 @@ return [studio.turns, Array.from(after.arrays.chart.filter((_, i) => chart[i] ==
 
 def test_a_chart_that_splits_keeps_the_place_and_the_number_of_its_larger_part(visit):
     visit.settle()
-    turns, numbers, most = visit.run(SPLIT)
+    turns, numbers, largest = visit.run(SPLIT)
     (larger, _), (smaller, _) = Counter(numbers).most_common()
     assert (turns, larger) == (1, 0)
-    assert smaller > most
+    assert smaller > largest
 
 
 def test_a_sliver_beside_a_drawn_cut_is_reported(visit):
@@ -300,9 +300,9 @@ def _rings(mesh):
     pairs = np.sort(strip[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     edges, counts = np.unique(pairs, axis=0, return_counts=True)
     neighbours = {}
-    for one, two in edges[counts == 1].tolist():
-        neighbours.setdefault(one, []).append(two)
-        neighbours.setdefault(two, []).append(one)
+    for tail, head in edges[counts == 1].tolist():
+        neighbours.setdefault(tail, []).append(head)
+        neighbours.setdefault(head, []).append(tail)
     loops = []
     while neighbours:
         start = next(iter(neighbours))
@@ -317,8 +317,8 @@ def _rings(mesh):
 def test_a_path_joins_an_earlier_cut_instead_of_running_next_to_it(visit):
     visit.settle()
     ends = visit.visible_vertices(40)
-    one, two = ends[0], ends[-1]
-    path = visit.run(f"studio.pathBetween(...studio.verticesOf([{one}, {two}]))")
+    start, end = ends[0], ends[-1]
+    path = visit.run(f"studio.pathBetween(...studio.verticesOf([{start}, {end}]))")
     visit.run(f"studio.act({{do: 'cut', path: {path}}})")
     visit.settle()
     beside = visit.run(
@@ -350,11 +350,11 @@ def test_sizes_are_shown_in_a_unit(hill, tmp_path):
 
 def test_a_picture_a_report_and_quads_are_saved(hill, tmp_path):
     page = hill.page
-    for what, begins in (("png", b"\x89PNG"), ("json", b"{")):
+    for kind, begins in (("png", b"\x89PNG"), ("json", b"{")):
         with page.expect_download() as download:
-            page.click(f"#save-{what}")
-        download.value.save_as(tmp_path / f"x.{what}")
-        assert (tmp_path / f"x.{what}").read_bytes().startswith(begins)
+            page.click(f"#save-{kind}")
+        download.value.save_as(tmp_path / f"x.{kind}")
+        assert (tmp_path / f"x.{kind}").read_bytes().startswith(begins)
     assert json.loads((tmp_path / "x.json").read_text())["flipped"] == 0
     page.fill("#quad-count", "300")
     with page.expect_download() as download:
@@ -432,7 +432,7 @@ def test_two_fingers_turn_and_zoom_whatever_the_tool(phone):
     for tool in ("look", "cone", "no_cone", "cut"):
         phone.page.locator(f"#tool-{tool}").tap()
         phone.run("coneflat.panes.forEach((pane) => pane.camera.fit())")
-        phone.rest()
+        phone.wait_until_drawn()
         (x, y), turn = phone.place_of(seen_cone(phone)), phone.run(TURN)
         # The first finger lands on a cone, the second beside it.
         phone.fingers.drag(((x, y), (x - 30, y)), ((x + 60, y), (x + 90, y)))

@@ -70,14 +70,14 @@ class TestFirstViews:
     def test_they_replace_nothing_newer(self, session):
         old = session._worker.jobs[-1]["job"]
         session.act({"do": "set", "name": "stretch", "value": 0.5})
-        new = session._worker.jobs[-1]["job"]
+        newest = session._worker.jobs[-1]["job"]
         self.answer(session, "early", old, "old")
         assert session.picture() is None
-        self.answer(session, "early", new, "new")
+        self.answer(session, "early", newest, "new")
         self.answer(session, "early", old, "old")
         self.answer(session, "done", old, "old")
         assert self.shown(session) == ("new", True, True, 1)
-        self.answer(session, "done", new, "newest")
+        self.answer(session, "done", newest, "newest")
         self.answer(session, "early", old, "old")
         assert self.shown(session) == ("newest", False, False, 2)
 
@@ -110,7 +110,7 @@ def test_a_first_view_comes_before_the_layout_and_has_no_numbers(tmp_path):
         np.testing.assert_array_equal(bench.result.uv, result.uv)
     small = JobRunner(early_from=2000)
     events.clear()
-    small.flatten(job, lambda *_: None, lambda *given: events.append(given))
+    small.flatten(job, lambda *_: None, lambda *preview: events.append(preview))
     assert not events
 
 
@@ -123,30 +123,30 @@ class TestKnownArrays:
         return with_hashes({"arrays": listed}, block), block
 
     @staticmethod
-    def arrays_of(picture, others=None):
+    def arrays_of(picture, received=None):
         """What a page makes of a picture, with those of another one."""
         head, block = picture
-        found = {}
-        for each in head["arrays"]:
-            kind = np.dtype(each["type"])
-            begin = each["offset"]
-            found[each["name"]] = (
-                others[each["name"]]
+        arrays = {}
+        for entry in head["arrays"]:
+            kind = np.dtype(entry["type"])
+            begin = entry["offset"]
+            arrays[entry["name"]] = (
+                received[entry["name"]]
                 if begin is None
-                else np.frombuffer(block, kind, each["count"], begin).tolist()
+                else np.frombuffer(block, kind, entry["count"], begin).tolist()
             )
-        return found
+        return arrays
 
     def test_only_those_that_changed_are_told(self):
-        known = SentPictures()
-        first = known.numbered(self.picture(places=[1.0, 2.0], tints=np.uint8([1, 2, 3]), uv=[0.5]))
-        second = known.numbered(self.picture(places=[1.0, 2.0], tints=np.uint8([1, 2, 4]), uv=[0.5]))
-        whole = known.without(0, second)
-        less = known.without(first[0]["number"], second)
-        assert [each["offset"] is None for each in less[0]["arrays"]] == [True, False, True]
-        assert len(less[1]) < len(whole[1])
-        assert self.arrays_of(less, self.arrays_of(first)) == self.arrays_of(whole)
-        assert self.arrays_of(whole) == {"places": [1.0, 2.0], "tints": [1, 2, 4], "uv": [0.5]}
+        sent = SentPictures()
+        first = sent.numbered(self.picture(places=[1.0, 2.0], tints=np.uint8([1, 2, 3]), uv=[0.5]))
+        second = sent.numbered(self.picture(places=[1.0, 2.0], tints=np.uint8([1, 2, 4]), uv=[0.5]))
+        complete = sent.without(0, second)
+        less = sent.without(first[0]["number"], second)
+        assert [entry["offset"] is None for entry in less[0]["arrays"]] == [True, False, True]
+        assert len(less[1]) < len(complete[1])
+        assert self.arrays_of(less, self.arrays_of(first)) == self.arrays_of(complete)
+        assert self.arrays_of(complete) == {"places": [1.0, 2.0], "tints": [1, 2, 4], "uv": [0.5]}
 
 
 @pytest.mark.slow
@@ -156,9 +156,9 @@ def test_a_change_cancels_the_separation_of_overlaps(tmp_path, monkeypatch):
     module, begun = sys.modules["coneflat.flattening"], threading.Event()
     separate = module.separate_overlaps
 
-    def endless(*given):
+    def endless(*arguments):
         if begun.is_set():
-            return separate(*given)
+            return separate(*arguments)
         begun.set()
         while True:
             check_cancelled()
@@ -183,4 +183,4 @@ def test_a_change_cancels_the_separation_of_overlaps(tmp_path, monkeypatch):
         while not (heard[-1]["job"] == 2 and "done" in heard[-1]):
             heard.append(read_frame(hearing)[0])
     assert {"job": 1, "given_up": True} in heard
-    assert not any(each["job"] == 1 and "done" in each for each in heard)
+    assert not any(message["job"] == 1 and "done" in message for message in heard)

@@ -56,20 +56,20 @@ def test_a_row_of_a_cone_is_one_tab_stop_and_its_controls_have_names(visit, stud
 
 def test_cones_of_both_signs_differ_in_shape(visit):
     visit.settle()
-    found = visit.run(
+    marks = visit.run(
         "coneflat.model.conePoints.flatMap((points, i) => points.map((point) => ["
         "coneflat.model.head.cone_curvatures[i], "
         "...coneflat.panes[1].camera.project(coneflat.model.flatPlace(point)).slice(0, 2)]))"
     )
     picture = visit.picture("layout")
     filled = {True: [], False: []}
-    for curvature, x, y in found:
+    for curvature, x, y in marks:
         radius = 0.75 * np.clip(6.5 * np.sqrt(abs(curvature) / (np.pi / 2)), 3.5, 10)
         inks = [
             picture[round(y + a * radius), round(x + b * radius)] for a in (-0.7, 0.7) for b in (-0.7, 0.7)
         ]
         ink = [214, 33, 33] if curvature > 0 else [0, 0, 0]
-        filled[curvature > 0].append(np.mean([np.abs(each - ink).max() < 60 for each in inks]))
+        filled[curvature > 0].append(np.mean([np.abs(colour - ink).max() < 60 for colour in inks]))
     assert np.mean(filled[False]) > np.mean(filled[True]) + 0.25
 
 

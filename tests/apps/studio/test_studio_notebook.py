@@ -27,9 +27,9 @@ def page():
 
 @pytest.mark.slow
 def test_arrays_are_flattened_as_they_are(page):
-    whole = coneflat.flatten(*shapes.sphere(3), repair=False)
-    np.testing.assert_array_equal(page.result.vertices, whole.vertices)
-    np.testing.assert_array_equal(page.result.uv, whole.uv)
+    result = coneflat.flatten(*shapes.sphere(3), repair=False)
+    np.testing.assert_array_equal(page.result.vertices, result.vertices)
+    np.testing.assert_array_equal(page.result.uv, result.uv)
     assert page.project.name == "mesh_studio.json"
     assert page.project.exists()
 
@@ -83,9 +83,9 @@ def test_files_and_projects(tmp_path, monkeypatch):
 def test_through_a_proxy_the_token_alone_opens_it():
     with coneflat.studio(*shapes.sphere(1), through="/proxy/{port}/") as opened:
         port, query = re.fullmatch(r"/proxy/(\d+)/(\?token=.+)", opened.address).groups()
-        for more, status in ((query, 200), ("", 403), ("?token=wrong", 403)):
+        for query_text, status in ((query, 200), ("", 403), ("?token=wrong", 403)):
             asked = http.client.HTTPConnection("127.0.0.1", int(port))
-            asked.request("GET", f"/{more}", headers={"Host": "hub.example"})
+            asked.request("GET", f"/{query_text}", headers={"Host": "hub.example"})
             assert asked.getresponse().status == status
             asked.close()
     for bad in ("", "/proxy/", "https://hub/user/me/proxy/8000/"):

@@ -91,15 +91,17 @@ def test_the_texture_of_the_file_is_shown_in_both_views(browser, tmp_path):
             visit.settle()
             visit.wait("coneflat.renderer.look.asInFile === true")
             visit.run("coneflat.state.set({show: 'picture', seams: false, cones: false})")
-            visit.rest()
-            found = visit.run(PIXELS)
-            left = [one for one in found if one[0] == "layout"]
-            assert {one[0] for one in found} == {"model", "layout"}
+            visit.wait_until_drawn()
+            pixels = visit.run(PIXELS)
+            left = [pixel for pixel in pixels if pixel[0] == "layout"]
+            assert {pixel[0] for pixel in pixels} == {"model", "layout"}
             assert len(left) > 50
-            is_red, is_green = (np.array([one[2 + k] > 100 + one[3 - k] for one in found]) for k in (0, 1))
+            is_red, is_green = (
+                np.array([pixel[2 + k] > 100 + pixel[3 - k] for pixel in pixels]) for k in (0, 1)
+            )
             assert is_red.sum() > 30
             assert is_green.sum() > 30
-            side = np.array([one[1] for one in found])
+            side = np.array([pixel[1] for pixel in pixels])
             assert side[is_red].min() > side[is_green].max() - 0.4
             # An image of the user is in the UVs of the layout again.
             visit.run("coneflat.renderer.setPicture(coneflat.renderer.look.picture)")

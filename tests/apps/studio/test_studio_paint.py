@@ -53,13 +53,13 @@ class TestRegion:
     def test_it_is_a_set(self):
         rng = random.Random(0)
         for _ in range(60):
-            one, two = (
+            first, second = (
                 {v for v in range(40) if rng.random() < share} for share in (rng.random(), rng.random())
             )
-            a, b = region(one), region(two)
-            assert a.joined(b) == region(one | two)
-            assert a.without(b) == region(one - two)
-            assert a.vertices() == sorted(one)
+            a, b = region(first), region(second)
+            assert a.joined(b) == region(first | second)
+            assert a.without(b) == region(first - second)
+            assert a.vertices() == sorted(first)
             assert Region.of_text(a.text) == a
 
     def test_it_is_short(self):
@@ -112,7 +112,7 @@ class TestPaint:
         words = chosen.keywords()
         assert words.pop("no_seams").tolist() == [5, 6]
         assert words == {"forbidden_cones": [1, 2], "weights": {8: 10.0}}
-        assert chosen.with_kept((7, 8)).keywords()["no_seams"].tolist() == [5, 6, 7, 8]
+        assert chosen.with_uncut((7, 8)).keywords()["no_seams"].tolist() == [5, 6, 7, 8]
         # Cones that were put somewhere by hand are there on purpose.
         by_hand = chosen.placed([1, 9])
         assert "forbidden_cones" not in by_hand.keywords()
@@ -125,11 +125,11 @@ class TestStories:
     def test_painted_places_are_heeded_and_replayed(self, session, tmp_path):
         result = coneflat.flatten(*shapes.sphere(3))
         top = result.cones[np.argmax(result.vertices[result.cones, 2])]
-        near = np.linalg.norm(result.vertices - result.vertices[top], axis=1) < 0.5
-        assert near[session.state()["found"]].any()
-        session.act({"do": "paint", "layer": "no_cone", "where": region(np.flatnonzero(near)).text})
+        is_painted = np.linalg.norm(result.vertices - result.vertices[top], axis=1) < 0.5
+        assert is_painted[session.state()["found"]].any()
+        session.act({"do": "paint", "layer": "no_cone", "where": region(np.flatnonzero(is_painted)).text})
         state = settled(session)
-        assert not near[state["found"]].any()
+        assert not is_painted[state["found"]].any()
         low = result.vertices[:, 2] < -0.6
         session.act({"do": "paint", "layer": "no_seam", "where": region(np.flatnonzero(low)).text})
         session.act({"do": "paint", "layer": "importance", "where": "0-40", "weight": 100})

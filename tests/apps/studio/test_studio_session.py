@@ -29,8 +29,8 @@ from coneflat.errors import OptionError, ProjectError, StudioError
 
 def worker_process():
     """The id of the worker process."""
-    (found,) = (each for each in psutil.Process().children() if COMMAND[-1] in each.cmdline())
-    return found.pid
+    (worker,) = (child for child in psutil.Process().children() if COMMAND[-1] in child.cmdline())
+    return worker.pid
 
 
 def settled(session):
@@ -48,28 +48,28 @@ class TestSession:
         state = settled(session)
         assert state["trouble"] is None
         assert state["layout"] == 1
-        found = state["found"]
-        session.act({"do": "angle", "vertex": found[0], "degrees": 200})
-        session.act({"do": "lock", "vertex": found[1], "locked": True})
+        cones = state["found"]
+        session.act({"do": "angle", "vertex": cones[0], "degrees": 200})
+        session.act({"do": "lock", "vertex": cones[1], "locked": True})
         state = settled(session)
         assert state["trouble"] is None
-        assert sorted(state["found"]) == sorted(found)
+        assert sorted(state["found"]) == sorted(cones)
         head, _ = session.picture()
         angles = dict(zip(state["found"], head["cone_curvatures"], strict=True))
-        assert 360 - math.degrees(angles[found[0]]) == pytest.approx(200)
-        session.act({"do": "set", "name": "cone_count", "value": len(found) + 1})
+        assert 360 - math.degrees(angles[cones[0]]) == pytest.approx(200)
+        session.act({"do": "set", "name": "cone_count", "value": len(cones) + 1})
         state = settled(session)
-        assert found[1] in state["found"]
-        assert len(state["found"]) == len(found) + 1
+        assert cones[1] in state["found"]
+        assert len(state["found"]) == len(cones) + 1
 
     @pytest.mark.slow
     def test_what_is_saved_is_what_the_command_makes(self, session, tmp_path):
-        found = settled(session)["found"]
-        session.act({"do": "remove", "vertex": found[0]})
-        session.act({"do": "angle", "vertex": found[1], "degrees": 120})
+        cones = settled(session)["found"]
+        session.act({"do": "remove", "vertex": cones[0]})
+        session.act({"do": "angle", "vertex": cones[1], "degrees": 120})
         graph = coneflat.TriangleMesh(*shapes.sphere(3)).edges
-        far = [edge for edge in graph.tolist() if not set(edge) & set(found)][:1]
-        session.act({"do": "keep", "path": far[0]})
+        apart = [edge for edge in graph.tolist() if not set(edge) & set(cones)][:1]
+        session.act({"do": "keep", "path": apart[0]})
         saved = uv_of(session.export(".npz"))
         assert settled(session)["trouble"] is None
         done = CliRunner().invoke(
@@ -98,15 +98,15 @@ class TestSession:
 
     @pytest.mark.slow
     def test_a_failure_is_told_and_undone(self, session):
-        found = settled(session)["found"]
-        for vertex in found:
+        cones = settled(session)["found"]
+        for vertex in cones:
             session.act({"do": "angle", "vertex": vertex, "degrees": 350})
         state = settled(session)
         assert "must sum to 2 pi chi" in state["trouble"]["text"]
         assert state["layout"] >= 1  # which is still shown
         with pytest.raises(StudioError, match="the last change could not be flattened"):
             session.export(".obj")
-        for _ in found:
+        for _ in cones:
             session.act({"do": "undo"})
         assert settled(session)["trouble"] is None
 
@@ -157,16 +157,18 @@ class TestSession:
             session.open(tmp_path / "other" / "ball.obj")
 
     def test_links_lead_nowhere_else(self, session, tmp_path_factory, tmp_path):
-        other = tmp_path_factory.mktemp("other")
-        shapes.write_obj(other / "secret.obj", *shapes.sphere(1))
-        (tmp_path / "link.obj").symlink_to(other / "secret.obj")
+        elsewhere = tmp_path_factory.mktemp("other")
+        shapes.write_obj(elsewhere / "secret.obj", *shapes.sphere(1))
+        (tmp_path / "link.obj").symlink_to(elsewhere / "secret.obj")
         with pytest.raises(StudioError, match="is outside the folder of the session"):
             session.open_named("link.obj")
 
     def test_a_dropped_project_names_no_mesh_elsewhere(self, session, tmp_path_factory, tmp_path):
-        other = tmp_path_factory.mktemp("other")
-        shapes.write_obj(other / "secret.obj", *shapes.sphere(1))
-        Project(other / "secret.obj", file_hash(other / "secret.obj"), Choices()).save(tmp_path / "p.json")
+        elsewhere = tmp_path_factory.mktemp("other")
+        shapes.write_obj(elsewhere / "secret.obj", *shapes.sphere(1))
+        Project(elsewhere / "secret.obj", file_hash(elsewhere / "secret.obj"), Choices()).save(
+            tmp_path / "p.json"
+        )
         with pytest.raises(ProjectError, match="is outside the folder of the session"):
             session.open_named("p.json")
 
@@ -175,12 +177,12 @@ def test_frames_come_whole_or_not_at_all():
     stream = BytesIO()
     write_frame(stream, {"a": 1}, b"body")
     write_frame(stream, {"b": "ä"})
-    whole = stream.getvalue()
+    frame = stream.getvalue()
     stream.seek(0)
     assert read_frame(stream) == ({"a": 1}, b"body")
     assert read_frame(stream) == ({"b": "ä"}, b"")
     assert read_frame(stream) is None
-    assert read_frame(BytesIO(whole[:19])) is None
+    assert read_frame(BytesIO(frame[:19])) is None
 
 
 @pytest.mark.slow

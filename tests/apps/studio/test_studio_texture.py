@@ -50,7 +50,7 @@ NOT_IN_THE_STUDIO = {
 
 def both_kinds():
     """Return choices with settings of both kinds of maps, for a texture."""
-    chosen = Choices().placed(CONES).locked(200, True).cut((1, 2)).with_kept((7, 8))
+    chosen = Choices().placed(CONES).locked(200, True).cut((1, 2)).with_uncut((7, 8))
     for name, value in {"max_energy": 4.05, "stretch": 0.25, "boundary": "disk", "padding": 4}.items():
         chosen = chosen.with_option(name, value)
     return chosen.painted("no_cone", Region.of_text("3")).painted("importance", Region.of_text("9"), 10)
@@ -76,9 +76,9 @@ class TestChoices:
         assert chosen.with_option("texel_density", None).keywords() == {}
 
     def test_every_option_of_the_commands_is_set_or_left_out_for_a_reason(self):
-        known = {param.name for name in ("flatten", "unwrap") for param in cli.commands[name].params}
-        known -= {name for names in NOT_IN_THE_STUDIO.values() for name in names}
-        assert known == set(PLAIN_OPTIONS)
+        options = {param.name for name in ("flatten", "unwrap") for param in cli.commands[name].params}
+        options -= {name for names in NOT_IN_THE_STUDIO.values() for name in names}
+        assert options == set(PLAIN_OPTIONS)
 
     def test_every_option_has_a_label(self):
         assert set(PLAIN_OPTIONS) <= set(CONTROLS)
@@ -183,10 +183,14 @@ class TestReplay:
     def test_a_project_has_its_own_options(self, tmp_path, mesh):
         path = tmp_path / "p.json"
         Project(mesh, file_hash(mesh), Choices()).save(path)
-        for more, what in {"--max-energy 4.2": "--max-energy", "x.obj": "MESH", "--weld": "--weld"}.items():
-            done = CliRunner().invoke(cli, ["unwrap", "--project", str(path), *more.split()])
+        for words, conflict in {
+            "--max-energy 4.2": "--max-energy",
+            "x.obj": "MESH",
+            "--weld": "--weld",
+        }.items():
+            done = CliRunner().invoke(cli, ["unwrap", "--project", str(path), *words.split()])
             assert done.exit_code == 2
-            assert f"leave out {what}" in done.output
+            assert f"leave out {conflict}" in done.output
         done = CliRunner().invoke(cli, ["unwrap"])
         assert done.exit_code == 2
         assert "Missing argument 'MESH'" in done.output
@@ -202,8 +206,8 @@ class TestSession:
         assert session.wait_until_idle(120)
         assert session.state()["trouble"] is None
         (tmp_npz := mesh.with_suffix(".npz")).write_bytes(session.export(".npz"))
-        found = coneflat.read_flattening(tmp_npz)
-        np.testing.assert_array_equal(found.uv, coneflat.unwrap(mesh, max_energy=4.3).uv)
+        exported = coneflat.read_flattening(tmp_npz)
+        np.testing.assert_array_equal(exported.uv, coneflat.unwrap(mesh, max_energy=4.3).uv)
         assert read_project(session.project_file).choices.for_texture
         for _ in range(2):
             session.act({"do": "undo"})

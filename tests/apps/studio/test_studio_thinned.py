@@ -32,20 +32,20 @@ def test_the_whole_mesh_goes_beside_what_is_shown(ball):
     bench = JobRunner()
     job = {"mesh": str(ball), "sha256": file_hash(ball), "choices": Choices().as_plain()}
 
-    def arrays(**more):
-        head, body = bench.flatten({**job, **more}, lambda stage, fraction: None, lambda head, body: None)
+    def arrays(**options):
+        head, body = bench.flatten({**job, **options}, lambda stage, fraction: None, lambda head, body: None)
         types = {"f4": np.float32, "u4": np.uint32, "i4": np.int32}
         return {
-            each["name"]: np.frombuffer(body, types[each["type"]], each["count"], each["offset"])
-            for each in head["head"]["arrays"]
-            if each["type"] in types
+            entry["name"]: np.frombuffer(body, types[entry["type"]], entry["count"], entry["offset"])
+            for entry in head["head"]["arrays"]
+            if entry["type"] in types
         }
 
     assert "whole_faces" not in arrays()
-    found, vertices, faces = arrays(most=SHOWN), *shapes.sphere(5)
-    np.testing.assert_array_equal(found["whole_faces"].reshape(-1, 3), faces)
-    assert found["whole_places"].reshape(-1, 3) == pytest.approx(into_ball(vertices), abs=1e-6)
-    np.testing.assert_array_equal(found["whole_numbers"], np.arange(len(vertices)) + 1)
+    shown, vertices, faces = arrays(most=SHOWN), *shapes.sphere(5)
+    np.testing.assert_array_equal(shown["whole_faces"].reshape(-1, 3), faces)
+    assert shown["whole_places"].reshape(-1, 3) == pytest.approx(into_ball(vertices), abs=1e-6)
+    np.testing.assert_array_equal(shown["whole_numbers"], np.arange(len(vertices)) + 1)
     model = Model.of(bench.result)
     head, _ = with_all_triangles({"arrays": []}, b"", model, bench.result)
-    assert [each["name"] for each in head["arrays"]] == ["whole_places", "whole_faces", "whole_numbers"]
+    assert [entry["name"] for entry in head["arrays"]] == ["whole_places", "whole_faces", "whole_numbers"]

@@ -31,25 +31,27 @@ class TestPlaces:
         painted = Choices().painted("no_cone", Region("3-9 20"))
         assert misplaced_warning(painted) == ()
         assert misplaced_warning(painted.added(10)) == ()
-        (one,) = misplaced_warning(painted.added(9))
-        assert one.startswith("1 cone set by hand or locked lies in regions painted as “No cones”: vertex 9.")
+        (warning,) = misplaced_warning(painted.added(9))
+        assert warning.startswith(
+            "1 cone set by hand or locked lies in regions painted as “No cones”: vertex 9."
+        )
         (two,) = misplaced_warning(painted.added(20).added(10).added(3))
         assert "2 cones set by hand or locked lie in regions painted as “No cones”: vertices 3, 20." in two
 
     @pytest.mark.slow
     def test_they_are_told_at_once_and_noted(self, session):
-        found = settled(session)["found"]
-        session.act({"do": "paint", "layer": "no_cone", "where": f"{found[0]}"})
+        cones = settled(session)["found"]
+        session.act({"do": "paint", "layer": "no_cone", "where": f"{cones[0]}"})
         state = settled(session)
-        assert found[0] not in state["found"]
+        assert cones[0] not in state["found"]
         assert state["warnings"] == []
-        session.act({"do": "add", "vertex": found[0]})
-        assert f"vertex {found[0]}." in session.state()["warnings"][0]
+        session.act({"do": "add", "vertex": cones[0]})
+        assert f"vertex {cones[0]}." in session.state()["warnings"][0]
         state = settled(session)
-        assert found[0] in state["found"]
+        assert cones[0] in state["found"]
         head, _ = session.picture()
         assert state["warnings"][0] in head["notes"]
-        session.act({"do": "remove", "vertex": found[0]})
+        session.act({"do": "remove", "vertex": cones[0]})
         assert session.state()["warnings"] == []
 
 
@@ -72,19 +74,19 @@ class TestAngles:
         """Of a ball's 720 degrees, three cones of 220 take 420; what is left leaves one more an angle below 90."""
         settled(session)
         session.act({"do": "set", "name": "cone_count", "value": 4})
-        one, *others = settled(session)["found"]
-        for vertex in others:
+        narrow, *remaining = settled(session)["found"]
+        for vertex in remaining:
             session.act({"do": "angle", "vertex": vertex, "degrees": 150})
         state = settled(session)
         # 720 - 3 * 210 = 90 is its curvature, 270 its angle.
         assert (state["trouble"], state["warnings"]) == (None, [])
-        for vertex in others:
+        for vertex in remaining:
             session.act({"do": "angle", "vertex": vertex, "degrees": 220})
         state = settled(session)
         # 720 - 3 * 140 = 300.
         (warning,) = state["warnings"]
         assert warning.startswith(
-            f"With the typed angles, 1 cone cannot have an angle from 90 to 720 degrees: vertex {one} 60."
+            f"With the typed angles, 1 cone cannot have an angle from 90 to 720 degrees: vertex {narrow} 60."
         )
         assert state["trouble"] is None
 
@@ -112,7 +114,7 @@ class TestWords:
         assert page_message(message) == said
 
     @pytest.mark.parametrize(
-        ("one", "other"),
+        ("options", "excluded"),
         [
             ({"resolution": 512}, {"texel_density": 2.0}),
             ({"max_energy": 4.3}, {"area": 0.1}),
@@ -120,12 +122,12 @@ class TestWords:
             ({"seams": "none"}, {"area": 0.1}),
         ],
     )
-    def test_options_that_exclude_each_other_are_named_as_the_page_has_them(self, one, other):
+    def test_options_that_exclude_each_other_are_named_as_the_page_has_them(self, options, excluded):
         with pytest.raises(OptionError) as caught:
-            read_options({**one, **other}, UnwrapOptions)
+            read_options({**options, **excluded}, UnwrapOptions)
         said = page_message(str(caught.value))
         assert said.endswith(" cannot be combined: leave out one of them")
-        for name in (*one, *other):
+        for name in (*options, *excluded):
             assert f"“{CONTROLS[name]}”" in said
             assert name not in said.split()
 

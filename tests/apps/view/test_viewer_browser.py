@@ -158,7 +158,7 @@ def test_a_click_keeps_a_cone_and_turns_the_model_to_it(visit, viewed):
     for index in range(len(viewed.cones)):
         visit.page.mouse.click(*visit.at("layout", thing("cone", index))[0])
         assert visit.state("picked") == {"kind": "cone", "index": index}
-        visit.rest()
+        visit.wait_until_drawn()
         assert visit.run(f"coneflat.marks.isSeen(coneflat.panes[0], {thing('cone', index)}, coneflat.state)")
         (x, y), box = visit.at("model", thing("cone", index))[0], visit.box("model")
         assert 0 < x - box["x"] < box["width"]

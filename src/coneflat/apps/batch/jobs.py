@@ -67,19 +67,19 @@ def find_jobs(
     """
     # A file counts once. If it is given by links only, the name of the first link is used, because content-addressed
     # stores name their files by checksums.
-    found: dict[str, str] = {}
+    names: dict[str, str] = {}
     for pattern in patterns:
         for path in find_meshes(pattern):
             real, name = os.path.realpath(path), os.path.abspath(path)
-            if real == name or real not in found:
-                found[real] = name
-    meshes = sorted(found.values())
+            if real == name or real not in names:
+                names[real] = name
+    meshes = sorted(names.values())
     jobs = [
         Job(mesh, str(folder / name), options, weld, _mark(mesh, options, weld, required), required)
         for mesh, name in zip(meshes, _names(meshes, ending), strict=True)
     ]
     for job in jobs:
-        if os.path.realpath(job.output) in found:
+        if os.path.realpath(job.output) in names:
             raise OptionError(f"the result of {job.mesh} would overwrite {job.output}: choose another folder")
     return jobs
 

@@ -111,10 +111,10 @@ class Child:
         self.end()
         remove_unfinished(job.output)
         if limit is not None and seconds >= limit:
-            why = f"it took longer than {limit:g} s"
+            reason = f"it took longer than {limit:g} s"
         else:
-            why = f"its process {exit_text(process.returncode)}"
-        return failed(job, why, round(seconds, 3))
+            reason = f"its process {exit_text(process.returncode)}"
+        return failed(job, reason, round(seconds, 3))
 
     def end(self) -> None:
         """End the process in any state; called by the thread that uses it."""
@@ -194,8 +194,8 @@ def rows_of_cluster(
         _require_scheduler(address)
         client = distributed.Client(address, timeout=ANSWER_SECONDS, set_as_default=False)
     except Exception as error:  # The library raises many types of errors for a wrong address.
-        why = " ".join(str(error).split()) or type(error).__name__
-        raise OptionError(f"no Dask scheduler answers at {address}: {why}") from error
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise OptionError(f"no Dask scheduler answers at {address}: {reason}") from error
     with client:
         futures = {client.submit(flatten_here, job, limit, pure=False, retries=RETRIES): job for job in jobs}
         try:

@@ -172,7 +172,7 @@ def _row(line: bytes) -> dict[str, Any] | None:
 def write_summary(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write a CSV table with one row per mesh."""
     rows = [
-        {name: printable(each) if isinstance(each, str) else each for name, each in row.items()}
+        {name: printable(cell) if isinstance(cell, str) else cell for name, cell in row.items()}
         for row in rows
     ]
     with atomic_write(path, "w") as file:

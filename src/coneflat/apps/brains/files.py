@@ -39,14 +39,14 @@ def structure_of(path: Path) -> str:
     return read_structure(path) or (f"Cortex{sides[0].title()}" if len(sides) == 1 else "")
 
 
-def check_same_side(surface: Path, others: dict[str, Path]) -> None:
+def check_same_side(surface: Path, values: dict[str, Path]) -> None:
     """Raise OptionError if a file is of the other hemisphere than the surface."""
-    for what, path in others.items():
+    for name, path in values.items():
         structures = structure_of(surface), structure_of(path)
         if set(structures) == {"CortexLeft", "CortexRight"}:
-            here, there = (structure.removeprefix("Cortex").lower() for structure in structures)
+            side, values_side = (structure.removeprefix("Cortex").lower() for structure in structures)
             raise OptionError(
-                f"{what} {path} must be of the {here} hemisphere, like {surface}, got the {there} one"
+                f"{name} {path} must be of the {side} hemisphere, like {surface}, got the {values_side} one"
             )
 
 
@@ -65,9 +65,11 @@ def write_gifti(path: Path, points: FloatArray, faces: IntArray, structure: str)
     meta = {"GeometricType": "Flat"} | ({"AnatomicalStructurePrimary": structure} if structure else {})
     for values, intent in ((np.pad(points, ((0, 0), (0, 1))), "POINTSET"), (faces, "TRIANGLE")):
         kind = np.float32 if intent == "POINTSET" else np.int32
-        more = {"meta": gifti.GiftiMetaData(meta)} if intent == "POINTSET" else {}
+        further = {"meta": gifti.GiftiMetaData(meta)} if intent == "POINTSET" else {}
         image.add_gifti_data_array(
-            gifti.GiftiDataArray(values.astype(kind), intent=f"NIFTI_INTENT_{intent}", datatype=kind, **more)
+            gifti.GiftiDataArray(
+                values.astype(kind), intent=f"NIFTI_INTENT_{intent}", datatype=kind, **further
+            )
         )
     with atomic_write(path) as stream:
         stream.write(image.to_bytes())

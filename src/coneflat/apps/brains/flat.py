@@ -93,7 +93,7 @@ def flatten_cortex(
     """
     path, upward = as_path(surface), SUPERIOR if up is None else up
     mesh = read_mesh(path, weld=False)
-    wall, kept = (_vertices(mesh, labels) for labels in (remove, keep))
+    wall, uncut = (_vertices(mesh, labels) for labels in (remove, keep))
     cut_off = mask_of(len(mesh.vertices), wall)
     faces = mesh.triangles[~cut_off[mesh.triangles].any(axis=1)]
     if not len(faces):
@@ -102,10 +102,10 @@ def flatten_cortex(
     count, part = label_faces(checked.mesh.faces, len(checked.mesh.vertices))
     largest = faces[checked.face_origin[part == np.bincount(part, minlength=count).argmax()]]
     offsets = np.arange(0, largest.size + 1, 3)
-    given = MeshFile(path, mesh.vertices, largest.reshape(-1), offsets, attributes=mesh.attributes)
-    if len(kept):
-        options["no_seams"] = kept[~cut_off[kept]]
-    result = flatten(given, **{"stretch": 1.0, "repair": True, "up": tuple(upward), **options})
+    source = MeshFile(path, mesh.vertices, largest.reshape(-1), offsets, attributes=mesh.attributes)
+    if len(uncut):
+        options["no_seams"] = uncut[~cut_off[uncut]]
+    result = flatten(source, **{"stretch": 1.0, "repair": True, "up": tuple(upward), **options})
     if len(largest) < len(faces):
         left_out = plural(len(faces) - len(largest), "triangle")
         note = f"{left_out} in separate pieces were left out."
@@ -115,14 +115,14 @@ def flatten_cortex(
 
 def _vertices(mesh: MeshFile, labels: Sequence[str]) -> IntArray:
     """Return the vertices of labels, which must be of the mesh."""
-    found = [np.empty(0, np.int64)]
+    parts = [np.empty(0, np.int64)]
     for label in labels:
         check_same_side(mesh.path, {"the label": Path(label.rpartition(":")[0] or label)})
         vertices = read_label(label, len(mesh.vertices))
         if not len(vertices):
             raise OptionError(f"{label} must have vertices, got none: choose another label")
-        found.append(vertices)
-    return np.unique(np.concatenate(found))
+        parts.append(vertices)
+    return np.unique(np.concatenate(parts))
 
 
 def _as_flat(result: Flattening, surface: MeshFile, up: FloatArray) -> FlatCortex:
@@ -138,8 +138,10 @@ def _as_flat(result: Flattening, surface: MeshFile, up: FloatArray) -> FlatCorte
     points = np.where(chosen[:, None] < 0, 0.0, (result.uv / result.uv_scale)[chosen])
     is_whole = (chosen[vertex[result.uv_faces]] == result.uv_faces).all(axis=1)
     faces = origin[result.faces[is_whole]]
-    used = chosen >= 0
-    points[used] = rotated_up(points[used], surface.vertices[used], up, area[chosen[used]])
+    is_laid_out = chosen >= 0
+    points[is_laid_out] = rotated_up(
+        points[is_laid_out], surface.vertices[is_laid_out], up, area[chosen[is_laid_out]]
+    )
     return FlatCortex(result, surface, points, faces, np.bincount(vertex, minlength=count) == 1)
 
 

@@ -44,8 +44,8 @@ class FlatMeasures:
 
     def report(self) -> dict[str, Any]:
         """Return all measures as plain Python values, ready for JSON."""
-        own = (self.metric, self.areal, self.inverted)
-        return self.uv.report() | dict(zip(FLAT_MEASURES, own, strict=True))
+        flat_measures = (self.metric, self.areal, self.inverted)
+        return self.uv.report() | dict(zip(FLAT_MEASURES, flat_measures, strict=True))
 
     def rows(self) -> list[Row]:
         """Return the rows (name, value, meaning) of the table."""
@@ -76,9 +76,9 @@ def measure_flat(mapped: UVMesh, *, strict: bool = False) -> FlatMeasures:
 
 
 def _areal(areas: FloatArray, flat: FloatArray) -> float:
-    known = (areas > 0) & (flat > 0)
-    ratio = np.log2(flat[known] / flat.sum() / areas[known] * areas.sum())
-    return float(np.average(np.abs(ratio), weights=areas[known]))
+    has_area = (areas > 0) & (flat > 0)
+    ratio = np.log2(flat[has_area] / flat.sum() / areas[has_area] * areas.sum())
+    return float(np.average(np.abs(ratio), weights=areas[has_area]))
 
 
 def metric_distortion(vertices: FloatArray, faces: IntArray, flat: FloatArray) -> float:
@@ -117,12 +117,12 @@ def _graph(vertices: FloatArray, faces: IntArray) -> tuple[csr_matrix, float]:
     edges = ends[is_first]
     lengths = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
     second = np.flatnonzero(~is_first)
-    origin, other = vertices[ends[second]].transpose(1, 0, 2)
-    base = np.linalg.norm(other - origin, axis=1)
+    origin, end = vertices[ends[second]].transpose(1, 0, 2)
+    base = np.linalg.norm(end - origin, axis=1)
     pairs = np.stack([apex[second - 1], apex[second]], axis=1)
     to = vertices[pairs] - origin[:, None]
     # Each triangle in the plane of the pair: along the common edge, and away from it.
-    along = np.einsum("eix,ex->ei", to, other - origin) / base[:, None]
+    along = np.einsum("eix,ex->ei", to, end - origin) / base[:, None]
     away = np.sqrt(np.maximum(np.einsum("eix,eix->ei", to, to) - along**2, 0))
     crossing = (along * away[:, ::-1]).sum(axis=1) / away.sum(axis=1)
     inside = (crossing > 0) & (crossing < base)

@@ -24,7 +24,6 @@ from .figure_commands import demo, figure
 from .flags import ExitCode
 from .flatten_commands import flatten, unwrap
 from .measure_command import measure
-from .peers import compare
 from .quads_command import quads
 from .transfer_command import transfer
 from .view_commands import studio, view
@@ -44,7 +43,7 @@ def cli(context: click.Context) -> None:
 
 
 for command in (
-    flatten, unwrap, transfer, batch, brain, quads, measure, cones, figure, view, studio, blender, compare, demo,
+    flatten, unwrap, transfer, batch, brain, quads, measure, cones, figure, view, studio, blender, demo,
     warm_up,
 ):  # fmt: skip
     cli.add_command(command)

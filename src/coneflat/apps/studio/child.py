@@ -57,7 +57,7 @@ class Jobs:
             with self._changed:
                 if job["do"] == "flatten":
                     self._newest = job["job"]
-                    self._waiting = deque(each for each in self._waiting if each["do"] != "flatten")
+                    self._waiting = deque(waiting for waiting in self._waiting if waiting["do"] != "flatten")
                 self._waiting.append(job)
                 self._changed.notify()
         with self._changed:
@@ -89,8 +89,8 @@ class JobRunner:
         self._source: Joined | None = None
         self._flattener: Flattener | None = None
         self._model: Model | None = None
-        self._most: int | None = None
-        self._own: tuple[Texture, FloatArray] | None = None
+        self._max_triangles: int | None = None
+        self._own_texture: tuple[Texture, FloatArray] | None = None
         self._read: tuple[str, str] | None = None
 
     def flatten(
@@ -104,7 +104,7 @@ class JobRunner:
             show: called with a preview of the layout, in the same form.
         """
 
-        self.result, self._most = None, job.get("most")
+        self.result, self._max_triangles = None, job.get("most")
         source, flattener = self._open(job["mesh"], job["sha256"], report)
         name, furthest = Path(job["mesh"]).name, 0.0
 
@@ -126,13 +126,13 @@ class JobRunner:
             result = flattener.flatten(on_preview=on_preview, progress=report_max, **words)
         result = with_warnings(replace(result, notes=source.all_notes(result.notes)), chosen)
         report("picture", 1.0)
-        own, missing = None, {}
+        quantity, missing = None, {}
         if job.get("color"):
             try:
-                own = own_quantity(result, job["color"])
+                quantity = own_quantity(result, job["color"])
             except ConeflatError as error:
                 missing = {"missing": page_message(str(error))}
-        head, body = self._picture(result, name, own=own)
+        head, body = self._picture(result, name, quantity=quantity)
         self.result = result
         warnings = angle_warning(chosen, result)
         if chosen.options.get("repair"):
@@ -163,7 +163,7 @@ class JobRunner:
         return curve_data(source, chosen, report), b""
 
     def _picture(
-        self, result: Flattening, name: str, title: str = "", own: Quantity | None = None
+        self, result: Flattening, name: str, title: str = "", quantity: Quantity | None = None
     ) -> tuple[Head, bytes]:
         """Return the page data of a result.
 
@@ -171,7 +171,7 @@ class JobRunner:
             result: the result.
             name: name of the mesh.
             title: title of a preview or a mesh without a layout, which has no numbers; "" for a final layout.
-            own: quantity that is shown as colours.
+            quantity: quantity that is shown as colours.
         """
 
         text = None
@@ -181,9 +181,9 @@ class JobRunner:
             result = replace(result, notes=())
         if self._model is None or not self._model.is_of(result):
             self._model = Model.of(result)
-        content = content_of(result, self._most or MAX_SHOWN_TRIANGLES, self._model, own)
-        show = "checker" if own is None else "own"
-        picture, uv = self._own or (None, None)
+        content = content_of(result, self._max_triangles or MAX_SHOWN_TRIANGLES, self._model, quantity)
+        show = "checker" if quantity is None else "own"
+        picture, uv = self._own_texture or (None, None)
         head, block = head_and_block(result, content, picture, name, "y", show, text)
         if uv is not None and result.face_corners is not None:
             own_uv = uv[result.face_corners[content.face_numbers]].astype(np.float32)
@@ -204,7 +204,7 @@ class JobRunner:
             repaired.cache_clear()
             source = read_joined(Path(mesh))
             self._source, self._flattener, self._read = source, Flattener(source.mesh), (mesh, sha256)
-            self._own = None if source.mesh.scene is None else own_picture(source.mesh)
+            self._own_texture = None if source.mesh.scene is None else own_picture(source.mesh)
         return self._source, self._flattener
 
 
@@ -223,9 +223,9 @@ def with_all_triangles(head: Head, block: bytes, model: Model, result: Flattenin
 
 def with_arrays(head: Head, block: bytes, arrays: Mapping[str, NDArray[Any]]) -> tuple[Head, bytes]:
     """Return page data with more arrays."""
-    listed, more = pack(arrays)
-    moved = [{**each, "offset": each["offset"] + len(block)} for each in listed]
-    return {**head, "arrays": [*head["arrays"], *moved]}, block + more
+    listed, added = pack(arrays)
+    moved = [{**entry, "offset": entry["offset"] + len(block)} for entry in listed]
+    return {**head, "arrays": [*head["arrays"], *moved]}, block + added
 
 
 def serve(jobs: Jobs, answers: IO[bytes]) -> None:
@@ -234,8 +234,8 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
     while (job := jobs.next()) is not None:
         number = job["job"]
 
-        def check_current(wanted: int = job.get("after") or number) -> None:
-            if jobs.is_stale(wanted):
+        def check_current(current: int = job.get("after") or number) -> None:
+            if jobs.is_stale(current):
                 raise Superseded
 
         def report(stage: str, fraction: float, number: int = number) -> None:

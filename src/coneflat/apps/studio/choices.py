@@ -75,7 +75,7 @@ class Choices:
         by_hand: whether `cones` are all cones; otherwise a search adds others to the locked ones.
         cones: placed or locked cones, sorted by vertex.
         cuts: paths along edges that are cut, as vertices.
-        kept: paths along edges that must not be cut.
+        uncut: paths along edges that must not be cut.
         paint: painted regions.
         corners: corners of a rectangle, vertices on the boundary, ascending.
         units: unit of length of the file, and the one in which lengths are shown, of `UNITS`.
@@ -86,7 +86,7 @@ class Choices:
     by_hand: bool = False
     cones: tuple[Cone, ...] = ()
     cuts: tuple[Path, ...] = ()
-    kept: tuple[Path, ...] = ()
+    uncut: tuple[Path, ...] = ()
     paint: Paint = field(default_factory=Paint)
     corners: Path = ()
     units: tuple[str, str] = ("", "")
@@ -109,8 +109,8 @@ class Choices:
         options, declared = dict(self.options), DECLARED[name]
         if value != "rectangle":
             value = declared.kind.parse(name, value)
-        for other in next((names for names in SINGLE if name in names), (name,)):
-            options.pop(other, None)
+        for exclusive in next((names for names in SINGLE if name in names), (name,)):
+            options.pop(exclusive, None)
         if value != declared.default or isinstance(declared.kind, Flag):
             options[name] = value
         chosen = replace(self, options=MappingProxyType(options))
@@ -127,11 +127,11 @@ class Choices:
 
     # Cones.
 
-    def placed(self, found: Iterable[int]) -> Choices:
+    def placed(self, vertices: Iterable[int]) -> Choices:
         """Return choices without a search: the cones that it has found, at these vertices, become placed cones."""
         if self.by_hand:
             return self
-        cones = {vertex: Cone(vertex) for vertex in found} | self._by_vertex()
+        cones = {vertex: Cone(vertex) for vertex in vertices} | self._by_vertex()
         return replace(self, by_hand=True)._with_cones(cones)
 
     def added(self, vertex: int, angle: float | None = None) -> Choices:
@@ -152,10 +152,10 @@ class Choices:
         """
         if vertex == to:
             return self
-        cone, others = self._cone(vertex), self.removed(vertex)._by_vertex()
-        if to in others:
+        cone, remaining = self._cone(vertex), self.removed(vertex)._by_vertex()
+        if to in remaining:
             raise StudioError(f"vertex {to} is a cone already")
-        return self._with_cones(others | {to: replace(cone, vertex=to)})
+        return self._with_cones(remaining | {to: replace(cone, vertex=to)})
 
     def removed(self, vertex: int) -> Choices:
         """Return choices without a cone.
@@ -188,22 +188,22 @@ class Choices:
         """Return choices with a further path that is cut."""
         return replace(self, cuts=(*self.cuts, _checked(path)))
 
-    def with_kept(self, path: Path) -> Choices:
+    def with_uncut(self, path: Path) -> Choices:
         """Return choices with a further path that must not be cut."""
-        return replace(self, kept=(*self.kept, _checked(path)))
+        return replace(self, uncut=(*self.uncut, _checked(path)))
 
-    def erased(self, one: int, two: int) -> Choices:
+    def erased(self, start: int, end: int) -> Choices:
         """Return choices without the paths that contain the edge between two vertices.
 
         Raises:
             StudioError: there is no such path.
         """
-        edge = frozenset((one, two))
-        both = self.cuts, self.kept
-        cuts, kept = (tuple(path for path in paths if edge not in edges_of(path)) for paths in both)
-        if (cuts, kept) == both:
-            raise StudioError(f"no path contains the edge {one}-{two}")
-        return replace(self, cuts=cuts, kept=kept)
+        edge = frozenset((start, end))
+        paths_before = self.cuts, self.uncut
+        cuts, uncut = (tuple(path for path in paths if edge not in edges_of(path)) for paths in paths_before)
+        if (cuts, uncut) == paths_before:
+            raise StudioError(f"no path contains the edge {start}-{end}")
+        return replace(self, cuts=cuts, uncut=uncut)
 
     # Paint, corners, units.
 
@@ -235,9 +235,9 @@ class Choices:
             raise StudioError(f"set the unit of the file before lengths are shown in {shown}")
         return replace(self, units=(str(of_file), str(shown)))
 
-    def flattens_like(self, other: Choices) -> bool:
+    def flattens_like(self, choices: Choices) -> bool:
         """Return whether these choices give the same layout as others."""
-        return replace(self, units=other.units) == other
+        return replace(self, units=choices.units) == choices
 
     # Conversion.
 
@@ -268,9 +268,9 @@ class Choices:
             words["seams"] = (words["seams"], cut) if "seams" in words else cut
         paint = self.paint
         if paint.no_seam:
-            words["no_seams"] = np.array([*paint.no_seam.vertices(), *chain(*self.kept)])
-        elif self.kept:
-            words["no_seams"] = _pairs(self.kept)
+            words["no_seams"] = np.array([*paint.no_seam.vertices(), *chain(*self.uncut)])
+        elif self.uncut:
+            words["no_seams"] = _pairs(self.uncut)
         # Painted regions only restrict searches, not cones that are placed by hand or locked.
         if paint.no_cone and not self.by_hand:
             locked = {cone.vertex for cone in self.cones}
@@ -295,7 +295,7 @@ class Choices:
             "by_hand": self.by_hand,
             "cones": [asdict(cone) for cone in self.cones],
             "cuts": [list(path) for path in self.cuts],
-            "kept": [list(path) for path in self.kept],
+            "kept": [list(path) for path in self.uncut],
             **({"paint": self.paint.as_plain()} if self.paint else {}),
             **({"corners": list(self.corners)} if self.corners else {}),
             **({"units": list(self.units)} if any(self.units) else {}),
@@ -314,15 +314,15 @@ class Choices:
         for name, value in plain["options"].items():
             chosen = chosen.with_option(name, value)
         cones = {}
-        for each in plain["cones"]:
-            vertex = as_vertex("a cone's vertex", each["vertex"])
-            angle = None if each["angle"] is None else as_number("a cone's angle", each["angle"])
+        for record in plain["cones"]:
+            vertex = as_vertex("a cone's vertex", record["vertex"])
+            angle = None if record["angle"] is None else as_number("a cone's angle", record["angle"])
             if vertex in cones:
                 raise StudioError(f"vertex {vertex} is given as a cone twice")
-            cones[vertex] = Cone(vertex, _checked_angle(angle), each["locked"] is True)
+            cones[vertex] = Cone(vertex, _checked_angle(angle), record["locked"] is True)
         chosen = replace(chosen, by_hand=plain["by_hand"] is True)._with_cones(cones)
-        cuts, kept = (tuple(map(_checked, plain[name])) for name in ("cuts", "kept"))
-        chosen = replace(chosen, cuts=cuts, kept=kept, paint=Paint.from_plain(plain.get("paint", {})))
+        cuts, uncut = (tuple(map(_checked, plain[name])) for name in ("cuts", "kept"))
+        chosen = replace(chosen, cuts=cuts, uncut=uncut, paint=Paint.from_plain(plain.get("paint", {})))
         for vertex in dict.fromkeys(plain.get("corners", ())):
             chosen = chosen.with_corner(as_vertex("a corner", vertex))
         units, for_texture = plain.get("units", ("", "")), plain.get("for_texture") is True

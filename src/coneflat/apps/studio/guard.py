@@ -70,13 +70,13 @@ class Guard:
         if not self._proxied and (len(host) != 1 or host[0].lower() not in self._hosts):
             return "the host is not this machine"
         if not self._proxied and any(
-            each.lower() not in {f"http://{name}" for name in self._hosts} for each in origin
+            address.lower() not in {f"http://{name}" for name in self._hosts} for address in origin
         ):
             return "the request comes from another page"
-        given = headers.get(TOKEN_HEADER, [])
-        if scope["path"] == "/" and not given:
+        tokens = headers.get(TOKEN_HEADER, [])
+        if scope["path"] == "/" and not tokens:
             # The token of the page itself is in its address.
-            given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [])
-        if len(given) != 1 or not hmac.compare_digest(given[0].encode(), self._token.encode()):
+            tokens = parse_qs(scope["query_string"].decode("latin-1")).get("token", [])
+        if len(tokens) != 1 or not hmac.compare_digest(tokens[0].encode(), self._token.encode()):
             return "the token is missing or wrong: open the address that the studio has printed"
         return ""

@@ -41,10 +41,10 @@ def page_message(message: str) -> str:
     return _NAMED.sub(_control, message.replace(REPAIR_ADVICE, "repair the mesh"))
 
 
-def _control(found: re.Match[str]) -> str:
-    flag = found["flag"]
-    name = flag.replace("-", "_") if flag else found["name"] or found["first"]
-    return f"“{CONTROLS[name]}”" if name in CONTROLS else f"{found[0]} of coneflat flatten"
+def _control(match: re.Match[str]) -> str:
+    flag = match["flag"]
+    name = flag.replace("-", "_") if flag else match["name"] or match["first"]
+    return f"“{CONTROLS[name]}”" if name in CONTROLS else f"{match[0]} of coneflat flatten"
 
 
 def misplaced_warning(chosen: Choices) -> tuple[str, ...]:
@@ -52,32 +52,32 @@ def misplaced_warning(chosen: Choices) -> tuple[str, ...]:
     inside = sorted({cone.vertex for cone in chosen.cones}.intersection(chosen.paint.no_cone.vertices()))
     if not inside or chosen.for_texture:
         return ()
-    verb, what = ("lies", "vertex") if len(inside) == 1 else ("lie", "vertices")
+    verb, noun = ("lies", "vertex") if len(inside) == 1 else ("lie", "vertices")
     return (
         f"{plural(len(inside), 'cone')} set by hand or locked {verb} in regions painted as “No cones”: "
-        f"{what} {list_some(inside)}. Searches avoid these regions; cones set by hand remain.",
+        f"{noun} {list_some(inside)}. Searches avoid these regions; cones set by hand remain.",
     )
 
 
 def angle_warning(chosen: Choices, result: Flattening) -> tuple[str, ...]:
     """Return a sentence on computed cone angles that are out of bounds because of typed ones, or nothing."""
-    least, most = MIN_CONE_ANGLE, MAX_CONE_ANGLE
+    low, high = MIN_CONE_ANGLE, MAX_CONE_ANGLE
     typed = {cone.vertex for cone in chosen.cones if cone.angle is not None}
     if chosen.for_texture or not (chosen.by_hand and typed):
         return ()
-    slack = 1e-9 * most  # Tolerance for rounding.
+    slack = 1e-9 * high  # Tolerance for rounding.
     names = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
     angles = 2 * math.pi - result.curvatures
     outside = [
         f"vertex {vertex} {math.degrees(angle):.4g}"
         for vertex, angle in sorted(zip(names.tolist(), angles.tolist(), strict=True))
-        if vertex not in typed and not least - slack <= angle <= most + slack
+        if vertex not in typed and not low - slack <= angle <= high + slack
     ]
     if not outside:
         return ()
     return (
-        f"With the typed angles, {plural(len(outside), 'cone')} cannot have an angle from {math.degrees(least):g} to "
-        f"{math.degrees(most):g} degrees: {list_some(outside)}. Change them, or add a cone whose angle is computed.",
+        f"With the typed angles, {plural(len(outside), 'cone')} cannot have an angle from {math.degrees(low):g} to "
+        f"{math.degrees(high):g} degrees: {list_some(outside)}. Change them, or add a cone whose angle is computed.",
     )
 
 
@@ -88,7 +88,7 @@ def with_warnings(result: Flattening, chosen: Choices) -> Flattening:
 
 def command_line(mesh: str, project: str, choices: Choices) -> str:
     """Return a command that maps a mesh with these choices; drawn paths and paint need the project file."""
-    if choices.cuts or choices.kept or choices.paint:
+    if choices.cuts or choices.uncut or choices.paint:
         return shlex.join(["coneflat", choices.command, "--project", project])
     parts = ["coneflat", choices.command, mesh]
     for name, value in choices.keywords().items():
@@ -105,28 +105,28 @@ def command_line(mesh: str, project: str, choices: Choices) -> str:
 
 def python_lines(mesh: str, choices: Choices) -> str:
     """Return Python code that maps a mesh with these choices."""
-    given = [f"    {name}={_written(value)}," for name, value in choices.keywords().items()]
-    if sum(map(len, given)) > 20_000:  # Characters in the panel.
+    arguments = [f"    {name}={_written(value)}," for name, value in choices.keywords().items()]
+    if sum(map(len, arguments)) > 20_000:  # Characters in the panel.
         return "# The drawn paths and the paint are too large to be shown here; they are in the project file."
     start = f"import coneflat\n\nresult = coneflat.{choices.command}(\n    {mesh!r},"
-    return "\n".join([start, *given, ")"])
+    return "\n".join([start, *arguments, ")"])
 
 
 def _written(value: Any) -> str:
     if hasattr(value, "tolist"):
         return repr(value.tolist())
     if isinstance(value, tuple):
-        return f"({', '.join(_written(each) for each in value)})"
+        return f"({', '.join(_written(entry) for entry in value)})"
     if isinstance(value, list) and len(value) > MAX_LISTED:
         return f"[{_ranges(value)}]"
     if isinstance(value, dict) and len(value) > MAX_LISTED:
         # Vertices with the same value are grouped.
         groups: dict[Any, list[int]] = {}
-        for vertex, each in value.items():
-            groups.setdefault(each, []).append(vertex)
+        for vertex, entry in value.items():
+            groups.setdefault(entry, []).append(vertex)
         if len(groups) <= MAX_LISTED:
             parts = (
-                f"**dict.fromkeys([{_ranges(sorted(group))}], {each!r})" for each, group in groups.items()
+                f"**dict.fromkeys([{_ranges(sorted(group))}], {entry!r})" for entry, group in groups.items()
             )
             return f"{{{', '.join(parts)}}}"
     return repr(value)

@@ -88,10 +88,10 @@ class Studio:
         """Return the path of a mesh file; arrays are written to a new file."""
         if faces is None and isinstance(mesh, (str, PathLike)):
             return Path(mesh)
-        given = as_input(mesh, faces)
-        if given.source is not None:
-            return given.source.path
-        vertices, triangles = np.asarray(given.vertices, dtype=np.float64), np.asarray(given.faces)
+        source = as_input(mesh, faces)
+        if source.source is not None:
+            return source.source.path
+        vertices, triangles = np.asarray(source.vertices, dtype=np.float64), np.asarray(source.faces)
         if vertices.ndim != 2 or vertices.shape[1] != 3:
             raise ArrayShapeError(f"vertices must have the shape (n, 3), got {vertices.shape}")
         if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":

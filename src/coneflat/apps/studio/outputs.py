@@ -79,9 +79,9 @@ def quads_file(source: Joined, choices: Choices, count: int, ending: str, report
     options = {name: words[name] for name in QUAD_OPTIONS if name in words}
     if words.get("boundary") == "straight":
         options["boundary"] = "straight"
-    found = quads(source.mesh, quads=count, progress=report, **source.map_options(options))
+    quad_mesh = quads(source.mesh, quads=count, progress=report, **source.map_options(options))
     stream = BytesIO()
-    write_quads_stream(found, stream, ending)
+    write_quads_stream(quad_mesh, stream, ending)
     return stream.getvalue()
 
 
@@ -96,11 +96,11 @@ def curve_data(source: Joined, choices: Choices, report: Progress) -> dict[str, 
 
     words = curve_options(choices)
     n = max(MAX_CONES, len(words.get("required_cones", ())) + 12)  # A dozen of them are free.
-    found = whole_curve(
+    cone_curve = whole_curve(
         source.mesh, read_options({**source.map_options(words), "cone_count": n, "progress": report}), n
     )
-    curve = {"counts": found.counts.tolist(), "distortions": found.distortions.tolist()}
-    return {**curve, "knee": found.knee, "parts": found.parts}
+    curve = {"counts": cone_curve.counts.tolist(), "distortions": cone_curve.distortions.tolist()}
+    return {**curve, "knee": cone_curve.knee, "parts": cone_curve.parts}
 
 
 def curve_options(choices: Choices) -> dict[str, Any]:
@@ -149,8 +149,8 @@ def repaired(source: Joined) -> tuple[CheckedMesh, str]:
     Raises:
         MeshError: no triangle is left, or the arrays are not a mesh.
     """
-    given = as_input(source.mesh)
-    vertices, faces = np.asarray(given.vertices), np.asarray(given.faces)
+    arrays = as_input(source.mesh)
+    vertices, faces = np.asarray(arrays.vertices), np.asarray(arrays.faces)
     try:
         return check_mesh(vertices, faces), ""
     except MeshError as error:
@@ -179,11 +179,13 @@ def own_picture(mesh: MeshFile) -> tuple[Texture, FloatArray] | None:
     with suppress(ConeflatError, AttributeError, TypeError):  # Materials that are not valid are not shown.
         painted = Painted(mesh.path, None)
         layers = {i: layer for i in painted.shown if (layer := painted.layer(BASE, i)) is not None}
-        most = max(layers, key=np.bincount(painted.material).item, default=None)
-        if most is not None:
-            places = np.where((painted.material == most)[:, None, None], painted.placed(layers[most]), np.nan)
+        material = max(layers, key=np.bincount(painted.material).item, default=None)
+        if material is not None:
+            places = np.where(
+                (painted.material == material)[:, None, None], painted.placed(layers[material]), np.nan
+            )
             uv = np.where(np.isfinite(places), places * [1, -1] + [0, 1], -1e6)
-            image = painted.pixels(layers[most])
+            image = painted.pixels(layers[material])
             step = -(-max(image.shape) // DECLARED["resolution"].default)
             return encode_png(np.ascontiguousarray(image[::step, ::step])), uv.reshape(-1, 2)
     return None
@@ -194,8 +196,8 @@ def without_layout(checked: CheckedMesh) -> Flattening:
     mesh, zeros, none = checked.mesh, np.zeros(len(checked.mesh.vertices)), np.empty(0, dtype=np.int64)
     # In a skew projection the triangles of boxes have areas, too, which a simplification for display needs.
     uv = mesh.vertices @ np.array([[0.92, 0.13], [0.31, 0.84], [0.23, 0.51]])
-    each = np.ones(len(mesh.faces))
-    unknown: Any = SimpleNamespace(qc=each, log_area_scale=0 * each)
+    ones = np.ones(len(mesh.faces))
+    unknown: Any = SimpleNamespace(qc=ones, log_area_scale=0 * ones)
     return Flattening(
         mesh.vertices, mesh.faces, uv, mesh.faces, 1.0, none, zeros[:0], zeros, zeros, zeros, mesh.edges[:0], 0.0,
         unknown, {}, vertex_origin=checked.vertex_origin,

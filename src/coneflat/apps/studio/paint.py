@@ -52,8 +52,8 @@ class Region:
             raise StudioError(f"a region must be a text such as 3-17 20, got {short_repr(text)}")
         runs, count = [np.empty(0, dtype=np.int64)], 0
         for word in text.split():
-            found = _RUN.fullmatch(word)
-            first, last = (found[1], found[2] or found[1]) if found else ("1", "0")
+            match = _RUN.fullmatch(word)
+            first, last = (match[1], match[2] or match[1]) if match else ("1", "0")
             if int(first) > int(last):
                 raise StudioError(f"a region must be a text such as 3-17 20; {short_repr(word)} is not valid")
             count += int(last) - int(first) + 1
@@ -72,13 +72,13 @@ class Region:
         """Return the vertices, ascending."""
         return [vertex for first, last in self.runs for vertex in range(first, last + 1)]
 
-    def joined(self, other: Region) -> Region:
+    def joined(self, region: Region) -> Region:
         """Return the union of two regions."""
-        return Region.of_vertices(self.vertices() + other.vertices())
+        return Region.of_vertices(self.vertices() + region.vertices())
 
-    def without(self, other: Region) -> Region:
+    def without(self, region: Region) -> Region:
         """Return the vertices of this region that are not in another."""
-        return Region.of_vertices(np.setdiff1d(self.vertices(), other.vertices()))
+        return Region.of_vertices(np.setdiff1d(self.vertices(), region.vertices()))
 
     def __bool__(self) -> bool:
         return bool(self.text)
@@ -118,10 +118,13 @@ class Paint:
             raise StudioError(
                 f"an importance must be above 0 and at most {MAX_IMPORTANCE:,.0f}, got {weight:g}"
             )
-        known = {each: region.without(where) for each, region in self.importance}
+        regions = {factor: region.without(where) for factor, region in self.importance}
         if weight != 1:
-            known[weight] = known.get(weight, Region()).joined(where)
-        return replace(self, importance=tuple((each, known[each]) for each in sorted(known) if known[each]))
+            regions[weight] = regions.get(weight, Region()).joined(where)
+        return replace(
+            self,
+            importance=tuple((factor, regions[factor]) for factor in sorted(regions) if regions[factor]),
+        )
 
     def erased(self, where: Region) -> Paint:
         """Return paint with all layers erased at some vertices."""
@@ -151,12 +154,12 @@ class Paint:
             AttributeError, ValueError: the values do not have the structure of paint.
         """
         paint = cls()
-        for name, given in plain.items():
+        for name, layer in plain.items():
             if name == "importance":
-                for weight, text in given.items():
+                for weight, text in layer.items():
                     paint = paint.with_weight(float(weight), Region.of_text(text))
             else:
-                paint = paint.with_flag(name, Region.of_text(given))
+                paint = paint.with_flag(name, Region.of_text(layer))
         return paint
 
     def with_stroke(self, layer: object, where: Region, weight: object) -> Paint:

@@ -58,12 +58,12 @@ class Project:
             ProjectError: the mesh has been changed since, or is missing.
         """
         try:
-            found = file_hash(self.mesh)
+            sha256 = file_hash(self.mesh)
         except MeshFileError as error:
             raise ProjectError(f"the project's mesh is missing: {error}") from error
-        if found != self.sha256:
+        if sha256 != self.sha256:
             raise ProjectError(
-                f"{self.mesh} is not the mesh that the project was made with: its SHA-256 begins with {found[:12]}, "
+                f"{self.mesh} is not the mesh that the project was made with: its SHA-256 begins with {sha256[:12]}, "
                 f"not {self.sha256[:12]}, so vertex numbers may have changed"
             )
 
@@ -161,8 +161,14 @@ def open_project(path: Path, folder: Path, only_within: bool = False) -> tuple[P
 
 def safe_name(name: str) -> str:
     """Return a file name that every system accepts, without invisible characters and those that reorder text."""
-    kept = "".join("_" if each in '<>:"|?*' else each for each in name if category(each)[0] != "C")
-    return f"_{kept}" if re.match(r"(?i)(con|prn|aux|nul|(com|lpt)[0-9¹²³])\s*(\.|$)", kept) else kept
+    printable = "".join(
+        "_" if character in '<>:"|?*' else character for character in name if category(character)[0] != "C"
+    )
+    return (
+        f"_{printable}"
+        if re.match(r"(?i)(con|prn|aux|nul|(com|lpt)[0-9¹²³])\s*(\.|$)", printable)
+        else printable
+    )
 
 
 def file_within(name: str, folder: Path) -> Path:

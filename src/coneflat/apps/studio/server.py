@@ -104,12 +104,12 @@ def studio_app(session: Session, token: str, port: int, **access: bool) -> ASGIA
         after = _number(request, "after")
         if isinstance(after, int):
             await notifier.wait_for_change(session, after, 20.0)  # Seconds.
-        known = _number(request, "chosen")
-        return JSONResponse(await run_sync(session.state, known if isinstance(known, int) else 0))
+        received = _number(request, "chosen")
+        return JSONResponse(await run_sync(session.state, received if isinstance(received, int) else 0))
 
     async def layout(request: Request) -> Response:
-        known = _number(request, "known")
-        shown = await run_sync(session.picture, known if isinstance(known, int) else 0)
+        received = _number(request, "known")
+        shown = await run_sync(session.picture, received if isinstance(received, int) else 0)
         if shown is None:
             raise StudioError("there is no layout yet")
         head = json.dumps(shown[0]).encode("ascii")
@@ -136,8 +136,8 @@ def studio_app(session: Session, token: str, port: int, **access: bool) -> ASGIA
         return JSONResponse(await run_sync(session.curve))
 
     async def upload(request: Request) -> Response:
-        given = file_within(request.query_params.get("name", ""), session.folder)
-        path = file_within(safe_name(given.name), session.folder)
+        requested = file_within(request.query_params.get("name", ""), session.folder)
+        path = file_within(safe_name(requested.name), session.folder)
         if path.suffix.lower() not in (*INPUT_FORMATS, ".json"):
             raise StudioError(f"{path.name} is not in a format that can be read: {', '.join(INPUT_FORMATS)}")
         before = set(session.folder.glob("*"))  # none if the folder is gone
@@ -145,8 +145,8 @@ def studio_app(session: Session, token: str, port: int, **access: bool) -> ASGIA
         try:
             await run_sync(session.open_named, stored.name)
         except ConeflatError:
-            for new in {stored} - before:
-                new.unlink(missing_ok=True)
+            for uploaded in {stored} - before:
+                uploaded.unlink(missing_ok=True)
             raise
         return JSONResponse({"version": session.version})
 
@@ -183,7 +183,7 @@ async def _refused(request: Request, error: Exception) -> Response:
     return PlainTextResponse(message, 400)
 
 
-async def _parts(request: Request, most: int) -> AsyncIterator[bytes]:
+async def _parts(request: Request, limit: int) -> AsyncIterator[bytes]:
     """Yield the content of a request, at most `most` bytes.
 
     Raises:
@@ -192,8 +192,8 @@ async def _parts(request: Request, most: int) -> AsyncIterator[bytes]:
     size = 0
     async for part in request.stream():
         size += len(part)
-        if size > most:
-            raise TooLarge(f"the request is larger than the limit of {most:,} bytes")
+        if size > limit:
+            raise TooLarge(f"the request is larger than the limit of {limit:,} bytes")
         yield part
 
 

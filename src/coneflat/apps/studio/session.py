@@ -28,7 +28,7 @@ class _Shown(NamedTuple):
     """What is shown: page data, cones, seconds per stage, warnings, the job, and whether there is no layout."""
 
     shown: tuple[Head, bytes] | None = None
-    found: Sequence[int] = ()
+    cones: Sequence[int] = ()
     seconds: Mapping[str, float] = MappingProxyType({})
     warnings: Sequence[str] = ()
     job: int = 0
@@ -68,7 +68,7 @@ class Session:
         self._trouble: dict[str, Any] | None = None
         self._current = _Shown()
         self._cached_texts: tuple[int, tuple[str, ...], dict[str, str]] = 0, (), {}
-        self._known = SentPictures()
+        self._sent = SentPictures()
         self._last: _Shown | None = None  # The last final layout, while a preview is shown.
         self._answers: dict[int, tuple[Head, bytes]] = {}
         self._curves: dict[tuple[str, str], dict[str, Any]] = {}
@@ -136,7 +136,7 @@ class Session:
                     self._apply_step(before)
             else:
                 try:
-                    chosen = STEPS[str(kind)](history.now, action, self._current.found)
+                    chosen = STEPS[str(kind)](history.now, action, self._current.cones)
                 except (KeyError, TypeError) as error:
                     raise StudioError(f"the action {short_repr(dict(action))} is not valid") from error
                 self._take_step(chosen, action.get("stroke"))
@@ -209,10 +209,10 @@ class Session:
         """Return the seconds that each stage of the current layout took."""
         return dict(self._current.seconds)
 
-    def state(self, known: int = 0) -> dict[str, Any]:
+    def state(self, received: int = 0) -> dict[str, Any]:
         """Return the state of the session as values for JSON.
 
-        known: number (`chosen`) of the choices that the caller has; they are left out then, because they may be large.
+        received: number (`chosen`) of the choices that the caller has; these are left out, because they may be large.
         """
         with self._changed:
             undo, redo = self._history.depth
@@ -234,10 +234,10 @@ class Session:
                 "early": self.is_early,
                 "bare": shown.is_bare,
                 "stale": is_stale,
-                "found": list(shown.found),
+                "found": list(shown.cones),
                 "seconds": sum(shown.seconds.values()),
                 "warnings": [*warnings, *(() if is_stale else shown.warnings)],
-                **({} if known == self._chosen else {"choices": self._history.now.as_plain(), **texts}),
+                **({} if received == self._chosen else {"choices": self._history.now.as_plain(), **texts}),
             }
 
     def _choice_texts(self, project: str) -> tuple[tuple[str, ...], dict[str, str]]:
@@ -250,13 +250,13 @@ class Session:
             self._cached_texts = self._chosen, misplaced_warning(chosen), texts
         return self._cached_texts[1:]
 
-    def picture(self, known: int = 0) -> tuple[Head, bytes] | None:
+    def picture(self, received: int = 0) -> tuple[Head, bytes] | None:
         """Return the page data of the current layout: numbers and texts, and arrays; None if there is none yet.
 
-        known: number of the page data that the caller has; arrays that have not changed are left out.
+        received: number of the page data that the caller has; arrays that have not changed are left out.
         """
         with self._changed:
-            return None if self._current.shown is None else self._known.without(known, self._current.shown)
+            return None if self._current.shown is None else self._sent.without(received, self._current.shown)
 
     def export(self, ending: str) -> bytes:
         """Return the content of a file of the result.
@@ -368,7 +368,7 @@ class Session:
 
     def _show(self, data: Head, body: bytes, job: int, is_bare: bool = False) -> None:
         self.layout += 1
-        picture = self._known.numbered((data["head"], body))
+        picture = self._sent.numbered((data["head"], body))
         self._current = _Shown(
             picture, data["found"], data["seconds"], data.get("warnings", ()), job, is_bare
         )

@@ -13,7 +13,7 @@ from .paint import Region
 
 def _step(change: Callable[..., Choices]) -> Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]:
     """Return a step that first turns the cones that a search has found into placed cones."""
-    return lambda chosen, action, found: change(chosen.placed(found), action)
+    return lambda chosen, action, cones: change(chosen.placed(cones), action)
 
 
 def _angle(action: Mapping[str, Any]) -> float | None:
@@ -27,22 +27,22 @@ def _vertex(action: Mapping[str, Any], name: str = "vertex") -> int:
 
 #: For each kind of step, a function (choices before, action, cones found by the search) -> choices after.
 STEPS: dict[str, Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]] = {
-    "set": lambda chosen, action, found: chosen.with_option(action["name"], action["value"]),
+    "set": lambda chosen, action, cones: chosen.with_option(action["name"], action["value"]),
     "hand": _step(lambda chosen, action: chosen),
     "add": _step(lambda chosen, action: chosen.added(_vertex(action), _angle(action))),
     "move": _step(lambda chosen, action: chosen.moved(_vertex(action), _vertex(action, "to"))),
     "remove": _step(lambda chosen, action: chosen.removed(_vertex(action))),
     "angle": _step(lambda chosen, action: chosen.with_angle(_vertex(action), _angle(action))),
-    "lock": lambda chosen, action, found: chosen.locked(_vertex(action), action["locked"] is True),
-    "cut": lambda chosen, action, found: chosen.cut(tuple(action["path"])),
-    "keep": lambda chosen, action, found: chosen.with_kept(tuple(action["path"])),
-    "erase": lambda chosen, action, found: chosen.erased(*(as_vertex("a vertex", v) for v in action["edge"])),
-    "paint": lambda chosen, action, found: chosen.painted(
+    "lock": lambda chosen, action, cones: chosen.locked(_vertex(action), action["locked"] is True),
+    "cut": lambda chosen, action, cones: chosen.cut(tuple(action["path"])),
+    "keep": lambda chosen, action, cones: chosen.with_uncut(tuple(action["path"])),
+    "erase": lambda chosen, action, cones: chosen.erased(*(as_vertex("a vertex", v) for v in action["edge"])),
+    "paint": lambda chosen, action, cones: chosen.painted(
         action["layer"], Region.of_text(action["where"]), action.get("weight")
     ),
-    "corner": lambda chosen, action, found: chosen.with_corner(_vertex(action)),
-    "texture": lambda chosen, action, found: chosen.with_texture(action["value"] is True),
-    "units": lambda chosen, action, found: chosen.with_units(action["of_file"], action["shown"]),
+    "corner": lambda chosen, action, cones: chosen.with_corner(_vertex(action)),
+    "texture": lambda chosen, action, cones: chosen.with_texture(action["value"] is True),
+    "units": lambda chosen, action, cones: chosen.with_units(action["of_file"], action["shown"]),
 }
 
 

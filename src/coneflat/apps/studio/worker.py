@@ -118,8 +118,8 @@ def with_hashes(head: Head, block: bytes) -> Head:
     view = memoryview(block)
     # With 16 bytes, hashes of different arrays do not collide by chance.
     arrays = [
-        {**each, "print": blake2b(view[slice(*_span(each))], digest_size=16).hexdigest()}
-        for each in head["arrays"]
+        {**entry, "print": blake2b(view[slice(*_span(entry))], digest_size=16).hexdigest()}
+        for entry in head["arrays"]
     ]
     return {**head, "arrays": arrays}
 
@@ -135,7 +135,7 @@ class SentPictures:
         """Return page data with a new number, from 1 on, and store the hashes of its arrays."""
         head, block = picture
         self._count += 1
-        self._hashes[self._count] = {each["name"]: each["print"] for each in head["arrays"]}
+        self._hashes[self._count] = {entry["name"]: entry["print"] for entry in head["arrays"]}
         if len(self._hashes) > 16:  # The page is never further behind than this.
             self._hashes.popitem(last=False)
         return {**head, "number": self._count}, block
@@ -145,13 +145,13 @@ class SentPictures:
         head, block = picture
         hashes = self._hashes.get(number, {})
         arrays, parts, offset = [], [], 0
-        for each in head["arrays"]:
-            if hashes.get(each["name"]) == each["print"]:
-                arrays.append({**each, "offset": None})
+        for entry in head["arrays"]:
+            if hashes.get(entry["name"]) == entry["print"]:
+                arrays.append({**entry, "offset": None})
                 continue
-            begin, end = _span(each)
+            begin, end = _span(entry)
             end += -end % 4  # Arrays are aligned to 4 bytes in the block.
-            arrays.append({**each, "offset": offset})
+            arrays.append({**entry, "offset": offset})
             parts.append(memoryview(block)[begin:end])
             offset += end - begin
         return {**head, "arrays": arrays}, b"".join(parts)

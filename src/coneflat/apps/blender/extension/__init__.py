@@ -55,7 +55,7 @@ def _panels(space: str, prefix: str) -> list[type]:
     """Return the panels in the sidebar of an editor: one for all commands, and one in it for each."""
     place = {"bl_space_type": space, "bl_region_type": "UI", "bl_category": "coneflat"}
     main = f"{prefix}_PT_coneflat"
-    found = [type(main, (bpy.types.Panel,), {**place, "bl_label": "coneflat", "draw": _draw_main})]
+    panels = [type(main, (bpy.types.Panel,), {**place, "bl_label": "coneflat", "draw": _draw_main})]
     for operator in COMMAND_OPERATORS:
         body = {
             **place,
@@ -64,8 +64,8 @@ def _panels(space: str, prefix: str) -> list[type]:
             "bl_options": set() if operator.command == "unwrap" else {"DEFAULT_CLOSED"},
             "draw": _draw_command(operator),
         }
-        found.append(type(f"{main}_{operator.command}", (bpy.types.Panel,), body))
-    return found
+        panels.append(type(f"{main}_{operator.command}", (bpy.types.Panel,), body))
+    return panels
 
 
 PANELS = [*_panels("VIEW_3D", "VIEW3D"), *_panels("IMAGE_EDITOR", "IMAGE")]
@@ -86,8 +86,8 @@ _CLASSES = (*GROUPS.values(), Settings, Preferences, *OPERATORS, *PANELS)
 
 def register() -> None:
     """Add the classes, the settings of scenes and the entries of menus."""
-    for each in _CLASSES:
-        bpy.utils.register_class(each)
+    for registered in _CLASSES:
+        bpy.utils.register_class(registered)
     bpy.types.Scene.coneflat = bpy.props.PointerProperty(type=Settings)
     for menu in MENUS:
         getattr(bpy.types, menu).append(draw_menu)
@@ -100,5 +100,5 @@ def unregister() -> None:
     for menu in MENUS:
         getattr(bpy.types, menu).remove(draw_menu)
     del bpy.types.Scene.coneflat
-    for each in reversed(_CLASSES):
-        bpy.utils.unregister_class(each)
+    for registered in reversed(_CLASSES):
+        bpy.utils.unregister_class(registered)

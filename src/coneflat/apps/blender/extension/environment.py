@@ -46,12 +46,12 @@ def python_in(folder: Path) -> Path:
     return folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
 
 
-def find(named: str, own: Path) -> Environment:
+def find(named: str, folder: Path) -> Environment:
     """Return the environment that a user names, else the extension's own, else one on the PATH.
 
     Args:
         named: a Python executable or a folder of an environment; "" for none.
-        own: the folder of the extension's environment, which may not exist.
+        folder: the folder of the extension's environment, which may not exist.
 
     Raises:
         Failure: there is none, or the named one cannot run coneflat.
@@ -61,13 +61,13 @@ def find(named: str, own: Path) -> Environment:
         return _checked((str(python_in(path) if path.is_dir() else path), "-m", "coneflat"))
     reason = f"coneflat is not installed: {HINT}"
     module = ("-m", "coneflat")
-    own_python = str(python_in(own))
+    own_python = str(python_in(folder))
     programs = ((own_python, module), ("coneflat", ()), ("python3", module), ("python", module))
-    for name, rest in programs:
+    for name, words in programs:
         program = shutil.which(name)
         try:
             if program is not None:
-                return _checked((program, *rest))
+                return _checked((program, *words))
         except Failure as failure:
             reason = str(failure) if name == own_python else reason
     raise Failure(reason)
@@ -105,11 +105,13 @@ def _output(command: Sequence[str]) -> tuple[int, str]:
     return done.returncode, done.stdout
 
 
-def install_commands(own: Path, requirement: str, wheels: str, online: bool) -> list[tuple[str, list[str]]]:
+def install_commands(
+    folder: Path, requirement: str, wheels: str, online: bool
+) -> list[tuple[str, list[str]]]:
     """Return the commands that make the extension's environment, each with a name for messages.
 
     Args:
-        own: the folder of the environment; what it contains is removed.
+        folder: the folder of the environment; what it contains is removed.
         requirement: what pip installs; "" for coneflat, which is not in the package index, from the folder of wheels.
         wheels: a folder of wheels, to install without a network; "" for none.
         online: whether Blender allows access to the network.
@@ -125,10 +127,10 @@ def install_commands(own: Path, requirement: str, wheels: str, online: bool) -> 
         raise Failure(f"online access is off: allow it; or, {HINT}")
     source = ["--no-index", "--find-links", wheels] if wheels else ["--retries", "1"]
     quiet = ["--disable-pip-version-check", "--no-input", "--progress-bar", "off"]
-    python = str(python_in(own))
+    python = str(python_in(folder))
     needed = requirement.strip() or f"coneflat>={KNOWN['version']}"
     return [
-        ("make environment", [_base_python(), "-m", "venv", "--clear", str(own)]),
+        ("make environment", [_base_python(), "-m", "venv", "--clear", str(folder)]),
         ("install coneflat", [python, "-m", "pip", "install", *quiet, *source, needed]),
         # Else the first unwrapping would take half a minute longer.
         ("compile coneflat", [python, "-m", "coneflat", "warm-up", "-q"]),
@@ -137,8 +139,11 @@ def install_commands(own: Path, requirement: str, wheels: str, online: bool) -> 
 
 def _base_python() -> str:
     """Return a Python that can make environments: Blender's own, which is always there, or one on the PATH."""
-    own = sys.executable if Path(sys.executable).name.lower().startswith("python") else None
-    for program in (own, *map(shutil.which, ("python3.12", "python3.11", "python3.10", "python3", "python"))):
+    running = sys.executable if Path(sys.executable).name.lower().startswith("python") else None
+    for program in (
+        running,
+        *map(shutil.which, ("python3.12", "python3.11", "python3.10", "python3", "python")),
+    ):
         if program and _output([program, "-c", _CAN_MAKE])[1].strip().endswith("True"):
             return program
     raise Failure(f"no Python 3.10 or later with venv was found: {HINT}")

@@ -74,7 +74,7 @@ def arguments(records: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -
         records: the options of the command.
         values: their values by name; weights are the names of vertex groups.
     """
-    found = list[str]()
+    words = list[str]()
     for record in records:
         name, value, kind = record["name"], values[record["name"]], record["kind"]
         is_default = value in (record["default"], "")
@@ -84,8 +84,8 @@ def arguments(records: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -
             # The angles that are wanted exactly are integers in degrees.
             texts = {"angle": "={1:.5g}deg", "number": "={0:.7g}", "flag": ""}
             text = f"={name}" if names_group(record, value) else texts.get(kind, "={0}")
-            found.append(_flag(name) + text.format(value, math.degrees(value) if kind == "angle" else 0))
-    return found
+            words.append(_flag(name) + text.format(value, math.degrees(value) if kind == "angle" else 0))
+    return words
 
 
 def _flag(name: str) -> str:
@@ -104,8 +104,8 @@ def write_parts(folder: Path, parts: Sequence[Part]) -> list[str]:
     for axis, column in zip("xyz", np.concatenate([part.positions for part in parts]).T, strict=True):
         rows[axis] = column
     for name in names:
-        whole = [part.weights.get(name, np.zeros(len(part.positions))) for part in parts]
-        rows[name] = FULL_WEIGHT ** np.clip(np.concatenate(whole), 0, 1)
+        weights = [part.weights.get(name, np.zeros(len(part.positions))) for part in parts]
+        rows[name] = FULL_WEIGHT ** np.clip(np.concatenate(weights), 0, 1)
     sizes, corners = _joined(parts)
     # Each polygon is its number of corners and its corners, all of them 32-bit integers.
     words = np.empty(len(sizes) + len(corners), "<i4")
@@ -117,14 +117,14 @@ def write_parts(folder: Path, parts: Sequence[Part]) -> list[str]:
     properties += f"element face {len(sizes)}\nproperty list int int vertex_indices\n"
     header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\n{properties}end_header\n"
     (folder / MESH).write_bytes(header.encode() + rows.tobytes() + words.tobytes())
-    found = [MESH, "-o", RESULT, "--no-weld"]
+    options = [MESH, "-o", RESULT, "--no-weld"]
     for name in sorted(set().union(*(part.lists for part in parts))):
         pairs = zip(parts, starts, strict=False)
         rows = np.concatenate([part.lists[name] + start for part, start in pairs if name in part.lists])
         if len(rows):
             np.savetxt(folder / f"{name}.txt", rows, fmt="%d")
-            found += [_flag(name), f"{name}.txt"]
-    return found
+            options += [_flag(name), f"{name}.txt"]
+    return options
 
 
 def _starts(parts: Sequence[Part]) -> list[int]:
@@ -147,35 +147,35 @@ def read_maps(folder: Path, parts: Sequence[Part]) -> tuple[list[Map], dict[str,
     Raises:
         Failure: the result does not fit the parts.
     """
-    found = _load(folder)
+    result = _load(folder)
     sizes, corners = _joined(parts)
     starts = _starts(parts)
     count = starts[-1]
-    origin = found["vertex_origin"]
-    polygon = np.repeat(np.arange(len(sizes)), sizes - 2)[found["face_origin"]]
-    wanted = polygon[:, None] * count + origin[found["faces"]]
-    known = np.repeat(np.arange(len(sizes)), sizes) * count + corners
-    order = np.argsort(known)
-    place = np.minimum(np.searchsorted(known, wanted, sorter=order), len(known) - 1)
+    origin = result["vertex_origin"]
+    polygon = np.repeat(np.arange(len(sizes)), sizes - 2)[result["face_origin"]]
+    corner_keys = polygon[:, None] * count + origin[result["faces"]]
+    polygon_keys = np.repeat(np.arange(len(sizes)), sizes) * count + corners
+    order = np.argsort(polygon_keys)
+    place = np.minimum(np.searchsorted(polygon_keys, corner_keys, sorter=order), len(polygon_keys) - 1)
     corner = order[place]
-    is_there = known[corner] == wanted
-    points = found["uv"][found["uv_faces"]]
+    is_there = polygon_keys[corner] == corner_keys
+    points = result["uv"][result["uv_faces"]]
     uv = np.full((len(corners), 2), np.nan)
     uv[corner[is_there]] = points[is_there]
     differs = is_there & (uv[corner] != points).any(axis=2)
     torn = np.unique(polygon[differs.any(axis=1)])
-    seams, cones = origin[found["seams"]].reshape(-1, 2), origin[found["cones"]]
+    seams, cones = origin[result["seams"]].reshape(-1, 2), origin[result["cones"]]
     lengths = [(len(part.positions), len(part.corners), len(part.sizes)) for part in parts]
     # The part of each vertex, corner and polygon.
     of_vertex, of_corner, of_polygon = (
-        np.repeat(np.arange(len(parts)), each) for each in zip(*lengths, strict=True)
+        np.repeat(np.arange(len(parts)), lengths_of) for lengths_of in zip(*lengths, strict=True)
     )
     maps = []
     for i, start in enumerate(starts[:-1]):
         own_seams = seams[of_vertex[seams[:, 0]] == i] - start
         own_cones = cones[of_vertex[cones] == i] - start
         maps.append(Map(uv[of_corner == i], own_seams, own_cones, int((of_polygon[torn] == i).sum())))
-    return maps, json.loads(str(found["report"]))
+    return maps, json.loads(str(result["report"]))
 
 
 def read_quads(folder: Path) -> tuple[dict[str, NDArray[Any]], list[str]]:
@@ -184,8 +184,8 @@ def read_quads(folder: Path) -> tuple[dict[str, NDArray[Any]], list[str]]:
     Raises:
         Failure: there is no result.
     """
-    found = _load(folder)
-    return found, json.loads(str(found["report"]))["notes"]
+    result = _load(folder)
+    return result, json.loads(str(result["report"]))["notes"]
 
 
 def _load(folder: Path) -> dict[str, NDArray[Any]]:

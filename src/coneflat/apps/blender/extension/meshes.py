@@ -53,13 +53,13 @@ def chosen_objects(context: Any) -> list[Any]:
     """
     in_edit = context.mode == "EDIT_MESH"
     objects = context.objects_in_mode if in_edit else context.selected_objects
-    found = {each.data: each for each in reversed(list(objects)) if each.type == "MESH"}
-    if not found:
+    by_mesh = {item.data: item for item in reversed(list(objects)) if item.type == "MESH"}
+    if not by_mesh:
         raise Failure("no mesh object is selected")
-    for each in found.values():
-        if each.data.library is not None:
-            raise Failure(f"{each.name} is linked from another file and cannot be changed")
-    return sorted(found.values(), key=lambda each: each.name)
+    for item in by_mesh.values():
+        if item.data.library is not None:
+            raise Failure(f"{item.name} is linked from another file and cannot be changed")
+    return sorted(by_mesh.values(), key=lambda item: item.name)
 
 
 @contextmanager
@@ -120,23 +120,23 @@ def read_source(
     is_base = mesh == item.data and mesh.shape_keys is not None
     rows = mesh.shape_keys.reference_key.data if is_base else mesh.vertices
     positions = values(rows, "co", np.float64, 3)[vertices] @ frame[:3, :3].T + frame[:3, 3]
-    used, times = np.unique(edges, return_counts=True)
+    edge_numbers, times = np.unique(edges, return_counts=True)
     is_cut = np.zeros(len(mesh.edges), bool)
     if marks != "NONE":
-        own = own_seams(mesh) if marks == "OWN" else False
-        is_cut |= values(mesh.edges, "use_seam", bool) & ~np.asarray(own)
+        own_marks = own_seams(mesh) if marks == "OWN" else False
+        is_cut |= values(mesh.edges, "use_seam", bool) & ~np.asarray(own_marks)
     if sharp:
         is_cut |= values(mesh.edges, "use_edge_sharp", bool)
-    inner = used[(times > 1) & is_cut[used]]
+    inner = edge_numbers[(times > 1) & is_cut[edge_numbers]]
     ends = values(mesh.edges, "vertices", np.int64, 2)[inner]
     weights, lists = {}, {"seams": np.searchsorted(vertices, ends).reshape(-1, 2)}
     for option, (name, kind) in groups.items():
         if name in item.vertex_groups:
-            found = _weights(mesh, item.vertex_groups[name].index)[vertices]
+            group_weights = _weights(mesh, item.vertex_groups[name].index)[vertices]
             if kind == "vertices":
-                lists[option] = np.flatnonzero(found >= 0.5)
+                lists[option] = np.flatnonzero(group_weights >= 0.5)
             else:
-                weights[option] = found
+                weights[option] = group_weights
     part = Part(item.name, positions, corners.reshape(-1), sizes, weights, lists)
     return Source(item.name, part, vertices, loops, edges, bool(determinant < 0), counts(mesh))
 
@@ -148,8 +148,10 @@ def counts(mesh: Any) -> tuple[int, int, int]:
 
 def _weights(mesh: Any, group: int) -> NDArray[np.float64]:
     """Return (n,) the weights of a vertex group, 0 outside."""
-    found = [next((each.weight for each in v.groups if each.group == group), 0.0) for v in mesh.vertices]
-    return np.array(found, np.float64)
+    weights = [
+        next((member.weight for member in v.groups if member.group == group), 0.0) for v in mesh.vertices
+    ]
+    return np.array(weights, np.float64)
 
 
 def own_seams(mesh: Any) -> NDArray[np.bool_]:
@@ -162,7 +164,7 @@ def own_seams(mesh: Any) -> NDArray[np.bool_]:
 
 def left_as_is(item: Any, applied: bool) -> list[str]:
     """Return a note that says which modifiers and shape keys of an object are used or not, or no note."""
-    names = ", ".join(each.name for each in item.modifiers if each.show_viewport)
+    names = ", ".join(modifier.name for modifier in item.modifiers if modifier.show_viewport)
     words = [f"modifiers {names} are {'applied' if applied else 'not applied'}"] if names else []
     if item.data.shape_keys is not None:
         words.append("shape keys are applied" if applied else "of the shape keys, the basis is used")
@@ -188,12 +190,12 @@ def check_uv_map(item: Any, name: str) -> None:
         raise Failure(f"{item.name} has {len(layers)} UV maps, and {name} cannot be added")
 
 
-def write_map(source: Source, found: Map, name: str, *, mark: bool, select: str) -> None:
+def write_map(source: Source, layout: Map, name: str, *, mark: bool, select: str) -> None:
     """Write UVs, seams and cones of a part to the mesh of its object, in object mode.
 
     Args:
         source: the part as it was read.
-        found: its UVs.
+        layout: its UVs.
         name: the UV map, which is added if it does not exist; "" for the active one.
         mark: mark the cut edges as seams.
         select: what to select: SEAMS, CONES or NONE.
@@ -206,16 +208,16 @@ def write_map(source: Source, found: Map, name: str, *, mark: bool, select: str)
     layer = layer or mesh.uv_layers.new(name=name or "UVMap", do_init=False)
     mesh.uv_layers.active = layer
     uv = values(layer.data, "uv", np.float64, 2)
-    has_uv = np.isfinite(found.uv).all(axis=1)
-    uv[source.loops[has_uv]] = found.uv[has_uv]
+    has_uv = np.isfinite(layout.uv).all(axis=1)
+    uv[source.loops[has_uv]] = layout.uv[has_uv]
     layer.data.foreach_set("uv", uv.astype(np.float32).ravel())
-    cut = _edges_between(mesh, source, found.seams)
+    cut = _edges_between(mesh, source, layout.seams)
     if mark:
         _mark(mesh, source, cut)
     if select == "SEAMS":
         _select(mesh, np.unique(values(mesh.edges, "vertices", np.int64, 2)[cut]), cut)
     elif select == "CONES":
-        _select(mesh, source.vertices[found.cones], [])
+        _select(mesh, source.vertices[layout.cones], [])
     mesh.update()
 
 
@@ -224,20 +226,20 @@ def _edges_between(mesh: Any, source: Source, pairs: NDArray[np.int64]) -> NDArr
     edges = np.unique(source.edges)
     n = len(source.vertices)
     ends = np.searchsorted(source.vertices, values(mesh.edges, "vertices", np.int64, 2)[edges])
-    known, wanted = (rows.min(axis=1) * n + rows.max(axis=1) for rows in (ends, pairs))
-    return edges[np.isin(known, wanted)]
+    edge_keys, pair_keys = (rows.min(axis=1) * n + rows.max(axis=1) for rows in (ends, pairs))
+    return edges[np.isin(edge_keys, pair_keys)]
 
 
 def _mark(mesh: Any, source: Source, cut: NDArray[np.int64]) -> None:
     """Mark the cut edges of a part, instead of those that coneflat has marked before."""
-    seam, own = values(mesh.edges, "use_seam", bool), own_seams(mesh)
-    seam[source.edges] &= ~own[source.edges]
-    own[source.edges] = False
-    own[cut[~seam[cut]]] = True
+    seam, is_own = values(mesh.edges, "use_seam", bool), own_seams(mesh)
+    seam[source.edges] &= ~is_own[source.edges]
+    is_own[source.edges] = False
+    is_own[cut[~seam[cut]]] = True
     seam[cut] = True
     mesh.edges.foreach_set("use_seam", seam)
     attribute = mesh.attributes.get(OWN_SEAMS) or mesh.attributes.new(OWN_SEAMS, "BOOLEAN", "EDGE")
-    attribute.data.foreach_set("value", own)
+    attribute.data.foreach_set("value", is_own)
 
 
 def _select(mesh: Any, vertices: Sequence[int] | NDArray[Any], edges: Sequence[int] | NDArray[Any]) -> None:
@@ -248,7 +250,7 @@ def _select(mesh: Any, vertices: Sequence[int] | NDArray[Any], edges: Sequence[i
         rows.foreach_set("select", flags)
 
 
-def add_quads(source: Source, found: dict[str, NDArray[Any]], select: bool) -> Any:
+def add_quads(source: Source, result: dict[str, NDArray[Any]], select: bool) -> Any:
     """Add an object with quads beside the object that they were made of, and return it.
 
     select: select the irregular vertices.
@@ -261,16 +263,16 @@ def add_quads(source: Source, found: dict[str, NDArray[Any]], select: bool) -> A
     added = bpy.data.objects.new(f"{item.name}_quads", mesh)
     added.matrix_world = item.matrix_world.copy()
     frame = np.array(added.matrix_basis, np.float64)  # This has no shear, which parents can cause.
-    points = found["vertices"] * ([-1, 1, 1] if source.is_mirrored else [1, 1, 1]) - frame[:3, 3]
+    points = result["vertices"] * ([-1, 1, 1] if source.is_mirrored else [1, 1, 1]) - frame[:3, 3]
     local = np.linalg.solve(frame[:3, :3], points.T).T
-    quads = found["quads"]
+    quads = result["quads"]
     # Blender 5.0 crashes at the selection of edges that it has found itself.
     edges = np.unique(np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], -1).reshape(-1, 2)), axis=0)
     mesh.from_pydata(local.tolist(), edges.tolist(), quads.tolist())
     for material in item.data.materials:
         mesh.materials.append(material)
     if select:
-        _select(mesh, found["irregular"], [])
+        _select(mesh, result["irregular"], [])
     mesh.update()
     for collection in item.users_collection:
         collection.objects.link(added)

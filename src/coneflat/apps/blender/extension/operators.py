@@ -141,9 +141,9 @@ def _set_status(context: Any, text: str | None) -> None:
 
 def _install(context: Any) -> Generator[Job, None, environment.Environment]:
     """Yield the jobs that make the extension's environment, and return it."""
-    own, chosen = own_folder(), preferences(context)
+    folder, chosen = own_folder(), preferences(context)
     wheels = bpy.path.abspath(chosen.wheels) if chosen.wheels else ""
-    commands = environment.install_commands(own, chosen.requirement, wheels, bpy.app.online_access)
+    commands = environment.install_commands(folder, chosen.requirement, wheels, bpy.app.online_access)
     for name, command in commands:
         with Job(name, command) as job:
             yield job
@@ -157,27 +157,27 @@ def _find(context: Any) -> environment.Environment:
         Failure: there is none.
     """
     named = preferences(context).python
-    Preferences.found, Preferences.named = None, named
+    Preferences.environment, Preferences.named = None, named
     try:
-        Preferences.found = environment.find(bpy.path.abspath(named) if named else "", own_folder())
+        Preferences.environment = environment.find(bpy.path.abspath(named) if named else "", own_folder())
     except Failure as failure:
         Preferences.reason = str(failure)
         raise
-    return Preferences.found
+    return Preferences.environment
 
 
 def _environment(context: Any) -> Generator[Job, None, tuple[str, ...]]:
     """Return the command that runs coneflat; install it if there is none and none is named."""
     named = preferences(context).python
-    found = Preferences.found if Preferences.named == named else None
-    if found is None or not Path(found.command[0]).exists():
+    current = Preferences.environment if Preferences.named == named else None
+    if current is None or not Path(current.command[0]).exists():
         try:
-            found = _find(context)
+            current = _find(context)
         except Failure:
             if named:
                 raise
-            found = yield from _install(context)
-    return found.command
+            current = yield from _install(context)
+    return current.command
 
 
 class Command(Runner):
@@ -215,15 +215,17 @@ class Command(Runner):
                 done.append((folder, chosen))
             # Nothing changes before all processes have ended well, and all results are read and can be written.
             with meshes.object_mode(context, returns=self.command != "quads"):
-                found = [self.load(context, folder, chosen) for folder, chosen in done]
-                for (_, chosen), result in zip(done, found, strict=True):
+                results = [self.load(context, folder, chosen) for folder, chosen in done]
+                for (_, chosen), result in zip(done, results, strict=True):
                     self.write(context, chosen, result)
 
     def arguments(self, context: Any) -> list[str]:
         """Return the options of the command that the settings change."""
         group = getattr(context.scene.coneflat, self.command)
         records = COMMANDS[self.command]
-        return exchange.arguments(records, {each["name"]: getattr(group, each["name"]) for each in records})
+        return exchange.arguments(
+            records, {record["name"]: getattr(group, record["name"]) for record in records}
+        )
 
     def read(self, context: Any, objects: Sequence[Any], in_edit: bool) -> list[meshes.Source]:
         """Return the faces of objects, in object mode.
@@ -233,32 +235,32 @@ class Command(Runner):
         """
         settings = context.scene.coneflat
         group = getattr(settings, self.command)
-        given = [(each, getattr(group, each["name"])) for each in COMMANDS[self.command]]
-        named = [(each, name) for each, name in given if exchange.names_group(each, name)]
-        groups = {each["name"]: (name, each["kind"]) for each, name in named}
-        names = ", ".join(each.name for each in objects)
+        records = [(entry, getattr(group, entry["name"])) for entry in COMMANDS[self.command]]
+        named = [(entry, name) for entry, name in records if exchange.names_group(entry, name)]
+        groups = {entry["name"]: (name, entry["kind"]) for entry, name in named}
+        names = ", ".join(entry.name for entry in objects)
         for name, _ in groups.values():
-            if not any(name in each.vertex_groups for each in objects):
+            if not any(name in entry.vertex_groups for entry in objects):
                 raise Failure(f"there is no vertex group {name!r} in {names}")
         is_quads = self.command == "quads"
         applied = is_quads and not in_edit and settings.modifiers
-        found = []
-        for each in objects:
+        sources = []
+        for entry in objects:
             if not is_quads:
-                meshes.check_uv_map(each, settings.uv_map)
-            self._say(meshes.left_as_is(each, applied))
+                meshes.check_uv_map(entry, settings.uv_map)
+            self._say(meshes.left_as_is(entry, applied))
             marks = {"marks": settings.marks, "sharp": settings.sharp} if not is_quads else {}
-            mesh = each.data
+            mesh = entry.data
             if applied:
-                mesh = each.evaluated_get(context.evaluated_depsgraph_get()).to_mesh()
-            source = meshes.read_source(each, mesh, selected=in_edit, groups=groups, **marks)
-            found += [source] if source is not None else []
-        if not found:
+                mesh = entry.evaluated_get(context.evaluated_depsgraph_get()).to_mesh()
+            source = meshes.read_source(entry, mesh, selected=in_edit, groups=groups, **marks)
+            sources += [source] if source is not None else []
+        if not sources:
             raise Failure("no faces are selected" if in_edit else "the selected objects have no faces")
         for option, (name, kind) in groups.items():
-            if kind == "vertices" and not any(len(each.part.lists.get(option, ())) for each in found):
+            if kind == "vertices" and not any(len(entry.part.lists.get(option, ())) for entry in sources):
                 raise Failure(f"the vertex group {name!r} has no vertices of the chosen faces of {names}")
-        return found
+        return sources
 
     def load(self, context: Any, folder: Path, sources: Sequence[meshes.Source]) -> Any:
         """Return the result of a command.
@@ -274,10 +276,10 @@ class Command(Runner):
         """Write UVs, and report measures and notes."""
         settings = context.scene.coneflat
         maps, measures = result
-        for source, found in zip(sources, maps, strict=True):
-            meshes.write_map(source, found, settings.uv_map, mark=settings.mark, select=settings.select)
-            if found.torn:
-                said = f"{source.name}: faces that seams divide, so that they need to be triangulated: {found.torn}"
+        for source, layout in zip(sources, maps, strict=True):
+            meshes.write_map(source, layout, settings.uv_map, mark=settings.mark, select=settings.select)
+            if layout.torn:
+                said = f"{source.name}: faces that seams divide, so that they need to be triangulated: {layout.torn}"
                 self.report({"WARNING"}, said)
         if settings.select != "NONE":
             context.tool_settings.mesh_select_mode = _SELECT_MODES[settings.select]
@@ -320,13 +322,13 @@ class CONEFLAT_OT_quads(Command, bpy.types.Operator):
 
     def write(self, context: Any, sources: Sequence[meshes.Source], result: Any) -> None:
         """Add an object, select it, and hide that of the mesh, which is in the same place."""
-        (source,), (found, notes) = sources, result
-        added = meshes.add_quads(source, found, context.scene.coneflat.select == "CONES")
+        (source,), (result_of_quads, notes) = sources, result
+        added = meshes.add_quads(source, result_of_quads, context.scene.coneflat.select == "CONES")
         bpy.data.objects[source.name].hide_set(True)  # which also deselects it
         added.select_set(True)
         context.view_layer.objects.active = added
         self._say(notes)
-        quads, irregular = len(found["quads"]), len(found["irregular"])
+        quads, irregular = len(result_of_quads["quads"]), len(result_of_quads["irregular"])
         self._say([f"{added.name}: {quads:,} quads, {irregular} irregular vertices"])
 
 
@@ -337,8 +339,8 @@ class CONEFLAT_OT_install(Runner, bpy.types.Operator):
 
     def work(self, context: Any) -> Work:
         """Make the environment."""
-        found = yield from _install(context)
-        self.report({"INFO"}, f"installed: {found}")
+        installed = yield from _install(context)
+        self.report({"INFO"}, f"installed: {installed}")
 
 
 class CONEFLAT_OT_check(bpy.types.Operator):

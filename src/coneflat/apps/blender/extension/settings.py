@@ -93,14 +93,16 @@ class Preferences(bpy.types.AddonPreferences):
     bl_idname = __package__
     __annotations__ = dict(_SHOWN)
     #: The environment that was found last, why there is none, and the Python that was named then.
-    found: ClassVar[Environment | None] = None
+    environment: ClassVar[Environment | None] = None
     reason: ClassVar[str] = "not checked yet"
     named: ClassVar[str] = ""
 
     def draw(self, context: Any) -> None:
         """Draw the environment and how to change it."""
-        found = type(self).found
-        self.layout.label(text=str(found or type(self).reason), icon="CHECKMARK" if found else "INFO")
+        environment = type(self).environment
+        self.layout.label(
+            text=str(environment or type(self).reason), icon="CHECKMARK" if environment else "INFO"
+        )
         for name in _SHOWN:
             self.layout.prop(self, name)
         row = self.layout.row()

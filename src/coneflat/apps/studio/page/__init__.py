@@ -27,11 +27,11 @@ def studio_page(formats: Sequence[str]) -> str:
     """Return the page as text; formats: extensions of meshes that can be dropped on it."""
     defaults = {name: DECLARED[name].default for name in PLAIN_OPTIONS}
     uses = {"Texture": "for-texture", "Cones": "for-angles", "Metric": "for-angles"}
-    more = [
+    further = [
         {**control_of(DECLARED[name]), "label": label, "use": uses.get(DECLARED[name].group, "")}
         for name, label in MORE.items()
     ]
-    constants = f"const DEFAULTS = {json.dumps(defaults)}, MORE = {json.dumps(more)};"
+    constants = f"const DEFAULTS = {json.dumps(defaults)}, MORE = {json.dumps(further)};"
     scripts = [constants, *(_read(f"{name}.js") for name in _SCRIPTS)]
     return page_around(
         POLICY,

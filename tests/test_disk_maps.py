@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapes
+from comparisons import flatten_by
+from comparisons.bff import HarmonicExtension, best_fit_lengths, boundary_first
+from comparisons.disk_maps import conformal_equations, least_squares_conformal
 from shapes import laid_out, lengths_of
 
 from coneflat import TriangleMesh, errors
-from coneflat.apps.peers import flatten_by
-from coneflat.apps.peers.bff import HarmonicExtension, best_fit_lengths, boundary_first
-from coneflat.apps.peers.disk_maps import conformal_equations, least_squares_conformal
 from coneflat.cones import cones_at, cones_with_curvature
 from coneflat.geometry import edge_lengths
 from coneflat.layout import far_pins
@@ -94,8 +94,8 @@ class TestPipeline:
         assert name in note
         assert "prescribes no cones" in note
         assert not flatten_by(method, *shapes.hill(), cones="none").notes
-        both = flatten_by(method, *shapes.join(shapes.sphere(1), shapes.sphere(2))).notes
-        assert both == (note.replace("match.", "match (and similarly 1 component more)."),)
+        notes_of_two = flatten_by(method, *shapes.join(shapes.sphere(1), shapes.sphere(2))).notes
+        assert notes_of_two == (note.replace("match.", "match (and similarly 1 component more)."),)
 
     @pytest.mark.parametrize("method", ["lscm", "bff"])
     def test_nothing_to_cut_through(self, method):
@@ -129,11 +129,11 @@ def solved(vertices, faces, cones=(), curvatures=None):
     """Return a mesh, its side lengths and the cones with their linear scale."""
     mesh = TriangleMesh(vertices, faces)
     surface = Surface.of(mesh, lengths_of(mesh))
-    given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
+    operators = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
     cones = np.array(cones, dtype=np.int64)
     if curvatures is None:
-        return mesh, surface.lengths, cones_at(*given, cones)
-    return mesh, surface.lengths, cones_with_curvature(*given, cones, np.array(curvatures))
+        return mesh, surface.lengths, cones_at(*operators, cones)
+    return mesh, surface.lengths, cones_with_curvature(*operators, cones, np.array(curvatures))
 
 
 class TestSteps:
@@ -149,26 +149,28 @@ class TestSteps:
         # What is left of a full turn around each vertex of the seams.
         copies = np.bincount(cut.origin)[cut.origin[on_border]]
         around = np.bincount(cut.origin[on_border], (np.pi - k[on_border]), len(mesh.vertices))
-        found = 2 * np.pi - around[cut.origin[on_border]]
+        curvature = 2 * np.pi - around[cut.origin[on_border]]
         assert copies.max() > 1
-        np.testing.assert_allclose(found, solution.target[cut.origin[on_border]], atol=1e-10)
+        np.testing.assert_allclose(curvature, solution.target[cut.origin[on_border]], atol=1e-10)
 
     def test_best_fit_is_the_closest_closed_curve(self):
         rng = np.random.default_rng(0)
         count = 40
-        which = np.concatenate([np.arange(30), np.arange(10)])
-        lengths, wanted = rng.uniform(1, 2, 30)[which], rng.uniform(1, 1.1, 30)[which]
+        edge_numbers = np.concatenate([np.arange(30), np.arange(10)])
+        lengths, targets = rng.uniform(1, 2, 30)[edge_numbers], rng.uniform(1, 1.1, 30)[edge_numbers]
         tangents = np.exp(2j * np.pi * (np.arange(count) + rng.random(count)) / count)
-        edge = 7 * which
-        found = best_fit_lengths(wanted, lengths, tangents, edge)
-        assert abs((found * tangents).sum()) < 1e-12
+        edge = 7 * edge_numbers
+        fitted = best_fit_lengths(targets, lengths, tangents, edge)
+        assert abs((fitted * tangents).sum()) < 1e-12
         # Stationary under changes that keep it closed, and of one length where sides belong together.
-        change = found - wanted
-        force = np.bincount(which, change / lengths)
-        effect = np.stack([np.bincount(which, tangents.real), np.bincount(which, tangents.imag)])
+        change = fitted - targets
+        force = np.bincount(edge_numbers, change / lengths)
+        effect = np.stack(
+            [np.bincount(edge_numbers, tangents.real), np.bincount(edge_numbers, tangents.imag)]
+        )
         multipliers = np.linalg.lstsq(effect.T, force, rcond=None)[0]
         np.testing.assert_allclose(effect.T @ multipliers, force, atol=1e-12)
-        np.testing.assert_allclose(found[:10], found[30:], rtol=1e-14)
+        np.testing.assert_allclose(fitted[:10], fitted[30:], rtol=1e-14)
         assert np.abs(change).max() > 1e-3
 
 
@@ -189,9 +191,9 @@ class TestPromises:
         inside = ~mesh.is_boundary_vertex
         np.testing.assert_allclose(result.curvature[inside], solution.target[inside], atol=1e-10)
         sides = result.points[result.corners][:, [2, 0, 1]] - result.points[result.corners][:, [1, 2, 0]]
-        one, two = mesh.edge_halfedges[~mesh.is_boundary_edge].T
+        first, second = mesh.edge_halfedges[~mesh.is_boundary_edge].T
         flat = np.linalg.norm(sides.reshape(-1, 2), axis=1)
-        np.testing.assert_allclose(flat[one], flat[two], rtol=1e-10)
+        np.testing.assert_allclose(flat[first], flat[second], rtol=1e-10)
 
 
 class TestNotes:

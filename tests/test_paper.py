@@ -12,7 +12,7 @@ import shapes
 
 from coneflat import PAPER, flatten
 
-BENCHMARKS = Path(__file__).resolve().parents[3] / "benchmarks"
+BENCHMARKS = Path(__file__).resolve().parents[1] / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
 
 from paper import METHODS, MODELS, model_of, reproduce  # noqa: E402
@@ -44,18 +44,18 @@ def test_the_experiments_of_the_paper(tmp_path):
     shapes.write_obj(tmp_path / "fandisk.obj", *shapes.sphere(3))
     shapes.write_obj(tmp_path / "another.obj", *shapes.hill(12, 12))
     (tmp_path / "gargoyle.obj").write_text("v 0 0 0\n")
-    found = reproduce([tmp_path])
-    assert [model.name for model in found.models] == ["fandisk", "another"]
-    assert found.failed[0][0] == "gargoyle.obj"
-    assert "gargoyle" in found.missing
-    assert "fandisk" not in found.missing
-    first, second = found.table_1()
+    reproduction = reproduce([tmp_path])
+    assert [model.name for model in reproduction.models] == ["fandisk", "another"]
+    assert reproduction.failed[0][0] == "gargoyle.obj"
+    assert "gargoyle" in reproduction.missing
+    assert "fandisk" not in reproduction.missing
+    first, second = reproduction.table_1()
     assert first[4] / first[5] == pytest.approx(first[6])
     assert np.isnan(second[5])
-    rows = [row for row in found.table_2() if row[0] == "fandisk"]
+    rows = [row for row in reproduction.table_2() if row[0] == "fandisk"]
     assert len(rows) == len(METHODS)
     assert rows[0][1:4:2] == ["circle-patterns/fixed (CP)", 1.013]
-    text = found.markdown()
+    text = reproduction.markdown()
     assert "Not among the files: rockerarm, foot" in text
     assert "gargoyle.obj" in text
     assert "In another resolution" in text

@@ -72,16 +72,16 @@ def coherent_angles(
     number[summed] = rows + np.arange(len(summed))
     row = np.concatenate([np.arange(count) // 3, number[triangulation.faces.ravel()]])
     column = np.tile(np.arange(count), 2)
-    wanted = row >= 0
+    is_entry = row >= 0
     equations = csr_matrix(
-        (np.ones(int(wanted.sum())), (row[wanted], column[wanted])), shape=(rows + len(summed), count)
+        (np.ones(int(is_entry.sum())), (row[is_entry], column[is_entry])), shape=(rows + len(summed), count)
     )
     right = np.concatenate([np.full(rows, np.pi), sums[summed]])
 
-    least = np.clip(MIN_ANGLE_FRACTION * angles, MIN_ANGLE, 0.02)
-    problem = _Dual(angles, least, triangulation.twin, equations, right, bool(is_summed.all()))
-    found, steps = minimise(problem, problem.evaluate(np.zeros(len(right))), ANGLE_LIMITS)
-    return CoherentAngles(problem.project(found.variables)[0], found.largest, steps)
+    lower_bounds = np.clip(MIN_ANGLE_FRACTION * angles, MIN_ANGLE, 0.02)
+    problem = _Dual(angles, lower_bounds, triangulation.twin, equations, right, bool(is_summed.all()))
+    solution, steps = minimise(problem, problem.evaluate(np.zeros(len(right))), ANGLE_LIMITS)
+    return CoherentAngles(problem.project(solution.variables)[0], solution.largest, steps)
 
 
 @dataclass(eq=False)
@@ -89,7 +89,7 @@ class _Dual:
     """The convex dual function of the multipliers of equations A x = b, for the x nearest to c within bounds."""
 
     angles: FloatArray
-    least: FloatArray
+    lower_bounds: FloatArray
     twin: IntArray
     equations: csr_matrix
     right: FloatArray
@@ -99,39 +99,41 @@ class _Dual:
         """Return the angles for multipliers, and their derivatives by the unbounded angles: own and across the edge."""
         free = self.angles + self.equations.T @ place
         is_inner = self.twin >= 0
-        other = np.where(is_inner, self.twin, 0)
-        bounded = np.maximum(free, self.least)
-        too_wide = is_inner & (bounded + bounded[other] > WIDEST_PAIR)
-        half = (free - free[other]) / 2
-        low, high = self.least - WIDEST_PAIR / 2, WIDEST_PAIR / 2 - self.least[other]
+        twins = np.where(is_inner, self.twin, 0)
+        bounded = np.maximum(free, self.lower_bounds)
+        too_wide = is_inner & (bounded + bounded[twins] > WIDEST_PAIR)
+        half = (free - free[twins]) / 2
+        low, high = self.lower_bounds - WIDEST_PAIR / 2, WIDEST_PAIR / 2 - self.lower_bounds[twins]
         slides = too_wide & (low < half) & (half < high)
         angles = np.where(too_wide, WIDEST_PAIR / 2 + np.clip(half, low, high), bounded)
-        own = np.where(too_wide, 0.5 * slides, free > self.least)
-        return angles, own, np.where(slides, -0.5, 0.0)
+        weights = np.where(too_wide, 0.5 * slides, free > self.lower_bounds)
+        return angles, weights, np.where(slides, -0.5, 0.0)
 
     def evaluate(self, place: FloatArray) -> Point:
         """Return the residual of each equation, which is minus the gradient."""
         return Point(place, self.right - self.equations @ self.project(place)[0])
 
-    def direction(self, here: Point, exactly: bool) -> tuple[FloatArray, bool]:
+    def direction(self, point: Point, exactly: bool) -> tuple[FloatArray, bool]:
         """Return the Newton step, with damping proportional to the residual; True, as there is no more exact step."""
-        residual = here.residual
-        _, own, across = self.project(here.variables)
+        residual = point.residual
+        _, weights, across = self.project(point.variables)
         slots = np.flatnonzero(across)
-        every = np.arange(len(own))
+        every = np.arange(len(weights))
         derivative = csr_matrix(
             (
-                np.concatenate([own, across[slots]]),
+                np.concatenate([weights, across[slots]]),
                 (np.concatenate([every, slots]), np.concatenate([every, self.twin[slots]])),
             ),
-            shape=(len(own), len(own)),
+            shape=(len(weights), len(weights)),
         )
-        used = len(residual) - self.is_closed
+        independent = len(residual) - self.is_closed
         # Damping relative to the residual covers a rank-deficient matrix.
-        damping = np.clip(1e-5 * np.abs(residual[:used]).max(), 1e-13, 1e-6)
-        equations = self.equations[:used]
-        matrix = csc_matrix(equations @ derivative @ equations.T + damping * identity(used, format="csr"))
+        damping = np.clip(1e-5 * np.abs(residual[:independent]).max(), 1e-13, 1e-6)
+        equations = self.equations[:independent]
+        matrix = csc_matrix(
+            equations @ derivative @ equations.T + damping * identity(independent, format="csr")
+        )
         matrix.sort_indices()
         step = np.zeros_like(residual)
-        step[:used] = factorize(matrix).solve(residual[:used])
+        step[:independent] = factorize(matrix).solve(residual[:independent])
         return step, True

@@ -7,13 +7,13 @@ from collections.abc import Callable
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ... import TriangleMesh
-from ...base import FloatArray, plural
-from ...errors import MetricError
-from ...geometry import double_areas
-from ...layout import far_pins, pinned_least_squares
-from ...optimise import rest_sides
-from ...stages import ConeSolution, Cut, Embedding, FlatMetric
+from coneflat import TriangleMesh
+from coneflat.base import FloatArray, plural
+from coneflat.errors import MetricError
+from coneflat.geometry import double_areas
+from coneflat.layout import far_pins, pinned_least_squares
+from coneflat.optimise import rest_sides
+from coneflat.stages import ConeSolution, Cut, Embedding, FlatMetric
 
 
 def least_squares_map(mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution) -> FlatMetric:

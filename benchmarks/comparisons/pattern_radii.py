@@ -52,8 +52,8 @@ def circle_pattern(twin: IntArray, coherent: CoherentAngles) -> CirclePattern:
     problem.base, steps = widest_pattern(problem)
     # If circles intersect at a small angle, the last bit of a log radius changes angles by a thousand times the
     # tolerance. As small changes of a base value, log radii are accurate enough.
-    found, more = minimise(problem, problem.evaluate(np.zeros_like(problem.base)), RADIUS_LIMITS)
-    log_radius = problem.base + found.variables
+    solution, radius_steps = minimise(problem, problem.evaluate(np.zeros_like(problem.base)), RADIUS_LIMITS)
+    log_radius = problem.base + solution.variables
     spread = float(np.ptp(log_radius))
     if not spread < 600:  # Squares of lengths must be finite; their logs are at most half as large.
         raise ConvergenceError(
@@ -61,11 +61,11 @@ def circle_pattern(twin: IntArray, coherent: CoherentAngles) -> CirclePattern:
             "other cones or --repair may help"
         )
     log_radius -= (log_radius.max() + log_radius.min()) / 2
-    half = problem.half_angles(found.variables)
+    half = problem.half_angles(solution.variables)
     lengths = 2 * np.exp(np.repeat(log_radius, 3)) * np.sin(half)
     upper = np.flatnonzero(twin > np.arange(len(half)))
     lengths[twin[upper]] = lengths[upper]
-    return CirclePattern(lengths, found.largest, steps + more)
+    return CirclePattern(lengths, solution.largest, steps + radius_steps)
 
 
 @dataclass(eq=False)
@@ -96,13 +96,13 @@ class RadiiProblem:
     def sides(self) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
         """Half-edges between two circles, the circles on their own and on the opposite side, and theta / 2."""
         slots = np.flatnonzero(self.twin >= 0)
-        others, angles = self.twin[slots], self.coherent.angles
-        return slots, slots // 3, others // 3, (np.pi - angles[slots] - angles[others]) / 2
+        twins, angles = self.twin[slots], self.coherent.angles
+        return slots, slots // 3, twins // 3, (np.pi - angles[slots] - angles[twins]) / 2
 
     def _gaps(self, place: FloatArray) -> FloatArray:
         """Return rho_k - rho_l for each side."""
-        _, own, other, _ = self.sides
-        return (self.base[own] - self.base[other]) + (place[own] - place[other])
+        _, faces, neighbours, _ = self.sides
+        return (self.base[faces] - self.base[neighbours]) + (place[faces] - place[neighbours])
 
     def half_angles(self, place: FloatArray) -> FloatArray:
         """Return (3m,) the half angles phi; at the boundary, the coherent angles."""
@@ -122,17 +122,17 @@ class RadiiProblem:
         """Return the sum of the half angles around each centre minus pi, which is minus the gradient."""
         return Point(place, self.excess(self.half_angles(place)))
 
-    def direction(self, here: Point, exactly: bool) -> tuple[FloatArray, bool]:
+    def direction(self, point: Point, exactly: bool) -> tuple[FloatArray, bool]:
         """Return the Newton step; True, as it is exact."""
-        half_theta, gaps = self.sides[3], self._gaps(here.variables)
+        half_theta, gaps = self.sides[3], self._gaps(point.variables)
         with np.errstate(over="ignore"):
             slope = np.sin(2 * half_theta) / (4 * (np.sinh(gaps / 2) ** 2 + np.sin(half_theta) ** 2))
-        return self.solve(slope, here.residual), True
+        return self.solve(slope, point.residual), True
 
     def solve(self, weight: FloatArray, residual: FloatArray) -> FloatArray:
         """Return the solution with zero mean for weights of the sides; the first radius is fixed in the solve."""
-        _, own, other, _ = self.sides
-        rows, columns = np.concatenate([own, own]), np.concatenate([own, other])
+        _, faces, neighbours, _ = self.sides
+        rows, columns = np.concatenate([faces, faces]), np.concatenate([faces, neighbours])
         matrix = csc_matrix((np.concatenate([weight, -weight]), (rows, columns)), (len(residual),) * 2)
         reduced = csc_matrix(matrix[1:, 1:])
         reduced.sort_indices()
@@ -148,25 +148,25 @@ def widest_pattern(problem: RadiiProblem) -> tuple[FloatArray, int]:
     difference of log radii, but log radii are a smooth function of angles, log sin(theta + phi) - log sin(phi). So
     Newton's method needs about ten steps for the dual problem, and many more for the primal one.
     """
-    slots, own, other, half_theta = problem.sides
+    slots, faces, neighbours, half_theta = problem.sides
     half = problem.coherent.angles.copy()
     radii = np.zeros(len(half) // 3)
     steps = 0
     while steps < 60:
         steps += 1
-        one, two = half[slots], half[problem.twin[slots]]
-        wanted = np.log(np.sin(two) / np.sin(one))
-        weight = np.sin(one) * np.sin(two) / np.sin(2 * half_theta)
-        radii = problem.solve(weight, np.bincount(own, weight * wanted, len(radii)) + problem.excess(half))
-        change = weight * (wanted - (radii[own] - radii[other]))
-        limit = one / np.maximum(-change, np.finfo(float).tiny)
+        angles, twin_angles = half[slots], half[problem.twin[slots]]
+        targets = np.log(np.sin(twin_angles) / np.sin(angles))
+        weight = np.sin(angles) * np.sin(twin_angles) / np.sin(2 * half_theta)
+        radii = problem.solve(weight, np.bincount(faces, weight * targets, len(radii)) + problem.excess(half))
+        change = weight * (targets - (radii[faces] - radii[neighbours]))
+        limit = angles / np.maximum(-change, np.finfo(float).tiny)
         factor = min(1.0, 0.9 * float(limit.min(initial=np.inf)))  # of the step, within the bounds of angles
-        half[slots] = one + factor * change
+        half[slots] = angles + factor * change
         for _ in range(30):  # while the step overshoots the maximum
             if not change @ np.log(np.sin(half[problem.twin[slots]]) / np.sin(half[slots])) < 0:
                 break
             factor /= 2
-            half[slots] = one + factor * change
+            half[slots] = angles + factor * change
         if np.abs(change).max(initial=0.0) <= 1e-5:  # radians: the primal problem now converges faster
             break
     return radii, steps

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ... import TriangleMesh
-from ...base import ComplexArray, FloatArray, IntArray
-from ...cones import GroundedLaplacian
-from ...geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
-from ...layout import closed_chain
-from ...metric import linear_flat_metric
-from ...stages import ConeSolution, Cut, Embedding, FlatMetric
+from coneflat import TriangleMesh
+from coneflat.base import ComplexArray, FloatArray, IntArray
+from coneflat.cones import GroundedLaplacian
+from coneflat.geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
+from coneflat.layout import closed_chain
+from coneflat.metric import linear_flat_metric
+from coneflat.stages import ConeSolution, Cut, Embedding, FlatMetric
+
 from .disk_maps import embedding_metric
 
 # Largest relative change of lengths, root mean square, for which both sides of a seam get equal lengths. Equal lengths
@@ -50,10 +51,12 @@ def boundary_first(mesh: TriangleMesh, lengths: FloatArray, solution: ConeSoluti
         log_scale = np.empty(len(disk.vertices))
         log_scale[disk.faces] = solution.log_scale[mesh.faces]
         tangents = np.exp(1j * np.cumsum(inside.boundary_curvature(log_scale)[disk.tails[border]]))
-        wanted = scaled.ravel()[border]
+        target_lengths = scaled.ravel()[border]
         # Half-edges have the same numbers in the cut mesh: both sides of a seam belong to one original edge.
-        found = best_fit_lengths(wanted, lengths.ravel()[border], tangents, mesh.halfedge_edges[border])
-        corners = closed_chain(found * tangents)
+        closing_lengths = best_fit_lengths(
+            target_lengths, lengths.ravel()[border], tangents, mesh.halfedge_edges[border]
+        )
+        corners = closed_chain(closing_lengths * tangents)
         # A very large change of lengths can reverse the orientation of the curve.
         if (np.conj(corners) * np.roll(corners, -1)).sum().imag < 0:
             corners = np.conj(corners)
@@ -61,7 +64,7 @@ def boundary_first(mesh: TriangleMesh, lengths: FloatArray, solution: ConeSoluti
         curve[:, disk.tails[border]] = corners.real, corners.imag
         points = np.stack([inside.extend(curve[0]), inside.extend(curve[1])], axis=1)
         notes: tuple[str, ...] = ()
-        change = float(np.abs(found / wanted - 1).max())
+        change = float(np.abs(closing_lengths / target_lengths - 1).max())
         if change > 0.01:
             notes = (
                 f"Boundary lengths were changed by up to {100 * change:,.1f} %, because with those of the linear scale "
@@ -102,7 +105,7 @@ class HarmonicExtension:
 
 
 def best_fit_lengths(
-    wanted: FloatArray, lengths: FloatArray, tangents: ComplexArray, edge: IntArray
+    targets: FloatArray, lengths: FloatArray, tangents: ComplexArray, edge: IntArray
 ) -> FloatArray:
     """Return (b,) the lengths closest to target lengths for which a curve with given tangents closes.
 
@@ -111,30 +114,30 @@ def best_fit_lengths(
     possible without a large change.
 
     Args:
-        wanted: (b,) target lengths.
+        targets: (b,) target lengths.
         lengths: (b,) lengths on the mesh.
         tangents: (b,) complex numbers of absolute value 1.
         edge: (b,) the edge of the mesh to which each side belongs.
     """
     _, joint = np.unique(edge, return_inverse=True)
-    found = _closing_lengths(wanted, lengths, tangents, joint)
-    if np.average((found / wanted - 1) ** 2, weights=wanted) <= MAX_CHANGE**2:
-        return found
-    return _closing_lengths(wanted, lengths, tangents, np.arange(len(edge)))
+    joint_lengths = _closing_lengths(targets, lengths, tangents, joint)
+    if np.average((joint_lengths / targets - 1) ** 2, weights=targets) <= MAX_CHANGE**2:
+        return joint_lengths
+    return _closing_lengths(targets, lengths, tangents, np.arange(len(edge)))
 
 
 def _closing_lengths(
-    wanted: FloatArray, lengths: FloatArray, tangents: ComplexArray, edge: IntArray
+    targets: FloatArray, lengths: FloatArray, tangents: ComplexArray, edge: IntArray
 ) -> FloatArray:
     """Return (b,) the closing lengths l - N^-1 T^t (T N^-1 T^t)^-1 T l with N = 1 / length and T the tangents."""
     inverse_mass = 1 / np.bincount(edge, 1 / lengths)
     effect = np.stack([np.bincount(edge, tangents.real), np.bincount(edge, tangents.imag)])
-    gap = np.array([(wanted * tangents.real).sum(), (wanted * tangents.imag).sum()])
+    gap = np.array([(targets * tangents.real).sum(), (targets * tangents.imag).sum()])
     # Two sides of a seam that differ by a translation have no effect on the gap; if all do, there is no gap. Directions
     # in which the effect is below 1e-10 of the largest possible one are ignored.
     system = (effect * inverse_mass) @ effect.T
     strength, axes = np.linalg.eigh(system)
-    kept = strength > 1e-10 * inverse_mass.sum()
-    force = axes[:, kept] @ (axes.T[kept] @ gap / strength[kept])
+    is_effective = strength > 1e-10 * inverse_mass.sum()
+    force = axes[:, is_effective] @ (axes.T[is_effective] @ gap / strength[is_effective])
     change: FloatArray = inverse_mass * (force @ effect)
-    return wanted - change[edge]
+    return targets - change[edge]

@@ -56,8 +56,8 @@ def circle_patterns(
     flips = make_delaunay(triangulation) if delaunay else np.empty(0, dtype=np.int64)
     coherent = _nearest_angles(triangulation, target, border)
     if not coherent.converged:
-        what = "no circle pattern on these triangles has the curvatures: their angles are"
-        raise _failure(what, coherent.residual, coherent.steps)
+        problem = "no circle pattern on these triangles has the curvatures: their angles are"
+        raise _failure(problem, coherent.residual, coherent.steps)
     pattern = circle_pattern(triangulation.twin, coherent)
     steps = coherent.steps + pattern.steps
     before, after = (
@@ -72,9 +72,9 @@ def circle_patterns(
     return metric
 
 
-def _failure(what: str, residual: float, steps: int) -> ConvergenceError:
+def _failure(problem: str, residual: float, steps: int) -> ConvergenceError:
     return ConvergenceError(
-        f"{what} {error_text(residual)} after {plural(steps, 'step')}; method 'exact', other cones, a repair or "
+        f"{problem} {error_text(residual)} after {plural(steps, 'step')}; method 'exact', other cones, a repair or "
         "remeshing may help"
     )
 

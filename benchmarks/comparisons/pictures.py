@@ -10,16 +10,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...geometry import signed_double_areas
-from ...io import atomic_write, check_target, make_folder
-from ...mesh import label_faces
-from .. import view
-from .run import Comparison, Drawn
+from coneflat.apps import view
+from coneflat.geometry import signed_double_areas
+from coneflat.io import atomic_write, check_target, make_folder
+from coneflat.mesh import label_faces
+
+from .comparison import Comparison, Drawn
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ... import Flattening
+    from coneflat import Flattening
 
 DPI = 200.0
 
@@ -30,7 +31,7 @@ def draw_layouts(comparison: Comparison) -> Figure:
     The colour bar has a histogram of the distortion by the first method.
     """
     shown = comparison.drawn
-    quantities, layouts = same_scale(shown), aligned_layouts([result for _, result in shown])
+    quantities, layouts = on_common_scale(shown), aligned_layouts([result for _, result in shown])
     panels = [
         view.Panel(
             view.layout_aspect(result, crop=True),
@@ -44,7 +45,7 @@ def draw_layouts(comparison: Comparison) -> Figure:
 
 def draw_qualities(comparison: Comparison, look: view.Look) -> Figure:
     """Return a figure of the model with the quasi-conformal distortion of all methods on one scale."""
-    quantities = same_scale(comparison.drawn)
+    quantities = on_common_scale(comparison.drawn)
     return _figure_of(quality_panels(comparison.drawn, quantities, look), quantities)
 
 
@@ -66,15 +67,17 @@ def aligned_layouts(results: Sequence[Flattening]) -> list[Flattening]:
 
 
 def _rotated_to(result: Flattening, model: Flattening) -> Flattening:
-    same = np.array_equal(result.faces, model.faces) and result.distortion.charts == model.distortion.charts
-    if result is model or not same:
+    has_same_faces = np.array_equal(result.faces, model.faces)
+    if result is model or not has_same_faces or result.distortion.charts != model.distortion.charts:
         return result
     count, chart = label_faces(model.uv_faces, len(model.uv))
     areas = np.bincount(chart, np.abs(signed_double_areas(model.corner_uv)), count)
     # The corners of the chart with the largest area, as complex numbers.
     largest = chart == areas.argmax()
-    one, other = ((each.corner_uv[largest] @ np.array([1, 1j])).ravel() for each in (result, model))
-    product = np.vdot(one - one.mean(), other - other.mean())
+    points, model_points = (
+        (layout.corner_uv[largest] @ np.array([1, 1j])).ravel() for layout in (result, model)
+    )
+    product = np.vdot(points - points.mean(), model_points - model_points.mean())
     if product == 0:
         return result
     rotated = (result.uv @ np.array([1, 1j])) * (product / abs(product))
@@ -86,7 +89,7 @@ def labelled(method: str, result: Flattening) -> str:
     return f"{method}: {result.distortion.qc_mean:.4f}"
 
 
-def same_scale(shown: Drawn) -> list[view.Quantity]:
+def on_common_scale(shown: Drawn) -> list[view.Quantity]:
     """Return the quasi-conformal distortion by each method, with a common colour scale."""
     quantities = [view.conformal_distortion(result) for _, result in shown]
     if not quantities:

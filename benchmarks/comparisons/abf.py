@@ -15,7 +15,6 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags, vstack
 
 from coneflat import TriangleMesh
-from coneflat.apps.peers.disk_maps import embedding_metric
 from coneflat.base import FloatArray, IntArray, plural
 from coneflat.base.text import error_text
 from coneflat.errors import ConvergenceError, CurvatureError
@@ -26,6 +25,8 @@ from coneflat.layout import far_pins, pinned_least_squares
 from coneflat.linalg import factorize
 from coneflat.mesh import NEXT, PREVIOUS
 from coneflat.stages import ConeSolution, Cut, Embedding, FlatMetric, SolveStatistics
+
+from .disk_maps import embedding_metric
 
 # Lower bound of angles, radians: those of needles can be rounded to 0, but their logs and relative squares must be
 # finite.
@@ -66,15 +67,17 @@ def angle_based(
             CurvatureError: the angle of a cone is too large for its triangles.
         """
         notes: list[str] = []
-        whole, curvature = mesh, solution.target
+        solved_mesh, curvature = mesh, solution.target
         if is_free:
-            whole, curvature = cut.mesh, np.zeros(len(cut.mesh.vertices))
+            solved_mesh, curvature = cut.mesh, np.zeros(len(cut.mesh.vertices))
             if len(cut.seams):
                 notes.append(
                     "The mesh was cut first: the angles of cones, and lengths along seams, were left free."
                 )
-        conditions = angle_conditions(whole, curvature)
-        angles, steps, converged = solve(conditions, wanted_angles(whole, corner_angles(lengths), curvature))
+        conditions = angle_conditions(solved_mesh, curvature)
+        angles, steps, converged = solve(
+            conditions, target_angles(solved_mesh, corner_angles(lengths), curvature)
+        )
         residual = conditions.residual(np.clip(angles, MIN_ANGLE, np.pi - MIN_ANGLE))
         if not converged:
             raise ConvergenceError(
@@ -104,17 +107,17 @@ def least_squares_points(disk: TriangleMesh, angles: FloatArray, lengths: FloatA
     rows = np.arange(len(angles))
     third = np.argmax(angles, axis=1)
     first, second = NEXT[third], PREVIOUS[third]
-    one, two = (
+    first_angle, second_angle = (
         np.where(angle > 0, angle, LEAST_SHAPE) for angle in (angles[rows, first], angles[rows, second])
     )
-    turn = np.sin(two) / np.sin(one + two) * np.exp(1j * one)
+    turn = np.sin(second_angle) / np.sin(first_angle + second_angle) * np.exp(1j * first_angle)
     values = np.stack([turn - 1, -turn, np.ones(len(rows))], axis=1)
     columns = disk.faces[rows[:, None], np.stack([first, second, third], axis=1)]
     equations = csr_matrix((values.ravel(), (np.repeat(rows, 3), columns.ravel())))
     return as_pairs(pinned_least_squares(equations, far_pins(disk, lengths)))
 
 
-def nearest_angles(conditions: AngleConditions, wanted: FloatArray) -> tuple[FloatArray, int, bool]:
+def nearest_angles(conditions: AngleConditions, targets: FloatArray) -> tuple[FloatArray, int, bool]:
     """Return the angles of a flat metric with the least sum of squared relative differences from target angles (ABF++).
 
     Newton's method for sum w (x - wanted)^2 / 2, w = 1 / wanted^2, with Lagrange multipliers, where each system is
@@ -126,7 +129,7 @@ def nearest_angles(conditions: AngleConditions, wanted: FloatArray) -> tuple[Flo
 
     Args:
         conditions: the conditions on angles.
-        wanted: (3m,) target angles, radians, positive and less than pi.
+        targets: (3m,) target angles, radians, positive and less than pi.
 
     Returns:
         (3m,) radians; the number of Newton steps; and whether the angles converged.
@@ -134,7 +137,7 @@ def nearest_angles(conditions: AngleConditions, wanted: FloatArray) -> tuple[Flo
     References:
         A. Sheffer, B. Levy, M. Mogilnitsky, A. Bogomyakov, "ABF++: fast and robust angle based flattening", 2005.
     """
-    angles, weights = wanted.copy(), wanted**-2
+    angles, weights = targets.copy(), targets**-2
     sums = len(conditions.totals)
     forces = np.zeros(sums + conditions.ratios.shape[0])
     residual = conditions.residual(angles)
@@ -146,7 +149,7 @@ def nearest_angles(conditions: AngleConditions, wanted: FloatArray) -> tuple[Flo
             conditions.off(angles),
             excess_of(angles),
             np.maximum(weights + bend, 0.1 * weights),
-            weights * (angles - wanted),
+            weights * (angles - targets),
         )
         change = float(np.abs(step).max())
         converged = residual <= TOLERANCE and change <= LAST_CHANGE
@@ -162,7 +165,7 @@ def nearest_angles(conditions: AngleConditions, wanted: FloatArray) -> tuple[Flo
     return angles, count, converged
 
 
-def linear_angles(conditions: AngleConditions, wanted: FloatArray) -> tuple[FloatArray, int, bool]:
+def linear_angles(conditions: AngleConditions, targets: FloatArray) -> tuple[FloatArray, int, bool]:
     """Return the angles that satisfy the conditions to first order with the least relative change.
 
     The logarithm of the wheel condition is linearised at the target angles. With the linear conditions on sums around
@@ -172,7 +175,7 @@ def linear_angles(conditions: AngleConditions, wanted: FloatArray) -> tuple[Floa
 
     Args:
         conditions: the conditions on angles.
-        wanted: (3m,) target angles, radians, positive and less than pi.
+        targets: (3m,) target angles, radians, positive and less than pi.
 
     Returns:
         The same as `nearest_angles`.
@@ -180,9 +183,9 @@ def linear_angles(conditions: AngleConditions, wanted: FloatArray) -> tuple[Floa
     References:
         R. Zayer, B. Levy, H.-P. Seidel, "Linear angle based parameterization", 2007.
     """
-    off, slopes = conditions.off(wanted), conditions.slopes(wanted)
-    change, _ = least_change(slopes, off, excess_of(wanted), wanted**-2, np.zeros_like(wanted))
-    return wanted + change, 1, True
+    off, slopes = conditions.off(targets), conditions.slopes(targets)
+    change, _ = least_change(slopes, off, excess_of(targets), targets**-2, np.zeros_like(targets))
+    return targets + change, 1, True
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,7 +263,7 @@ def _strip_ratios(mesh: TriangleMesh, strips: list[IntArray]) -> csr_matrix:
     return csr_matrix((values, (np.tile(rows, 2), columns)), shape=(len(strips), mesh.faces.size))
 
 
-def wanted_angles(mesh: TriangleMesh, angles: FloatArray, curvature: FloatArray) -> FloatArray:
+def target_angles(mesh: TriangleMesh, angles: FloatArray, curvature: FloatArray) -> FloatArray:
     """Return (3m,) the target angles: those of the mesh, scaled at each inner vertex to the prescribed sum.
 
     These are the optimal angles of angle based flattening (as in ABF++, Sheffer et al. 2005), with the cone angle
@@ -278,24 +281,24 @@ def wanted_angles(mesh: TriangleMesh, angles: FloatArray, curvature: FloatArray)
     angles = np.maximum(angles, MIN_ANGLE)
     count = np.bincount(at, minlength=len(mesh.vertices))
     total = np.bincount(at, angles.ravel(), len(mesh.vertices))
-    wanted = np.where(mesh.is_boundary_vertex, total, 2 * np.pi - curvature)
-    low = np.flatnonzero(wanted <= MIN_ANGLE)
+    vertex_targets = np.where(mesh.is_boundary_vertex, total, 2 * np.pi - curvature)
+    low = np.flatnonzero(vertex_targets <= MIN_ANGLE)
     if len(low):
         raise CurvatureError(
-            f"{plural(len(low), 'cone')} whose angle is not positive: {wanted[low[0]] / np.pi:.4g} pi; "
+            f"{plural(len(low), 'cone')} whose angle is not positive: {vertex_targets[low[0]] / np.pi:.4g} pi; "
             "curvatures must be below 2 pi"
         )
-    wide = np.flatnonzero(wanted >= np.pi * count)
+    wide = np.flatnonzero(vertex_targets >= np.pi * count)
     if len(wide):
         worst = wide[0]
         raise CurvatureError(
             f"{plural(len(wide), 'cone')} with angles too large for the triangles around: {count[worst]} of them "
-            f"cannot hold an angle of {wanted[worst] / np.pi:.4g} pi; choose others, or remesh"
+            f"cannot hold an angle of {vertex_targets[worst] / np.pi:.4g} pi; choose others, or remesh"
         )
-    scaled: FloatArray = angles.ravel() * (wanted / total)[at]
+    scaled: FloatArray = angles.ravel() * (vertex_targets / total)[at]
     too_wide = np.zeros(len(count), dtype=bool)
     too_wide[at[scaled >= np.pi]] = True
-    return np.where(too_wide[at], (wanted / count)[at], scaled)
+    return np.where(too_wide[at], (vertex_targets / count)[at], scaled)
 
 
 def least_change(
@@ -318,19 +321,19 @@ def least_change(
     """
     i, j, k = stiffness.reshape(-1, 3).T
     pairs = i * j + j * k + k * i
-    given = -(np.stack([j * k, k * i, i * j], axis=1) * (excess / pairs)[:, None]).ravel()
-    one = np.stack([j + k, -k, -j], axis=1) / np.sqrt(pairs * (j + k))[:, None]
+    particular = -(np.stack([j * k, k * i, i * j], axis=1) * (excess / pairs)[:, None]).ravel()
+    spoke = np.stack([j + k, -k, -j], axis=1) / np.sqrt(pairs * (j + k))[:, None]
     two = np.stack([np.zeros(len(i)), np.ones(len(i)), -np.ones(len(i))], axis=1) / np.sqrt(j + k)[:, None]
     columns = np.arange(2 * len(i)).repeat(3)
     rows = np.tile(np.arange(len(stiffness)), 2)
-    directions = csr_matrix((np.concatenate([one, two], axis=None), (rows, columns)))
+    directions = csr_matrix((np.concatenate([spoke, two], axis=None), (rows, columns)))
     half = csr_matrix(slopes @ directions)
     matrix = csc_matrix(half @ half.T)
     matrix.sort_indices()
     factor = factorize(matrix)
     pulled = directions.T @ pull
-    right = off + slopes @ given - half @ pulled
+    right = off + slopes @ particular - half @ pulled
     forces = factor.solve(right)
     # One step of iterative refinement reduces rounding errors.
     forces += factor.solve(right - half @ (half.T @ forces))
-    return given - directions @ (pulled + half.T @ forces), forces
+    return particular - directions @ (pulled + half.T @ forces), forces

@@ -1,4 +1,4 @@
-"""Methods that flatten meshes with cuts of their own: `coneflat.unwrap`, and other packages if these are installed."""
+"""Baselines that find their own cut: `coneflat.unwrap`, and other packages if these are installed."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from ... import Flattening, unwrap
-from ...base import FloatArray
-from ...errors import MetricError
-from ...io import as_uv_mesh
-from ..view import uv_flattening
+from coneflat import Flattening, unwrap
+from coneflat.apps.view import uv_flattening
+from coneflat.base import FloatArray
+from coneflat.errors import MetricError
+from coneflat.io import as_uv_mesh
 
 
 @dataclass(frozen=True)
-class Peer:
-    """A method with a cut of its own, or of another package.
+class AtlasBaseline:
+    """A method that finds its own cut, often of another package.
 
     Attributes:
         module: the module to import.
@@ -32,22 +32,22 @@ class Peer:
     note: str
 
 
-def installed_peers() -> tuple[str, ...]:
-    """Return the names of the peers that are installed."""
-    return tuple(name for name, peer in PEERS.items() if find_spec(peer.module) is not None)
+def installed_baselines() -> tuple[str, ...]:
+    """Return the names of the baselines that are installed."""
+    return tuple(name for name, baseline in ATLAS_BASELINES.items() if find_spec(baseline.module) is not None)
 
 
-def run_peer(name: str, base: Flattening) -> tuple[Flattening, float]:
-    """Return the result of a peer for the mesh of a flattening, and its running time in seconds.
+def run_baseline(name: str, base: Flattening) -> tuple[Flattening, float]:
+    """Return the result of a baseline for the mesh of a flattening, and its running time in seconds.
 
     Raises:
-        MetricError: the peer fails, or its result is not a map of the mesh.
+        MetricError: the baseline fails, or its result is not a map of the mesh.
     """
-    peer = PEERS[name]
+    baseline = ATLAS_BASELINES[name]
     try:
-        import_module(peer.module)
+        import_module(baseline.module)
         start = time.perf_counter()
-        corner_uv = peer.run(base)
+        corner_uv = baseline.run(base)
     except Exception as error:  # other packages may raise anything
         raise MetricError(f"{name} failed: {type(error).__name__}: {error}") from error
     seconds = time.perf_counter() - start
@@ -76,13 +76,13 @@ def uvunwrap_charts(base: Flattening) -> FloatArray:
     import uvunwrap
 
     mesh = uvunwrap.Mesh(base.vertices.ravel().tolist(), base.faces.ravel().tolist())
-    found = uvunwrap.generate([mesh]).meshes[0]
-    return np.array(found.corner_uvs, dtype=np.float64).reshape(-1, 3, 2)
+    unwrapped = uvunwrap.generate([mesh]).meshes[0]
+    return np.array(unwrapped.corner_uvs, dtype=np.float64).reshape(-1, 3, 2)
 
 
-#: Peers by name.
-PEERS = {
-    "unwrap": Peer("coneflat", unwrap_charts, "short seams with free sides, for textures"),
-    "xatlas": Peer("xatlas", xatlas_charts, "charts of its own"),
-    "uvunwrap": Peer("uvunwrap", uvunwrap_charts, "charts of its own"),
+#: The baselines by name.
+ATLAS_BASELINES = {
+    "unwrap": AtlasBaseline("coneflat", unwrap_charts, "short seams with free sides, for textures"),
+    "xatlas": AtlasBaseline("xatlas", xatlas_charts, "own charts"),
+    "uvunwrap": AtlasBaseline("uvunwrap", uvunwrap_charts, "own charts"),
 }
