@@ -245,13 +245,11 @@ def left_out(result: Flattening, ending: str, has_texture: bool = False) -> tupl
         return ()
     # A texture would be multiplied by colours of vertices.
     hidden = {VERTEX_COLOURS, ALPHA} if has_texture and source.scene is None else set()
-    kept_attributes = form.kept_attributes(source) - hidden
-    lost_attributes = set(source.attributes) - kept_attributes
-    complete_endings = (
-        name for name, form in _FORMATS.items() if lost_attributes <= form.kept_attributes(source)
-    )
+    preserved = form.kept_attributes(source) - hidden
+    lost = set(source.attributes) - preserved
+    complete = (name for name, other_form in _FORMATS.items() if lost <= other_form.kept_attributes(source))
     return (
-        *losses(source, ending, kept_attributes, next(complete_endings, "")),
+        *losses(source, ending, preserved, next(complete, "")),
         *([old_textures("the file")] if form.keeps_old_textures(source) else []),
         *form.changes(result, has_texture),
     )
