@@ -311,7 +311,7 @@ class _EndOfFile(Exception):
 
 
 def _decode(content: bytes, start: int, element: _Element, chosen: list[int]) -> tuple[list[Column], int]:
-    """Return the wanted columns of an element, a list as two columns (lengths, items), and its end position."""
+    """Return the chosen columns of an element, a list as two columns (lengths, items), and its end position."""
     lists = [i for i, p in enumerate(element.properties) if p.count]
     first = _row(content, start, element)[1] if element.length else [0] * len(lists)
     lengths = dict(zip(lists, first, strict=True))
