@@ -46,7 +46,7 @@ def main() -> int:
     seeds = range(chosen.seed, chosen.seed + chosen.cases)
     run_all([(chosen.kind, seed) for seed in seeds], chosen.jobs, say, WORK[chosen.kind])
     print(f"\n{summary(outcomes)}\n\n{len(outcomes):,} cases in {time.perf_counter() - began:.0f} s")
-    return int(any(one.breaches for one in outcomes))
+    return int(any(result.breaches for result in outcomes))
 
 
 if __name__ == "__main__":

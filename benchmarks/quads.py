@@ -67,7 +67,7 @@ def main() -> None:
     if not arguments.tool.exists():
         sys.exit(f"{arguments.tool} is not there: name a program that measures quads with --tool")
     methods = [name for name in arguments.methods.split(",") if find_spec(METHODS[name][0])]
-    found: dict[tuple[int, str], list[dict[str, float]]] = defaultdict(list)
+    rows_of: dict[tuple[int, str], list[dict[str, float]]] = defaultdict(list)
     failed: dict[tuple[int, str], int] = defaultdict(int)
     names = [name for name, _, _ in COLUMNS]
     print("| model | asked | method | quads | " + " | ".join(names) + " |")
@@ -79,14 +79,14 @@ def main() -> None:
                 text = row(measures) if measures else f"{error} |" + " |" * len(names)
                 print(f"| {name} | {count:,} | {method} | {text}", flush=True)
                 if measures and not mesh.is_boundary_edge.any():
-                    found[count, method].append(measures)
+                    rows_of[count, method].append(measures)
                 failed[count, method] += not measures
     print("\nMedians over closed models:\n")
     print("| asked | method | models | failed | with inverted quads | " + " | ".join(names) + " |")
     print("| --- " * (5 + len(names)) + "|")
-    for (count, method), rows in sorted(found.items()):
-        middle = {key: median([each[key] for each in rows if key in each]) for _, key, _ in COLUMNS}
-        inverted = sum(each["J_neg"] > 0 for each in rows)
+    for (count, method), rows in sorted(rows_of.items()):
+        middle = {key: median([entry[key] for entry in rows if key in entry]) for _, key, _ in COLUMNS}
+        inverted = sum(entry["J_neg"] > 0 for entry in rows)
         cells = " | ".join(form.format(middle[key]) for _, key, form in COLUMNS)
         print(
             f"| {count:,} | {method} | {len(rows)} | {failed[count, method]} | {inverted} | {cells} |",
@@ -134,20 +134,20 @@ def trial(mesh: TriangleMesh, count: int, make: Maker, tool: Path) -> tuple[dict
             pool.submit(be_silent).result()
             pool.submit(warm_up, make).result()
             seconds = pool.submit(write, path, mesh, count, make).result()
-            found = json.loads(
+            answer = json.loads(
                 subprocess.check_output([sys.executable, tool, surface, path], stderr=subprocess.DEVNULL)
             )
         except BrokenProcessPool:
             return {}, "crashed"
         except Exception as error:  # Other packages raise any type.
             return {}, f"{type(error).__name__}: {str(error)[:120]}"
-    return {**numbers(found), "quads": found["topo"]["F"], "seconds": seconds}, ""
+    return {**numbers(answer), "quads": answer["topo"]["F"], "seconds": seconds}, ""
 
 
-def numbers(found: dict[str, Any]) -> dict[str, float]:
+def numbers(row: dict[str, Any]) -> dict[str, float]:
     """Return the measures of the tool that are numbers; self-intersecting pairs are the first of two."""
-    pairs = found.get("selfint")
-    plain = {key: float(value) for key, value in found.items() if isinstance(value, (int, float))}
+    pairs = row.get("selfint")
+    plain = {key: float(value) for key, value in row.items() if isinstance(value, (int, float))}
     return {**plain, **({"self": float(pairs[0])} if isinstance(pairs, list) else {})}
 
 
@@ -174,34 +174,34 @@ def write(path: Path, mesh: TriangleMesh, count: int, make: Maker) -> float:
 def write_polygons(path: Path, vertices: np.ndarray, polygons: list[list[int]]) -> None:
     with path.open("w") as file:
         file.writelines(f"v {x!r} {y!r} {z!r}\n" for x, y, z in vertices.tolist())
-        file.writelines(f"f {' '.join(str(corner + 1) for corner in each)}\n" for each in polygons)
+        file.writelines(f"f {' '.join(str(corner + 1) for corner in polygon)}\n" for polygon in polygons)
 
 
 def by_coneflat(vertices: np.ndarray, faces: np.ndarray, count: int, **options: Any) -> Polygons:
-    found = quads(vertices, faces, quads=count, **options)
-    return found.vertices, found.quads.tolist()
+    mesh = quads(vertices, faces, quads=count, **options)
+    return mesh.vertices, mesh.quads.tolist()
 
 
 def by_quadriflow(vertices: np.ndarray, faces: np.ndarray, count: int, sharp: bool = False) -> Polygons:
     """Return the quads of QuadriFlow; `sharp` preserves sharp edges and the boundary."""
     from pyQuadriFlow.pyQuadriFlow import pyquadriflow
 
-    found = pyquadriflow(count, 0, vertices.tolist(), faces.tolist(), sharp, sharp, False, False, False)
-    return np.array(found["vertices"]), found["faces"]
+    quad_arrays = pyquadriflow(count, 0, vertices.tolist(), faces.tolist(), sharp, sharp, False, False, False)
+    return np.array(quad_arrays["vertices"]), quad_arrays["faces"]
 
 
 def by_instant_meshes(vertices: np.ndarray, faces: np.ndarray, count: int, **options: Any) -> Polygons:
     """Convert the number: the package counts vertices before it splits all faces into quads, usually four."""
     import pynanoinstantmeshes
 
-    points, found = pynanoinstantmeshes.remesh(
+    points, polygons = pynanoinstantmeshes.remesh(
         vertices.astype(np.float32),
         faces.astype(np.uint32),
         vertex_count=count // 4,
         deterministic=True,
         **options,
     )
-    return points.astype(np.float64), found.tolist()
+    return points.astype(np.float64), polygons.tolist()
 
 
 METHODS: dict[str, tuple[str, Maker]] = {

@@ -1,7 +1,7 @@
 """Catmull-Clark subdivision of a mesh of quads: `python examples/catmull_clark.py quads.obj finer.obj 2`.
 
-E. Catmull, J. Clark, "Recursively generated B-spline surfaces on arbitrary topological meshes", 1978. What `coneflat
-quads` writes is a control mesh for it: the limit is smooth, and C2 but at the few irregular vertices.
+E. Catmull, J. Clark, "Recursively generated B-spline surfaces on arbitrary topological meshes", 1978. The output
+of `coneflat quads` is a control mesh for it: the limit surface is C2 except at the few irregular vertices.
 """
 
 from __future__ import annotations

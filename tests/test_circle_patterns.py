@@ -197,7 +197,7 @@ class TestRefusals:
 )
 def test_the_figures_of_table_2(shared, name, published, with_flips):
     """The cones of the paper's search; its circle patterns were made without intrinsic Delaunay triangulations."""
-    part = Source(as_input(shared(name))).prepared(Options()).parts[0]
+    part = Source(as_input(shared(name))).prepared(Options()).components[0]
     mesh, surface = part.mesh, Surface.of(part.mesh, part.lengths)
     operators = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
     solution = greedy_cones(*operators, epsilon=1.0, tie_key=tie_key(mesh.vertices))

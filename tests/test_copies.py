@@ -12,10 +12,10 @@ import coneflat
 from coneflat.base.arrays import FloatArray, IntArray
 from coneflat.io import as_input
 from coneflat.options import Options
-from coneflat.source import Part, Source
+from coneflat.source import Component, Source
 from coneflat.source.copies import find_copies
 
-method = import_module("coneflat.flattening")
+flattener, retries = import_module("coneflat.flattener"), import_module("coneflat.retries")
 
 Mesh = tuple[FloatArray, IntArray]
 
@@ -39,8 +39,8 @@ def bump() -> Mesh:
     return vertices * (1.0, 1.3, 0.8), faces
 
 
-def parts_of(mesh: Mesh, options: Options) -> tuple[Part, ...]:
-    return Source(as_input(*mesh)).prepared(options).parts
+def parts_of(mesh: Mesh, options: Options) -> tuple[Component, ...]:
+    return Source(as_input(*mesh)).prepared(options).components
 
 
 def sides_of(found: coneflat.Flattening) -> FloatArray:
@@ -88,11 +88,13 @@ def test_creases_of_the_same_lengths_are_no_copies() -> None:
 def test_copies_are_laid_out_as_each_by_itself(mesh: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = joined(mesh, turned(mesh, 1), turned(mesh, 2, 2.5), turned(mesh, 3, 0.3))
     calls = []
-    lay_out_part = method.lay_out_part
-    monkeypatch.setattr(method, "lay_out_part", lambda *some: calls.append(some) or lay_out_part(*some))
+    lay_out = retries.lay_out_with_thick_triangles
+    monkeypatch.setattr(
+        retries, "lay_out_with_thick_triangles", lambda *inputs: calls.append(inputs) or lay_out(*inputs)
+    )
     found = coneflat.flatten(*whole)
     assert len(calls) == 1
-    monkeypatch.setattr(method, "find_copies", lambda parts, _: [None] * len(parts))
+    monkeypatch.setattr(flattener, "find_copies", lambda parts, _: [None] * len(parts))
     alone = coneflat.flatten(*whole)
     assert len(calls) == 1 + 4
     assert np.array_equal(found.cones, alone.cones)

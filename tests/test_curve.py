@@ -12,7 +12,7 @@ from coneflat.errors import OptionError
 from coneflat.options import Options
 
 
-def test_the_curve_falls_and_holds_what_it_says():
+def test_the_curve_decreases_and_flatten_attains_it():
     vertices, faces = shapes.genus(1)
     curve = coneflat.cone_curve(vertices, faces, most=10)
     assert (np.diff(curve.counts) > 0).all()
@@ -26,28 +26,28 @@ def test_the_curve_falls_and_holds_what_it_says():
     assert result.solve.area_distortion_linear == pytest.approx(chosen.distortion, rel=1e-3)
 
 
-def test_no_search_for_one_number_is_much_better():
+def test_a_search_for_one_number_is_not_much_better():
     vertices, faces = shapes.sphere(3)
     curve = coneflat.cone_curve(vertices, faces, most=8)
-    for each in curve.sets:
-        alone = coneflat.find_cones(vertices, faces, cone_count=len(each.vertices))
-        assert each.distortion <= alone.distortion * 1.1
+    for cones in curve.sets:
+        alone = coneflat.find_cones(vertices, faces, cone_count=len(cones.vertices))
+        assert cones.distortion <= alone.distortion * 1.1
 
 
-def test_found_cones_are_those_of_flatten():
+def test_cones_are_those_of_flatten():
     vertices, faces = shapes.sphere(3)
-    found = coneflat.find_cones(vertices, faces, distortion=0.1)
-    np.testing.assert_array_equal(coneflat.flatten(vertices, faces, distortion=0.1).cones, found.vertices)
-    assert found.distortion <= 0.1
+    cones = coneflat.find_cones(vertices, faces, distortion=0.1)
+    np.testing.assert_array_equal(coneflat.flatten(vertices, faces, distortion=0.1).cones, cones.vertices)
+    assert cones.distortion <= 0.1
 
 
 @pytest.mark.parametrize("most", [0, 2.5, True, "5", np.arange(3), float("nan"), None])
-def test_numbers_that_make_no_sense(most):
+def test_invalid_numbers_are_errors(most):
     with pytest.raises(OptionError, match="most must be an? (integer|number)"):
         coneflat.cone_curve(*shapes.sphere(2), most=most)
 
 
-def test_too_few_for_the_surface():
+def test_too_few_cones_are_an_error():
     with pytest.raises(OptionError, match="up to 2 cones"):
         coneflat.cone_curve(*shapes.sphere(2), most=2)
 
@@ -79,31 +79,36 @@ def test_the_command_draws_the_curve(model, tmp_path, monkeypatch):
 class TestWhole:
     """The curve of all parts of a mesh together."""
 
-    def test_of_one_component_it_is_the_same(self):
+    def test_one_component_has_the_curve_of_the_component(self):
         mesh = shapes.sphere(2)
-        whole, one = whole_curve(mesh, Options(), 6), coneflat.cone_curve(*mesh, most=6)
-        assert whole.parts == 1
-        np.testing.assert_array_equal(whole.counts, one.counts)
-        np.testing.assert_allclose(whole.distortions, one.distortions, rtol=1e-12)
-        assert whole.knee == one.knee
+        mesh_curve, component_curve = whole_curve(mesh, Options(), 6), coneflat.cone_curve(*mesh, most=6)
+        assert mesh_curve.parts == 1
+        np.testing.assert_array_equal(mesh_curve.counts, component_curve.counts)
+        np.testing.assert_allclose(mesh_curve.distortions, component_curve.distortions, rtol=1e-12)
+        assert mesh_curve.knee == component_curve.knee
 
-    def test_of_several_it_is_what_flatten_has(self):
+    def test_components_combine_by_area(self):
         """A ball beside a hill, which needs no cones: at each number those of both count, by area."""
         ball, hill = shapes.sphere(3), shapes.hill(10, 8)
         vertices, faces = shapes.join((3 * ball[0] * [1, 1, 1.4], ball[1]), (hill[0] + 20, hill[1]))
-        whole = whole_curve((vertices, faces), Options(), 9)
-        assert whole.parts == 2
-        assert (np.diff(whole.distortions) < 0).all()
-        alone = [coneflat.cone_curve(*each, most=9) for each in ((3 * ball[0] * [1, 1, 1.4], ball[1]), hill)]
+        mesh_curve = whole_curve((vertices, faces), Options(), 9)
+        assert mesh_curve.parts == 2
+        assert (np.diff(mesh_curve.distortions) < 0).all()
+        alone = [
+            coneflat.cone_curve(*component, most=9)
+            for component in ((3 * ball[0] * [1, 1, 1.4], ball[1]), hill)
+        ]
         # A closed surface has no cones fewer than carry its curvature, whatever the other part could do with.
-        assert whole.counts[0] == max(curve.counts[0] for curve in alone)
-        assert set(whole.counts.tolist()) <= set(alone[0].counts.tolist()) | set(alone[1].counts.tolist())
-        for count in whole.counts[[0, -1]].tolist():
+        assert mesh_curve.counts[0] == max(curve.counts[0] for curve in alone)
+        assert set(mesh_curve.counts.tolist()) <= set(alone[0].counts.tolist()) | set(
+            alone[1].counts.tolist()
+        )
+        for count in mesh_curve.counts[[0, -1]].tolist():
             result = coneflat.flatten(vertices, faces, cone_count=count)
-            at = whole.distortions[whole.counts.tolist().index(count)]
+            at = mesh_curve.distortions[mesh_curve.counts.tolist().index(count)]
             assert result.solve.area_distortion_linear == pytest.approx(at, rel=0.1)
 
-    def test_what_seams_cut_off_is_a_part(self):
+    def test_regions_between_seams_are_parts(self):
         """A ball that is cut along its equator is two disks, which need no cones."""
         vertices, faces = shapes.sphere(3)
         mesh = coneflat.TriangleMesh(vertices, faces)
@@ -111,6 +116,6 @@ class TestWhole:
         rim = mesh.edges[~low[mesh.edges].any(axis=1)]
         below = np.isin(np.arange(len(vertices)), faces[low[faces].any(axis=1)]) & ~low
         seams = rim[below[rim].all(axis=1)]
-        whole = whole_curve((vertices, faces), Options(seams=seams), 6)
-        assert whole.parts == 2
-        assert whole.counts[0] == 0
+        mesh_curve = whole_curve((vertices, faces), Options(seams=seams), 6)
+        assert mesh_curve.parts == 2
+        assert mesh_curve.counts[0] == 0

@@ -16,11 +16,11 @@ from coneflat.linalg import factorize
 from coneflat.mesh.connectivity import label_faces
 
 
-def assert_same(one, other):
+def assert_same(result, expected):
     for name in ("uv", "uv_faces", "cones", "curvatures", "log_scale", "seams"):
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), name)
-    assert one.distortion.qc_mean == other.distortion.qc_mean
-    assert one.notes == other.notes
+        np.testing.assert_array_equal(getattr(result, name), getattr(expected, name), name)
+    assert result.distortion.qc_mean == expected.distortion.qc_mean
+    assert result.notes == expected.notes
 
 
 def wavy(resolution=3):
@@ -49,7 +49,7 @@ ASKED = (
 )
 
 
-def test_the_same_as_each_time_anew():
+def test_results_equal_those_of_flatten():
     mesh = wavy()
     edges = coneflat.TriangleMesh(*mesh).edges
     flattener = coneflat.Flattener(*mesh)
@@ -70,7 +70,7 @@ def test_the_same_as_each_time_anew():
         (shapes.torus(20, 10), [{}, {"quantise": np.pi / 2}, {"cones": {3: 0.5, 90: None}}]),
     ],
 )
-def test_borders_parts_and_handles(mesh, asked):
+def test_results_equal_those_of_flatten_with_boundaries_components_and_handles(mesh, asked):
     flattener = coneflat.Flattener(mesh)
     for _ in range(2):
         for options in asked:
@@ -94,7 +94,7 @@ def test_many_moves_factorize_the_mesh_once(monkeypatch):
     assert len(made) == 1
 
 
-def test_another_mesh_of_it_drops_what_was_kept():
+def test_other_seams_clear_the_cache():
     mesh = wavy()
     edges = coneflat.TriangleMesh(*mesh).edges
     flattener = coneflat.Flattener(*mesh)
@@ -114,7 +114,7 @@ class Enough(Exception):
 
 
 @pytest.mark.parametrize(("how", "step"), [("told", 12), ("asked", 2)])
-def test_what_is_given_up_leaves_nothing_behind(how, step):
+def test_cancelled_calls_do_not_change_later_results(how, step):
     mesh, asked = wavy(), {"cones": {5: 3.0, 60: None, 140: None, 300: None}}
     expected = coneflat.flatten(*mesh, **asked)
     flattener = coneflat.Flattener(*mesh)
@@ -141,7 +141,7 @@ def test_what_is_given_up_leaves_nothing_behind(how, step):
     assert interrupted > 1
 
 
-def test_a_first_layout_comes_early():
+def test_the_preview_precedes_relaxing():
     mesh, told, early = two_parts(), [], []
 
     def show(first):
@@ -161,7 +161,7 @@ def test_a_first_layout_comes_early():
     assert first.distortion.flipped == 0
 
 
-def test_what_is_no_mesh_and_what_makes_no_sense():
+def test_invalid_meshes_and_options_are_errors():
     with pytest.raises(errors.ArrayShapeError):
         coneflat.Flattener(object())
     flattener = coneflat.Flattener(*shapes.sphere(1))

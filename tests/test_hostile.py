@@ -167,7 +167,7 @@ def test_seams_differ_only_where_and_as_much_as_their_note_says(ball):
     moved_vertex = int(result.faces[is_moved][0])
     distant_vertex = int(np.argmax(np.linalg.norm(result.vertices - result.vertices[moved_vertex], axis=1)))
     room = (
-        "1 triangle had no room between seams with equal sides, next to vertex {}: they are positively "
+        "1 triangle could not be untangled with matching seams, next to vertex {}: they are positively "
         "oriented, but the sides of seams near them are unequal."
     )
     unmatched = (

@@ -39,12 +39,14 @@ def boundary_loop(vertices, faces):
 
 @pytest.mark.parametrize("name", ["sphere", "annulus", "genus 2"])
 @pytest.mark.parametrize("prescribed", ["scale", "curvature"])
-def test_angles_of_the_layout_are_flat_but_at_cones(name, prescribed):
+def test_angle_sums_of_the_layout_are_flat_except_at_cones(name, prescribed):
     vertices, faces = SHAPES[name]
     greedy = {"cones": "greedy"}
     if prescribed == "curvature":
-        found = flatten(vertices, faces, method="linear", charts="one", **greedy)
-        greedy = {"cones": dict(zip(found.cones.tolist(), found.curvatures.tolist(), strict=True)) or "none"}
+        linear = flatten(vertices, faces, method="linear", charts="one", **greedy)
+        greedy = {
+            "cones": dict(zip(linear.cones.tolist(), linear.curvatures.tolist(), strict=True)) or "none"
+        }
     result = flatten(vertices, faces, charts="one", relax="off", **greedy)
     d = result.distortion
     assert d.flipped == d.degenerate == 0
@@ -72,12 +74,12 @@ def test_rectangle_from_four_corners():
     at[result.faces] = result.corner_uv
     sides = np.linalg.norm(np.diff(at[[*corners, corners[0]]], axis=0), axis=1)
     np.testing.assert_allclose(sides[:2], sides[2:], rtol=1e-8)
-    one, two = (result.corner_uv[:, k] - result.corner_uv[:, 0] for k in (1, 2))
-    area = np.sum(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2
+    second_corner, third_corner = (result.corner_uv[:, k] - result.corner_uv[:, 0] for k in (1, 2))
+    area = np.sum(second_corner[:, 0] * third_corner[:, 1] - second_corner[:, 1] * third_corner[:, 0]) / 2
     assert area == pytest.approx(sides[0] * sides[1], rel=1e-8)
 
 
-def test_polygon_with_angles_of_its_own():
+def test_polygon_with_prescribed_angles():
     vertices, faces = SHAPES["disk"]
     corners = boundary_loop(vertices, faces)[[0, 30, 60]].tolist()
     curvatures = [np.pi / 2, 0.7 * np.pi, 0.8 * np.pi]
@@ -131,7 +133,7 @@ def test_the_curvature_of_round_loops_does_not_depend_on_the_scale():
         ({"boundary": "disk", "method": "linear"}, errors.OptionError, "has a free boundary"),
     ],
 )
-def test_bad_choices_are_named(options, kind, message):
+def test_invalid_options_are_errors(options, kind, message):
     vertices, faces = SHAPES["disk"]
     with pytest.raises(kind, match=message):
         flatten(vertices, faces, **{"cones": "none", **options})
@@ -160,27 +162,27 @@ def test_real_models_flatten_exactly(shared, name):
     assert d.degenerate == 0
     untouched = turned_angles(result)
     # Untangling moves vertices, and the angles around them, but never the sum of the angles at one.
-    used = np.unique(result.faces)
-    inside = used[~TriangleMesh(result.vertices, result.faces).is_boundary_vertex[used]]
+    face_vertices = np.unique(result.faces)
+    inside = face_vertices[~TriangleMesh(result.vertices, result.faces).is_boundary_vertex[face_vertices]]
     expected = np.full(len(result.vertices), 2 * np.pi)
     expected[result.cones] -= result.curvatures
     np.testing.assert_allclose(untouched[inside], expected[inside], atol=1e-6)
 
 
-def test_components_without_a_corner_are_as_if_free():
+def test_components_without_a_corner_have_a_free_boundary():
     vertices, faces = shapes.hill()
-    two = np.concatenate([vertices, vertices + 9]), np.concatenate([faces, faces + len(vertices)])
+    two_hills = np.concatenate([vertices, vertices + 9]), np.concatenate([faces, faces + len(vertices)])
     on_boundary = np.flatnonzero(TriangleMesh(vertices, faces).is_boundary_vertex)
     corners = on_boundary[:: len(on_boundary) // 4][:4]
-    result = flatten(*two, boundary=corners, charts="one")
+    result = flatten(*two_hills, boundary=corners, charts="one")
     free = flatten(vertices, faces, charts="one")
-    other = result.vertex_origin >= len(vertices)
+    in_second = result.vertex_origin >= len(vertices)
     np.testing.assert_allclose(
-        result.curvatures[np.isin(result.cones, np.flatnonzero(other))], free.curvatures
+        result.curvatures[np.isin(result.cones, np.flatnonzero(in_second))], free.curvatures
     )
     np.testing.assert_allclose(
         result.distortion.qc[result.faces[:, 0] >= len(vertices)], free.distortion.qc, rtol=1e-6
     )
     assert np.isnan(
-        result.prescribed[other & np.isin(result.vertex_origin - len(vertices), on_boundary)]
+        result.prescribed[in_second & np.isin(result.vertex_origin - len(vertices), on_boundary)]
     ).all()

@@ -130,7 +130,7 @@ def test_cones_of_the_users_own():
         ({"max_cones": -1}, errors.OptionError, "max_cones"),
         ({"max_cones": 2.5}, errors.OptionError, "max_cones must be an integer"),
         ({"cones": "greedy", "max_cones": 0}, errors.CurvatureError, "allow some"),
-        ({"cones": "greedy", "max_cones": 2}, errors.CurvatureError, "2 cones cannot carry"),
+        ({"cones": "greedy", "max_cones": 2}, errors.CurvatureError, "2 cones cannot absorb"),
         ({"cones": "greedy", "max_cones": 2, "method": "linear"}, errors.CurvatureError, "2 pi or more"),
         ({"cones": "none"}, errors.CurvatureError, "has none"),
         ({"cones": [1, 2, 3, 3]}, errors.OptionError, "vertex 3 is given as a cone twice"),
@@ -255,8 +255,8 @@ def test_notes_name_every_cone_and_vertex_where_triangles_fail():
     notes = flatten(vertices, faces, cones=cones).notes
     cannot = next(note for note in notes if "surrounding triangles cannot form" in note)
     assert f"form: vertex {wide[0]} (5.1 pi), vertex {wide[1]} (5.1 pi), vertex" in cannot
-    no_room = next(note for note in notes if "had no room" in note)
-    assert re.search(r"next to vertex \d+, vertex \d+.*: they are positively oriented", no_room)
+    unmatched = next(note for note in notes if "could not be untangled" in note)
+    assert re.search(r"next to vertex \d+, vertex \d+.*: they are positively oriented", unmatched)
 
 
 def test_bounds_of_angles_count_for_the_sparse_search():
@@ -382,11 +382,13 @@ def test_components_have_the_same_texel_density():
 
 def test_no_more_cones_are_searched_for_than_a_search_can_find(monkeypatch):
     """A distortion that needs more cones than the search allows is named at once: each search would take longest."""
-    pipeline = import_module("coneflat.flattening")
-    searches, once = [], pipeline.lay_out_part
-    monkeypatch.setattr(pipeline, "lay_out_part", lambda *arguments: searches.append(0) or once(*arguments))
-    monkeypatch.setattr(pipeline, "MAX_SEARCHED", 5)
-    for module in (pipeline, import_module("coneflat.bounds")):
+    retries = import_module("coneflat.retries")
+    searches, lay_out = [], retries.lay_out_with_thick_triangles
+    monkeypatch.setattr(
+        retries, "lay_out_with_thick_triangles", lambda *arguments: searches.append(0) or lay_out(*arguments)
+    )
+    monkeypatch.setattr(retries, "MAX_SEARCHED", 5)
+    for module in (retries, import_module("coneflat.bounds")):
         monkeypatch.setattr(module, "excess", lambda *_: 2.0)
     result = coneflat.flatten(coneflat.sample_path())
     assert len(searches) == 1

@@ -25,7 +25,7 @@ NAMES = module_paths()
 FRONT = ("apps.warm_up", "apps.blender", "apps.cli", "apps.studio")
 SHARED = ("quadmesh", "textures", "geometry.nearest")
 #: The most levels of the packages of the core.
-LEVELS = 8
+LEVELS = 10
 
 
 def is_core(name: str) -> bool:

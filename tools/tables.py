@@ -117,7 +117,8 @@ def readings_table(measured: Measured, body: str) -> str:
             row += [f"{paper:.3f}"] if paper else []
             row.append(f"{result.distortion.qc_mean:.4f}")
     headings = (
-        "model | CP: paper | here | with flips | LABF: paper | here | cones held | CF: paper | here | exact"
+        "model | CP: paper | here | with flips | LABF: paper | here | cone angles prescribed | "
+        "CF: paper | here | exact"
     )
     return _table(headings, list(_row_of_each(tuple(PAPERS), body, made)))
 
@@ -259,7 +260,7 @@ def atlases_table(measured: Measured, body: str) -> str:
         ]
     headings = (
         "model | triangles | charts: coneflat, with more cones, xatlas, uvunwrap | seam length | "
-        "QC distortion | packed"
+        "QC distortion | packing efficiency"
     )
     return _table(headings, [*rows, mean])
 
@@ -299,8 +300,8 @@ def quads_table(measured: Measured, body: str) -> str:
             f"{m.hausdorff / m.edge_mean:.2f}",
         ]
     headings = (
-        "model | quads | irregular vertices | degrees off 90: mean, 95% below | edge lengths, cv | "
-        "scaled Jacobian: mean, least | distance, edges"
+        "model | quads | irregular vertices | angle deviation, degrees: mean, p95 | edge lengths, cv | "
+        "scaled Jacobian: mean, minimum | distance, edges"
     )
     return _table(headings, list(_row_of_each(QUADS, body, made)))
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from coneflat import Flattening, TriangleMesh
 from coneflat.base import FloatArray
-from coneflat.flattening import flatten_source
+from coneflat.flattener import flatten_source
 from coneflat.io import as_input
 from coneflat.metric import find_metric
 from coneflat.options import Choice, Options, option, read_options

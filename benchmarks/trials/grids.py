@@ -106,13 +106,13 @@ def grid_of_mesh(
     options = {**make_grid_options(rng, vertices, faces), **options}
     smooth = int(rng.choice([0, 3, 10]))
     outcome.recipe = f"{made}; {in_short(options)}, smooth={smooth}"
-    grid = found = None
+    grid = quads = None
     with outcome.guarded(expects_nan=not np.isfinite(vertices).all()):
         grid = coneflat.integer_grid(vertices, faces, **options)
         check_grid(outcome, grid, options)
-        found = coneflat.quads(grid, smooth=smooth)
-    if grid is not None and found is not None:
-        check_quads(outcome, found, grid)
+        quads = coneflat.quads(grid, smooth=smooth)
+    if grid is not None and quads is not None:
+        check_quads(outcome, quads, grid)
 
 
 #: Surfaces of the trial of few triangles, and the numbers of quads asked for.
@@ -151,7 +151,7 @@ def few_case(rng: Random, outcome: Outcome) -> None:
     ):
         if rng.random() < chance:
             options[name] = values[int(rng.integers(len(values)))]
-    wanted = options["quads"]
+    requested = options["quads"]
     if rng.random() < 0.2:
         corners = vertices[faces]
         area = np.linalg.norm(
@@ -159,17 +159,17 @@ def few_case(rng: Random, outcome: Outcome) -> None:
         ).sum()
         options["size"] = float(np.sqrt(area / 2 / options.pop("quads"))) or 1.0
     outcome.recipe = f"{' and '.join(makers)}, {len(faces)} faces; {in_short(options)}"
-    found = None
+    quads = None
     with outcome.guarded():
-        found = coneflat.quads(vertices, faces, **options)
-    if found is None:
+        quads = coneflat.quads(vertices, faces, **options)
+    if quads is None:
         return
-    if not np.isfinite(found.vertices).all() or not np.isfinite(found.barycentric).all():
-        outcome.breach("quads: not finite", int((~np.isfinite(found.vertices)).sum()))
+    if not np.isfinite(quads.vertices).all() or not np.isfinite(quads.barycentric).all():
+        outcome.breach("quads: not finite", int((~np.isfinite(quads.vertices)).sum()))
     # The area, and with it the number for a size, changes a little by the repair.
-    if len(found.quads) > 1.01 * MAX_TIMES * wanted:
-        outcome.breach("quads: too many", f"{len(found.quads):,} for {wanted:,}")
-    if len(found.quads) < 50_000 and not np.isfinite(found.uv).all():
+    if len(quads.quads) > 1.01 * MAX_TIMES * requested:
+        outcome.breach("quads: too many", f"{len(quads.quads):,} for {requested:,}")
+    if len(quads.quads) < 50_000 and not np.isfinite(quads.uv).all():
         outcome.breach("quads: UVs not finite")
 
 
@@ -196,32 +196,32 @@ def check_grid(outcome: Outcome, grid: Any, options: dict[str, Any]) -> None:
     sides = z[:, [2, 0, 1]] - z[:, [1, 2, 0]]
     angles = np.angle(-sides[:, [1, 2, 0]] * np.conj(sides[:, [2, 0, 1]]))
     sums = np.bincount(faces.ravel(), angles.ravel(), len(grid.vertices)) / (np.pi / 2)
-    wanted = np.full(len(sums), 4)
-    wanted[grid.cones] = grid.quarters
+    expected = np.full(len(sums), 4)
+    expected[grid.cones] = grid.quarters
     inside = topology.is_used & ~topology.is_border
-    if np.abs(sums - wanted)[inside].max(initial=0) > 1e-3:
-        outcome.breach("grid: angles are not those of cones", np.abs(sums - wanted)[inside].max())
-    whole = np.isin(faces, np.concatenate([grid.cones, grid.corners]))
-    if (grid.corner_grid[whole] != np.rint(grid.corner_grid[whole])).any():
+    if np.abs(sums - expected)[inside].max(initial=0) > 1e-3:
+        outcome.breach("grid: angles are not those of cones", np.abs(sums - expected)[inside].max())
+    is_node = np.isin(faces, np.concatenate([grid.cones, grid.corners]))
+    if (grid.corner_grid[is_node] != np.rint(grid.corner_grid[is_node])).any():
         outcome.breach("grid: cones off the grid points")
-    most = options.get("max_cone_angle", 3 * np.pi) / (np.pi / 2) + 1e-6
-    least = (
+    max_quarters = options.get("max_cone_angle", 3 * np.pi) / (np.pi / 2) + 1e-6
+    min_quarters = (
         options.get("min_cone_angle", 1.5 * np.pi if "boundary" not in options else 0) / (np.pi / 2) - 1e-6
     )
     # The angles of vertices on sharp edges are sums of those between the edges.
     if (
         len(grid.quarters)
         and "sharp_angle" not in options
-        and (grid.quarters.max() > most or grid.quarters.min() < least)
+        and (grid.quarters.max() > max_quarters or grid.quarters.min() < min_quarters)
     ):
         outcome.breach("grid: cones beyond bounds", sorted(set(grid.quarters.tolist())))
 
 
-def check_quads(outcome: Outcome, found: Any, grid: Any) -> None:
+def check_quads(outcome: Outcome, mesh: Any, grid: Any) -> None:
     """Check that quads are an oriented manifold mesh on the surface with its topology."""
-    quads, points = found.quads, found.vertices
-    if any("\n" in note or "nan" in note.split() for note in found.notes):
-        outcome.breach("quads: a note of several lines, or of nan", found.notes)
+    quads, points = mesh.quads, mesh.vertices
+    if any("\n" in note or "nan" in note.split() for note in mesh.notes):
+        outcome.breach("quads: a note of several lines, or of nan", mesh.notes)
     if not len(quads) or quads.shape[1:] != (4,) or quads.min() < 0 or quads.max() >= len(points):
         outcome.breach("quads: none, or bad indices")
         return
@@ -234,34 +234,34 @@ def check_quads(outcome: Outcome, found: Any, grid: Any) -> None:
     _check_fans(outcome, quads, len(points))
     euler = len(points) - len(edges) + len(quads)
     surface = Topology.of(grid.faces, len(grid.vertices))
-    own = int(surface.is_used.sum()) - len(surface.edges) + len(grid.faces)
-    if euler != own:
-        if _says(found, r"The Euler characteristic of the quads is -?[\d,]+, that of the surface"):
+    surface_euler = int(surface.is_used.sum()) - len(surface.edges) + len(grid.faces)
+    if euler != surface_euler:
+        if _says(mesh, r"The Euler characteristic of the quads is -?[\d,]+, that of the surface"):
             outcome.excuse("Euler characteristic")
         else:
-            outcome.breach("quads: another Euler characteristic", f"{euler}, not {own}")
+            outcome.breach("quads: another Euler characteristic", f"{euler}, not {surface_euler}")
     z = grid.corner_grid @ [1, 1j]
     doubled = (np.conj(z[:, 1] - z[:, 0]) * (z[:, 2] - z[:, 0])).imag
     if not surface.is_border.any() and abs(doubled.sum() / 2 - len(quads)) > 1e-3:
         outcome.breach("quads: not as many as squares", f"{len(quads)}, {doubled.sum() / 2:.6f}")
-    corners = grid.vertices[grid.faces[found.faces]]
-    placed = np.einsum("qi,qix->qx", found.barycentric, corners)
+    corners = grid.vertices[grid.faces[mesh.faces]]
+    placed = np.einsum("qi,qix->qx", mesh.barycentric, corners)
     size = np.ptp(grid.vertices[surface.is_used], axis=0).max()
     off = np.abs(placed - points).max() if np.isfinite(points).all() else np.inf
-    if not off <= ROUNDING * size or found.barycentric.min() < 0:
+    if not off <= ROUNDING * size or mesh.barycentric.min() < 0:
         outcome.breach("quads: vertices off the surface", f"{off:.2g} of {size:.2g}")
-    if not (np.abs(found.barycentric.sum(axis=1) - 1) <= 1e-9).all():
+    if not (np.abs(mesh.barycentric.sum(axis=1) - 1) <= 1e-9).all():
         outcome.breach("quads: barycentric coordinates that are none")
     inverted = _inverted(points, quads)
     if inverted:
-        if _says(found, r"[\d,]+ quads? with an angle of 180 degrees or more"):
+        if _says(mesh, r"[\d,]+ quads? with an angle of 180 degrees or more"):
             outcome.excuse("inverted quads")
         else:
             outcome.breach("quads: inverted without a note", inverted)
 
 
-def _says(found: Any, sentence: str) -> bool:
-    return any(re.match(sentence, note) for note in found.notes)
+def _says(mesh: Any, sentence: str) -> bool:
+    return any(re.match(sentence, note) for note in mesh.notes)
 
 
 def _check_fans(outcome: Outcome, quads: np.ndarray, count: int) -> None:
@@ -278,8 +278,8 @@ def _inverted(points: np.ndarray, quads: np.ndarray) -> int:
     """Return the number of quads with a corner of an orientation opposite to that of their diagonals."""
     corners = points[quads] / max(np.abs(points).max(), np.finfo(float).tiny)
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-    least = np.full(len(quads), np.inf)
+    smallest = np.full(len(quads), np.inf)
     for i in range(4):
-        one, two = corners[:, (i + 1) % 4] - corners[:, i], corners[:, i - 1] - corners[:, i]
-        least = np.minimum(least, (np.cross(one, two) * normal).sum(axis=1))
-    return int((least < 0).sum())
+        forward, backward = corners[:, (i + 1) % 4] - corners[:, i], corners[:, i - 1] - corners[:, i]
+        smallest = np.minimum(smallest, (np.cross(forward, backward) * normal).sum(axis=1))
+    return int((smallest < 0).sum())

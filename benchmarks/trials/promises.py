@@ -19,7 +19,9 @@ ANGLE, SIDES = 1e-6, 1e-8
 #: by how much sides differ.
 LOOSE_SIDES = 1e-6
 #: The notes that name seams with unequal sides: those near vertices; so many marked ones, and their largest error.
-NO_ROOM = re.compile(r".* had no room .* next to (vertex .*): .* the sides of seams near them are unequal")
+NO_ROOM = re.compile(
+    r".* could not be untangled .* next to (vertex .*): .* the sides of seams near them are unequal"
+)
 NOT_KEPT = re.compile(
     r"([\d,]+) edges? of [\d,]+ on the boundary or on marked seams could not keep their lengths, "
     r"with relative errors of up to (\S+):"

@@ -34,7 +34,7 @@ __version__ = "0.2.0"
 
 # Module of each public name.
 _HOMES = {
-    "flatten": "flattening",
+    "flatten": "flattener",
     "Flattener": "flattener",
     "Flattening": "result",
     "Distortion": "measures.distortion",
@@ -125,8 +125,7 @@ if TYPE_CHECKING:
     from .apps.view import make_figure, save_figure
     from .curves import ConeCurve, cone_curve, find_cones
     from .errors import ConeflatError, GuaranteeWarning
-    from .flattener import Flattener
-    from .flattening import flatten
+    from .flattener import Flattener, flatten
     from .io import read_flattening, read_mesh
     from .io.mesh_file import MeshFile
     from .measures.distortion import Distortion, measure

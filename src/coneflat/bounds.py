@@ -14,7 +14,7 @@ from .geometry.planar import mean_energy, signed_double_areas
 from .measures.guarantees import EXTREME_QC
 from .optimise import mean_qc
 from .options import Options
-from .source.parts import Part
+from .source.components import Component
 from .stages import Layout
 
 # A layout may exceed the allowed area distortion by this factor.
@@ -25,51 +25,60 @@ TOLERATED_EXCESS = 1.02
 SEAMS_PER_ENERGY = 20.0
 
 
-def rank(parts: Sequence[Part], layouts: Sequence[Layout]) -> tuple[int, float, float]:
-    """Return what decides between layouts of a component, in one part or cut into several: the smaller is the better.
+def rank(components: Sequence[Component], layouts: Sequence[Layout]) -> tuple[int, float, float]:
+    """Return the rank of layouts of a component, uncut or cut into pieces; of two, the smaller is better.
 
     Fewer notes are better, then a smaller excess over the allowed area distortion, and within that bound a smaller sum
     of seams and distortion.
     """
     notes = sum(len(layout.notes) for layout in layouts)
-    return notes, max(excess(parts, layouts), TOLERATED_EXCESS), borders_and_distortion(parts, layouts)
+    return (
+        notes,
+        max(excess(components, layouts), TOLERATED_EXCESS),
+        borders_and_distortion(components, layouts),
+    )
 
 
-def is_too_distorted(part: Part, layout: Layout) -> bool:
-    """Return whether a part of which no more than a bound is asked has more area or angle distortion than is usable."""
-    if not is_bounded(part):
+def is_too_distorted(component: Component, layout: Layout) -> bool:
+    """Return whether a layout has too much area or angle distortion, where only a bound is requested."""
+    if not is_bounded(component):
         return False
-    return excess([part], [layout]) > TOLERATED_EXCESS or mean_qc(layout) > EXTREME_QC
+    return excess([component], [layout]) > TOLERATED_EXCESS or mean_qc(layout) > EXTREME_QC
 
 
-def excess(parts: Sequence[Part], layouts: Sequence[Layout]) -> float:
+def excess(components: Sequence[Component], layouts: Sequence[Layout]) -> float:
     """Return the area distortion of the triangles of all layouts, divided by the one allowed; 0 without a bound."""
-    bounded = [(part, layout) for part, layout in zip(parts, layouts, strict=True) if is_bounded(part)]
+    bounded = [
+        (component, layout)
+        for component, layout in zip(components, layouts, strict=True)
+        if is_bounded(component)
+    ]
     if not bounded:
         return 0.0
-    areas = np.concatenate([part.double_areas for part, _ in bounded])
+    areas = np.concatenate([component.double_areas for component, _ in bounded])
     flat = np.concatenate([signed_double_areas(layout.points[layout.corners]) for _, layout in bounded])
     chosen = (areas > 0) & (flat > 0)
     log_scale = np.log(flat[chosen] / areas[chosen]) / 2
-    return area_distortion(log_scale, areas[chosen]) / parts[0].cones.distortion
+    return area_distortion(log_scale, areas[chosen]) / components[0].cones.distortion
 
 
-def is_bounded(part: Part) -> bool:
-    """Return whether the area distortion of a part's layout is bounded by the options."""
-    cones = part.cones
+def is_bounded(component: Component) -> bool:
+    """Return whether the area distortion of a component's layout is bounded by the options."""
+    cones = component.cones
     is_free = cones.count is None and cones.weights is None and cones.quantum is None
-    return part.is_exact and is_free and uses_sparse_search(part.mesh, cones)
+    return component.is_exact and is_free and uses_sparse_search(component.mesh, cones)
 
 
-def borders_and_distortion(parts: Sequence[Part], layouts: Sequence[Layout]) -> float:
+def borders_and_distortion(components: Sequence[Component], layouts: Sequence[Layout]) -> float:
     """Return the length of all borders and seams, relative to the square root of the area, and a cost of distortion.
 
-    A seam counts once, the two borders of parts that it separates half each.
+    A seam counts once, the two borders of components that it separates half each.
     """
     areas = np.array([layout.area for layout in layouts])
     energies = [mean_energy(layout.lengths, layout.points[layout.corners]) for layout in layouts]
     length = sum(
-        seam_length(layout) + border_length(part) / 2 for part, layout in zip(parts, layouts, strict=True)
+        seam_length(layout) + border_length(component) / 2
+        for component, layout in zip(components, layouts, strict=True)
     )
     return float(length / np.sqrt(areas.sum()) + SEAMS_PER_ENERGY * np.average(energies, weights=areas))
 
@@ -80,24 +89,26 @@ def seam_length(layout: Layout) -> float:
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
 
 
-def border_length(part: Part) -> float:
-    """Return the length of the border of a part on the surface, model units."""
-    sides = part.mesh.edge_halfedges[part.mesh.is_boundary_edge, 0]
-    return float(part.lengths.ravel()[sides].sum())
+def border_length(component: Component) -> float:
+    """Return the length of the border of a component on the surface, model units."""
+    sides = component.mesh.edge_halfedges[component.mesh.is_boundary_edge, 0]
+    return float(component.lengths.ravel()[sides].sum())
 
 
-def bound_notes(parts: Sequence[Part], layouts: Sequence[Layout], o: Options) -> Iterator[Unmet]:
+def bound_notes(
+    components: Sequence[Component], layouts: Sequence[Layout], options: Options
+) -> Iterator[Unmet]:
     """Yield a note if the area distortion of a component, or of all of them together, is above the one allowed."""
-    pairs = zip(parts, layouts, strict=True)
-    curved = [(part, layout) for part, layout in pairs if layout.statistics.area_distortion > 0]
-    alone = max((excess([part], [layout]) for part, layout in curved), default=0.0)
-    together = excess(parts, layouts)
+    pairs = zip(components, layouts, strict=True)
+    curved = [(component, layout) for component, layout in pairs if layout.statistics.area_distortion > 0]
+    alone = max((excess([component], [layout]) for component, layout in curved), default=0.0)
+    together = excess(components, layouts)
     if (beyond := max(alone, together)) > TOLERATED_EXCESS:
-        reached = beyond * o.distortion
+        reached = beyond * options.distortion
         advice = f"allow {np.ceil(100 * reached) / 100:g}"
-        if o.max_cones is not None:
+        if options.max_cones is not None:
             advice += ", or more cones"
         yield Unmet(
             f"The triangles of {'a component' if alone == beyond else 'all components'} have an area distortion of "
-            f"{reached:.3g}, above the {o.distortion:g} allowed, and none with less was found: {advice}."
+            f"{reached:.3g}, above the {options.distortion:g} allowed, and none with less was found: {advice}."
         )

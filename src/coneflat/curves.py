@@ -18,7 +18,7 @@ from .geometry import double_areas
 from .geometry.operators import area_distortion, weighted_areas
 from .io.packages import as_input
 from .options import CurveOptions, FindOptions, Options, read_options, takes
-from .source.parts import Part, Source
+from .source.components import Component, Source
 from .stages import ConeSolution, Surface
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class FoundCones:
     Attributes:
         vertices: (s,) in the input's numbering.
         curvatures: (s,) radians.
-        distortion: area distortion E of the linear model: standard deviation of the log scale, weighted by area.
+        distortion: area distortion E: area-weighted standard deviation of the linear log conformal factor.
         notes: unmet requests, one sentence each.
     """
 
@@ -53,7 +53,7 @@ class ConeCurve:
         >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
         >>> faces = [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]]
         >>> curve = coneflat.cone_curve(vertices, faces)
-        >>> curve.counts  # no fewer cones carry the curvature of a sphere
+        >>> curve.counts  # no fewer cones absorb the curvature of a sphere
         array([3, 4])
         >>> curve.sets[-1].vertices
         array([0, 1, 2, 3])
@@ -64,16 +64,16 @@ class ConeCurve:
     @property
     def counts(self) -> IntArray:
         """(k,) numbers of cones."""
-        return np.array([len(each.vertices) for each in self.sets])
+        return np.array([len(cones.vertices) for cones in self.sets])
 
     @property
     def distortions(self) -> FloatArray:
         """(k,) area distortion E of the linear model with each set of cones."""
-        return np.array([each.distortion for each in self.sets])
+        return np.array([cones.distortion for cones in self.sets])
 
     @property
     def knee(self) -> int:
-        """The number of cones beyond which more of them gain least: farthest below the chord of the curve."""
+        """The number of cones beyond which additional cones reduce E little: farthest below the chord of the curve."""
         return _knee(self.counts, self.distortions)
 
 
@@ -93,7 +93,7 @@ class WholeCurve:
 
     @property
     def knee(self) -> int:
-        """The number of cones beyond which more of them gain least: farthest below the chord of the curve."""
+        """The number of cones beyond which additional cones reduce E little: farthest below the chord of the curve."""
         return _knee(self.counts, self.distortions)
 
 
@@ -118,7 +118,7 @@ def find_cones(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Fou
     Raises:
         MeshError: the mesh cannot be flattened; see `coneflat.errors` for its kinds.
         MeshFileError: its file cannot be read.
-        CurvatureError: no cones that are allowed carry the curvature of the surface.
+        CurvatureError: no cones that are allowed absorb the curvature of the surface.
         OptionError: an option is unknown or invalid.
         MetricError: the computation found no finite result.
         TooLargeError: the mesh does not fit into the free memory.
@@ -143,9 +143,9 @@ def find_cones(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Fou
             return replace(search, notes=notes)
         with stages("cones"):
             count = chosen.cone_count
-            found = search.fewest(chosen.distortion) if count is None else search.best_of(count)
-    notes = unmet_requests(part.mesh, found.solution.cones, found.distortion, part.cones)
-    return replace(_found_cones(found.solution, found.distortion, part), notes=notes)
+            search_result = search.fewest(chosen.distortion) if count is None else search.best_of(count)
+    notes = unmet_requests(part.mesh, search_result.solution.cones, search_result.distortion, part.cones)
+    return replace(_found_cones(search_result.solution, search_result.distortion, part), notes=notes)
 
 
 @takes(CurveOptions)
@@ -163,7 +163,7 @@ def cone_curve(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Con
     Raises:
         MeshError: the mesh cannot be flattened; see `coneflat.errors` for its kinds.
         MeshFileError: its file cannot be read.
-        CurvatureError: no cones that are allowed carry the curvature of the surface.
+        CurvatureError: no cones that are allowed absorb the curvature of the surface.
         OptionError: an option is unknown or invalid, or no set of up to `most` cones has the required total curvature.
         MetricError: the computation found no finite result.
         TooLargeError: the mesh does not fit into the free memory.
@@ -184,13 +184,13 @@ def cone_curve(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Con
         return _curve(_largest(mesh, faces, chosen, stages), parsed.most, stages)[0]
 
 
-def whole_curve(mesh: Any, options: Options, most: int) -> WholeCurve:
+def whole_curve(mesh: Any, options: Options, max_count: int) -> WholeCurve:
     """Search for the best set of cones of each size, on all parts of a mesh.
 
     Args:
         mesh: as for `coneflat.flatten`.
         options: parsed options of `coneflat.flatten`; `cone_count` is ignored.
-        most: largest number of cones in each part.
+        max_count: largest number of cones in each part.
 
     Returns:
         The area distortion of the whole mesh against the number of cones.
@@ -201,52 +201,57 @@ def whole_curve(mesh: Any, options: Options, most: int) -> WholeCurve:
     stages = Stopwatch(options.progress)
     with limit_threads(options.threads):
         with stages("check"):
-            parts = Source(as_input(mesh)).prepared(options).parts
+            parts = Source(as_input(mesh)).prepared(options).components
         total, curves = sum(len(part.faces) for part in parts), []
         for part in parts:
             stages.share = len(part.faces) / total
-            curves.append(_curve(part, most, stages))
+            curves.append(_curve(part, max_count, stages))
             stages.end_component()
-    least = max(curve.counts[0] for curve, _ in curves)
-    counts = np.unique(np.concatenate([[least], *(curve.counts for curve, _ in curves)]))
-    counts = counts[counts >= least]
+    smallest_count = max(curve.counts[0] for curve, _ in curves)
+    counts = np.unique(np.concatenate([[smallest_count], *(curve.counts for curve, _ in curves)]))
+    counts = counts[counts >= smallest_count]
     # If up to c cones are allowed, a part uses its best set of at most c cones.
-    each = [curve.distortions[np.searchsorted(curve.counts, counts, side="right") - 1] for curve, _ in curves]
+    per_part = [
+        curve.distortions[np.searchsorted(curve.counts, counts, side="right") - 1] for curve, _ in curves
+    ]
     areas = [area for _, area in curves]
-    whole = np.sqrt(np.average(np.square(each), axis=0, weights=areas))
-    return WholeCurve(counts, whole, len(parts))
+    distortions = np.sqrt(np.average(np.square(per_part), axis=0, weights=areas))
+    return WholeCurve(counts, distortions, len(parts))
 
 
-def _largest(mesh: Any, faces: ArrayLike | None, options: Options, stages: Stopwatch) -> Part:
+def _largest(mesh: Any, faces: ArrayLike | None, options: Options, stages: Stopwatch) -> Component:
     """Return the largest component of a mesh; progress counts this component alone."""
     with stages("check"):
-        part = max(Source(as_input(mesh, faces)).prepared(options).parts, key=lambda each: len(each.faces))
+        part = max(
+            Source(as_input(mesh, faces)).prepared(options).components,
+            key=lambda component: len(component.faces),
+        )
     stages.share = 1.0
     return part
 
 
-def _curve(part: Part, most: int, stages: Stopwatch) -> tuple[ConeCurve, float]:
+def _curve(part: Component, max_count: int, stages: Stopwatch) -> tuple[ConeCurve, float]:
     """Return the curve of a component and twice its area."""
     area, search = float(double_areas(part.lengths).sum()), _open(part, stages)
     if isinstance(search, FoundCones):
         return ConeCurve((search,)), area
     with stages("cones"):
-        found = search.curve(most)
-    if not found:
-        raise OptionError(f"no set of up to {most} cones carries this surface's curvature; allow more")
-    return ConeCurve(tuple(_found_cones(each.solution, each.distortion, part) for each in found)), area
+        curve = search.curve(max_count)
+    if not curve:
+        raise OptionError(f"no set of up to {max_count} cones absorbs this surface's curvature; allow more")
+    return ConeCurve(tuple(_found_cones(cones.solution, cones.distortion, part) for cones in curve)), area
 
 
-def _open(part: Part, stages: Stopwatch) -> ConeSearch | FoundCones:
+def _open(part: Component, stages: Stopwatch) -> ConeSearch | FoundCones:
     """Return a cone search on a component, or the only possible set of cones if there is nothing to search."""
     surface = Surface.of(part.mesh, part.lengths)
-    only = coneless_solution(surface, part.cones)
-    if only is not None:
+    coneless = coneless_solution(surface, part.cones)
+    if coneless is not None:
         share = weighted_areas(surface.areas, part.cones.weights)
-        return _found_cones(only, area_distortion(only.log_scale, share), part)
+        return _found_cones(coneless, area_distortion(coneless.log_scale, share), part)
     with stages("cones", 0.3):
-        return open_search(surface, part.cones, stages)
+        return open_search(surface, part.cones)
 
 
-def _found_cones(solution: ConeSolution, distortion: float, part: Part) -> FoundCones:
+def _found_cones(solution: ConeSolution, distortion: float, part: Component) -> FoundCones:
     return FoundCones(part.cones.names[solution.cones], solution.curvatures, distortion)

@@ -1,4 +1,4 @@
-"""Assembly of the result from the layouts of all parts: numbering, packing and measures."""
+"""Assembly of the result from the layouts of all components: numbering, packing and measures."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from .atlas import arrange_charts, separate_touching
 from .base.arrays import FloatArray, IntArray, rows_of
 from .base.notes import counted_notes
-from .base.progress import Stopwatch
+from .base.progress import stage, stage_seconds
 from .geometry.overlap import Overlaps
 from .measures.distortion import curvature_errors, measure
 from .measures.guarantees import unmet_guarantees
@@ -24,7 +24,7 @@ from .source.input_mesh import reorder_corners, result_numbering
 from .stages import SolveStatistics
 
 if TYPE_CHECKING:
-    from .source.parts import Prepared
+    from .source.components import Prepared
     from .stages import Layout
 
 
@@ -79,24 +79,22 @@ def evaluate(
     prepared: Prepared,
     layouts: Sequence[Layout],
     options: Options,
-    watch: Stopwatch,
     overlaps: Overlaps | None = None,
 ) -> Flattening:
     """Return the result of a flattening: packed, in the input's numbering, measured, with notes on unmet guarantees.
 
     Args:
         prepared: the input.
-        layouts: the layouts of its parts.
+        layouts: the layouts of its components.
         options: the options; the result records them.
-        watch: the stopwatch; the result records its times.
         overlaps: overlapping pairs of the result's triangles; None to compute them.
     """
     checked = prepared.checked
-    with watch("pack"):
+    with stage("pack"):
         numbering, order, mesh = _result_mesh(prepared)
         layout = _pack(layouts, order, mesh, options)
-    with watch("measure"):
-        source, face_corners = prepared.given.source, prepared.given.face_corners
+    with stage("measure"):
+        source, face_corners = prepared.input_mesh.source, prepared.input_mesh.face_corners
         if face_corners is not None and source is not None:
             face_corners = reorder_corners(checked, face_corners)
         target = numbering.spread([one.target for one in layouts])
@@ -111,7 +109,7 @@ def evaluate(
             curvature_error=curvature_errors(residual[np.isfinite(residual)]),
             cones=cones,
             prescribed=prescribed,
-            lengths=prepared.own_lengths,
+            lengths=prepared.user_lengths,
         )
         distortion = measured(rows_of(layout.uv, layout.corners), overlaps=overlaps)
         # In an atlas, triangles that overlap by rounding alone are separated.
@@ -140,7 +138,7 @@ def evaluate(
             [numbering.of_checked[prepared.seams], numbering.renumber([one.seams for one in layouts])]
         ),
         distortion=distortion.rescaled(checked.exponent * np.log(2)),
-        seconds=dict(watch.seconds),
+        seconds=stage_seconds(),
         notes=(
             *checked.notes,
             *prepared.notes,
@@ -150,10 +148,12 @@ def evaluate(
         solve=combined,
         rotations=rotations,
         vertex_origin=numbering.vertex_origin,
-        face_origin=checked.face_origin[np.sort(np.concatenate([part.faces for part in prepared.parts]))],
+        face_origin=checked.face_origin[
+            np.sort(np.concatenate([component.faces for component in prepared.components]))
+        ],
         face_corners=face_corners,
         source=source,
-        lengths=None if prepared.own_lengths is None else np.ldexp(prepared.own_lengths, -checked.exponent),
+        lengths=None if prepared.user_lengths is None else np.ldexp(prepared.user_lengths, -checked.exponent),
     )
     return replace(result, notes=(*result.notes, *unmet_guarantees(result)))
 
@@ -178,18 +178,18 @@ def _result_mesh(prepared: Prepared) -> tuple[_Numbering, IntArray, TriangleMesh
     Triangles are sorted in the order of the input's faces.
     """
     checked, numbering = prepared.checked, _number_vertices(prepared)
-    origin = np.concatenate([part.faces for part in prepared.parts])
+    origin = np.concatenate([component.faces for component in prepared.components])
     order = np.argsort(origin, kind="stable")
-    faces = rows_of(numbering.renumber([part.mesh.faces for part in prepared.parts]), order)
+    faces = rows_of(numbering.renumber([component.mesh.faces for component in prepared.components]), order)
     points = np.ldexp(numbering.positions, checked.exponent)
     return numbering, order, _known_or_new(checked.mesh, points, faces)
 
 
 def _number_vertices(prepared: Prepared) -> _Numbering:
     """Return the numbering of the result's vertices."""
-    points = np.asarray(prepared.given.vertices, dtype=np.float64)
+    points = np.asarray(prepared.input_mesh.vertices, dtype=np.float64)
     number, vertex_origin = result_numbering(prepared.checked, len(points))
-    of_parts = [number[part.vertices] for part in prepared.parts]
+    of_parts = [number[component.vertices] for component in prepared.components]
     return _Numbering(points[vertex_origin], vertex_origin, number, of_parts)
 
 

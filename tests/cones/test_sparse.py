@@ -46,23 +46,23 @@ def sparse(vertices, faces, distortion=0.2, count=None, **options):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SHAPES)
-def test_what_was_asked_before_costs_no_cone(name):
+def test_earlier_queries_of_a_search_cost_no_cones(name):
     search = search_on(*SHAPES[name])
     search.fewest(0.3)
     search.restrict(~search.is_boundary)
-    found, alone = search.fewest(0.1), search_on(*SHAPES[name]).fewest(0.1)
-    assert found.distortion <= 0.1
-    assert len(found.solution.cones) <= len(alone.solution.cones)
+    repeated, alone = search.fewest(0.1), search_on(*SHAPES[name]).fewest(0.1)
+    assert repeated.distortion <= 0.1
+    assert len(repeated.solution.cones) <= len(alone.solution.cones)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SHAPES)
 def test_reported_distortion_is_that_of_the_log_scale(name):
     laplacian, curvature, areas, is_boundary, chi = surface(*SHAPES[name])
-    found = sparse(*SHAPES[name], distortion=0.1)
-    solution = found.solution
-    assert found.distortion <= 0.1
-    assert found.distortion == pytest.approx(area_distortion(solution.log_scale, areas), rel=1e-9)
+    result = sparse(*SHAPES[name], distortion=0.1)
+    solution = result.solution
+    assert result.distortion <= 0.1
+    assert result.distortion == pytest.approx(area_distortion(solution.log_scale, areas), rel=1e-9)
     residual = laplacian @ solution.log_scale - solution.target + curvature
     assert np.abs(residual).max() < 1e-9
     outside = np.setdiff1d(np.arange(len(areas)), solution.cones)
@@ -72,29 +72,29 @@ def test_reported_distortion_is_that_of_the_log_scale(name):
 
 @pytest.mark.parametrize("name", SHAPES)
 @pytest.mark.parametrize("angles", [(np.pi, None), (1.5 * np.pi, 3 * np.pi)])
-def test_cone_angles_keep_to_their_bounds(name, angles):
+def test_cone_angles_are_within_their_bounds(name, angles):
     low, high = angles
-    found = sparse(*SHAPES[name], distortion=0.15, min_cone_angle=low, max_cone_angle=high)
-    cone_angles = 2 * np.pi - found.solution.curvatures
+    result = sparse(*SHAPES[name], distortion=0.15, min_cone_angle=low, max_cone_angle=high)
+    cone_angles = 2 * np.pi - result.solution.curvatures
     assert (cone_angles >= low - 1e-9).all()
     assert high is None or (cone_angles <= high + 1e-9).all()
 
 
 def test_positive_only():
-    found = sparse(*shapes.sphere(3), distortion=0.1, positive_only=True)
-    assert (found.solution.curvatures >= 0).all()
+    result = sparse(*shapes.sphere(3), distortion=0.1, positive_only=True)
+    assert (result.solution.curvatures >= 0).all()
     with pytest.raises(CurvatureError, match="-8 pi"):
         sparse(*HANDLE, positive_only=True)
 
 
-def test_bounds_that_leave_nothing_to_gain_end_the_search():
+def test_a_search_without_possible_gain_ends():
     """On a torus curvatures sum to 0: without negative ones there are none."""
     vertices, faces = shapes.genus(1)
     search = search_on(vertices, faces, positive_only=True)
-    found = search.fewest(0.01)
-    assert found.distortion > 0.01
+    result = search.fewest(0.01)
+    assert result.distortion > 0.01
     assert max(search.coarse.best.sizes) < 30
-    assert not found.solution.cones.size
+    assert not result.solution.cones.size
 
 
 @pytest.mark.parametrize("name", [*SHAPES, "stretched"])
@@ -103,9 +103,9 @@ def test_no_cone_can_be_left_out(name):
     vertices, faces = SHAPES["sphere" if name == "stretched" else name]
     vertices = vertices * ([30, 1, 1] if name == "stretched" else 1)
     search = search_on(vertices, faces)
-    found = search.fewest(0.1)
-    assert found.distortion <= 0.1
-    members = search.exact.insert(search.operator.unknowns_of(found.solution.cones))
+    result = search.fewest(0.1)
+    assert result.distortion <= 0.1
+    members = search.exact.insert(search.operator.unknowns_of(result.solution.cones))
     for place in range(len(members)):
         assert search.exact.energy(np.delete(members, place)) > 0.01
 
@@ -114,45 +114,45 @@ def test_no_cone_can_be_left_out(name):
 def test_noise_needs_cones_beyond_those_of_the_coarse_model():
     """With sets of the coarse model only, 102 cones are needed."""
     search = search_on(*noisy("noisy-sphere"))
-    found = search.fewest(0.06)
-    count = len(found.solution.cones)
-    assert found.distortion <= 0.06
+    result = search.fewest(0.06)
+    count = len(result.solution.cones)
+    assert result.distortion <= 0.06
     assert count < 90
-    assert search.best_of(count).distortion <= found.distortion
+    assert search.best_of(count).distortion <= result.distortion
 
 
 @pytest.mark.slow
-def test_noise_where_few_vertices_may_be_cones():
+def test_noise_with_few_allowed_vertices():
     """The vertices around which the gain is largest are mostly not allowed."""
     vertices, faces = noisy("noisy-sphere")
     allowed = np.random.default_rng(1).random(len(vertices)) < 0.1
-    found = search_on(vertices, faces, allowed=allowed).fewest(0.08)
-    assert found.distortion <= 0.08
-    assert allowed[found.solution.cones].all()
+    result = search_on(vertices, faces, allowed=allowed).fewest(0.08)
+    assert result.distortion <= 0.08
+    assert allowed[result.solution.cones].all()
 
 
 @pytest.mark.slow
-def test_a_distortion_out_of_reach_has_the_same_answer_again():
+def test_an_unreachable_distortion_gives_the_same_result_twice():
     """And has not many cones that gain nothing."""
     search = search_on(*noisy("noisy-sphere"), positive_only=True)
-    one, two = (search.fewest(0.06) for _ in range(2))
-    assert one.distortion > 0.06
-    assert one.distortion == two.distortion
-    assert len(one.solution.cones) == len(two.solution.cones) < 90
+    first, second = (search.fewest(0.06) for _ in range(2))
+    assert first.distortion > 0.06
+    assert first.distortion == second.distortion
+    assert len(first.solution.cones) == len(second.solution.cones) < 90
 
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_renumbering_changes_nothing(name):
     vertices, faces = SHAPES[name]
     shuffled, turned, _ = shapes.renumber(vertices, faces)
-    one = sparse(vertices, faces, distortion=0.1)
-    two = sparse(shuffled, turned, distortion=0.1)
-    assert len(one.solution.cones) == len(two.solution.cones)
-    assert one.distortion == pytest.approx(two.distortion, rel=1e-6)
+    original = sparse(vertices, faces, distortion=0.1)
+    renumbered = sparse(shuffled, turned, distortion=0.1)
+    assert len(original.solution.cones) == len(renumbered.solution.cones)
+    assert original.distortion == pytest.approx(renumbered.distortion, rel=1e-6)
 
 
 @pytest.mark.slow
-def test_a_torus_has_no_cones_or_two_and_more():
+def test_a_torus_has_no_cones_or_at_least_two():
     vertices, faces = shapes.torus()
     loose = sparse(vertices, faces, distortion=10)
     assert len(loose.solution.cones) == 0
@@ -184,17 +184,17 @@ def test_required_cones_are_kept_and_forbidden_ones_avoided():
     free = sparse(*hill, distortion=0.05)
     x = vertices[:, 0]
     forbidden = x > 0.4
-    found = sparse(*hill, distortion=0.05, allowed=~forbidden)
-    assert not forbidden[found.solution.cones].any()
+    result = sparse(*hill, distortion=0.05, allowed=~forbidden)
+    assert not forbidden[result.solution.cones].any()
     inner = np.flatnonzero(~check_mesh(*hill).mesh.is_boundary_vertex)
     required = [int(inner[7]), int(inner[300])]
-    found = sparse(*hill, distortion=0.05, required=required)
-    assert found.solution.cones[:2].tolist() == required
+    result = sparse(*hill, distortion=0.05, required=required)
+    assert result.solution.cones[:2].tolist() == required
     allowed = np.zeros(len(x), dtype=bool)
     allowed[free.solution.cones] = True
-    found = sparse(*hill, distortion=0.05, allowed=allowed)
-    assert set(found.solution.cones) <= set(free.solution.cones)
-    assert found.distortion == pytest.approx(free.distortion, rel=0.05)
+    result = sparse(*hill, distortion=0.05, allowed=allowed)
+    assert set(result.solution.cones) <= set(free.solution.cones)
+    assert result.distortion == pytest.approx(free.distortion, rel=0.05)
 
 
 def test_weights_shift_distortion_away():
@@ -204,22 +204,22 @@ def test_weights_shift_distortion_away():
     plain = sparse(vertices, faces, count=5)
     careful = sparse(vertices, faces, count=5, weights=np.where(face, 50.0, 1.0))
 
-    def inside(found):
-        return area_distortion(found.solution.log_scale[face], areas[face])
+    def inside(result):
+        return area_distortion(result.solution.log_scale[face], areas[face])
 
     assert inside(careful) < 0.7 * inside(plain)
 
 
-def test_what_cannot_be_reached_is_the_best_there_is():
+def test_an_unreachable_distortion_uses_the_allowed_vertices():
     vertices, faces = shapes.sphere(3)
     allowed = np.zeros(len(vertices), dtype=bool)
     allowed[[0, 5, 9, 11]] = True
-    found = sparse(vertices, faces, distortion=1e-3, allowed=allowed)
-    assert found.distortion > 1e-3
-    assert set(found.solution.cones) <= {0, 5, 9, 11}
+    result = sparse(vertices, faces, distortion=1e-3, allowed=allowed)
+    assert result.distortion > 1e-3
+    assert set(result.solution.cones) <= {0, 5, 9, 11}
 
 
-def test_a_distortion_whose_square_is_zero_may_be_asked_for():
+def test_a_distortion_whose_square_underflows_is_valid():
     cylinder = shapes.cylinder()
     assert sparse(*cylinder, distortion=1e-300).distortion <= sparse(*cylinder).distortion
 
@@ -242,7 +242,7 @@ def test_a_distortion_whose_square_is_zero_may_be_asked_for():
         ({"allowed": np.zeros(162, dtype=bool)}, CurvatureError),
     ],
 )
-def test_options_that_make_no_sense(options, error):
+def test_invalid_options_are_errors(options, error):
     with pytest.raises(error):
         sparse(*shapes.sphere(2), **options)
 
@@ -256,22 +256,22 @@ def test_fit_agrees_with_the_optimality_conditions(at_once, monkeypatch):
         size = int(rng.integers(1, 9)) if trial < 100 else 60
         root = rng.normal(size=(size, size + 2))
         gram, slope = root @ root.T, 3 * rng.normal(size=size)
-        least, most = -rng.uniform(0, 2), rng.uniform(0, 2)
-        total = rng.uniform(size * least, size * most) if rng.random() < 0.5 else np.nan
-        k, multiplier, feasible = fit(gram, slope, np.full(size, least), np.full(size, most), total)
+        lower, upper = -rng.uniform(0, 2), rng.uniform(0, 2)
+        total = rng.uniform(size * lower, size * upper) if rng.random() < 0.5 else np.nan
+        k, multiplier, feasible = fit(gram, slope, np.full(size, lower), np.full(size, upper), total)
         gradient = gram @ k + slope + (0 if np.isnan(total) else multiplier)
         assert feasible
-        assert (k >= least - 1e-12).all()
-        assert (k <= most + 1e-12).all()
+        assert (k >= lower - 1e-12).all()
+        assert (k <= upper + 1e-12).all()
         assert np.isnan(total) or k.sum() == pytest.approx(total, abs=1e-9)
-        assert (gradient[k < most - 1e-9] > -1e-7).all()
-        assert (gradient[k > least + 1e-9] < 1e-7).all()
-        guess = rng.choice([least, most, (least + most) / 2, np.nan], size)
-        again = fit(gram, slope, np.full(size, least), np.full(size, most), total, guess)
-        np.testing.assert_allclose(again[0], k, atol=1e-9)
+        assert (gradient[k < upper - 1e-9] > -1e-7).all()
+        assert (gradient[k > lower + 1e-9] < 1e-7).all()
+        guess = rng.choice([lower, upper, (lower + upper) / 2, np.nan], size)
+        with_guess = fit(gram, slope, np.full(size, lower), np.full(size, upper), total, guess)
+        np.testing.assert_allclose(with_guess[0], k, atol=1e-9)
 
 
-def test_changing_bounds_one_by_one_starts_from_the_bounds_found_at_once(monkeypatch):
+def test_changing_bounds_one_by_one_starts_from_the_active_bounds(monkeypatch):
     """From the optimum, no bound changes: with tight bounds, starting anew takes a hundred factorizations."""
     rng = np.random.default_rng(3)
     root = rng.normal(size=(80, 82))
@@ -279,7 +279,7 @@ def test_changing_bounds_one_by_one_starts_from_the_bounds_found_at_once(monkeyp
     program = root @ root.T, 3 * rng.normal(size=80), *bounds, 0.5
     best, _ = fit_curvatures.change_one_by_one(*program, np.zeros(80))
     calls, once = [], fit_curvatures.best_free
-    monkeypatch.setattr(fit_curvatures, "best_free", lambda *given: calls.append(0) or once(*given))
+    monkeypatch.setattr(fit_curvatures, "best_free", lambda *arguments: calls.append(0) or once(*arguments))
     again, _ = fit_curvatures.change_one_by_one(*program, best)
     np.testing.assert_allclose(again, best, atol=1e-9)
     assert np.count_nonzero(np.abs(best) == 0.1) > 20
@@ -301,9 +301,9 @@ def test_fewer_cones_than_published(shared, name):
     """Li et al. 2023 report 5, 10 and 10 cones for E <= 0.2."""
     model = read_mesh(shared(name))
     vertices, faces = model.vertices, model.corners.reshape(-1, 3)
-    found = sparse(vertices, faces, distortion=0.2, min_cone_angle=0.1 * np.pi)
-    assert found.distortion <= 0.2
-    assert len(found.solution.cones) <= PUBLISHED[name]
+    result = sparse(vertices, faces, distortion=0.2, min_cone_angle=0.1 * np.pi)
+    assert result.distortion <= 0.2
+    assert len(result.solution.cones) <= PUBLISHED[name]
 
 
 @pytest.mark.parametrize("shape", ["sphere", "annulus"])
@@ -329,16 +329,16 @@ def test_scale_does_not_change_the_coarse_model():
         laplacian = csr_matrix(cotangent_laplacian(faces, cots, len(vertices)))
         return coarse_basis(laplacian, np.full(len(vertices), 1 / len(vertices)), 60)
 
-    one = basis(1.0)
+    unscaled = basis(1.0)
     for scale in (7.0, 1e-6, 0.3):
-        other = basis(scale)
-        for known, found in zip(one, other, strict=True):
-            np.testing.assert_array_equal(found.indices, known.indices)
-            np.testing.assert_allclose(found.data, known.data, rtol=1e-9, atol=1e-12)
+        scaled = basis(scale)
+        for expected, matrix in zip(unscaled, scaled, strict=True):
+            np.testing.assert_array_equal(matrix.indices, expected.indices)
+            np.testing.assert_allclose(matrix.data, expected.data, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize("shape", ["hub", "strip", "pockets"])
-def test_coarse_model_of_odd_connectivity_stays_small(shape):
+def test_coarse_model_of_unusual_connectivity_is_small(shape):
     """One vertex that all others meet, a line of vertices between two boundaries, vertices that meet no other."""
     if shape == "hub":
         vertices, faces = shapes.cylinder(3000, 1, caps=True)
@@ -355,7 +355,7 @@ def test_coarse_model_of_odd_connectivity_stays_small(shape):
 
 
 @pytest.mark.slow
-def test_hubs_leave_vertices_to_choose_from():
+def test_hubs_leave_candidates_for_cones():
     """Two vertices that all others meet: their aggregates must not swallow the rest."""
     count = 20_000
     turn = np.arange(count) * 2 * np.pi / count
@@ -369,7 +369,7 @@ def test_hubs_leave_vertices_to_choose_from():
 
 
 @pytest.mark.slow
-def test_more_cones_than_are_searched_for_is_an_error():
+def test_too_many_or_infeasible_cones_are_errors():
     with pytest.raises(CurvatureError, match="400 cones or more"):
         sparse(*SHAPES["sphere"], min_cone_angle=1.99 * np.pi)
     with pytest.raises(CurvatureError, match="no set of .* cones was found"):
@@ -379,11 +379,11 @@ def test_more_cones_than_are_searched_for_is_an_error():
 
 
 @pytest.mark.slow
-def test_the_few_vertices_with_room_are_found():
+def test_the_few_vertices_that_can_have_wide_cones_are_found():
     """Four saddles of 4 pi carry the curvature, and only six vertices can have one."""
     wide = np.random.default_rng(0).choice(len(HANDLE[0]), 6, replace=False)
     max_angles = np.full(len(HANDLE[0]), 2 * np.pi)
     max_angles[wide] = 4 * np.pi
-    found = sparse(*HANDLE, max_angles=max_angles, count=8).solution
-    assert np.isin(found.cones[found.curvatures < 0], wide).all()
-    assert found.curvatures.min() >= -2 * np.pi - 1e-9
+    solution = sparse(*HANDLE, max_angles=max_angles, count=8).solution
+    assert np.isin(solution.cones[solution.curvatures < 0], wide).all()
+    assert solution.curvatures.min() >= -2 * np.pi - 1e-9

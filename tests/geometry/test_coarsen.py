@@ -17,16 +17,18 @@ def sphere() -> TriangleMesh:
 
 
 def test_the_number_of_triangles_is_reached(sphere: TriangleMesh):
-    coarse, kept, faces = coarse_mesh(sphere, 1_000)
+    coarse, vertices, faces = coarse_mesh(sphere, 1_000)
     assert len(coarse.faces) == len(faces) == 1_000
-    assert np.array_equal(coarse.vertices, sphere.vertices[kept])
+    assert np.array_equal(coarse.vertices, sphere.vertices[vertices])
 
 
 def test_the_order_and_type_of_faces_in_memory_change_nothing(sphere: TriangleMesh):
     faces = np.asfortranarray(sphere.faces.astype(np.int32))
-    one, two = (coarse_mesh(each, 500)[0].faces for each in (sphere, TriangleMesh(sphere.vertices, faces)))
-    assert len(one) == 500
-    assert np.array_equal(one, two)
+    coarse, coarse_of_copy = (
+        coarse_mesh(mesh, 500)[0].faces for mesh in (sphere, TriangleMesh(sphere.vertices, faces))
+    )
+    assert len(coarse) == 500
+    assert np.array_equal(coarse, coarse_of_copy)
 
 
 def test_the_topology_stays():
@@ -44,8 +46,8 @@ def test_the_surface_stays(sphere: TriangleMesh):
     centres = coarse.vertices[coarse.faces].mean(axis=1)
     fine = sphere.vertices[sphere.faces].mean(axis=1)
     assert cKDTree(fine).query(centres)[0].max() < 0.06
-    corners = [each.vertices[each.faces].transpose(1, 0, 2) for each in (coarse, sphere)]
-    volumes = [np.linalg.det(np.stack(each, axis=1)).sum() for each in corners]
+    corners = [mesh.vertices[mesh.faces].transpose(1, 0, 2) for mesh in (coarse, sphere)]
+    volumes = [np.linalg.det(np.stack(columns, axis=1)).sum() for columns in corners]
     assert volumes[0] == pytest.approx(volumes[1], rel=0.02)
 
 
@@ -53,12 +55,14 @@ def test_renumbering_changes_nothing(sphere: TriangleMesh):
     order = np.random.default_rng(1).permutation(len(sphere.vertices))
     place = np.argsort(order)
     shuffled = TriangleMesh(sphere.vertices[order], place[sphere.faces][::-1])
-    one, two = (coarse_mesh(each, 500)[0].vertices for each in (sphere, shuffled))
-    assert np.array_equal(one[np.lexsort(one.T)], two[np.lexsort(two.T)])
+    vertices, vertices_shuffled = (coarse_mesh(mesh, 500)[0].vertices for mesh in (sphere, shuffled))
+    assert np.array_equal(
+        vertices[np.lexsort(vertices.T)], vertices_shuffled[np.lexsort(vertices_shuffled.T)]
+    )
 
 
-@pytest.mark.parametrize(("height", "most"), [(0.1, 800), (0.02, 3000)])
-def test_thin_triangles_are_not_folded_over(height, most):
+@pytest.mark.parametrize(("height", "largest_count"), [(0.1, 800), (0.02, 3000)])
+def test_thin_triangles_are_not_folded_over(height, largest_count):
     """A flat sheet stays flat, and its triangles keep their orientation."""
     points = np.random.default_rng(0).uniform(size=(2000, 2))
     sheet = TriangleMesh(
@@ -67,4 +71,4 @@ def test_thin_triangles_are_not_folded_over(height, most):
     for mesh in (sheet, coarse_mesh(sheet, 800)[0]):
         sides = mesh.vertices[mesh.faces][:, 1:] - mesh.vertices[mesh.faces][:, :1]
         assert (np.cross(sides[:, 0], sides[:, 1])[:, 2] >= 0).all()
-    assert len(mesh.faces) <= most < len(sheet.faces)
+    assert len(mesh.faces) <= largest_count < len(sheet.faces)

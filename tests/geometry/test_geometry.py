@@ -128,17 +128,17 @@ def test_the_laplacian_sums_over_triangles(shape):
             i, j = face[(corner + 1) % 3], face[(corner + 2) % 3]
             expected[[i, j], [i, j]] += weight
             expected[[i, j], [j, i]] -= weight
-    found = cotangent_laplacian(faces, cots, len(vertices))
-    np.testing.assert_allclose(found.toarray(), expected, atol=1e-12)
-    assert (found.data != 0).all()
-    assert all((np.diff(rows) > 0).all() for rows in np.split(found.indices, found.indptr[1:-1]))
+    laplacian = cotangent_laplacian(faces, cots, len(vertices))
+    np.testing.assert_allclose(laplacian.toarray(), expected, atol=1e-12)
+    assert (laplacian.data != 0).all()
+    assert all((np.diff(rows) > 0).all() for rows in np.split(laplacian.indices, laplacian.indptr[1:-1]))
 
 
 def test_the_laplacian_of_edges_glued_to_each_other():
     # A cone of one triangle, two of whose sides are one: vertices 0, 1 and 1, and a side from 1 to itself.
     cots = np.array([[0.5, 2.0, 3.0]])
-    found = cotangent_laplacian(np.array([[0, 1, 1]]), cots, 2)
-    np.testing.assert_allclose(found.toarray(), 2.5 * np.array([[1, -1], [-1, 1]]))
+    laplacian = cotangent_laplacian(np.array([[0, 1, 1]]), cots, 2)
+    np.testing.assert_allclose(laplacian.toarray(), 2.5 * np.array([[1, -1], [-1, 1]]))
 
 
 @pytest.mark.parametrize(

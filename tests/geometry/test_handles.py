@@ -102,13 +102,14 @@ def test_corrections_that_need_more_steps_than_are_left_end_at_once(monkeypatch)
     solved, solve = [], exact_metric
     monkeypatch.setattr(find, "MAX_CHANGE", 1e-4)
     monkeypatch.setattr(
-        "coneflat.metric.solve.exact_metric", lambda *given, **more: solved.append(0) or solve(*given, **more)
+        "coneflat.metric.solve.exact_metric",
+        lambda *arguments, **options: solved.append(0) or solve(*arguments, **options),
     )
     cones = flatten(*shapes.genus(2), quantise=QUARTER)
     solved.clear()
-    given = dict(zip(cones.cones.tolist(), cones.curvatures.tolist(), strict=True))
+    curvatures = dict(zip(cones.cones.tolist(), cones.curvatures.tolist(), strict=True))
     with pytest.raises(errors.ConvergenceError, match=r"did not reach multiples of 0\.5 pi: they are off by"):
-        flatten(*shapes.genus(2), cones=given, quantise=QUARTER, correct_handles=True)
+        flatten(*shapes.genus(2), cones=curvatures, quantise=QUARTER, correct_handles=True)
     assert len(solved) == 1
 
 
@@ -136,6 +137,6 @@ def test_measured_rotations_of_a_cut_square():
         ),
     ],
 )
-def test_options_that_make_no_sense(options, kind, message):
+def test_invalid_combinations_are_refused(options, kind, message):
     with pytest.raises(kind, match=message):
         flatten(*shapes.sphere(2), **options)

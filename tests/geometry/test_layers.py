@@ -20,7 +20,7 @@ def squares(size):
 
 
 @pytest.mark.parametrize("fault", ["none", "moved", "upside down", "flat", "folded"])
-def test_of_a_mesh_only_what_may_overlap_is_compared(fault):
+def test_suspected_triangles_include_all_overlapping_ones(fault):
     """Pairs and areas are those of all triangles, whatever their orientation and wherever the layout is torn."""
     random = np.random.default_rng(3)
     size = 30
@@ -31,10 +31,10 @@ def test_of_a_mesh_only_what_may_overlap_is_compared(fault):
     if fault == "folded":
         places = (u - 0.3 * np.maximum(u - 20, 0) * 5) + 1j * v
     if fault in ("moved", "flat"):
-        some = random.choice(len(u), 40, replace=False)
-        places[some] += 0.1 * random.normal(size=40) if fault == "moved" else 0
+        chosen = random.choice(len(u), 40, replace=False)
+        places[chosen] += 0.1 * random.normal(size=40) if fault == "moved" else 0
         if fault == "flat":
-            places[some] = places[some + 1 - 2 * (some == len(u) - 1)]
+            places[chosen] = places[chosen + 1 - 2 * (chosen == len(u) - 1)]
     corners = np.stack([places.real, places.imag], axis=1)[mesh.faces]
     if fault == "moved":  # torn from the rest
         corners[random.choice(len(corners), 30, replace=False)] += 0.2
@@ -46,7 +46,7 @@ def test_of_a_mesh_only_what_may_overlap_is_compared(fault):
     assert (fewer.area, fewer.fraction) == (every.area, every.fraction)
 
 
-def test_inside_a_layout_that_covers_the_plane_once_nothing_may_overlap():
+def test_no_triangle_inside_a_single_layer_is_suspected():
     size = 100
     mesh = squares(size)
     faces = mesh.faces

@@ -29,13 +29,13 @@ class TestChecks:
         for flat in (False, True):
             np.testing.assert_array_equal(check_lengths(mesh, lengths, flat=flat), lengths)
 
-    def test_rounding_is_made_up_for(self):
+    def test_rounding_differences_are_removed(self):
         """Both sides of an edge get the same bits."""
-        found = check_lengths(TWO, changed(1, 1, 1.5 * (1 + 1e-12)))
-        assert found[0, 0] == found[1, 1]
-        np.testing.assert_allclose(found, SIDES, rtol=1e-11)
+        checked = check_lengths(TWO, changed(1, 1, 1.5 * (1 + 1e-12)))
+        assert checked[0, 0] == checked[1, 1]
+        np.testing.assert_allclose(checked, SIDES, rtol=1e-11)
 
-    def test_whole_numbers_will_do(self):
+    def test_integers_are_accepted(self):
         assert check_lengths(TWO, np.ones((2, 3), dtype=int)).dtype == np.float64
 
     @pytest.mark.parametrize(
@@ -116,16 +116,18 @@ def broken_mesh():
 
 
 class TestInput:
-    def test_they_follow_the_repair(self):
+    def test_lengths_are_repaired_with_the_mesh(self):
         """Those that the positions have come out as the repaired mesh's own, to the last bit."""
         vertices, faces = broken_mesh()
         checked = at_unit_size(check_mesh(vertices, faces, repair=True))
         assert len(checked.mesh.faces) < len(faces)
         assert checked.is_flipped.any()
-        given = edge_lengths(vertices, faces)
-        given[20] = np.nan  # of a face that is dropped
-        found = lengths_of_input(checked, given, len(faces))
-        np.testing.assert_array_equal(found, edge_lengths(checked.mesh.vertices, checked.mesh.faces))
+        lengths = edge_lengths(vertices, faces)
+        lengths[20] = np.nan  # of a face that is dropped
+        repaired_lengths = lengths_of_input(checked, lengths, len(faces))
+        np.testing.assert_array_equal(
+            repaired_lengths, edge_lengths(checked.mesh.vertices, checked.mesh.faces)
+        )
 
     def test_another_numbering_is_the_same_metric(self):
         vertices, faces = shapes.sphere(2)
@@ -135,24 +137,26 @@ class TestInput:
             ends = scale[triangles[:, [1, 2, 0]]] * scale[triangles[:, [2, 0, 1]]]
             return edge_lengths(points, triangles) * ends
 
-        other, turned, number = shapes.renumber(vertices, faces)
+        renumbered, turned, number = shapes.renumber(vertices, faces)
         moved = np.empty_like(factor)
         moved[number] = factor
-        one = lengths_of_input(check_mesh(vertices, faces), scaled(vertices, faces, factor), len(faces))
-        two = lengths_of_input(check_mesh(other, turned), scaled(other, turned, moved), len(faces))
-        np.testing.assert_allclose(np.sort(one.ravel()), np.sort(two.ravel()), rtol=1e-14)
+        lengths = lengths_of_input(check_mesh(vertices, faces), scaled(vertices, faces, factor), len(faces))
+        renumbered_lengths = lengths_of_input(
+            check_mesh(renumbered, turned), scaled(renumbered, turned, moved), len(faces)
+        )
+        np.testing.assert_allclose(np.sort(lengths.ravel()), np.sort(renumbered_lengths.ravel()), rtol=1e-14)
 
     def test_names_are_those_of_the_input(self):
         vertices, faces = broken_mesh()
         checked = check_mesh(vertices, faces, repair=True)
-        given = edge_lengths(vertices, faces)
-        given[30, 0] = -1.0
+        lengths = edge_lengths(vertices, faces)
+        lengths[30, 0] = -1.0
         with pytest.raises(errors.LengthError, match="not positive: 30; face 30 has sides of -1"):
-            lengths_of_input(checked, given, len(faces))
-        given = edge_lengths(vertices, faces)
+            lengths_of_input(checked, lengths, len(faces))
+        lengths = edge_lengths(vertices, faces)
         a, b = sorted(faces[40, 1:])
-        given[40, 0] *= 1.01
+        lengths[40, 0] *= 1.01
         with pytest.raises(errors.LengthError, match=f": {a}-{b}; edge {a}-{b} is .* in face (40|.*40$)"):
-            lengths_of_input(checked, given, len(faces))
+            lengths_of_input(checked, lengths, len(faces))
         with pytest.raises(errors.ArrayShapeError, match=rf"\({len(faces)}, 3\)"):
-            lengths_of_input(checked, given[1:], len(faces))
+            lengths_of_input(checked, lengths[1:], len(faces))

@@ -28,23 +28,23 @@ def exact(triangle):
     return corners if turn(*corners) > 0 else corners[::-1]
 
 
-def common_area(one, two):
+def common_area(first, second):
     """Twice the area that two triangles have in common, a fraction, by clipping."""
-    polygon, clip = exact(one), exact(two)
+    polygon, clip = exact(first), exact(second)
     if turn(*polygon) == 0 or turn(*clip) == 0:
         return 0
     for i in range(3):
         p, q = clip[i], clip[(i + 1) % 3]
-        kept = []
+        clipped = []
         for k, b in enumerate(polygon):
             a = polygon[k - 1]
             side_a, side_b = turn(p, q, a), turn(p, q, b)
             if side_a * side_b < 0:
                 t = side_a / (side_a - side_b)
-                kept.append((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])))
+                clipped.append((a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])))
             if side_b >= 0:
-                kept.append(b)
-        polygon = kept
+                clipped.append(b)
+        polygon = clipped
     return sum(a[0] * b[1] - a[1] * b[0] for a, b in zip(polygon, polygon[1:] + polygon[:1], strict=True))
 
 
@@ -54,7 +54,7 @@ def brute_force(corners):
     ]
 
 
-def found(corners, **options):
+def pairs_of(corners, **options):
     return [tuple(pair) for pair in find_overlaps(np.array(corners, dtype=float), **options).pairs.tolist()]
 
 
@@ -108,7 +108,7 @@ def test_contact_is_no_overlap(name):
 @pytest.mark.parametrize("name", OVERLAPS)
 def test_inner_points_in_common_are_overlap(name):
     for pair in ([UNIT, OVERLAPS[name]], [OVERLAPS[name], UNIT]):
-        assert found(pair) == [(0, 1)]
+        assert pairs_of(pair) == [(0, 1)]
         area = float(common_area(*pair)) / 2
         assert find_overlaps(np.array(pair, dtype=float)).area == pytest.approx(area, abs=1e-15)
 
@@ -130,12 +130,12 @@ def test_orientation_where_rounding_would_decide():
 @pytest.mark.parametrize("seed", range(2))
 def test_pairs_are_those_of_exact_clipping(seed):
     rng = np.random.default_rng(seed)
-    whole = rng.integers(0, 7, (40, 3, 2))  # many contacts of every kind, some triangles without area
-    assert found(whole) == brute_force(whole)
+    integers = rng.integers(0, 7, (40, 3, 2))  # many contacts of every kind, some triangles without area
+    assert pairs_of(integers) == brute_force(integers)
     spread = rng.random((40, 1, 2)) + 0.3 * rng.normal(size=(40, 3, 2)) * np.exp(-8 * rng.random((40, 1, 1)))
-    assert found(spread) == brute_force(spread)
-    near = rng.integers(0, 5, (40, 3, 2)) / 8 + 0.5 + rng.integers(-1, 2, (40, 3, 2)) * ULP
-    assert found(near) == brute_force(near)
+    assert pairs_of(spread) == brute_force(spread)
+    close = rng.integers(0, 5, (40, 3, 2)) / 8 + 0.5 + rng.integers(-1, 2, (40, 3, 2)) * ULP
+    assert pairs_of(close) == brute_force(close)
 
 
 def test_a_triangulation_has_no_overlaps_at_any_scale():
@@ -159,7 +159,7 @@ def test_fans_leave_the_pairs_as_they_are(seed, monkeypatch):
         ]
     )
     corners[60:70, 1] = corners[70:, 2] = corners[60, 1]
-    assert found(corners) == brute_force(corners)
+    assert pairs_of(corners) == brute_force(corners)
 
 
 @pytest.mark.parametrize("count", [17, 301])
@@ -204,12 +204,12 @@ def test_layers_that_coincide_but_for_rounding(turns, share):
 
 def test_areas_do_not_depend_on_the_blocks_of_the_sweep(monkeypatch):
     points, faces = spiral(3.3, 0.4)
-    whole = find_overlaps(points, faces)
+    unblocked = find_overlaps(points, faces)
     monkeypatch.setattr(coverage, "CROSSINGS_PER_BLOCK", 100)
-    parts = find_overlaps(points, faces)
-    assert parts.area == pytest.approx(whole.area, rel=1e-12)
-    assert parts.fraction == pytest.approx(whole.fraction, rel=1e-12)
-    assert whole.fraction == pytest.approx(sampled(points[faces]), abs=2e-3)
+    blocked = find_overlaps(points, faces)
+    assert blocked.area == pytest.approx(unblocked.area, rel=1e-12)
+    assert blocked.fraction == pytest.approx(unblocked.fraction, rel=1e-12)
+    assert unblocked.fraction == pytest.approx(sampled(points[faces]), abs=2e-3)
 
 
 def test_triangles_of_very_different_size():
@@ -228,17 +228,17 @@ def test_triangles_of_very_different_size():
 def test_renumbering_renumbers_the_pairs():
     rng = np.random.default_rng(5)
     corners = rng.random((300, 1, 2)) + 0.1 * rng.normal(size=(300, 3, 2))
-    new = rng.permutation(300)
+    number = rng.permutation(300)
     shuffled = np.empty_like(corners)
-    shuffled[new] = np.roll(corners, 1, axis=1)
-    one, two = find_overlaps(corners), find_overlaps(shuffled)
-    pairs = np.sort(new[one.pairs], axis=1)
-    np.testing.assert_array_equal(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], two.pairs)
-    assert one.area == pytest.approx(two.area, rel=1e-12)
+    shuffled[number] = np.roll(corners, 1, axis=1)
+    overlaps, shuffled_overlaps = find_overlaps(corners), find_overlaps(shuffled)
+    pairs = np.sort(number[overlaps.pairs], axis=1)
+    np.testing.assert_array_equal(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], shuffled_overlaps.pairs)
+    assert overlaps.area == pytest.approx(shuffled_overlaps.area, rel=1e-12)
     for scale in (1e-6, 1e6):
         scaled = find_overlaps(corners * scale)
-        np.testing.assert_array_equal(scaled.pairs, one.pairs)
-        assert scaled.area == pytest.approx(one.area * scale**2, rel=1e-12)
+        np.testing.assert_array_equal(scaled.pairs, overlaps.pairs)
+        assert scaled.area == pytest.approx(overlaps.area * scale**2, rel=1e-12)
 
 
 def test_limit():
@@ -248,17 +248,17 @@ def test_limit():
     np.testing.assert_array_equal(every.pairs, np.stack(np.triu_indices(200, 1), axis=1))
     assert (every.area, every.fraction) == pytest.approx((0.5, 1))
     assert find_overlaps(corners, limit=len(every.pairs)).complete
-    some = find_overlaps(corners, limit=17)
-    assert len(some.pairs) == 17
-    assert not some.complete
-    assert np.isnan([some.area, some.fraction]).all()
+    limited = find_overlaps(corners, limit=17)
+    assert len(limited.pairs) == 17
+    assert not limited.complete
+    assert np.isnan([limited.area, limited.fraction]).all()
     assert len(find_overlaps(corners[:1]).pairs) == 0
     assert find_overlaps(0 * corners).fraction == 0  # no triangle has area
     assert find_overlaps(corners[:2], limit=1).complete
 
 
 def separate_cells(columns=12, rows=9):
-    """Squares in rows, each with points of its own, which touch along their sides or parts of them."""
+    """Squares in rows, each with separate points, which touch along their sides or parts of them."""
     low = np.stack(
         np.meshgrid(np.arange(columns, dtype=float), np.arange(rows, dtype=float), indexing="ij"), -1
     )
@@ -270,7 +270,7 @@ def separate_cells(columns=12, rows=9):
 
 @pytest.mark.parametrize("angle", [0.1, 2.5])
 @pytest.mark.parametrize("mirrored", [False, True])
-def test_what_touches_is_parted(angle, mirrored):
+def test_touching_triangles_are_separated(angle, mirrored):
     points, triangles = separate_cells()
     turned = points @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]]) / 31
     triangles = triangles[:, ::-1] if mirrored else triangles
@@ -280,7 +280,7 @@ def test_what_touches_is_parted(angle, mirrored):
     assert np.abs(parted - turned).max() < 1e-13
 
 
-def test_what_overlaps_is_not_parted():
+def test_overlapping_triangles_are_not_separated():
     points, triangles = separate_cells(2, 1)
     points[4:, 0] -= 1e-6
     parted, overlaps = separate_touching(points, triangles)

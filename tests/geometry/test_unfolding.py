@@ -58,8 +58,8 @@ def test_a_flat_torus_unfolds_to_its_parallelogram():
     assert len(points) == len(disk.vertices)
     hull = points - points.mean(axis=0)
     assert np.abs(hull).max() < 6
-    one, two = (points[disk.faces[:, k]] - points[disk.faces[:, 0]] for k in (1, 2))
-    areas = (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2
+    first, second = (points[disk.faces[:, k]] - points[disk.faces[:, 0]] for k in (1, 2))
+    areas = (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2
     np.testing.assert_allclose(areas, np.sqrt(3) / 4, rtol=1e-12)
 
 
@@ -122,10 +122,10 @@ class TestUnfold:
         cut = halfedge_twins(cut_mesh.mesh) < 0
         uv = unfold(flat, corners)
         assert seam_mismatch(flat, cut, uv, corners) < 1e-12
-        lengths, wanted = np.abs(side_vectors(uv, corners)).ravel(), np.abs(flat.sides)
-        np.testing.assert_allclose(lengths, wanted, rtol=1e-11)
+        lengths, flat_lengths = np.abs(side_vectors(uv, corners)).ravel(), np.abs(flat.sides)
+        np.testing.assert_allclose(lengths, flat_lengths, rtol=1e-11)
 
-    def test_a_plane_figure_stays_what_it_is(self):
+    def test_a_planar_mesh_stays_unchanged(self):
         points, faces = shapes.grid(9, 7)
         _, flat = planar(points[:, :2], faces)
         uv = unfold(flat, faces)
@@ -137,8 +137,8 @@ class TestUnfold:
         uv = unfold(flat, faces)
         count = 5 * 4
         for part in (slice(0, count), slice(count, None)):
-            given = points[part, :2]
-            np.testing.assert_allclose(uv[part] - uv[part][0], given - given[0], atol=1e-14)
+            plane_points = points[part, :2]
+            np.testing.assert_allclose(uv[part] - uv[part][0], plane_points - plane_points[0], atol=1e-14)
 
     def test_triangles_turned_over_are_laid_out_that_way(self):
         points, faces = shapes.grid(4, 4)
@@ -212,9 +212,9 @@ class TestUntangle:
         pinned = np.zeros(n, dtype=bool)
         pinned[cones] = True
         seam = np.bincount(cut_mesh.origin, minlength=n) > 1
-        near = np.zeros(n, dtype=bool)
-        near[mesh.faces[seam[mesh.faces].any(axis=1)]] = True
-        victim = int(np.flatnonzero(near & ~seam)[0])
+        is_adjacent = np.zeros(n, dtype=bool)
+        is_adjacent[mesh.faces[seam[mesh.faces].any(axis=1)]] = True
+        victim = int(np.flatnonzero(is_adjacent & ~seam)[0])
         tangled = drag(flat, mesh.faces, victim, 1.3)
         result = untangled(tangled, mesh, angles_around(flat, mesh), pinned | seam, pinned)
         assert len(result.left) == 0
@@ -222,9 +222,9 @@ class TestUntangle:
 
 
 def untangled(flat, mesh, angles, *stays):
-    """Flat triangles untangled; what stays is first what is given first."""
-    rest = rest_sides(np.abs(flat.sides).reshape(-1, 3))
-    return untangle(flat, mesh.faces, angles, mesh.is_boundary_vertex, stays, rest)
+    """Flat triangles untangled."""
+    target_shapes = rest_sides(np.abs(flat.sides).reshape(-1, 3))
+    return untangle(flat, mesh.faces, angles, mesh.is_boundary_vertex, stays, target_shapes)
 
 
 def drag(flat, faces, vertex, amount):

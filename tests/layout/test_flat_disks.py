@@ -13,7 +13,7 @@ from coneflat.errors import CurvatureError
 from coneflat.geometry import edge_lengths, signed_double_areas
 from coneflat.layout import lay_out_flat_disks
 
-pipeline = import_module("coneflat.flattening")
+retries = import_module("coneflat.retries")
 
 
 def laid_out(*parts):
@@ -56,10 +56,10 @@ def test_flat_disks_keep_all_lengths():
         assert np.array_equal(layout.corners, faces)
 
 
-def test_others_are_left_out():
+def test_curved_and_overlapping_components_are_not_laid_out():
     overlapping = spiral(1.4)
-    others = shapes.hill(4, 4), shapes.annulus(12, 2), shapes.tetrahedron(), overlapping
-    assert laid_out(*others, shapes.grid(2, 2))[:-1] == [None] * len(others)
+    unfit = shapes.hill(4, 4), shapes.annulus(12, 2), shapes.tetrahedron(), overlapping
+    assert laid_out(*unfit, shapes.grid(2, 2))[:-1] == [None] * len(unfit)
     assert laid_out(spiral(0.8))[0] is not None
 
 
@@ -79,10 +79,10 @@ def cards(count: int, seed: int = 0):
 
 
 @pytest.mark.parametrize("function", [coneflat.flatten, coneflat.unwrap])
-def test_no_stage_runs_for_each_flat_disk(monkeypatch, function):
+def test_flat_disks_are_laid_out_in_one_call(monkeypatch, function):
     """Thousands of leaf cards take seconds: they are laid out together."""
-    for name in ("lay_out_part", "lay_out_once", "finish_part"):
-        monkeypatch.setattr(pipeline, name, lambda *_: pytest.fail("a stage runs for a flat disk"))
+    for name in ("lay_out_with_thick_triangles", "lay_out_component", "finish_component"):
+        monkeypatch.setattr(retries, name, lambda *_: pytest.fail("a stage runs for a flat disk"))
     vertices, faces = cards(50)
     result = function(vertices, faces)
     d = result.distortion
@@ -93,7 +93,7 @@ def test_no_stage_runs_for_each_flat_disk(monkeypatch, function):
     )
 
 
-def test_requests_for_cones_or_a_shape_are_heard():
+def test_requested_cones_or_shapes_are_respected():
     """A flat disk is laid out like others where its boundary is prescribed."""
     vertices, faces = shapes.grid(5, 5)
     disk = coneflat.flatten(vertices, faces, boundary="disk")

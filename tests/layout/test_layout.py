@@ -9,13 +9,13 @@ from coneflat.geometry import edge_lengths
 from coneflat.layout import least_squares_layout
 
 
-def test_flat_mesh_comes_back():
+def test_a_flat_mesh_is_reconstructed():
     vertices, faces = shapes.grid(9, 5)
     points = least_squares_layout(TriangleMesh(vertices, faces), edge_lengths(vertices, faces))
     assert shapes.similar(points, vertices[:, :2]) < 1e-11
 
 
-def test_slivers_do_not_hurt():
+def test_slivers_are_laid_out_accurately():
     vertices, faces = shapes.grid(30, 30)
     vertices[:, 1] *= 1e-3
     points = least_squares_layout(TriangleMesh(vertices, faces), edge_lengths(vertices, faces))

@@ -15,18 +15,18 @@ def free(monkeypatch, count):
     monkeypatch.setattr(memory, "free_memory", lambda: float(count))
 
 
-def test_small_meshes_are_not_asked(monkeypatch):
+def test_small_meshes_are_not_checked(monkeypatch):
     free(monkeypatch, 0)
     check_memory(CHECKED_BYTES // BYTES_PER_TRIANGLE)
 
 
-def test_what_fits_is_taken(monkeypatch):
+def test_meshes_that_fit_are_accepted(monkeypatch):
     count = CHECKED_BYTES // BYTES_PER_TRIANGLE + 1
     free(monkeypatch, BYTES_PER_TRIANGLE * count)
     check_memory(count)
 
 
-def test_what_does_not_fit(monkeypatch):
+def test_meshes_that_do_not_fit_are_refused(monkeypatch):
     free(monkeypatch, 2e9)
     with pytest.raises(TooLargeError) as raised:
         check_memory(30_000_000)
@@ -35,7 +35,7 @@ def test_what_does_not_fit(monkeypatch):
     assert isinstance(raised.value, MemoryError)
 
 
-def test_a_flattening_is_refused(monkeypatch):
+def test_flatten_checks_the_memory(monkeypatch):
     free(monkeypatch, 1e5)
     monkeypatch.setattr(memory, "CHECKED_BYTES", 100)
     with pytest.raises(TooLargeError, match="320 triangles"):
@@ -44,10 +44,10 @@ def test_a_flattening_is_refused(monkeypatch):
 
 def test_free_memory_is_that_of_the_container(monkeypatch, tmp_path):
     monkeypatch.setattr(memory, "CGROUP", tmp_path)
-    whole = free_memory()
-    assert whole > 0
+    unlimited = free_memory()
+    assert unlimited > 0
     (tmp_path / "memory.current").write_text("1000\n")
     (tmp_path / "memory.max").write_text("max\n")
-    assert free_memory() == pytest.approx(whole, rel=0.5)
+    assert free_memory() == pytest.approx(unlimited, rel=0.5)
     (tmp_path / "memory.max").write_text("5000\n")
     assert free_memory() == 4000

@@ -72,18 +72,18 @@ def test_solutions(kind, matrix):
     assert factor.solve(np.asfortranarray(right)[:, ::2]) == pytest.approx(expected[:, ::2], abs=1e-9)
 
 
-def test_the_same_pattern_and_another(kind, matrix):
+def test_factors_are_reused_for_other_matrices(kind, matrix):
     """What was analysed for one matrix serves others of its size, whichever their pattern."""
-    same = csc_matrix((matrix.data * 2, matrix.indices, matrix.indptr), shape=matrix.shape)
-    other = csc_matrix(matrix + csc_matrix(([0.5, 0.5], ([0, 500], [500, 0])), shape=matrix.shape))
-    other.setdiag(other.diagonal() + 1)
-    other.sort_indices()
+    rescaled = csc_matrix((matrix.data * 2, matrix.indices, matrix.indptr), shape=matrix.shape)
+    extended = csc_matrix(matrix + csc_matrix(([0.5, 0.5], ([0, 500], [500, 0])), shape=matrix.shape))
+    extended.setdiag(extended.diagonal() + 1)
+    extended.sort_indices()
     right = np.random.default_rng(0).normal(size=matrix.shape[0])
     factor = factorize(matrix)
-    for each in (same, other, matrix):
-        factor = factorize(each, previous=factor)
+    for system in (rescaled, extended, matrix):
+        factor = factorize(system, previous=factor)
         assert type(factor) is kind
-        assert factor.solve(right) == pytest.approx(np.linalg.solve(each.toarray(), right), abs=1e-9)
+        assert factor.solve(right) == pytest.approx(np.linalg.solve(system.toarray(), right), abs=1e-9)
 
 
 def test_indefinite_matrices_are_solved_with_pivots(kind, matrix):
@@ -91,9 +91,9 @@ def test_indefinite_matrices_are_solved_with_pivots(kind, matrix):
     changed[100, 100] -= 100.0
     right = np.random.default_rng(0).normal(size=matrix.shape[0])
     factor = factorize(matrix)
-    for each in (changed, matrix, changed):
-        factor = factorize(csc_matrix(each), previous=factor)
-        assert factor.solve(right) == pytest.approx(np.linalg.solve(each.toarray(), right), abs=1e-8)
+    for system in (changed, matrix, changed):
+        factor = factorize(csc_matrix(system), previous=factor)
+        assert factor.solve(right) == pytest.approx(np.linalg.solve(system.toarray(), right), abs=1e-8)
 
 
 def test_matrices_without_a_positive_diagonal_print_nothing(kind, matrix, capfd):
@@ -140,10 +140,10 @@ def test_the_size_chooses_the_solver(matrix, hidden):
 def test_small_systems_are_solved_by_superlu(matrix, unforced, capfd):
     right = np.ones(matrix.shape[0])
     indefinite = csc_matrix(matrix - diags(np.full(matrix.shape[0], 0.5)))
-    for each in (matrix, indefinite):
-        factor = factorize(each)
+    for system in (matrix, indefinite):
+        factor = factorize(system)
         assert type(factor) is SuperLUFactor
-        assert factor.solve(right) == pytest.approx(np.linalg.solve(each.toarray(), right), abs=1e-6)
+        assert factor.solve(right) == pytest.approx(np.linalg.solve(system.toarray(), right), abs=1e-6)
     assert capfd.readouterr().out == ""
 
 
@@ -176,7 +176,7 @@ def test_a_reused_analysis_changes_no_bit(kind, matrix):
     assert np.array_equal(reused.solve(right), factorize(matrix).solve(right))
 
 
-def test_no_right_hand_sides(kind, matrix):
+def test_zero_right_hand_sides(kind, matrix):
     assert factorize(matrix).solve(np.zeros((matrix.shape[0], 0))).shape == (matrix.shape[0], 0)
 
 
@@ -269,12 +269,12 @@ def test_flattening_is_the_same_to_the_last_bit(kind):
 
 @pytest.mark.slow
 @needs_pardiso
-@pytest.mark.parametrize("found", [None, ()])
-def test_mkl_is_found_where_no_package_tells_of_it(monkeypatch, found):
+@pytest.mark.parametrize("listed_files", [None, ()])
+def test_mkl_is_found_without_package_metadata(monkeypatch, listed_files):
     def files(name):
-        if found is None:
+        if listed_files is None:
             raise pardiso.metadata.PackageNotFoundError(name)
-        return found
+        return listed_files
 
     usual = pardiso._library()
     monkeypatch.setattr(pardiso.metadata, "files", files)
@@ -287,25 +287,27 @@ def test_mkl_is_found_where_no_package_tells_of_it(monkeypatch, found):
 def test_the_number_of_threads_changes_nothing_but_rounding(monkeypatch):
     monkeypatch.setenv(SOLVER_VARIABLE, "pardiso")
     vertices, faces = shapes.sphere(4)
-    one, two, again = (flatten(vertices, faces, threads=n, max_cones=4) for n in (1, 3, 3))
-    assert one.cones.tolist() == two.cones.tolist()
-    assert one.log_scale == pytest.approx(two.log_scale, abs=1e-9)
-    assert np.array_equal(two.uv, again.uv)
+    one_thread, three_threads, again = (flatten(vertices, faces, threads=n, max_cones=4) for n in (1, 3, 3))
+    assert one_thread.cones.tolist() == three_threads.cones.tolist()
+    assert one_thread.log_scale == pytest.approx(three_threads.log_scale, abs=1e-9)
+    assert np.array_equal(three_threads.uv, again.uv)
 
 
 @needs_pardiso
-def test_a_factor_stays_on_the_threads_that_it_was_made_on(matrix, monkeypatch):
-    used, call = [], pardiso._pardiso
+def test_a_factor_uses_the_threads_of_its_analysis(matrix, monkeypatch):
+    thread_counts, call = [], pardiso._pardiso
     monkeypatch.setattr(
-        pardiso, "_pardiso", lambda kind, count, *rest: used.append(count) or call(kind, count, *rest)
+        pardiso,
+        "_pardiso",
+        lambda kind, count, *arguments: thread_counts.append(count) or call(kind, count, *arguments),
     )
     with limit_threads(3):
         factor = PardisoFactor(matrix)
     with limit_threads(1):
         factor = factor.refactorized(2 * matrix)
         factor.solve(np.ones(matrix.shape[0]))
-    assert set(used) == {3}
-    assert len(used) > 3
+    assert set(thread_counts) == {3}
+    assert len(thread_counts) > 3
 
 
 class Heap(ctypes.Structure):
@@ -318,24 +320,24 @@ class Heap(ctypes.Structure):
 
 
 @needs_pardiso
-def test_another_pattern_leaves_no_memory_behind(matrix):
+def test_new_patterns_do_not_leak_memory(matrix):
     try:
         tell = ctypes.CDLL("libc.so.6").mallinfo2
     except (OSError, AttributeError):
         pytest.skip("needs the C library of GNU to tell how much memory is used")
     tell.restype = Heap
-    right, found = np.ones(matrix.shape[0]), []
-    kept = PardisoFactor(matrix)
+    right, in_use = np.ones(matrix.shape[0]), []
+    factor = PardisoFactor(matrix)
     for _ in range(60):
         # Another array of indices may be of another pattern.
-        kept = kept.refactorized(matrix.copy())
-        found.append(tell().in_use + tell().mapped)
-    np.testing.assert_array_equal(kept.solve(right), PardisoFactor(matrix).solve(right))
+        factor = factor.refactorized(matrix.copy())
+        in_use.append(tell().in_use + tell().mapped)
+    np.testing.assert_array_equal(factor.solve(right), PardisoFactor(matrix).solve(right))
     # An analysis takes more than the matrix does.
-    assert max(found[10:]) - found[10] < 5 * matrix.data.nbytes
+    assert max(in_use[10:]) - in_use[10] < 5 * matrix.data.nbytes
 
 
 @pytest.mark.parametrize("count", [0, -1, 1.5, 257, "many"])
-def test_numbers_of_threads_that_make_no_sense(count):
+def test_invalid_numbers_of_threads_are_errors(count):
     with pytest.raises(errors.OptionError, match="threads must be"):
         flatten(*shapes.sphere(1), threads=count)

@@ -30,7 +30,7 @@ class TestConvergence:
         np.testing.assert_allclose(even.curvature, 4 * np.pi / len(ball.vertices), atol=1e-12)
         assert np.abs(exact_metric(ring, lengths_of(ring), 0.0).curvature).max() < 1e-11
 
-    def test_its_own_triangles_have_its_curvature(self):
+    def test_triangles_of_the_metric_have_its_curvature(self):
         """Sums of their angles, up to full turns: some may be flipped."""
         mesh = TriangleMesh(*shapes.hill(16, 12))
         target = np.zeros(len(mesh.vertices))
@@ -103,7 +103,7 @@ class TestTwoRoutes:
         assert flipped.euclidean_flips == plain.euclidean_flips == 0
         np.testing.assert_allclose(flipped.log_scale, plain.log_scale, atol=1e-12)
 
-    def test_without_any_flip_it_is_newton_on_the_given_triangles(self):
+    def test_without_flips_it_is_newton_on_the_triangles_of_the_input(self):
         mesh = TriangleMesh(*shapes.sphere(3, bumps=0.0))
         lengths = lengths_of(mesh)
         target = cones_on(mesh, np.full(80, np.pi / 20))
@@ -118,7 +118,7 @@ class TestTwoRoutes:
         np.testing.assert_allclose(metric.log_scale - metric.log_scale[0], phi - phi[0], atol=1e-11)
 
     @pytest.mark.parametrize("shape", [shapes.sphere(3), shapes.torus(), shapes.hill(), shapes.genus(2)])
-    def test_curvatures_that_came_out_give_the_same_metric_when_prescribed(self, shape):
+    def test_prescribing_the_resulting_curvatures_gives_the_same_metric(self, shape):
         mesh = TriangleMesh(*shape)
         fixed = mesh.is_boundary_vertex.copy()
         fixed[np.random.default_rng(1).choice(len(fixed), 6, replace=False)] = True
@@ -131,10 +131,10 @@ class TestTwoRoutes:
     def test_the_start_does_not_matter(self):
         mesh = TriangleMesh(*shapes.torus())
         target = cones_on(mesh, [np.pi, 0.5 * np.pi, -1.5 * np.pi])
-        one = exact_metric(mesh, lengths_of(mesh), target)
+        from_zero = exact_metric(mesh, lengths_of(mesh), target)
         start = np.random.default_rng(0).normal(0, 1, len(target))
-        two = exact_metric(mesh, lengths_of(mesh), target, start=start)
-        np.testing.assert_allclose(one.log_scale, two.log_scale, atol=1e-9)
+        from_random = exact_metric(mesh, lengths_of(mesh), target, start=start)
+        np.testing.assert_allclose(from_zero.log_scale, from_random.log_scale, atol=1e-9)
 
     def test_the_double_of_a_disk_has_the_metric_of_the_disk_twice(self):
         """A disk whose boundary edges see acute angles needs no flip of theirs, so both must agree."""
@@ -153,7 +153,7 @@ class TestTwoRoutes:
         plain = angle_defect(mesh.faces, corner_angles(lengths), mesh.is_boundary_vertex)
         np.testing.assert_allclose(curvature, (np.where(mesh.is_boundary_vertex, 2, 1) * plain)[original])
 
-    def test_where_boundary_triangles_break_the_double_takes_over(self):
+    def test_surfaces_with_broken_boundary_triangles_are_doubled(self):
         mesh = TriangleMesh(*shapes.hill())
         rng = np.random.default_rng(0)
         border = mesh.is_boundary_vertex
@@ -180,55 +180,57 @@ class TestInvariance:
         """The log scale does not see the unit of length, and the total area stays."""
         mesh = TriangleMesh(*shapes.sphere(3))
         target = cones_on(mesh, [np.pi, 2.5 * np.pi - np.pi, 1.5 * np.pi])
-        one = exact_metric(mesh, lengths_of(mesh), target)
-        other = exact_metric(mesh, 1e-20 * lengths_of(mesh), target)
-        np.testing.assert_allclose(other.log_scale, one.log_scale, atol=1e-10)
-        flat = straight_triangles(one.triangulation, one.flips).sides.reshape(-1, 3)
+        metric = exact_metric(mesh, lengths_of(mesh), target)
+        scaled = exact_metric(mesh, 1e-20 * lengths_of(mesh), target)
+        np.testing.assert_allclose(scaled.log_scale, metric.log_scale, atol=1e-10)
+        flat = straight_triangles(metric.triangulation, metric.flips).sides.reshape(-1, 3)
         area = (np.conj(flat[:, 0]) * flat[:, 1]).imag.sum() / 2
         a, b, c = mesh.vertices[mesh.faces].transpose(1, 0, 2)
         assert area == pytest.approx(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2, rel=1e-10)
 
     def test_renumbering(self):
         vertices, faces = shapes.sphere(3)
-        other_vertices, other_faces, new = shapes.renumber(vertices, faces)
-        mesh, other = TriangleMesh(vertices, faces), TriangleMesh(other_vertices, other_faces)
+        renumbered_vertices, renumbered_faces, number = shapes.renumber(vertices, faces)
+        mesh, renumbered = TriangleMesh(vertices, faces), TriangleMesh(renumbered_vertices, renumbered_faces)
         target = cones_on(mesh, np.full(4, np.pi))
         moved = np.empty_like(target)
-        moved[new] = target
-        one = exact_metric(mesh, lengths_of(mesh), target)
-        two = exact_metric(other, lengths_of(other), moved)
-        np.testing.assert_allclose(two.log_scale[new], one.log_scale, atol=1e-9)
+        moved[number] = target
+        metric = exact_metric(mesh, lengths_of(mesh), target)
+        renumbered_metric = exact_metric(renumbered, lengths_of(renumbered), moved)
+        np.testing.assert_allclose(renumbered_metric.log_scale[number], metric.log_scale, atol=1e-9)
 
     def test_the_same_input_gives_the_same_bits(self):
         mesh = TriangleMesh(*shapes.genus(2))
         target = cones_on(mesh, [-4 * np.pi])
-        one, two = (exact_metric(mesh, lengths_of(mesh), target) for _ in range(2))
-        np.testing.assert_array_equal(one.log_scale, two.log_scale)
-        np.testing.assert_array_equal(one.flips, two.flips)
+        first, second = (exact_metric(mesh, lengths_of(mesh), target) for _ in range(2))
+        np.testing.assert_array_equal(first.log_scale, second.log_scale)
+        np.testing.assert_array_equal(first.flips, second.flips)
 
     def test_a_start_of_a_huge_range_takes_no_more_steps_than_none(self):
         mesh = TriangleMesh(*shapes.hill(12, 10))
         target = np.where(mesh.is_boundary_vertex, 2 * np.pi / mesh.is_boundary_vertex.sum(), 0.0)
         start = np.linspace(-120, 120, len(target))
-        one, two = (exact_metric(mesh, lengths_of(mesh), target, start=each) for each in (None, start))
-        assert two.converged
-        assert two.steps == one.steps
-        np.testing.assert_array_equal(one.log_scale, two.log_scale)
+        from_zero, from_start = (
+            exact_metric(mesh, lengths_of(mesh), target, start=initial) for initial in (None, start)
+        )
+        assert from_start.converged
+        assert from_start.steps == from_zero.steps
+        np.testing.assert_array_equal(from_zero.log_scale, from_start.log_scale)
 
-    def test_components_do_not_see_each_other(self):
-        two = TriangleMesh(*shapes.join(shapes.sphere(2), shapes.torus(20, 10)))
-        one = TriangleMesh(*shapes.sphere(2))
-        target = cones_on(one, np.full(4, np.pi))
-        both = np.concatenate([target, np.zeros(len(two.vertices) - len(target))])
-        joint = exact_metric(two, lengths_of(two), both)
-        alone = exact_metric(one, lengths_of(one), target)
+    def test_components_are_independent(self):
+        joined = TriangleMesh(*shapes.join(shapes.sphere(2), shapes.torus(20, 10)))
+        sphere = TriangleMesh(*shapes.sphere(2))
+        target = cones_on(sphere, np.full(4, np.pi))
+        joint_target = np.concatenate([target, np.zeros(len(joined.vertices) - len(target))])
+        joint = exact_metric(joined, lengths_of(joined), joint_target)
+        alone = exact_metric(sphere, lengths_of(sphere), target)
         assert joint.converged
         np.testing.assert_allclose(joint.log_scale[: len(target)], alone.log_scale, atol=1e-9)
 
 
 class TestHessian:
     @pytest.mark.parametrize("shape", [shapes.sphere(2), shapes.hill(6, 5), shapes.genus(1)])
-    def test_it_is_the_cotangent_laplacian(self, shape):
+    def test_the_hessian_is_the_cotangent_laplacian(self, shape):
         mesh = TriangleMesh(*shape)
         cots = cotangents(lengths_of(mesh))
         pattern = HessianPattern(intrinsic_triangulation(mesh, lengths_of(mesh)))
@@ -238,7 +240,7 @@ class TestHessian:
         np.testing.assert_allclose(matrix.toarray(), expected.toarray(), atol=1e-12)
         assert matrix.has_sorted_indices
 
-    def test_held_vertices_leave_the_pattern(self):
+    def test_fixed_vertices_do_not_change_the_pattern(self):
         mesh = TriangleMesh(*shapes.hill(6, 5))
         pattern = HessianPattern(intrinsic_triangulation(mesh, lengths_of(mesh)))
         held = mesh.is_boundary_vertex
@@ -265,13 +267,13 @@ class TestRefusal:
         with pytest.raises(errors.CurvatureError, match="pi or more on the boundary"):
             exact_metric(mesh, lengths_of(mesh), target)
 
-    def test_a_sum_that_misses_gauss_bonnet(self):
+    def test_a_sum_that_violates_gauss_bonnet(self):
         mesh = TriangleMesh(*shapes.sphere(2))
         with pytest.raises(errors.CurvatureError, match=r"4 pi, but the input sums to 3 pi"):
             exact_metric(mesh, lengths_of(mesh), cones_on(mesh, [np.pi, np.pi, np.pi]))
 
     @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-    def test_a_curvature_that_is_no_number(self, value):
+    def test_a_curvature_that_is_not_finite(self, value):
         mesh = TriangleMesh(*shapes.sphere(2))
         with pytest.raises(errors.CurvatureError, match="NaN or infinite at 1 vertex: "):
             exact_metric(mesh, lengths_of(mesh), cones_on(mesh, [value, np.pi]))
@@ -317,10 +319,10 @@ class TestRefusal:
         assert abs(metric.curvature[metric.worst_vertex]) > 0
 
 
-def test_edges_beside_triangles_that_do_not_close_are_suspects():
+def test_edges_of_broken_triangles_are_suspects():
     # Two triangles on an edge: half-edges 0 and 3 are twins.
     twin = np.array([3, -1, -1, 0, -1, -1])
-    found = np.empty(6, dtype=np.int64)
+    suspects = np.empty(6, dtype=np.int64)
     for cots, expected in (
         ([1, 1, 1, 1, 1, 1], []),
         ([0, 1, 1, 1, 1, 1], []),  # a right angle
@@ -328,4 +330,4 @@ def test_edges_beside_triangles_that_do_not_close_are_suspects():
         ([1, 1, 1, 0, 0, 0], [0]),
         ([0.5, 1, 1, -0.6, 2, 2], [0]),
     ):
-        assert found[: find_suspects(twin, np.array(cots, dtype=float), found)].tolist() == expected
+        assert suspects[: find_suspects(twin, np.array(cots, dtype=float), suspects)].tolist() == expected

@@ -21,16 +21,16 @@ class LogCosh:
     def evaluate(self, place):
         return Point(place, -np.tanh(place - self.centre))
 
-    def direction(self, here, exactly):
+    def direction(self, point, exactly):
         self.asked.append(exactly)
-        return here.residual * np.cosh(here.variables - self.centre) ** 2, True
+        return point.residual * np.cosh(point.variables - self.centre) ** 2, True
 
 
 class Flawed(LogCosh):
     """The same, with directions that lead uphill unless exact ones are asked for."""
 
-    def direction(self, here, exactly):
-        step, _ = super().direction(here, exactly)
+    def direction(self, point, exactly):
+        step, _ = super().direction(point, exactly)
         return (step, True) if exactly else (-step, False)
 
 
@@ -41,31 +41,31 @@ def test_a_quadratic_takes_one_step():
         def evaluate(self, place):
             return Point(place, matrix @ (centre - place))
 
-        def direction(self, here, exactly):
-            return np.linalg.solve(matrix, here.residual), True
+        def direction(self, point, exactly):
+            return np.linalg.solve(matrix, point.residual), True
 
     problem = Quadratic()
-    found, steps = minimise(problem, problem.evaluate(np.zeros(2)), LIMITS)
-    np.testing.assert_allclose(found.variables, centre, atol=1e-14)
+    minimum, steps = minimise(problem, problem.evaluate(np.zeros(2)), LIMITS)
+    np.testing.assert_allclose(minimum.variables, centre, atol=1e-14)
     assert steps <= 2
 
 
-@pytest.mark.parametrize("far", [0.1, 2.0, 8.0])
-def test_the_minimum_is_found_where_full_steps_run_away(far):
+@pytest.mark.parametrize("offset", [0.1, 2.0, 8.0])
+def test_the_minimum_is_found_although_full_steps_diverge(offset):
     problem = LogCosh(np.array([1.0, 3.0, -2.0]))
-    found, _ = minimise(problem, problem.evaluate(problem.centre + far), LIMITS)
-    np.testing.assert_allclose(found.variables, problem.centre, atol=1e-9)
-    assert found.largest <= 1e-9
+    minimum, _ = minimise(problem, problem.evaluate(problem.centre + offset), LIMITS)
+    np.testing.assert_allclose(minimum.variables, problem.centre, atol=1e-9)
+    assert minimum.largest <= 1e-9
 
 
-def test_what_leads_uphill_is_not_taken_and_an_exact_direction_is_asked_for():
+def test_ascent_directions_are_replaced_by_direct_solves():
     problem = Flawed(np.zeros(2))
-    found, _ = minimise(problem, problem.evaluate(np.array([0.6, -0.4])), LIMITS)
-    assert found.largest <= 1e-9
+    minimum, _ = minimise(problem, problem.evaluate(np.array([0.6, -0.4])), LIMITS)
+    assert minimum.largest <= 1e-9
     assert problem.asked[:2] == [False, True]
 
 
-def test_the_largest_step_is_kept():
+def test_steps_are_not_longer_than_allowed():
     problem = LogCosh(np.zeros(1))
     places = []
     evaluate = problem.evaluate
@@ -75,9 +75,9 @@ def test_the_largest_step_is_kept():
     assert places[-1] == pytest.approx(0, abs=1e-9)
 
 
-def test_a_singular_hessian_leaves_the_best_so_far():
+def test_a_singular_hessian_ends_at_the_best_point():
     class Singular(LogCosh):
-        def direction(self, here, exactly):
+        def direction(self, point, exactly):
             raise MetricError("singular")
 
     problem = Singular(np.zeros(1))
@@ -85,11 +85,11 @@ def test_a_singular_hessian_leaves_the_best_so_far():
     assert minimise(problem, start, LIMITS)[0] is start
 
 
-def test_what_is_not_admissible_is_not_accepted():
+def test_inadmissible_points_are_not_accepted():
     class Half(LogCosh):
         def evaluate(self, place):
             return Point(place, -np.tanh(place - self.centre), bool(place[0] > 0.1))
 
     problem = Half(np.zeros(1))
-    found, _ = minimise(problem, problem.evaluate(np.array([0.8])), LIMITS)
-    assert 0.1 < found.variables[0] < 0.8
+    minimum, _ = minimise(problem, problem.evaluate(np.array([0.8])), LIMITS)
+    assert 0.1 < minimum.variables[0] < 0.8

@@ -28,7 +28,7 @@ def inverse_of(mesh, break_even, is_good):
 
 
 @pytest.mark.parametrize(("break_even", "is_good"), [(60, True), (4, True), (60, False), (1, False)])
-def test_a_preconditioner_changes_the_way_not_the_end(break_even, is_good):
+def test_a_preconditioner_does_not_change_the_result(break_even, is_good):
     mesh = random_sphere(300, 7)
     target = cones_on(mesh, np.full(4, np.pi))
     expected = exact_metric(mesh, lengths_of(mesh), target)
@@ -40,7 +40,7 @@ def test_a_preconditioner_changes_the_way_not_the_end(break_even, is_good):
     assert metric.log_scale == pytest.approx(expected.log_scale, abs=1e-9)
 
 
-def test_an_inverse_is_corrected_where_the_matrix_differs():
+def test_an_inverse_is_corrected_for_the_rows_that_differ():
     mesh = random_sphere(400, 3)
     lengths = lengths_of(mesh)
     inverse, made = inverse_of(mesh, 60, True)
@@ -55,29 +55,31 @@ def test_an_inverse_is_corrected_where_the_matrix_differs():
     right = np.random.default_rng(0).normal(size=400)
     right -= right.mean()
 
-    def calls(one):
+    def calls(preconditioner):
         made.clear()
-        solution = conjugate_gradients(matrix, right, one, 1e-12)
+        solution = conjugate_gradients(matrix, right, preconditioner, 1e-12)
         assert matrix @ solution == pytest.approx(right, abs=1e-9)
         return len(made)
 
-    better = corrected(inverse, matrix, held)
+    improved = corrected(inverse, matrix, held)
     around = np.unique(mesh.faces[(mesh.faces % 50 == 0).any(axis=1)])
-    before, after = (np.abs(matrix @ each.solve(right) - right) < 1e-9 for each in (inverse, better))
+    before, after = (
+        np.abs(matrix @ approximate.solve(right) - right) < 1e-9 for approximate in (inverse, improved)
+    )
     gained = np.flatnonzero(after & ~before)
     assert len(gained) == 40
     assert set(gained) <= set(around)
     # It is symmetric, or conjugate gradients would go astray.
-    one, other = np.random.default_rng(1).normal(size=(2, 400))
-    one, other = one - one.mean(), other - other.mean()
-    assert one @ better.solve(other) == pytest.approx(other @ better.solve(one), rel=1e-9)
-    assert calls(better) < 0.6 * calls(inverse)
+    first, second = np.random.default_rng(1).normal(size=(2, 400))
+    first, second = first - first.mean(), second - second.mean()
+    assert first @ improved.solve(second) == pytest.approx(second @ improved.solve(first), rel=1e-9)
+    assert calls(improved) < 0.6 * calls(inverse)
     # Nothing differs, or what differs is held.
     assert corrected(inverse, inverse.laplacian, held) is inverse
     assert corrected(inverse, matrix, ~held) is inverse
 
 
-def test_conjugate_gradients_tell_what_they_cannot_solve():
+def test_conjugate_gradients_report_failure():
     mesh = random_sphere(60, 1)
     inverse, _ = inverse_of(mesh, 60, True)
     laplacian = inverse.laplacian

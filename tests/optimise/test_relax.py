@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 import shapes
 
-from coneflat import TriangleMesh, errors
-from coneflat.flattening import flatten
+from coneflat import TriangleMesh, errors, flatten
 from coneflat.geometry import edge_lengths
 from coneflat.geometry.planar import sides_between, signed_double_areas
 from coneflat.optimise import Lines, PointConstraints, StretchEnergy, relax
 from coneflat.optimise.constraints import check_constraints
 from coneflat.optimise.elements import Elements
 from coneflat.optimise.energies import UntanglingEnergy
-from coneflat.optimise.motions import find_motions
+from coneflat.optimise.motions import find_motions, find_restrictions
 from coneflat.optimise.relaxing import rest_sides
 from coneflat.optimise.seam_chains import find_chains
 
@@ -53,43 +52,43 @@ def angle_sums(mesh, corners, points):
 def test_derivatives_of_energies_are_their_differences(energy):
     """Also at flipped triangles, if their energy is finite."""
     rng = np.random.default_rng(3)
-    two = rng.uniform(-2 if energy.is_regularised else 0.2, 2, 50)
-    one = np.abs(two) + rng.uniform(0.01, 2, 50)
-    found, h = energy.derivatives(one, two), 1e-5
-    assert np.allclose(found.value, energy.values(one, two), rtol=1e-12)
+    s2 = rng.uniform(-2 if energy.is_regularised else 0.2, 2, 50)
+    s1 = np.abs(s2) + rng.uniform(0.01, 2, 50)
+    derivatives, h = energy.derivatives(s1, s2), 1e-5
+    assert np.allclose(derivatives.value, energy.values(s1, s2), rtol=1e-12)
     assert np.allclose(
-        found.one, (energy.values(one + h, two) - energy.values(one - h, two)) / (2 * h), rtol=1e-5
+        derivatives.by_1, (energy.values(s1 + h, s2) - energy.values(s1 - h, s2)) / (2 * h), rtol=1e-5
     )
     assert np.allclose(
-        found.two, (energy.values(one, two + h) - energy.values(one, two - h)) / (2 * h), rtol=1e-5
+        derivatives.by_2, (energy.values(s1, s2 + h) - energy.values(s1, s2 - h)) / (2 * h), rtol=1e-5
     )
-    up, down = energy.derivatives(one + h, two), energy.derivatives(one - h, two)
-    assert np.allclose(found.one_one, (up.one - down.one) / (2 * h), rtol=1e-5, atol=1e-6)
-    assert np.allclose(found.one_two, (up.two - down.two) / (2 * h), rtol=1e-5, atol=1e-6)
-    up, down = energy.derivatives(one, two + h), energy.derivatives(one, two - h)
-    assert np.allclose(found.two_two, (up.two - down.two) / (2 * h), rtol=1e-5, atol=1e-6)
+    up, down = energy.derivatives(s1 + h, s2), energy.derivatives(s1 - h, s2)
+    assert np.allclose(derivatives.by_11, (up.by_1 - down.by_1) / (2 * h), rtol=1e-5, atol=1e-6)
+    assert np.allclose(derivatives.by_12, (up.by_2 - down.by_2) / (2 * h), rtol=1e-5, atol=1e-6)
+    up, down = energy.derivatives(s1, s2 + h), energy.derivatives(s1, s2 - h)
+    assert np.allclose(derivatives.by_22, (up.by_2 - down.by_2) / (2 * h), rtol=1e-5, atol=1e-6)
 
 
-def test_isometries_cost_one_and_nothing_costs_less():
+def test_the_minimum_of_the_energy_is_one_at_isometries():
     rng = np.random.default_rng(4)
-    one, two = rng.uniform(0.1, 5, (2, 200))
+    s1, s2 = rng.uniform(0.1, 5, (2, 200))
     for energy in ENERGIES:
         assert energy.values(np.ones(1), np.ones(1)) == pytest.approx(1)
-        assert (energy.values(one, two) >= 1).all()
-        assert np.allclose(energy.values(one, two), energy.values(two, one))
+        assert (energy.values(s1, s2) >= 1).all()
+        assert np.allclose(energy.values(s1, s2), energy.values(s2, s1))
     # StretchEnergy of angles does not know of scale.
-    assert np.allclose(StretchEnergy().values(one, two), StretchEnergy().values(7 * one, 7 * two))
+    assert np.allclose(StretchEnergy().values(s1, s2), StretchEnergy().values(7 * s1, 7 * s2))
 
 
 @pytest.mark.parametrize("energy", ENERGIES)
 def test_the_gradient_of_a_cut_surface_is_that_of_its_energy(energy):
     mesh, uv, corners, _ = laid_out(shapes.sphere(2), cones="greedy", max_cones=5)
     z = uv[:, 0] + 1j * uv[:, 1]
-    motions = find_motions(
-        mesh, corners, z, np.ones(len(mesh.vertices), dtype=bool), check_constraints(PointConstraints(), uv)
-    )
-    rest = rest_sides(edge_lengths(mesh.vertices, mesh.faces))
-    elements = Elements(motions, corners, rest, 1.0, np.ones(len(corners)))
+    is_free = np.ones(len(mesh.vertices), dtype=bool)
+    restrictions = find_restrictions(mesh, corners, z, is_free, check_constraints(PointConstraints(), uv))
+    motions = find_motions(z, restrictions)
+    target_shapes = rest_sides(edge_lengths(mesh.vertices, mesh.faces))
+    elements = Elements(motions, corners, target_shapes, 1.0, np.ones(len(corners)))
 
     def total(step):
         return elements.energies(energy, elements.maps(z + motions.shifts(step))).sum()
@@ -115,16 +114,16 @@ def test_the_gradient_of_a_cut_surface_is_that_of_its_energy(energy):
 )
 def test_seams_stay_rigid_copies_and_cones_keep_their_angles(shape, stretch):
     mesh, uv, corners, _ = laid_out(shape)
-    found = relax(mesh, uv, corners, StretchEnergy(stretch))
-    assert found.energy < found.energy_before
-    assert (signed_double_areas(found.points[corners]) > 0).all()
-    one, two = seam_copies(mesh, corners, found.points)
-    assert np.allclose(np.abs(one), np.abs(two), rtol=1e-9)
+    relaxed = relax(mesh, uv, corners, StretchEnergy(stretch))
+    assert relaxed.energy < relaxed.energy_before
+    assert (signed_double_areas(relaxed.points[corners]) > 0).all()
+    first, second = seam_copies(mesh, corners, relaxed.points)
+    assert np.allclose(np.abs(first), np.abs(second), rtol=1e-9)
     before = seam_copies(mesh, corners, uv)
-    assert np.allclose(two / one, before[1] / before[0], atol=1e-8)
+    assert np.allclose(second / first, before[1] / before[0], atol=1e-8)
     inside = ~mesh.is_boundary_vertex
     assert np.allclose(
-        angle_sums(mesh, corners, found.points)[inside], angle_sums(mesh, corners, uv)[inside], atol=1e-9
+        angle_sums(mesh, corners, relaxed.points)[inside], angle_sums(mesh, corners, uv)[inside], atol=1e-9
     )
 
 
@@ -133,15 +132,15 @@ def test_a_developable_surface_becomes_isometric():
     vertices, faces = shapes.grid(12, 9)
     x, y = vertices[:, 0] / 11, vertices[:, 1] / 8
     mesh = TriangleMesh(np.stack([np.cos(3 * x), np.sin(3 * x), y], axis=1), faces)
-    found = relax(mesh, np.stack([2 * x + 0.3 * y**2, y], axis=1), faces, StretchEnergy(1), tolerance=1e-14)
-    lengths = np.abs(sides_between(found.points[faces]))
+    relaxed = relax(mesh, np.stack([2 * x + 0.3 * y**2, y], axis=1), faces, StretchEnergy(1), tolerance=1e-14)
+    lengths = np.abs(sides_between(relaxed.points[faces]))
     # Up to scale: the layout keeps the area that it has.
     ratio = lengths / edge_lengths(mesh.vertices, faces)
-    assert found.energy == pytest.approx(1, abs=1e-9)
+    assert relaxed.energy == pytest.approx(1, abs=1e-9)
     assert np.allclose(ratio, ratio.mean(), rtol=1e-4)
 
 
-def test_pinned_points_and_lines_hold_in_the_end():
+def test_pinned_points_and_lines_hold_after_relaxation():
     vertices, faces = shapes.hill(14, 10)
     mesh = TriangleMesh(vertices, faces)
     start = vertices[:, :2]
@@ -155,10 +154,10 @@ def test_pinned_points_and_lines_hold_in_the_end():
     )
     inner = int(np.argmin(np.linalg.norm(start - start.mean(axis=0), axis=1)))
     goal = start[inner] + 0.2 * (start.max(axis=0) - start.min(axis=0)) * [0.3, -0.4]
-    found = relax(
+    relaxed = relax(
         mesh, start, faces, StretchEnergy(1), PointConstraints(pinned=[inner], places=[goal], lines=lines)
     )
-    points = found.points
+    points = relaxed.points
     assert np.allclose(points[inner], goal, atol=1e-12)
     assert np.allclose(points[left, 0], start[:, 0].min() - 0.05, atol=1e-9)
     assert np.ptp(points[right, 0]) < 1e-9
@@ -171,10 +170,10 @@ def test_only_free_vertices_move():
     mesh, uv, corners, _ = laid_out(shapes.sphere(2))
     free = np.zeros(len(mesh.vertices), dtype=bool)
     free[mesh.faces[:40]] = True
-    found = relax(mesh, uv, corners, free=free)
+    relaxed = relax(mesh, uv, corners, free=free)
     stays = ~free[mesh.faces]
-    assert np.array_equal(found.points[corners[stays]], uv[corners[stays]])
-    assert found.energy < found.energy_before
+    assert np.array_equal(relaxed.points[corners[stays]], uv[corners[stays]])
+    assert relaxed.energy < relaxed.energy_before
 
 
 def test_the_result_does_not_depend_on_numbers_scale_or_place():
@@ -183,7 +182,7 @@ def test_the_result_does_not_depend_on_numbers_scale_or_place():
     plain = relax(mesh, uv, corners, StretchEnergy(0.5), tolerance=1e-12)
     turn = np.exp(0.7j)
     z = (uv[:, 0] + 1j * uv[:, 1]) * 1e5 * turn + (3e5 - 1e5j)
-    other = relax(
+    moved = relax(
         TriangleMesh(1e-3 * vertices @ shapes.rotation(), faces),
         np.stack([z.real, z.imag], axis=1),
         corners,
@@ -191,8 +190,8 @@ def test_the_result_does_not_depend_on_numbers_scale_or_place():
         tolerance=1e-12,
     )
     sides = np.abs(sides_between(plain.points[corners]))
-    assert other.energy == pytest.approx(plain.energy, rel=1e-9)
-    assert np.allclose(np.abs(sides_between(other.points[corners])), 1e5 * sides, rtol=1e-4)
+    assert moved.energy == pytest.approx(plain.energy, rel=1e-9)
+    assert np.allclose(np.abs(sides_between(moved.points[corners])), 1e5 * sides, rtol=1e-4)
     order = np.random.default_rng(1).permutation(len(faces))
     shuffled = relax(
         TriangleMesh(vertices, faces[order]), uv, corners[order], StretchEnergy(0.5), tolerance=1e-12
@@ -200,7 +199,7 @@ def test_the_result_does_not_depend_on_numbers_scale_or_place():
     assert shuffled.energy == pytest.approx(plain.energy, rel=1e-9)
 
 
-def test_what_is_turned_over_stays_and_nothing_else_turns():
+def test_flipped_triangles_stay_and_no_other_is_flipped():
     vertices, faces = shapes.grid(10, 10)
     mesh = TriangleMesh(vertices, faces)
     points = vertices[:, :2].copy()
@@ -208,20 +207,20 @@ def test_what_is_turned_over_stays_and_nothing_else_turns():
     points[inner] += 1.5 * (points[1] - points[0])
     before = signed_double_areas(points[faces])
     assert (before <= 0).any()
-    found = relax(mesh, points, faces, StretchEnergy(1))
-    after = signed_double_areas(found.points[faces])
+    relaxed = relax(mesh, points, faces, StretchEnergy(1))
+    after = signed_double_areas(relaxed.points[faces])
     assert np.array_equal(after <= 0, before <= 0)
 
 
-def test_progress_ends_it():
+def test_a_progress_that_returns_true_ends_the_iteration():
     mesh, uv, corners, _ = laid_out(shapes.sphere(2))
     seen = []
-    found = relax(
+    relaxed = relax(
         mesh, uv, corners, StretchEnergy(1), progress=lambda step, energy: seen.append(energy) or step == 2
     )
-    assert found.steps == len(seen) == 2
+    assert relaxed.steps == len(seen) == 2
     assert seen[1] < seen[0]
-    assert relax(mesh, uv, corners, StretchEnergy(1), steps=0).energy == pytest.approx(found.energy_before)
+    assert relax(mesh, uv, corners, StretchEnergy(1), steps=0).energy == pytest.approx(relaxed.energy_before)
 
 
 def test_bad_input_is_refused_by_name():
@@ -262,7 +261,7 @@ def test_constraints_that_cannot_hold_are_refused():
         )
 
 
-def test_sides_that_are_no_copies_are_refused():
+def test_seams_whose_sides_are_not_rigid_copies_are_refused():
     mesh, uv, corners, _ = laid_out(shapes.sphere(2))
     bent = uv.copy()
     bent[:, 0] *= 1.3
@@ -278,26 +277,26 @@ def test_tied_seams_get_their_translations():
     cut = np.flatnonzero((starts[h] != ends[t]) | (ends[h] != starts[t]))
     z = points @ [1, 1j]
     move = z[starts[h]] - z[ends[t]]  # a torus without cones has translations alone
-    first, wanted = h[cut[0]], move[cut[0]] * 1.1 + 0.02j
-    found = relax(
+    first, translation = h[cut[0]], move[cut[0]] * 1.1 + 0.02j
+    relaxed = relax(
         mesh,
         points,
         corners,
-        constraints=PointConstraints(tied=[first], translations=[[wanted.real, wanted.imag]]),
+        constraints=PointConstraints(tied=[first], translations=[[translation.real, translation.imag]]),
     )
-    after = found.points @ [1, 1j]
+    after = relaxed.points @ [1, 1j]
     moved = after[starts[h]] - after[ends[t]]
-    same = np.abs(move - move[cut[0]]) < 1e-9
-    assert same[cut].sum() > 1
-    assert np.abs(moved - wanted)[same & np.isin(np.arange(len(h)), cut)].max() < 1e-9
-    assert signed_double_areas(found.points[corners]).min() > 0
+    is_same_seam = np.abs(move - move[cut[0]]) < 1e-9
+    assert is_same_seam[cut].sum() > 1
+    assert np.abs(moved - translation)[is_same_seam & np.isin(np.arange(len(h)), cut)].max() < 1e-9
+    assert signed_double_areas(relaxed.points[corners]).min() > 0
 
 
 @pytest.mark.parametrize(
     ("tied", "translations", "message"),
     [([0], [], "1 half-edge tied, but 0 translations"), ([0], [[0, 0]], "tied half-edge 0 is on no seam")],
 )
-def test_ties_that_make_no_sense(tied, translations, message):
+def test_ties_without_seam_or_translation_are_refused(tied, translations, message):
     mesh, points, corners, _ = laid_out(shapes.hill(), cones="none")
     with pytest.raises(errors.OptionError, match=message):
         relax(mesh, points, corners, constraints=PointConstraints(tied=tied, translations=translations))
@@ -314,8 +313,8 @@ def test_seam_edges_without_length_are_counted(collapsed: float):
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("stretch", [0.0, 0.5, 1.0])
 def test_triangles_flipped_by_rounding_give_no_warnings(stretch):
-    found = StretchEnergy(stretch).derivatives(np.array([1.0, 1.0]), np.array([-1e-12, 0.0]))
-    assert len(found.value) == 2
+    derivatives = StretchEnergy(stretch).derivatives(np.array([1.0, 1.0]), np.array([-1e-12, 0.0]))
+    assert len(derivatives.value) == 2
 
 
 def test_lengths_are_reached_whatever_the_area_of_the_layout():
@@ -324,8 +323,8 @@ def test_lengths_are_reached_whatever_the_area_of_the_layout():
     middle, left = np.median(flat[:, 0]), flat[:, 0].min()
     stretched = flat.copy()
     stretched[:, 0] += 0.6 * np.maximum(flat[:, 0] - middle, 0)
-    given = mesh, stretched, mesh.faces, StretchEnergy(1)
+    problem = mesh, stretched, mesh.faces, StretchEnergy(1)
     free, tolerance = flat[:, 0] > left, 1e-9
-    reached = relax(*given, free=free, to_scale=True, tolerance=tolerance).points
+    reached = relax(*problem, free=free, to_scale=True, tolerance=tolerance).points
     assert reached == pytest.approx(flat, abs=1e-8)
-    assert np.ptp(relax(*given, free=free, tolerance=tolerance).points) > 1.1 * np.ptp(flat)
+    assert np.ptp(relax(*problem, free=free, tolerance=tolerance).points) > 1.1 * np.ptp(flat)

@@ -40,15 +40,16 @@ def test_components_keep_their_areas_relative_to_each_other():
     flat = np.abs(signed_double_areas(result.corner_uv))
     areas = double_areas(edge_lengths(result.vertices, result.faces))
     of_ball, of_plate = (
-        flat[own].sum() / areas[own].sum() for own in np.split(np.arange(len(flat)), [len(ball[1])])
+        flat[triangles].sum() / areas[triangles].sum()
+        for triangles in np.split(np.arange(len(flat)), [len(ball[1])])
     )
     assert of_ball == pytest.approx(of_plate, rel=1e-6)
 
 
 @pytest.mark.parametrize("name", SHAPES)
-def test_nothing_is_lost_by_it(name):
-    before, after, whole = (flatten(*SHAPES[name], relax=relax) for relax in ("off", "auto", "whole"))
-    for result in (after, whole):
+def test_relaxing_never_increases_distortion(name):
+    before, after, fully_relaxed = (flatten(*SHAPES[name], relax=relax) for relax in ("off", "auto", "whole"))
+    for result in (after, fully_relaxed):
         assert np.array_equal(result.cones, before.cones)
         assert np.allclose(result.curvatures, before.curvatures, atol=1e-9)
         d = result.distortion
@@ -63,14 +64,14 @@ def test_nothing_is_lost_by_it(name):
     assert np.isnan(before.solve.qc_mean_unrelaxed)
 
 
-def test_the_worst_triangle_is_bent_less():
+def test_the_worst_triangle_is_less_distorted():
     before, after = (flatten(*SHAPES["genus2"], relax=relax).distortion for relax in ("off", "auto"))
     assert after.qc_mean < before.qc_mean - 0.001
     assert after.qc_max - 1 < 0.7 * (before.qc_max - 1)
 
 
 @pytest.mark.parametrize("name", ["sphere", "genus2"])
-def test_the_dial_goes_from_angles_to_areas(name):
+def test_stretch_trades_angles_for_areas(name):
     results = [flatten(*SHAPES[name], stretch=stretch) for stretch in (0.0, 0.25, 0.5, 1.0)]
     angles = [result.distortion.qc_mean for result in results]
     areas = [result.distortion.area_std for result in results]
@@ -87,7 +88,7 @@ def test_the_dial_goes_from_angles_to_areas(name):
         assert d.curvature_error_max < 1e-9
 
 
-def test_lengths_of_the_boundary_are_kept():
+def test_prescribed_lengths_of_the_boundary_stay():
     result = flatten(*shapes.hill(), boundary="lengths", stretch=1.0)
     flat, model = border_lengths(result)
     assert np.allclose(flat / result.uv_scale, model, rtol=1e-9)
@@ -98,8 +99,10 @@ def test_a_prescribed_boundary_is_not_moved(boundary):
     plain, relaxed = (flatten(*shapes.hill(), boundary=boundary, charts="one", stretch=s) for s in (0, 1))
     assert relaxed.distortion.area_std < plain.distortion.area_std
     assert relaxed.distortion.curvature_error_max < 1e-9
-    one, two = border_lengths(plain)[0], border_lengths(relaxed)[0]
-    assert np.allclose(one / one.sum(), two / two.sum(), rtol=1e-9)
+    plain_lengths, relaxed_lengths = border_lengths(plain)[0], border_lengths(relaxed)[0]
+    assert np.allclose(
+        plain_lengths / plain_lengths.sum(), relaxed_lengths / relaxed_lengths.sum(), rtol=1e-9
+    )
 
 
 def test_marked_seams_keep_equal_sides():
@@ -109,7 +112,7 @@ def test_marked_seams_keep_equal_sides():
     assert result.distortion.flipped == 0
 
 
-def test_weights_count():
+def test_weighted_vertices_are_less_distorted():
     vertices, faces = shapes.sphere(3)
     front = vertices[:, 2] > 0.3
     faces_there = front[faces].all(axis=1)
@@ -121,15 +124,15 @@ def test_weights_count():
     assert spread(np.where(front, 100.0, 1.0)) < 0.8 * spread(None)
 
 
-def test_it_is_the_same_for_the_same_mesh_at_any_size():
+def test_results_are_reproducible_and_independent_of_scale():
     vertices, faces = SHAPES["genus2"]
     plain = flatten(vertices, faces, stretch=0.5)
     again = flatten(vertices, faces, stretch=0.5)
     assert np.array_equal(plain.corner_uv, again.corner_uv)
     for scale in (1e-6, 1e6):
-        other = flatten(scale * vertices @ shapes.rotation(), faces, stretch=0.5)
-        assert other.distortion.qc_mean == pytest.approx(plain.distortion.qc_mean, rel=1e-6)
-        assert other.distortion.area_std == pytest.approx(plain.distortion.area_std, rel=1e-5)
+        scaled = flatten(scale * vertices @ shapes.rotation(), faces, stretch=0.5)
+        assert scaled.distortion.qc_mean == pytest.approx(plain.distortion.qc_mean, rel=1e-6)
+        assert scaled.distortion.area_std == pytest.approx(plain.distortion.area_std, rel=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -142,12 +145,12 @@ def test_it_is_the_same_for_the_same_mesh_at_any_size():
         ({"relax": "whole", "method": "linear", "cones": "none"}, "does not relax"),
     ],
 )
-def test_options_that_make_no_sense_are_refused(options, words):
+def test_invalid_options_are_refused(options, words):
     with pytest.raises(errors.OptionError, match=words):
         flatten(*shapes.hill(), **options)
 
 
-def test_a_metric_that_did_not_converge_is_left_alone(monkeypatch):
+def test_a_layout_with_unequal_seams_is_returned_unchanged(monkeypatch):
     def refuse(*arguments, **options):
         raise errors.SeamError("the sides of 3 of 4 seam edges are not copies of each other")
 
@@ -167,7 +170,7 @@ def of_many_sizes():
     ]
     pieces = [(size * np.asarray(vertices) * (1.0, 1.2, 0.9), faces) for (vertices, faces), size in meshes]
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])
-    faces = [own + start for (_, own), start in zip(pieces, starts, strict=False)]
+    faces = [piece_faces + start for (_, piece_faces), start in zip(pieces, starts, strict=False)]
     return pieces, np.concatenate([vertices for vertices, _ in pieces]), np.concatenate(faces)
 
 
@@ -178,30 +181,32 @@ def side_lengths(result):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("options", [{}, {"stretch": 0.5}])
-def test_small_components_are_relaxed_together_as_each_by_itself(options, monkeypatch):
+def test_small_components_relaxed_together_equal_those_relaxed_separately(options, monkeypatch):
     pieces, vertices, faces = of_many_sizes()
     sizes, relax_layouts = [], METHOD.relax_layouts
     monkeypatch.setattr(
-        METHOD, "relax_layouts", lambda *some: sizes.append(len(some[0])) or relax_layouts(*some)
+        METHOD,
+        "relax_layouts",
+        lambda *arguments: sizes.append(len(arguments[0])) or relax_layouts(*arguments),
     )
     result = flatten(vertices, faces, **options)
     assert sizes[:2] == [4, 1]  # further ones are those of other cones
     assert result.distortion.flipped == 0
-    alone = [flatten(*piece, **options) for piece in pieces]
+    results_alone = [flatten(*piece, **options) for piece in pieces]
     # Newton's method ends where little is left to gain, which does not say where to the last digits.
     start, scales, sides = 0, [], side_lengths(result)
-    for piece, one in zip(pieces, alone, strict=True):
-        own = sides[start : start + len(piece[1])]
-        assert np.allclose(own, side_lengths(one), rtol=1e-6)
-        start += len(own)
-        scales.append(one.log_scale)
+    for piece, separate in zip(pieces, results_alone, strict=True):
+        piece_sides = sides[start : start + len(piece[1])]
+        assert np.allclose(piece_sides, side_lengths(separate), rtol=1e-6)
+        start += len(piece_sides)
+        scales.append(separate.log_scale)
     assert np.allclose(result.log_scale, np.concatenate(scales), atol=1e-6)
-    assert result.solve.relaxed_vertices == sum(one.solve.relaxed_vertices for one in alone)
-    worst = [one.solve.qc_max_unrelaxed for one in alone]
+    assert result.solve.relaxed_vertices == sum(separate.solve.relaxed_vertices for separate in results_alone)
+    worst = [separate.solve.qc_max_unrelaxed for separate in results_alone]
     assert result.solve.qc_max_unrelaxed == pytest.approx(max(worst), rel=1e-9)
 
 
-def test_a_small_component_that_cannot_be_relaxed_leaves_the_others_to_themselves(monkeypatch):
+def test_if_components_cannot_be_relaxed_together_they_are_relaxed_separately(monkeypatch):
     _, vertices, faces = of_many_sizes()
     relax, components = STAGE.relax, []
 
@@ -211,17 +216,17 @@ def test_a_small_component_that_cannot_be_relaxed_leaves_the_others_to_themselve
             raise errors.SeamError("the sides of 3 of 4 seam edges are not copies of each other")
         return relax(mesh, *arguments, **options)
 
-    wanted = flatten(vertices, faces)
+    undisturbed = flatten(vertices, faces)
     monkeypatch.setattr(STAGE, "relax", refuse)
     result = flatten(vertices, faces)
     assert sorted(components, reverse=True)[:2] == [4, 1]
-    assert np.allclose(side_lengths(result), side_lengths(wanted), rtol=1e-6)
-    assert result.distortion.qc_max == pytest.approx(wanted.distortion.qc_max, rel=1e-6)
+    assert np.allclose(side_lengths(result), side_lengths(undisturbed), rtol=1e-6)
+    assert result.distortion.qc_max == pytest.approx(undisturbed.distortion.qc_max, rel=1e-6)
 
 
-def test_progress_of_components_in_groups_goes_on():
+def test_progress_of_grouped_components_never_decreases():
     _, vertices, faces = of_many_sizes()
-    told = []
-    flatten(vertices, faces, progress=lambda stage, done: told.append(done))
-    assert told == sorted(told)
-    assert 0.9 < told[-1] <= 1
+    fractions = []
+    flatten(vertices, faces, progress=lambda stage, done: fractions.append(done))
+    assert fractions == sorted(fractions)
+    assert 0.9 < fractions[-1] <= 1

@@ -33,8 +33,8 @@ def test_a_first_guess_that_is_far_off_does_not_matter():
     target = np.full(len(mesh.vertices), 4 * np.pi / len(mesh.vertices))
     plain = exact_metric(mesh, lengths, target)
     for size in (300.0, 1e4):
-        far = size * np.random.default_rng(1).normal(size=len(target))
-        again = exact_metric(mesh, lengths, target, start=far)
+        start = size * np.random.default_rng(1).normal(size=len(target))
+        again = exact_metric(mesh, lengths, target, start=start)
         assert again.converged
         assert np.allclose(again.log_scale, plain.log_scale, atol=1e-8)
 
@@ -49,7 +49,7 @@ def test_a_refusal_never_speaks_of_nan():
             coneflat.flatten(vertices, faces, cones="greedy")
         except errors.ConeflatError as error:
             messages.append(str(error))
-    assert not [each for each in messages if "nan" in each or "inf" in each]
+    assert not [message for message in messages if "nan" in message or "inf" in message]
 
 
 @pytest.mark.parametrize("seed", range(2))

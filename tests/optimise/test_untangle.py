@@ -88,8 +88,8 @@ def untangled(request):
     """The result of a wild mesh in one chart, and the patches that were untangled for it."""
     seen = []
 
-    def watched(flat, faces, angles, on_boundary, stays, rest, rings):
-        result = untangle(flat, faces, angles, on_boundary, stays, rest, rings)
+    def watched(flat, faces, angles, on_boundary, stays, target_shapes, rings):
+        result = untangle(flat, faces, angles, on_boundary, stays, target_shapes, rings)
         seen.append((result, faces, angles, flat, on_boundary))
         return result
 
@@ -100,7 +100,7 @@ def untangled(request):
 
 class TestWinding:
     def test_no_untangled_patch_winds_around_a_vertex(self, untangled):
-        """Where it would, triangles stay upside down, and are named."""
+        """Otherwise triangles stay flipped, and are reported."""
         _, seen = untangled
         assert seen
         for result, faces, angles, before, on_boundary in seen:
@@ -118,7 +118,7 @@ class TestWinding:
             result.curvature_residual[inner], (angle_sums(result) - 2 * np.pi)[inner], atol=1e-7
         )
 
-    def test_a_vertex_that_is_wound_around_shows(self):
+    def test_curvature_counts_double_winding(self):
         """Six triangles of 120 degrees at the hub: all upright, 4 pi in all."""
         _, faces = fan(6, 0, "0")
         turn = 2 * np.pi * np.arange(7) / 3
@@ -151,7 +151,7 @@ class TestFreeSeams:
             stretched(shapes.sphere(3), 100),
         ],
     )
-    def test_what_has_no_room_is_upright_at_the_expense_of_seams(self, mesh):
+    def test_triangles_that_need_unequal_seams_are_untangled_with_a_note(self, mesh):
         result = coneflat.flatten(*mesh, charts="one")
         assert result.distortion.flipped == result.distortion.degenerate == 0
         sums = angle_sums(result)[inside(result)]
@@ -187,7 +187,7 @@ RULES = ["free", "lengths", "disk", "straight"]
 
 
 class TestPrescribed:
-    def test_corners_keep_what_was_prescribed(self):
+    def test_prescribed_corners_keep_their_angles(self):
         """Three corners in a row: much is folded, and the four sides of the sheet lie on three straight lines."""
         points, faces = shapes.grid(9, 7, lambda x, y: np.sin(6.3 * x))
         result = coneflat.flatten(points * [9, 7, 1], faces, boundary=[0, 1, 2])
@@ -206,11 +206,11 @@ class TestPrescribed:
         assert result.solve.untangled_triangles
         border = TriangleMesh(result.vertices, result.faces).is_boundary_vertex
         if isinstance(boundary, dict):
-            wanted = np.zeros(len(border))
-            wanted[list(boundary)] = np.pi / 2
+            prescribed = np.zeros(len(border))
+            prescribed[list(boundary)] = np.pi / 2
             sums = angle_sums(result)
             held = border & is_upright(result)
-            np.testing.assert_allclose((np.pi - sums - wanted)[held], 0, atol=1e-9)
+            np.testing.assert_allclose((np.pi - sums - prescribed)[held], 0, atol=1e-9)
         off = np.abs(result.curvature_residual[border & is_upright(result)]).max()
         assert off < 1e-9 or any("the angle sum differs" in note for note in result.notes)
 
@@ -224,7 +224,7 @@ class TestPrescribed:
         flat = np.abs(at[:, [2, 0, 1]] - at[:, [1, 2, 0]]).ravel()[sides]
         np.testing.assert_allclose(flat, edge_lengths(mesh.vertices, mesh.faces).ravel()[sides], rtol=1e-9)
 
-    def test_on_a_free_boundary_what_comes_out_is_what_was_wanted(self):
+    def test_untangling_a_free_boundary_leaves_no_residual(self):
         result = coneflat.flatten(*fan(12, 6, "2"))
         assert result.solve.untangled_vertices
         assert np.abs(result.curvature_residual).max() < 1e-9
@@ -236,16 +236,16 @@ class TestMarkedSeams:
     def test_both_sides_are_equal_whatever_the_boundary(self, boundary, noise):
         result = coneflat.flatten(*folded(noise), boundary=boundary, seams=self.seams(), charts="one")
         assert result.distortion.charts == 3
-        # Others may be freed where triangles have no room between them.
+        # The sides of other seams may differ where triangles could not be untangled between them.
         marked = np.isin(self.keys(result.seams), self.keys(self.seams()))
         assert np.count_nonzero(marked) == 32
         np.testing.assert_allclose(result.seam_data.seam_scale[marked], 1, rtol=1e-9)
 
     @pytest.mark.parametrize("boundary", ["free", pytest.param("lengths", marks=pytest.mark.slow)])
-    def test_lengths_that_cannot_be_kept_are_named(self, boundary, monkeypatch):
+    def test_seams_whose_lengths_cannot_be_equal_are_reported(self, boundary, monkeypatch):
         """Where triangles at a seam are too coarse for the curvature beside it, there is no metric with their sides."""
-        monkeypatch.setattr(import_module("coneflat.flattening"), "MAX_SEARCHES", 1)  # other cones may help
-        monkeypatch.setattr(import_module("coneflat.flattening"), "MAX_CORRECTIONS", 0)
+        monkeypatch.setattr(import_module("coneflat.retries"), "MAX_SEARCHES", 1)  # other cones may help
+        monkeypatch.setattr(import_module("coneflat.retries"), "MAX_CORRECTIONS", 0)
         result = coneflat.flatten(*folded(0.3), boundary=boundary, seams=self.seams())
         assert result.distortion.seam_mismatch_max > 0.1
         assert any("could not keep their lengths" in note for note in result.notes)
@@ -294,7 +294,7 @@ class TestMarkedSeams:
 
 
 class TestPatches:
-    def test_what_is_hopeless_is_given_up(self):
+    def test_a_vertex_without_valid_position_stays_flipped(self):
         """A vertex whose six neighbours are held in an order around it that no place of it makes upright."""
         points = np.exp(1j * np.pi / 3 * np.array([0, 2, 1, 3, 4, 5]))
         points = np.append(points, 0)

@@ -50,9 +50,9 @@ def test_a_box_has_its_corners():
 
 def test_directions_follow_the_axis_of_a_cylinder():
     mesh = check_mesh(*shapes.cylinder(around=40, along=20)).mesh
-    wanted = preferred_directions(mesh).curved
+    curved = preferred_directions(mesh).curved
     first = np.diff(mesh.vertices[mesh.faces[:, 1:]], axis=1)[:, 0]
-    across = np.angle(wanted) / 4
+    across = np.angle(curved) / 4
     # Turned by the cross, the first side of a triangle is along the axis or at a right angle to it.
     slope = np.arcsin(first[:, 2] / np.linalg.norm(first, axis=1))
     off = (slope + across) % (np.pi / 2)
@@ -72,10 +72,10 @@ def test_short_sharp_edges_are_noise():
 def test_the_linear_model_agrees_with_an_exact_map(name):
     """Between two sets of cones that differ a little, log scale and rotation change by nearly the same."""
     mesh = mesh_of(name)
-    wanted = preferred_directions(mesh).both
+    preferred = preferred_directions(mesh).combined
     start = field_indices(mesh, smoothest_cross_field(mesh, preferred_directions(mesh)))
     triangles = np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
-    model = MapModel(mesh, wanted, -2, 1, triangles)
+    model = MapModel(mesh, preferred, -2, 1, triangles)
     indices = np.append(start[model.places], 0)
     model.linearise(indices)
     scale, waves, loops = model.state(indices)
@@ -87,7 +87,7 @@ def test_the_linear_model_agrees_with_an_exact_map(name):
     uv = result.corner_uv[..., 0] + 1j * result.corner_uv[..., 1]
     frame = halfedge_angles(corner_angles(edge_lengths(mesh.vertices, mesh.faces))).reshape(-1, 3)
     side = (uv[:, [2, 0, 1]] - uv[:, [1, 2, 0]]) * np.exp(-1j * frame)
-    crosses = wanted * (side.sum(axis=1) / np.abs(side.sum(axis=1))) ** 4
+    crosses = preferred * (side.sum(axis=1) / np.abs(side.sum(axis=1))) ** 4
     if not mesh.genus():
         assert abs(np.abs(crosses.sum()) - np.abs(waves.sum())) < 0.05 * model.weight
     assert len(loops) == 2 * mesh.genus()
@@ -99,10 +99,12 @@ def test_cones_do_not_depend_on_numbering_scale_or_place(name):
     vertices, faces = SURFACES[name]
     shuffled, turned, _ = shapes.renumber(vertices, faces)
     moved = 7.0 * shuffled @ shapes.rotation().T + [1, 2, 3]
-    one, two = (aligned_cones(TriangleMesh(*each), 0.2) for each in ((vertices, faces), (moved, turned)))
+    cones, moved_cones = (
+        aligned_cones(TriangleMesh(*arrays), 0.2) for arrays in ((vertices, faces), (moved, turned))
+    )
     # On symmetric surfaces, equivalent vertices can be exchanged.
-    assert sorted(one.values()) == sorted(two.values())
-    assert sum(one.values()) == 4 * mesh_of(name).euler_characteristic
+    assert sorted(cones.values()) == sorted(moved_cones.values())
+    assert sum(cones.values()) == 4 * mesh_of(name).euler_characteristic
 
 
 @pytest.mark.slow

@@ -30,30 +30,30 @@ def grid(request):
 
 def sorted_cones(grid):
     """The grid with its cones, and the corners of its boundary, in the order of vertices."""
-    one, two = np.argsort(grid.cones), np.argsort(grid.corners)
+    cone_order, corner_order = np.argsort(grid.cones), np.argsort(grid.corners)
     return replace(
         grid,
-        cones=grid.cones[one],
-        quarters=grid.quarters[one],
-        corners=grid.corners[two],
-        corner_quarters=grid.corner_quarters[two],
+        cones=grid.cones[cone_order],
+        quarters=grid.quarters[cone_order],
+        corners=grid.corners[corner_order],
+        corner_quarters=grid.corner_quarters[corner_order],
     )
 
 
-def assert_same(one, other):
+def assert_same(grid, other_grid):
     """All fields, bit for bit."""
-    for field in fields(one):
+    for field in fields(grid):
         if field.name == "seconds":
             continue
-        np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name), field.name)
+        np.testing.assert_array_equal(getattr(grid, field.name), getattr(other_grid, field.name), field.name)
 
 
 def test_a_grid_comes_back(grid, tmp_path):
     again = IntegerGrid.load(grid.save(tmp_path / "grid.npz"))
     assert_same(grid, again)
-    one, other = extract_quads(grid), extract_quads(again)
-    np.testing.assert_array_equal(one.vertices, other.vertices)
-    np.testing.assert_array_equal(one.quads, other.quads)
+    quads, quads_again = extract_quads(grid), extract_quads(again)
+    np.testing.assert_array_equal(quads.vertices, quads_again.vertices)
+    np.testing.assert_array_equal(quads.quads, quads_again.quads)
 
 
 @pytest.mark.parametrize("ending", [".obj", ".OBJ"])
@@ -66,27 +66,27 @@ def test_an_obj_has_the_coordinates_as_uvs(grid, tmp_path, ending):
 
 def test_motions_and_cones_follow_from_the_corners_alone(grid):
     again = grid_of_corners(grid.vertices, grid.faces, grid.corner_grid)
-    wanted = sorted_cones(grid)
+    expected = sorted_cones(grid)
     for name in ("turns", "shifts", "cones", "quarters", "corners", "corner_quarters"):
-        np.testing.assert_array_equal(getattr(wanted, name), getattr(again, name))
+        np.testing.assert_array_equal(getattr(expected, name), getattr(again, name))
     assert again.size == pytest.approx(grid.size, rel=0.1)
 
 
 def test_known_motions_are_found():
     # Squares in charts that are turned and moved at random, with motions found one edge at a time.
-    known = on_squares(*polycube(RING), 4, inside=5, along=2, seed=7)
-    again = grid_of_corners(known.vertices, known.faces, known.corner_grid)
+    ring = on_squares(*polycube(RING), 4, inside=5, along=2, seed=7)
+    again = grid_of_corners(ring.vertices, ring.faces, ring.corner_grid)
     for name in ("turns", "shifts", "cones", "quarters"):
-        np.testing.assert_array_equal(getattr(known, name), getattr(again, name))
+        np.testing.assert_array_equal(getattr(ring, name), getattr(again, name))
     assert len(np.unique(again.turns)) == 4
     # A square's side is a quarter of a cube's.
     assert again.size == pytest.approx(1 / 4)
 
 
 @pytest.fixture(scope="module")
-def known():
-    found = on_squares(*polycube(RING), 2, inside=3, along=1, seed=1)
-    return grid_of_corners(found.vertices, found.faces, found.corner_grid)
+def ring():
+    ring = on_squares(*polycube(RING), 2, inside=3, along=1, seed=1)
+    return grid_of_corners(ring.vertices, ring.faces, ring.corner_grid)
 
 
 class TestWhatIsNone:
@@ -99,8 +99,8 @@ class TestWhatIsNone:
             ("report", "", "not a readable NPZ file"),
         ],
     )
-    def test_archives(self, known, tmp_path, name, value, message):
-        with np.load(known.save(tmp_path / "grid.npz")) as archive:
+    def test_archives(self, ring, tmp_path, name, value, message):
+        with np.load(ring.save(tmp_path / "grid.npz")) as archive:
             arrays = dict(archive)
         if value is None:
             del arrays[name]
@@ -139,17 +139,17 @@ class TestWhatIsNone:
         with pytest.raises(MeshFileError, match=f"holds no integer grid: its {message}"):
             IntegerGrid.load(tmp_path / "bad.npz")
 
-    def test_maps_that_do_not_fit(self, known):
-        places = known.corner_grid.copy()
+    def test_maps_that_do_not_fit(self, ring):
+        places = ring.corner_grid.copy()
         with pytest.raises(GridError, match="flipped or without area"):
-            grid_of_corners(known.vertices, known.faces, places[..., ::-1])
+            grid_of_corners(ring.vertices, ring.faces, places[..., ::-1])
         places[5] += 0.25
         with pytest.raises(GridError, match="differ by 0.[23]"):
-            grid_of_corners(known.vertices, known.faces, places)
+            grid_of_corners(ring.vertices, ring.faces, places)
 
-    def test_endings(self, known, tmp_path):
+    def test_endings(self, ring, tmp_path):
         with pytest.raises(UnknownFormatError, match=r"integer grids are written as \.obj, \.npz"):
-            known.save(tmp_path / "grid.glb")
+            ring.save(tmp_path / "grid.glb")
         with pytest.raises(UnknownFormatError, match="integer grids are read from"):
             IntegerGrid.load(tmp_path / "grid.ply")
 

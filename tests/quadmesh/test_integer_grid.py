@@ -1,4 +1,4 @@
-"""Integer grids: transitions that are whole, cones on grid points, no triangle flipped, any topology."""
+"""Integer grids: integer transitions, cones on grid points, no triangle flipped, any topology."""
 
 from __future__ import annotations
 
@@ -106,8 +106,8 @@ def test_the_coarsest_grid_of_a_box_is_a_cube():
 
 def test_a_result_will_do():
     shape = shapes.sphere(3)
-    one = integer_grid(flatten(*shape, **QUARTER), quads=200)
-    assert (one.corner_grid == integer_grid(*shape, quads=200, cones="sparse").corner_grid).all()
+    grid = integer_grid(flatten(*shape, **QUARTER), quads=200)
+    assert (grid.corner_grid == integer_grid(*shape, quads=200, cones="sparse").corner_grid).all()
 
 
 def check_sides(grid):
@@ -142,12 +142,12 @@ def askew():
     """A bumpy sheet with two square holes, neither of which is parallel to it or to the other."""
     vertices, faces = shapes.hill(30, 24)
     places = vertices[faces].mean(axis=1)[:, :2] @ [1, 1j] / np.ptp(vertices[:, 0])
-    kept = np.ones(len(faces), dtype=bool)
+    is_inside = np.ones(len(faces), dtype=bool)
     for centre, half, angle in ((0.3 + 0.3j, 0.1, 0.5), (0.7 + 0.4j, 0.09, 0.2)):
         turned = (places - centre) * np.exp(-1j * angle)
-        kept &= np.maximum(np.abs(turned.real), np.abs(turned.imag)) > half
-    used, faces = np.unique(faces[kept], return_inverse=True)
-    return vertices[used], faces.reshape(-1, 3)
+        is_inside &= np.maximum(np.abs(turned.real), np.abs(turned.imag)) > half
+    vertices_of_faces, faces = np.unique(faces[is_inside], return_inverse=True)
+    return vertices[vertices_of_faces], faces.reshape(-1, 3)
 
 
 @pytest.mark.slow
@@ -168,9 +168,9 @@ def test_a_flat_rectangle_keeps_its_shape():
     assert len(grid.corners) == 4
     assert grid.corner_quarters.tolist() == [1] * 4
     assert sorted(np.ptp(grid.corner_grid.reshape(-1, 2), axis=0)) == [4, 6]
-    one, two, three = grid.vertices[grid.faces].transpose(1, 0, 2)
-    wanted = np.linalg.norm(np.cross(two - one, three - one), axis=1)
-    assert (double_areas(grid) * grid.size**2 / wanted).min() == pytest.approx(1)
+    first, second, third = grid.vertices[grid.faces].transpose(1, 0, 2)
+    expected = np.linalg.norm(np.cross(second - first, third - first), axis=1)
+    assert (double_areas(grid) * grid.size**2 / expected).min() == pytest.approx(1)
 
 
 @pytest.mark.slow
@@ -194,10 +194,12 @@ def test_a_note_says_what_cones_are_not_chosen_for(monkeypatch):
 
 def test_numbering_changes_nothing():
     vertices, faces = shapes.sphere(3)
-    shuffled, turned, new = shapes.renumber(vertices, faces)
-    one, two = (integer_grid(*shape, quads=300) for shape in ((vertices, faces), (shuffled, turned)))
-    assert sorted(new[one.cones]) == sorted(two.cones)
-    assert np.sort(double_areas(one)) == pytest.approx(np.sort(double_areas(two)), rel=1e-6)
+    shuffled, turned, number = shapes.renumber(vertices, faces)
+    grid, shuffled_grid = (
+        integer_grid(*shape, quads=300) for shape in ((vertices, faces), (shuffled, turned))
+    )
+    assert sorted(number[grid.cones]) == sorted(shuffled_grid.cones)
+    assert np.sort(double_areas(grid)) == pytest.approx(np.sort(double_areas(shuffled_grid)), rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -268,9 +270,9 @@ def test_sizes_far_from_that_of_the_mesh_are_refused(scale, size):
 def test_given_side_lengths_are_those_of_the_grid():
     vertices, faces = shapes.sphere(2)
     plain = integer_grid(vertices, faces, quads=60, cones="sparse")
-    given = integer_grid(vertices, faces, quads=60, lengths=edge_lengths(vertices, faces))
-    assert np.array_equal(given.faces, plain.faces)
-    assert given.corner_grid == pytest.approx(plain.corner_grid, abs=1e-9)
+    grid_of_lengths = integer_grid(vertices, faces, quads=60, lengths=edge_lengths(vertices, faces))
+    assert np.array_equal(grid_of_lengths.faces, plain.faces)
+    assert grid_of_lengths.corner_grid == pytest.approx(plain.corner_grid, abs=1e-9)
 
 
 def layout_of_rectangle(inside, cones):

@@ -23,18 +23,22 @@ def whole_space(gram):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_solutions_are_all_solutions(seed):
-    """Whatever solves the equations is the one plus whole multiples of the basis, in one way."""
+    """Whatever solves the equations is one solution plus integer multiples of the basis, in one way."""
     rng = np.random.default_rng(seed)
     rows = rng.integers(-2, 3, size=(3, 6))
     rows[2] = rows[0] + rows[1]  # one depends on the others
-    known = rng.integers(-5, 6, size=6)
-    found = integer_solutions(rows, rows @ known)
-    assert found is not None
-    assert (rows @ found.one == rows @ known).all()
-    assert not (rows @ found.basis).any()
-    assert np.linalg.matrix_rank(found.basis) == found.basis.shape[1] == 6 - np.linalg.matrix_rank(rows)
-    steps = np.linalg.lstsq(found.basis.astype(float), (known - found.one).astype(float), rcond=None)[0]
-    assert (found.basis @ np.rint(steps).astype(int) == known - found.one).all()
+    solution = rng.integers(-5, 6, size=6)
+    solutions = integer_solutions(rows, rows @ solution)
+    assert solutions is not None
+    assert (rows @ solutions.solution == rows @ solution).all()
+    assert not (rows @ solutions.basis).any()
+    assert (
+        np.linalg.matrix_rank(solutions.basis) == solutions.basis.shape[1] == 6 - np.linalg.matrix_rank(rows)
+    )
+    steps = np.linalg.lstsq(
+        solutions.basis.astype(float), (solution - solutions.solution).astype(float), rcond=None
+    )[0]
+    assert (solutions.basis @ np.rint(steps).astype(int) == solution - solutions.solution).all()
 
 
 def test_what_has_no_whole_solution():
@@ -68,12 +72,12 @@ def test_nearest_points_with_equations_are_those_of_brute_force(seed):
     place = rng.uniform(-2, 2, size=4)
     row = np.array([1, -1, 2, 0])
     lattice = whole_space(gram).where(row, 3).reduced()
-    found = lattice.nearest(place)
-    assert found @ row == 3
-    every = np.array([each for each in product(range(-12, 13), repeat=4) if row @ each == 3])
-    least = np.einsum("ki,ij,kj->k", every - place, gram, every - place).min()
-    if np.abs(found).max() < 12:
-        assert (found - place) @ gram @ (found - place) == pytest.approx(least)
+    nearest = lattice.nearest(place)
+    assert nearest @ row == 3
+    every = np.array([point for point in product(range(-12, 13), repeat=4) if row @ point == 3])
+    least_distance = np.einsum("ki,ij,kj->k", every - place, gram, every - place).min()
+    if np.abs(nearest).max() < 12:
+        assert (nearest - place) @ gram @ (nearest - place) == pytest.approx(least_distance)
     assert lattice.where(row, 4) is None
     assert lattice.where(2 * np.array([0, 1, 0, 1]), 1) is None
 

@@ -32,9 +32,9 @@ def needle(power, height, around=8, rings=4):
     circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(around)], 1)
     up = np.linspace(0, 1, rings)
     vertices = np.concatenate([circle * (1 - u) ** power + [0, 0, height * u] for u in up])
-    one = np.arange(around * (rings - 1))
-    two = one - one % around + (one + 1) % around
-    faces = [np.stack([one, two, two + around], 1), np.stack([one, two + around, one + around], 1)]
+    vertex = np.arange(around * (rings - 1))
+    two = vertex - vertex % around + (vertex + 1) % around
+    faces = [np.stack([vertex, two, two + around], 1), np.stack([vertex, two + around, vertex + around], 1)]
     return vertices, np.concatenate(faces)
 
 
@@ -44,9 +44,9 @@ def needle(power, height, around=8, rings=4):
 def test_a_needle_has_no_more_quads_than_the_limit_or_an_error_with_a_number(options):
     with pytest.raises(
         GridError, match=r"squares, and at most 160 are possible|are possible for 48 triangles"
-    ) as why:
+    ) as caught:
         quads(*needle(4, 1.6e4), quads=10, smooth=0, **options)
-    assert "\n" not in str(why.value)
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.slow
@@ -60,9 +60,9 @@ def test_quads_of_needles_are_bounded_and_finite(power, height, count):
 
 
 def test_more_quads_than_triangles_carry_are_refused_with_the_number_and_the_size_that_are_possible():
-    with pytest.raises(GridError, match="use at most 100,000 quads, of size 0.00318, or subdivide") as why:
+    with pytest.raises(GridError, match="use at most 100,000 quads, of size 0.00318, or subdivide") as caught:
         quads(*SQUARE, quads=10**6)
-    assert "1,000,000 quads are too many for 2 triangles" in str(why.value)
+    assert "1,000,000 quads are too many for 2 triangles" in str(caught.value)
     assert SquareLimit.of((1 / 0.00318) ** 2, 2, 1.0)
     for call in (quads, integer_grid):
         with pytest.raises(GridError, match="too many for 2 triangles"):
@@ -81,17 +81,17 @@ def test_more_quads_than_fit_into_memory_are_refused_before_any_work(monkeypatch
         TooLargeError, match="a grid of 5,000,000 squares needs about 4.25 GB of memory, but 2 GB"
     ):
         SquareLimit.of(5e6, 10**6, 1.0)
-    assert SquareLimit.of(1e6, 10**6, 1.0).wanted == 1e6
+    assert SquareLimit.of(1e6, 10**6, 1.0).requested == 1e6
 
 
-@pytest.mark.parametrize(("wanted", "triangles", "limit"), [(10, 50, 160), (0.1, 50, 16), (1e5, 50, 2e5)])
-def test_the_limit_is_that_of_the_number_wanted_or_of_the_triangles(wanted, triangles, limit):
-    found = SquareLimit.of(wanted, triangles, 1.0)
-    assert found.squares == limit
-    assert found.excess(limit) == ""
-    assert found.excess(math.nan) == found.excess(math.inf) == "the nearest grid is not finite"
+@pytest.mark.parametrize(("requested", "triangles", "limit"), [(10, 50, 160), (0.1, 50, 16), (1e5, 50, 2e5)])
+def test_the_limit_is_that_of_the_number_requested_or_of_the_triangles(requested, triangles, limit):
+    square_limit = SquareLimit.of(requested, triangles, 1.0)
+    assert square_limit.squares == limit
+    assert square_limit.excess(limit) == ""
+    assert square_limit.excess(math.nan) == square_limit.excess(math.inf) == "the nearest grid is not finite"
     advice = "use fewer quads" if limit == 2e5 else f"use at least {math.ceil((limit + 1) / 16)} quads"
-    assert advice in found.excess(limit + 1)
+    assert advice in square_limit.excess(limit + 1)
 
 
 def test_a_grid_with_cones_at_the_corners_of_a_surface_is_not_smaller_than_they_need():
@@ -107,10 +107,10 @@ def test_a_grid_with_cones_at_the_corners_of_a_surface_is_not_smaller_than_they_
 def test_components_together_are_limited():
     """Each of many balls needs six quads."""
     ball = shapes.sphere(1)
-    many = shapes.join(*((ball[0] + [3.0 * i, 0, 0], ball[1]) for i in range(12)))
+    balls = shapes.join(*((ball[0] + [3.0 * i, 0, 0], ball[1]) for i in range(12)))
     with pytest.raises(GridError, match="at most 32 are possible for 2 quads: use at least"):
-        quads(*many, quads=2)
-    assert len(quads(*many, quads=30).quads) <= MAX_TIMES * 30
+        quads(*balls, quads=2)
+    assert len(quads(*balls, quads=30).quads) <= MAX_TIMES * 30
 
 
 def test_a_map_whose_lines_cross_edges_too_often_is_refused_before_the_extraction():
@@ -127,15 +127,17 @@ def test_the_search_for_cones_ends_after_some_work(monkeypatch):
     mesh = TriangleMesh(vertices, faces)
     usual = aligned_cones(mesh, 0.1)
     calls, step = [], _Search._best_steps
-    monkeypatch.setattr(_Search, "_best_steps", lambda self, *rest: calls.append(1) or step(self, *rest))
+    monkeypatch.setattr(
+        _Search, "_best_steps", lambda self, *arguments: calls.append(1) or step(self, *arguments)
+    )
     assert aligned_cones(mesh, 0.1) == usual
-    many = len(calls)
+    call_count = len(calls)
     for name in ("MAX_PAIRS_OF_FEW", "PAIRS_PER_VERTEX"):
         monkeypatch.setattr(f"coneflat.quadmesh.aligned_cones.{name}", 1)
     calls.clear()
     with suppress(errors.CurvatureError):
         aligned_cones(mesh, 0.1)
-    assert len(calls) < many
+    assert len(calls) < call_count
 
 
 def test_points_in_triangles_without_area_have_weights():
@@ -151,9 +153,9 @@ def test_quads_without_places_are_an_error(monkeypatch):
     grid = integer_grid(*SQUARE, quads=16)
 
     def lost(*arguments, **options):
-        found = extract_quads(*arguments, **options)
-        found.vertices[3] = np.nan
-        return found
+        extracted = extract_quads(*arguments, **options)
+        extracted.vertices[3] = np.nan
+        return extracted
 
     monkeypatch.setattr("coneflat.quadmesh.quad_meshing.extract_quads", lost)
     with pytest.raises(GridError, match="1 vertex of quads without a place"):

@@ -62,9 +62,9 @@ def test_polycubes(name, cells, inside):
     assert len(mesh.quads) == count
     assert len(mesh.vertices) == count + euler  # E is 2 F
     assert mesh.euler_characteristic == mesh.surface_euler == euler
-    which, many = np.unique(mesh.valences[mesh.irregular], return_counts=True)
-    assert dict(zip(which.tolist(), many.tolist(), strict=True)) == valences
-    # On flat squares all quads are squares, at corners that are whole multiples, and they cover all.
+    which, counts = np.unique(mesh.valences[mesh.irregular], return_counts=True)
+    assert dict(zip(which.tolist(), counts.tolist(), strict=True)) == valences
+    # On flat squares all quads are squares, at corners that are integer multiples, and they cover all.
     np.testing.assert_allclose(quad_areas(mesh), 1 / cells**2, rtol=1e-9)
     np.testing.assert_allclose(mesh.vertices * cells, np.round(mesh.vertices * cells), atol=1e-9)
     assert len(np.unique(np.round(mesh.vertices * cells), axis=0)) == len(mesh.vertices)
@@ -123,7 +123,7 @@ def mirrored(grid):
 
 
 def test_cones_off_the_grid_are_refused():
-    # Moving everything by half a unit in one chart leaves motions whole only if the cones are off by a half.
+    # Moving everything by half a unit in one chart leaves integer motions only if the cones are off by a half.
     points, squares = polycube(CUBE)
     grid = on_squares(points, squares, 3)
     moved = with_motions(grid.vertices, grid.faces, grid.corner_grid + 0.5)
@@ -148,17 +148,17 @@ def test_open_borders_are_covered_to_the_last_quad(name):
         turn = np.exp(0.4j) * (vertices[:, 0] + 1j * vertices[:, 1])
         grid = flat(np.column_stack([turn.real, turn.imag]) * 7, faces)
         assert extract_quads(grid).left_out > 0
-        mesh, wanted = coneflat.quads(grid), 49.0
+        mesh, area = coneflat.quads(grid), 49.0
         corners = np.array([0, 7, 7j, 7 + 7j]) * np.exp(0.4j)
         off = np.abs(mesh.vertices[:, 0] + 1j * mesh.vertices[:, 1] - corners[:, None]).min(axis=1)
         np.testing.assert_allclose(off, 0, atol=1e-9)
     else:
         vertices, faces = shapes.hill(12, 12) if name == "hill" else shapes.annulus(48, 8)
         mesh = coneflat.quads(vertices, faces, quads=300, boundary="free")
-        wanted = area_of(vertices, faces)
+        area = area_of(vertices, faces)
     assert (mesh.left_out, mesh.area_left_out) == (0, pytest.approx(0, abs=1e-9))
     assert mesh.euler_characteristic == mesh.surface_euler
-    assert area_of(mesh.vertices, mesh.triangles) > 0.985 * wanted
+    assert area_of(mesh.vertices, mesh.triangles) > 0.985 * area
     border = mesh.surface.vertices[mesh.surface.is_boundary_vertex]
     ends = mesh.vertices[mesh.edges[mesh.is_boundary_edge]]
     along = (ends[:, :1] + np.linspace(0, 1, 20)[:, None] * (ends[:, 1:] - ends[:, :1])).reshape(-1, 3)
@@ -177,9 +177,9 @@ def test_edges_between_boundary_vertices_do_not_prevent_straight_sides():
     vertices, faces = shapes.sphere(3, 0.2)
     vertices, faces = vertices, faces[vertices[faces].mean(axis=1) @ [0.3, 0.2, 1] > -0.1]
     mesh = coneflat.quads(vertices, faces, quads=300)
-    given = coneflat.check_mesh(vertices, faces).mesh
-    inner = given.edges[~given.is_boundary_edge]
-    assert given.is_boundary_vertex[inner].all(axis=1).any()
+    checked = coneflat.check_mesh(vertices, faces).mesh
+    inner = checked.edges[~checked.is_boundary_edge]
+    assert checked.is_boundary_vertex[inner].all(axis=1).any()
     assert mesh.left_out == 0
 
 
@@ -210,24 +210,26 @@ def test_distances_are_the_least_of_all_triangles():
     weights = np.stack([1 - u - v, u, v], axis=1)[u + v <= 1 + 1e-12]
     samples = (weights @ vertices[faces]).reshape(-1, 3)
     dense = np.array([np.linalg.norm(samples - query, axis=1).min() for query in queries])
-    found = surface_distances(vertices, faces, queries)
-    assert (found <= dense + 1e-12).all()
+    distances = surface_distances(vertices, faces, queries)
+    assert (distances <= dense + 1e-12).all()
     # Samples are 0.005 sides apart, and a distance is off by no more than half of that.
-    assert (found >= dense - 0.03).all()
+    assert (distances >= dense - 0.03).all()
 
 
 def test_components_without_area_get_no_quads():
     vertices, faces = rectangle(4, 4)
     line = np.array([[0, 9, 0], [1, 9, 0], [2, 9, 0]])
     alone = coneflat.quads(vertices, faces, quads=100)
-    both = coneflat.quads(np.concatenate([vertices, line]), [*faces, len(vertices) + np.arange(3)], quads=100)
-    assert len(both.quads) == len(alone.quads)
+    with_line = coneflat.quads(
+        np.concatenate([vertices, line]), [*faces, len(vertices) + np.arange(3)], quads=100
+    )
+    assert len(with_line.quads) == len(alone.quads)
 
 
 @pytest.mark.slow
 def test_cones_may_be_of_any_angle():
     without, bounded = (
-        coneflat.quads(*shapes.genus(2), quads=500, max_cone_angle=most) for most in (None, 20.0)
+        coneflat.quads(*shapes.genus(2), quads=500, max_cone_angle=max_angle) for max_angle in (None, 20.0)
     )
     np.testing.assert_array_equal(without.quads, bounded.quads)
 
@@ -246,32 +248,32 @@ def test_quads_that_meet_themselves_are_made_smaller():
     """Around each hole of a surface with three handles there are too few squares."""
     options = {"quads": 10, "cones": "sparse", "distortion": 0.2}
     grid = coneflat.integer_grid(*shapes.genus(3), **options)
-    with pytest.raises(GridError, match="with a vertex or an edge twice .*: use more quads"):
+    with pytest.raises(GridError, match="degenerate quads? of .*: use more quads"):
         extract_quads(grid)
     assert all("Left out" in note for note in extract_quads(grid, leave_out=True).notes)
     mesh = coneflat.quads(*shapes.genus(3), **options)
     assert mesh.euler_characteristic == mesh.surface_euler == -4
-    assert any("More quads than wanted" in note for note in mesh.notes)
+    assert any("More quads than requested" in note for note in mesh.notes)
     assert not degenerate_quads(mesh.quads, edges_of(mesh.quads)).any()
 
 
 @pytest.mark.slow
 def test_bad_quads_are_left_out_where_no_finer_grid_is_found(monkeypatch):
     options = {"quads": 10, "cones": "sparse", "distortion": 0.2}
-    search, tried = GridSearch._as_given, []
+    search, searches = GridSearch._as_given, []
 
     def fail_if_finer(self):
-        tried.append(self.size)
-        if self.size < wanted:
+        searches.append(self.size)
+        if self.size < requested:
             raise GridError("none")
         return search(self)
 
     monkeypatch.setattr(GridSearch, "_as_given", fail_if_finer)
-    wanted = GridSearch.of(*shapes.genus(3), {"quads": 10}, {}).size
+    requested = GridSearch.of(*shapes.genus(3), {"quads": 10}, {}).size
     mesh = coneflat.quads(*shapes.genus(3), **options)
     assert any("Left out" in note for note in mesh.notes)
-    assert not any("More quads than wanted" in note for note in mesh.notes)
-    assert tried[0] == wanted > tried[1]
+    assert not any("More quads than requested" in note for note in mesh.notes)
+    assert searches[0] == requested > searches[1]
     assert mesh.grid.seconds.keys() >= {"flatten", "grid"}
 
 
@@ -279,9 +281,9 @@ def test_bad_quads_are_left_out_where_no_finer_grid_is_found(monkeypatch):
 def test_cones_are_chosen_once_for_all_sizes_of_one_price(monkeypatch):
     chosen, sizes, choose, extract = [], [], grid_search.aligned_flattening, extract_quads
 
-    def count(*arguments, **more):
+    def count(*arguments, **options):
         chosen.append(arguments)
-        return choose(*arguments, **more)
+        return choose(*arguments, **options)
 
     def fail_twice(grid):
         sizes.append(grid.size)
@@ -311,25 +313,25 @@ def test_components_of_equal_price_have_grids_of_their_own():
 
 
 @pytest.mark.slow
-def test_a_large_grid_that_is_much_finer_than_wanted_is_not_refined(monkeypatch):
-    tried, extract = [], extract_quads
+def test_a_large_grid_that_is_much_finer_than_requested_is_not_refined(monkeypatch):
+    grids, extract = [], extract_quads
 
     def fail_at_first(grid):
-        tried.append(grid.squares)
-        if len(tried) < 3:
+        grids.append(grid.squares)
+        if len(grids) < 3:
             raise CoarseGridError("too coarse", grid)
         return extract(grid)
 
     monkeypatch.setattr("coneflat.quadmesh.grid_search.extract_quads", fail_at_first)
     options = {"cones": "sparse", "quads": 2000}
     assert coneflat.quads(*shapes.sphere(3), **options).left_out == 0
-    assert len(tried) == 3
-    tried.clear()
+    assert len(grids) == 3
+    grids.clear()
     monkeypatch.setattr(
         "coneflat.quadmesh.grid_search.aligned", lambda it, size, angle: aligned(it, size / 3, angle)
     )
     coneflat.quads(*shapes.sphere(3), **options)
-    assert len(tried) == 1
+    assert len(grids) == 1
 
 
 @pytest.mark.slow
@@ -363,7 +365,7 @@ def test_a_thin_component_does_not_make_the_others_finer(monkeypatch):
     mesh = coneflat.quads(*shapes.join(shapes.sphere(3), (small / 3 + 3, triangles)), quads=500)
     assert max(sizes) == pytest.approx(450, rel=0.1)
     assert 60 <= len(mesh.quads) - max(sizes) < 160
-    assert sum("More quads than wanted" in note for note in mesh.notes) == 1
+    assert sum("More quads than requested" in note for note in mesh.notes) == 1
     assert mesh.euler_characteristic == 4
 
 

@@ -51,12 +51,12 @@ def test_a_ball(ball, quads_of_ball):
 
 def test_a_grid_may_be_given():
     grid = on_squares(*polycube(RING), 4)
-    own = IntegerGrid(**vars(grid), size=0.0, notes=("As given.",))
-    mesh = coneflat.quads(own, smooth=0)
+    stored = IntegerGrid(**vars(grid), size=0.0, notes=("As given.",))
+    mesh = coneflat.quads(stored, smooth=0)
     assert len(mesh.quads) == 32 * 16
     assert mesh.notes == ("As given.",)
     with pytest.raises(OptionError, match="a grid already has"):
-        coneflat.quads(own, quads=100)
+        coneflat.quads(stored, quads=100)
 
 
 @pytest.mark.parametrize("smooth", [-1, 1.5, None, "x"])
@@ -71,12 +71,12 @@ def test_the_mesh_is_read_and_checked_once(tmp_path, monkeypatch, ball, options)
     path, calls = write_obj(tmp_path / "ball.obj", *ball), []
 
     def counted(name, function):
-        return lambda *given, **more: (calls.append(name), function(*given, **more))[1]
+        return lambda *arguments, **options: (calls.append(name), function(*arguments, **options))[1]
 
     for module, name in (
         ("io.packages", "triangulate"),
         ("io.packages", "read_mesh"),
-        ("source.parts", "check_mesh"),
+        ("source.components", "check_mesh"),
     ):
         module = import_module(f"coneflat.{module}")
         monkeypatch.setattr(module, name, counted(name, getattr(module, name)))
@@ -109,19 +109,19 @@ def run(*words):
 
 def test_the_grid_is_written_and_made_into_the_same_quads(tmp_path, ball, quads_of_ball):
     path = write_obj(tmp_path / "ball.obj", *ball)
-    npz, other = tmp_path / "grid.npz", tmp_path / "other.npz"
-    both = tmp_path / "both.npz"
+    npz, quads_of_grid = tmp_path / "grid.npz", tmp_path / "other.npz"
+    quads_of_mesh = tmp_path / "both.npz"
     done = run(path, "--quads", 600, "--grid", npz, "--report", tmp_path / "grid.json")
     assert done.exit_code == 0, done.output
     # Without -o there is a grid alone.
-    assert sorted(each.name for each in tmp_path.iterdir()) == ["ball.obj", "grid.json", "grid.npz"]
+    assert sorted(written.name for written in tmp_path.iterdir()) == ["ball.obj", "grid.json", "grid.npz"]
     told = json.loads((tmp_path / "grid.json").read_text())
     assert "quads" not in told
     assert told["grid"]["size"] == IntegerGrid.load(npz).size
     assert list(told["seconds"]) == ["read", "cones", "flatten", "grid", "write"]
-    assert run(npz, "-o", both, "--grid", other).exit_code == 0
-    np.testing.assert_array_equal(IntegerGrid.load(other).turns, IntegerGrid.load(npz).turns)
-    again = QuadMesh.load(both)
+    assert run(npz, "-o", quads_of_mesh, "--grid", quads_of_grid).exit_code == 0
+    np.testing.assert_array_equal(IntegerGrid.load(quads_of_grid).turns, IntegerGrid.load(npz).turns)
+    again = QuadMesh.load(quads_of_mesh)
     np.testing.assert_array_equal(again.quads, quads_of_ball.quads)
     np.testing.assert_array_equal(again.vertices, quads_of_ball.vertices)
     refused = run(npz, "--quads", 5)
@@ -154,21 +154,21 @@ def test_cones_that_are_given(tmp_path):
     vertices, faces = sphere(3)
     path = write_obj(tmp_path / "ball.obj", vertices, faces)
     corners = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / np.sqrt(3)
-    near = [int(np.linalg.norm(vertices - corner, axis=1).argmin()) for corner in corners]
-    words = ",".join(f"{vertex}:pi/2" for vertex in near)
+    nearest = [int(np.linalg.norm(vertices - corner, axis=1).argmin()) for corner in corners]
+    words = ",".join(f"{vertex}:pi/2" for vertex in nearest)
     done = run(path, "-o", tmp_path / "q.npz", "--quads", 600, "--cones", words, "--smooth", 0)
     assert done.exit_code == 0, done.output
     mesh = QuadMesh.load(tmp_path / "q.npz")
     assert mesh.valences[mesh.irregular].tolist() == [3] * 8
     # They lie where they are asked for, to rounding: extraction has them at corners of triangles.
-    apart = np.linalg.norm(mesh.vertices[mesh.irregular][:, None] - vertices[near], axis=2)
+    apart = np.linalg.norm(mesh.vertices[mesh.irregular][:, None] - vertices[nearest], axis=2)
     assert (apart.min(axis=0) < 1e-12).all()
     refused = run(path, "--cones", words, "--max-cones", 9)
     assert "there is no search if the cones are given: leave out --max-cones" in refused.output
-    for curvatures, what in ((None, "not given"), (1.0, "is 1")):
-        cones = near if curvatures is None else dict.fromkeys(near, curvatures)
+    for curvatures, reason in ((None, "not given"), (1.0, "is 1")):
+        cones = nearest if curvatures is None else dict.fromkeys(nearest, curvatures)
         with pytest.raises(
-            OptionError, match=f"multiples of pi/2; that of vertex {near[0]} is.*{what.split()[-1]}"
+            OptionError, match=f"multiples of pi/2; that of vertex {nearest[0]} is.*{reason.split()[-1]}"
         ):
             coneflat.quads(vertices, faces, cones=cones)
 
@@ -182,8 +182,8 @@ def test_quads_are_more_alike_where_weights_are():
         quads = coneflat.quads(vertices, faces, quads=2000, distortion=0.3, weights=weights)
         centres = quads.vertices[quads.quads].mean(axis=1)
         sizes = np.log(np.abs(quad_areas(quads))) / 2
-        there = centres[:, 2] > np.quantile(vertices[:, 2], 0.7)
-        return sizes[there].std()
+        is_top = centres[:, 2] > np.quantile(vertices[:, 2], 0.7)
+        return sizes[is_top].std()
 
     assert spread(np.where(matters, 100.0, 1.0)) < 0.9 * spread(None)
 
@@ -209,7 +209,7 @@ def test_the_command_tries_a_finer_grid_as_the_function_does(tmp_path):
     words = ("--quads", 10, "--cones", "sparse", "--distortion", 0.2)
     done = run(path, *words, "-o", tmp_path / "quads.npz", "--grid", tmp_path / "grid.npz")
     assert done.exit_code == 0, done.output
-    assert "More quads than wanted" in done.output
+    assert "More quads than requested" in done.output
     mesh = coneflat.quads(coneflat.read_mesh(path), quads=10, cones="sparse", distortion=0.2)
     np.testing.assert_array_equal(QuadMesh.load(tmp_path / "quads.npz").quads, mesh.quads)
     # The grid that is written is that of the quads.

@@ -54,13 +54,13 @@ class TestObj:
         model = tmp_path / "in" / "ball.obj"
         if is_flat:
             model = coneflat.flatten(model, quantise=np.pi / 2, correct_handles=True, charts="one")
-        found = coneflat.quads(model, quads=300)
-        text = found.save(tmp_path / "quads.obj").read_text()
+        mesh = coneflat.quads(model, quads=300)
+        text = mesh.save(tmp_path / "quads.obj").read_text()
         assert text.startswith("mtllib in/a.mtl\nmtllib in/b.mtl\nv ")
         low, *top = (part.count("\nf ") for part in re.split("usemtl blue", text))
         assert all(line in text for line in ("usemtl red\n", "g low\n", "g top cap\n", "g \n"))
-        assert low + sum(top) == len(found.quads)
-        height = found.vertices[found.quads].mean(axis=1)[:, 2]
+        assert low + sum(top) == len(mesh.quads)
+        height = mesh.vertices[mesh.quads].mean(axis=1)[:, 2]
         assert sum(top) == pytest.approx((height > 0).sum(), abs=20)
         assert low > 50
 
@@ -80,8 +80,8 @@ class TestGlb:
             sides = {(t[i], t[(i + 1) % 3]) for t in pair.tolist() for i in range(3)}
             around = set(zip(quad.tolist(), np.roll(quad, -1).tolist(), strict=True))
             assert around <= sides
-            (one, two), again = sides - around
-            assert again == (two, one)
+            (first, second), again = sides - around
+            assert again == (second, first)
 
     def test_lines_are_the_edges(self, cube, saved):
         data = GltfData(saved, saved.read_bytes())
@@ -114,14 +114,14 @@ class TestNpz:
     def test_all_comes_back(self, cube, saved):
         again = QuadMesh.load(saved)
         for field in fields(cube):
-            one, other = getattr(cube, field.name), getattr(again, field.name)
+            stored, restored = getattr(cube, field.name), getattr(again, field.name)
             if field.name == "seconds":
                 continue
             if field.name == "surface":
-                np.testing.assert_array_equal(one.vertices, other.vertices)
-                np.testing.assert_array_equal(one.faces, other.faces)
+                np.testing.assert_array_equal(stored.vertices, restored.vertices)
+                np.testing.assert_array_equal(stored.faces, restored.faces)
             else:
-                np.testing.assert_array_equal(one, other)
+                np.testing.assert_array_equal(stored, restored)
 
     @pytest.mark.parametrize(
         ("name", "value", "message"),
@@ -153,15 +153,15 @@ class TestNpz:
 class TestMeshio:
     def test_reads_the_same_quads(self, cube, tmp_path, ending):
         meshio = pytest.importorskip("meshio")
-        found = meshio.read(cube.save(tmp_path / f"quads{ending}"))
-        np.testing.assert_array_equal(found.points, cube.vertices)
-        (block,) = found.cells
+        mesh = meshio.read(cube.save(tmp_path / f"quads{ending}"))
+        np.testing.assert_array_equal(mesh.points, cube.vertices)
+        (block,) = mesh.cells
         assert block.type == "quad"
         np.testing.assert_array_equal(block.data, cube.quads)
         if ending != ".inp":
-            np.testing.assert_array_equal(found.point_data["valence"], cube.valences)
+            np.testing.assert_array_equal(mesh.point_data["valence"], cube.valences)
             np.testing.assert_allclose(
-                found.cell_data["jacobian"][0], least_jacobians(cube.vertices, cube.quads)
+                mesh.cell_data["jacobian"][0], least_jacobians(cube.vertices, cube.quads)
             )
 
     def test_is_an_extra(self, cube, tmp_path, monkeypatch, ending):

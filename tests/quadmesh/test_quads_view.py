@@ -26,8 +26,8 @@ def check_domains(mesh, domains):
     assert (sides[:, 1] > 0).all()
     np.testing.assert_array_equal(np.bincount(domains.domain), sides.prod(axis=1))
     # Each quad is a unit square, counterclockwise, and no two are the same one.
-    one, two = places[:, 1] - places[:, 0], places[:, 3] - places[:, 0]
-    np.testing.assert_array_equal(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0], 1)
+    first, second = places[:, 1] - places[:, 0], places[:, 3] - places[:, 0]
+    np.testing.assert_array_equal(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0], 1)
     np.testing.assert_array_equal(places[:, 2], places[:, 1] + places[:, 3] - places[:, 0])
     low = places.min(axis=1)
     assert len(np.unique(np.column_stack([domains.domain, low]), axis=0)) == len(low)
@@ -60,15 +60,15 @@ def test_domains_of_cubes(name):
 
 
 def test_a_cube_has_its_six_sides():
-    found = find_domains(quads_of(CUBE, 4))
-    assert sorted(found.sides.tolist()) == [[4, 4]] * 6
+    domains = find_domains(quads_of(CUBE, 4))
+    assert sorted(domains.sides.tolist()) == [[4, 4]] * 6
 
 
 def test_a_torus_without_irregular_vertices_is_cut():
     mesh = extract_quads(torus_map(6, 9, 2))
-    found = find_domains(mesh)
-    check_domains(mesh, found)
-    assert found.sides.prod(axis=1).sum() == len(mesh.quads)
+    domains = find_domains(mesh)
+    check_domains(mesh, domains)
+    assert domains.sides.prod(axis=1).sum() == len(mesh.quads)
 
 
 def head_of(page):

@@ -45,7 +45,7 @@ SHAPES = {
 
 
 def check_features(grid):
-    """Both ends of each sharp edge have the same whole coordinate, to the bit, in every triangle beside it."""
+    """Both ends of each sharp edge have the same integer coordinate, to the bit, in every triangle beside it."""
     mesh = TriangleMesh(grid.vertices, grid.faces)
     edges = edge_indices(mesh, grid.features)
     assert (mesh.edges[edges] == np.sort(grid.features, axis=1)).all()
@@ -75,21 +75,21 @@ def test_laws(name, count):
     mesh = TriangleMesh(grid.vertices, grid.faces)
     sharp = sharp_edges(mesh, SHARP)
     assert set(sharp.tolist()) == set(edge_indices(mesh, grid.features).tolist())
-    found = extract_quads(grid)
-    assert found.left_out == 0
-    assert found.euler_characteristic == found.surface_euler
-    assert abs(found.area_left_out) < 1e-3
+    quad_mesh = extract_quads(grid)
+    assert quad_mesh.left_out == 0
+    assert quad_mesh.euler_characteristic == quad_mesh.surface_euler
+    assert abs(quad_mesh.area_left_out) < 1e-3
 
 
 @pytest.mark.parametrize("count", [100, 1000])
 def test_cube_is_of_squares(count):
-    found = quads(*SHAPES["cube"], quads=count, sharp_angle=SHARP)
-    assert found.valences[found.irregular].tolist() == [3] * 8
-    measures = measure_quads(found)
+    mesh = quads(*SHAPES["cube"], quads=count, sharp_angle=SHARP)
+    assert mesh.valences[mesh.irregular].tolist() == [3] * 8
+    measures = measure_quads(mesh)
     assert measures.angle_max < 1e-6
     assert measures.edge_cv < 1e-6
     assert measures.hausdorff < 1e-9
-    corners = found.vertices[found.irregular]
+    corners = mesh.vertices[mesh.irregular]
     assert sorted(map(tuple, np.round(corners, 9).tolist())) == [
         (x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)
     ]
@@ -98,8 +98,8 @@ def test_cube_is_of_squares(count):
 @pytest.mark.parametrize("name", ["cylinder", "hexagon"])
 def test_quads_follow_round_edges(name):
     """All sharp edges are on edges of quads, and irregular vertices add up to 8 quarter turns (Gauss-Bonnet)."""
-    found = quads(*SHAPES[name], quads=1000, sharp_angle=SHARP)
-    assert (4 - found.valences[found.irregular]).sum() == 8
+    mesh = quads(*SHAPES[name], quads=1000, sharp_angle=SHARP)
+    assert (4 - mesh.valences[mesh.irregular]).sum() == 8
     vertices, faces = SHAPES[name]
     for level in (vertices[:, 2].min(), vertices[:, 2].max()):
         # Each quad is on a cap or beside it, so those on the cap cover it.
@@ -107,8 +107,8 @@ def test_quads_follow_round_edges(name):
             double_areas_of(points, corners[(np.abs(points[:, 2] - level) < 1e-9)[corners].all(axis=1)])
             for points, corners in (
                 (vertices, faces),
-                (found.vertices, found.quads[:, :3]),
-                (found.vertices, found.quads[:, [0, 2, 3]]),
+                (mesh.vertices, mesh.quads[:, :3]),
+                (mesh.vertices, mesh.quads[:, [0, 2, 3]]),
             )
         ]
         assert areas[1] + areas[2] == pytest.approx(areas[0], rel=0.01)
@@ -145,8 +145,8 @@ def test_elimination_spans_all_solutions(size, seed):
     )
     rows = np.concatenate([rows, rows[:3] - rows[3:6]])
     right = rows @ rng.normal(size=variables)
-    found, left = solutions_of(csr_matrix(rows), right)
-    basis = found.toarray()
+    solutions, left = solutions_of(csr_matrix(rows), right)
+    basis = solutions.toarray()
     assert np.abs(left).max(initial=0.0) < 1e-9
     assert rows @ basis[:, -1] == pytest.approx(right, abs=1e-9)
     assert np.abs(rows @ basis[:, :-1]).max() < 1e-9
@@ -170,16 +170,19 @@ def test_elimination_does_not_divide_by_rounding(noise):
     rings, size = 60, 6
     turns = rng.uniform(-np.pi, np.pi, (rings, size))
     turns[:, -1] = -turns[:, :-1].sum(axis=1)
-    one = np.arange(rings * size)
-    other = (one.reshape(rings, size)[:, [*range(1, size), 0]]).ravel()
-    factor = np.exp(1j * (turns.ravel() + noise * rng.normal(size=one.size)))
-    rows = np.zeros((2 * one.size, 2 * one.size))
+    unknown = np.arange(rings * size)
+    neighbour = (unknown.reshape(rings, size)[:, [*range(1, size), 0]]).ravel()
+    factor = np.exp(1j * (turns.ravel() + noise * rng.normal(size=unknown.size)))
+    rows = np.zeros((2 * unknown.size, 2 * unknown.size))
     for axis, unit in enumerate((1.0, 1j)):
         image = -factor * unit
-        rows[2 * one, 2 * one + axis], rows[2 * one + 1, 2 * one + axis] = image.real, image.imag
-        rows[2 * one + axis, 2 * other + axis] += 1.0
-    found, _ = solutions_of(csr_matrix(rows), np.zeros(len(rows)))
-    basis = found[:, :-1].toarray()
+        rows[2 * unknown, 2 * unknown + axis], rows[2 * unknown + 1, 2 * unknown + axis] = (
+            image.real,
+            image.imag,
+        )
+        rows[2 * unknown + axis, 2 * neighbour + axis] += 1.0
+    solutions, _ = solutions_of(csr_matrix(rows), np.zeros(len(rows)))
+    basis = solutions[:, :-1].toarray()
     assert basis.shape[1] == 2 * rings
     assert np.abs(rows @ basis).max() <= 50 * noise + 1e-12
     assert np.abs(basis).max() < 10
@@ -187,8 +190,8 @@ def test_elimination_does_not_divide_by_rounding(noise):
 
 @pytest.mark.parametrize(("equations", "variables"), [(3, 0), (3, 4), (0, 4), (200, 4)])
 def test_elimination_without_coefficients(equations, variables):
-    found, left = solutions_of(csr_matrix((equations, variables)), np.ones(equations))
-    np.testing.assert_array_equal(found.toarray(), np.eye(variables, variables + 1))
+    solutions, left = solutions_of(csr_matrix((equations, variables)), np.ones(equations))
+    np.testing.assert_array_equal(solutions.toarray(), np.eye(variables, variables + 1))
     np.testing.assert_array_equal(left, np.ones(equations))
 
 
@@ -196,9 +199,9 @@ def test_elimination_without_coefficients(equations, variables):
 def test_elimination_of_many_separate_equations_stays_sparse():
     """The basis has 20,000 vectors, of two entries each: as an array it would need 6 GB."""
     blocks = block_diag([csr_matrix([[1.0, -1.0]])] * 20_000, format="csr")
-    found, left = solutions_of(blocks, np.zeros(20_000))
-    assert found.shape == (40_000, 20_001)
-    assert found.nnz == 40_000
+    solutions, left = solutions_of(blocks, np.zeros(20_000))
+    assert solutions.shape == (40_000, 20_001)
+    assert solutions.nnz == 40_000
     assert not np.abs(left).any()
 
 

@@ -36,28 +36,28 @@ MODELS = {
 def test_quads_lie_on_the_given_surface(coarser, name):
     vertices, faces = MODELS[name]()
     assert len(faces) > 2000
-    found = coneflat.quads(vertices, faces, quads=300)
-    np.testing.assert_array_equal(found.surface.vertices, vertices)
-    assert len(found.grid.faces) < 0.9 * len(faces)
-    on = np.einsum("qi,qix->qx", found.barycentric, vertices[found.surface.faces[found.faces]])
-    np.testing.assert_allclose(on, found.vertices, atol=1e-12)
-    measures = coneflat.measure_quads(found)
+    mesh = coneflat.quads(vertices, faces, quads=300)
+    np.testing.assert_array_equal(mesh.surface.vertices, vertices)
+    assert len(mesh.grid.faces) < 0.9 * len(faces)
+    on = np.einsum("qi,qix->qx", mesh.barycentric, vertices[mesh.surface.faces[mesh.faces]])
+    np.testing.assert_allclose(on, mesh.vertices, atol=1e-12)
+    measures = coneflat.measure_quads(mesh)
     assert measures.euler_characteristic == measures.surface_euler
     assert measures.jacobian_min > 0
     assert measures.hausdorff < 0.5 * measures.edge_mean
     # Borders lie on borders.
-    weights = found.barycentric[found.is_boundary_vertex]
-    sides = found.surface.is_boundary_edge[found.surface.halfedge_edges].reshape(-1, 3)
-    at = found.faces[found.is_boundary_vertex]
+    weights = mesh.barycentric[mesh.is_boundary_vertex]
+    sides = mesh.surface.is_boundary_edge[mesh.surface.halfedge_edges].reshape(-1, 3)
+    at = mesh.faces[mesh.is_boundary_vertex]
     assert ((weights <= 1e-12) & (sides[at] | (weights.max(axis=1) > 1 - 1e-12)[:, None])).any(axis=1).all()
 
 
 def test_vertices_stay_on_their_component_where_borders_touch(coarser):
-    """Two hills, one of them upside down, have the same border."""
+    """Two hills, one of them inverted, have the same border."""
     vertices, faces = shapes.grid(60, 50, lambda x, y: x * (1 - x) * y * (1 - y))
-    both = shapes.join((vertices, faces), (vertices * [1, 1, -1], faces[:, ::-1]))
-    found = coneflat.quads(*both, quads=300)
-    of_quads = (found.faces >= len(faces))[found.quads]
+    halves = shapes.join((vertices, faces), (vertices * [1, 1, -1], faces[:, ::-1]))
+    mesh = coneflat.quads(*halves, quads=300)
+    of_quads = (mesh.faces >= len(faces))[mesh.quads]
     assert (of_quads == of_quads[:, :1]).all()
     assert len(np.unique(of_quads)) == 2
 
@@ -71,28 +71,28 @@ def test_vertices_slide_along_the_surface():
         depth = np.maximum(1 - along, along - 2).clip(0)
         return TriangleMesh(np.stack([0.1 * (along - 1).clip(0, 1), points[:, 1], depth], axis=1), faces)
 
-    given, finer = channel(3, 2), channel(12, 8)
-    common, rest = np.array([0, 4, 8]), np.setdiff1d(np.arange(len(finer.vertices)), [0, 4, 8])
-    order = np.append(common, rest)
+    coarse, finer = channel(3, 2), channel(12, 8)
+    common, remaining = np.array([0, 4, 8]), np.setdiff1d(np.arange(len(finer.vertices)), [0, 4, 8])
+    order = np.append(common, remaining)
     surface = TriangleMesh(finer.vertices[order], np.argsort(order)[finer.faces])
-    one, two = surface.faces.reshape(2, -1, 3)
+    first, second = surface.faces.reshape(2, -1, 3)
     at = np.argsort(surface.faces.ravel())[
         np.searchsorted(np.sort(surface.faces.ravel()), np.arange(len(order)))
     ]
     quads = QuadMesh(
-        surface.vertices, np.column_stack([one, two[:, 2]]), at // 3, np.eye(3)[at % 3], 0, 0.0, surface
+        surface.vertices, np.column_stack([first, second[:, 2]]), at // 3, np.eye(3)[at % 3], 0, 0.0, surface
     )
     is_filling = np.zeros(len(surface.faces), dtype=bool)
-    np.testing.assert_array_equal(given.vertices[[0, 1, 2]], surface.vertices[[0, 1, 2]])
-    moved = module.SimplerMesh(surface, np.array([0, 1, 2]), given, is_filling, 0.1).moved(quads)
+    np.testing.assert_array_equal(coarse.vertices[[0, 1, 2]], surface.vertices[[0, 1, 2]])
+    moved = module.SimplerMesh(surface, np.array([0, 1, 2]), coarse, is_filling, 0.1).moved(quads)
     np.testing.assert_allclose(moved.vertices, quads.vertices, atol=1e-12)
 
 
 def test_creases_are_kept(coarser):
     vertices, faces = MODELS["box"]()
-    found = coneflat.quads(vertices, faces, quads=300)
+    mesh = coneflat.quads(vertices, faces, quads=300)
     # Vertices on two sides of the box are on its edges.
-    off = np.minimum(np.abs(found.vertices), np.abs(found.vertices - vertices.max(axis=0)))
+    off = np.minimum(np.abs(mesh.vertices), np.abs(mesh.vertices - vertices.max(axis=0)))
     assert ((off < 1e-12).sum(axis=1) >= 2).sum() > 70
 
 
@@ -108,9 +108,12 @@ def test_creases_are_kept(coarser):
 )
 def test_options_for_which_the_given_mesh_is_used(coarser, options):
     vertices, faces = MODELS["ball"]()
-    own = {"quads": 300, **{name: options.pop(name) for name in ("quads", "sharp_angle") if name in options}}
+    quad_options = {
+        "quads": 300,
+        **{name: options.pop(name) for name in ("quads", "sharp_angle") if name in options},
+    }
     assert simplified(GridSearch.of(vertices, faces, {"quads": 300}, {}))[1] is not None
-    search = GridSearch.of(vertices, faces, own, options)
+    search = GridSearch.of(vertices, faces, quad_options, options)
     assert simplified(search) == (search, None)
 
 
@@ -118,32 +121,32 @@ def test_sizes_are_those_of_the_given_mesh(coarser):
     vertices, faces = MODELS["ball"]()
     sizes = np.linspace(1, 2, len(vertices))
     search, small = simplified(GridSearch.of(vertices, faces, {"quads": 300, "size": sizes}, {}))
-    np.testing.assert_allclose(search.sizes, sizes[small.kept])
-    np.testing.assert_array_equal(small.mesh.vertices, vertices[small.kept])
+    np.testing.assert_allclose(search.sizes, sizes[small.vertex_origin])
+    np.testing.assert_array_equal(small.mesh.vertices, vertices[small.vertex_origin])
 
 
-def components_of(found):
+def components_of(mesh):
     """The number of components of quads, and of their surface."""
-    quads = csr_matrix((np.ones(len(found.edges)), found.edges.T), shape=(len(found.vertices),) * 2)
-    return connected_components(quads)[0], found.surface.components[0]
+    quads = csr_matrix((np.ones(len(mesh.edges)), mesh.edges.T), shape=(len(mesh.vertices),) * 2)
+    return connected_components(quads)[0], mesh.surface.components[0]
 
 
 @pytest.mark.slow
-def test_all_but_the_largest_components_are_divided(monkeypatch):
+def test_small_components_are_divided(monkeypatch):
     monkeypatch.setattr(module, "MAX_COMPONENTS", 2)
     cube, (ball, faces) = shapes.box(1, (1.0, 1.0, 1.0)), shapes.sphere(3)
     parts = [(4.0 * k + size * cube[0], cube[1]) for k, size in enumerate((3, 1, 2, 0.1))]
-    found = coneflat.quads(*shapes.join(*parts, (ball - 9, faces)), quads=300)
-    assert components_of(found) == (5, 5)
-    assert any("of 3 components without a grid" in note for note in found.notes)
-    on = np.einsum("qi,qix->qx", found.barycentric, found.surface.vertices[found.surface.faces[found.faces]])
-    np.testing.assert_allclose(on, found.vertices, atol=1e-12)
-    measures = coneflat.measure_quads(found)
+    mesh = coneflat.quads(*shapes.join(*parts, (ball - 9, faces)), quads=300)
+    assert components_of(mesh) == (5, 5)
+    assert any("of 3 components without a grid" in note for note in mesh.notes)
+    on = np.einsum("qi,qix->qx", mesh.barycentric, mesh.surface.vertices[mesh.surface.faces[mesh.faces]])
+    np.testing.assert_allclose(on, mesh.vertices, atol=1e-12)
+    measures = coneflat.measure_quads(mesh)
     assert measures.euler_characteristic == measures.surface_euler == 10
     assert measures.jacobian_min > 0
     assert measures.hausdorff < measures.edge_mean
     # The unit cube has about as many quads as its area needs, or up to four times as many.
-    corners = found.vertices[found.quads].mean(axis=1)
+    corners = mesh.vertices[mesh.quads].mean(axis=1)
     is_unit = (np.abs(corners - 4.5).max(axis=1) < 0.6).sum()
     assert 0.8 < is_unit / (300 * 6 / (14.01 * 6 + 4 * np.pi)) < 4
 
@@ -158,20 +161,20 @@ def with_holes(count, corners=((20, 20), (60, 20), (20, 60), (60, 60))):
 
 @pytest.mark.slow
 def test_holes_smaller_than_quads_are_filled():
-    found = coneflat.quads(*with_holes(80), quads=100)
-    assert (len(found.quads), found.euler_characteristic, len(found.irregular)) == (100, 1, 0)
-    assert any(note.startswith("Filled 4 holes: small ones") for note in found.notes)
-    assert found.surface.euler_characteristic == -3
+    mesh = coneflat.quads(*with_holes(80), quads=100)
+    assert (len(mesh.quads), mesh.euler_characteristic, len(mesh.irregular)) == (100, 1, 0)
+    assert any(note.startswith("Filled 4 holes: small ones") for note in mesh.notes)
+    assert mesh.surface.euler_characteristic == -3
 
 
 def test_quads_over_filled_holes_are_left_out(monkeypatch):
     monkeypatch.setattr(module, "MAX_HOLES", 1)
-    found = coneflat.quads(*with_holes(20, ((3, 3), (15, 3), (3, 15), (15, 15))), quads=1600)
-    assert any(note.startswith("Filled 3 holes") for note in found.notes)
-    assert found.euler_characteristic == found.surface_euler == -3
-    places = found.vertices[found.quads].mean(axis=1)[:, None, :2] * 20 - [[3.5, 3.5], [15.5, 3.5]]
+    mesh = coneflat.quads(*with_holes(20, ((3, 3), (15, 3), (3, 15), (15, 15))), quads=1600)
+    assert any(note.startswith("Filled 3 holes") for note in mesh.notes)
+    assert mesh.euler_characteristic == mesh.surface_euler == -3
+    places = mesh.vertices[mesh.quads].mean(axis=1)[:, None, :2] * 20 - [[3.5, 3.5], [15.5, 3.5]]
     assert (np.abs(places).max(axis=2) > 0.4).all()
-    assert coneflat.measure_quads(found).jacobian_min > 0
+    assert coneflat.measure_quads(mesh).jacobian_min > 0
 
 
 @pytest.mark.slow
@@ -181,16 +184,16 @@ def test_round_holes_that_are_filled_give_no_flipped_quads(monkeypatch):
     middle = vertices[faces].mean(axis=1)[:, :2]
     centres = np.array([[0.2, 0.25], [0.7, 0.3], [0.35, 0.7], [0.75, 0.75]])
     is_gone = (np.linalg.norm(middle[:, None] - centres, axis=2) < 0.07).any(axis=1)
-    found = coneflat.quads(vertices, faces[~is_gone], quads=1000)
-    assert found.euler_characteristic == found.surface_euler == -3
-    assert coneflat.measure_quads(found).jacobian_min > 0
+    mesh = coneflat.quads(vertices, faces[~is_gone], quads=1000)
+    assert mesh.euler_characteristic == mesh.surface_euler == -3
+    assert coneflat.measure_quads(mesh).jacobian_min > 0
 
 
 def test_a_boundary_with_very_many_corners_is_free(monkeypatch):
     monkeypatch.setattr(module, "MAX_CORNERS", 3)
-    found = coneflat.quads(*shapes.grid(8, 8), quads=50)
-    assert "The boundary cuts squares, because it has more than 3 corners." in found.notes
-    assert found.euler_characteristic == 1
+    mesh = coneflat.quads(*shapes.grid(8, 8), quads=50)
+    assert "The boundary cuts squares, because it has more than 3 corners." in mesh.notes
+    assert mesh.euler_characteristic == 1
     asked = coneflat.quads(*shapes.grid(8, 8), quads=50, boundary="straight")
     assert len(asked.irregular) == 0
     assert not any("corners" in note for note in asked.notes)
@@ -217,24 +220,28 @@ def test_components_for_which_no_grid_is_found_are_divided(monkeypatch, name):
         monkeypatch.setattr(module, "MAX_COMPONENTS", 4)
         parts += [(0.1 * cube[0] - 5 * k, cube[1]) for k in range(1, 4)]
     vertices, triangles = shapes.join(*parts)
-    found = coneflat.quads(vertices, triangles, quads=2000 if name == "as given" else 200)
-    assert components_of(found) == (len(parts), len(parts))
-    assert any(note.startswith("No grid for a component of 12 triangles: none.") for note in found.notes)
-    assert any(note.startswith("Made three quads of each triangle") for note in found.notes)
-    assert len(found.surface.faces) == len(triangles)
-    on = np.einsum("qi,qix->qx", found.barycentric, found.surface.vertices[found.surface.faces[found.faces]])
-    np.testing.assert_allclose(on, found.vertices, atol=1e-12)
-    assert any("Filled 1 hole" in note for note in found.notes) == (name != "as given")
+    quad_mesh = coneflat.quads(vertices, triangles, quads=2000 if name == "as given" else 200)
+    assert components_of(quad_mesh) == (len(parts), len(parts))
+    assert any(note.startswith("No grid for a component of 12 triangles: none.") for note in quad_mesh.notes)
+    assert any(note.startswith("Made three quads of each triangle") for note in quad_mesh.notes)
+    assert len(quad_mesh.surface.faces) == len(triangles)
+    on = np.einsum(
+        "qi,qix->qx",
+        quad_mesh.barycentric,
+        quad_mesh.surface.vertices[quad_mesh.surface.faces[quad_mesh.faces]],
+    )
+    np.testing.assert_allclose(on, quad_mesh.vertices, atol=1e-12)
+    assert any("Filled 1 hole" in note for note in quad_mesh.notes) == (name != "as given")
 
 
 def test_two_sided_triangles_are_divided(monkeypatch):
     """Splitting edges of two triangles with the same vertices would join two vertices twice."""
     monkeypatch.setattr(module, "MAX_COMPONENTS", 1)
     pillow = np.array([[5.0, 0, 0], [6, 0, 0], [5, 1, 0]]), np.array([[0, 1, 2], [0, 2, 1]])
-    found = coneflat.quads(*shapes.join(shapes.sphere(3), pillow), quads=2000)
-    assert components_of(found) == (2, 2)
-    assert found.euler_characteristic == 4
-    tails, heads = found.quads.ravel(), np.roll(found.quads, -1, axis=1).ravel()
+    mesh = coneflat.quads(*shapes.join(shapes.sphere(3), pillow), quads=2000)
+    assert components_of(mesh) == (2, 2)
+    assert mesh.euler_characteristic == 4
+    tails, heads = mesh.quads.ravel(), np.roll(mesh.quads, -1, axis=1).ravel()
     assert len(np.unique(np.stack([tails, heads], axis=1), axis=0)) == len(tails)
 
 
@@ -266,12 +273,12 @@ def test_edges_of_a_small_part_are_no_noise(cells):
     solid = np.zeros((cells + 2, cells + 2, 5), dtype=bool)
     solid[1:-1, 1:-1, 1] = solid[cells // 2, cells // 2, 2:4] = True
     rows, turns = [], {0: (1, 2), 1: (2, 0), 2: (0, 1)}
-    for axis, (one, two) in turns.items():
+    for axis, (first, second) in turns.items():
         for up in (True, False):
-            other = np.roll(solid, -1 if up else 1, axis=axis)
-            for cell in np.argwhere(solid & ~other):
+            neighbour = np.roll(solid, -1 if up else 1, axis=axis)
+            for cell in np.argwhere(solid & ~neighbour):
                 a = cell + up * np.eye(3, dtype=int)[axis]
-                b, c = np.eye(3, dtype=int)[[one, two]]
+                b, c = np.eye(3, dtype=int)[[first, second]]
                 square = [a, a + b, a + b + c, a + c]
                 rows.append(square if up else square[::-1])
     points, index = np.unique(np.array(rows).reshape(-1, 3), axis=0, return_inverse=True)
@@ -281,7 +288,7 @@ def test_edges_of_a_small_part_are_no_noise(cells):
 
 
 @pytest.mark.slow
-def test_meshes_of_thin_triangles_are_triangulated_anew():
+def test_meshes_of_thin_triangles_are_remeshed():
     """As in files of CAD programs: a pipe of strips as long as it, and a cap with a fan around its centre."""
     count = 60
     turn = np.arange(count) * 2 * np.pi / count
@@ -291,41 +298,44 @@ def test_meshes_of_thin_triangles_are_triangulated_anew():
     after, above = np.roll(low, -1), np.roll(high, -1)
     fans = [[low, after, above], [low, above, high], [high, above, 0 * low + 2 * count]]
     faces = np.concatenate([np.stack(fan, axis=1) for fan in fans])
-    given = check_mesh(vertices, faces).mesh
-    assert module._is_thin(given).all()
-    new, some, of = module._retriangulated(given, 4000)
-    common = some[some < len(vertices)]
-    assert (np.diff(some) >= 0).all()
-    np.testing.assert_array_equal(new.vertices[: len(common)], given.vertices[common])
-    assert (new.euler_characteristic, len(new.faces)) == (1, len(of))
-    assert module._is_thin(new).mean() < 0.2
-    found = coneflat.quads(vertices, faces, quads=600)
-    np.testing.assert_array_equal(found.surface.vertices, vertices)
-    assert (found.left_out, found.euler_characteristic) == (0, 1)
-    assert coneflat.measure_quads(found).jacobian_min > 0.2
-    assert not any("Cones are not chosen" in note for note in found.notes)
-    np.testing.assert_allclose(found.vertices[found.is_boundary_vertex][:, 2], 0, atol=1e-9)
+    checked = check_mesh(vertices, faces).mesh
+    assert module._is_thin(checked).all()
+    remeshed, vertices_of, of = module._retriangulated(checked, 4000)
+    common = vertices_of[vertices_of < len(vertices)]
+    assert (np.diff(vertices_of) >= 0).all()
+    np.testing.assert_array_equal(remeshed.vertices[: len(common)], checked.vertices[common])
+    assert (remeshed.euler_characteristic, len(remeshed.faces)) == (1, len(of))
+    assert module._is_thin(remeshed).mean() < 0.2
+    mesh = coneflat.quads(vertices, faces, quads=600)
+    np.testing.assert_array_equal(mesh.surface.vertices, vertices)
+    assert (mesh.left_out, mesh.euler_characteristic) == (0, 1)
+    assert coneflat.measure_quads(mesh).jacobian_min > 0.2
+    assert not any("Cones are not chosen" in note for note in mesh.notes)
+    np.testing.assert_allclose(mesh.vertices[mesh.is_boundary_vertex][:, 2], 0, atol=1e-9)
 
 
 def test_meshes_whose_triangles_stay_thin_are_taken_as_given():
     vertices, faces = shapes.grid(40, 2)
     mesh = check_mesh(vertices * [0.2, 8, 1], faces).mesh
-    new, some, of = module._retriangulated(mesh, 400)
-    np.testing.assert_array_equal(new.faces, mesh.faces)
-    assert (some.tolist(), of.tolist()) == (list(range(len(mesh.vertices))), list(range(len(mesh.faces))))
+    remeshed, vertices_of, of = module._retriangulated(mesh, 400)
+    np.testing.assert_array_equal(remeshed.faces, mesh.faces)
+    assert (vertices_of.tolist(), of.tolist()) == (
+        list(range(len(mesh.vertices))),
+        list(range(len(mesh.faces))),
+    )
 
 
 @pytest.mark.slow
 def test_triangles_that_stay_thin_are_not_split_without_bound(monkeypatch):
     """The triangles of a cylinder of many sides are thin at their tips, however often they are split."""
-    most, coarse = [], module.coarse_mesh
+    counts, coarse = [], module.coarse_mesh
 
     def watched(mesh, count):
-        most.append(len(mesh.faces) / count)
+        counts.append(len(mesh.faces) / count)
         return coarse(mesh, count)
 
     monkeypatch.setattr(module, "coarse_mesh", watched)
     vertices, faces = shapes.cylinder(300, 1, 9.0, caps=True)
-    found = coneflat.quads(vertices, faces, quads=1000, repair=True)
-    assert 1 < most[0] < 12
-    assert len(found.grid.faces) < 3 * len(faces)
+    quad_mesh = coneflat.quads(vertices, faces, quads=1000, repair=True)
+    assert 1 < counts[0] < 12
+    assert len(quad_mesh.grid.faces) < 3 * len(faces)

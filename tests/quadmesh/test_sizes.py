@@ -1,4 +1,4 @@
-"""Wanted sizes of quads, and components with searches of their own."""
+"""Target sizes of quads, and components with searches of their own."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ def graded(ball):
 
 
 @pytest.mark.slow
-def test_quads_have_the_wanted_sizes(ball, graded):
+def test_quads_have_the_requested_sizes(ball, graded):
     sides, places = edges_and_places(graded)
     asked, reached = places[:, 2] * np.log(2), np.log(sides)
     assert np.corrcoef(asked, reached)[0, 1] > 0.85
     even = edges_and_places(coneflat.quads(*ball, quads=1500))[0]
     low, high = np.quantile(reached - asked, [0.05, 0.95])
-    # As even, relative to the wanted sizes, as quads are without them.
+    # As even, relative to the requested sizes, as quads are without them.
     assert high - low < 1.3 * np.subtract(*np.quantile(np.log(even), [0.95, 0.05]))
     assert 1200 < len(graded.quads) < 1800
     assert "have a correlation of 0.9" in " ".join(graded.notes)
@@ -73,8 +73,10 @@ def test_new_vertices_get_the_mean_of_their_neighbours():
     values = extended(np.array([1.0, 2.0, 6.0]), finer)
     np.testing.assert_allclose(values[:3], [1, 2, 6])
     for value, point in zip(values[3:], finer.vertices[3:], strict=True):
-        near = [{0: 1, 1: 2, 2: 6}[v] for v in range(3) if np.linalg.norm(point - finer.vertices[v]) < 1.5]
-        assert value == pytest.approx(np.mean(near))
+        neighbours = [
+            {0: 1, 1: 2, 2: 6}[v] for v in range(3) if np.linalg.norm(point - finer.vertices[v]) < 1.5
+        ]
+        assert value == pytest.approx(np.mean(neighbours))
 
 
 @pytest.mark.parametrize(
@@ -92,10 +94,10 @@ def test_sizes_that_are_none(ball, size, message):
         coneflat.quads(*ball, quads=100, size=size)
 
 
-@pytest.mark.parametrize("more", [{"cone_count": 8}, {"cones": "sparse"}])
-def test_sizes_need_cones_that_may_be_chosen(ball, more):
+@pytest.mark.parametrize("options", [{"cone_count": 8}, {"cones": "sparse"}])
+def test_sizes_need_cones_that_may_be_chosen(ball, options):
     with pytest.raises(OptionError, match="sizes cannot be combined"):
-        coneflat.quads(*ball, quads=100, size="curvature", **more)
+        coneflat.quads(*ball, quads=100, size="curvature", **options)
 
 
 @pytest.mark.slow
@@ -170,9 +172,9 @@ def test_triangles_around_flipped_ones_are_split(monkeypatch):
     vertices, faces = shapes.torus()
 
     def first_is_flipped(result):
-        found = has_area(result)
-        found[0] &= len(result.faces) > len(faces)
-        return found
+        is_flat = has_area(result)
+        is_flat[0] &= len(result.faces) > len(faces)
+        return is_flat
 
     monkeypatch.setattr("coneflat.quadmesh.aligned_cones.has_area", first_is_flipped)
     grid = coneflat.integer_grid(vertices, faces, quads=500)

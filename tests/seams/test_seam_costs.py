@@ -45,11 +45,11 @@ def well(width=1.0, depth=1.0, wall=0.4, rows=12, around=32):
 
 class TestVisibility:
     @pytest.mark.parametrize("shape", [shapes.sphere(2, 0.0), shapes.box(4)])
-    def test_all_of_a_convex_shape_can_be_seen(self, shape):
+    def test_convex_shapes_are_visible_everywhere(self, shape):
         assert visible_share(*shape).min() > 0.97
 
     @pytest.mark.parametrize("depth", [0.5, 2.0])
-    def test_from_the_bottom_of_a_well_one_sees_its_mouth(self, depth):
+    def test_visibility_in_a_well_is_its_view_factor(self, depth):
         vertices, faces, bottom = well(depth=depth)
         share = visible_share(vertices, faces)
         # The view factor of a disk of radius 1 at this distance.
@@ -57,11 +57,11 @@ class TestVisibility:
         outside = np.flatnonzero(np.hypot(*vertices[:, :2].T) > 1.39)
         assert share[outside].min() > 0.97
 
-    def test_the_side_that_is_seen_better_counts(self):
+    def test_visibility_does_not_depend_on_the_orientation(self):
         vertices, faces, _ = well()
         np.testing.assert_allclose(visible_share(vertices, faces[:, ::-1]), visible_share(vertices, faces))
 
-    def test_who_looks_from_above_sees_the_underside_badly(self):
+    def test_an_up_direction_hides_the_underside(self):
         vertices, faces = shapes.sphere(3, 0.0)
         for up in ([0, 0, 1], [0, -3, 0]):
             share = visible_share(vertices, faces, np.array(up))
@@ -69,23 +69,23 @@ class TestVisibility:
             # Integrals of (1 + z) / 2 by the cosine over the hemispheres of the top, the side and the underside.
             np.testing.assert_allclose(share, 0.6 + 0.4 * height, atol=0.03)
 
-    def test_other_parts_hide_too(self):
+    def test_components_hide_each_other(self):
         ball, plate = shapes.sphere(3, 0.0), shapes.box(6, (4.0, 4.0, 0.1))
         plate = plate[0] - plate[0].mean(axis=0) + [0, 0, 1.1], plate[1]
         share = visible_share(*shapes.join(ball, plate))[: len(ball[0])]
         assert share[np.argmax(ball[0][:, 2])] < 0.2
         assert share[np.argmin(ball[0][:, 2])] > 0.97
 
-    def test_neither_numbers_nor_place_nor_size_matter(self):
+    def test_numbering_position_and_size_do_not_matter(self):
         vertices, faces = shapes.sphere(3, 0.6)
         share = visible_share(vertices, faces)
         assert share.min() < 0.95
         for seed, size in ((1, 1e-6), (3, 1e6)):
-            moved, turned, new = shapes.renumber(vertices, faces, seed)
-            other = visible_share(size * (moved @ shapes.rotation(seed).T + [1, 2, 3]), turned)[new]
+            moved, turned, number = shapes.renumber(vertices, faces, seed)
+            moved_share = visible_share(size * (moved @ shapes.rotation(seed).T + [1, 2, 3]), turned)[number]
             # A vertex on the edge of a pixel may fall to either side.
-            assert np.mean(np.abs(other - share) < 1e-6) > 0.99
-            assert np.abs(other - share).max() < 0.1
+            assert np.mean(np.abs(moved_share - share) < 1e-6) > 0.99
+            assert np.abs(moved_share - share).max() < 0.1
 
     @pytest.mark.slow
     def test_more_directions_and_pixels_change_little(self, monkeypatch):
@@ -101,7 +101,7 @@ class TestVisibility:
             visible_share(*shapes.sphere(1), up)
 
 
-def test_ridges_bend_one_way_and_valleys_the_other():
+def test_dihedral_angles_of_ridges_are_positive_and_of_valleys_negative():
     mesh = TriangleMesh(*shapes.grid(12, 4, lambda x, y: 3 * np.abs(np.abs(x - 0.5) - 0.25)))
     angles = dihedral_angles(mesh)
     middle = mesh.vertices[mesh.edges].mean(axis=1)
@@ -115,7 +115,7 @@ def test_ridges_bend_one_way_and_valleys_the_other():
 
 
 class TestCosts:
-    def test_without_constraints_they_are_lengths(self):
+    def test_without_constraints_costs_are_lengths(self):
         mesh = TriangleMesh(*shapes.sphere(2))
         np.testing.assert_array_equal(edge_costs(mesh, lengths_of(mesh)), lengths_of(mesh))
 
@@ -145,7 +145,7 @@ class TestCosts:
         np.testing.assert_allclose(costs[sharp], 0.1)
         np.testing.assert_allclose(costs[~sharp], 1.0)
 
-    def test_seams_hide(self):
+    def test_seams_prefer_hidden_places(self):
         mesh, cones = with_cones(shapes.genus(2), 5)
         share, lengths = visible_share(mesh.vertices, mesh.faces), lengths_of(mesh)
         costs = edge_costs(mesh, lengths, hiding=1)
@@ -157,7 +157,7 @@ class TestCosts:
         assert seen[1] < seen[0] - 0.05
         assert costs[hidden].sum() < costs[plain].sum()
 
-    def test_what_is_hidden_is_cheap(self):
+    def test_hidden_edges_are_cheap(self):
         vertices, faces, bottom = well(depth=3.0)
         mesh = TriangleMesh(vertices, faces)
         ratio = edge_costs(mesh, lengths_of(mesh), hiding=1) / lengths_of(mesh)
@@ -165,15 +165,15 @@ class TestCosts:
         assert ratio[at_bottom].max() < 0.2
         assert ratio.max() <= 1 + 1e-12
         assert ratio.min() > 0
-        given = edge_costs(mesh, lengths_of(mesh), hiding=1, visibility=np.ones(len(vertices)))
+        all_visible = edge_costs(mesh, lengths_of(mesh), hiding=1, visibility=np.ones(len(vertices)))
         valley = dihedral_angles(mesh) < -1e-3
-        assert (given[valley] < lengths_of(mesh)[valley]).all()
-        np.testing.assert_allclose(given[~valley], lengths_of(mesh)[~valley])
+        assert (all_visible[valley] < lengths_of(mesh)[valley]).all()
+        np.testing.assert_allclose(all_visible[~valley], lengths_of(mesh)[~valley])
         inside_out = TriangleMesh(vertices, faces[:, ::-1])
         turned = edge_costs(inside_out, lengths_of(inside_out), hiding=1) / lengths_of(inside_out)
         np.testing.assert_allclose(np.sort(turned), np.sort(ratio))
 
-    def test_seams_keep_to_what_the_user_makes_cheap(self):
+    def test_seams_follow_cheap_weights(self):
         # A detour that is three times as long, at a tenth of the cost.
         columns, rows = 20, 20
         mesh, _ = with_cones(shapes.grid(columns, rows), 0)
@@ -190,7 +190,7 @@ class TestCosts:
         on_lane = cheap[mesh.edges[inner]].all(axis=1)
         assert on_lane.sum() >= 28  # of 30; corners are cut
 
-    def test_weights_of_zero_are_taken_for_small_ones(self):
+    def test_weights_of_zero_become_small(self):
         mesh = TriangleMesh(*shapes.sphere(2))
         weights = np.zeros(len(mesh.vertices))
         weights[:10] = 2.0
@@ -212,20 +212,22 @@ class TestCosts:
             ({"vertex_weights": np.full(162, np.nan)}, "must be finite"),
         ],
     )
-    def test_nonsense_is_refused(self, constraints, message):
+    def test_invalid_constraints_are_refused(self, constraints, message):
         mesh = TriangleMesh(*shapes.sphere(2))
         with pytest.raises(errors.OptionError, match=message):
             edge_costs(mesh, lengths_of(mesh), **constraints)
 
-    def test_costs_do_not_depend_on_numbers_place_or_size(self):
+    def test_costs_do_not_depend_on_numbering_position_or_size(self):
         vertices, faces = SURFACES["genus 1"]
         mesh = TriangleMesh(vertices, faces)
         ratio = edge_costs(mesh, lengths_of(mesh), creases=1.0, hiding=1) / lengths_of(mesh)
         for seed, size in ((1, 1e-6), (3, 1e6)):
-            moved, turned, new = shapes.renumber(vertices, faces, seed)
-            other = TriangleMesh(size * (moved @ shapes.rotation(seed).T + [1, 2, 3]), turned)
-            found = edge_costs(other, lengths_of(other), creases=1.0, hiding=1) / lengths_of(other)
-            ends = np.sort(new[mesh.edges], axis=1)
+            moved, turned, number = shapes.renumber(vertices, faces, seed)
+            moved_mesh = TriangleMesh(size * (moved @ shapes.rotation(seed).T + [1, 2, 3]), turned)
+            moved_ratio = edge_costs(moved_mesh, lengths_of(moved_mesh), creases=1.0, hiding=1) / lengths_of(
+                moved_mesh
+            )
+            ends = np.sort(number[mesh.edges], axis=1)
             place = np.lexsort((ends[:, 1], ends[:, 0]))
-            same = np.lexsort((other.edges[:, 1], other.edges[:, 0]))
-            assert np.mean(np.isclose(found[same], ratio[place], rtol=1e-6)) > 0.98
+            moved_place = np.lexsort((moved_mesh.edges[:, 1], moved_mesh.edges[:, 0]))
+            assert np.mean(np.isclose(moved_ratio[moved_place], ratio[place], rtol=1e-6)) > 0.98

@@ -34,15 +34,15 @@ def remove_faces(shape, count, seed):
     vertices, faces = shape
     rng = np.random.default_rng(seed)
     gone = np.zeros(len(faces), dtype=bool)
-    near = np.zeros(len(vertices), dtype=bool)
+    is_adjacent = np.zeros(len(vertices), dtype=bool)
     for v in rng.permutation(len(vertices)):
         ring = (faces == v).any(axis=1)
-        if count and not near[faces[ring]].any():
+        if count and not is_adjacent[faces[ring]].any():
             gone |= ring
-            near[faces[near[faces].any(axis=1) | ring]] = True
+            is_adjacent[faces[is_adjacent[faces].any(axis=1) | ring]] = True
             count -= 1
-    used, index = np.unique(faces[~gone], return_inverse=True)
-    return vertices[used], index.reshape(-1, 3)
+    kept_vertices, index = np.unique(faces[~gone], return_inverse=True)
+    return vertices[kept_vertices], index.reshape(-1, 3)
 
 
 def with_cones(shape, count, seed=0):
@@ -117,7 +117,7 @@ def test_diagonals_are_avoided():
 
 class TestForbidden:
     @pytest.mark.parametrize("name", ["sphere", "annulus", "genus 1"])
-    def test_seams_are_found_just_if_there_are_any(self, name):
+    def test_seams_are_found_if_and_only_if_they_exist(self, name):
         # The surface minus all edges that may be cut and can be reached falls into disks just if some seams do.
         outcomes = set()
         for seed in range(12):
@@ -143,7 +143,7 @@ class TestForbidden:
                     find_seams(mesh, cones, lengths_of(mesh), forbidden=np.flatnonzero(forbidden))
         assert outcomes == {False, True}
 
-    def test_the_count_of_edges_that_are_needed(self):
+    def test_errors_count_the_forbidden_edges_needed(self):
         mesh, cones = with_cones(shapes.sphere(2), 3)
         around = np.flatnonzero((mesh.edges == cones[0]).any(axis=1))
         message = f"1 edge of {len(mesh.edges)} is needed to open the mesh, but forbidden as seams"
@@ -186,26 +186,26 @@ def test_paths_are_those_of_scipy_and_the_nearest_target_is_reached(seed):
     assert (short >= distance).all()
 
 
-@pytest.mark.parametrize("least", [0.0, 5.0, 100.0])
-def test_sets_grow_by_what_is_nearest(least):
+@pytest.mark.parametrize("min_size", [0.0, 5.0, 100.0])
+def test_sets_grow_by_the_nearest_nodes(min_size):
     graph = random_graph(5)
     paths = graph.shortest_paths(np.array([3, 30]))
     for seed in (3, 30):
         chosen = np.arange(graph.nodes) == seed
-        own = np.flatnonzero(paths.source == seed)
-        nearest = own[np.argsort(paths.distance[own])][: max(1, int(least))]
-        assert set(np.flatnonzero(grown(paths, chosen, np.ones(graph.nodes), least))) == set(nearest)
+        region = np.flatnonzero(paths.source == seed)
+        nearest = region[np.argsort(paths.distance[region])][: max(1, int(min_size))]
+        assert set(np.flatnonzero(grown(paths, chosen, np.ones(graph.nodes), min_size))) == set(nearest)
 
 
-def test_the_seams_of_several_components_are_those_of_each():
+def test_seams_of_components_are_independent():
     # Of the closed one, two adjacent cones: one edge alone would not open it.
-    one, other = TriangleMesh(*shapes.sphere(1)), TriangleMesh(*shapes.hill(7, 5))
-    both = TriangleMesh(*shapes.join((one.vertices, one.faces), (other.vertices, other.faces)))
-    cones = one.edges[0]
-    found = both.edges[find_seams(both, cones, lengths_along_edges(both))]
-    alone = one.edges[find_seams(one, cones, lengths_along_edges(one))]
-    np.testing.assert_array_equal(np.sort(found), np.sort(alone))
-    assert len(found) == 2
+    closed, bounded = TriangleMesh(*shapes.sphere(1)), TriangleMesh(*shapes.hill(7, 5))
+    joined = TriangleMesh(*shapes.join((closed.vertices, closed.faces), (bounded.vertices, bounded.faces)))
+    cones = closed.edges[0]
+    joint_seams = joined.edges[find_seams(joined, cones, lengths_along_edges(joined))]
+    alone = closed.edges[find_seams(closed, cones, lengths_along_edges(closed))]
+    np.testing.assert_array_equal(np.sort(joint_seams), np.sort(alone))
+    assert len(joint_seams) == 2
 
 
 def lengths_along_edges(mesh):

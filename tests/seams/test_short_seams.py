@@ -34,15 +34,15 @@ def least_tree(mesh, cones, costs):
     ends = [*cones.tolist(), *(int(np.argmax(loop == i)) for i in range(count))]
     best = {}
     for size in range(1, len(ends)):
-        for some in itertools.combinations(range(len(ends) - 1), size):
+        for terminals in itertools.combinations(range(len(ends) - 1), size):
             if size == 1:
-                best[some] = away[ends[some[0]]]
+                best[terminals] = away[ends[terminals[0]]]
                 continue
             met = np.full(len(away), np.inf)
             for k in range(1, size):
-                for part in itertools.combinations(some, k):
-                    met = np.minimum(met, best[part] + best[tuple(i for i in some if i not in part)])
-            best[some] = (met + away).min(axis=1)
+                for part in itertools.combinations(terminals, k):
+                    met = np.minimum(met, best[part] + best[tuple(i for i in terminals if i not in part)])
+            best[terminals] = (met + away).min(axis=1)
     return best[tuple(range(len(ends) - 1))][ends[-1]]
 
 
@@ -93,18 +93,18 @@ def named_pairs(mesh, seams, names):
 
 
 @pytest.mark.parametrize("name", SURFACES)
-def test_neither_numbers_nor_place_nor_size_matter(name):
+def test_numbering_position_and_size_do_not_matter(name):
     mesh, chosen = with_cones(SURFACES[name], 7)
     seams = find_seams(mesh, chosen, lengths_of(mesh))
     expected = named_pairs(mesh, seams, np.arange(len(mesh.vertices)))
     for seed, size in ((1, 1e-6), (3, 1e6)):
-        vertices, faces, new = shapes.renumber(mesh.vertices, mesh.faces, seed)
-        other = TriangleMesh(size * (vertices @ shapes.rotation(seed).T + [1, 2, 3]), faces)
-        found = find_seams(other, new[chosen], lengths_of(other))
-        assert named_pairs(other, found, np.argsort(new)) == expected
+        vertices, faces, number = shapes.renumber(mesh.vertices, mesh.faces, seed)
+        moved = TriangleMesh(size * (vertices @ shapes.rotation(seed).T + [1, 2, 3]), faces)
+        moved_seams = find_seams(moved, number[chosen], lengths_of(moved))
+        assert named_pairs(moved, moved_seams, np.argsort(number)) == expected
 
 
 def test_the_same_input_gives_the_same_seams():
     mesh, cones = with_cones(SURFACES["genus 2"], 5)
-    one, two = (find_seams(mesh, cones, lengths_of(mesh)) for _ in range(2))
-    np.testing.assert_array_equal(one, two)
+    first, second = (find_seams(mesh, cones, lengths_of(mesh)) for _ in range(2))
+    np.testing.assert_array_equal(first, second)

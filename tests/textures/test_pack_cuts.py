@@ -10,15 +10,13 @@ import shapes
 
 from coneflat import TriangleMesh
 from coneflat.atlas import pack_charts
-from coneflat.base import Stopwatch
-from coneflat.flattening import Method, lay_out_part
+from coneflat.flattening import Steps
 from coneflat.geometry import signed_double_areas
 from coneflat.io import as_input
 from coneflat.mesh import label_faces
-from coneflat.metric import find_metric
 from coneflat.options import Options
+from coneflat.retries import lay_out_with_thick_triangles
 from coneflat.source import Source
-from coneflat.stages import RelaxSpec, Surface
 from coneflat.textures.pack_cuts import MIN_PIECE, SHARE, cut_for_packing
 
 GAP = 2 / 1024
@@ -53,9 +51,8 @@ def starfish(x, y):
 
 def layout_of(vertices, faces):
     """The layout of a mesh in one chart, and the costs of its edges."""
-    part = Source(as_input(vertices, faces)).prepared(Options()).parts[0]
-    method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
-    layout = lay_out_part(part, method)
+    component = Source(as_input(vertices, faces)).prepared(Options()).components[0]
+    layout = lay_out_with_thick_triangles(component, Steps())
     mesh = layout.mesh
     return layout, np.linalg.norm(np.diff(mesh.vertices[mesh.edges], axis=1)[:, 0], axis=1)
 

@@ -14,16 +14,14 @@ from stored import at_hand, noisy
 import coneflat
 from coneflat import errors, measure_uv, unwrap
 from coneflat.atlas import ChartLayout, with_charts
-from coneflat.base import Stopwatch
-from coneflat.flattening import Method, lay_out_part
+from coneflat.flattening import Steps
 from coneflat.geometry import corner_angles, signed_double_areas
 from coneflat.io import as_input
-from coneflat.metric import find_metric
 from coneflat.options import Options
+from coneflat.retries import lay_out_with_thick_triangles
 from coneflat.source import Source
-from coneflat.stages import RelaxSpec, Surface
 from coneflat.textures.free_seams import freed
-from coneflat.textures.search import CutSearch, coarse_part
+from coneflat.textures.search import CutSearch, coarse_component
 from coneflat.textures.unwrapping import along_sharp_edges
 
 CLOSED = {"sphere": shapes.sphere(3), "two handles": shapes.genus(2), "box": shapes.box()}
@@ -125,21 +123,19 @@ def test_freed_seams_lower_the_energy():
     tied = coneflat.flatten(*shapes.sphere(3), cone_count=6, stretch=1.0, charts="one")
     source = Source(as_input(tied.vertices, tied.faces))
     cones = dict(zip(tied.cones.tolist(), tied.curvatures.tolist(), strict=True))
-    part = source.prepared(Options(cones=cones)).parts[0]
-    method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
-    free, energy = freed(lay_out_part(part, method))
+    component = source.prepared(Options(cones=cones)).components[0]
+    free, energy = freed(lay_out_with_thick_triangles(component, Steps()))
     assert len(free.seams) == len(tied.seams)
     assert 4 < energy < tied.distortion.energy - 1e-3
 
 
 @pytest.mark.slow
 def test_a_flipped_start_is_replaced():
-    part = Source(as_input(*shapes.hill())).prepared(Options()).parts[0]
-    method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
-    layout = lay_out_part(part, method)
+    component = Source(as_input(*shapes.hill())).prepared(Options()).components[0]
+    layout = lay_out_with_thick_triangles(component, Steps())
     points = layout.points.copy()
-    inner = int(np.flatnonzero(~part.mesh.is_boundary_vertex)[0])
-    points[layout.corners[part.mesh.faces == inner][0]] += 100.0
+    inner = int(np.flatnonzero(~component.mesh.is_boundary_vertex)[0])
+    points[layout.corners[component.mesh.faces == inner][0]] += 100.0
     wanted, found = freed(layout)[1], freed(replace(layout, points=points))[1]
     assert found == pytest.approx(wanted, rel=1e-3)
 
@@ -147,11 +143,10 @@ def test_a_flipped_start_is_replaced():
 @pytest.mark.slow
 def test_few_flipped_triangles_are_untangled_in_place(monkeypatch):
     """Embedding the whole chart anew takes many more steps."""
-    part = Source(as_input(*shapes.hill(20, 20))).prepared(Options()).parts[0]
-    method = Method(RelaxSpec("off", 0.0), False, None, Stopwatch(), Surface.of, find_metric)
-    layout = lay_out_part(part, method)
+    component = Source(as_input(*shapes.hill(20, 20))).prepared(Options()).components[0]
+    layout = lay_out_with_thick_triangles(component, Steps())
     wanted, points = freed(layout)[1], layout.points.copy()
-    at = layout.corners[part.mesh.faces == np.flatnonzero(~part.mesh.is_boundary_vertex)[150]]
+    at = layout.corners[component.mesh.faces == np.flatnonzero(~component.mesh.is_boundary_vertex)[150]]
     points[at[0]] += 2 * np.ptp(points[layout.corners[(layout.corners == at[0]).any(axis=1)]], axis=(0, 1))
     assert (signed_double_areas(points[layout.corners]) <= 0).any()
     for module in ("textures.free_seams", "optimise.seam_untangling"):
@@ -336,26 +331,26 @@ def test_seams_follow_sharp_edges_where_these_bend_the_surface():
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     assert lengths[on_edge[result.seams].all(axis=1)].sum() > 0.8 * lengths.sum()
     creases = [
-        along_sharp_edges(Source(as_input(*shape)).prepared(Options()).parts)[0].seams.creases
+        along_sharp_edges(Source(as_input(*shape)).prepared(Options()).components)[0].seams.creases
         for shape in (shapes.box(), shapes.sphere(3, 0.0))
     ]
     assert creases == [pytest.approx(0.3), 0.0]
 
 
-def test_a_coarse_part_keeps_what_belongs_to_its_vertices():
+def test_a_coarse_component_keeps_what_belongs_to_its_vertices():
     vertices, faces = shapes.hill(20, 20)
     weights = np.arange(1.0, len(vertices) + 1)
     options = Options(forbidden_cones=[3, 50], boundary="lengths", seam_weights=weights)
-    part = Source(as_input(vertices, faces)).prepared(options).parts[0]
-    coarse, kept = coarse_part(part, 300)
-    assert np.array_equal(coarse.vertices, part.vertices[kept])
-    assert np.array_equal(coarse.mesh.vertices, part.mesh.vertices[kept])
+    component = Source(as_input(vertices, faces)).prepared(options).components[0]
+    coarse, kept = coarse_component(component, 300)
+    assert np.array_equal(coarse.vertices, component.vertices[kept])
+    assert np.array_equal(coarse.mesh.vertices, component.mesh.vertices[kept])
     for one, every in (
-        (coarse.cones.is_allowed, part.cones.is_allowed),
-        (coarse.cones.absorbs_curvature, part.cones.absorbs_curvature),
-        (coarse.cones.names, part.cones.names),
-        (coarse.metric.keeps_length, part.metric.keeps_length),
-        (coarse.seams.weights, part.seams.weights),
+        (coarse.cones.is_allowed, component.cones.is_allowed),
+        (coarse.cones.absorbs_curvature, component.cones.absorbs_curvature),
+        (coarse.cones.names, component.cones.names),
+        (coarse.metric.keeps_length, component.metric.keeps_length),
+        (coarse.seams.weights, component.seams.weights),
     ):
         assert np.array_equal(one, every[kept])
         assert len(np.unique(one)) > 1

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..base.arrays import FloatArray, IntArray, rows_of
 from ..base.notes import Unmet
+from ..base.progress import stage
 from ..base.text import plural
 from ..geometry.overlap import overlaps_of_mesh
 from ..geometry.planar import signed_double_areas
@@ -76,6 +77,7 @@ def injective_charts(
     return min(found, key=lambda one: one[:-1])[-1]
 
 
+@stage("atlas")
 def separate_overlaps(
     layout: Layout, costs: FloatArray, spec: SeamSpec, tries: int = len(MIN_CHART_AREAS)
 ) -> Layout:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from .defaults import DISTORTION, MAX_CONE_ANGLE, MAX_CONES, MIN_CONE_ANGLE, TYPED_TOLERANCE
 from .notes import Unmet, inner_calls, warn_of, warns
-from .progress import Progress, Stopwatch, cancel_with, check_cancelled
+from .progress import Progress, Stopwatch, cancel_with, check_cancelled, report_detail, stage, timing
 from .text import MAX_LISTED, exit_text, list_some, plural, printable, short_repr
 from .threads import THREADS, limit_threads
 
@@ -34,8 +34,8 @@ __all__ = [
     "BoolArray", "ComplexArray", "DISTORTION", "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE", "MAX_LISTED",
     "MIN_CONE_ANGLE", "Progress", "Stopwatch", "THREADS", "TYPED_TOLERANCE", "Unmet", "as_floats", "as_indices",
     "cache_folder", "cancel_with", "check_cancelled", "compilation", "compiled", "dots", "exit_text", "has_any",
-    "inner_calls", "limit_threads", "list_some", "mask_of", "plural", "printable", "short_repr", "unit_exponent",
-    "warn_of", "warns",
+    "inner_calls", "limit_threads", "list_some", "mask_of", "plural", "printable", "report_detail", "short_repr",
+    "stage", "timing", "unit_exponent", "warn_of", "warns",
 ]  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Timing and progress of the stages of a computation."""
+"""Timing, progress and cancellation: a stage reports to the stopwatch of its context, which is set once at the top."""
 
 from __future__ import annotations
 
@@ -12,8 +12,12 @@ from ..errors import OptionError
 #: Called with a text on the current step and the fraction of the total work that is done.
 Progress = Callable[[str, float], None]
 
+# Approximate fraction of the work on a component that is done when a stage ends. Layouts of all components are computed
+# first ("layout" ends this work), then finished ("atlas" ends that).
+DONE_AFTER = {"cones": 0.5, "metric": 0.8, "cut": 0.9, "layout": 1.0, "relax": 0.2, "atlas": 1.0}
+
 _ask: ContextVar[Callable[[], None] | None] = ContextVar("coneflat_ask", default=None)
-_stage: ContextVar[Stopwatch | None] = ContextVar("coneflat_stage", default=None)
+_stopwatch: ContextVar[Stopwatch | None] = ContextVar("coneflat_stopwatch", default=None)
 
 
 @contextmanager
@@ -36,11 +40,59 @@ def check_cancelled() -> None:
         ask()
 
 
+@contextmanager
+def timing(progress: Progress | None = None) -> Iterator[Stopwatch]:
+    """Set a new stopwatch for the stages in the block, and yield it.
+
+    progress: receives the progress of the stages.
+
+    Raises:
+        OptionError: `progress` is not callable.
+    """
+    stopwatch = Stopwatch(progress)
+    token = _stopwatch.set(stopwatch)
+    try:
+        yield stopwatch
+    finally:
+        _stopwatch.reset(token)
+
+
+@contextmanager
+def stage(name: str) -> Iterator[None]:
+    """Time the block, or the function that this decorates, as a stage on the stopwatch of the context, if there is one.
+
+    A stage inside another counts as a part of that.
+    """
+    stopwatch = _stopwatch.get()
+    if stopwatch is None or stopwatch.is_running:
+        yield
+        return
+    with stopwatch(name, DONE_AFTER.get(name, 0.0)):
+        yield
+
+
 def report_detail(detail: str) -> None:
     """Report a detail of the stage that is running, if its progress is reported at all."""
-    watch = _stage.get()
-    if watch is not None:
-        watch.report(detail)
+    stopwatch = _stopwatch.get()
+    if stopwatch is not None and stopwatch.is_running:
+        stopwatch.report(detail)
+
+
+@contextmanager
+def component_at_work(place: str, share: float) -> Iterator[None]:
+    """Report the progress of the stages in the block as that of a component.
+
+    Args:
+        place: which component it is, or "" if there is only one.
+        share: fraction of the total work of the component.
+    """
+    stopwatch = _stopwatch.get()
+    if stopwatch is None:
+        yield
+        return
+    stopwatch.component, stopwatch.share = place, share
+    yield
+    stopwatch.end_component()
 
 
 class Stopwatch:
@@ -51,6 +103,7 @@ class Stopwatch:
         done: fraction of the total work that was done before the current component.
         share: fraction of the total work of the current component.
         component: which component it is, for the progress; empty if there is only one.
+        is_running: a stage is running.
 
     Raises:
         OptionError: `progress` is not callable.
@@ -64,6 +117,7 @@ class Stopwatch:
         self.seconds: dict[str, float] = {}
         self.done = self.share = self._within = 0.0
         self.component = self._name = ""
+        self.is_running = False
         self._progress = progress
 
     @contextmanager
@@ -75,18 +129,20 @@ class Stopwatch:
         self._name = name
         self.report()
         start = time.perf_counter()
-        token = _stage.set(self)
+        token = _stopwatch.set(self)
+        self.is_running = True
         try:
             yield
         finally:
-            _stage.reset(token)
+            self.is_running = False
+            _stopwatch.reset(token)
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
         self._within = until
 
     def end_component(self) -> None:
         """Count the current component as done."""
         self.done += self.share
-        self._within, self.component = 0.0, ""
+        self._within, self.component, self.share = 0.0, "", 0.0
 
     def report(self, detail: str = "") -> None:
         """Report the current stage and the fraction done to the callback, with an optional detail."""
@@ -95,3 +151,9 @@ class Stopwatch:
             self._progress(
                 f"{place}: {detail}" if detail else place, min(self.done + self.share * self._within, 1.0)
             )
+
+
+def stage_seconds() -> dict[str, float]:
+    """Return the wall time of each stage so far on the stopwatch of the context."""
+    stopwatch = _stopwatch.get()
+    return {} if stopwatch is None else dict(stopwatch.seconds)

@@ -11,8 +11,8 @@ from .find import (
     unmet_requests,
     uses_sparse_search,
 )
-from .given import cones_at, cones_with_curvature
 from .greedy import greedy_cones
+from .prescribed import cones_at, cones_with_curvature
 from .solution import GroundedLaplacian
 from .sparse import SparseCones
 from .sparse.limits import MAX_SEARCHED

@@ -39,4 +39,4 @@ def with_corners(
         return None
     if angles.min() < spec.min_angle or angles.max() > (spec.max_angle or np.inf):
         return None
-    return replace(spec, strategy="given", given=VertexCurvatures(corners, curvature[corners]))
+    return replace(spec, strategy="prescribed", prescribed=VertexCurvatures(corners, curvature[corners]))

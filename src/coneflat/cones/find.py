@@ -10,15 +10,15 @@ import numpy as np
 
 from ..base.arrays import FloatArray, IntArray
 from ..base.notes import Unmet
-from ..base.progress import Stopwatch
+from ..base.progress import report_detail, stage
 from ..base.text import plural
 from ..base.threads import MEMORY_BOUND_TRIANGLES
 from ..geometry.operators import weighted_areas
 from ..mesh.connectivity import TriangleMesh
 from ..mesh.ties import mesh_tie_key
 from ..stages import ConeSolution, ConeSpec, Surface
-from .given import cones_at, fitted_cones
 from .greedy import greedy_cones
+from .prescribed import cones_at, fitted_cones
 from .solution import check_enough, check_feasible
 from .sparse import ConeSearch, SparseCones
 from .sparse.limits import MAX_SEARCHED
@@ -27,12 +27,12 @@ from .sparse.linear_model import LinearModel
 if TYPE_CHECKING:
     from .integer.search import QuantisedCones
 
-# Cone angle per triangle around a cone, radians, up to which the triangles can hold the angle with straight sides. It
+# Cone angle per triangle around a cone, radians, up to which the triangles can realise it with straight sides. It
 # is less than pi, since the angle cannot be distributed evenly over the triangles.
 CONE_ANGLE_PER_TRIANGLE = 0.6 * np.pi
 # On meshes with this number of vertices, a neighbouring vertex is as good for a cone. The corners at a cone, all
 # widened by the same factor, must then not exceed this angle. Otherwise a triangle with straight sides may be unable to
-# hold its corner, and the search has to be repeated, which takes 14% of the time on a horse of 97,000 triangles.
+# realise its corner, and the search has to be repeated, which takes 14% of the time on a horse of 97,000 triangles.
 FINE_VERTICES, MAX_CORNER = 30_000, 0.95 * np.pi
 # Relative excess of the distortion over the requested one up to which there is no note.
 RELATIVE_TOLERANCE = 1e-3
@@ -43,15 +43,13 @@ HOLONOMY_FACTOR = 1.15
 Holonomy: TypeAlias = Callable[[ConeSolution], FloatArray]
 
 
-def find_cones(
-    surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holonomy | None = None
-) -> ConeSolution:
-    """Return cones with their curvatures and linear log scale.
+@stage("cones")
+def find_cones(surface: Surface, spec: ConeSpec, holonomy: Holonomy | None = None) -> ConeSolution:
+    """Return cones with their curvatures and linear log conformal factor.
 
     Args:
         surface: the mesh.
         spec: the options of the cones.
-        watch: receives the progress.
         holonomy: measures rotations along handles; used if curvatures are quantised on a mesh with handles.
 
     Raises:
@@ -60,17 +58,17 @@ def find_cones(
     mesh = surface.mesh
     too_many_handles = has_many_handles(mesh, spec)
     if uses_sparse_search(mesh, spec):
-        return _search(surface, spec, watch, holonomy)
-    given = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
+        return _search(surface, spec, holonomy)
+    operators = surface.laplacian, surface.curvature, mesh.is_boundary_vertex, mesh.euler_characteristic
     is_greedy = spec.strategy == "greedy" or too_many_handles
     if is_greedy:
         solution = greedy_cones(
-            *given, max_cones=spec.max_count, tie_key=mesh_tie_key(mesh), progress=watch.report
+            *operators, max_cones=spec.max_count, tie_key=mesh_tie_key(mesh), progress=report_detail
         )
-    elif len(spec.given) or spec.searches_corners:
+    elif len(spec.prescribed) or spec.searches_corners:
         solution = _fit_given(surface, spec)
     else:  # "none", or no given cone is on this component
-        solution = cones_at(*given, spec.given.vertices)
+        solution = cones_at(*operators, spec.prescribed.vertices)
     if spec.scale_at_cones:
         check_enough(len(solution.cones), mesh)
     else:
@@ -99,7 +97,11 @@ def leaves_flat_disks(spec: ConeSpec) -> bool:
     """Return whether a flat disk gets no cones by any search: none are requested, and its boundary is free."""
     requests = spec.count, spec.quantum
     is_free = not (spec.prescribes_boundary or spec.searches_corners or spec.strategy == "greedy")
-    return is_free and not (len(spec.given) or len(spec.required)) and all(one is None for one in requests)
+    return (
+        is_free
+        and not (len(spec.prescribed) or len(spec.required))
+        and all(request is None for request in requests)
+    )
 
 
 def has_many_handles(mesh: TriangleMesh, spec: ConeSpec) -> bool:
@@ -136,13 +138,12 @@ def needs_no_cone(surface: Surface, spec: ConeSpec) -> bool:
     return linear_model(surface, spec).distortion <= spec.distortion
 
 
-def open_search(surface: Surface, spec: ConeSpec, watch: Stopwatch) -> ConeSearch:
+def open_search(surface: Surface, spec: ConeSpec) -> ConeSearch:
     """Return a search for cones; a cached search of the surface is reused, restricted to the allowed vertices.
 
     Args:
         surface: connected mesh with its operators.
         spec: what is required of the cones.
-        watch: measures time and reports progress.
     """
     mesh = surface.mesh
     search: ConeSearch | None = surface.memo.get("search")
@@ -166,7 +167,7 @@ def open_search(surface: Surface, spec: ConeSpec, watch: Stopwatch) -> ConeSearc
         allowed=spec.is_allowed,
         max_angles=max_angles.astype(np.float64),
     )
-    search.progress = watch.report
+    search.progress = report_detail
     if len(mesh.faces) <= MEMORY_BOUND_TRIANGLES:  # else it would use too much memory
         surface.memo["search"] = search
     return search
@@ -196,45 +197,45 @@ def linear_model(surface: Surface, spec: ConeSpec) -> LinearModel:
 
 def _fit_given(surface: Surface, spec: ConeSpec) -> ConeSolution:
     """Return the given cones; curvatures that are not given are fitted. On a straight boundary they are its corners."""
-    found = fitted_cones(
+    solution = fitted_cones(
         linear_model(surface, spec),
         surface.mesh.euler_characteristic,
-        spec.given.vertices,
-        spec.given.curvatures,
+        spec.prescribed.vertices,
+        spec.prescribed.curvatures,
         min_cone_angle=spec.min_angle,
         max_cone_angle=spec.max_angle,
     )
-    return replace(found, cones=found.cones[~surface.mesh.is_boundary_vertex[found.cones]])
+    return replace(solution, cones=solution.cones[~surface.mesh.is_boundary_vertex[solution.cones]])
 
 
-def _search(surface: Surface, spec: ConeSpec, watch: Stopwatch, holonomy: Holonomy | None) -> ConeSolution:
+def _search(surface: Surface, spec: ConeSpec, holonomy: Holonomy | None) -> ConeSolution:
     """Return the fewest cones for the allowed distortion, or the best cones of the requested number."""
     mesh = surface.mesh
-    only = coneless_solution(surface, spec)
-    if only is not None:
-        return replace(only, notes=unmet_requests(mesh, only.cones, 0.0, spec))
+    coneless = coneless_solution(surface, spec)
+    if coneless is not None:
+        return replace(coneless, notes=unmet_requests(mesh, coneless.cones, 0.0, spec))
     if needs_no_cone(surface, spec):
         none = np.empty(0, dtype=np.int64)
         return replace(linear_model(surface, spec).solution_of(none, np.empty(0)), is_searched=True)
-    search = open_search(surface, spec, watch)
-    distortion, count, most = spec.distortion, spec.count, spec.max_count
-    found: SparseCones | QuantisedCones
+    search = open_search(surface, spec)
+    distortion, count, max_count = spec.distortion, spec.count, spec.max_count
+    search_result: SparseCones | QuantisedCones
     if spec.quantum is None:
-        found = search.fewest(distortion, most) if count is None else search.best_of(count)
+        search_result = search.fewest(distortion, max_count) if count is None else search.best_of(count)
     else:
         from ..geometry.handles import loop_holonomy
         from .integer.search import align_handles, quantise_cones
 
-        found = quantised = quantise_cones(
-            search, spec.quantum, distortion=distortion, count=count, most=most
+        search_result = quantised = quantise_cones(
+            search, spec.quantum, distortion=distortion, count=count, max_count=max_count
         )
         if holonomy is not None:
             bound = max(quantised.distortion * HOLONOMY_FACTOR, distortion if count is None else 0.0)
             by_scale = loop_holonomy(mesh).by_log_scale(surface.lengths)
-            found = align_handles(search, quantised, by_scale, holonomy, bound)
-    solution = found.solution
+            search_result = align_handles(search, quantised, by_scale, holonomy, bound)
+    solution = search_result.solution
     cones = solution.cones[~mesh.is_boundary_vertex[solution.cones]]
-    notes = unmet_requests(mesh, cones, found.distortion, spec)
+    notes = unmet_requests(mesh, cones, search_result.distortion, spec)
     return replace(solution, cones=cones, is_searched=True, notes=notes)
 
 
@@ -260,11 +261,11 @@ def unmet_requests(
         return (Unmet(note),)
     if distortion <= spec.distortion * (1 + RELATIVE_TOLERANCE):
         return ()
-    why = "no better cones were found within the given bounds"
+    reason = "no better cones were found within the given bounds"
     if spec.quantum is not None and genus and distortion <= spec.distortion * HOLONOMY_FACTOR:
-        why = "cones were moved to align the rotations along handles"
+        reason = "cones were moved to align the rotations along handles"
     note = (
         f"The area distortion is {distortion:.3g} with {plural(cone_count, 'cone')}, above the "
-        f"{spec.distortion:g} allowed: {why}."
+        f"{spec.distortion:g} allowed: {reason}."
     )
     return (Unmet(note),)

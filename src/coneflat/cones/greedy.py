@@ -13,10 +13,10 @@ from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..errors import OptionError
 from ..mesh.ties import argmax_tied
 from ..stages import ConeSolution
-from .given import cones_at
+from .prescribed import cones_at
 from .solution import GroundedLaplacian, target_from_log_scale
 
-# Range of the log scale at which the search of the paper ends.
+# Range of the log conformal factor at which the search of the paper ends.
 EPSILON = 1.0
 
 
@@ -134,13 +134,13 @@ class _Search:
         for vertex in vertices:
             self._append(vertex, self._green(vertex))
 
-    def _ground_pair(self, one: int, two: int) -> None:
+    def _ground_pair(self, first: int, second: int) -> None:
         """Add the first two cones of a torus: phi must have the same value at both."""
         self.floating = False
-        self.reference = (one, self.grounded.green(one))
-        self.phi -= self.phi[one]
-        self._mark(one)
-        self._append(two, self._green(two))
+        self.reference = (first, self.grounded.green(first))
+        self.phi -= self.phi[first]
+        self._mark(first)
+        self._append(second, self._green(second))
 
     def _green(self, vertex: int) -> FloatArray:
         """Return (n,) the Green's function of a vertex that vanishes at grounded vertices and at all cones."""

@@ -1,4 +1,4 @@
-"""Linear systems for the log scale of cones, and checks of the curvatures of cones."""
+"""Linear systems for the log conformal factor of cones, and checks of the curvatures of cones."""
 
 from __future__ import annotations
 
@@ -73,10 +73,10 @@ def check_feasible(cones: IntArray, curvatures: FloatArray, names: IntArray, adv
 
 
 def check_enough(count: int, mesh: TriangleMesh) -> None:
-    """Raise CurvatureError if `count` cones of less than 2 pi each cannot carry the curvature of a closed mesh."""
+    """Raise CurvatureError if `count` cones of less than 2 pi each cannot absorb the curvature of a closed mesh."""
     total = 2 * mesh.euler_characteristic
     if not mesh.is_boundary_vertex.any() and total >= 2 * max(count, 1):
         raise CurvatureError(
-            f"{plural(count, 'cone')} cannot carry this closed surface's total curvature of {total} pi, as each has "
+            f"{plural(count, 'cone')} cannot absorb this closed surface's total curvature of {total} pi, as each has "
             f"less than 2 pi: {total // 2 + 1} or more are needed"
         )

@@ -33,8 +33,9 @@ def coarse_mesh(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntArray,
     collapse_edges(
         Collapses(points, quadrics, key, mesh.is_boundary_vertex, faces.reshape(-1), *links), seen, count
     )
-    kept, corners = np.unique(faces[faces[:, 0] >= 0], return_inverse=True)
-    return TriangleMesh(mesh.vertices[kept], corners.reshape(-1, 3)), kept, np.flatnonzero(faces[:, 0] >= 0)
+    remains = faces[:, 0] >= 0
+    vertices, corners = np.unique(faces[remains], return_inverse=True)
+    return TriangleMesh(mesh.vertices[vertices], corners.reshape(-1, 3)), vertices, np.flatnonzero(remains)
 
 
 def _quadrics(mesh: TriangleMesh, points: FloatArray) -> FloatArray:
@@ -43,23 +44,23 @@ def _quadrics(mesh: TriangleMesh, points: FloatArray) -> FloatArray:
     They are symmetric matrices of four by four, the lower triangles by rows. Planes through boundary edges,
     perpendicular to the triangles, keep the shape of the boundary.
     """
-    one, two, three = points[mesh.faces].transpose(1, 0, 2)
-    normals = np.cross(two - one, three - one)
+    corner_a, corner_b, corner_c = points[mesh.faces].transpose(1, 0, 2)
+    normals = np.cross(corner_b - corner_a, corner_c - corner_a)
     sides = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
-    (tails, heads), near = mesh.ends_of(sides), normals[sides // 3]
+    (tails, heads), side_normals = mesh.ends_of(sides), normals[sides // 3]
     along = points[heads] - points[tails]
-    size = np.sqrt(dots(along, along) / np.maximum(dots(near, near), 1e-300))
-    across = np.cross(along, near) * size[:, None]
-    found, (row, column) = np.zeros((len(points), 10)), np.tril_indices(4)
-    planes = (normals, one, mesh.faces.T), (across, points[tails], np.stack([tails, heads]))
+    size = np.sqrt(dots(along, along) / np.maximum(dots(side_normals, side_normals), 1e-300))
+    across = np.cross(along, side_normals) * size[:, None]
+    quadrics, (row, column) = np.zeros((len(points), 10)), np.tril_indices(4)
+    planes = (normals, corner_a, mesh.faces.T), (across, points[tails], np.stack([tails, heads]))
     for normal, place, vertices in planes:
         # Multiplied by the root of the area.
         plane = np.column_stack([normal, -dots(normal, place)])
         plane /= np.maximum(dots(normal, normal), 1e-300)[:, None] ** 0.25
         for i in range(10):
             for vertex in vertices:
-                found[:, i] += np.bincount(vertex, plane[:, row[i]] * plane[:, column[i]], len(points))
-    return found
+                quadrics[:, i] += np.bincount(vertex, plane[:, row[i]] * plane[:, column[i]], len(points))
+    return quadrics
 
 
 class Collapses(NamedTuple):
@@ -104,27 +105,27 @@ def edge_cost(points: FloatArray, quadrics: FloatArray, tail: int, head: int) ->
 @compiled
 def cheapest_edge(mesh: Collapses, tail: int, passed: float, last_head: int) -> tuple[float, float, int, int]:
     """Return the cheapest edge from a vertex that comes after one with a given cost and head: cost, key, ends."""
-    least, to, corner = np.inf, tail, mesh.first[tail]
+    lowest_cost, to, corner = np.inf, tail, mesh.first[tail]
     while corner >= 0:
         # Around an inner vertex, the next corners are all its neighbours.
         for step in range(1, 3 if mesh.is_boundary[tail] else 2):
             head = mesh.corners[corner - corner % 3 + (corner + step) % 3]
             cost = edge_cost(mesh.points, mesh.quadrics, tail, head) if head >= 0 else np.inf
-            if (passed, mesh.key[last_head]) < (cost, mesh.key[head]) < (least, mesh.key[to]):
-                least, to = cost, head
+            if (passed, mesh.key[last_head]) < (cost, mesh.key[head]) < (lowest_cost, mesh.key[to]):
+                lowest_cost, to = cost, head
         corner = mesh.after[corner]
-    mesh.cost[tail] = least
-    return least, mesh.key[tail], tail, to
+    mesh.cost[tail] = lowest_cost
+    return lowest_cost, mesh.key[tail], tail, to
 
 
 @compiled
 def normal_and_shape(
-    points: FloatArray, one: int, two: int, three: int
+    points: FloatArray, a_vertex: int, b_vertex: int, c_vertex: int
 ) -> tuple[float, float, float, float, float]:
     """Return the normal of a triangle, its length, and that relative to half the sum of the squared sides."""
-    x, y, z = points[one, 0], points[one, 1], points[one, 2]
-    a, b, c = points[two, 0] - x, points[two, 1] - y, points[two, 2] - z
-    d, e, f = points[three, 0] - x, points[three, 1] - y, points[three, 2] - z
+    x, y, z = points[a_vertex, 0], points[a_vertex, 1], points[a_vertex, 2]
+    a, b, c = points[b_vertex, 0] - x, points[b_vertex, 1] - y, points[b_vertex, 2] - z
+    d, e, f = points[c_vertex, 0] - x, points[c_vertex, 1] - y, points[c_vertex, 2] - z
     g, h, i = b * f - c * e, c * d - a * f, a * e - b * d
     size = math.sqrt(g * g + h * h + i * i)
     sides = a * a + b * b + c * c + d * d + e * e + f * f - (a * d + b * e + c * f)
@@ -140,14 +141,14 @@ def can_collapse(mesh: Collapses, seen: IntArray, stamp: int, tail: int, head: i
     corner, shared, common = mesh.first[tail], 0, 0
     while corner >= 0:
         face = corner - corner % 3
-        one, two = mesh.corners[face + (corner + 1) % 3], mesh.corners[face + (corner + 2) % 3]
-        if one >= 0:
-            seen[one] = seen[two] = stamp
-        if head in (one, two):
+        following, preceding = mesh.corners[face + (corner + 1) % 3], mesh.corners[face + (corner + 2) % 3]
+        if following >= 0:
+            seen[following] = seen[preceding] = stamp
+        if head in (following, preceding):
             shared += 1
-        elif one >= 0:
-            a, b, c, size, shape = normal_and_shape(mesh.points, tail, one, two)
-            d, e, f, new_size, new_shape = normal_and_shape(mesh.points, head, one, two)
+        elif following >= 0:
+            a, b, c, size, shape = normal_and_shape(mesh.points, tail, following, preceding)
+            d, e, f, new_size, new_shape = normal_and_shape(mesh.points, head, following, preceding)
             if not new_shape > min(shape, MIN_SHAPE):
                 return False
             if shape > MIN_SHAPE**4 and a * d + b * e + c * f < MAX_ROTATION * size * new_size:
@@ -213,15 +214,15 @@ def collapse_edges(mesh: Collapses, seen: IntArray, count: int) -> None:
             while chain >= 0:
                 corner, chain = chain, after[chain]
                 face = corner - corner % 3
-                one, two = corners[face + (corner + 1) % 3], corners[face + (corner + 2) % 3]
-                if corners[corner] == tail and head in (one, two):
+                following, preceding = corners[face + (corner + 1) % 3], corners[face + (corner + 2) % 3]
+                if corners[corner] == tail and head in (following, preceding):
                     for k in range(face, face + 3):
                         corners[k] = -1
                     left -= 1
                 elif corners[corner] >= 0:
                     corners[corner] = head
                     link_corner(mesh, corner, head)
-                    for vertex in (one, two):
+                    for vertex in (following, preceding):
                         if edge_cost(points, quadrics, vertex, head) < mesh.cost[vertex]:
                             heapq.heappush(heap, cheapest_edge(mesh, vertex, -np.inf, vertex))
             heapq.heappush(heap, cheapest_edge(mesh, head, -np.inf, head))

@@ -40,12 +40,12 @@ def overlap_areas(corners: FloatArray, pairs: IntArray) -> tuple[float, float]:
     total = float(_cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1]).sum()) / 2
     if not len(pairs):
         return 0.0, total
-    used, index = np.unique(pairs, return_inverse=True)
-    corners, pairs = corners[used], index.reshape(-1, 2)
+    triangles, index = np.unique(pairs, return_inverse=True)
+    corners, pairs = corners[triangles], index.reshape(-1, 2)
     corners = corners - corners.min(axis=(0, 1))
     steps = _outline(corners)
-    twice, more = _sweep(corners, steps, _crossings(corners, steps != 0, pairs))
-    return twice, total - more
+    overlap, excess = _sweep(corners, steps, _crossings(corners, steps != 0, pairs))
+    return overlap, total - excess
 
 
 def approximate_overlap_areas(corners: FloatArray) -> tuple[float, float]:
@@ -68,8 +68,8 @@ def approximate_overlap_areas(corners: FloatArray) -> tuple[float, float]:
     return int(np.count_nonzero(layers > 1)) * pixel, int(np.count_nonzero(layers)) * pixel
 
 
-def _cross(one: FloatArray, two: FloatArray) -> FloatArray:
-    return one[..., 0] * two[..., 1] - one[..., 1] * two[..., 0]
+def _cross(first: FloatArray, second: FloatArray) -> FloatArray:
+    return first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
 
 
 def _outline(corners: FloatArray) -> IntArray:
@@ -79,8 +79,8 @@ def _outline(corners: FloatArray) -> IntArray:
     """
     places = corners @ np.array([1, 1j])
     sides = np.stack([places, places[:, NEXT]], axis=2).reshape(-1, 2)
-    same, balance = cancel_sides(sides, np.zeros(places.size, dtype=np.int64))
-    return np.where(same == np.arange(len(same)), balance, 0).reshape(-1, 3)
+    first_equal, balance = cancel_sides(sides, np.zeros(places.size, dtype=np.int64))
+    return np.where(first_equal == np.arange(len(first_equal)), balance, 0).reshape(-1, 3)
 
 
 def cancel_sides(sides: ComplexArray, chart: IntArray) -> tuple[IntArray, IntArray]:
@@ -98,11 +98,11 @@ def cancel_sides(sides: ComplexArray, chart: IntArray) -> tuple[IntArray, IntArr
     keys = np.stack([chart, number.min(axis=1), number.max(axis=1)])
     order = np.lexsort(keys)
     begins = np.append(True, np.diff(keys[:, order], axis=1).any(axis=0))[: len(order)]
-    same = np.empty(len(order), dtype=np.int64)
-    same[order] = order[begins][np.cumsum(begins) - 1]
+    first_equal = np.empty(len(order), dtype=np.int64)
+    first_equal[order] = order[begins][np.cumsum(begins) - 1]
     runs_up = number[:, 0] <= number[:, 1]
-    balance = np.bincount(same, np.where(runs_up == runs_up[same], 1, -1), len(same))
-    return same, balance.astype(np.int64)
+    balance = np.bincount(first_equal, np.where(runs_up == runs_up[first_equal], 1, -1), len(first_equal))
+    return first_equal, balance.astype(np.int64)
 
 
 def _crossings(corners: FloatArray, on_outline: BoolArray, pairs: IntArray) -> FloatArray:
@@ -110,15 +110,15 @@ def _crossings(corners: FloatArray, on_outline: BoolArray, pairs: IntArray) -> F
     heights = []
     for i in range(3):
         for j in range(3):
-            one, two = pairs[on_outline[pairs[:, 0], i] & on_outline[pairs[:, 1], j]].T
-            start, along = corners[one, i], corners[one, NEXT[i]] - corners[one, i]
-            other, across = corners[two, j], corners[two, NEXT[j]] - corners[two, j]
+            first, second = pairs[on_outline[pairs[:, 0], i] & on_outline[pairs[:, 1], j]].T
+            start, along = corners[first, i], corners[first, NEXT[i]] - corners[first, i]
+            opposite, across = corners[second, j], corners[second, NEXT[j]] - corners[second, j]
             slope = _cross(along, across)
             with np.errstate(divide="ignore", invalid="ignore"):  # parallel sides
-                here = _cross(other - start, across) / slope
-                there = _cross(other - start, along) / slope
-            meet = (here > 0) & (here < 1) & (there > 0) & (there < 1)
-            heights.append(start[meet, 1] + here[meet] * along[meet, 1])
+                fraction = _cross(opposite - start, across) / slope
+                opposite_fraction = _cross(opposite - start, along) / slope
+            meet = (fraction > 0) & (fraction < 1) & (opposite_fraction > 0) & (opposite_fraction < 1)
+            heights.append(start[meet, 1] + fraction[meet] * along[meet, 1])
     return np.concatenate(heights)
 
 
@@ -138,7 +138,7 @@ def _sweep(corners: FloatArray, steps: IntArray, crossings: FloatArray) -> tuple
     first, last = np.searchsorted(heights, low[:, 1]), np.searchsorted(heights, high[:, 1])
     if int((last - first).sum()) > MAX_CROSSINGS:
         return float("nan"), float("nan")
-    twice = more = 0.0
+    overlap = excess = 0.0
     for begin, stop in _blocks(first, last, len(heights)):
         bottom = np.maximum(first, begin)
         count = np.maximum(np.minimum(last, stop) - bottom, 0)
@@ -149,9 +149,9 @@ def _sweep(corners: FloatArray, steps: IntArray, crossings: FloatArray) -> tuple
         order = np.lexsort((x, strip))
         layers = np.cumsum(step[side[order]])[:-1]  # 0 at the end of each strip
         areas = np.diff(x[order]) * np.diff(heights)[strip[order[:-1]]]
-        twice += float(areas[layers > 1].sum())
-        more += float((areas * np.maximum(layers - 1, 0)).sum())
-    return twice, more
+        overlap += float(areas[layers > 1].sum())
+        excess += float((areas * np.maximum(layers - 1, 0)).sum())
+    return overlap, excess
 
 
 def _blocks(first: IntArray, last: IntArray, count: int) -> Iterator[tuple[int, int]]:

@@ -34,7 +34,7 @@ def make_delaunay(
 
     Args:
         triangulation: changed in place.
-        log_scale: None for the triangulation's own metric and Euclidean flips. With (n,) log scale factors
+        log_scale: None for the triangulation's metric and Euclidean flips. With (n,) log conformal factors
             phi, the metric l_ij exp((phi_i + phi_j) / 2) is made Delaunay by Ptolemy flips of the lengths l,
             which preserve the discrete conformal class (Springborn 2019; Gillespie, Springborn, Crane 2021).
         suspects: half-edges of the edges that may violate the condition at first; None: all.
@@ -157,27 +157,27 @@ def flip(
     twins = (twin[h2], twin[t1], twin[t2], twin[h1])
     sides = (length[h2], length[t1], length[t2], length[h1])
     u, v, p, q = tail[h], tail[t], tail[h2], tail[t2]
-    old = (h2, t1, t2, h1)
-    new = (h1, h2, t1, t2)
+    origins = (h2, t1, t2, h1)
+    destinations = (h1, h2, t1, t2)
     for i in range(4):
-        other = twins[i]
+        neighbour = twins[i]
         for j in range(4):
-            if twins[i] == old[j]:
-                other = new[j]
-        twin[new[i]] = other
-        if other >= 0:
-            twin[other] = new[i]
-        length[new[i]] = sides[i]
+            if twins[i] == origins[j]:
+                neighbour = destinations[j]
+        twin[destinations[i]] = neighbour
+        if neighbour >= 0:
+            twin[neighbour] = destinations[i]
+        length[destinations[i]] = sides[i]
     length[h] = diagonal
     length[t] = diagonal
     tail[h], tail[h1], tail[h2] = q, p, u
     tail[t], tail[t1], tail[t2] = p, q, v
-    return new
+    return destinations
 
 
 @compiled
 def doubled(values: Numbers) -> Numbers:
-    """Return an array with room for twice as many values."""
+    """Return an array of twice the capacity."""
     larger = np.empty(2 * len(values), values.dtype)
     for i in range(len(values)):
         larger[i] = values[i]
@@ -192,7 +192,7 @@ def flip_until_delaunay(
     scale: FloatArray,
     is_euclidean: bool,
     suspects: IntArray,
-    most: int,
+    max_flips: int,
 ) -> IntArray:
     """Flip edges that violate the Delaunay condition, always the worst, until there is none; return them in order.
 
@@ -203,7 +203,7 @@ def flip_until_delaunay(
         twin, tail, length, scale: the triangulation, see `make_delaunay`.
         is_euclidean: whether flips preserve the metric of the lengths; else the conformal class.
         suspects: half-edges of the edges that may violate the condition, one or both per edge.
-        most: largest number of flips.
+        max_flips: largest number of flips.
 
     Returns:
         (k,) the flipped half-edges, in order.
@@ -217,7 +217,7 @@ def flip_until_delaunay(
                 keys, items = doubled(keys), doubled(items)
             size = push(keys, items, size, -amount, h)
     record, count = np.empty(64, np.int64), 0
-    while size > 0 and count < most:
+    while size > 0 and count < max_flips:
         key, h = keys[0], items[0]
         size = drop_first(keys, items, size)
         if key == 0.0 or -violation(twin, tail, length, scale, h) != key:  # outdated: the quad has changed

@@ -56,11 +56,12 @@ class Fans:
         while leaves > 1:
             below = slice(leaves - 1, 2 * leaves - 1)
             leaves //= 2
-            own, left, right = slice(leaves - 1, 2 * leaves - 1), numbers[below][::2], numbers[below][1::2]
-            numbers[own] = np.where(left == right, left, -1)
+            parents = slice(leaves - 1, 2 * leaves - 1)
+            left, right = numbers[below][::2], numbers[below][1::2]
+            numbers[parents] = np.where(left == right, left, -1)
             begins, ends = angles[below].T
-            angles[own, 0] = np.minimum(begins[::2], begins[1::2])
-            angles[own, 1] = np.maximum(ends[::2], ends[1::2])
+            angles[parents, 0] = np.minimum(begins[::2], begins[1::2])
+            angles[parents, 1] = np.maximum(ends[::2], ends[1::2])
         return numbers, angles
 
 
@@ -90,9 +91,9 @@ def find_fans(corners: FloatArray) -> Fans | None:
     angles = np.zeros((len(corners), 2))
     apex = suspected[first] % 3
     at = points.reshape(-1, 3)
-    one, two = (at[triangles, step[apex]] - at[triangles, apex] for step in (NEXT, PREVIOUS))
-    angles[triangles, 0] = np.angle(one)
-    angles[triangles, 1] = np.angle(one) + np.angle(one.conj() * two)
+    leading, trailing = (at[triangles, step[apex]] - at[triangles, apex] for step in (NEXT, PREVIOUS))
+    angles[triangles, 0] = np.angle(leading)
+    angles[triangles, 1] = np.angle(leading) + np.angle(leading.conj() * trailing)
     return Fans(numbers, angles)
 
 

@@ -65,11 +65,13 @@ def _contract_loops(mesh: TriangleMesh, together: bool) -> IntArray:
 
 def _loop(paths: Paths, across: IntArray, edge: int) -> IntArray:
     """Return (k,) the half-edges crossed by the loop that goes over an edge and returns through the tree."""
-    there, back = ([*paths.nodes_to(face), paths.source[face[0]]] for face in across[edge][:, None] // 3)
+    outward, homeward = (
+        [*paths.nodes_to(face), paths.source[face[0]]] for face in across[edge][:, None] // 3
+    )
     # The common part of both paths to the root is removed.
-    while len(there) > 1 and len(back) > 1 and there[-2] == back[-2]:
-        there.pop(), back.pop()
-    out, home = np.array(there[::-1]), np.array(back)
+    while len(outward) > 1 and len(homeward) > 1 and outward[-2] == homeward[-2]:
+        outward.pop(), homeward.pop()
+    out, home = np.array(outward[::-1]), np.array(homeward)
     pairs = across[np.concatenate([paths.edge[out[1:]], [edge], paths.edge[home[:-1]]])]
     faces = np.concatenate([out, home[:-1]])
     return np.where(pairs[:, 0] // 3 == faces, pairs[:, 0], pairs[:, 1])
@@ -116,7 +118,7 @@ class Holonomy:
         return csr_matrix(self.signs @ _angles_by_log_lengths(self.mesh, lengths))
 
     def by_log_scale(self, lengths: FloatArray) -> FloatArray:
-        """Return (l, n) the derivative of the angles by the log scale at the vertices, at side lengths (m, 3)."""
+        """Return (l, n) the derivative of the angles by the log conformal factors, at side lengths (m, 3)."""
         return np.asarray((self.by_log_lengths(lengths) @ edge_means(self.mesh)).todense())
 
 
@@ -132,7 +134,7 @@ def loop_holonomy(mesh: TriangleMesh, holes: bool = False) -> Holonomy:
 
 
 def edge_means(mesh: TriangleMesh) -> csr_matrix:
-    """Return (e, n) the matrix of the means of the two end values of edges: from log scale to log length."""
+    """Return (e, n) the matrix of the means of the two end values of edges: from log conformal factor to log length."""
     count = len(mesh.edges)
     rows = np.repeat(np.arange(count), 2)
     return csr_matrix(

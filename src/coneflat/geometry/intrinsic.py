@@ -56,25 +56,30 @@ def check_lengths(
     with np.errstate(all="ignore"):
         areas = double_areas(values)  # 0 or not finite for every invalid triangle
     pairs = mesh.edge_halfedges[~mesh.is_boundary_edge]
-    one, two = values.ravel()[pairs].T
-    if not flat and np.array_equal(one, two) and (areas > 0).all() and np.isfinite(areas).all():
+    length_at_first, length_at_second = values.ravel()[pairs].T
+    has_equal_sides = np.array_equal(length_at_first, length_at_second)
+    if not flat and has_equal_sides and (areas > 0).all() and np.isfinite(areas).all():
         return values
     faces = np.arange(len(values)) if face_names is None else face_names
     _refuse_numbers(values, faces, flat)
-    differ = np.flatnonzero(np.abs(one - two) > LENGTH_ROUNDING * np.maximum(one, two))
+    differ = np.flatnonzero(
+        np.abs(length_at_first - length_at_second)
+        > LENGTH_ROUNDING * np.maximum(length_at_first, length_at_second)
+    )
     if len(differ):
         edges = mesh.edges[~mesh.is_boundary_edge][differ]
         names = edges if vertex_names is None else vertex_names[edges]
         first = differ[0]
-        here, there = faces[pairs[first] // 3]
+        first_face, second_face = faces[pairs[first] // 3]
         raise LengthError(
             f"{plural(len(differ), 'edge')} with different lengths on their two sides: "
             f"{list_some([f'{a}-{b}' for a, b in names[:6]], len(differ))}; edge {names[0, 0]}-{names[0, 1]} is "
-            f"{one[first]:.9g} long in face {here} and {two[first]:.9g} in face {there}"
+            f"{length_at_first[first]:.9g} long in face {first_face} and {length_at_second[first]:.9g} in "
+            f"face {second_face}"
         )
-    if not np.array_equal(one, two):
+    if not has_equal_sides:
         values = values.copy()
-        values.ravel()[pairs[:, 1]] = one
+        values.ravel()[pairs[:, 1]] = length_at_first
     unit = np.ldexp(values, -np.frexp(values.max())[1])
     spare = slacks(unit).min(axis=1)
     is_broken = np.asarray(spare < -LENGTH_ROUNDING * unit.max(axis=1))
@@ -103,21 +108,23 @@ def _refuse_numbers(values: FloatArray, faces: IntArray, flat: bool) -> None:
             f"{list_some(faces[bad])}"
         )
     _refuse_faces(values.min(axis=1) <= 0, "with lengths that are not positive", values, faces)
-    least, largest = values.min(), values.max()
+    smallest, largest = values.min(), values.max()
     # If flat triangles are accepted, lengths are scaled later, so only their ratio matters.
-    if least / largest < 1 / MAX_LENGTH or not (flat or 1 / MAX_LENGTH <= least <= largest <= MAX_LENGTH):
+    if smallest / largest < 1 / MAX_LENGTH or not (
+        flat or 1 / MAX_LENGTH <= smallest <= largest <= MAX_LENGTH
+    ):
         raise LengthError(
-            f"lengths from {least:.3g} to {largest:.3g} overflow or underflow when they are multiplied: scale them"
+            f"lengths from {smallest:.3g} to {largest:.3g} overflow or underflow when they are multiplied: scale them"
         )
 
 
-def _refuse_faces(is_bad: BoolArray, what: str, values: FloatArray, faces: IntArray) -> None:
+def _refuse_faces(is_bad: BoolArray, defect: str, values: FloatArray, faces: IntArray) -> None:
     bad = np.flatnonzero(is_bad)
     if len(bad):
         a, b, c = values[bad[0]]
         raise LengthError(
-            f"{plural(len(bad), 'face')} of {len(values):,} {what}: {list_some(faces[bad])}; face {faces[bad[0]]} has "
-            f"sides of {a:.9g}, {b:.9g} and {c:.9g}"
+            f"{plural(len(bad), 'face')} of {len(values):,} {defect}: {list_some(faces[bad])}; face {faces[bad[0]]} "
+            f"has sides of {a:.9g}, {b:.9g} and {c:.9g}"
         )
 
 
@@ -186,11 +193,11 @@ def double(triangulation: IntrinsicTriangulation) -> tuple[IntrinsicTriangulatio
     image = np.arange(n)
     image[inside] = n + np.arange(inside.sum())
 
-    both = 2 * len(twin)
-    new_twin, new_tail, length = np.empty(both, np.int64), np.empty(both, np.int64), np.empty(both)
-    new_twin[slots] = np.where(outer, mirror, twin)
-    new_twin[mirror] = np.where(outer, slots, mirror[twin])
-    new_tail[slots], new_tail[mirror] = tail, image[head]
+    double_twin, double_tail = np.empty((2, 2 * len(twin)), np.int64)
+    length = np.empty(2 * len(twin))
+    double_twin[slots] = np.where(outer, mirror, twin)
+    double_twin[mirror] = np.where(outer, slots, mirror[twin])
+    double_tail[slots], double_tail[mirror] = tail, image[head]
     length[slots] = length[mirror] = triangulation.length
     original = np.concatenate([np.arange(n), np.flatnonzero(inside)])
-    return IntrinsicTriangulation(new_twin, new_tail, length, len(original)), original
+    return IntrinsicTriangulation(double_twin, double_tail, length, len(original)), original

@@ -124,12 +124,12 @@ def find_suspected(
     corners: FloatArray, signs: IntArray, x: float, y: float, scale: float, sums: Int32Array
 ) -> BoolArray:
     """Return (m,) which triangles (m, 6) with area have suspected cells in their bounding boxes."""
-    found = np.zeros(len(corners), np.bool_)
+    is_suspected = np.zeros(len(corners), np.bool_)
     for t in range(len(corners)):
         c = corners[t]
         left, right = int((min(c[0], c[2], c[4]) - x) * scale), int((max(c[0], c[2], c[4]) - x) * scale)
         bottom, top = int((min(c[1], c[3], c[5]) - y) * scale), int((max(c[1], c[3], c[5]) - y) * scale)
         # The last row and column are zeros, at the index -1.
         inside = sums[top, right] - sums[top, left - 1] - sums[bottom - 1, right] + sums[bottom - 1, left - 1]
-        found[t] = signs[t] != 0 and inside > 0
-    return found
+        is_suspected[t] = signs[t] != 0 and inside > 0
+    return is_suspected

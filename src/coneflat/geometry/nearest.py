@@ -58,12 +58,12 @@ class TriangleTree:
             normals: (q, 3) direction to which the surface of each point faces; triangles that face away are avoided.
         """
         normals = np.zeros_like(points) if normals is None else normals
-        found, weights = np.empty(len(points), np.int64), np.empty((len(points), 3))
+        triangles, weights = np.empty(len(points), np.int64), np.empty((len(points), 3))
         _search(
             self._boxes, self._leaves, self._order, self._corners, self._normals,
-            (OPPOSITE * self.diagonal) ** 2, points, normals, found, weights,
+            (OPPOSITE * self.diagonal) ** 2, points, normals, triangles, weights,
         )  # fmt: skip
-        return found, weights
+        return triangles, weights
 
 
 @compiled
@@ -76,7 +76,7 @@ def _search(
     opposite: float,
     points: FloatArray,
     directions: FloatArray,
-    found: IntArray,
+    triangles: IntArray,
     weights: FloatArray,
 ) -> None:
     """Find the nearest triangle of each point, depth first, the nearer child first."""
@@ -101,7 +101,7 @@ def _search(
     for q in range(len(points)):
         # The triangle of the point before gives a first bound.
         best = square_to(last, q)
-        found[q], weights[q] = last, trial
+        triangles[q], weights[q] = last, trial
         stack[0], size = 0, 1
         while size > 0:
             size -= 1
@@ -119,8 +119,8 @@ def _search(
                 f = order[k]
                 square = square_to(f, q)
                 if square <= best:
-                    best, found[q], weights[q] = square, f, trial
-        last = found[q]
+                    best, triangles[q], weights[q] = square, f, trial
+        last = triangles[q]
 
 
 def surface_distances(vertices: FloatArray, faces: IntArray, queries: FloatArray) -> FloatArray:

@@ -30,7 +30,7 @@ def vertex_areas(faces: IntArray, lengths: FloatArray, vertex_count: int) -> Flo
 
 
 def area_distortion(log_scale: FloatArray, areas: FloatArray) -> float:
-    """Return the area distortion E, the area-weighted standard deviation of the log scale; 0 for uniform scaling.
+    """Return the area distortion E: the area-weighted standard deviation of the log conformal factor, 0 if uniform.
 
     log_scale, areas: (n,).
     """
@@ -99,12 +99,14 @@ def cotangent_laplacian(faces: IntArray, cots: FloatArray, vertex_count: int) ->
     Raises:
         ArrayShapeError, EmptyMeshError, FaceIndexError: the arrays do not fit each other.
     """
-    triangles, given = as_faces(faces, vertex_count), as_floats("cots", cots)
-    if given.shape != triangles.shape:
-        raise ArrayShapeError(f"cots must have the shape {triangles.shape} of the faces, got {given.shape}")
-    one, two = triangles[:, NEXT].ravel(), triangles[:, PREVIOUS].ravel()
+    triangles, corner_cots = as_faces(faces, vertex_count), as_floats("cots", cots)
+    if corner_cots.shape != triangles.shape:
+        raise ArrayShapeError(
+            f"cots must have the shape {triangles.shape} of the faces, got {corner_cots.shape}"
+        )
+    tails, heads = triangles[:, NEXT].ravel(), triangles[:, PREVIOUS].ravel()
     shape = vertex_count, vertex_count
-    half = csc_matrix((given.ravel() / 2, (one, two)), shape=shape)
+    half = csc_matrix((corner_cots.ravel() / 2, (tails, heads)), shape=shape)
     weights = half + half.T
     laplacian = csc_matrix(diags(np.asarray(weights.sum(axis=0))[0]) - weights)
     laplacian.eliminate_zeros()

@@ -180,9 +180,9 @@ def _find_pairs(corners: FloatArray, chosen: IntArray, limit: int | None) -> tup
     stack, top = np.zeros((4 * len(tree).bit_length(), 2), dtype=np.int64), 1
     keys, capacity, left = [], len(chosen), np.inf if limit is None else limit + 1
     while top > 0 and left > 0:
-        found = np.empty((int(min(left, capacity)), 2), dtype=np.int64)
-        top, count = join(*arrays, stack, top, found)
-        pairs = chosen[found[:count]]
+        buffer = np.empty((int(min(left, capacity)), 2), dtype=np.int64)
+        top, count = join(*arrays, stack, top, buffer)
+        pairs = chosen[buffer[:count]]
         keys.append(pairs.min(axis=1) * len(corners) + pairs.max(axis=1))
         left -= count
         capacity *= 2
@@ -257,8 +257,8 @@ def z_order(boxes: FloatArray) -> IntArray:
 def _spread(cells: NDArray[np.uint64]) -> NDArray[np.uint64]:
     """Return numbers with a zero bit inserted before each of their 32 bits."""
     for shift in (16, 8, 4, 2, 1):
-        kept = np.uint64((2**64 - 1) // (2**shift + 1))  # runs of `shift` ones and as many zeros
-        cells = (cells | cells << np.uint64(shift)) & kept
+        mask = np.uint64((2**64 - 1) // (2**shift + 1))  # runs of `shift` ones and as many zeros
+        cells = (cells | cells << np.uint64(shift)) & mask
     return cells
 
 
@@ -289,13 +289,13 @@ def _boxes_meet(tree: FloatArray, i: int, j: int) -> bool:
 
 
 @compiled
-def _lies_outside(corners: FloatArray, one: int, two: int, parts: FloatArray) -> bool:
+def _lies_outside(corners: FloatArray, first: int, second: int, parts: FloatArray) -> bool:
     """Return whether the line along a side of triangle `one` has no corner of triangle `two` on its left."""
     for i in range(0, 6, 2):
-        px, py = corners[one, i], corners[one, i + 1]
-        qx, qy = corners[one, (i + 2) % 6], corners[one, (i + 3) % 6]
+        px, py = corners[first, i], corners[first, i + 1]
+        qx, qy = corners[first, (i + 2) % 6], corners[first, (i + 3) % 6]
         k = 0
-        while k < 6 and orientation(px, py, qx, qy, corners[two, k], corners[two, k + 1], parts) <= 0:
+        while k < 6 and orientation(px, py, qx, qy, corners[second, k], corners[second, k + 1], parts) <= 0:
             k += 2
         if k == 6:
             return True
@@ -315,20 +315,20 @@ def find_overlapping_groups(
         starts: (k + 1,) the first triangle of each group.
         parts: (12,) buffer for exact sums.
     """
-    found = np.zeros(len(starts) - 1, np.bool_)
-    for group in range(len(found)):
-        for one in range(starts[group], starts[group + 1]):
-            for two in range(one + 1, starts[group + 1]):
+    is_overlapping = np.zeros(len(starts) - 1, np.bool_)
+    for group in range(len(is_overlapping)):
+        for first in range(starts[group], starts[group + 1]):
+            for second in range(first + 1, starts[group + 1]):
                 if (
-                    not found[group]
-                    and has_area[one]
-                    and has_area[two]
-                    and _boxes_meet(boxes, one, two)
-                    and not _lies_outside(corners, one, two, parts)
-                    and not _lies_outside(corners, two, one, parts)
+                    not is_overlapping[group]
+                    and has_area[first]
+                    and has_area[second]
+                    and _boxes_meet(boxes, first, second)
+                    and not _lies_outside(corners, first, second, parts)
+                    and not _lies_outside(corners, second, first, parts)
                 ):
-                    found[group] = True
-    return found
+                    is_overlapping[group] = True
+    return is_overlapping
 
 
 @compiled
@@ -340,7 +340,7 @@ def join(
     parts: FloatArray,
     stack: IntArray,
     top: int,
-    found: IntArray,
+    pairs: IntArray,
 ) -> tuple[int, int]:
     """Write the pairs of triangles whose interiors intersect, until the buffer is full.
 
@@ -354,20 +354,22 @@ def join(
         parts: (12,) buffer for exact sums.
         stack: (s, 2) pairs of nodes of the same level, the smaller first, that are still to be searched.
         top: number of pairs on the stack.
-        found: (p, 2) buffer for the pairs.
+        pairs: (p, 2) buffer for the pairs.
 
     Returns:
         The height of the stack, 0 if the search is complete, and the number of pairs written.
     """
     first_leaf = len(tree) // 2
     count = 0
-    while top > 0 and count < len(found):
+    while top > 0 and count < len(pairs):
         top -= 1
         i, j = stack[top, 0], stack[top, 1]
         if i >= first_leaf:
-            one, two = i - first_leaf, j - first_leaf
-            if not _lies_outside(corners, one, two, parts) and not _lies_outside(corners, two, one, parts):
-                found[count, 0], found[count, 1] = one, two
+            first, second = i - first_leaf, j - first_leaf
+            if not _lies_outside(corners, first, second, parts) and not _lies_outside(
+                corners, second, first, parts
+            ):
+                pairs[count, 0], pairs[count, 1] = first, second
                 count += 1
             continue
         for a in range(2 * i + 1, 2 * i + 3):

@@ -28,16 +28,16 @@ def as_pairs(points: ComplexArray) -> FloatArray:
 def signed_double_areas(corners: FloatArray) -> FloatArray:
     """Return (m,) twice the area of triangles with corners (m, 3, 2), negative for clockwise ones."""
     with np.errstate(over="ignore", invalid="ignore"):
-        one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        areas: FloatArray = one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]
+        side_b, side_c = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+        areas: FloatArray = side_b[:, 0] * side_c[:, 1] - side_b[:, 1] * side_c[:, 0]
     return areas
 
 
 def bounds(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return (m, 2) the smallest and (m, 2) the largest coordinates of triangles with corners (m, 3, 2)."""
     # NumPy is slow at extrema along an axis of length three.
-    one, two, three = (corners[:, k] for k in range(3))
-    return np.minimum(np.minimum(one, two), three), np.maximum(np.maximum(one, two), three)
+    first, second, third = (corners[:, k] for k in range(3))
+    return np.minimum(np.minimum(first, second), third), np.maximum(np.maximum(first, second), third)
 
 
 def signed_angles(sides: ComplexArray) -> FloatArray:
@@ -64,16 +64,16 @@ def sides_between(corners: FloatArray) -> ComplexArray:
     return sides.view(np.complex128)[..., 0]
 
 
-def map_factors(rest: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+def map_factors(rest_sides: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
     """Return (m, 3) and (m, 3) the derivatives of a and b in the map z -> a z + b conj(z) by the corner positions.
 
     The map takes each triangle from its rest shape, with the sides `rest` (m, 3), to the plane. Its singular values
     are |a| + |b| and |a| - |b|. For triangles without area the result is NaN or infinite.
 
     Args:
-        rest: (m, 3) sides of the triangles before the map, as complex numbers.
+        rest_sides: (m, 3) sides of the triangles before the map, as complex numbers.
     """
-    r0, r1 = rest[:, 0], rest[:, 1]
+    r0, r1 = rest_sides[:, 0], rest_sides[:, 1]
     area = r0 * np.conj(r1) - np.conj(r0) * r1
     with np.errstate(divide="ignore", invalid="ignore"):
         sides = (np.conj(r1) / area, -np.conj(r0) / area), (-r1 / area, r0 / area)
@@ -111,8 +111,8 @@ def vertex_log_scale(mesh: TriangleMesh, before: FloatArray, after: FloatArray) 
     """
     corner, count = mesh.faces.ravel(), len(mesh.vertices)
     around = [np.bincount(corner, np.repeat(areas, 3), count) for areas in (before, after)]
-    one, two = (np.maximum(each, MIN_AREA * each.mean()) for each in around)
-    return np.log(two / one) / 2
+    area_before, area_after = (np.maximum(areas, MIN_AREA * areas.mean()) for areas in around)
+    return np.log(area_after / area_before) / 2
 
 
 def triangle_energies(lengths: FloatArray, places: FloatArray) -> FloatArray:

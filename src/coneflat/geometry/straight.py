@@ -130,26 +130,26 @@ def undo_flips(
         turn = turns[h]
         # The edge rotates clockwise: sides move h1 to h2, h2 to t1, t1 to t2, t2 to h1. The second of them changes
         # from the frame of h to that of t, the fourth from that of t to that of h.
-        old = (h1, h2, t1, t2)
-        new = (h2, t1, t2, h1)
+        origins = (h1, h2, t1, t2)
+        destinations = (h2, t1, t2, h1)
         into = (1.0 + 0.0j, turn.conjugate(), 1.0 + 0.0j, turn)
         moved = (sides[h1], sides[h2] * into[1], sides[t1], sides[t2] * into[3])
         twins = (twin[h1], twin[h2], twin[t1], twin[t2])
         outer = (turns[h1], turns[h2], turns[t1], turns[t2])
         p, u, q, v = tail[h1], tail[h2], tail[t1], tail[t2]
         for i in range(4):
-            other, total = twins[i], into[i] * outer[i]
+            neighbour, total = twins[i], into[i] * outer[i]
             for j in range(4):
-                if twins[i] == old[j]:
-                    other = new[j]
+                if twins[i] == origins[j]:
+                    neighbour = destinations[j]
                     total *= into[j].conjugate()
             total /= abs(total)
-            sides[new[i]] = moved[i]
-            twin[new[i]] = other
-            turns[new[i]] = total
-            if other >= 0:
-                twin[other] = new[i]
-                turns[other] = total.conjugate()
+            sides[destinations[i]] = moved[i]
+            twin[destinations[i]] = neighbour
+            turns[destinations[i]] = total
+            if neighbour >= 0:
+                twin[neighbour] = destinations[i]
+                turns[neighbour] = total.conjugate()
         sides[h] = -(sides[h1] + sides[h2])
         sides[t] = -sides[h] * turn.conjugate()
         tail[h], tail[h1], tail[h2] = u, v, p

@@ -136,10 +136,10 @@ def measure_cotangents(lengths: FloatArray) -> FloatArray:
             product *= 0.0 if cots[t, i] < 0.0 else cots[t, i]
         # Eight times the area, with the same rounding as in `measure_double_areas`.
         eightfold = 4 * (math.sqrt(perimeter * product) / 2)
-        one, two, three = cots[t, 0], cots[t, 1], cots[t, 2]
-        cots[t, 0] = (perimeter * one - two * three) / eightfold
-        cots[t, 1] = (perimeter * two - three * one) / eightfold
-        cots[t, 2] = (perimeter * three - one * two) / eightfold
+        slack_0, slack_1, slack_2 = cots[t, 0], cots[t, 1], cots[t, 2]
+        cots[t, 0] = (perimeter * slack_0 - slack_1 * slack_2) / eightfold
+        cots[t, 1] = (perimeter * slack_1 - slack_2 * slack_0) / eightfold
+        cots[t, 2] = (perimeter * slack_2 - slack_0 * slack_1) / eightfold
     return cots
 
 
@@ -192,8 +192,8 @@ def corner_normals(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 def sums_at(places: IntArray, vectors: FloatArray, count: int) -> FloatArray:
     """Return (count, 3) the sum of the vectors (m, 3 or 1, 3) that have each index in `places` (m, 3)."""
-    each = np.broadcast_to(vectors, (*places.shape, 3))
-    return np.stack([np.bincount(places.ravel(), each[..., k].ravel(), count) for k in range(3)], axis=1)
+    index, components = places.ravel(), np.broadcast_to(vectors, (*places.shape, 3)).reshape(-1, 3).T
+    return np.stack([np.bincount(index, component, count) for component in components], axis=1)
 
 
 def unit_vectors(vectors: FloatArray) -> FloatArray:
@@ -212,9 +212,9 @@ def dihedral_angles(mesh: TriangleMesh) -> FloatArray:
     If the faces are counterclockwise seen from outside, it is positive at convex and negative at concave edges.
     """
     normals = face_normals(mesh.vertices, mesh.faces)
-    one, two = normals[mesh.edge_faces[:, 0]], normals[mesh.edge_faces[:, 1]]
+    first_normals, second_normals = normals[mesh.edge_faces[:, 0]], normals[mesh.edge_faces[:, 1]]
     side = mesh.edge_halfedges[:, 0]
     along = mesh.vertices[mesh.heads[side]] - mesh.vertices[mesh.tails[side]]
-    across = np.cross(one, two)
-    angles = np.arctan2(np.sqrt(dots(across, across)), dots(one, two))
+    across = np.cross(first_normals, second_normals)
+    angles = np.arctan2(np.sqrt(dots(across, across)), dots(first_normals, second_normals))
     return np.where(mesh.is_boundary_edge, 0.0, np.where(dots(across, along) < 0, -angles, angles))

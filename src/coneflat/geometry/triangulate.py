@@ -52,13 +52,13 @@ def triangulate(vertices: FloatArray, corners: IntArray, offsets: IntArray) -> t
 
     for size in np.unique(sizes).tolist():
         polygons = np.flatnonzero(sizes == size)
-        own = corners[offsets[polygons, None] + np.arange(size)]
+        polygon_corners = corners[offsets[polygons, None] + np.arange(size)]
         local = fan_corners(np.array([0, size]))
         if size == 4:
-            use_02 = _splits_at_first_corner(vertices, own)[:, None, None]
+            use_02 = _splits_at_first_corner(vertices, polygon_corners)[:, None, None]
             local = np.where(use_02, local, [[0, 1, 3], [1, 2, 3]])
         elif size > 4:
-            local = _ngons(vertices[own])
+            local = _ngons(vertices[polygon_corners])
         rows = first_triangle[polygons, None] + np.arange(size - 2)
         face_corners[rows] = offsets[polygons, None, None] + local
     return corners[face_corners], face_corners
@@ -96,12 +96,12 @@ def _splits_at_first_corner(vertices: FloatArray, quads: IntArray) -> BoolArray:
     p0, p1, p2, p3 = (vertices[quads[:, k]] for k in range(4))
     with np.errstate(invalid="ignore", over="ignore"):
         normal = np.cross(p2 - p0, p3 - p1)
-        least = _ROUNDING * dots(normal, normal)
-        valid_02 = (dots(np.cross(p1 - p0, p2 - p0), normal) > least) & (
-            dots(np.cross(p2 - p0, p3 - p0), normal) > least
+        threshold = _ROUNDING * dots(normal, normal)
+        valid_02 = (dots(np.cross(p1 - p0, p2 - p0), normal) > threshold) & (
+            dots(np.cross(p2 - p0, p3 - p0), normal) > threshold
         )
-        valid_13 = (dots(np.cross(p1 - p0, p3 - p0), normal) > least) & (
-            dots(np.cross(p2 - p1, p3 - p1), normal) > least
+        valid_13 = (dots(np.cross(p1 - p0, p3 - p0), normal) > threshold) & (
+            dots(np.cross(p2 - p1, p3 - p1), normal) > threshold
         )
         length_02 = dots(p2 - p0, p2 - p0)
         length_13 = dots(p3 - p1, p3 - p1)
@@ -152,12 +152,12 @@ def _newell_normals(points: FloatArray) -> FloatArray:
 
 def _is_convex(points: FloatArray, normals: FloatArray) -> BoolArray:
     """Return (q,) whether every corner turns left and the fan from corner 0 covers the polygon once."""
-    least = _ROUNDING * np.einsum("ij,ij->i", normals, normals)
+    threshold = _ROUNDING * np.einsum("ij,ij->i", normals, normals)
     sides = np.roll(points, -1, axis=1) - points
     turns = np.einsum("qki,qi->qk", np.cross(np.roll(sides, 1, axis=1), sides), normals)
     local = points - points[:, :1]
     fan = np.einsum("qki,qi->qk", np.cross(local[:, 1:-1], local[:, 2:]), normals)
-    return np.asarray(np.all(turns > least[:, None], axis=1) & np.all(fan > least[:, None], axis=1))
+    return np.asarray(np.all(turns > threshold[:, None], axis=1) & np.all(fan > threshold[:, None], axis=1))
 
 
 def _in_plane(points: FloatArray, normal: FloatArray) -> FloatArray | None:

@@ -142,8 +142,8 @@ def _close_gaps(
     """
     squares = sides.real**2 + sides.imag**2
     weight = 1 / np.maximum(squares, NO_LENGTH**2 * squares.max())
-    one, two, three = weight.reshape(-1, 3).T
-    around = np.stack([two + three, three + one, one + two], axis=1)
+    weight_0, weight_1, weight_2 = weight.reshape(-1, 3).T
+    around = np.stack([weight_1 + weight_2, weight_2 + weight_0, weight_0 + weight_1], axis=1)
     diagonal = np.bincount(corner, around.ravel(), len(points))
     damping = np.divide(1.0, diagonal, out=np.zeros(len(points)), where=~pinned & (diagonal > 0))
     residual, pull = np.empty_like(points), np.empty_like(points)
@@ -264,9 +264,9 @@ def apply_stiffness(corner: IntArray, weight: FloatArray, shift: ComplexArray, f
         i, j, k = corner[h], corner[h + 1], corner[h + 2]
         a, b, c = shift[i], shift[j], shift[k]
         # Real and imaginary parts separately: real times complex would be computed with twice the products.
-        one, two, three = weight[h], weight[h + 1], weight[h + 2]
-        x, y, z = one * (c.real - b.real), two * (a.real - c.real), three * (b.real - a.real)
-        u, v, w = one * (c.imag - b.imag), two * (a.imag - c.imag), three * (b.imag - a.imag)
+        weight_0, weight_1, weight_2 = weight[h], weight[h + 1], weight[h + 2]
+        x, y, z = weight_0 * (c.real - b.real), weight_1 * (a.real - c.real), weight_2 * (b.real - a.real)
+        u, v, w = weight_0 * (c.imag - b.imag), weight_1 * (a.imag - c.imag), weight_2 * (b.imag - a.imag)
         force[i] += complex(y - z, v - w)
         force[j] += complex(z - x, w - u)
         force[k] += complex(x - y, u - v)

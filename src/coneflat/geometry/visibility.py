@@ -116,7 +116,7 @@ def fill_nearest(points: FloatArray, faces: IntArray, depth: FloatArray, face: I
     Args:
         points: (n, 3) x to the right and y downwards in pixels, and depth away from the viewer.
         faces: (m, 3) indices of points.
-        depth, face: (h, w) depth and face of the image so far; among faces of the same depth, the first is kept.
+        depth, face: (h, w) depth and face of the image so far; among faces of the same depth, the first is drawn.
     """
     height, width = depth.shape
     for f in range(len(faces)):

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.arrays import FloatArray, mask_of, rows_of
+from ..base.progress import stage
 from ..base.text import plural
 from ..errors import MetricError
 from ..geometry import angle_defect, corner_angles, double_areas
@@ -19,6 +20,7 @@ from ..stages import Cut, Embedding, FlatMetric, Layout
 from .least_squares import least_squares_layout
 
 
+@stage("layout")
 def lay_out(metric: FlatMetric, cut: Cut, untangles: bool = True) -> Layout:
     """Return the layout of a flat metric on a mesh that is cut open (Section 4.3 of the paper).
 
@@ -72,8 +74,8 @@ def _unfolded(metric: FlatMetric, triangles: FlatTriangles, cut: Cut, rings: int
     on_seam = mask_of(len(mesh.vertices), mesh.edges[cut.seams])
     angles = np.where(on_boundary, np.pi, 2 * np.pi) - metric.target
     masks = stays | on_seam | on_boundary, stays | on_boundary, stays
-    rest = rest_sides(metric.lengths)
-    untangled = untangle(triangles, mesh.faces, angles, on_boundary, masks, rest, rings)
+    target_shapes = rest_sides(metric.lengths)
+    untangled = untangle(triangles, mesh.faces, angles, on_boundary, masks, target_shapes, rings)
     points = unfold(untangled.flat, cut.mesh.faces) * metric.scale
     curvature = layout_curvature(mesh, rows_of(points, cut.mesh.faces))
     statistics = replace(

@@ -23,14 +23,14 @@ def check_memory(triangles: int) -> None:
     require_memory(triangles * BYTES_PER_TRIANGLE, f"{triangles:,} triangles need")
 
 
-def require_memory(needed: float, what: str) -> None:
+def require_memory(needed: float, purpose: str) -> None:
     """Raise TooLargeError if a number of bytes does not fit into the free memory; not for less than a gigabyte.
 
     Raises:
-        TooLargeError: the message has both sizes after `what`, such as "a grid needs".
+        TooLargeError: the message has both sizes after `purpose`, such as "a grid needs".
     """
     if needed > CHECKED_BYTES and needed > (free := free_memory()):
-        raise TooLargeError(f"{what} about {_size(needed)} of memory, but {_size(free)} are free")
+        raise TooLargeError(f"{purpose} about {_size(needed)} of memory, but {_size(free)} are free")
 
 
 def free_memory() -> float:
@@ -40,10 +40,12 @@ def free_memory() -> float:
     free = float(psutil.virtual_memory().available + psutil.swap_memory().free)
     try:
         # The limit of a container; the file contains "max" if there is no limit.
-        limit, used = (int((CGROUP / f"memory.{what}").read_text()) for what in ("max", "current"))
+        limit, used_bytes = (
+            int((CGROUP / f"memory.{file_name}").read_text()) for file_name in ("max", "current")
+        )
     except (OSError, ValueError):
         return free
-    return min(free, float(limit - used))
+    return min(free, float(limit - used_bytes))
 
 
 def _size(count: float) -> str:

@@ -50,7 +50,7 @@ class Convex(Protocol[P]):
         """Return the point with given variables (n,)."""
         ...
 
-    def direction(self, here: P, exactly: bool) -> tuple[FloatArray, bool]:
+    def direction(self, point: P, exactly: bool) -> tuple[FloatArray, bool]:
         """Return (n,) the Newton direction, and whether it was computed by a direct solve.
 
         exactly: require a direct solve.
@@ -100,36 +100,36 @@ def minimise(function: Convex[P], start: P, limits: Limits) -> tuple[P, int]:
         accepted only if it halves the smallest gradient so far, which can happen only finitely often. Therefore the
         search neither stalls nor cycles.
     """
-    here = best = start
+    point = best = start
     steps, exactly = 0, False
-    while best.largest > limits.goal and here.is_admissible and steps < limits.steps:
+    while best.largest > limits.goal and point.is_admissible and steps < limits.steps:
         steps += 1
         is_reached = best.largest <= limits.tolerance
         try:
-            step, is_exact = function.direction(here, exactly)
+            step, is_exact = function.direction(point, exactly)
         except MetricError:  # singular in double precision: return the best point so far
             break
-        if not is_reached and np.abs(step).max() <= ROUNDING * np.abs(here.variables).max():
+        if not is_reached and np.abs(step).max() <= ROUNDING * np.abs(point.variables).max():
             break
         halvings = 0 if is_reached else limits.halvings
-        found = _search_line(function, here, step, best.largest, halvings, limits.largest_step)
-        if found is None:
+        accepted = _search_line(function, point, step, best.largest, halvings, limits.largest_step)
+        if accepted is None:
             if is_exact or is_reached:
                 break
             exactly = True
             continue
         exactly = False
-        is_halved = found.largest <= best.largest / 2
-        here = found
-        if here.largest < best.largest:
-            best = here
+        is_halved = accepted.largest <= best.largest / 2
+        point = accepted
+        if point.largest < best.largest:
+            best = point
         if best.largest <= limits.tolerance and not is_halved:
             break
     return best, steps
 
 
 def _search_line(
-    function: Convex[P], here: P, step: FloatArray, least: float, halvings: int, largest_step: float
+    function: Convex[P], point: P, step: FloatArray, best_gradient: float, halvings: int, largest_step: float
 ) -> P | None:
     """Return the first accepted point along a step, or None."""
     reach = float(np.abs(step).max(initial=0.0))
@@ -137,13 +137,13 @@ def _search_line(
         return None
     length = min(1.0, largest_step / reach)
     for _ in range(halvings + 1):
-        variables = here.variables + length * step
-        if np.array_equal(variables, here.variables):  # shorter than rounding
+        variables = point.variables + length * step
+        if np.array_equal(variables, point.variables):  # shorter than rounding
             return None
         check_cancelled()
-        found = function.evaluate(variables)
-        is_short = float(found.residual @ step) >= 0
-        if (is_short or found.largest <= least / 2) and found.is_admissible:
-            return found
+        trial = function.evaluate(variables)
+        is_short = float(trial.residual @ step) >= 0
+        if (is_short or trial.largest <= best_gradient / 2) and trial.is_admissible:
+            return trial
         length /= 2
     return None

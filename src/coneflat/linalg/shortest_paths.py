@@ -30,12 +30,12 @@ class Paths:
 
     def nodes_to(self, ends: IntArray) -> IntArray:
         """Return the nodes on the paths to given nodes, each once, without the sources."""
-        found: dict[int, None] = {}
+        on_paths: dict[int, None] = {}
         for node in ends.tolist():
-            while node not in found and self.before[node] >= 0:
-                found[node] = None
+            while node not in on_paths and self.before[node] >= 0:
+                on_paths[node] = None
                 node = int(self.before[node])
-        return np.array(list(found), dtype=np.int64)
+        return np.array(list(on_paths), dtype=np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,11 +120,11 @@ def find_paths(
             continue
         for i in range(starts[v], starts[v + 1]):
             e = sides[i]
-            other = ends[e, 0] + ends[e, 1] - v
-            if key + costs[e] < distance[other]:
-                distance[other], before[other], edge[other] = key + costs[e], v, e
-                source[other] = source[v]
-                size = push(keys, items, size, distance[other], other)
+            neighbour = ends[e, 0] + ends[e, 1] - v
+            if key + costs[e] < distance[neighbour]:
+                distance[neighbour], before[neighbour], edge[neighbour] = key + costs[e], v, e
+                source[neighbour] = source[v]
+                size = push(keys, items, size, distance[neighbour], neighbour)
 
 
 @compiled
@@ -153,13 +153,13 @@ def drop_first(keys: FloatArray, items: IntArray, size: int) -> int:
         first = 4 * i + 1
         if first >= size:
             break
-        child, least = first, keys[first]
-        for other in range(first + 1, min(first + 4, size)):
-            if keys[other] < least:
-                child, least = other, keys[other]
-        if least >= key:
+        child, smallest = first, keys[first]
+        for sibling in range(first + 1, min(first + 4, size)):
+            if keys[sibling] < smallest:
+                child, smallest = sibling, keys[sibling]
+        if smallest >= key:
             break
-        keys[i] = least
+        keys[i] = smallest
         items[i] = items[child]
         i = child
     keys[i] = key

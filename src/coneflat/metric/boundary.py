@@ -101,12 +101,12 @@ def prescribed_boundary(
     round_total[outer] = np.nan if len(corners) else needed
     if len(corners):
         values[corners] = np.where(np.isnan(curvatures), needed / len(corners), curvatures)
-        found = float(values.sum())
-        if abs(found - needed) > TYPED_TOLERANCE:
+        total = float(values.sum())
+        if abs(total - needed) > TYPED_TOLERANCE:
             raise CurvatureError(
-                f"the corners' curvatures must sum to {needed / np.pi:.6g} pi, but sum to {found / np.pi:.6g} pi"
+                f"the corners' curvatures must sum to {needed / np.pi:.6g} pi, but sum to {total / np.pi:.6g} pi"
             )
-        values[corners] += (needed - found) / len(corners)
+        values[corners] += (needed - total) / len(corners)
         worst = corners[np.argmax(values[corners])]
         if values[worst] >= np.pi:
             advice = "give more corners" if np.isnan(curvatures).all() else "choose smaller curvatures"

@@ -30,7 +30,7 @@ MAX_STEP = 5.0
 MAX_RELATIVE_RESIDUAL = 0.05
 # Number of vertices below which a factorization takes less time than the function calls of conjugate gradients.
 MAX_DIRECT_VERTICES = 200
-# Largest difference of log scales whose Hessians are nearly the same.
+# Largest difference of log conformal factors whose Hessians are nearly the same.
 MAX_REUSE_CHANGE = 0.05
 # Largest number of halvings of a step on surfaces with a boundary: instead of taking tiny steps past triangles that
 # nearly break the triangle inequality, the surface is doubled.
@@ -39,7 +39,7 @@ HALVINGS_BOUNDED = 6
 
 @dataclass(eq=False)
 class State(Point):
-    """Curvature for a log scale, on the triangulation that is Delaunay for it.
+    """Curvature for a log conformal factor, on the triangulation that is Delaunay for it.
 
     Attributes:
         curvature: (n,) radians; the residual is the target minus this.
@@ -54,7 +54,7 @@ class State(Point):
 
 
 def centred(log_scale: FloatArray) -> FloatArray:
-    """Return a log scale shifted so that the middle of its range is 0, which avoids overflow and keeps all angles."""
+    """Return a log conformal factor with the middle of its range shifted to 0: no overflow, and the same angles."""
     return log_scale - (log_scale.max() + log_scale.min()) / 2
 
 
@@ -87,7 +87,7 @@ class ConformalProblem:
     last: State | None = None
     _pattern: HessianPattern | None = None
     _factor: Factor | None = None
-    _known: tuple[LaplacianInverse, FloatArray, LaplacianInverse] | None = None
+    _correction: tuple[LaplacianInverse, FloatArray, LaplacianInverse] | None = None
 
     @cached_property
     def is_bounded(self) -> bool:
@@ -112,13 +112,13 @@ class ConformalProblem:
         return sum_angles(self.triangulation.tail, self.triangulation.length, scale, sums, cots)
 
     def evaluate(self, log_scale: FloatArray) -> State:
-        """Return the state of a log scale (n,); the triangulation is flipped to Delaunay in the scaled metric."""
+        """Return the state of a log conformal factor (n,); the triangulation is flipped to Delaunay in its metric."""
         sums = np.empty(len(log_scale))
         cots = np.empty(len(self.triangulation.tail))
         broken = self.sum_angles(log_scale, sums, cots)
         # The cotangents are needed anyway, and give a fast test for edges that need no flip.
-        found = np.empty(len(cots), dtype=np.int64)
-        suspects = found[: find_suspects(self.triangulation.twin, cots, found)]
+        edges = np.empty(len(cots), dtype=np.int64)
+        suspects = edges[: find_suspects(self.triangulation.twin, cots, edges)]
         if len(suspects):
             flipped = make_delaunay(self.triangulation, log_scale, suspects)
             if len(flipped):
@@ -143,7 +143,7 @@ class ConformalProblem:
         errors = np.bincount(self.triangulation.tail, np.repeat(triangles, 3))
         return min(LENGTH_ROUNDING * float(errors.max()), MAX_ROUNDING_ERROR)
 
-    def direction(self, here: State, exactly: bool) -> tuple[FloatArray, bool]:
+    def direction(self, point: State, exactly: bool) -> tuple[FloatArray, bool]:
         """Return (n,) the Newton direction of a state, 0 at fixed vertices, and whether the Hessian was factorized.
 
         exactly: factorize the Hessian even if there is a preconditioner.
@@ -152,12 +152,12 @@ class ConformalProblem:
             MetricError: the Hessian is singular in double precision.
         """
         # The Hessian needs the triangulation of its own metric.
-        state = here if here is self.last else self.evaluate(here.variables)
+        state = point if point is self.last else self.evaluate(point.variables)
         if exactly:
             self.preconditioner = None
         if self._pattern is None:
             self._pattern = HessianPattern(self.triangulation)
-        if self.preconditioner is not None and len(here.variables) >= MAX_DIRECT_VERTICES:
+        if self.preconditioner is not None and len(point.variables) >= MAX_DIRECT_VERTICES:
             accuracy = min(max(state.largest, GOAL_RESIDUAL / state.largest / 4), MAX_RELATIVE_RESIDUAL)
             hessian = self._pattern.matrix(state.cots, self.fixed)
             inverse = self._corrected(self.preconditioner, hessian, state.variables)
@@ -178,10 +178,10 @@ class ConformalProblem:
         self, inverse: LaplacianInverse, hessian: csc_matrix, log_scale: FloatArray
     ) -> LaplacianInverse:
         """Return an inverse corrected for the Hessian; reused while the Hessian has hardly changed."""
-        known = self._known
-        if known is None or known[0] is not inverse or np.ptp(log_scale - known[1]) > MAX_REUSE_CHANGE:
-            known = self._known = inverse, log_scale, corrected(inverse, hessian, self.fixed)
-        return known[2]
+        cached = self._correction
+        if cached is None or cached[0] is not inverse or np.ptp(log_scale - cached[1]) > MAX_REUSE_CHANGE:
+            cached = self._correction = inverse, log_scale, corrected(inverse, hessian, self.fixed)
+        return cached[2]
 
 
 def find_scale(
@@ -192,8 +192,7 @@ def find_scale(
 ) -> tuple[State, int]:
     """Return the state with the smallest residual that Newton's method reaches, and the number of steps.
 
-    The search starts from a given log scale (n,). On a surface with a boundary it starts from 0 if the given one breaks
-    triangles.
+    The search starts from `log_scale` (n,). On a surface with a boundary it starts from 0 if this breaks triangles.
     """
     start = problem.evaluate(log_scale)
     if not start.is_admissible:
@@ -265,8 +264,8 @@ def sum_angles(
 
 
 @compiled
-def find_suspects(twin: IntArray, cots: FloatArray, found: IntArray) -> int:
-    """Write to `found` one half-edge of each edge that may not be Delaunay; return their number.
+def find_suspects(twin: IntArray, cots: FloatArray, suspects: IntArray) -> int:
+    """Write to `suspects` one half-edge of each edge that may not be Delaunay; return their number.
 
     Its cotangents have a negative sum, or it belongs to a triangle that breaks the triangle inequality.
     """
@@ -281,6 +280,6 @@ def find_suspects(twin: IntArray, cots: FloatArray, found: IntArray) -> int:
             # All cotangents of a triangle whose inequality is broken are 0.
             is_suspect |= cots[base] == 0.0 and cots[base + 1] == 0.0 and cots[base + 2] == 0.0
         if is_suspect:
-            found[count] = h
+            suspects[count] = h
             count += 1
     return count

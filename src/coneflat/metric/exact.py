@@ -89,8 +89,8 @@ def exact_metric(
         lengths: (m, 3) side lengths, column i opposite corner i, model units: those of `edge_lengths`, or any others
             whose triangles have area.
         target: (n,) curvature in radians, or one number for all vertices; not used at fixed vertices.
-        fixed: (n,) True for vertices whose log scale is given and whose curvature is computed: cones with phi = 0, or
-            a free boundary. None: all curvatures are prescribed, and phi, which is then unique up to a constant, is
+        fixed: (n,) True for vertices whose phi is prescribed and whose curvature is computed: cones with phi = 0, or a
+            free boundary. None: all curvatures are prescribed, and phi, which is then unique up to a constant, is
             chosen to preserve the total area.
         fixed_log_scale: (n,) or one number, phi at the fixed vertices.
         start: (n,) initial phi; the linear solution is a good choice.
@@ -138,8 +138,10 @@ def exact_metric(
 
         first: (n,) initial phi.
         """
-        original, known = np.arange(n), flipped if delaunay and not doubled else None
-        triangulation = intrinsic_triangulation(mesh, lengths) if known is None else deepcopy(known[0])
+        original, delaunay_flips = np.arange(n), flipped if delaunay and not doubled else None
+        triangulation = (
+            intrinsic_triangulation(mesh, lengths) if delaunay_flips is None else deepcopy(delaunay_flips[0])
+        )
         if doubled:
             triangulation, original = double(triangulation)
             problem = ConformalProblem(
@@ -152,15 +154,17 @@ def exact_metric(
         else:
             problem = ConformalProblem(triangulation, flat_angle, target, fixed, pinned, preconditioner)
         if delaunay:
-            problem.records.append(make_delaunay(triangulation) if known is None else known[1])
+            problem.records.append(
+                make_delaunay(triangulation) if delaunay_flips is None else delaunay_flips[1]
+            )
         state, steps = find_scale(problem, first[original], tolerance, max_steps)
         return problem, state, original, steps
 
     problem, state, original, steps = solved_from(log_scale)
     if not _is_solved(problem, state, tolerance) and mesh.is_boundary_vertex.any() and not doubled:
         doubled = True
-        problem, state, original, more = solved_from(log_scale)
-        steps += more
+        problem, state, original, further_steps = solved_from(log_scale)
+        steps += further_steps
     if not _is_solved(problem, state, tolerance) and (log_scale != plain).any():
         # An initial phi may be so far off, for example on a surface of many spikes, that triangles there vanish. With
         # phi = 0 they are those of the input.
@@ -242,7 +246,7 @@ def checked_target(mesh: TriangleMesh, target: FloatArray, fixed: BoolArray) -> 
     Args:
         mesh: the mesh.
         target: (n,) curvature, radians; not used at fixed vertices.
-        fixed: (n,) vertices whose log scale is given.
+        fixed: (n,) vertices whose log conformal factor is given.
 
     Returns:
         (n,) the corrected target, and (n,) True at one vertex of each component without fixed vertices.

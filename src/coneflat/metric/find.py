@@ -14,6 +14,7 @@ import numpy as np
 from scipy.sparse import csc_matrix
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, mask_of
+from ..base.progress import stage
 from ..errors import ConvergenceError
 from ..geometry import corner_angles, double_areas
 from ..geometry.handles import (
@@ -46,12 +47,13 @@ SCALING_WEIGHT = 1e-3
 CONE_RINGS = 3
 
 
+@stage("metric")
 def find_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec, steps: int = 200) -> FlatMetric:
     """Return the flat metric of a connected mesh for its cones.
 
     Args:
         surface: the mesh with its side lengths.
-        solution: cones, target curvatures and the linear log scale.
+        solution: cones, target curvatures and the linear log conformal factor.
         spec: the options of the metric.
         steps: maximum number of Newton steps of each attempt at an exact metric without a quantum.
 
@@ -121,7 +123,7 @@ def corrected_flat_metric(
 
     Args:
         lengths: (m, 3) side lengths.
-        solution: cones, target curvatures and the linear log scale.
+        solution: cones, target curvatures and the linear log conformal factor.
         solve: returns the exact metric of other side lengths for cones.
         holonomy: of loops along the handles, and around the holes if the boundary is free.
         quantum: radians.
@@ -130,7 +132,7 @@ def corrected_flat_metric(
         ConvergenceError: the rotations did not converge to multiples of the quantum, or need too many steps.
     """
     # The first error is the ninth.
-    mesh, given, changes, errors = holonomy.mesh, lengths, None, 8 * [np.inf]
+    mesh, original_lengths, changes, errors = holonomy.mesh, lengths, None, 8 * [np.inf]
     off, inverse, step = np.empty(0), np.empty((0, 0)), np.empty(0)
     for left in range(MAX_STEPS, -1, -1):
         metric = solve(lengths, solution)
@@ -140,7 +142,7 @@ def corrected_flat_metric(
         # With many loops, rounding leaves more: the errors then no longer decrease.
         is_rounding = errors[-2] < 2 * errors[-1] <= 200 * TOLERANCE
         if errors[-1] <= TOLERANCE or is_rounding:
-            change = float(np.abs(np.log(lengths / given)).max())
+            change = float(np.abs(np.log(lengths / original_lengths)).max())
             note = (
                 f"Rotations around holes and along handles were off by up to {errors[8]:.2g} rad; edge lengths were "
                 f"changed by up to {100 * change:.2g}% to make them multiples of {quantum:.4g} rad (quantise)."

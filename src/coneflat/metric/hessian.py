@@ -111,25 +111,25 @@ def number_entries(
             the same vertex.
         diagonal: (n,) the indices of the diagonal entries on return.
     """
-    kept, begin = 0, 0
+    count, begin = 0, 0
     for v in range(len(starts) - 1):
         end = starts[v + 1]
-        starts[v] = kept
+        starts[v] = count
         sort_keys(keys[begin:end])
         last = -1
         for at in range(begin, end):
             row, h = keys[at] >> 32, (keys[at] & 0xFFFFFFFF) - 1
             if row != last:
                 last = row
-                rows[kept] = row
+                rows[count] = row
                 if row == v:
-                    diagonal[v] = kept
-                kept += 1
+                    diagonal[v] = count
+                count += 1
             if h >= 0:
-                entry[h] = kept - 1
+                entry[h] = count - 1
         begin = end
-    starts[len(starts) - 1] = kept
-    return kept
+    starts[len(starts) - 1] = count
+    return count
 
 
 @compiled
@@ -199,20 +199,20 @@ def changed_share(
         if fixed[v]:
             continue
         change, diagonal = 0.0, 0.0
-        at, other = starts[v], other_starts[v]
-        while at < starts[v + 1] or other < other_starts[v + 1]:
-            row = rows[at] if at < starts[v + 1] else len(fixed)
-            if other < other_starts[v + 1]:
-                row = min(row, other_rows[other])
+        first, second = starts[v], other_starts[v]
+        while first < starts[v + 1] or second < other_starts[v + 1]:
+            row = rows[first] if first < starts[v + 1] else len(fixed)
+            if second < other_starts[v + 1]:
+                row = min(row, other_rows[second])
             value = 0.0
-            if at < starts[v + 1] and rows[at] == row:
-                value += values[at]
-                at += 1
-            if other < other_starts[v + 1] and other_rows[other] == row:
-                value -= other_values[other]
+            if first < starts[v + 1] and rows[first] == row:
+                value += values[first]
+                first += 1
+            if second < other_starts[v + 1] and other_rows[second] == row:
+                value -= other_values[second]
                 if row == v:
-                    diagonal = other_values[other]
-                other += 1
+                    diagonal = other_values[second]
+                second += 1
             if not fixed[row]:
                 change += abs(value)
         share[v] = change / diagonal if diagonal > 0 else np.inf
@@ -231,8 +231,10 @@ def corrected(inverse: LaplacianInverse, matrix: csc_matrix, fixed: BoolArray) -
         matrix: the matrix.
         fixed: (n,) rows that do not count.
     """
-    one, other = matrix, inverse.laplacian
-    share = changed_share(one.indptr, one.indices, one.data, other.indptr, other.indices, other.data, fixed)
+    current, previous = matrix, inverse.laplacian
+    share = changed_share(
+        current.indptr, current.indices, current.data, previous.indptr, previous.indices, previous.data, fixed
+    )
     chosen = np.flatnonzero(share > max(CHANGED_SHARE, float(np.quantile(share, 1 - MAX_CORRECTED_SHARE))))
     if not len(chosen):
         return inverse
@@ -244,9 +246,9 @@ def corrected(inverse: LaplacianInverse, matrix: csc_matrix, fixed: BoolArray) -
         return inverse
 
     def solve(right: FloatArray) -> FloatArray:
-        own = factor.solve(right[chosen])
-        solution = inverse.solve(right - columns @ own)
-        solution[chosen] += own
+        correction = factor.solve(right[chosen])
+        solution = inverse.solve(right - columns @ correction)
+        solution[chosen] += correction
         solution[chosen] += factor.solve(right[chosen] - columns.T @ solution)
         return solution
 

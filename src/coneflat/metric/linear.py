@@ -1,4 +1,4 @@
-"""The linear metric of the paper: the log scale solves a linear system, lengths are integrals along edges."""
+"""The linear metric of the paper: phi solves a linear system, and lengths are integrals of exp(phi) along edges."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ SERIES = 1e-3
 def linear_flat_metric(
     mesh: TriangleMesh, lengths: FloatArray, solution: ConeSolution, rule: str = "integral"
 ) -> FlatMetric:
-    """Return the linear metric of the paper (Section 2.3) for cones and their log scale, with the area of the input.
+    """Return the linear metric of the paper (Section 2.3) for cones and their phi, with the area of the input.
 
     Args:
         mesh: connected.
         lengths: (m, 3) side lengths, model units.
-        solution: cones, target curvatures and the linear log scale.
+        solution: cones, target curvatures and the linear log conformal factor.
         rule: as in `scaled_lengths`.
 
     Raises:

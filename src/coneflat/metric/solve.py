@@ -62,7 +62,7 @@ class ExactSolver:
 
         Args:
             lengths: (m, 3) side lengths, model units.
-            solution: cones, target curvatures and the linear log scale.
+            solution: cones, target curvatures and the linear log conformal factor.
             flipped: the intrinsic Delaunay triangulation and the half-edges flipped for it, if known.
             steps: maximum number of Newton steps of each attempt.
 
@@ -115,39 +115,39 @@ class ExactSolver:
         steps: int,
     ) -> tuple[ExactMetric, FloatArray]:
         """Return the metric and its target curvature (n,), which for a round boundary depends on the metric."""
-        known = solution.inverse
-        inverse = known if known is not None and np.array_equal(known.is_zero, fixed) else None
+        cached = solution.inverse
+        inverse = cached if cached is not None and np.array_equal(cached.is_zero, fixed) else None
         mesh, boundary = self.mesh, self.boundary
         solve_once = partial(
             exact_metric, mesh, lengths, fixed=fixed, preconditioner=inverse, flipped=flipped, max_steps=steps
         )
 
         def solve(target: FloatArray, start: FloatArray) -> ExactMetric:
-            found = solve_once(target, start=start, doubled=self.is_doubled)
-            self.is_doubled = found.doubled
-            return found
+            solved = solve_once(target, start=start, doubled=self.is_doubled)
+            self.is_doubled = solved.doubled
+            return solved
 
         inside = np.where(mesh.is_boundary_vertex, 0.0, solution.target)
         if boundary is None:
             return solve(inside, start=solution.log_scale), inside
-        wanted = boundary.target(lengths, solution.log_scale)
-        if _is_too_sharp(boundary, wanted):
+        prescribed = boundary.target(lengths, solution.log_scale)
+        if _is_too_sharp(boundary, prescribed):
             # With the linear scale, one side makes up nearly all of the boundary, as on a surface of many spikes.
-            wanted = boundary.target(lengths, np.zeros_like(solution.log_scale))
-        solved = solve(inside + wanted, start=solution.log_scale)
-        step = np.where(wanted < 0, HOLE_STEP, 1.0)
+            prescribed = boundary.target(lengths, np.zeros_like(solution.log_scale))
+        solved = solve(inside + prescribed, start=solution.log_scale)
+        step = np.where(prescribed < 0, HOLE_STEP, 1.0)
         for _ in range(MAX_ROUNDS if boundary.has_round_loops else 0):
-            change = boundary.target(lengths, solved.log_scale) - wanted
-            if not solved.converged or not (np.abs(change) > ROUND_TOLERANCE * np.abs(wanted)).any():
+            change = boundary.target(lengths, solved.log_scale) - prescribed
+            if not solved.converged or not (np.abs(change) > ROUND_TOLERANCE * np.abs(prescribed)).any():
                 break
-            rounder = wanted + step * change
+            rounder = prescribed + step * change
             if _is_too_sharp(boundary, rounder):
                 break
-            again = solve(inside + rounder, start=solved.log_scale)
-            if not again.converged:
+            resolved = solve(inside + rounder, start=solved.log_scale)
+            if not resolved.converged:
                 break
-            wanted, solved = rounder, again
-        return solved, inside + wanted
+            prescribed, solved = rounder, resolved
+        return solved, inside + prescribed
 
 
 def _length_notes(
@@ -176,6 +176,6 @@ def _length_notes(
     return (Unmet(note),)
 
 
-def _is_too_sharp(boundary: BoundaryCurvature, wanted: FloatArray) -> bool:
+def _is_too_sharp(boundary: BoundaryCurvature, prescribed: FloatArray) -> bool:
     """Return whether a round boundary would have a sharp corner that the user did not prescribe."""
-    return boundary.has_round_loops and bool((wanted[boundary.corners == 0] >= TOO_SHARP).any())
+    return boundary.has_round_loops and bool((prescribed[boundary.corners == 0] >= TOO_SHARP).any())

@@ -128,18 +128,22 @@ def _across(directions: FloatArray, places: FloatArray) -> FloatArray:
 
 
 def _indices(value: ArrayLike, count: int, name: str) -> IntArray:
-    given: Any = np.asarray(value)
-    if given.size == 0:
+    indices: Any = np.asarray(value)
+    if indices.size == 0:
         return np.empty(0, dtype=np.int64)
-    if given.ndim != 1 or given.dtype.kind not in "iu":
-        raise OptionError(f"{name} must be a list of indices, got {given.dtype} of shape {given.shape}")
-    if given.min() < 0 or given.max() >= count:
-        raise OptionError(f"{name} must be below {count}, got indices from {given.min()} to {given.max()}")
-    return given.astype(np.int64)
+    if indices.ndim != 1 or indices.dtype.kind not in "iu":
+        raise OptionError(f"{name} must be a list of indices, got {indices.dtype} of shape {indices.shape}")
+    if indices.min() < 0 or indices.max() >= count:
+        raise OptionError(
+            f"{name} must be below {count}, got indices from {indices.min()} to {indices.max()}"
+        )
+    return indices.astype(np.int64)
 
 
 def _floats(value: ArrayLike, name: str) -> FloatArray:
-    given = np.asarray(value, dtype=np.float64)
-    if not np.isfinite(given).all():
-        raise OptionError(f"{name} must be finite: {plural(int((~np.isfinite(given)).sum()), 'number')} not")
-    return given
+    numbers = np.asarray(value, dtype=np.float64)
+    if not np.isfinite(numbers).all():
+        raise OptionError(
+            f"{name} must be finite: {plural(int((~np.isfinite(numbers)).sum()), 'number')} not"
+        )
+    return numbers

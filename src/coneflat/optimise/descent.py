@@ -87,16 +87,16 @@ def descend(
     def sums(values: FloatArray) -> FloatArray:
         return np.bincount(part, values, parts).astype(np.float64)
 
-    here = sums(elements.energies(energy, maps))
-    before, done, least = float(here.sum()), 0.0, energy.least * sums(elements.weight)
+    energies = sums(elements.energies(energy, maps))
+    before, done, minima = float(energies.sum()), 0.0, energy.minimum * sums(elements.weight)
     total, unknowns = np.zeros(elements.count + 1), np.arange(elements.count)
     active = np.ones(parts, dtype=bool)
     factor: Factor | None = None
     while taken < steps and ((elements.count and active.any()) or remaining > RELATIVE_ROUNDING):
         if not together and elements.count and active[unknown_part].mean() < MIN_ACTIVE_SHARE:
-            done += float(here[~active].sum())
+            done += float(energies[~active].sum())
             elements, of_chosen = elements.of_parts(active)
-            unknowns, here, least = unknowns[of_chosen], here[active], least[active]
+            unknowns, energies, minima = unknowns[of_chosen], energies[active], minima[active]
             part, parts, unknown_part = elements.part, elements.parts, elements.unknown_part
             maps, active, factor = elements.maps(places), np.ones(parts, dtype=bool), None
         check_cancelled()
@@ -109,11 +109,11 @@ def descend(
             if not np.isfinite(step).all():
                 raise MetricError(f"relaxation found no finite step of its {elements.count:,} unknowns")
             slope = np.bincount(unknown_part, gradient * step[:-1], parts)
-            if remaining or not (slope[active] > RELATIVE_ROUNDING * here[active]).any():
+            if remaining or not (slope[active] > RELATIVE_ROUNDING * energies[active]).any():
                 break
-        is_last = (-slope <= tolerance * (here - least)) & (not remaining)
+        is_last = (-slope <= tolerance * (energies - minima)) & (not remaining)
         if not remaining:
-            active &= -slope > RELATIVE_ROUNDING * here
+            active &= -slope > RELATIVE_ROUNDING * energies
             step[:-1][~active[unknown_part]] = 0.0
             if not active.any():
                 break
@@ -124,9 +124,13 @@ def descend(
         taken += 1
         for _ in range(HALVINGS):
             trial = maps.plus(length[part], change)
-            there = sums(elements.energies(energy, trial))
+            trial_energies = sums(elements.energies(energy, trial))
             # The energy may have to rise on the way to the constraints, so it need only be finite.
-            enough = np.isfinite(there) if remaining else there <= here + ARMIJO * length * slope
+            enough = (
+                np.isfinite(trial_energies)
+                if remaining
+                else trial_energies <= energies + ARMIJO * length * slope
+            )
             good = ~active | enough
             if good.all():
                 break
@@ -136,21 +140,21 @@ def descend(
         # Without the negative eigenvalues of the Hessians, steps are too short.
         for times in () if remaining else (1.5, 1.5):
             longer = np.minimum(times * length, farthest)
-            beyond = sums(elements.energies(energy, maps.plus(longer[part], change)))
-            better = (length > 0) & (beyond < there)
-            if not better.any():
+            longer_energies = sums(elements.energies(energy, maps.plus(longer[part], change)))
+            is_lower = (length > 0) & (longer_energies < trial_energies)
+            if not is_lower.any():
                 break
-            length[better], there[better] = longer[better], beyond[better]
+            length[is_lower], trial_energies[is_lower] = longer[is_lower], longer_energies[is_lower]
         total[unknowns] += length[unknown_part] * step[:-1]
         total[-1] += length[0] * step[-1] if remaining else 0.0
         places = points + motions.shifts(total)
         maps = elements.maps(places)
-        here = sums(elements.energies(energy, maps))
+        energies = sums(elements.energies(energy, maps))
         if remaining:
             remaining = 1.0 - float(total[-1])
             remaining = remaining if remaining > RELATIVE_ROUNDING else 0.0
             if length[0] < MIN_PROGRESS:
                 break
-        if progress is not None and progress(taken, done + float(here.sum())):
+        if progress is not None and progress(taken, done + float(energies.sum())):
             break
-    return Descent(places, before, done + float(here.sum()), taken, remaining)
+    return Descent(places, before, done + float(energies.sum()), taken, remaining)

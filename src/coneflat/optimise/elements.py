@@ -39,8 +39,8 @@ class Maps:
 
     def singular_values(self) -> tuple[FloatArray, FloatArray]:
         """Return (f,), (f,) the larger and the smaller singular value; the latter is negative for flipped maps."""
-        one, two = np.abs(self.a), np.abs(self.b)
-        return one + two, one - two
+        size_a, size_b = np.abs(self.a), np.abs(self.b)
+        return size_a + size_b, size_a - size_b
 
     def largest_steps(self, step: Maps) -> FloatArray:
         """Return (f,) the step lengths at which the triangles have no area, infinite if there is none."""
@@ -70,52 +70,61 @@ class Elements:
     """
 
     def __init__(
-        self, motions: Motions, corners: IntArray, rest: ComplexArray, unit: float, weight: FloatArray
+        self, motions: Motions, corners: IntArray, rest_sides: ComplexArray, unit: float, weight: FloatArray
     ) -> None:
         """Find the triangles that the motions move, and the derivatives of their maps.
 
         Args:
             motions: the motions of points.
             corners: (m, 3) the points of all triangles.
-            rest: (m, 3) complex sides in the target shape; used only for triangles that move.
+            rest_sides: (m, 3) complex sides in the target shape; used only for triangles that move.
             unit: factor of these sides.
             weight: (m,) weights of the triangles.
         """
-        moves = np.diff(motions.start) > 0
+        matrix = motions.matrix
+        moves = np.diff(matrix.indptr) > 0
         self.faces = np.flatnonzero(has_any(moves, corners))
         self.count, self.weight = motions.count, weight[self.faces]
         corners = corners[self.faces]
         self._corners = corners
-        self._a_of, self._b_of = map_factors(unit * rest[self.faces])
+        self._a_of, self._b_of = map_factors(unit * rest_sides[self.faces])
         # The unknowns of an element are those of its corners in order; an unknown may occur twice.
-        sizes = np.diff(motions.start)[corners.ravel()]
+        sizes = np.diff(matrix.indptr)[corners.ravel()]
         ends = np.cumsum(sizes)
         self._start = np.concatenate([[0], ends[2::3]])
         entry = np.arange(len(sizes)).repeat(sizes)
         at = (
-            motions.start[corners.ravel()].repeat(sizes)
+            matrix.indptr[corners.ravel()].repeat(sizes)
             + np.arange(int(sizes.sum()))
             - (ends - sizes).repeat(sizes)
         )
-        self._unknown = motions.unknown[at]
-        self._alpha = self._a_of.ravel()[entry] * motions.coefficient[at]
-        self._beta = self._b_of.ravel()[entry] * motions.coefficient[at]
+        self._unknown = matrix.indices[at].astype(np.int64)
+        self._alpha = self._a_of.ravel()[entry] * matrix.data[at]
+        self._beta = self._b_of.ravel()[entry] * matrix.data[at]
         self._find_pattern()
 
     def of_parts(self, chosen: BoolArray) -> tuple[Elements, IntArray]:
         """Return the elements of chosen parts (parts,), renumbered, and (k',) the indices here of their unknowns."""
-        some, is_kept = chosen[self.part], chosen[self.unknown_part]
-        unknowns = np.flatnonzero(is_kept)
-        number = np.append(np.cumsum(is_kept) - 1, len(unknowns))
-        found, sizes = copy(self), np.diff(self._start)
-        entries = some.repeat(sizes)
-        found.faces, found.weight, found.count = self.faces[some], self.weight[some], len(unknowns)
-        found._corners, found._a_of, found._b_of = self._corners[some], self._a_of[some], self._b_of[some]
-        found._start = np.concatenate([[0], np.cumsum(sizes[some])])
-        found._unknown = number[self._unknown[entries]]
-        found._alpha, found._beta = self._alpha[entries], self._beta[entries]
-        found._find_pattern()
-        return found, unknowns
+        is_chosen, is_chosen_unknown = chosen[self.part], chosen[self.unknown_part]
+        unknowns = np.flatnonzero(is_chosen_unknown)
+        number = np.append(np.cumsum(is_chosen_unknown) - 1, len(unknowns))
+        restricted, sizes = copy(self), np.diff(self._start)
+        entries = is_chosen.repeat(sizes)
+        restricted.faces, restricted.weight, restricted.count = (
+            self.faces[is_chosen],
+            self.weight[is_chosen],
+            len(unknowns),
+        )
+        restricted._corners, restricted._a_of, restricted._b_of = (
+            self._corners[is_chosen],
+            self._a_of[is_chosen],
+            self._b_of[is_chosen],
+        )
+        restricted._start = np.concatenate([[0], np.cumsum(sizes[is_chosen])])
+        restricted._unknown = number[self._unknown[entries]]
+        restricted._alpha, restricted._beta = self._alpha[entries], self._beta[entries]
+        restricted._find_pattern()
+        return restricted, unknowns
 
     def _find_pattern(self) -> None:
         k, sizes = self.count, np.diff(self._start)
@@ -152,10 +161,10 @@ class Elements:
 
     def energies(self, energy: Energy, maps: Maps) -> FloatArray:
         """Return (f,) the energy of each triangle; infinite where it is flipped, unless the energy is regularised."""
-        one, two = maps.singular_values()
-        is_positive = (two > 0) | energy.is_regularised
-        values = np.full(len(one), np.inf)
-        values[is_positive] = energy.values(one[is_positive], two[is_positive]) * self.weight[is_positive]
+        s1, s2 = maps.singular_values()
+        is_positive = (s2 > 0) | energy.is_regularised
+        values = np.full(len(s1), np.inf)
+        values[is_positive] = energy.values(s1[is_positive], s2[is_positive]) * self.weight[is_positive]
         return values
 
     def newton_system(
@@ -174,14 +183,14 @@ class Elements:
             coordinates: Smith, de Goes, Kim, "Analytic eigensystems for isotropic distortion energies", 2019). Each
             block is projected to a positive semidefinite one.
         """
-        one, two = np.abs(maps.a), np.abs(maps.b)
-        found = energy.derivatives(one + two, one - two)
-        by_a, by_b = found.one + found.two, found.one - found.two
-        first = found.one_one + 2 * found.one_two + found.two_two
-        last = found.one_one - 2 * found.one_two + found.two_two
-        cross = found.one_one - found.two_two
-        unit_a, turn_a = _polar(maps.a, one, two, by_a, first)
-        unit_b, turn_b = _polar(maps.b, two, one, by_b, last)
+        size_a, size_b = np.abs(maps.a), np.abs(maps.b)
+        derivatives = energy.derivatives(size_a + size_b, size_a - size_b)
+        by_a, by_b = derivatives.by_1 + derivatives.by_2, derivatives.by_1 - derivatives.by_2
+        first = derivatives.by_11 + 2 * derivatives.by_12 + derivatives.by_22
+        last = derivatives.by_11 - 2 * derivatives.by_12 + derivatives.by_22
+        cross = derivatives.by_11 - derivatives.by_22
+        unit_a, turn_a = _polar(maps.a, size_a, size_b, by_a, first)
+        unit_b, turn_b = _polar(maps.b, size_b, size_a, by_b, last)
         middle, half = (first + last) / 2, (first - last) / 2
         radius = np.hypot(half, cross)
         high, low = np.maximum(middle + radius, 0.0), np.maximum(middle - radius, 0.0)
@@ -223,14 +232,14 @@ class Elements:
 
 
 def _polar(
-    values: ComplexArray, size: FloatArray, other: FloatArray, slope: FloatArray, bend: FloatArray
+    values: ComplexArray, size: FloatArray, reference: FloatArray, slope: FloatArray, bend: FloatArray
 ) -> tuple[ComplexArray, FloatArray]:
     """Return (f,) the directions of complex numbers of a given size, and the derivatives by it divided by it.
 
     By symmetry the derivative `slope` vanishes with the size, so the limit of the quotient is the second derivative
     `bend`. Sizes that are tiny in comparison with `other` count as 0.
     """
-    is_zero = size <= 1e-9 * other
+    is_zero = size <= 1e-9 * reference
     divisor = np.where(is_zero, 1.0, size)
     return np.where(is_zero, 1.0, values / divisor), np.where(is_zero, bend, slope / divisor)
 
@@ -325,9 +334,9 @@ def add_elements(
                     + bends[f, 4] * q_i.imag * q_j.imag
                 )
                 for k in range(1 if i == j else 2):
-                    one, two = (i, j) if k == 0 else (j, i)
-                    slot = slots[squares[f] + (one - begin) * size + two - begin]
+                    row, column = (i, j) if k == 0 else (j, i)
+                    slot = slots[squares[f] + (row - begin) * size + column - begin]
                     if slot >= 0:
                         values[slot] += value
-                    elif unknown[two] == last:
-                        pull[unknown[one]] += value
+                    elif unknown[column] == last:
+                        pull[unknown[row]] += value

@@ -31,6 +31,8 @@ def solutions_of(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, Float
         column; and (d,) the remaining transformed right-hand sides, rounding errors if the equations are consistent,
         else about as large as their contradictions.
     """
+    if not len(right):
+        return eye(rows.shape[1], rows.shape[1] + 1, format="csr"), right
     # Up to a hundred equations are solved faster as a dense system, and so are those that connect most variables, of
     # which few can be eliminated at once.
     equations, variables = _independent_pivots(rows) if len(right) > 100 else (np.empty(0, np.int64),) * 2
@@ -46,16 +48,16 @@ def solutions_of(rows: csr_matrix, right: FloatArray) -> tuple[csr_matrix, Float
     # The given variables are `values` minus `factors` times the others.
     values = right[equations] / divisors
     factors = csr_matrix(rows[equations].multiply(1 / divisors[:, None]))[:, ~is_given]
-    others = rows[~is_used]
-    given = others[:, variables]
-    left = csr_matrix(others[:, ~is_given] - given @ factors)
+    equations_left = rows[~is_used]
+    coefficients = equations_left[:, variables]
+    left = csr_matrix(equations_left[:, ~is_given] - coefficients @ factors)
     left.data[np.abs(left.data) <= ZERO_COEFFICIENT] = 0.0
     left.eliminate_zeros()
-    solutions, residuals = solutions_of(left, right[~is_used] - given @ values)
+    solutions, residuals = solutions_of(left, right[~is_used] - coefficients @ values)
     last = csr_matrix((len(values), solutions.shape[1] - 1))
-    own = hstack([last, values[:, None]]) - factors @ solutions
+    values_of_pivots = hstack([last, values[:, None]]) - factors @ solutions
     order = np.argsort(np.concatenate([np.flatnonzero(~is_given), variables]))
-    return csr_matrix(vstack([solutions, own], format="csr")[order]), residuals
+    return csr_matrix(vstack([solutions, values_of_pivots], format="csr")[order]), residuals
 
 
 def _independent_pivots(rows: csr_matrix) -> tuple[IntArray, IntArray]:
@@ -66,14 +68,16 @@ def _independent_pivots(rows: csr_matrix) -> tuple[IntArray, IntArray]:
     """
     by_variable, entries = rows.tocsc(), rows.tocoo()
     sizes, widths, heights = np.abs(entries.data), np.diff(rows.indptr), np.diff(by_variable.indptr)
-    least = np.full(rows.shape[0], 0.01)
-    np.maximum.at(least, entries.row, sizes / 2)
-    found = np.flatnonzero(sizes >= least[entries.row])
+    threshold = np.full(rows.shape[0], 0.01)
+    np.maximum.at(threshold, entries.row, sizes / 2)
+    candidates = np.flatnonzero(sizes >= threshold[entries.row])
     cost = (widths[entries.row] - 1) * (heights[entries.col] - 1)
-    found = found[np.argsort(cost[found], kind="stable")]
+    candidates = candidates[np.argsort(cost[candidates], kind="stable")]
     has_given, is_contained = np.zeros(rows.shape[0], dtype=bool), np.zeros(rows.shape[1], dtype=bool)
     pivots = []
-    for equation, variable in zip(entries.row[found].tolist(), entries.col[found].tolist(), strict=True):
+    for equation, variable in zip(
+        entries.row[candidates].tolist(), entries.col[candidates].tolist(), strict=True
+    ):
         if not has_given[equation] and not is_contained[variable]:
             pivots.append((equation, variable))
             is_contained[rows.indices[rows.indptr[equation] : rows.indptr[equation + 1]]] = True
@@ -93,8 +97,8 @@ def _solutions_of_dense(rows: FloatArray, right: FloatArray) -> tuple[FloatArray
     turned = lapack.dormqr("L", "T", r[:, : len(scales)], scales, right[:, None], PANEL_COLUMNS)[0][:, 0]
     diagonal = np.abs(np.diag(r))
     rank = int((diagonal > RELATIVE_ROUNDING * max(diagonal[0], 1.0)).sum())
-    wanted = np.concatenate([-r[:rank, rank:], turned[:rank, None]], axis=1)
-    solved = lapack.dtrtrs(r[:rank, :rank], wanted)[0] if rank else wanted
+    columns = np.concatenate([-r[:rank, rank:], turned[:rank, None]], axis=1)
+    solved = lapack.dtrtrs(r[:rank, :rank], columns)[0] if rank else columns
     solutions = np.eye(width, width - rank + 1, k=-rank)
     solutions[:rank] = np.where(np.abs(solved) > ZERO_COEFFICIENT, solved, 0.0)
     return solutions[np.argsort(pivots)], turned[rank:]

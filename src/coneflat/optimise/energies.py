@@ -16,11 +16,11 @@ class Derivatives(NamedTuple):
     """An energy and its derivatives by the singular values s1 >= s2 > 0 of each map, (f,) each."""
 
     value: FloatArray
-    one: FloatArray
-    two: FloatArray
-    one_one: FloatArray
-    one_two: FloatArray
-    two_two: FloatArray
+    by_1: FloatArray
+    by_2: FloatArray
+    by_11: FloatArray
+    by_12: FloatArray
+    by_22: FloatArray
 
 
 class Energy(Protocol):
@@ -36,15 +36,15 @@ class Energy(Protocol):
         ...
 
     @property
-    def least(self) -> float:
+    def minimum(self) -> float:
         """Return the minimum of the energy."""
         ...
 
-    def values(self, one: FloatArray, two: FloatArray) -> FloatArray:
+    def values(self, s1: FloatArray, s2: FloatArray) -> FloatArray:
         """Return (f,) the energy at singular values (f,) each, both positive."""
         ...
 
-    def derivatives(self, one: FloatArray, two: FloatArray) -> Derivatives:
+    def derivatives(self, s1: FloatArray, s2: FloatArray) -> Derivatives:
         """Return the energy and its derivatives."""
         ...
 
@@ -77,41 +77,41 @@ class StretchEnergy:
 
     is_regularised: ClassVar[bool] = False
     #: The minimum of the energy, for isometries.
-    least: ClassVar[float] = 1.0
+    minimum: ClassVar[float] = 1.0
 
-    def values(self, one: FloatArray, two: FloatArray) -> FloatArray:
+    def values(self, s1: FloatArray, s2: FloatArray) -> FloatArray:
         """Return (f,) the energy at singular values (f,) each, both positive."""
-        result: FloatArray = (one / two + two / one) / 2
+        result: FloatArray = (s1 / s2 + s2 / s1) / 2
         if self.stretch != 0:
-            area = one * two
+            area = s1 * s2
             result = result * ((area + 1 / area) / 2) ** self.stretch
         return result if self.sharpness == 1 else result**self.sharpness
 
     @np.errstate(all="ignore")  # triangles that are flipped by rounding; a step is not finite then
-    def derivatives(self, one: FloatArray, two: FloatArray) -> Derivatives:
+    def derivatives(self, s1: FloatArray, s2: FloatArray) -> Derivatives:
         """Return the energy and its derivatives."""
-        ratio, inverse = one / two, two / one
+        ratio, inverse = s1 / s2, s2 / s1
         angle = Derivatives(
             (ratio + inverse) / 2,
-            (1 - inverse**2) / (2 * two),
-            (1 - ratio**2) / (2 * one),
-            inverse / one**2,
-            -(1 / two**2 + 1 / one**2) / 2,
-            ratio / two**2,
+            (1 - inverse**2) / (2 * s2),
+            (1 - ratio**2) / (2 * s1),
+            inverse / s1**2,
+            -(1 / s2**2 + 1 / s1**2) / 2,
+            ratio / s2**2,
         )
-        product = angle if self.stretch == 0 else _product(angle, self._area(one, two))
+        product = angle if self.stretch == 0 else _product(angle, self._area(s1, s2))
         return product if self.sharpness == 1 else _power(product, self.sharpness)
 
-    def _area(self, one: FloatArray, two: FloatArray) -> Derivatives:
+    def _area(self, s1: FloatArray, s2: FloatArray) -> Derivatives:
         """Return A^stretch and its derivatives."""
-        area = one * two
+        area = s1 * s2
         mean = (area + 1 / area) / 2
         power = mean**self.stretch
         slope, bend = (1 - area**-2) / 2, area**-3  # of A, by the area
         first = self.stretch * power / mean * slope
         second = self.stretch * power / mean * ((self.stretch - 1) / mean * slope**2 + bend)
         return Derivatives(
-            power, first * two, first * one, second * two**2, second * area + first, second * one**2
+            power, first * s2, first * s1, second * s2**2, second * area + first, second * s1**2
         )
 
 
@@ -130,45 +130,43 @@ class UntanglingEnergy:
 
     epsilon: FloatArray
     is_regularised: ClassVar[bool] = True
-    least: ClassVar[float] = 0.0
+    minimum: ClassVar[float] = 0.0
 
-    def values(self, one: FloatArray, two: FloatArray) -> FloatArray:
+    def values(self, s1: FloatArray, s2: FloatArray) -> FloatArray:
         """Return (f,) the energy at singular values (f,) each."""
-        return self._parts(one, two)[3]
+        return self._parts(s1, s2)[3]
 
-    def derivatives(self, one: FloatArray, two: FloatArray) -> Derivatives:
+    def derivatives(self, s1: FloatArray, s2: FloatArray) -> Derivatives:
         """Return the energy and its derivatives."""
-        det, root, p, energy = self._parts(one, two)
+        det, root, p, energy = self._parts(s1, s2)
         by_norm, by_det, mixed = 1 / p, det / p - energy / root, -1 / (p * root)
-        twice = 1 / p - det / (p * root) - by_det / root + energy * det / root**3
+        by_det_twice = 1 / p - det / (p * root) - by_det / root + energy * det / root**3
         return Derivatives(
             energy,
-            by_norm * one + by_det * two,
-            by_norm * two + by_det * one,
-            by_norm + 2 * mixed * det + twice * two**2,
-            by_det + mixed * (one**2 + two**2) + twice * det,
-            by_norm + 2 * mixed * det + twice * one**2,
+            by_norm * s1 + by_det * s2,
+            by_norm * s2 + by_det * s1,
+            by_norm + 2 * mixed * det + by_det_twice * s2**2,
+            by_det + mixed * (s1**2 + s2**2) + by_det_twice * det,
+            by_norm + 2 * mixed * det + by_det_twice * s1**2,
         )
 
-    def _parts(
-        self, one: FloatArray, two: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    def _parts(self, s1: FloatArray, s2: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return D, sqrt(epsilon^2 + D^2), p and the energy."""
-        det = one * two
+        det = s1 * s2
         root: FloatArray = np.hypot(self.epsilon, det)
         # Without cancellation where the determinant is negative.
         p = np.where(det > 0, (det + root) / 2, self.epsilon**2 / (2 * (root + np.abs(det))))
-        return det, root, p, ((one**2 + two**2) / 2 + (1 + det**2) / 2) / p
+        return det, root, p, ((s1**2 + s2**2) / 2 + (1 + det**2) / 2) / p
 
 
 def _product(f: Derivatives, g: Derivatives) -> Derivatives:
     return Derivatives(
         f.value * g.value,
-        f.one * g.value + f.value * g.one,
-        f.two * g.value + f.value * g.two,
-        f.one_one * g.value + 2 * f.one * g.one + f.value * g.one_one,
-        f.one_two * g.value + f.one * g.two + f.two * g.one + f.value * g.one_two,
-        f.two_two * g.value + 2 * f.two * g.two + f.value * g.two_two,
+        f.by_1 * g.value + f.value * g.by_1,
+        f.by_2 * g.value + f.value * g.by_2,
+        f.by_11 * g.value + 2 * f.by_1 * g.by_1 + f.value * g.by_11,
+        f.by_12 * g.value + f.by_1 * g.by_2 + f.by_2 * g.by_1 + f.value * g.by_12,
+        f.by_22 * g.value + 2 * f.by_2 * g.by_2 + f.value * g.by_22,
     )
 
 
@@ -177,9 +175,9 @@ def _power(f: Derivatives, exponent: float) -> Derivatives:
     bend = (exponent - 1) * slope / f.value
     return Derivatives(
         f.value**exponent,
-        slope * f.one,
-        slope * f.two,
-        slope * f.one_one + bend * f.one**2,
-        slope * f.one_two + bend * f.one * f.two,
-        slope * f.two_two + bend * f.two**2,
+        slope * f.by_1,
+        slope * f.by_2,
+        slope * f.by_11 + bend * f.by_1**2,
+        slope * f.by_12 + bend * f.by_1 * f.by_2,
+        slope * f.by_22 + bend * f.by_2**2,
     )

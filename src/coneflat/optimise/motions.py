@@ -1,14 +1,19 @@
-"""Motions of the points of a layout as functions of unknowns, such that seams stay rigid and constraints hold."""
+"""Motions of the points of a layout as functions of unknowns, such that seams stay rigid and constraints hold.
+
+The shifts of points are eliminated in two steps, each a product with a sparse matrix. First they are written as sums of
+real numbers, here called sources: the shifts of free points, and coupled ones, which several points share. The coupled
+sources satisfy linear equations. In the second step they are replaced by the solutions of these equations.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_matrix, eye, vstack
+from scipy.sparse import csr_matrix
 
-from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, mask_of
 from ..errors import OptionError
 from ..geometry.planar import as_complex
 from ..mesh.charts import point_vertices
@@ -19,366 +24,450 @@ from .seam_chains import SeamChains, constrained_chains
 
 # Unit of the rounding gaps between the sides of seams. In this unit they are large enough not to be treated as zero.
 CLOSING_UNIT = 2.0**-40
+# Kinds of points: those that do not move; those that move freely, along a line, or to a place; the second points of
+# vertices within seams, which follow the first; and joints, whose shifts are coupled to those of others by equations.
+FIXED, FREE, ON_LINE, PINNED, FOLLOWER, JOINT = range(6)
 
 
 @dataclass(frozen=True, eq=False)
 class Motions:
-    """The shift of each point as a sum of real unknowns times complex coefficients.
+    """The shifts of points as linear functions of real unknowns.
 
     Attributes:
-        count: the number of unknowns k, all real.
-        start: (u + 1,) the start of the entries of each point.
-        unknown, coefficient: the unknown of each entry, and the shift of the point per unit of it. Unknown k is not
+        matrix: (u, k + 1) the complex shift of each point per unit of each unknown. Unknown k, the offset, is not
             solved for: with the value 1 it moves the points to where the constraints hold.
+        count: the number of unknowns k.
         has_offset: whether constraints do not hold at the current points.
-        builder: the builder of these motions, if seams have to be closed.
     """
 
-    count: int
-    start: IntArray
-    unknown: IntArray
-    coefficient: ComplexArray
-    has_offset: bool = False
-    builder: _Builder | None = None
+    matrix: csr_matrix
 
-    def closed(self, points: ComplexArray) -> ComplexArray:
-        """Return (u,) moved points with the rounding gaps between the sides of seams closed.
+    @property
+    def count(self) -> int:
+        """Return the number of unknowns, without the offset."""
+        return int(self.matrix.shape[1]) - 1
 
-        If a layout shrinks by a factor of a thousand, the relative size of rounding errors grows by the same factor.
-        """
-        builder = self.builder
-        if builder is None or not len(builder.chains.edges):
-            return points
-        motions = builder.at(points).motions()
-        step = np.zeros(motions.count + 1)
-        step[-1] = CLOSING_UNIT
-        return points + motions.shifts(step)
+    @property
+    def has_offset(self) -> bool:
+        """Return whether the offset moves a point."""
+        return bool(np.any(self.matrix.data[self.matrix.indices == self.count] != 0))
 
     def shifts(self, step: FloatArray) -> ComplexArray:
         """Return (u,) the complex shifts of the points for a step (k + 1,) of the unknowns and the offset."""
-        size = len(self.start) - 1
-        moved = self.coefficient * step[self.unknown]
-        total = np.empty(size, dtype=np.complex128)
-        total.real = np.bincount(self._point, moved.real, size)
-        total.imag = np.bincount(self._point, moved.imag, size)
-        return total
-
-    @cached_property
-    def _point(self) -> IntArray:
-        """Return the point of each coefficient."""
-        return np.arange(len(self.start) - 1).repeat(np.diff(self.start))
+        return np.asarray(self.matrix @ step)
 
 
-def find_motions(
+@dataclass(frozen=True, eq=False)
+class Restrictions:
+    """What restricts the motions of points.
+
+    Attributes:
+        vertex: (u,) the vertex of each point.
+        is_free: (u,) True for points that may move; the translation of a seam that contains others is fixed.
+        chains: the seams, across which rotations are preserved.
+        constraints: further constraints.
+    """
+
+    vertex: IntArray
+    is_free: BoolArray
+    chains: SeamChains
+    constraints: CheckedConstraints
+
+
+@dataclass(frozen=True, eq=False)
+class Sources:
+    """The real numbers on which shifts depend: coupled ones, those of single points, and the constant 1, in this order.
+
+    Attributes:
+        coupled: number of coupled sources: two for each joint and each changing translation of a seam, one for each
+            line that moves sideways.
+        constant: index of the constant, the last one.
+        of_point: (u,) the first source of each point: free points and joints have two, the coordinates of the shift,
+            points on lines have one, others none, which is -1.
+        of_chain: (c,) the first of two sources of each seam's translation; -1 if it is fixed.
+        of_line: (l,) the source of each line; -1 if it is fixed.
+    """
+
+    coupled: int
+    constant: int
+    of_point: IntArray
+    of_chain: IntArray
+    of_line: IntArray
+
+
+class Equations(NamedTuple):
+    """Linear equations between coupled sources: matrix entries by row, source and factor; and right-hand sides (r,)."""
+
+    row: IntArray
+    source: IntArray
+    factor: FloatArray
+    right: FloatArray
+
+
+class Entries(NamedTuple):
+    """Entries of a matrix of shifts: the shift of a point per unit of a source."""
+
+    point: IntArray
+    source: IntArray
+    shift: ComplexArray
+
+
+def find_restrictions(
     mesh: TriangleMesh,
     corners: IntArray,
     points: ComplexArray,
     is_free: BoolArray,
     constraints: CheckedConstraints,
-) -> Motions:
-    """Return the motions of points that preserve the rotation across every seam and satisfy constraints.
-
-    An ordinary point has two unknowns, its shift. A vertex within a seam also has two; the shift of its second point is
-    that of the first, rotated by the rotation of the seam, plus the change of the seam's translation. These changes
-    and the shifts of the points where seams end satisfy a small linear system, whose solutions are spanned by further
-    unknowns.
+) -> Restrictions:
+    """Return what restricts the motions of a layout's points.
 
     Args:
         mesh: the mesh.
         corners: (m, 3) the point at each triangle corner.
         points: (u,) positions in the plane as complex numbers.
-        is_free: (n,) True for vertices that may move; the translation of a seam that contains others is fixed.
-        constraints: further constraints on points.
+        is_free: (n,) True for vertices that may move.
+        constraints: constraints on points.
 
     Raises:
         SeamError: the sides of a seam are not rigid copies of each other.
-        OptionError: the constraints contradict each other.
     """
     vertex = point_vertices(mesh.faces, corners, len(points))
     chains = constrained_chains(mesh, corners, points, vertex, constraints)
-    return _Builder(points, vertex, is_free, chains, constraints).motions()
+    return Restrictions(vertex, is_free[vertex], chains, constraints)
 
 
-def _require_solved(residual: float, right: FloatArray) -> None:
+def find_motions(points: ComplexArray, restrictions: Restrictions) -> Motions:
+    """Return the motions of points (u,) that preserve the rotation across every seam and satisfy constraints.
+
+    Raises:
+        OptionError: the constraints contradict each other.
+
+    Notes:
+        The second point of a vertex within a seam has the shift of the first, rotated by the rotation of the seam, plus
+        the change of the seam's translation. At the ends of seams the same holds for the shifts of joints, as
+        equations: several seams meet there.
+    """
+    gaps = np.zeros(restrictions.chains.left.shape, dtype=np.complex128)
+    motions, residual, size = _motions_and_residual(points, restrictions, gaps)
     # The rotations of seams are exact up to rounding, and points are many units from their centres.
-    if residual > 100 * RELATIVE_ROUNDING * max(1.0, float(np.abs(right).max())):
+    if residual > 100 * RELATIVE_ROUNDING * max(1.0, size):
         raise OptionError(f"constraints contradict each other, or the seams, by about {residual:.2g}")
+    return motions
 
 
-class _Builder:
-    """The linear system of node shifts, translation changes and line shifts, and the motions of all points."""
+def close_seams(points: ComplexArray, restrictions: Restrictions) -> ComplexArray:
+    """Return (u,) moved points with the rounding gaps between the sides of seams closed.
 
-    def __init__(
-        self,
-        points: ComplexArray,
-        vertex: IntArray,
-        is_free: BoolArray,
-        chains: SeamChains,
-        constraints: CheckedConstraints,
-        is_closing: bool = False,
-    ) -> None:
-        self.points, self.vertex, self.chains, self.constraints = points, vertex, chains, constraints
-        self.is_closing = is_closing
-        self.free_vertices = is_free
-        self.is_free = is_free[vertex]
-        self.entries: list[tuple[IntArray, IntArray, ComplexArray]] = []
-        on_seam = np.zeros(len(points), dtype=bool)
-        on_seam[chains.left] = on_seam[chains.right] = True
-        self.is_special = on_seam & chains.is_node[vertex]
-        fixed = np.concatenate([constraints.pinned, constraints.on_line])
-        if len(fixed):
-            twice, times = np.unique(fixed, return_counts=True)
-            self.is_special[twice[times > 1]] = True
-        self.is_special &= self.is_free
-        # Real variables of the linear system: two for each special point and each translation, one for each line.
-        self.of_point = np.full(len(points), -1)
-        special = np.flatnonzero(self.is_special)
-        self.of_point[special] = 2 * np.arange(len(special))
-        self.of_chain = np.full(len(chains.rotation), -1)
-        loose = self._loose_chains()
-        self.of_chain[loose] = 2 * (len(special) + np.arange(len(loose)))
-        self.of_line = np.full(len(constraints.directions), -1)
-        shifting = np.flatnonzero(np.isnan(constraints.offsets))
-        self.of_line[shifting] = 2 * (len(special) + len(loose)) + np.arange(len(shifting))
-        self.size = 2 * (len(special) + len(loose)) + len(shifting)
-        self.translation = self._translations()
-        c = constraints
-        self.ties = [
-            self._tie(side, shift)
-            for side, shift in zip(c.tied.tolist(), as_complex(c.translations).tolist(), strict=True)
-        ]
+    If a layout shrinks by a factor of a thousand, the relative size of rounding errors grows by the same factor.
+    """
+    chains = restrictions.chains
+    if not len(chains.edges):
+        return points
+    images = chains.rotation[chains.chain, None] * points[chains.left]
+    images += mean_translations(points, chains)[chains.chain, None]
+    # The gaps between fixed points remain, so the equations may be inconsistent by rounding.
+    gaps = (images - points[chains.right]) / CLOSING_UNIT
+    motions, _, _ = _motions_and_residual(points, restrictions, gaps)
+    offset = np.zeros(motions.count + 1)
+    offset[-1] = CLOSING_UNIT
+    return points + motions.shifts(offset)
 
-    def at(self, points: ComplexArray) -> _Builder:
-        """Return the builder for moved points; its offset, in units of `CLOSING_UNIT`, closes all seams."""
-        return _Builder(
-            points, self.vertex, self.free_vertices, self.chains, self.constraints, is_closing=True
-        )
 
-    def _loose_chains(self) -> IntArray:
-        """Return the chains whose translations may change."""
-        chains = self.chains
-        stays = ~self.is_free[chains.left] & ~chains.is_node[chains.vertices]
-        return np.flatnonzero(np.bincount(chains.chain, stays.any(axis=1), len(chains.rotation)) == 0)
+def _motions_and_residual(
+    points: ComplexArray, restrictions: Restrictions, gaps: ComplexArray
+) -> tuple[Motions, float, float]:
+    """Return motions that close gaps, and the residual and the largest right-hand side of the equations.
 
-    def _translations(self) -> ComplexArray:
-        """Return (c,) the mean translation of each chain from its rotated left side to its right side."""
-        chains = self.chains
-        off = (
-            self.points[chains.right] - chains.rotation[chains.chain, None] * self.points[chains.left]
-        ).mean(axis=1)
-        total = np.zeros(len(chains.rotation), dtype=np.complex128)
-        np.add.at(total, chains.chain, off)
-        return total / np.bincount(chains.chain, minlength=len(total))
+    gaps: (k, 2) for the ends of seam edges, the shift of the right point that is needed in addition.
+    """
+    kind = point_kinds(restrictions)
+    sources = number_sources(kind, restrictions)
+    constraints = restrictions.constraints
+    distances = line_distances(points, constraints)
+    rows, right = stack_equations(
+        [
+            joint_equations(kind, sources, restrictions, gaps),
+            pin_equations(kind, sources, points, constraints),
+            tie_equations(sources, mean_translations(points, restrictions.chains), restrictions),
+            line_equations(kind, sources, distances, constraints),
+        ],
+        sources.coupled,
+    )
+    solutions, residuals = solutions_of(rows, right)
+    leaders = stack_entries(
+        [
+            free_shifts(kind, sources),
+            line_shifts(kind, sources, distances, constraints),
+            pinned_shifts(kind, sources, points, constraints),
+        ],
+        sources,
+    )
+    matrix = with_followers(leaders, kind, sources, restrictions.chains, gaps) @ expansion(solutions, sources)
+    residual, size = (float(np.abs(values).max(initial=0.0)) for values in (residuals, right))
+    return Motions(matrix), residual, size
 
-    def _gaps(self, left: IntArray, right: IntArray, chain: IntArray) -> ComplexArray:
-        """Return the shifts of right points that close the gaps to the mapped left points, in units of `CLOSING_UNIT`.
 
-        They are zero unless seams are closed.
-        """
-        if not self.is_closing:
-            return np.zeros(len(left), dtype=np.complex128)
-        turned: ComplexArray = self.chains.rotation[chain] * self.points[left]
-        gaps: ComplexArray = turned + self.translation[chain] - self.points[right]
-        return gaps / CLOSING_UNIT
+def point_kinds(restrictions: Restrictions) -> IntArray:
+    """Return (u,) the kind of each point."""
+    chains, constraints, is_free = restrictions.chains, restrictions.constraints, restrictions.is_free
+    kind = np.where(is_free, FREE, FIXED)
+    kind[constraints.pinned] = PINNED
+    kind[constraints.on_line] = ON_LINE
+    kind[chains.right] = FOLLOWER
+    is_at_node = mask_of(len(kind), np.concatenate([chains.left, chains.right]))
+    is_at_node &= chains.is_node[restrictions.vertex]
+    constrained, times = np.unique(
+        np.concatenate([constraints.pinned, constraints.on_line]), return_counts=True
+    )
+    kind[is_at_node] = kind[constrained[times > 1]] = JOINT
+    return np.where(is_free, kind, FIXED)
 
-    def motions(self) -> Motions:
-        """Return the motions."""
-        basis = self._solutions()
-        self.count = basis.shape[1] - 1
-        self._basis = basis
-        special = np.flatnonzero(self.is_special)
-        self._add(
-            special, self.of_point[special], np.ones(len(special), dtype=np.complex128), is_complex=True
-        )
-        self._add_seams()
-        self._add_ordinary()
-        point, unknown, coefficient = (np.concatenate(parts) for parts in zip(*self.entries, strict=True))
-        last = unknown < 0  # the offset, whose index is known only now
-        unknown = np.where(last, self.count, unknown)
-        order = np.argsort(point, kind="stable")
-        start = np.searchsorted(point[order], np.arange(len(self.points) + 1))
-        return Motions(
-            self.count, start, unknown[order], coefficient[order], bool(np.any(coefficient[last] != 0)), self
-        )
 
-    def _add(self, points: IntArray, variables: IntArray, factors: ComplexArray, is_complex: bool) -> None:
-        """Add shifts of points by variables of the linear system, each multiplied by a factor."""
-        if not len(points):
-            return
-        rows = self._basis[variables]
-        found = (rows + 1j * self._basis[variables + 1] if is_complex else rows).tocoo()
-        row, column, coefficient = found.row, found.col, found.data * factors[found.row]
-        self.entries.append(
-            (points[row], np.where(column == self._basis.shape[1] - 1, -1, column), coefficient)
-        )
+def number_sources(kind: IntArray, restrictions: Restrictions) -> Sources:
+    """Return the numbers of the sources."""
+    chains = restrictions.chains
+    joints = np.flatnonzero(kind == JOINT)
+    is_stuck = ~restrictions.is_free[chains.left] & ~chains.is_node[chains.vertices]
+    loose_chains = np.flatnonzero(np.bincount(chains.chain, is_stuck.any(axis=1), len(chains.rotation)) == 0)
+    loose_lines = np.flatnonzero(np.isnan(restrictions.constraints.offsets))
+    of_point, of_chain = np.full(len(kind), -1), np.full(len(chains.rotation), -1)
+    of_line = np.full(len(restrictions.constraints.directions), -1)
+    of_point[joints] = 2 * np.arange(len(joints))
+    of_chain[loose_chains] = 2 * (len(joints) + np.arange(len(loose_chains)))
+    of_line[loose_lines] = 2 * (len(joints) + len(loose_chains)) + np.arange(len(loose_lines))
+    coupled = 2 * (len(joints) + len(loose_chains)) + len(loose_lines)
+    moving = np.flatnonzero((kind == FREE) | (kind == ON_LINE))
+    ends = coupled + np.cumsum(np.where(kind[moving] == FREE, 2, 1))
+    of_point[moving[:1]], of_point[moving[1:]] = coupled, ends[:-1]
+    constant = int(ends[-1]) if len(ends) else coupled
+    return Sources(coupled, constant, of_point, of_chain, of_line)
 
-    def _add_offset(self, points: IntArray, shifts: ComplexArray) -> None:
-        moved = shifts != 0
-        self.entries.append((points[moved], np.full(int(moved.sum()), -1), shifts[moved]))
 
-    def _add_seams(self) -> None:
-        """Add the motions of vertices within seams, which move both points of a vertex."""
-        chains = self.chains
-        if not len(chains.edges):
-            return
-        inside = (~chains.is_node[chains.vertices]) & self.is_free[chains.left]
-        left, at = np.unique(chains.left[inside], return_index=True)
-        right = chains.right[inside][at]
-        chain = np.broadcast_to(chains.chain[:, None], chains.left.shape)[inside][at]
-        self.is_special[left] = self.is_special[right] = True
-        turn = chains.rotation[chain]
-        self._add_offset(right, self._gaps(left, right, chain))
-        on_line = np.isin(left, self.constraints.on_line)
-        self._add_on_lines(left[on_line], right[on_line], turn[on_line])
-        one, two, turning = left[~on_line], right[~on_line], turn[~on_line]
-        unknown = self.count + 2 * np.arange(len(one))
-        self.count += 2 * len(one)
-        for axis, direction in enumerate((1.0, 1j)):
-            self.entries.append((one, unknown + axis, np.full(len(one), direction, dtype=np.complex128)))
-            self.entries.append((two, unknown + axis, direction * turning))
-        moves = self.of_chain[chain] >= 0
-        ones = np.ones(int(moves.sum()), dtype=np.complex128)
-        self._add(right[moves], self.of_chain[chain[moves]], ones, is_complex=True)
+def mean_translations(points: ComplexArray, chains: SeamChains) -> ComplexArray:
+    """Return (c,) the mean translation of each chain from its rotated left side to its right side."""
+    translations = points[chains.right] - chains.rotation[chains.chain, None] * points[chains.left]
+    total = np.zeros(len(chains.rotation), dtype=np.complex128)
+    np.add.at(total, chains.chain, translations.mean(axis=1))
+    return total / np.bincount(chains.chain, minlength=len(total))
 
-    def _add_on_lines(self, left: IntArray, right: IntArray, turn: ComplexArray) -> None:
-        """Add the motions of left points within seams along and with their lines, and of the matching right points."""
-        if not len(left):
-            return
-        c = self.constraints
-        order = np.argsort(c.on_line, kind="stable")
-        at = order[np.searchsorted(c.on_line[order], left)]
-        line = c.line[at]
-        direction = as_complex(c.directions)[line]
-        normal = 1j * direction
-        off = normal * self._off_line(left, line)
-        shifts = self.of_line[line] >= 0
-        unknown = self.count + np.arange(len(left))
-        self.count += len(left)
-        same: ComplexArray = np.ones_like(turn)
-        for points, factor in ((left, same), (right, turn)):
-            self.entries.append((points, unknown, factor * direction))
-            self._add_offset(points, factor * off)
-            self._add(points[shifts], self.of_line[line[shifts]], (factor * normal)[shifts], is_complex=False)
 
-    def _add_ordinary(self) -> None:
-        """Add the motions of all other points: free, along a line, or to their prescribed positions."""
-        c = self.constraints
-        rest = self.is_free & ~self.is_special
-        if len(c.pinned) or len(c.on_line):
-            self._add_constrained(rest)
-        free = np.flatnonzero(rest)
-        for axis, step in enumerate((1.0, 1j)):
-            directions = np.full(len(free), step, dtype=np.complex128)
-            self.entries.append((free, self.count + 2 * np.arange(len(free)) + axis, directions))
-        self.count += 2 * len(free)
+def line_distances(points: ComplexArray, constraints: CheckedConstraints) -> FloatArray:
+    """Return (q,) the signed distance of each point on a line to it, positive to the left of its direction.
 
-    def _add_constrained(self, rest: BoolArray) -> None:
-        """Add the motions of pinned points and points on lines that are in `rest` (u,), and remove them from it."""
-        c = self.constraints
-        pins = np.flatnonzero(rest[c.pinned])
-        self._add_offset(c.pinned[pins], as_complex(c.places[pins]) - self.points[c.pinned[pins]])
-        rest[c.pinned] = False
-        on = np.flatnonzero(rest[c.on_line])
-        points, line = c.on_line[on], c.line[on]
-        direction = as_complex(c.directions)[line]
-        self.entries.append((points, self.count + np.arange(len(points)), direction))
-        self.count += len(points)
-        normal = 1j * direction
-        self._add_offset(points, normal * self._off_line(points, line))
-        shifts = self.of_line[line] >= 0
-        self._add(points[shifts], self.of_line[line[shifts]], normal[shifts], is_complex=False)
-        rest[c.on_line] = False
+    A line that may move sideways passes through its first point.
+    """
+    line, offsets = constraints.line, constraints.offsets.copy()
+    across = (np.conj(_normals(constraints)[line]) * points[constraints.on_line]).real
+    lines, first = np.unique(line, return_index=True)
+    is_loose = np.isnan(offsets[lines])
+    offsets[lines[is_loose]] = across[first[is_loose]]
+    return offsets[line] - across
 
-    def _off_line(self, points: IntArray, line: IntArray) -> FloatArray:
-        """Return (q,) the signed distance of each point to its line, positive to the left of its direction.
 
-        A line that may move sideways passes through its first point.
-        """
-        c = self.constraints
-        across = (np.conj(1j * as_complex(c.directions)[c.line]) * self.points[c.on_line]).real
-        at = c.offsets.copy()
-        lines, first = np.unique(c.line, return_index=True)
-        loose = np.isnan(at[lines])
-        at[lines[loose]] = across[first[loose]]
-        return at[line] - (np.conj(1j * as_complex(c.directions)[line]) * self.points[points]).real
+def _normals(constraints: CheckedConstraints) -> ComplexArray:
+    """Return (l,) the unit normals of lines, to the left of their directions."""
+    return 1j * as_complex(constraints.directions)
 
-    def _solutions(self) -> csr_matrix:
-        """Return (v, k + 1) a basis of the variables' values, and a particular solution in the last column."""
-        rows, right = self._equations()
-        if not len(right):
-            return eye(self.size, self.size + 1, format="csr")
-        basis, left = solutions_of(rows, right)
-        if not self.is_closing:  # rounding gaps between fixed points may be inconsistent
-            _require_solved(float(np.abs(left).max(initial=0.0)), right)
-        return basis
 
-    def _equations(self) -> tuple[csr_matrix, FloatArray]:
-        """Return (r, v) the equations between the variables, and their right-hand sides (r,)."""
-        ends, values = self._equations_of_ends()
-        rows: list[FloatArray] = []
-        right: list[float] = []
-        c = self.constraints
+def stack_equations(parts: list[Equations], width: int) -> tuple[csr_matrix, FloatArray]:
+    """Return the matrix (r, width) and the right-hand sides (r,) of all equations."""
+    sizes = np.cumsum([0, *(len(part.right) for part in parts)])
+    row = np.concatenate([part.row + start for part, start in zip(parts, sizes, strict=False)])
+    source, factor, right = (np.concatenate(arrays) for arrays in list(zip(*parts, strict=True))[1:])
+    matrix = csr_matrix((factor, (row, source)), shape=(int(sizes[-1]), width))
+    matrix.eliminate_zeros()
+    return matrix, right
 
-        def add(terms: list[tuple[int, complex]], value: complex) -> None:
-            """Add the equation "sum of factors times complex variables = value" as two real equations."""
-            both = np.zeros((2, self.size))
-            for variable, factor in terms:
-                both[0, variable] += factor.real
-                both[0, variable + 1] -= factor.imag
-                both[1, variable] += factor.imag
-                both[1, variable + 1] += factor.real
-            rows.extend(both)
-            right.extend([value.real, value.imag])
 
-        for point, place in zip(c.pinned.tolist(), as_complex(c.places).tolist(), strict=True):
-            if self.of_point[point] >= 0:
-                add([(int(self.of_point[point]), 1.0 + 0.0j)], place - complex(self.points[point]))
-        for chain, value in self.ties:
-            add([(int(self.of_chain[chain]), 1.0 + 0.0j)], value)
-        off = self._off_line(c.on_line, c.line) if len(c.on_line) else np.empty(0)
-        for point, line, value in zip(c.on_line.tolist(), c.line.tolist(), off.tolist(), strict=True):
-            if self.of_point[point] >= 0:
-                row = np.zeros(self.size)
-                normal = 1j * complex(*c.directions[line])
-                row[self.of_point[point] : self.of_point[point] + 2] = normal.real, normal.imag
-                if self.of_line[line] >= 0:
-                    row[self.of_line[line]] = -1.0
-                rows.append(row)
-                right.append(value)
-        if not rows:
-            return ends, values
-        return vstack([ends, csr_matrix(np.array(rows))], format="csr"), np.concatenate([values, right])
+def complex_equations(sources: IntArray, factors: ComplexArray, right: ComplexArray) -> Equations:
+    """Return two real equations for each complex one, in which sums of factors times sources have given values.
 
-    def _equations_of_ends(self) -> tuple[csr_matrix, FloatArray]:
-        """Return equations (2 q, v) and right-hand sides (2 q,): chains map left points at nodes to right ones."""
-        chains = self.chains
-        edge, end = np.nonzero(chains.is_node[chains.vertices])
-        chain, left, right = chains.chain[edge], chains.left[edge, end], chains.right[edge, end]
-        variables = np.stack([self.of_point[right], self.of_point[left], self.of_chain[chain]], axis=1)
-        some = (variables >= 0).any(axis=1)
-        variables, chain, left, right = variables[some], chain[some], left[some], right[some]
-        factors = np.full(variables.shape, 1.0 + 0.0j)
-        factors[:, 1], factors[:, 2] = -chains.rotation[chain], -1.0
-        equation, which = np.nonzero(variables >= 0)
-        variable, factor = variables[equation, which], factors[equation, which]
-        entries = np.concatenate([factor.real, -factor.imag, factor.imag, factor.real])
-        row = np.concatenate([2 * equation, 2 * equation, 2 * equation + 1, 2 * equation + 1])
-        column = np.concatenate([variable, variable + 1, variable, variable + 1])
-        some = entries != 0
-        rows = csr_matrix((entries[some], (row[some], column[some])), shape=(2 * len(chain), self.size))
-        gaps = self._gaps(left, right, chain)
-        return rows, np.stack([gaps.real, gaps.imag], axis=1).ravel()
+    Args:
+        sources: (q, t) the first of the two sources of each complex number; -1 for none.
+        factors: (q, t) complex factors.
+        right: (q,) complex values.
+    """
+    equation, term = np.nonzero(sources >= 0)
+    source, factor = sources[equation, term], factors[equation, term]
+    return Equations(
+        np.concatenate([2 * equation, 2 * equation, 2 * equation + 1, 2 * equation + 1]),
+        np.concatenate([source, source + 1, source, source + 1]),
+        np.concatenate([factor.real, -factor.imag, factor.imag, factor.real]),
+        np.stack([right.real, right.imag], axis=1).ravel(),
+    )
 
-    def _tie(self, side: int, shift: complex) -> tuple[int, complex]:
-        """Return a half-edge's chain, and the change of its translation that gives the half-edge the one in `shift`."""
-        chains = self.chains
-        at = np.argwhere(chains.halfedges == side)
+
+def joint_equations(
+    kind: IntArray, sources: Sources, restrictions: Restrictions, gaps: ComplexArray
+) -> Equations:
+    """Return that seams map the shifts of their left points at nodes to those of the right ones, up to gaps."""
+    chains = restrictions.chains
+    edge, end = np.nonzero(chains.is_node[chains.vertices])
+    chain, left, right = chains.chain[edge], chains.left[edge, end], chains.right[edge, end]
+    of_joint = np.where(kind == JOINT, sources.of_point, -1)
+    terms = np.stack([of_joint[right], of_joint[left], sources.of_chain[chain]], axis=1)
+    factors = np.stack([np.ones(len(chain)), -chains.rotation[chain], -np.ones(len(chain))], axis=1)
+    moves = (terms >= 0).any(axis=1)
+    return complex_equations(terms[moves], factors[moves], gaps[edge, end][moves])
+
+
+def pin_equations(
+    kind: IntArray, sources: Sources, points: ComplexArray, constraints: CheckedConstraints
+) -> Equations:
+    """Return that pinned joints get their places."""
+    is_joint = kind[constraints.pinned] == JOINT
+    pinned = constraints.pinned[is_joint]
+    shifts = as_complex(constraints.places[is_joint]) - points[pinned]
+    return complex_equations(
+        sources.of_point[pinned, None], np.ones((len(pinned), 1), dtype=np.complex128), shifts
+    )
+
+
+def tie_equations(sources: Sources, translations: ComplexArray, restrictions: Restrictions) -> Equations:
+    """Return that tied seams get their translations.
+
+    Raises:
+        OptionError: a tied half-edge is on no seam, or on one whose translation is fixed.
+    """
+    chains, constraints = restrictions.chains, restrictions.constraints
+    terms, changes = [], []
+    for halfedge, target in zip(
+        constraints.tied.tolist(), as_complex(constraints.translations).tolist(), strict=True
+    ):
+        at = np.argwhere(chains.halfedges == halfedge)
         if not len(at):
-            raise OptionError(f"tied half-edge {side} is on no seam")
-        k, is_right = at[0].tolist()
-        chain = int(chains.chain[k])
-        if self.of_chain[chain] < 0:
-            raise OptionError(f"tied half-edge {side} is on a seam with a fixed translation")
-        turn = complex(chains.rotation[chain])
-        wanted = shift if is_right else -turn * shift
-        return chain, wanted - complex(self.translation[chain])
+            raise OptionError(f"tied half-edge {halfedge} is on no seam")
+        edge, is_right = at[0].tolist()
+        chain = int(chains.chain[edge])
+        if sources.of_chain[chain] < 0:
+            raise OptionError(f"tied half-edge {halfedge} is on a seam with a fixed translation")
+        terms.append(sources.of_chain[chain])
+        translation = target if is_right else -complex(chains.rotation[chain]) * target
+        changes.append(translation - complex(translations[chain]))
+    return complex_equations(
+        np.array(terms, dtype=np.int64).reshape(-1, 1),
+        np.ones((len(terms), 1), dtype=np.complex128),
+        np.array(changes, dtype=np.complex128),
+    )
+
+
+def line_equations(
+    kind: IntArray, sources: Sources, distances: FloatArray, constraints: CheckedConstraints
+) -> Equations:
+    """Return that joints on lines reach them: their shift across the line is the distance and the line's shift."""
+    at_joint = np.flatnonzero(kind[constraints.on_line] == JOINT)
+    line, point = constraints.line[at_joint], constraints.on_line[at_joint]
+    normal, row = _normals(constraints)[line], np.arange(len(at_joint))
+    is_loose = sources.of_line[line] >= 0
+    return Equations(
+        np.concatenate([row, row, row[is_loose]]),
+        np.concatenate(
+            [sources.of_point[point], sources.of_point[point] + 1, sources.of_line[line[is_loose]]]
+        ),
+        np.concatenate([normal.real, normal.imag, -np.ones(int(is_loose.sum()))]),
+        distances[at_joint],
+    )
+
+
+def stack_entries(parts: list[Entries], sources: Sources) -> csr_matrix:
+    """Return the (u, s + 1) matrix of the shifts of all points; entries of the constant that are zero are left out."""
+    point, source, shift = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    stays = (source < sources.constant) | (shift != 0)
+    return csr_matrix(
+        (shift[stays], (point[stays], source[stays])), shape=(len(sources.of_point), sources.constant + 1)
+    )
+
+
+def complex_entries(points: IntArray, first: IntArray) -> Entries:
+    """Return the shifts of points (q,) by complex numbers, each given by the first of its two sources (q,)."""
+    ones = np.ones(len(points), dtype=np.complex128)
+    return Entries(
+        np.concatenate([points, points]),
+        np.concatenate([first, first + 1]),
+        np.concatenate([ones, 1j * ones]),
+    )
+
+
+def free_shifts(kind: IntArray, sources: Sources) -> Entries:
+    """Return the shifts of free points and joints."""
+    points = np.flatnonzero((kind == FREE) | (kind == JOINT))
+    return complex_entries(points, sources.of_point[points])
+
+
+def line_shifts(
+    kind: IntArray, sources: Sources, distances: FloatArray, constraints: CheckedConstraints
+) -> Entries:
+    """Return the shifts of points on lines: along the line, with it sideways, and onto it."""
+    at = np.flatnonzero(kind[constraints.on_line] == ON_LINE)
+    points, line = constraints.on_line[at], constraints.line[at]
+    normal = _normals(constraints)[line]
+    is_loose = sources.of_line[line] >= 0
+    return Entries(
+        np.concatenate([points, points[is_loose], points]),
+        np.concatenate(
+            [
+                sources.of_point[points],
+                sources.of_line[line[is_loose]],
+                np.full(len(points), sources.constant),
+            ]
+        ),
+        np.concatenate([-1j * normal, normal[is_loose], normal * distances[at]]),
+    )
+
+
+def pinned_shifts(
+    kind: IntArray, sources: Sources, points: ComplexArray, constraints: CheckedConstraints
+) -> Entries:
+    """Return the shifts of pinned points to their places."""
+    at = np.flatnonzero(kind[constraints.pinned] == PINNED)
+    pinned = constraints.pinned[at]
+    shifts = as_complex(constraints.places[at]) - points[pinned]
+    return Entries(pinned, np.full(len(pinned), sources.constant), shifts)
+
+
+def with_followers(
+    leaders: csr_matrix, kind: IntArray, sources: Sources, chains: SeamChains, gaps: ComplexArray
+) -> csr_matrix:
+    """Return the (u, s + 1) shifts of all points, from those of all but followers.
+
+    A follower has the shift of its leader, the left point of the vertex within a seam, rotated by the rotation of the
+    seam, plus the change of the seam's translation, and the gap.
+    """
+    edge, end = np.nonzero(kind[chains.right] == FOLLOWER)
+    if not len(edge):
+        return leaders
+    followers, first = np.unique(chains.right[edge, end], return_index=True)
+    edge, end = edge[first], end[first]
+    chain = chains.chain[edge]
+    count = len(kind)
+    copies = csr_matrix((chains.rotation[chain], (followers, chains.left[edge, end])), shape=(count, count))
+    is_loose = sources.of_chain[chain] >= 0
+    translations = complex_entries(followers[is_loose], sources.of_chain[chain[is_loose]])
+    closings = Entries(followers, np.full(len(followers), sources.constant), gaps[edge, end])
+    return leaders + copies @ leaders + stack_entries([translations, closings], sources)
+
+
+def expansion(solutions: csr_matrix, sources: Sources) -> csr_matrix:
+    """Return the (s + 1, k + 1) matrix from unknowns to sources: the solutions of equations, and further sources.
+
+    solutions: (v, b + 1) a basis of the values of coupled sources, and their values at the offset in the last column.
+    """
+    coupled = solutions.tocoo()
+    dimension = solutions.shape[1] - 1
+    further = np.arange(sources.coupled, sources.constant + 1)
+    count = dimension + len(further) - 1
+    return csr_matrix(
+        (
+            np.concatenate([coupled.data, np.ones(len(further))]),
+            (
+                np.concatenate([coupled.row, further]),
+                np.concatenate(
+                    [
+                        np.where(coupled.col == dimension, count, coupled.col),
+                        further - sources.coupled + dimension,
+                    ]
+                ),
+            ),
+        ),
+        shape=(sources.constant + 1, count + 1),
+    )

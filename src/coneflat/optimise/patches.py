@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
 from ..errors import MetricError
@@ -48,7 +49,7 @@ class Patches:
         faces: IntArray,
         sides: ComplexArray,
         movable: BoolArray,
-        rest: ComplexArray,
+        target_shapes: ComplexArray,
     ) -> None:
         self.vertices = np.flatnonzero(movable)
         self.faces = np.flatnonzero(has_any(movable, faces))
@@ -62,18 +63,19 @@ class Patches:
         size = np.bincount(self.corners[is_loose], around) / np.bincount(self.corners[is_loose])
         frames = _corner_frames(flat, faces[self.faces], self.faces, movable)
         self.shift = np.where(is_loose, frames * size[self.corners], 0)
-        rest = rest[self.faces]
-        scale = np.sqrt((np.abs(self.sides) ** 2).sum(axis=1) / (np.abs(rest) ** 2).sum(axis=1))
-        rest = rest * np.maximum(scale, scale.mean() * DEGENERATE_HEIGHT)[:, None]
+        target_shapes = target_shapes[self.faces]
+        scale = np.sqrt((np.abs(self.sides) ** 2).sum(axis=1) / (np.abs(target_shapes) ** 2).sum(axis=1))
+        target_shapes = target_shapes * np.maximum(scale, scale.mean() * DEGENERATE_HEIGHT)[:, None]
         # Every corner is a point, as each triangle has its own frame: corner 2 is at 0.
-        places = np.stack([self.sides[:, 1], -self.sides[:, 0], np.zeros(len(rest))], axis=1)
+        places = np.stack([self.sides[:, 1], -self.sides[:, 0], np.zeros(len(target_shapes))], axis=1)
         self._points = places.ravel()
         start = np.concatenate([[0], np.cumsum(2 * is_loose.ravel())])
         unknown = 2 * self.corners[is_loose].repeat(2) + np.tile([0, 1], int(is_loose.sum()))
         coefficient = np.stack([self.shift[is_loose], 1j * self.shift[is_loose]], axis=1).ravel()
-        motions = Motions(2 * len(self.vertices), start, unknown, coefficient)
+        shape = self.corners.size, 2 * len(self.vertices) + 1
+        motions = Motions(csr_matrix((coefficient, unknown, start), shape=shape))
         corners = np.arange(self.corners.size).reshape(-1, 3)
-        self.elements = Elements(motions, corners, rest, 1.0, np.ones(len(rest)))
+        self.elements = Elements(motions, corners, target_shapes, 1.0, np.ones(len(target_shapes)))
         self.count, self.patch = self.elements.parts, self.elements.unknown_part[::2]
         self.face_patch = self.elements.part
 
@@ -90,48 +92,54 @@ class Patches:
         for _ in range(MAX_ROUNDS):
             if not active.any():
                 break
-            some, unknowns = self.elements.of_parts(active)
-            chosen, own, goes_on = np.flatnonzero(active), shifts[unknowns], np.ones(some.parts, dtype=bool)
+            active_elements, unknowns = self.elements.of_parts(active)
+            chosen, active_shifts, goes_on = (
+                np.flatnonzero(active),
+                shifts[unknowns],
+                np.ones(active_elements.parts, dtype=bool),
+            )
             for _ in range(STEPS_PER_ROUND):
-                goes_on &= self._step(some, own, goes_on)
-            shifts[unknowns], before = own, gap[chosen]
-            gap[chosen] = TARGET_AREA_SHARE - _worst(some, self._maps_at(some, own))
+                goes_on &= self._step(active_elements, active_shifts, goes_on)
+            shifts[unknowns], before = active_shifts, gap[chosen]
+            gap[chosen] = TARGET_AREA_SHARE - _worst(
+                active_elements, self._maps_at(active_elements, active_shifts)
+            )
             active[chosen] = goes_on & (gap[chosen] <= MIN_SHRINKING * before)
         return shifts[0::2] + 1j * shifts[1::2]
 
-    def _step(self, some: Elements, shifts: FloatArray, active: BoolArray) -> BoolArray:
+    def _step(self, elements: Elements, shifts: FloatArray, active: BoolArray) -> BoolArray:
         """Add a step to the unknowns of active parts, in place; return the parts that improved and may continue."""
-        maps = self._maps_at(some, shifts)
-        worst = _worst(some, maps)
+        maps = self._maps_at(elements, shifts)
+        worst = _worst(elements, maps)
         epsilon = np.hypot(MIN_REGULARISATION, RELATIVE_REGULARISATION * np.minimum(worst, 0.0))
-        energy = UntanglingEnergy(epsilon[some.part])
-        gradient, _, matrix = some.newton_system(energy, maps, 0.0)
+        energy = UntanglingEnergy(epsilon[elements.part])
+        gradient, _, matrix = elements.newton_system(energy, maps, 0.0)
         matrix.setdiag(matrix.diagonal() + RELATIVE_RIDGE * matrix.diagonal().max())
         try:
             step = SuperLUFactor(matrix).solve(-gradient)
         except MetricError:
             step = np.full(len(gradient), np.nan)
         if not np.isfinite(step).all():
-            return np.zeros(some.parts, dtype=bool)  # all are stuck
-        slopes = np.bincount(some.unknown_part, gradient * step, some.parts)
-        change = some.change(np.append(step, 0.0))
-        before = np.bincount(some.part, some.energies(energy, maps), some.parts)
-        length = np.ones(some.parts)
+            return np.zeros(elements.parts, dtype=bool)  # all are stuck
+        slopes = np.bincount(elements.unknown_part, gradient * step, elements.parts)
+        change = elements.change(np.append(step, 0.0))
+        before = np.bincount(elements.part, elements.energies(energy, maps), elements.parts)
+        length = np.ones(elements.parts)
         for _ in range(HALVINGS):
-            trial = maps.plus(length[some.part], change)
-            after = np.bincount(some.part, some.energies(energy, trial), some.parts)
+            trial = maps.plus(length[elements.part], change)
+            after = np.bincount(elements.part, elements.energies(energy, trial), elements.parts)
             gained = ~active | (after <= before + ARMIJO * length * slopes)
             if gained.all():
                 break
             length[~gained] /= 2
         gained &= active & (worst < TARGET_AREA_SHARE)
-        shifts += np.where(gained, length, 0.0)[some.unknown_part] * step
+        shifts += np.where(gained, length, 0.0)[elements.unknown_part] * step
         return gained
 
-    def _maps_at(self, some: Elements, shifts: FloatArray) -> Maps:
+    def _maps_at(self, elements: Elements, shifts: FloatArray) -> Maps:
         """Return the maps of some of the triangles for given shifts of their vertices, as real unknowns."""
-        change = some.change(np.append(shifts, 0.0))
-        return some.maps(self._points).plus(np.ones(len(some.faces)), change)
+        change = elements.change(np.append(shifts, 0.0))
+        return elements.maps(self._points).plus(np.ones(len(elements.faces)), change)
 
     def moved(self, shifts: ComplexArray) -> ComplexArray:
         """Return (f, 3) the sides of the triangles after their vertices are shifted."""
@@ -139,10 +147,10 @@ class Patches:
         return self.sides + moved[:, [2, 0, 1]] - moved[:, [1, 2, 0]]
 
 
-def _worst(some: Elements, maps: Maps) -> FloatArray:
+def _worst(elements: Elements, maps: Maps) -> FloatArray:
     """Return (parts,) the smallest determinant of each part."""
-    worst = np.full(some.parts, np.inf)
-    np.minimum.at(worst, some.part, np.abs(maps.a) ** 2 - np.abs(maps.b) ** 2)
+    worst = np.full(elements.parts, np.inf)
+    np.minimum.at(worst, elements.part, np.abs(maps.a) ** 2 - np.abs(maps.b) ** 2)
     return worst
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, mask_of, rows_of
 from ..base.notes import Unmet
+from ..base.progress import report_detail, stage
 from ..errors import LengthError, MetricError, SeamError
 from ..geometry import double_areas
 from ..geometry.operators import MIN_WEIGHT, area_distortion, at_unit_scale, vertex_areas, weighted_areas
@@ -36,11 +37,11 @@ RETRY_SHARPNESS = 2.0
 RELATIVE_TOLERANCE = 1e-9
 
 
+@stage("relax")
 def relax_layouts(
     layouts: Sequence[Layout],
     weights: Sequence[FloatArray | None],
     spec: RelaxSpec,
-    report: Callable[[str], None],
 ) -> list[Layout]:
     """Return layouts with less distortion, the same cones and the same seams, relaxed as one mesh.
 
@@ -51,7 +52,6 @@ def relax_layouts(
         layouts: layouts of connected meshes.
         weights: for each layout the (n,) importance of its vertices, or None.
         spec: the options for relaxing.
-        report: called after each step with a description of it.
 
     Returns:
         The relaxed layouts, in the same order.
@@ -62,11 +62,12 @@ def relax_layouts(
     if spec.is_off or not layouts:
         return list(layouts)
     try:
-        return _relaxed(LayoutGroup(layouts, weights), spec, report)
+        return _relaxed(LayoutGroup(layouts, weights), spec)
     except (SeamError, LengthError, MetricError) as error:  # a metric that did not converge
         if len(layouts) > 1:
             return [
-                relax_layouts([one], [w], spec, report)[0] for one, w in zip(layouts, weights, strict=True)
+                relax_layouts([layout], [layout_weights], spec)[0]
+                for layout, layout_weights in zip(layouts, weights, strict=True)
             ]
         if isinstance(error, MetricError):
             raise
@@ -79,7 +80,7 @@ def mean_qc(layout: Layout) -> float:
     return float(group.means(group.ratios(group.points))[0])
 
 
-def _relaxed(group: LayoutGroup, spec: RelaxSpec, report: Callable[[str], None]) -> list[Layout]:
+def _relaxed(group: LayoutGroup, spec: RelaxSpec) -> list[Layout]:
     mesh, points = group.mesh, group.points
     before = group.ratios(points)
     is_free = group.is_free
@@ -98,7 +99,7 @@ def _relaxed(group: LayoutGroup, spec: RelaxSpec, report: Callable[[str], None])
             weights=group.weights,
             free=is_free,
             tolerance=TOLERANCE,
-            progress=lambda step, _: report(f"step {step}"),
+            progress=lambda step, _: report_detail(f"step {step}"),
         ).points
 
     if spec.stretch:
@@ -109,20 +110,20 @@ def _relaxed(group: LayoutGroup, spec: RelaxSpec, report: Callable[[str], None])
             points, _ = group.without_losses(
                 points, relaxed_by(points, RETRY_SHARPNESS, is_lost), before, is_lost
             )
-    found = group.updated(points, is_free)
-    freed = np.bincount(group.of_vertex[is_free], minlength=len(found)).tolist()
+    relaxed = group.updated(points, is_free)
+    freed = np.bincount(group.of_vertex[is_free], minlength=len(relaxed)).tolist()
     means, largest = group.means(before).tolist(), group.largest(before).tolist()
     return [
         replace(
-            one,
+            layout,
             statistics=replace(
-                one.statistics,
+                layout.statistics,
                 relaxed_vertices=freed[i],
                 qc_mean_unrelaxed=means[i],
                 qc_max_unrelaxed=largest[i],
             ),
         )
-        for i, one in enumerate(found)
+        for i, layout in enumerate(relaxed)
     ]
 
 
@@ -139,17 +140,17 @@ class LayoutGroup:
     """
 
     def __init__(self, layouts: Sequence[Layout], weights: Sequence[FloatArray | None]) -> None:
-        self.layouts, self._given_weights = layouts, weights
-        meshes = [one.mesh for one in layouts]
+        self.layouts, self._vertex_weights = layouts, weights
+        meshes = [layout.mesh for layout in layouts]
         self._vertices = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
         self._faces = np.cumsum([0, *(len(mesh.faces) for mesh in meshes)])
-        self._points = np.cumsum([0, *(len(one.points) for one in layouts)])
+        self._points = np.cumsum([0, *(len(layout.points) for layout in layouts)])
         self.mesh = meshes[0] if len(meshes) == 1 else joined(meshes, self._vertices)
-        self.points = np.concatenate([one.points for one in layouts])
+        self.points = np.concatenate([layout.points for layout in layouts])
         self.corners = np.concatenate(
-            [one.corners + start for one, start in zip(layouts, self._points, strict=False)]
+            [layout.corners + start for layout, start in zip(layouts, self._points, strict=False)]
         )
-        self.lengths = np.concatenate([one.lengths for one in layouts])
+        self.lengths = np.concatenate([layout.lengths for layout in layouts])
         self.areas = double_areas(self.lengths) / 2
         self.of_vertex = np.arange(len(layouts)).repeat(np.diff(self._vertices))
         self._of_face = np.arange(len(layouts)).repeat(np.diff(self._faces))
@@ -157,7 +158,7 @@ class LayoutGroup:
     @property
     def is_free(self) -> BoolArray:
         """Return (n,) True for vertices that may move."""
-        return ~np.concatenate([one.is_fixed for one in self.layouts])
+        return ~np.concatenate([layout.is_fixed for layout in self.layouts])
 
     def _sums(self, values: FloatArray, at: BoolArray | slice = slice(None)) -> FloatArray:
         """Return the sum of (m,) values per face for each layout, over the faces `at`."""
@@ -173,13 +174,17 @@ class LayoutGroup:
     @cached_property
     def weights(self) -> FloatArray:
         """Return (m,) the weights of triangles relative to their area."""
-        least = np.finfo(np.float64).tiny
+        smallest_area = np.finfo(np.float64).tiny
         means = self._sums(self.areas) / np.diff(self._faces)
-        weights: FloatArray = 1 + MEAN_AREA_SHARE * means[self._of_face] / np.maximum(self.areas, least)
-        for one, own, start in zip(self.layouts, self._given_weights, self._faces, strict=False):
-            if own is not None:
-                at_vertices = np.maximum(at_unit_scale(own), MIN_WEIGHT)
-                of_faces = at_vertices[one.mesh.faces].mean(axis=1)
+        weights: FloatArray = 1 + MEAN_AREA_SHARE * means[self._of_face] / np.maximum(
+            self.areas, smallest_area
+        )
+        for layout, vertex_weights, start in zip(
+            self.layouts, self._vertex_weights, self._faces, strict=False
+        ):
+            if vertex_weights is not None:
+                at_vertices = np.maximum(at_unit_scale(vertex_weights), MIN_WEIGHT)
+                of_faces = at_vertices[layout.mesh.faces].mean(axis=1)
                 weights[start : start + len(of_faces)] *= of_faces
         return weights
 
@@ -228,50 +233,50 @@ class LayoutGroup:
         gain = before[touched] - after[touched]
         areas = self.areas[touched]
         gained = np.bincount(of_face, gain * areas, count)
-        least = -RELATIVE_TOLERANCE * np.bincount(of_face, before[touched] * areas, count)
+        threshold = -RELATIVE_TOLERANCE * np.bincount(of_face, before[touched] * areas, count)
         worst = np.zeros(count)
         np.maximum.at(worst, of_face, after[touched])
         is_worse = worst[patch] > (1 + RELATIVE_TOLERANCE) * self.largest(before)[self.of_vertex]
-        is_lost = ((gained < least)[patch] | is_worse) & was_free
+        is_lost = ((gained < threshold)[patch] | is_worse) & was_free
         back = mask_of(len(moved), self.corners[is_lost[faces]])
         return np.where(back[:, None], points, moved), is_lost
 
     def updated(self, points: FloatArray, was_free: BoolArray) -> list[Layout]:
-        """Return the layouts with moved points and with updated curvature, target and log scale."""
+        """Return the layouts with moved points and with updated curvature, target and log conformal factor."""
         mesh, corners = self.mesh, rows_of(points, self.corners)
         # Curvatures change only at vertices of moved triangles.
         changed = mask_of(len(mesh.vertices), mesh.faces[has_any(was_free, mesh.faces)])
-        old = np.concatenate([one.curvature for one in self.layouts])
+        old = np.concatenate([layout.curvature for layout in self.layouts])
         curvature = np.where(changed, layout_curvature(mesh, corners, changed), old)
         # Areas are relative to those of each layout, as the threshold for zero area is.
         unit = self._sums(self.areas)[self._of_face]
         before, after = (np.abs(signed_double_areas(p[self.corners])) / 2 for p in (self.points, points))
         growth = np.log(self._sums(after) / self._sums(before)) / 2
-        old = np.concatenate([one.log_scale for one in self.layouts])
+        old = np.concatenate([layout.log_scale for layout in self.layouts])
         log_scale = np.where(was_free, vertex_log_scale(mesh, self.areas / unit, after / unit), old)
-        found = []
-        for i, one in enumerate(self.layouts):
-            own = slice(self._vertices[i], self._vertices[i + 1])
-            areas = vertex_areas(one.mesh.faces, one.lengths, len(one.mesh.vertices))
-            share = weighted_areas(areas, self._given_weights[i])
+        layouts = []
+        for i, layout in enumerate(self.layouts):
+            vertices = slice(self._vertices[i], self._vertices[i + 1])
+            areas = vertex_areas(layout.mesh.faces, layout.lengths, len(layout.mesh.vertices))
+            share = weighted_areas(areas, self._vertex_weights[i])
             # The energy of angles does not depend on the scale: components keep their areas relative to each other. The
-            # mean log scale is hardly changed by the few huge triangles that untangling may leave.
-            grown = share @ log_scale[own] if one.statistics.untangled_vertices else growth[i]
-            factor = 1.0 if one.is_fixed.any() else np.exp(-grown)
-            log_scale[own] += np.log(factor)
-            reached = area_distortion(log_scale[own], share)
-            found.append(
+            # mean log conformal factor is hardly changed by the few huge triangles that untangling may leave.
+            grown = share @ log_scale[vertices] if layout.statistics.untangled_vertices else growth[i]
+            factor = 1.0 if layout.is_fixed.any() else np.exp(-grown)
+            log_scale[vertices] += np.log(factor)
+            reached = area_distortion(log_scale[vertices], share)
+            layouts.append(
                 replace(
-                    one,
+                    layout,
                     points=factor * points[self._points[i] : self._points[i + 1]],
-                    curvature=curvature[own],
+                    curvature=curvature[vertices],
                     # Where the curvature is not prescribed, the target is set to the resulting curvature.
-                    target=np.where(one.is_open, curvature[own], one.target),
-                    log_scale=log_scale[own],
-                    statistics=replace(one.statistics, area_distortion=reached),
+                    target=np.where(layout.is_open, curvature[vertices], layout.target),
+                    log_scale=log_scale[vertices],
+                    statistics=replace(layout.statistics, area_distortion=reached),
                 )
             )
-        return found
+        return layouts
 
 
 def joined(meshes: Sequence[TriangleMesh], starts: IntArray) -> TriangleMesh:

@@ -29,7 +29,7 @@ from .constraints import PointConstraints, check_constraints
 from .descent import RELATIVE_ROUNDING, descend
 from .elements import Elements
 from .energies import Energy, StretchEnergy
-from .motions import find_motions
+from .motions import close_seams, find_motions, find_restrictions
 
 # The last step is the first one whose predicted decrease is at most this fraction of the energy minus its lower bound;
 # and the maximum number of steps.
@@ -120,38 +120,43 @@ def relax(
             f"corners must have the shape {mesh.faces.shape} of the faces, got {corner.shape}"
         )
     require_finite(places, corner)
-    own = edge_lengths(mesh.vertices, mesh.faces) if lengths is None else check_lengths(mesh, lengths)
+    side_lengths = (
+        edge_lengths(mesh.vertices, mesh.faces) if lengths is None else check_lengths(mesh, lengths)
+    )
     if not 0 <= tolerance < 1 or steps < 0:
         raise OptionError(f"tolerance must be from 0 to 1 and steps from 0, got {tolerance!r} and {steps!r}")
     checked = check_constraints(PointConstraints() if constraints is None else constraints, places)
     is_free = _flags(free, len(mesh.vertices))
-    areas = double_areas(own) / 2
+    areas = double_areas(side_lengths) / 2
     share = areas * _weights(weights, len(mesh.faces))
     doubled = signed_double_areas(rows_of(places, corner))
     # Only for triangles that may move, which are usually few.
-    near = np.flatnonzero(has_any(is_free, mesh.faces))
-    rest = np.empty(own.shape, dtype=np.complex128)
-    rest[near] = at_rest = rest_sides(own[near])
-    height = np.minimum(heights(at_rest), heights(sides_between(rows_of(places, corner[near]))))
-    is_free[mesh.faces[near[(height <= RELATIVE_ROUNDING) | (areas[near] <= 0)]]] = False
+    candidates = np.flatnonzero(has_any(is_free, mesh.faces))
+    target_shapes = np.empty(side_lengths.shape, dtype=np.complex128)
+    target_shapes[candidates] = candidate_shapes = rest_sides(side_lengths[candidates])
+    height = np.minimum(
+        heights(candidate_shapes), heights(sides_between(rows_of(places, corner[candidates])))
+    )
+    is_free[mesh.faces[candidates[(height <= RELATIVE_ROUNDING) | (areas[candidates] <= 0)]]] = False
     if not is_free.any():
         return Relaxed(places, 0.0, 0.0, 0, is_free)
     unit = 1.0 if to_scale else float(np.sqrt(np.abs(doubled).sum() / (2 * areas.sum())))
     z = as_complex(places)
-    motions = find_motions(mesh, corner, z, is_free, checked)
-    elements = Elements(motions, corner, rest, unit, share)
+    restrictions = find_restrictions(mesh, corner, z, is_free, checked)
+    motions = find_motions(z, restrictions)
+    elements = Elements(motions, corner, target_shapes, unit, share)
     if not elements.count and not motions.has_offset:
         return Relaxed(places, 0.0, 0.0, 0, is_free)
     stride = 1.0 if constraints is None else constraints.stride
-    found = descend(z, motions, elements, energy, tolerance, steps, progress, stride)
-    if found.remaining:
+    descent = descend(z, motions, elements, energy, tolerance, steps, progress, stride)
+    if descent.remaining:
         raise ConvergenceError(
-            f"constraints cannot be met without flipping triangles: {found.remaining:.1%} of the way to them "
-            f"is left after {plural(found.steps, 'step')}"
+            f"constraints cannot be met without flipping triangles: {descent.remaining:.1%} of the way to them "
+            f"is left after {plural(descent.steps, 'step')}"
         )
     total = float(elements.weight.sum())
-    moved = as_pairs(motions.closed(found.points))
-    return Relaxed(moved, found.before / total, found.after / total, found.steps, is_free)
+    moved = as_pairs(close_seams(descent.points, restrictions))
+    return Relaxed(moved, descent.before / total, descent.after / total, descent.steps, is_free)
 
 
 def rest_sides(lengths: FloatArray) -> ComplexArray:

@@ -64,9 +64,9 @@ def find_chains(
     h, t = mesh.edge_halfedges[edges].T
     vertices = np.stack(mesh.ends_of(h), axis=1)
     sides = np.stack(both_sides(mesh, edges, corners))
-    one, two = (points[side[:, 1]] - points[side[:, 0]] for side in sides)
-    _check_rigid(edges, vertices, one, two)
-    turns = two * np.conj(one)
+    first_vectors, second_vectors = (points[side[:, 1]] - points[side[:, 0]] for side in sides)
+    _check_rigid(edges, vertices, first_vectors, second_vectors)
+    turns = second_vectors * np.conj(first_vectors)
     turns /= np.abs(turns)
     is_node = np.bincount(vertices.ravel(), minlength=len(mesh.vertices)) != 2
     is_node |= mesh.is_boundary_vertex
@@ -83,7 +83,8 @@ def find_chains(
     np.add.at(
         total,
         chain,
-        np.where(swapped, two * np.conj(one), 0).conj() + np.where(swapped, 0, two * np.conj(one)),
+        np.where(swapped, second_vectors * np.conj(first_vectors), 0).conj()
+        + np.where(swapped, 0, second_vectors * np.conj(first_vectors)),
     )
     return SeamChains(edges, vertices, left, right, halfedges, chain, total / np.abs(total), is_node)
 
@@ -125,20 +126,22 @@ def _rotating(vertices: IntArray, sides: IntArray, turns: ComplexArray, is_node:
     """Return the vertices between two seam edges at which the rotation changes."""
     ends = vertices.ravel()
     edge = np.arange(len(vertices)).repeat(2)
-    rest = ~is_node[ends]
-    ends, edge, point = ends[rest], edge[rest], sides[0].ravel()[rest]
+    is_inner = ~is_node[ends]
+    ends, edge, point = ends[is_inner], edge[is_inner], sides[0].ravel()[is_inner]
     order = np.argsort(ends, kind="stable").reshape(-1, 2)
     edge, point = edge[order], point[order]
     # The first sides of both edges are on the same side of the seam if they share a point.
-    other = np.where(point[:, 0] == point[:, 1], turns[edge[:, 1]], np.conj(turns[edge[:, 1]]))
-    return ends[order[np.abs(other - turns[edge[:, 0]]) > ROTATION_TOLERANCE, 0]]
+    next_turns = np.where(point[:, 0] == point[:, 1], turns[edge[:, 1]], np.conj(turns[edge[:, 1]]))
+    return ends[order[np.abs(next_turns - turns[edge[:, 0]]) > ROTATION_TOLERANCE, 0]]
 
 
-def _check_rigid(edges: IntArray, vertices: IntArray, one: ComplexArray, two: ComplexArray) -> None:
-    lengths: FloatArray = np.abs(one)
+def _check_rigid(
+    edges: IntArray, vertices: IntArray, first_vectors: ComplexArray, second_vectors: ComplexArray
+) -> None:
+    lengths: FloatArray = np.abs(first_vectors)
     if not (lengths > 0).all():
         raise SeamError(f"{int((~(lengths > 0)).sum())} seam edges have no length in the plane")
-    off = np.abs(np.abs(two) / lengths - 1)
+    off = np.abs(np.abs(second_vectors) / lengths - 1)
     if (off > RIGID_TOLERANCE).any():
         worst = int(off.argmax())
         pair = "-".join(str(v) for v in vertices[worst].tolist())

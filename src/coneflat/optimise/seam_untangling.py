@@ -6,6 +6,7 @@ import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of
 from ..base.notes import Unmet
+from ..base.progress import stage
 from ..base.text import list_some, plural
 from ..geometry.intrinsic import halfedge_twins
 from ..geometry.operators import cotangent_laplacian
@@ -21,6 +22,7 @@ from .relaxing import relax, rest_sides
 from .untangling import MAX_RINGS, find_degenerate, untangle
 
 
+@stage("relax")
 def untangle_seams(layout: Layout, spec: ConeSpec, stretch: float, quantum: float | None) -> Layout:
     """Return a layout whose inverted triangles are positively oriented, while seams near them may become unequal.
 
@@ -68,16 +70,16 @@ def untangle_seams(layout: Layout, spec: ConeSpec, stretch: float, quantum: floa
         free=is_free,
     ).points
     was_free = mask_of(len(layout.mesh.vertices), vertex[is_free])
-    found = group.updated(points, was_free)[0]
+    untangled = group.updated(points, was_free)[0]
     flipped = np.flatnonzero(was_bad & ~find_degenerate(sides_between(points[disk.faces])))
     if not len(flipped):
         return layout
     where = list_some(f"vertex {name}" for name in np.unique(spec.names[layout.mesh.faces[flipped, 0]]))
     note = (
-        f"{plural(len(flipped), 'triangle')} had no room between seams with equal sides, next to "
+        f"{plural(len(flipped), 'triangle')} could not be untangled with matching seams, next to "
         f"{where}: they are positively oriented, but {caveat}."
     )
-    return found.with_notes(Unmet(note))
+    return untangled.with_notes(Unmet(note))
 
 
 def untangled_disk(
@@ -91,10 +93,10 @@ def untangled_disk(
         lengths: (m, 3) side lengths of its triangles on the surface.
         fixed: (c,) points that do not move.
         may_wind: whether triangles may wind around inner vertices several times where nothing else untangles them; the
-            disk is not embedded anew then.
+            disk is not embedded again then.
 
     Returns:
-        (c, 2) points, (c,) those that moved, and whether the whole disk was embedded anew.
+        (c, 2) points, (c,) those that moved, and whether the disk was embedded again.
     """
     # The angle at a vertex of a prescribed boundary is preserved if the adjacent seam edges do not move.
     border = disk.edges[disk.is_boundary_edge]
@@ -102,20 +104,20 @@ def untangled_disk(
     is_near[border[fixed[border].any(axis=1)]] = True
     sides, twins = sides_between(points[disk.faces]), halfedge_twins(disk)
     flat = FlatTriangles(sides.ravel(), np.ones(sides.size, dtype=np.complex128), twins)
-    given = disk.is_boundary_vertex, (is_near, fixed), rest_sides(lengths)
+    fixed_input = disk.is_boundary_vertex, (is_near, fixed), rest_sides(lengths)
     angles = np.where(disk.is_boundary_vertex, np.nan, 2 * np.pi)
     # More rings rarely help if triangles may wind, and take half of the time on small CAD parts.
     rings = MAX_RINGS // 2 if may_wind else 2 * MAX_RINGS
-    untangled = untangle(flat, disk.faces, angles, *given, rings)
+    untangled = untangle(flat, disk.faces, angles, *fixed_input, rings)
     if may_wind:
-        untangled = untangle(untangled.flat, disk.faces, np.full_like(angles, np.nan), *given, rings)
-    found, moved = unfold(untangled.flat, disk.faces), mask_of(len(points), untangled.moved)
+        untangled = untangle(untangled.flat, disk.faces, np.full_like(angles, np.nan), *fixed_input, rings)
+    places, moved = unfold(untangled.flat, disk.faces), mask_of(len(points), untangled.moved)
     if len(untangled.left) and not (may_wind or fixed.any()) and disk.boundary_loops[0] == 1:
-        areas = np.abs(signed_double_areas(found[disk.faces])) / 2
+        areas = np.abs(signed_double_areas(places[disk.faces])) / 2
         embedded = embedded_disks(disk, np.zeros(len(areas), dtype=np.int64), areas)
         if not find_degenerate(sides_between(embedded[disk.faces])).any():
             return embedded, ~fixed, True
-    return found, moved, False
+    return places, moved, False
 
 
 def embedded_disks(disks: TriangleMesh, of_face: IntArray, areas: FloatArray) -> FloatArray:

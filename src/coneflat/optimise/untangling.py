@@ -44,7 +44,7 @@ def untangle(
     angles: FloatArray,
     on_boundary: BoolArray,
     stays: Sequence[BoolArray],
-    rest: ComplexArray,
+    target_shapes: ComplexArray,
     max_rings: int = MAX_RINGS,
 ) -> Untangled:
     """Return flat triangles whose inverted and degenerate triangles are flipped by moving as few vertices as possible.
@@ -66,7 +66,7 @@ def untangle(
         angles: (n,) the angle around each vertex on the flat surface, radians; NaN where any angle is allowed.
         on_boundary: (n,) True for vertices of the boundary.
         stays: masks (n,) of vertices that must not move; each is used where the ones before left inverted triangles.
-        rest: (m, 3) sides of the triangles in their target shapes.
+        target_shapes: (m, 3) sides of the triangles in their target shapes.
         max_rings: maximum number of rings of triangles around the inverted ones whose vertices may move.
 
     Notes:
@@ -75,7 +75,7 @@ def untangle(
     """
     if not find_degenerate(flat.sides.reshape(-1, 3)).any():
         return Untangled(flat, np.empty(0, dtype=np.int64), 0.0, np.empty(0, dtype=np.int64))
-    state = _Untangling(flat, faces, angles, on_boundary, _thickened(rest))
+    state = _Untangling(flat, faces, angles, on_boundary, _thickened(target_shapes))
     for stay in stays:
         rings = 1
         while rings <= max_rings:
@@ -104,7 +104,7 @@ class _Untangling:
     faces: IntArray
     angles: FloatArray
     on_boundary: BoolArray
-    rest: ComplexArray
+    target_shapes: ComplexArray
 
     def __post_init__(self) -> None:
         self.sides = self.flat.sides.reshape(-1, 3).copy()
@@ -115,7 +115,7 @@ class _Untangling:
         """Untangle bad triangles by moving the vertices in a number of rings around them, except those in `stay`."""
         movable = nearby(self.faces, self.is_bad, rings - 1) & ~stay
         if movable.any():
-            patches = Patches(self.flat, self.faces, self.sides, movable, self.rest)
+            patches = Patches(self.flat, self.faces, self.sides, movable, self.target_shapes)
             self._accept(patches, patches.solve())
 
     def _accept(self, patches: Patches, shifts: ComplexArray) -> None:
@@ -132,8 +132,8 @@ class _Untangling:
 
     def _winding(self, patches: Patches, trial: ComplexArray) -> IntArray:
         """Return the vertices with a wrong angle sum only after the patches' triangles get the trial sides (f, 3)."""
-        near = mask_of(len(self.angles), self.faces[patches.faces])
-        rows = np.flatnonzero(has_any(near, self.faces))
+        is_adjacent = mask_of(len(self.angles), self.faces[patches.faces])
+        rows = np.flatnonzero(has_any(is_adjacent, self.faces))
         is_free = np.zeros(len(self.angles), dtype=bool)
         is_free[patches.vertices] = self.on_boundary[patches.vertices]
         before = self.sides[rows]
@@ -143,7 +143,7 @@ class _Untangling:
             winding_vertices(sides, self.faces[rows], self.angles, is_free) for sides in (before, after)
         )
         # Vertices far from the patches are in both sets.
-        is_new = near
+        is_new = is_adjacent
         is_new[now] = False
         return then[is_new[then]]
 
@@ -166,18 +166,18 @@ def winding_vertices(
     return np.flatnonzero(~is_bad & winds)
 
 
-def _thickened(rest: ComplexArray) -> ComplexArray:
+def _thickened(target_shapes: ComplexArray) -> ComplexArray:
     """Return (m, 3) the sides of triangles with their heights raised to `MIN_HEIGHT` times the longest side."""
-    f = np.arange(len(rest))
-    longest = np.abs(rest).argmax(axis=1)
-    base = np.abs(rest[f, longest])
-    apex = -rest[f, (longest + 2) % 3] / rest[f, longest]
+    f = np.arange(len(target_shapes))
+    longest = np.abs(target_shapes).argmax(axis=1)
+    base = np.abs(target_shapes[f, longest])
+    apex = -target_shapes[f, (longest + 2) % 3] / target_shapes[f, longest]
     apex = apex.real + 1j * np.maximum(apex.imag, MIN_HEIGHT)
-    wanted = np.empty_like(rest)
-    wanted[f, longest] = base
-    wanted[f, (longest + 1) % 3] = base * (apex - 1)
-    wanted[f, (longest + 2) % 3] = -base * apex
-    return wanted
+    thickened = np.empty_like(target_shapes)
+    thickened[f, longest] = base
+    thickened[f, (longest + 1) % 3] = base * (apex - 1)
+    thickened[f, (longest + 2) % 3] = -base * apex
+    return thickened
 
 
 def find_degenerate(sides: ComplexArray) -> BoolArray:

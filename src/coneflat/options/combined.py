@@ -50,7 +50,7 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
             # The curvatures of given cones without one minimize the weighted area distortion. If all are given, handles
             # can be corrected to a quantum, and a straight boundary has corners among them.
             is_fitted = None in self.named_cones.values()
-            allowed = "weights" if is_fitted else "quantise" if self.cone_choice == "given" else ""
+            allowed = "weights" if is_fitted else "quantise" if self.cone_choice == "prescribed" else ""
             for name in SEARCH_OPTIONS:
                 if self._is_set(name) and name != allowed:
                     yield f"{name} is an option of cones 'sparse', not of cones {self.cone_choice!r}"
@@ -83,8 +83,8 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
 
     @property
     def cone_choice(self) -> str:
-        """How cones are found: "auto", "sparse", "greedy", "none" or "given"."""
-        return self.cones if isinstance(self.cones, str) else "given"
+        """How cones are found: "auto", "sparse", "greedy", "none" or "prescribed"."""
+        return self.cones if isinstance(self.cones, str) else "prescribed"
 
     @property
     def searches_cones(self) -> bool:

@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..base import ComplexArray, FloatArray, IntArray, Stopwatch, limit_threads
 from ..errors import CurvatureError
-from ..flattening import flatten
+from ..flattener import flatten
 from ..geometry import coarse_mesh
 from ..mesh import CheckedMesh
 from ..mesh.connectivity import TriangleMesh
@@ -70,29 +70,33 @@ def aligned_flattening(
         options: those of `integer_grid`.
         stages: the stopwatch.
         sharp_angle: dihedral angle of edges that are required on grid lines, or None.
-        log_scale: (n,) the log scale wanted at the vertices, or None for equal sizes.
+        log_scale: (n,) the target log scale at the vertices, or None for equal sizes.
         limit: largest number of squares of a grid.
 
     Raises:
         GridError: a grid with cones at all corners of the surface has more squares.
         CurvatureError, MetricError, OptionError: as for `coneflat.flatten`.
     """
-    own = read_options(options, QuadOptions)
+    cone_options = read_options(options, QuadOptions)
     mesh = _with_places(checked.mesh, is_split, SHARP_ANGLE if sharp_angle is None else sharp_angle)
     # The bounds of curvature in quarter turns; without a largest angle, there is none in effect.
-    turns = [4 - angle / (np.pi / 2) for angle in (own.max_cone_angle or 1e6, own.min_cone_angle)]
+    turns = [
+        4 - angle / (np.pi / 2) for angle in (cone_options.max_cone_angle or 1e6, cone_options.min_cone_angle)
+    ]
     bounds = int(np.ceil(turns[0] - GRID_TOLERANCE)), int(np.floor(turns[1] + GRID_TOLERANCE))
-    wanted = None if log_scale is None else extended(log_scale, mesh)
-    with stages("cones"), limit_threads(own.threads):
-        found = aligned_cones(mesh, own.distortion, *bounds, price, sharp_angle, wanted, limit)
-    cones = {vertex: quarters * np.pi / 2 for vertex, quarters in found.items()}
-    given = {name: one for name, one in options.items() if name not in FLATTENING_OPTIONS}
-    given |= {**flattening_defaults({"cones": cones}), "cones": cones}
+    target_scale = None if log_scale is None else extended(log_scale, mesh)
+    with stages("cones"), limit_threads(cone_options.threads):
+        quarters_at = aligned_cones(
+            mesh, cone_options.distortion, *bounds, price, sharp_angle, target_scale, limit
+        )
+    cones = {vertex: quarters * np.pi / 2 for vertex, quarters in quarters_at.items()}
+    flattening_options = {name: choice for name, choice in options.items() if name not in FLATTENING_OPTIONS}
+    flattening_options |= {**flattening_defaults({"cones": cones}), "cones": cones}
     if mesh.is_boundary_edge.any():
-        given["boundary"] = "straight"
+        flattening_options["boundary"] = "straight"
     for splits in range(3):
         with stages("flatten"):
-            result = flatten(np.ldexp(mesh.vertices, -checked.exponent), mesh.faces, **given)
+            result = flatten(np.ldexp(mesh.vertices, -checked.exponent), mesh.faces, **flattening_options)
         # Large cones that are adjacent flip triangles.
         if splits == 2 or (is_flat := has_area(result)).all():
             break
@@ -115,8 +119,8 @@ def _with_places(mesh: TriangleMesh, is_split: bool, sharp_angle: float) -> Tria
 def aligned_cones(
     mesh: TriangleMesh,
     distortion: float,
-    least: int = -2,
-    most: int = 1,
+    min_quarters: int = -2,
+    max_quarters: int = 1,
     price: float = 1.0,
     sharp_angle: float | None = None,
     log_scale: FloatArray | None = None,
@@ -127,7 +131,7 @@ def aligned_cones(
     Args:
         mesh: connected mesh.
         distortion: area distortion that should not be exceeded: the standard deviation of the log scale.
-        least, most: bounds of the curvature of cones.
+        min_quarters, max_quarters: bounds of the curvature of cones.
         price: cost of a cone, 1 by default.
         sharp_angle: dihedral angle of edges that grid lines must follow, radians; None: that from which on they prefer
             to, and other directions count as much.
@@ -139,13 +143,13 @@ def aligned_cones(
         CurvatureError: the mesh has too few vertices for the cones that it needs.
     """
     distortion = min(max(distortion, MIN_DISTORTION), MAX_DISTORTION)
-    angle, kept = SHARP_ANGLE if sharp_angle is None else sharp_angle, np.arange(len(mesh.vertices))
+    angle, origin = SHARP_ANGLE if sharp_angle is None else sharp_angle, np.arange(len(mesh.vertices))
     degrees = np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
     if len(mesh.faces) > 2 * COARSE:
-        mesh, kept, _ = coarse_mesh(mesh, COARSE)
+        mesh, origin, _ = coarse_mesh(mesh, COARSE)
     directions, start = directions_and_indices(mesh, angle)
-    scale = None if log_scale is None else log_scale[kept]
-    model = MapModel(mesh, directions.both, least, most, degrees[kept], scale)
+    scale = None if log_scale is None else log_scale[origin]
+    model = MapModel(mesh, directions.combined, min_quarters, max_quarters, degrees[origin], scale)
     search = _Search(mesh, model, start, price, angle)
     limit.check_cones(search.fixed_quarters)
     along = COST_OF_DIRECTIONS * (1.0 if sharp_angle is None else TIMES_REQUIRED)
@@ -157,8 +161,8 @@ def aligned_cones(
         areas *= 2
     if search.indices[-1]:
         raise CurvatureError(f"{len(mesh.vertices):,} vertices are too few for the cones")
-    found = np.flatnonzero(search.indices[:-1])
-    return dict(zip(kept[model.places[found]].tolist(), search.indices[found].tolist(), strict=True))
+    coned = np.flatnonzero(search.indices[:-1])
+    return dict(zip(origin[model.places[coned]].tolist(), search.indices[coned].tolist(), strict=True))
 
 
 class _Costs(NamedTuple):
@@ -198,14 +202,14 @@ class _Search:
         self, mesh: TriangleMesh, model: MapModel, start: IntArray, price: float, sharp_angle: float
     ) -> None:
         self.model, self.graph, self.key = model, vertex_graph(mesh), model.key
-        inside = np.clip(start[model.places], model.least[:-1], model.most[:-1])
+        inside = np.clip(start[model.places], model.min_quarters[:-1], model.max_quarters[:-1])
         # Cones at corners of the surface, where sharp edges meet, stay there.
         edges_at = np.bincount(sharp_ends(mesh, sharp_angle).ravel(), minlength=len(mesh.vertices))[
             model.places
         ]
         is_corner = (inside != 0) & (edges_at > 2) & (np.abs(model.curvature - inside) < 0.25)
         fixed = np.flatnonzero(is_corner)
-        model.least[fixed] = model.most[fixed] = inside[fixed]
+        model.min_quarters[fixed] = model.max_quarters[fixed] = inside[fixed]
         is_border = mesh.is_boundary_vertex[model.places[fixed]]
         self.fixed_quarters = np.where(is_border, 2, 4) - inside[fixed]
         self._pairs_left = max(MAX_PAIRS_OF_FEW, PAIRS_PER_VERTEX * len(mesh.vertices))
@@ -221,22 +225,24 @@ class _Search:
         for radius in RADII:
             cones = np.flatnonzero(self.indices[:-1])
             if len(cones):
-                self._descend(cones, np.union1d(cones, self._near(cones, radius * self.model.spacing)), costs)
+                self._descend(
+                    cones, np.union1d(cones, self._places_near(cones, radius * self.model.spacing)), costs
+                )
             self.model.linearise(self.indices)
 
-    def _near(self, cones: IntArray, radius: float) -> IntArray:
+    def _places_near(self, cones: IntArray, radius: float) -> IntArray:
         """Return some places near cones; both are indices of places."""
-        places, found = self.model.places, [cones]
+        places, lists = self.model.places, [cones]
         for row in dijkstra(self.graph, indices=places[cones], limit=radius)[:, places]:
-            near = np.flatnonzero(np.isfinite(row))
-            order = np.lexsort((self.key[near], np.round(row[near] / self.model.spacing, 9)))
-            chosen = np.unique(np.linspace(0, len(near) - 1, PLACES_NEAR + 1).astype(np.int64))
-            found.append(near[order[chosen]])
-        return np.concatenate(found)
+            reached = np.flatnonzero(np.isfinite(row))
+            order = np.lexsort((self.key[reached], np.round(row[reached] / self.model.spacing, 9)))
+            chosen = np.unique(np.linspace(0, len(reached) - 1, PLACES_NEAR + 1).astype(np.int64))
+            lists.append(reached[order[chosen]])
+        return np.concatenate(lists)
 
-    def _descend(self, one: IntArray, two: IntArray, costs: _Costs) -> None:
+    def _descend(self, pluses: IntArray, minuses: IntArray, costs: _Costs) -> None:
         """Decrease the cost by steps between a place of `one` and a place of `two`, in both directions."""
-        first, second = self._block(one), self._block(two)
+        first, second = self._block(pluses), self._block(minuses)
         gram = first.scales.T @ second.scales
         squares = first.squares[:, None] + second.squares - 2 * gram
         while self._pairs_left > 0:
@@ -252,7 +258,7 @@ class _Search:
                 # Few places are all compared again after each step.
                 change = self._changes(steps, costs) + self._price_of(1)[plus] + self._price_of(-1)[minus]
                 best = int(np.argmin(np.round(change, 6)))
-                if change[best] >= -MIN_GAIN or len(two) < SAMPLES // 2:
+                if change[best] >= -MIN_GAIN or len(minuses) < SAMPLES // 2:
                     break
 
     def _best_steps(
@@ -267,7 +273,7 @@ class _Search:
         model = self.model
         scale, waves, loops = model.state(self.indices)
         now = _direction_cost(waves.sum()[None], loops.sum()[None], model, costs)[0]
-        found = list[tuple[FloatArray, IntArray, IntArray]]()
+        candidates = list[tuple[FloatArray, IntArray, IntArray]]()
         for to, of, square in ((first, second, squares), (second, first, squares.T)):
             change = costs.areas * (square + 2 * ((scale @ to.scales)[:, None] - scale @ of.scales)) - now
             change += self._price_of(1)[to.places][:, None] + self._price_of(-1)[of.places]
@@ -280,10 +286,10 @@ class _Search:
             loops_of = (loops[:, None] * to.loops[:, rows]).T @ of.loops[:, columns].conj()
             change = change[rows[:, None], columns] + _direction_cost(waves_of, loops_of, model, costs)
             best = np.round(change, 6).argmin(axis=1)
-            found.append((change[np.arange(len(best)), best], to.places[rows], of.places[columns[best]]))
+            candidates.append((change[np.arange(len(best)), best], to.places[rows], of.places[columns[best]]))
             if np.array_equal(to.places, of.places):
                 break
-        change, plus, minus = (np.concatenate(each) for each in zip(*found, strict=True))
+        change, plus, minus = (np.concatenate(parts) for parts in zip(*candidates, strict=True))
         order = np.argsort(np.round(change, 6), kind="stable")[: int((change < -MIN_GAIN).sum())]
         return plus[order], minus[order]
 
@@ -298,15 +304,15 @@ class _Search:
     def _price_of(self, step: int) -> FloatArray:
         """Return (p + 1,) the change of the price of cones by a quarter turn more (1) or less (-1)."""
         model, indices = self.model, self.indices
-        may = indices < model.most if step > 0 else indices > model.least
+        may = indices < model.max_quarters if step > 0 else indices > model.min_quarters
         return np.where(may, np.abs(indices + step) - np.abs(indices), np.inf) * self.price
 
     def _block(self, places: IntArray, origins: IntArray | None = None) -> _Block:
         """Return the model at places, or its changes by steps to them from their origins (k,)."""
         model = self.model
         scales, turns, loops = (
-            each[:, places] if origins is None else each[:, places] - each[:, origins]
-            for each in (model.scales, model.turns, model.loops)
+            matrix[:, places] if origins is None else matrix[:, places] - matrix[:, origins]
+            for matrix in (model.scales, model.turns, model.loops)
         )
         return _Block(places, scales, (scales**2).sum(axis=0), np.exp(1j * turns), np.exp(1j * loops))
 

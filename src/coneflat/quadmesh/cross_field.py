@@ -55,9 +55,9 @@ class Directions:
     curved: ComplexArray
 
     @property
-    def both(self) -> ComplexArray:
+    def combined(self) -> ComplexArray:
         """(m,) the sum of both, in which sharp edges have a share that does not depend on the curvature."""
-        sharp, curved = (float(np.abs(each).sum()) for each in (self.sharp, self.curved))
+        sharp, curved = (float(np.abs(crosses).sum()) for crosses in (self.sharp, self.curved))
         return self.curved + SHARP_SHARE * max(curved, 1.0) / max(sharp, 1.0) * self.sharp
 
 
@@ -128,11 +128,11 @@ def curvature_tensors(mesh: TriangleMesh, areas: FloatArray, radius: float) -> F
     lengths = np.linalg.norm(along, axis=1)
     weights = dihedral_angles(mesh) / np.maximum(lengths, np.finfo(float).tiny) / 2
     products = (weights[:, None, None] * along[:, :, None] * along[:, None, :]).reshape(-1, 9)
-    one, two = mesh.edge_faces[~mesh.is_boundary_edge].T
+    first, second = mesh.edge_faces[~mesh.is_boundary_edge].T
     inner = products[~mesh.is_boundary_edge]
-    both = np.concatenate([one, two])
-    sums = [np.bincount(both, np.tile(column, 2), len(mesh.faces)) for column in inner.T]
-    stiffness = _dual_laplacian(mesh, areas, np.zeros(len(one)))
+    faces_of_edges = np.concatenate([first, second])
+    sums = [np.bincount(faces_of_edges, np.tile(column, 2), len(mesh.faces)) for column in inner.T]
+    stiffness = _dual_laplacian(mesh, areas, np.zeros(len(first)))
     system = csc_matrix(diags(areas) + radius**2 * stiffness.real)
     right = np.ascontiguousarray(np.stack(sums, axis=1), dtype=np.float64)
     mean = factorize(system.sorted_indices()).solve(right).reshape(-1, 3, 3)
@@ -145,10 +145,15 @@ def curvature_tensors(mesh: TriangleMesh, areas: FloatArray, radius: float) -> F
 
 def _dual_laplacian(mesh: TriangleMesh, areas: FloatArray, rotations: FloatArray) -> csr_matrix:
     """Return (m, m) the matrix of the energy sum w |z_g - e^(4 i r) z_f|^2 over the inner edges between f and g."""
-    one, two = mesh.edge_faces[~mesh.is_boundary_edge].T
-    weights = 3 * lengths_along(mesh, np.flatnonzero(~mesh.is_boundary_edge)) ** 2 / (areas[one] + areas[two])
+    first, second = mesh.edge_faces[~mesh.is_boundary_edge].T
+    weights = (
+        3 * lengths_along(mesh, np.flatnonzero(~mesh.is_boundary_edge)) ** 2 / (areas[first] + areas[second])
+    )
     across = -weights * np.exp(4j * rotations)
-    rows, columns = np.concatenate([one, two, one, two]), np.concatenate([one, two, two, one])
+    rows, columns = (
+        np.concatenate([first, second, first, second]),
+        np.concatenate([first, second, second, first]),
+    )
     values = np.concatenate([weights, weights, across.conj(), across])
     return coo_matrix((values, (rows, columns)), shape=(len(areas), len(areas))).tocsr()
 
@@ -163,9 +168,9 @@ def smoothest_cross_field(mesh: TriangleMesh, directions: Directions) -> Complex
     areas = double_areas(lengths) / 2
     energy = _dual_laplacian(mesh, areas, edge_rotations(mesh, halfedge_angles(corner_angles(lengths))))
     sharp = SHARP_WEIGHT * directions.sharp * np.sqrt(areas.sum() / areas)
-    wanted = sharp + directions.curved
+    preferred = sharp + directions.curved
     weights = np.abs(sharp) + np.abs(directions.curved) + 1e-6 * areas / areas.sum()
-    field = HermitianFactor(csr_matrix(energy + diags(weights))).solve(wanted)
+    field = HermitianFactor(csr_matrix(energy + diags(weights))).solve(preferred)
     return field / np.maximum(np.abs(field), np.finfo(float).tiny)
 
 
@@ -174,8 +179,8 @@ def edge_rotations(mesh: TriangleMesh, angles: FloatArray) -> FloatArray:
 
     Angles are modulo half turns; `angles` (3m,) are the directions of half-edges.
     """
-    one, two = mesh.edge_halfedges[~mesh.is_boundary_edge].T
-    return angles[two] - angles[one]
+    first, second = mesh.edge_halfedges[~mesh.is_boundary_edge].T
+    return angles[second] - angles[first]
 
 
 def field_indices(mesh: TriangleMesh, field: ComplexArray) -> IntArray:
@@ -187,8 +192,8 @@ def field_indices(mesh: TriangleMesh, field: ComplexArray) -> IntArray:
     sides = halfedge_angles(angles)
     defect = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
     inner = ~mesh.is_boundary_edge
-    one, two = mesh.edge_faces[inner].T
-    rotation = np.angle(field[two] * np.exp(-4j * edge_rotations(mesh, sides)) * field[one].conj()) / 4
+    first, second = mesh.edge_faces[inner].T
+    rotation = np.angle(field[second] * np.exp(-4j * edge_rotations(mesh, sides)) * field[first].conj()) / 4
     halfedge = mesh.edge_halfedges[inner, 0]
     border = mesh.edge_halfedges[~inner, 0]
     # From the direction of a boundary edge to the nearest of the cross.
@@ -209,8 +214,10 @@ def directions_and_indices(mesh: TriangleMesh, angle: float) -> tuple[Directions
     """
     smooth = _smoothed(mesh)
     before, after = (
-        halfedge_angles(corner_angles(mollify(edge_lengths(one.vertices, one.faces), one)[0])).reshape(-1, 3)
-        for one in (smooth, mesh)
+        halfedge_angles(
+            corner_angles(mollify(edge_lengths(surface.vertices, surface.faces), surface)[0])
+        ).reshape(-1, 3)
+        for surface in (smooth, mesh)
     )
     # From the frame of a smoothed triangle to that of the triangle, so that sides agree in the mean.
     turn = np.exp(4j * (after - before).mean(axis=1))
@@ -221,10 +228,10 @@ def directions_and_indices(mesh: TriangleMesh, angle: float) -> tuple[Directions
 
 def _smoothed(mesh: TriangleMesh) -> TriangleMesh:
     """Return a mesh with its vertices averaged over half the radius of curvatures."""
-    found = diffused(mesh, mesh.vertices, CURVATURE_SCALE / 2)
+    averaged = diffused(mesh, mesh.vertices, CURVATURE_SCALE / 2)
     # Digits that depend on the numbering are left out.
-    digits = 30 - int(np.frexp(np.abs(found).max())[1])
-    return mesh.moved_to(np.ldexp(np.rint(np.ldexp(found, digits)), -digits))
+    digits = 30 - int(np.frexp(np.abs(averaged).max())[1])
+    return mesh.moved_to(np.ldexp(np.rint(np.ldexp(averaged, digits)), -digits))
 
 
 def diffused(mesh: TriangleMesh, values: FloatArray, radius: float) -> FloatArray:

@@ -35,18 +35,18 @@ def extract_quads(grid: IntegerGrid, leave_out: bool = False) -> QuadMesh:
 
     Args:
         grid: the map.
-        leave_out: leave out quads with the same vertex or edge twice, instead of raising an error.
+        leave_out: leave out degenerate quads, instead of raising an error.
 
     Raises:
-        GridError: the map is not an integer-grid map, is so coarse that a quad has the same vertex or edge twice, or
+        GridError: the map is not an integer-grid map, is so coarse that a quad is degenerate, or
             has too many squares or crossings.
         TooLargeError: there is not enough memory.
     """
     check_extraction(grid.corner_grid)
     exact = exact_grid(grid)
-    found = find_points(exact)
-    ports = find_ports(exact, found)
-    mates = join_ports(exact, found, ports)
+    points = find_points(exact)
+    ports = find_ports(exact, points)
+    mates = join_ports(exact, points, ports)
     _require_pairs(mates, ports)
     following = _turn_left(mates, ports)
     darts, left_out = _close(following, ports)
@@ -62,17 +62,17 @@ def extract_quads(grid: IntegerGrid, leave_out: bool = False) -> QuadMesh:
     origin, quads, edges = _split_fans(darts, mates, ports.points)
     notes: tuple[str, ...] = ()
     while (bad := degenerate_quads(quads, edges)).any():
-        text = f"{plural(int(bad.sum()), 'quad')} of {len(quads):,} with a vertex or an edge twice"
+        text = f"{plural(int(bad.sum()), 'degenerate quad')} of {len(quads):,}"
         if not leave_out or bad.all():
             raise CoarseGridError(f"{text} ({list_some(np.flatnonzero(bad))}): use more quads", grid)
         darts, notes = darts[~bad], (*notes, Unmet(f"Left out {text}: the surface is too thin there."))
         origin, quads, edges = _split_fans(darts, mates, ports.points)
-    barycentric = _barycentric(exact, found, origin)
-    corners = exact.mesh.vertices[exact.mesh.faces[found.faces[origin]]]
+    barycentric = _barycentric(exact, points, origin)
+    corners = exact.mesh.vertices[exact.mesh.faces[points.faces[origin]]]
     return QuadMesh(
         np.einsum("qi,qix->qx", barycentric, corners),
         quads,
-        found.faces[origin],
+        points.faces[origin],
         barycentric,
         left_out,
         area - len(darts),
@@ -96,8 +96,8 @@ def _turn_left(mates: IntArray, ports: Ports) -> IntArray:
     """Return (k,) the next port along the quad to the left of each port, clockwise of its mate; -1 for none."""
     clockwise = np.arange(len(mates)) - 1
     first, count = ports.start[:-1], np.diff(ports.start)
-    some = count > 0
-    clockwise[first[some]] = np.where(ports.is_boundary[some], -1, (first + count - 1)[some])
+    has_ports = count > 0
+    clockwise[first[has_ports]] = np.where(ports.is_boundary[has_ports], -1, (first + count - 1)[has_ports])
     return np.where(mates >= 0, clockwise[mates], -1)
 
 
@@ -128,22 +128,22 @@ def _split_fans(darts: IntArray, mates: IntArray, points: IntArray) -> tuple[Int
     corner_of = np.full(len(points), -1, dtype=np.int64)
     corner_of[darts.ravel()] = corner
     # The quad on the other side of the edge has the mate of the port.
-    other = corner_of[mates[darts.ravel()]]
-    count, fan = corner_fans(other)
+    opposite = corner_of[mates[darts.ravel()]]
+    count, fan = corner_fans(opposite)
     point_of = np.empty(count, dtype=np.int64)
     point_of[fan] = points[darts.ravel()]
     rank = np.argsort(point_of, kind="stable")
-    edge = np.where(other >= 0, np.minimum(corner, other), corner)
+    edge = np.where(opposite >= 0, np.minimum(corner, opposite), corner)
     return point_of[rank], np.argsort(rank)[fan].reshape(-1, 4), edge.reshape(-1, 4)
 
 
-def _barycentric(exact: ExactGrid, found: GridPoints, points: IntArray) -> FloatArray:
-    """Return (q, 3) barycentric coordinates of grid points in their triangles, exact on sides and at corners."""
-    corners = exact.corners[found.faces[points]]
-    offset = corners - found.own_places[points][:, None]
-    one, two = offset[:, [1, 2, 0]], offset[:, [2, 0, 1]]
-    areas = one[..., 0] * two[..., 1] - one[..., 1] * two[..., 0]
-    side = found.sides[points]
+def _barycentric(exact: ExactGrid, grid_points: GridPoints, points: IntArray) -> FloatArray:
+    """Return (q, 3) barycentric coordinates of grid points in their triangles, not rounded on sides."""
+    corners = exact.corners[grid_points.faces[points]]
+    offset = corners - grid_points.own_places[points][:, None]
+    following, preceding = offset[:, [1, 2, 0]], offset[:, [2, 0, 1]]
+    areas = following[..., 0] * preceding[..., 1] - following[..., 1] * preceding[..., 0]
+    side = grid_points.sides[points]
     for i in range(3):
         areas[side == i, i] = 0.0
         areas[side == 3 + i] = np.eye(3)[i]
@@ -211,11 +211,13 @@ def with_borders(quads: QuadMesh) -> QuadMesh:
         )
     on, barycentric = np.concatenate(faces), np.concatenate(weights)
     points = np.einsum("qi,qix->qx", barycentric, mesh.vertices[mesh.faces[on]])
-    found = replace(quads, vertices=points, quads=np.concatenate(layers), faces=on, barycentric=barycentric)
+    bordered = replace(
+        quads, vertices=points, quads=np.concatenate(layers), faces=on, barycentric=barycentric
+    )
     if missing:
-        return found
+        return bordered
     note = f"A layer of quads along the boundary replaces {plural(quads.left_out, 'square')} that it cuts."
-    return replace(found, left_out=0, area_left_out=0.0, notes=(*quads.notes, note))
+    return replace(bordered, left_out=0, area_left_out=0.0, notes=(*quads.notes, note))
 
 
 def _walks(tails: IntArray, heads: IntArray) -> list[IntArray]:
@@ -244,11 +246,13 @@ def _places_along(
     """
     lengths = np.sqrt(dots(steps, steps))
     # Along a boundary of few edges, the nearest one need not be next to the nearest vertex.
-    both = np.stack([edge, edge - 1]) if len(steps) > 64 else np.arange(len(steps))[:, None] + 0 * edge
-    share = np.clip(dots(points - starts[both], steps[both]) / np.maximum(lengths[both] ** 2, 1e-300), 0, 1)
-    off = np.linalg.norm(starts[both] + share[..., None] * steps[both] - points, axis=2)
+    nearby = np.stack([edge, edge - 1]) if len(steps) > 64 else np.arange(len(steps))[:, None] + 0 * edge
+    share = np.clip(
+        dots(points - starts[nearby], steps[nearby]) / np.maximum(lengths[nearby] ** 2, 1e-300), 0, 1
+    )
+    off = np.linalg.norm(starts[nearby] + share[..., None] * steps[nearby] - points, axis=2)
     ends, total = np.cumsum(lengths), lengths.sum()
-    at = (ends[both] - lengths[both] * (1 - share))[off.argmin(axis=0), np.arange(len(points))]
+    at = (ends[nearby] - lengths[nearby] * (1 - share))[off.argmin(axis=0), np.arange(len(points))]
     gaps = (np.roll(at, -1) - at + total / 2) % total - total / 2
     if abs(gaps.sum() - total) > total / 2:
         return None, off.min(axis=0)

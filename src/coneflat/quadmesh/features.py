@@ -23,29 +23,29 @@ def lengths_along(mesh: TriangleMesh, edges: IntArray) -> FloatArray:
 
 def vertex_graph(mesh: TriangleMesh) -> csr_matrix:
     """Return (n, n) the lengths of edges."""
-    one, two = mesh.edges.T
-    both = np.concatenate([one, two]), np.concatenate([two, one])
+    tails, heads = mesh.edges.T
+    ends = np.concatenate([tails, heads]), np.concatenate([heads, tails])
     lengths = lengths_along(mesh, np.arange(len(mesh.edges)))
-    return csr_matrix((np.tile(lengths, 2), both), shape=(len(mesh.vertices),) * 2)
+    return csr_matrix((np.tile(lengths, 2), ends), shape=(len(mesh.vertices),) * 2)
 
 
-def without_stubs(mesh: TriangleMesh, edges: IntArray, least: float) -> IntArray:
+def without_stubs(mesh: TriangleMesh, edges: IntArray, shortest: float) -> IntArray:
     """Return the indices of the edges (k,) that remain after stubs are removed.
 
     A stub is a chain with a free end and fewer than two edges, or shorter than `least`.
     """
-    kept = np.arange(len(edges))
+    remaining = np.arange(len(edges))
     lengths = lengths_along(mesh, edges)
     while True:
-        chain, ends = feature_chains(mesh, edges[kept])
+        chain, ends = feature_chains(mesh, edges[remaining])
         count = int(chain.max(initial=-1)) + 1
         is_stub = mask_of(count, chain[(ends == 1).any(axis=1)])
         is_stub &= (np.bincount(chain, minlength=count) < 2) | (
-            np.bincount(chain, lengths[kept], count) < least
+            np.bincount(chain, lengths[remaining], count) < shortest
         )
         if not is_stub.any():
-            return kept
-        kept = kept[~is_stub[chain]]
+            return remaining
+        remaining = remaining[~is_stub[chain]]
 
 
 def feature_chains(mesh: TriangleMesh, edges: IntArray) -> tuple[IntArray, IntArray]:
@@ -80,8 +80,8 @@ def split_chords(mesh: TriangleMesh, ends: IntArray | None = None) -> tuple[Tria
 def split_around(mesh: TriangleMesh, vertices: IntArray) -> TriangleMesh:
     """Return a mesh with the edges of triangles at some vertices split at their midpoints."""
     mesh = without_pillows(mesh)
-    near = mask_of(len(mesh.vertices), vertices)[mesh.faces].any(axis=1)
-    return split_edges(mesh, mask_of(len(mesh.edges), mesh.halfedge_edges.reshape(-1, 3)[near]))[0]
+    is_around = mask_of(len(mesh.vertices), vertices)[mesh.faces].any(axis=1)
+    return split_edges(mesh, mask_of(len(mesh.edges), mesh.halfedge_edges.reshape(-1, 3)[is_around]))[0]
 
 
 def edge_indices(mesh: TriangleMesh, pairs: IntArray) -> IntArray:
@@ -138,11 +138,16 @@ def split_longest(
     first = np.argmax(np.where(is_split, lengths, -1), axis=1)
     turn = (first[:, None] + np.arange(3)) % 3
     six = np.concatenate([turn, 3 + turn], axis=1)
-    one, two, three = np.take_along_axis(is_split, turn, axis=1).T
+    splits_first, splits_second, splits_third = np.take_along_axis(is_split, turn, axis=1).T
     pieces = (
-        (~one, (0, 1, 2)), (one & ~three, (0, 1, 3)), (one & three, (0, 5, 3)), (one & three, (5, 1, 3)),
-        (one & ~two, (0, 3, 2)), (one & two, (0, 3, 4)), (one & two, (4, 3, 2)),
-    )  # fmt: skip
+        (~splits_first, (0, 1, 2)),
+        (splits_first & ~splits_third, (0, 1, 3)),
+        (splits_first & splits_third, (0, 5, 3)),
+        (splits_first & splits_third, (5, 1, 3)),
+        (splits_first & ~splits_second, (0, 3, 2)),
+        (splits_first & splits_second, (0, 3, 4)),
+        (splits_first & splits_second, (4, 3, 2)),
+    )
     origin = np.concatenate([np.flatnonzero(chosen) for chosen, _ in pieces])
     piece = np.concatenate([six[chosen][:, corners] for chosen, corners in pieces])
     corners = np.concatenate([mesh.faces, middle[sides]], axis=1)[origin]

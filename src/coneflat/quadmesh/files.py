@@ -70,10 +70,10 @@ _HEAD = (
 
 def check_quads_output(path: str | PathLike[str]) -> Path:
     """Return a path that `write_quads` can write, or raise the same errors in advance."""
-    found = checked_target(path, endings=QUAD_FORMATS, what="quads are written as")
-    if found.suffix.lower() in _MESHIO:
+    target = checked_target(path, endings=QUAD_FORMATS, what="quads are written as")
+    if target.suffix.lower() in _MESHIO:
         imported("meshio", "meshes of meshio need meshio", "meshio")
-    return found
+    return target
 
 
 def check_grid_output(path: str | PathLike[str]) -> Path:
@@ -138,15 +138,15 @@ def _states(mesh: QuadMesh, path: Path) -> tuple[bytes, list[bytes], IntArray]:
 
     They are those of the OBJ file that the mesh was read from, of the polygon nearest to the centre of the quad.
     """
-    source, known, states, starts = mesh.source, dict[bytes, bytes](), dict[bytes, int]({b"": 0}), [(0, 0)]
+    source, current, states, starts = mesh.source, dict[bytes, bytes](), dict[bytes, int]({b"": 0}), [(0, 0)]
     if source is None or source.obj is None:
         return b"", [b""], np.zeros(len(mesh.quads), dtype=np.int64)
     libraries = list[bytes]()
     for polygon, gap in sorted(relocated(source.obj, source.path.parent, path.parent).gaps.items()):
-        found = [(word, b"%s %s\n" % (word, names)) for word, names in _STATE.findall(gap)]
-        libraries += [line for word, line in found if word == b"mtllib"]
-        known |= {word: line for word, line in found if word != b"mtllib"}
-        starts.append((polygon, states.setdefault(b"".join(known.values()), len(states))))
+        lines = [(word, b"%s %s\n" % (word, names)) for word, names in _STATE.findall(gap)]
+        libraries += [line for word, line in lines if word == b"mtllib"]
+        current |= {word: line for word, line in lines if word != b"mtllib"}
+        starts.append((polygon, states.setdefault(b"".join(current.values()), len(states))))
     corners = mesh.vertices[mesh.quads]
     normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     on, _ = TriangleTree(source.vertices, source.triangles).nearest(corners.mean(axis=1), normals)
@@ -166,14 +166,14 @@ def _face_lines(corners: IntArray, at_once: int = 1 << 15) -> Iterator[bytes]:
 
 def _write_by_meshio(mesh: QuadMesh, stream: IO[bytes], ending: str) -> None:
     meshio = imported("meshio", "meshes of meshio need meshio", "meshio")
-    least = least_jacobians(mesh.vertices, mesh.quads)
+    jacobians = least_jacobians(mesh.vertices, mesh.quads)
     data: dict[str, Any] = {}
     if ending != ".inp":
-        data = {"point_data": {"valence": mesh.valences}, "cell_data": {"jacobian": [least]}}
-    found = meshio.Mesh(mesh.vertices, [("quad", mesh.quads)], **data)
+        data = {"point_data": {"valence": mesh.valences}, "cell_data": {"jacobian": [jacobians]}}
+    written = meshio.Mesh(mesh.vertices, [("quad", mesh.quads)], **data)
     with TemporaryDirectory() as folder:  # not all writers of meshio take streams
         path = Path(folder) / f"quads{ending}"
-        meshio.write(path, found, _MESHIO[ending])
+        meshio.write(path, written, _MESHIO[ending])
         stream.write(path.read_bytes())
 
 
@@ -255,15 +255,15 @@ def _write_glb(mesh: QuadMesh, stream: IO[bytes]) -> None:
         }
     )
 
-    def floats(rows: FloatArray, **more: Any) -> int:
-        form = {"componentType": 5126, "type": "VEC3", **more}
+    def floats(rows: FloatArray, **form_entries: Any) -> int:
+        form = {"componentType": 5126, "type": "VEC3", **form_entries}
         return glb.add_array(rows.astype("<f4"), form, FOR_VERTICES)
 
-    def primitive(places: FloatArray, indices: IntArray, **more: int) -> dict[str, Any]:
+    def primitive(places: FloatArray, indices: IntArray, **entries: int) -> dict[str, Any]:
         form = {"componentType": 5125, "type": "SCALAR"}
         at = glb.add_array(indices.reshape(-1, 1).astype("<u4"), form, FOR_INDICES)
         attributes = {"POSITION": floats(places, **bounds(places.astype("<f4")))}
-        return {"attributes": attributes, "indices": at, **more}
+        return {"attributes": attributes, "indices": at, **entries}
 
     faces = primitive(places.local.astype(np.float64), mesh.triangles, material=0)
     faces["attributes"]["NORMAL"] = floats(normals)
@@ -313,10 +313,10 @@ def read_grid(path: str | PathLike[str]) -> IntegerGrid:
 
 def _require_mesh(path: Path, vertices: FloatArray, faces: IntArray) -> None:
     """Raise MeshFileError unless the triangles are a consistently oriented manifold."""
-    used, numbers = np.unique(faces, return_inverse=True)
+    vertices_of_faces, numbers = np.unique(faces, return_inverse=True)
     again = numbers.reshape(-1, 3)
     try:
-        checked = check_mesh(vertices[used], again)
+        checked = check_mesh(vertices[vertices_of_faces], again)
     except MeshError as error:
         # The rest of the message advises a repair, which would break the map.
         raise MeshFileError(f"{path} holds no integer grid: {str(error).split(';')[0]}") from error
@@ -336,8 +336,8 @@ def _require_lines(path: Path, grid: IntegerGrid) -> None:
         raise MeshFileError(
             f"{path} holds no integer grid: its corners are listed twice, are not on grid points, or have other angles"
         )
-    known = mesh.edges[on_lines(mesh, grid.corner_grid)] @ [n, 1]
-    if not np.isin(np.sort(grid.features, axis=1) @ [n, 1], known).all():
+    line_keys = mesh.edges[on_lines(mesh, grid.corner_grid)] @ [n, 1]
+    if not np.isin(np.sort(grid.features, axis=1) @ [n, 1], line_keys).all():
         raise MeshFileError(f"{path} holds no integer grid: its sharp edges are not edges on grid lines")
 
 

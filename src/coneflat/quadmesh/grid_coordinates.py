@@ -58,27 +58,27 @@ def exact_grid(grid: IntegerGrid) -> ExactGrid:
             point, or a triangle is not counterclockwise.
     """
     mesh = TriangleMesh(np.asarray(grid.vertices, np.float64), np.asarray(grid.faces, np.int64))
-    given = np.ascontiguousarray(grid.corner_grid, np.float64)
+    corner_grid = np.ascontiguousarray(grid.corner_grid, np.float64)
     twin = halfedge_twins(mesh)
     # The motions of a half-edge are those to its twin's triangle, the inverse of the given ones.
     turns = np.where(twin >= 0, np.asarray(grid.turns)[twin] % 4, 0)
     shifts = np.where(twin[:, None] >= 0, np.asarray(grid.shifts)[twin], 0.0)
     fans = _fans(mesh, twin)
-    most = max(float(np.abs(given).max()), float(np.abs(shifts).max(initial=0.0)), 1.0)
+    largest = max(float(np.abs(corner_grid).max()), float(np.abs(shifts).max(initial=0.0)), 1.0)
     # Coordinates have two binary digits less than a double, so that sums of coordinates and shifts are exact.
-    step = np.ldexp(1.0, int(np.frexp(most)[1]) - 51)
+    step = np.ldexp(1.0, int(np.frexp(largest)[1]) - 51)
     start = np.zeros((len(mesh.vertices), 2))
-    start[mesh.faces.ravel()[fans[0]]] = step * np.round(given.reshape(-1, 2)[fans[0]] / step)
+    start[mesh.faces.ravel()[fans[0]]] = step * np.round(corner_grid.reshape(-1, 2)[fans[0]] / step)
     rounded = np.round(start)
     snapped = np.where(np.abs(start - rounded) <= SNAP_DISTANCE, rounded, start)
-    exact = ExactGrid(mesh, given, twin, turns, shifts, fans)
+    exact = ExactGrid(mesh, corner_grid, twin, turns, shifts, fans)
     corners, is_off = _transport(exact, snapped)
     bad = mesh.faces[orientations(corners) <= 0]
     if bad.size:  # Snapping degenerates very thin triangles: their vertices are rounded, but not snapped.
         snapped[bad] = start[bad]
         corners, is_off = _transport(exact, snapped)
     exact = replace(exact, corners=corners)
-    _require_map(exact, given, is_off)
+    _require_map(exact, corner_grid, is_off)
     return exact
 
 
@@ -104,15 +104,15 @@ def _transport(exact: ExactGrid, start: FloatArray) -> tuple[FloatArray, BoolArr
 
     And (n,) whether the coordinates of a vertex differ after a full loop.
     """
-    flat, here = exact.mesh.faces.ravel(), start.copy()
+    flat, current = exact.mesh.faces.ravel(), start.copy()
     corners = np.empty((len(flat), 2))
     for corner in exact.fans:
-        corners[corner] = here[flat[corner]]
+        corners[corner] = current[flat[corner]]
         out = corner - corner % 3 + (corner + 1) % 3
         goes_on = exact.twin[out] >= 0
         vertex, out = flat[corner[goes_on]], out[goes_on]
-        here[vertex] = rotated(exact.turns[out], here[vertex]) + exact.shifts[out]
-    is_off = (here != start).any(axis=1) & ~exact.mesh.is_boundary_vertex
+        current[vertex] = rotated(exact.turns[out], current[vertex]) + exact.shifts[out]
+    is_off = (current != start).any(axis=1) & ~exact.mesh.is_boundary_vertex
     return corners.reshape(-1, 3, 2), is_off
 
 
@@ -135,10 +135,10 @@ def orientations(corners: FloatArray) -> IntArray:
     return signs
 
 
-def _require_map(exact: ExactGrid, given: FloatArray, is_off: BoolArray) -> None:
+def _require_map(exact: ExactGrid, corner_grid: FloatArray, is_off: BoolArray) -> None:
     """Raise GridError unless sides of edges match, triangles are counterclockwise, and cones lie on grid points."""
     mesh, flat = exact.mesh, exact.corners.reshape(-1, 2)
-    off = np.abs(exact.corners - given).max(axis=(1, 2))
+    off = np.abs(exact.corners - corner_grid).max(axis=(1, 2))
     is_cone = ~mesh.is_boundary_vertex & (quarters_around(mesh, sides_between(exact.corners)) != 4)
     is_between = mask_of(len(mesh.vertices), mesh.faces.ravel()[(flat != np.round(flat)).any(axis=1)])
     apart = f"the two sides of edges of {{}} are up to {off.max():.1e} grid units apart"

@@ -83,8 +83,8 @@ def find_points(exact: ExactGrid) -> GridPoints:
     """Return the grid points of a surface."""
     faces, places = _candidates(exact.corners)
     corners = exact.corners[faces]
-    each = np.broadcast_to(places[:, None], corners.shape)
-    rows = np.stack([corners[:, [1, 2, 0]], corners[:, [2, 0, 1]], each], axis=2)
+    repeated = np.broadcast_to(places[:, None], corners.shape)
+    rows = np.stack([corners[:, [1, 2, 0]], corners[:, [2, 0, 1]], repeated], axis=2)
     signs = orientations(rows.reshape(-1, 3, 2)).reshape(-1, 3)
     within = (signs >= 0).all(axis=1)
     faces, places, on = faces[within], places[within], signs[within] == 0
@@ -103,15 +103,15 @@ def _candidates(corners: FloatArray) -> tuple[IntArray, FloatArray]:
     """Return (k,) triangles and (k, 2) candidate grid points: all in the triangles, and a few others."""
     low, high = np.ceil(corners[..., 1].min(axis=1)), np.floor(corners[..., 1].max(axis=1))
     faces, y = _ranges(low, high)
-    least, most = np.full(len(y), np.inf), np.full(len(y), -np.inf)
+    leftmost, rightmost = np.full(len(y), np.inf), np.full(len(y), -np.inf)
     for i in range(3):
-        one, two = corners[faces, i], corners[faces, (i + 1) % 3]
-        along = two - one
-        meets = (along[:, 1] != 0) & (np.minimum(one[:, 1], two[:, 1]) <= y)
-        meets &= y <= np.maximum(one[:, 1], two[:, 1])
-        x = one[meets, 0] + (y - one[:, 1])[meets] / along[meets, 1] * along[meets, 0]
-        least[meets], most[meets] = np.minimum(least[meets], x), np.maximum(most[meets], x)
-    rows, x = _ranges(np.floor(least), np.ceil(most))
+        start, end = corners[faces, i], corners[faces, (i + 1) % 3]
+        along = end - start
+        meets = (along[:, 1] != 0) & (np.minimum(start[:, 1], end[:, 1]) <= y)
+        meets &= y <= np.maximum(start[:, 1], end[:, 1])
+        x = start[meets, 0] + (y - start[:, 1])[meets] / along[meets, 1] * along[meets, 0]
+        leftmost[meets], rightmost[meets] = np.minimum(leftmost[meets], x), np.maximum(rightmost[meets], x)
+    rows, x = _ranges(np.floor(leftmost), np.ceil(rightmost))
     return faces[rows], np.stack([x, y[rows]], axis=1)
 
 
@@ -129,11 +129,11 @@ def _same_point(exact: ExactGrid, faces: IntArray, places: FloatArray, sides: In
     label = np.arange(len(faces)) + len(exact.mesh.vertices)
     label[at_vertex] = exact.mesh.faces[faces[at_vertex], sides[at_vertex] - 3]
     half = 3 * faces[on_edge] + sides[on_edge]
-    there, place = half.copy(), places[on_edge]
+    owner, place = half.copy(), places[on_edge]
     seen = np.flatnonzero((exact.twin[half] >= 0) & (exact.twin[half] < half))
-    there[seen] = exact.twin[half[seen]]
+    owner[seen] = exact.twin[half[seen]]
     place[seen] = rotated(exact.turns[half[seen]], place[seen]) + exact.shifts[half[seen]]
-    keys = np.concatenate([there[:, None], place.astype(np.int64)], axis=1)
+    keys = np.concatenate([owner[:, None], place.astype(np.int64)], axis=1)
     _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     label[on_edge] = label[on_edge][first][which.ravel()]
     return label
@@ -154,17 +154,17 @@ def find_entry(start: IntArray, places: FloatArray, face: int, x: float, y: floa
     return -1
 
 
-def find_ports(exact: ExactGrid, found: GridPoints) -> Ports:
+def find_ports(exact: ExactGrid, points: GridPoints) -> Ports:
     """Return the directions in which grid lines leave the grid points."""
     corners, flat = exact.corners, exact.mesh.faces.ravel()
-    inside = np.flatnonzero(found.sides == 6)
+    inside = np.flatnonzero(points.sides == 6)
     every = np.broadcast_to(np.arange(4), (len(inside), 4))
     parts = [
-        (inside, found.faces[inside], found.own_places[inside], every, np.zeros(len(inside), dtype=bool))
+        (inside, points.faces[inside], points.own_places[inside], every, np.zeros(len(inside), dtype=bool))
     ]
 
-    on_edge = np.flatnonzero(found.sides < 3)
-    half, places = 3 * found.faces[on_edge] + found.sides[on_edge], found.own_places[on_edge]
+    on_edge = np.flatnonzero(points.sides < 3)
+    half, places = 3 * points.faces[on_edge] + points.sides[on_edge], points.own_places[on_edge]
     for _ in range(2):
         faces, i = half // 3, half % 3
         side = corners[faces, (i + 2) % 3] - corners[faces, (i + 1) % 3]
@@ -172,22 +172,24 @@ def find_ports(exact: ExactGrid, found: GridPoints) -> Ports:
         parts.append((on_edge, faces, places, _directions(side, -side, closed), closed))
         places = (rotated(exact.turns[half], places) + exact.shifts[half])[~closed]
         on_edge, half = on_edge[~closed], exact.twin[half[~closed]]
-    at_vertex = np.flatnonzero((found.sides >= 3) & (found.sides < 6))
+    at_vertex = np.flatnonzero((points.sides >= 3) & (points.sides < 6))
     point = np.full(len(exact.mesh.vertices), -1)
-    point[flat[3 * found.faces[at_vertex] + found.sides[at_vertex] - 3]] = at_vertex
+    point[flat[3 * points.faces[at_vertex] + points.sides[at_vertex] - 3]] = at_vertex
     for fan in exact.fans:
         fan = fan[point[flat[fan]] >= 0]
         faces, i = fan // 3, fan % 3
-        own = corners[faces, i]
-        one, two = corners[faces, (i + 1) % 3] - own, corners[faces, (i + 2) % 3] - own
+        place = corners[faces, i]
+        start_side, end_side = corners[faces, (i + 1) % 3] - place, corners[faces, (i + 2) % 3] - place
         closed = exact.twin[3 * faces + (i + 1) % 3] < 0
-        parts.append((point[flat[fan]], faces, own, _directions(one, two, closed), closed))
-    points, faces, places, directions, closed = (np.concatenate(each) for each in zip(*parts, strict=True))
-    order = np.argsort(points, kind="stable")
+        parts.append((point[flat[fan]], faces, place, _directions(start_side, end_side, closed), closed))
+    point_of_wedge, faces, places, directions, closed = (
+        np.concatenate(parts_of_field) for parts_of_field in zip(*parts, strict=True)
+    )
+    order = np.argsort(point_of_wedge, kind="stable")
     wedge, which = np.nonzero(directions[order] >= 0)
     wedge = order[wedge]
-    is_boundary = mask_of(len(found.entry), points[closed])
-    start = np.concatenate([[0], np.cumsum(np.bincount(points[wedge], minlength=len(found.entry)))])
+    is_boundary = mask_of(len(points.entry), point_of_wedge[closed])
+    start = np.concatenate([[0], np.cumsum(np.bincount(point_of_wedge[wedge], minlength=len(points.entry)))])
     return Ports(start, faces[wedge], directions[wedge, which], places[wedge], is_boundary)
 
 
@@ -201,7 +203,7 @@ def _directions(start: FloatArray, end: FloatArray, closed: BoolArray) -> IntArr
     d = np.select([(x > 0) & (y >= 0), y > 0, x < 0], [0, 1, 2], 3)
     # The components of an axis are 0 and 1 or -1, so the products are exact.
     d = (d + (_cross(start, AXES[d]) != 0)) % 4
-    found = np.full((len(d), 4), -1)
+    directions = np.full((len(d), 4), -1)
     goes_on = np.ones(len(d), dtype=bool)
     for k in range(3):
         along = AXES[d]
@@ -210,30 +212,35 @@ def _directions(start: FloatArray, end: FloatArray, closed: BoolArray) -> IntArr
         goes_on &= np.where(
             since > 0, (left > 0) | is_last, (since == 0) & ((dots(start, along) > 0) | is_last)
         )
-        found[goes_on, k] = d[goes_on]
+        directions[goes_on, k] = d[goes_on]
         d = (d + 1) % 4
-    return found
+    return directions
 
 
-def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
-    return one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
-def join_ports(exact: ExactGrid, found: GridPoints, ports: Ports) -> IntArray:
+def join_ports(exact: ExactGrid, points: GridPoints, ports: Ports) -> IntArray:
     """Return (k,) the mate of each port: the port at the other end of its grid line, BOUNDARY or LOST."""
     ends = np.empty((len(ports.faces), 3), dtype=np.int64)
-    grid = exact.corners, exact.twin, exact.turns, exact.shifts, found.start, found.places
+    grid = exact.corners, exact.twin, exact.turns, exact.shifts, points.start, points.places
     _follow_all(grid, ports.places, ports.faces, ports.directions, ends)
     mates, face, direction = ends.T
     arrived = np.flatnonzero(mates >= 0)
     mates[arrived] = _ports_back(
-        exact, found, ports, mates[arrived], face[arrived], (direction[arrived] + 2) % 4
+        exact, points, ports, mates[arrived], face[arrived], (direction[arrived] + 2) % 4
     )
     return mates
 
 
 def _ports_back(
-    exact: ExactGrid, found: GridPoints, ports: Ports, entry: IntArray, face: IntArray, direction: IntArray
+    exact: ExactGrid,
+    grid_points: GridPoints,
+    ports: Ports,
+    entry: IntArray,
+    face: IntArray,
+    direction: IntArray,
 ) -> IntArray:
     """Return (k,) the port of the point of each entry in a given triangle and direction, or LOST.
 
@@ -243,18 +250,18 @@ def _ports_back(
     def keys(points: IntArray, faces: IntArray, directions: IntArray) -> IntArray:
         return 4 * (points * len(exact.corners) + faces) + directions
 
-    known = keys(ports.points, ports.faces, ports.directions)
-    order = np.argsort(known, kind="stable")
+    keys_of_ports = keys(ports.points, ports.faces, ports.directions)
+    order = np.argsort(keys_of_ports, kind="stable")
 
     def port_at(which: IntArray) -> IntArray:
-        wanted = keys(found.points[entry[which]], face[which], direction[which])
-        at = order[np.minimum(np.searchsorted(known, wanted, sorter=order), len(order) - 1)]
-        return np.where(known[at] == wanted, at, LOST)
+        sought = keys(grid_points.points[entry[which]], face[which], direction[which])
+        at = order[np.minimum(np.searchsorted(keys_of_ports, sought, sorter=order), len(order) - 1)]
+        return np.where(keys_of_ports[at] == sought, at, LOST)
 
     port = port_at(np.arange(len(entry)))
     lost = np.flatnonzero(port == LOST)
     crossed = np.full(len(lost), -1)
-    along, places = AXES[direction[lost]], found.places[entry[lost]]
+    along, places = AXES[direction[lost]], grid_points.places[entry[lost]]
     for i in range(3):
         a, b = exact.corners[face[lost], (i + 1) % 3], exact.corners[face[lost], (i + 2) % 3]
         side, half = b - a, 3 * face[lost] + i

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from ..base import THREADS, FloatArray, Stopwatch, Unmet, limit_threads, plural, warns
 from ..errors import ConvergenceError, CurvatureError, GridError, MetricError, OptionError, SeamError
-from ..flattening import flatten_source
+from ..flattener import flatten_source
 from ..geometry import double_areas, edge_lengths
 from ..io import as_input
 from ..measures import unmet_guarantees
@@ -33,7 +33,7 @@ from .options import QUADS, QuadOptions, flattening_defaults
 from .quad_mesh import CoarseGridError
 from .round_layout import grid_about, split_between_nodes, with_note
 from .rounding import find_rounding
-from .sizes import note_on_sizes, wanted_scales
+from .sizes import note_on_sizes, target_scales
 
 # Options that only the search for the fewest cones takes into account.
 SPARSE_OPTIONS = (*SEARCH_OPTIONS, "max_cones", "lengths")
@@ -175,13 +175,13 @@ class GridSearch:
         return replace(self.of_any_size(), seconds=dict(self.stages.seconds))
 
     def of_any_size(self, tries: int = 3) -> IntegerGrid:
-        """Return a grid, with more squares if some quads of one of the wanted size have a vertex or an edge twice.
+        """Return a grid, with more squares if some quads of one of the requested size are degenerate.
 
         This is so where the surface is as thin as a square. A grid of more than 1,000 squares, and four times as many
-        as wanted, is not refined, since each try repeats the search.
+        as requested, is not refined, since each try repeats the search.
 
         Raises:
-            CoarseGridError: none was found, with the grid of the wanted size.
+            CoarseGridError: none was found, with the grid of the requested size.
         """
         try:
             return self._as_given()
@@ -197,9 +197,7 @@ class GridSearch:
             found = search.of_any_size(tries - 1)
         except NO_GRID:
             raise coarse from None
-        return with_note(
-            found, Unmet("More quads than wanted: with fewer, some have a vertex or an edge twice.")
-        )
+        return with_note(found, Unmet("More quads than requested: with fewer, some are degenerate."))
 
     def _as_given(self) -> IntegerGrid:
         """Return a grid for the options as given."""
@@ -211,7 +209,9 @@ class GridSearch:
             return self._with_fewest_cones()
         if self.checked.mesh.components[0] > 1:
             return self._of_components()
-        what = "the boundary, sharp edges or curvature" + ", nor for wanted sizes" * (self.sizes is not None)
+        what = "the boundary, sharp edges or curvature" + ", nor for requested sizes" * (
+            self.sizes is not None
+        )
         failed = list[Exception]()
         # On a coarse mesh that is split, costlier cones are others, for which there may be a grid.
         # With so many holes and handles, costlier cones hardly ever help, nor others if rotations are not reached.
@@ -252,7 +252,7 @@ class GridSearch:
         of_face = scales[mesh.faces].mean(axis=1)
         # Nothing of a component without area can be seen.
         for part, vertices, faces in (each for each in mesh.split_components() if areas[each[2]].any()):
-            # The mean of the log scale on the component, relative to that on the whole mesh.
+            # The mean of the log scale on the component, relative to that on all components.
             mean = np.average(of_face[faces], weights=areas[faces]) - np.average(of_face, weights=areas)
             search = replace(
                 self,
@@ -321,14 +321,14 @@ class GridSearch:
         """The root of the area of the mesh, in model units."""
         checked, given = self.checked, self.result.lengths if self.result else self.options.get("lengths")
         options = read_options({"lengths": given, "repair": self.options.get("repair", False)}, Options)
-        own = None if given is None else self.source.prepared(options).own_lengths
+        own = None if given is None else self.source.prepared(options).user_lengths
         lengths = edge_lengths(checked.mesh.vertices, checked.mesh.faces) if own is None else own
         return float(np.ldexp(max(np.sqrt(double_areas(lengths).sum() / 2), 1e-150), -checked.exponent))
 
     @cached_property
     def scales(self) -> FloatArray | None:
-        """(n,) the wanted log scale at the vertices of the checked mesh, if relative sizes are given."""
-        return None if self.sizes is None else wanted_scales(self.source, self.checked, self.sizes)
+        """(n,) the target log scale at the vertices of the checked mesh, if relative sizes are given."""
+        return None if self.sizes is None else target_scales(self.source, self.checked, self.sizes)
 
     def _of_flattening(self, boundary: str = "", all_sides: bool = False, note: str = "") -> IntegerGrid:
         """Return the grid of a flattening with a given boundary, or else the one of the options, by default free.
@@ -373,7 +373,7 @@ class GridSearch:
                 lines = edge_indices(sided.mesh, sharp_ends(sided.mesh, self._angle))
                 split = split_between_nodes(sided, lines)
                 found, left = grid_with_lines(split, self._angle, self.sharp_angle is not None, self.energy)
-            # Rather than many more squares than wanted, a grid with other cones is searched.
+            # Rather than many more squares than requested, a grid with other cones is searched.
             most = 1 if is_aligned and self.sharp_angle is None else 4
             found = with_note(found or self._with_sides(layout, sided, all_sides, most), left)
         if result is not self.result:

@@ -128,7 +128,7 @@ def find_motions(mesh: TriangleMesh, corner_grid: FloatArray) -> tuple[IntArray,
         rounded = np.rint(shift)
         shifts[h] = np.stack([rounded.real, rounded.imag], axis=1).astype(np.int64)
         missed = (starts[h] - motion * ends[t] - rounded, ends[h] - motion * starts[t] - rounded)
-        off = max(off, *(float(np.abs(each).max(initial=0.0)) for each in missed))
+        off = max(off, *(float(np.abs(miss).max(initial=0.0)) for miss in missed))
     return turns, shifts, off
 
 
@@ -138,7 +138,7 @@ def grid_of_corners(
     corner_grid: FloatArray,
     cones: IntArray | None = None,
     corners: IntArray | None = None,
-    **known: float | tuple[str, ...] | IntArray,
+    **attributes: float | tuple[str, ...] | IntArray,
 ) -> IntegerGrid:
     """Return the integer grid of given corner coordinates, with the motions and cones that follow from them.
 
@@ -147,7 +147,7 @@ def grid_of_corners(
         corner_grid: (m, 3, 2) grid coordinates of every triangle corner.
         cones, corners: None: all inner vertices with another angle than four quarter turns; and all corners of the
             boundary.
-        known: the size of squares, which else is computed, notes, features, and the angles of corners.
+        attributes: the size of squares, which else is computed, notes, features, and the angles of corners.
 
     Raises:
         GridError: triangles are flipped, or the sides of seams are not related by quarter turns and integer
@@ -177,9 +177,13 @@ def grid_of_corners(
         is_between = np.bincount(sides.ravel(), minlength=len(vertices)) == 2
         corners = np.flatnonzero((quarters != 2) & is_between)
     area = float(double_areas(edge_lengths(vertices, faces)).sum())
-    known = {"size": float(np.sqrt(area / flat.sum())), "corner_quarters": quarters[corners], **known}
+    attributes = {
+        "size": float(np.sqrt(area / flat.sum())),
+        "corner_quarters": quarters[corners],
+        **attributes,
+    }
     arrays = (vertices, faces, corner_grid, turns, shifts, cones, quarters[cones])
-    return IntegerGrid(*arrays, corners=corners, **known)  # type: ignore[arg-type]
+    return IntegerGrid(*arrays, corners=corners, **attributes)  # type: ignore[arg-type]
 
 
 def joined_grids(grids: Sequence[IntegerGrid], notes: Sequence[str]) -> IntegerGrid:
@@ -187,12 +191,14 @@ def joined_grids(grids: Sequence[IntegerGrid], notes: Sequence[str]) -> IntegerG
     first = np.cumsum([0, *(len(grid.vertices) for grid in grids)])
     squares = [grid.squares for grid in grids]
     values: dict[str, Any] = {}
-    for each in fields(IntegerGrid):
-        own = [getattr(grid, each.name) for grid in grids]
-        if each.name in ("faces", "cones", "corners", "features"):
-            values[each.name] = np.concatenate([one + start for one, start in zip(own, first, strict=False)])
-        elif str(each.type).endswith("Array"):
-            values[each.name] = np.concatenate(own)
+    for attribute in fields(IntegerGrid):
+        values_of = [getattr(grid, attribute.name) for grid in grids]
+        if attribute.name in ("faces", "cones", "corners", "features"):
+            values[attribute.name] = np.concatenate(
+                [array + start for array, start in zip(values_of, first, strict=False)]
+            )
+        elif str(attribute.type).endswith("Array"):
+            values[attribute.name] = np.concatenate(values_of)
     values["size"] = float(np.average([grid.size for grid in grids], weights=squares))
     values["notes"] = tuple(dict.fromkeys([*notes, *(note for grid in grids for note in grid.notes)]))
     return IntegerGrid(**values)
@@ -200,6 +206,6 @@ def joined_grids(grids: Sequence[IntegerGrid], notes: Sequence[str]) -> IntegerG
 
 def on_lines(mesh: TriangleMesh, corner_grid: FloatArray) -> BoolArray:
     """Return (e,) whether each edge is on a grid line."""
-    one = mesh.edge_halfedges[:, 0]
-    starts, ends = (corner_grid[:, which].reshape(-1, 2)[one] for which in (NEXT, PREVIOUS))
+    halfedge = mesh.edge_halfedges[:, 0]
+    starts, ends = (corner_grid[:, which].reshape(-1, 2)[halfedge] for which in (NEXT, PREVIOUS))
     return ((starts == ends) & (starts == np.rint(starts))).any(axis=1)

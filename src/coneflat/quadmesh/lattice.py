@@ -23,7 +23,7 @@ class IntegerSolutions(NamedTuple):
     Column k of the basis belongs to the k-th of the variables that are free, (n,) True.
     """
 
-    one: IntArray
+    solution: IntArray
     basis: IntArray
     is_free: BoolArray
 
@@ -41,22 +41,26 @@ def integer_solutions(rows: IntArray, right: IntArray) -> IntegerSolutions | Non
         the ones in the sparsest columns, so that entries stay small.
     """
     columns = np.concatenate([rows.T.astype(np.int64), np.eye(rows.shape[1], dtype=np.int64)], axis=1)
-    rows, one = np.ascontiguousarray(rows, dtype=np.int64), np.zeros(len(columns), dtype=np.int64)
-    is_free, has_solution = eliminate(columns, rows, right.astype(np.int64), one)
+    rows, solution = np.ascontiguousarray(rows, dtype=np.int64), np.zeros(len(columns), dtype=np.int64)
+    is_free, has_solution = eliminate(columns, rows, right.astype(np.int64), solution)
     # This bound protects against overflow of 64 bits; entries for seams stay below a hundred.
     if np.abs(columns).max(initial=0) > 2**40:
         raise GridError(f"the equations between {len(columns)} translations of seams overflow")
-    return IntegerSolutions(one, columns[is_free, len(rows) :].T.copy(), is_free) if has_solution else None
+    return (
+        IntegerSolutions(solution, columns[is_free, len(rows) :].T.copy(), is_free) if has_solution else None
+    )
 
 
 @compiled
-def eliminate(columns: IntArray, rows: IntArray, right: IntArray, one: IntArray) -> tuple[BoolArray, bool]:
+def eliminate(
+    columns: IntArray, rows: IntArray, right: IntArray, solution: IntArray
+) -> tuple[BoolArray, bool]:
     """Bring rows to echelon form by column operations, until all are or entries get very large.
 
     Args:
         columns: (n, r + n) the columns of the rows (r, n), and of an identity below them; changed in place.
         rows, right: the equations.
-        one: (n,) zeros; on return a solution.
+        solution: (n,) zeros; on return a solution.
 
     Returns:
         (n,) True for the columns that are then zero in all rows; and whether there are solutions. Without any, or with
@@ -70,15 +74,15 @@ def eliminate(columns: IntArray, rows: IntArray, right: IntArray, one: IntArray)
     for i in range(len(rows)):
         filled = 2
         while filled > 1:
-            pivot, least, filled = -1, (0, 0), 0
+            pivot, smallest, filled = -1, (0, 0), 0
             for c in range(len(columns)):
                 if is_free[c] and columns[c, i] != 0:
                     entries = 0
                     for k in range(size):
                         entries += columns[c, k] != 0
                     filled += 1
-                    if pivot < 0 or (abs(columns[c, i]), entries) < least:
-                        pivot, least = c, (abs(columns[c, i]), entries)
+                    if pivot < 0 or (abs(columns[c, i]), entries) < smallest:
+                        pivot, smallest = c, (abs(columns[c, i]), entries)
             for c in range(len(columns)):
                 if filled > 1 and c != pivot and is_free[c] and columns[c, i] != 0:
                     times = round(columns[c, i] / columns[pivot, i])
@@ -87,13 +91,13 @@ def eliminate(columns: IntArray, rows: IntArray, right: IntArray, one: IntArray)
                         if abs(columns[c, k]) > 2**40:
                             return is_free, False
         missing = right[i]
-        for k in range(len(one)):
-            missing -= rows[i, k] * one[k]
+        for k in range(len(solution)):
+            missing -= rows[i, k] * solution[k]
         if pivot >= 0:
             # The column is zero in all previous rows, so these remain satisfied.
             times = missing // columns[pivot, i]
-            for k in range(len(one)):
-                one[k] += times * columns[pivot, len(rows) + k]
+            for k in range(len(solution)):
+                solution[k] += times * columns[pivot, len(rows) + k]
             missing %= columns[pivot, i]
             is_free[pivot] = False
         if missing != 0:
@@ -103,15 +107,15 @@ def eliminate(columns: IntArray, rows: IntArray, right: IntArray, one: IntArray)
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """The integer vectors one + basis y for integer y, with a metric.
+    """The integer vectors origin + basis y for integer y, with a metric.
 
     Attributes:
-        one: (d,) one vector.
+        origin: (d,) one vector.
         basis: (d, k) integers.
         gram: (d, d) the scalar product.
     """
 
-    one: IntArray
+    origin: IntArray
     basis: IntArray
     gram: FloatArray
 
@@ -120,12 +124,12 @@ class Lattice:
         # Only basis vectors with a product that is not zero change, which are few.
         entries = np.flatnonzero(row)
         filled = np.flatnonzero(products := row[entries] @ self.basis[entries])
-        within = integer_solutions(products[None, filled], np.array([value - int(row @ self.one)]))
+        within = integer_solutions(products[None, filled], np.array([value - int(row @ self.origin)]))
         if within is None or not len(filled):
             return None
-        some, basis = self.basis[:, filled], np.delete(self.basis, filled[~within.is_free], axis=1)
-        basis[:, (filled - np.cumsum(~within.is_free))[within.is_free]] = some @ csr_matrix(within.basis)
-        return Lattice(self.one + some @ within.one, basis, self.gram)
+        changed, basis = self.basis[:, filled], np.delete(self.basis, filled[~within.is_free], axis=1)
+        basis[:, (filled - np.cumsum(~within.is_free))[within.is_free]] = changed @ csr_matrix(within.basis)
+        return Lattice(self.origin + changed @ within.solution, basis, self.gram)
 
     def reduced(self) -> ReducedLattice:
         """Return the same lattice with a nearly orthogonal basis."""
@@ -134,7 +138,7 @@ class Lattice:
         root = scipy.linalg.cholesky(transposed @ (transposed @ self.gram).T)
         reduce_basis(root, change)
         return ReducedLattice(
-            self.one, self.basis @ csr_matrix(change), self.gram, np.ascontiguousarray(root)
+            self.origin, self.basis @ csr_matrix(change), self.gram, np.ascontiguousarray(root)
         )
 
 
@@ -147,16 +151,18 @@ class ReducedLattice(Lattice):
     def nearest(self, place: FloatArray) -> IntArray:
         """Return (d,) the vector nearest to a real vector (d,).
 
-        The search starts at Babai's point and stops after `MAX_VISITS` nodes. The result is exact if it is complete
-        before.
+        The search starts at Babai's point and stops after `MAX_VISITS` nodes. The result is the nearest
+        vector if the search is complete before.
 
         References:
             C. P. Schnorr, M. Euchner, "Lattice basis reduction: improved practical algorithms", 1994.
         """
         if not self.basis.shape[1]:
-            return self.one
-        target = scipy.linalg.cho_solve((self.root, False), self.basis.T @ (self.gram @ (place - self.one)))
-        return self.one + self.basis @ nearest_point(self.root, target, MAX_VISITS)
+            return self.origin
+        target = scipy.linalg.cho_solve(
+            (self.root, False), self.basis.T @ (self.gram @ (place - self.origin))
+        )
+        return self.origin + self.basis @ nearest_point(self.root, target, MAX_VISITS)
 
 
 @compiled
@@ -184,8 +190,8 @@ def reduce_basis(root: FloatArray, basis: IntArray) -> None:
         norm = math.sqrt(above * above + below * below)
         c, s = above / norm, below / norm
         for i in range(k - 1, size):
-            one, two = root[k - 1, i], root[k, i]
-            root[k - 1, i], root[k, i] = c * one + s * two, c * two - s * one
+            first, second = root[k - 1, i], root[k, i]
+            root[k - 1, i], root[k, i] = c * first + s * second, c * second - s * first
         root[k, k - 1] = 0.0
         k = max(k - 1, 1)
 
@@ -198,34 +204,34 @@ def nearest_point(root: FloatArray, target: FloatArray, visits: int) -> IntArray
     distance, so that the first leaf is Babai's point.
     """
     size = len(target)
-    here, step, found = np.zeros(size, np.int64), np.zeros(size, np.int64), np.zeros(size, np.int64)
+    integers, step, nearest = np.zeros(size, np.int64), np.zeros(size, np.int64), np.zeros(size, np.int64)
     centre = np.zeros(size)
     beyond = np.zeros(size + 1)  # squared distance in the coordinates from this one on
-    least, depth, is_new = np.inf, size - 1, True
+    least_distance, depth, is_new = np.inf, size - 1, True
     for _ in range(visits):
         if is_new:
             pull = 0.0
             for j in range(depth + 1, size):
-                pull += root[depth, j] * (here[j] - target[j])
+                pull += root[depth, j] * (integers[j] - target[j])
             centre[depth] = target[depth] - pull / root[depth, depth]
-            here[depth] = round(centre[depth])
-            step[depth] = 1 if centre[depth] >= here[depth] else -1
-        off = (here[depth] - centre[depth]) * root[depth, depth]
+            integers[depth] = round(centre[depth])
+            step[depth] = 1 if centre[depth] >= integers[depth] else -1
+        off = (integers[depth] - centre[depth]) * root[depth, depth]
         total = beyond[depth + 1] + off * off
-        is_new = total < least and depth > 0
+        is_new = total < least_distance and depth > 0
         if is_new:
             beyond[depth] = total
             depth -= 1
             continue
-        if total < least:
-            least = total
+        if total < least_distance:
+            least_distance = total
             for j in range(size):
-                found[j] = here[j]
+                nearest[j] = integers[j]
         else:
             depth += 1
             if depth == size:
                 break
         # The next nearest integer is on the other side, one further away.
-        here[depth] += step[depth]
+        integers[depth] += step[depth]
         step[depth] = -step[depth] - (1 if step[depth] > 0 else -1)
-    return found
+    return nearest

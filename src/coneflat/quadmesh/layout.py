@@ -153,8 +153,8 @@ def aligned(result: Flattening, size: float, sharp_angle: float = SHARP_ANGLE) -
     largest = float(np.abs(result.vertices).max())
     if not 1e-60 < largest < 1e60:
         raise GridError(f"the largest coordinate is {largest:.3g}, out of range for quads: scale the mesh")
-    own = edge_lengths(mesh.vertices, mesh.faces) if result.lengths is None else result.lengths
-    lengths, _ = mollify(own, mesh)
+    side_lengths = edge_lengths(mesh.vertices, mesh.faces) if result.lengths is None else result.lengths
+    lengths, _ = mollify(side_lengths, mesh)
     flat, bad = signed_double_areas(result.corner_uv), int((~has_area(result)).sum())
     if bad:
         raise GridError(f"{bad} of {len(flat):,} triangles of the layout are flipped or have no area")
@@ -212,12 +212,14 @@ def at_origin(layout: GridLayout, component: IntArray) -> GridLayout:
 def _preferred_angles(layout: GridLayout, component: IntArray, sharp_angle: float) -> FloatArray:
     """Return (c,) the rotation of each component up to quarter turns at which it follows preferred directions best."""
     mesh, (starts, ends) = layout.mesh, layout.ends
-    wanted = preferred_directions(mesh, sharp_angle).both
+    preferred = preferred_directions(mesh, sharp_angle).combined
     # A triangle rotates as its half-edges do on average.
-    before = layout.lengths.ravel() * np.exp(1j * halfedge_angles(corner_angles(layout.lengths)))
-    turned = ((layout.points[ends] - layout.points[starts]) * before.conj()).reshape(-1, 3).sum(axis=1)
+    directions_before = layout.lengths.ravel() * np.exp(1j * halfedge_angles(corner_angles(layout.lengths)))
+    turned = (
+        ((layout.points[ends] - layout.points[starts]) * directions_before.conj()).reshape(-1, 3).sum(axis=1)
+    )
     return _directions(
-        np.abs(wanted), turned * np.exp(0.25j * np.angle(wanted)), component, component[starts[::3]]
+        np.abs(preferred), turned * np.exp(0.25j * np.angle(preferred)), component, component[starts[::3]]
     )
 
 
@@ -226,7 +228,7 @@ def _side_angles(layout: GridLayout, component: IntArray) -> tuple[BoolArray, Fl
 
     component: (u,) the component of each point.
     """
-    starts, ends = (each[layout.border] for each in layout.ends)
+    starts, ends = (points[layout.border] for points in layout.ends)
     vector, label = layout.points[ends] - layout.points[starts], component[starts]
     angles = _directions(np.abs(vector), vector, component, label)
     off = np.zeros(len(angles))
@@ -245,9 +247,9 @@ def _directions(
 def find_sides(layout: GridLayout, is_straight: BoolArray) -> Sides:
     """Return the straight sides of a layout, along the axes; `is_straight` (u,) marks points of such components."""
     mesh, points, border = layout.mesh, layout.points, layout.border
-    starts, ends = (each[border] for each in layout.ends)
-    kept = is_straight[starts]
-    border, starts, ends = border[kept], starts[kept], ends[kept]
+    starts, ends = (points_of[border] for points_of in layout.ends)
+    on_straight = is_straight[starts]
+    border, starts, ends = border[on_straight], starts[on_straight], ends[on_straight]
     if not len(border):
         return Sides()
     quarter = np.rint(np.angle(points[ends] - points[starts]) / (np.pi / 2)).astype(np.int64) % 4
@@ -258,11 +260,11 @@ def find_sides(layout: GridLayout, is_straight: BoolArray) -> Sides:
     count, side = label_components(len(border), np.flatnonzero(goes_on), after[goes_on])
     axis = np.zeros(count, dtype=np.int64)
     axis[side] = 1 - quarter % 2
-    both = np.unique(np.stack([np.concatenate([starts, ends]), np.tile(side, 2)], axis=1), axis=0)
+    incidences = np.unique(np.stack([np.concatenate([starts, ends]), np.tile(side, 2)], axis=1), axis=0)
     z = points[layout.corners]
     quarters = quarters_around(mesh, z[:, PREVIOUS] - z[:, NEXT])
     at = np.unique(np.concatenate([mesh.tails[border], mesh.heads[border]]))
-    return Sides(at[quarters[at] != 2], both[:, 0], both[:, 1], axis)
+    return Sides(at[quarters[at] != 2], incidences[:, 0], incidences[:, 1], axis)
 
 
 def quarters_around(mesh: TriangleMesh, sides: ComplexArray) -> IntArray:
@@ -301,10 +303,10 @@ def split_edges(layout: GridLayout, is_split: BoolArray) -> GridLayout:
     """Return a layout of the same surface with the edges `is_split` (e,) split at their midpoints."""
     points = layout.points
     mesh, origin, piece = split_longest(layout.mesh, is_split, layout.lengths)
-    own, pairs = _middle_points(layout, is_split)
-    six = np.concatenate([layout.corners, own], axis=1)
+    middles, pairs = _middle_points(layout, is_split)
+    six = np.concatenate([layout.corners, middles], axis=1)
     corners, places = (
-        np.take_along_axis(each[origin], piece, axis=1) for each in (six, _six_places(layout.lengths))
+        np.take_along_axis(six_of[origin], piece, axis=1) for six_of in (six, _six_places(layout.lengths))
     )
     lengths: FloatArray = np.abs(places[:, PREVIOUS] - places[:, NEXT])
     points = np.concatenate([points, points[pairs].mean(axis=1)])
@@ -322,9 +324,9 @@ def _middle_points(layout: GridLayout, is_split: BoolArray) -> tuple[IntArray, I
     sides = np.flatnonzero(is_split[layout.mesh.halfedge_edges])
     ends = np.sort(np.stack(layout.ends, axis=1)[sides], axis=1)
     pairs, index = np.unique(ends, axis=0, return_inverse=True)
-    own = np.full(layout.corners.size, -1)
-    own[sides] = len(layout.points) + index.ravel()
-    return own.reshape(-1, 3), pairs
+    middles = np.full(layout.corners.size, -1)
+    middles[sides] = len(layout.points) + index.ravel()
+    return middles.reshape(-1, 3), pairs
 
 
 def _six_places(lengths: FloatArray) -> ComplexArray:

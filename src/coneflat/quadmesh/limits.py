@@ -12,9 +12,9 @@ from ..errors import GridError
 from ..geometry import signed_double_areas
 from ..linalg import require_memory
 
-#: Largest number of squares of a grid, relative to the number wanted.
+#: Largest number of squares of a grid, relative to the number requested.
 MAX_TIMES = 16
-#: Largest number of squares wanted of any mesh, of one of few triangles, and for each triangle of larger meshes.
+#: Largest number of squares requested of any mesh, of one of few triangles, and for each triangle of larger meshes.
 #: Beyond, quads are those of single flat triangles, and smoothing takes over ten seconds.
 MAX_SQUARES, FEW_SQUARES, SQUARES_PER_TRIANGLE = 20_000_000, 100_000, 1_000
 #: Largest number of crossings of grid lines with edges, relative to these numbers. There are about as many as squares
@@ -25,7 +25,7 @@ BYTES_PER_SQUARE, BYTES_PER_CROSSING = 850, 600
 
 
 def most_squares(triangles: int) -> int:
-    """Return the largest number of squares that may be wanted of a mesh with a number of triangles."""
+    """Return the largest number of squares that may be requested of a mesh with a number of triangles."""
     return min(max(FEW_SQUARES, SQUARES_PER_TRIANGLE * triangles), MAX_SQUARES)
 
 
@@ -33,22 +33,22 @@ def most_squares(triangles: int) -> int:
 class SquareLimit:
     """The largest number of squares of a grid, and of quads made of it.
 
-    A grid may have more squares than wanted, because cones and seams must be some squares apart.
+    A grid may have more squares than requested, because cones and seams must be some squares apart.
 
     Attributes:
-        wanted: the number wanted, at least 1.
+        requested: the number of squares that is requested, at least 1.
         triangles: number of triangles of the mesh.
     """
 
-    wanted: float = math.inf
+    requested: float = math.inf
     triangles: int = MAX_SQUARES
 
     @classmethod
-    def of(cls, wanted: float, triangles: int, extent: float) -> SquareLimit:
+    def of(cls, requested: float, triangles: int, extent: float) -> SquareLimit:
         """Return the limit for a number of squares, which must not be too large for the mesh or the memory.
 
         Args:
-            wanted: the number of squares.
+            requested: the number of squares.
             triangles: that of the mesh.
             extent: the root of the area of the mesh, in model units.
 
@@ -56,21 +56,21 @@ class SquareLimit:
             GridError: there are too many squares.
             TooLargeError: they do not fit into the free memory.
         """
-        most = most_squares(triangles)
-        if wanted > most:
+        largest = most_squares(triangles)
+        if requested > largest:
             # The size is rounded up.
-            size = float(f"{1.005 * extent / math.sqrt(most):.3g}")
+            size = float(f"{1.005 * extent / math.sqrt(largest):.3g}")
             raise GridError(
-                f"{wanted:,.10g} quads are too many for {plural(triangles, 'triangle')}: use at most {most:,} quads, "
-                f"of size {size:.3g}, or subdivide the mesh"
+                f"{requested:,.10g} quads are too many for {plural(triangles, 'triangle')}: use at most {largest:,} "
+                f"quads, of size {size:.3g}, or subdivide the mesh"
             )
-        require_memory(wanted * BYTES_PER_SQUARE, f"a grid of {wanted:,.0f} squares needs")
-        return cls(max(wanted, 1.0), triangles)
+        require_memory(requested * BYTES_PER_SQUARE, f"a grid of {requested:,.0f} squares needs")
+        return cls(max(requested, 1.0), triangles)
 
     @property
     def squares(self) -> float:
         """The limit itself."""
-        return min(MAX_TIMES * self.wanted, 2 * most_squares(self.triangles))
+        return min(MAX_TIMES * self.requested, 2 * most_squares(self.triangles))
 
     def excess(self, squares: float) -> str:
         """Return what is wrong with a number of squares above the limit; "" if nothing.
@@ -87,12 +87,12 @@ class SquareLimit:
         if squares > 2 * most_squares(self.triangles):
             advice = (
                 "use fewer quads, or subdivide the mesh"
-                if self.wanted > self.triangles
+                if self.requested > self.triangles
                 else "subdivide the mesh"
             )
             return f"{text}{plural(self.triangles, 'triangle')}: {advice}"
-        least = math.ceil(squares / MAX_TIMES)
-        return f"{text}{plural(round(self.wanted), 'quad')}: use at least {least:,} quads"
+        fewest = math.ceil(squares / MAX_TIMES)
+        return f"{text}{plural(round(self.requested), 'quad')}: use at least {fewest:,} quads"
 
     def check_cones(self, quarters: IntArray) -> None:
         """Raise GridError if a grid with some cones and corners has more squares than the limit.
@@ -105,7 +105,7 @@ class SquareLimit:
             raise GridError(f"{plural(len(quarters), 'cone')} of the surface: {text}")
 
 
-#: The limit of a grid that no number of squares was wanted of.
+#: The limit of a grid for which no number of squares is requested.
 NO_LIMIT = SquareLimit()
 
 
@@ -124,11 +124,11 @@ def check_extraction(corner_grid: FloatArray) -> None:
         raise GridError(
             f"a grid of {area:,.0f} squares is too fine: at most {MAX_SQUARES:,} quads can be extracted"
         )
-    most = MAX_CROSSINGS * most_squares(len(corner_grid))
-    if not crossings <= most:
+    max_crossings = MAX_CROSSINGS * most_squares(len(corner_grid))
+    if not crossings <= max_crossings:
         raise GridError(
             f"a grid of {area:,.0f} squares is too distorted: its lines cross edges {crossings:,.0f} times, of at most "
-            f"{most:,} that are possible: use fewer quads, or subdivide the mesh"
+            f"{max_crossings:,} that are possible: use fewer quads, or subdivide the mesh"
         )
     needed = area * BYTES_PER_SQUARE + crossings * BYTES_PER_CROSSING
     require_memory(needed, f"a grid of {area:,.0f} squares needs")

@@ -46,10 +46,10 @@ def grid_with_lines(
         is_required: put as many edges as possible on lines; else only those that deform the grid little.
         energy: what the grid minimises.
     """
-    mesh, off, why = layout.mesh, _deviations(layout), "too short for quads of this size"
+    mesh, off, reason = layout.mesh, _deviations(layout), "too short for quads of this size"
     sharp = sharp_edges(mesh, angle) if is_required else edge_indices(mesh, sharp_ends(mesh, angle))
-    near = sharp if is_required else sharp[np.abs(off[sharp]) < MAX_TURN]
-    edges, found = _long_chains(layout, near), None
+    candidates = sharp if is_required else sharp[np.abs(off[sharp]) < MAX_TURN]
+    edges, grid = _long_chains(layout, candidates), None
     for attempt in count() if is_required else range(6):
         lined = _with_lines(layout, edges, off)
         if not len(lined.edges):
@@ -60,25 +60,26 @@ def grid_with_lines(
         # Each failure leaves out the costliest chains: of preferred edges half of them, or those above a bound that
         # decreases so that the attempts end; of required ones fewer.
         bound = 0.5 ** (1 + attempt / 4) * costs.max() if is_required else np.median(costs)
-        most = np.inf if is_required else MAX_COST * np.sqrt(layout.area)
-        if costs.max() > most:
-            bound = 0.7**attempt * most
+        max_cost = np.inf if is_required else MAX_COST * np.sqrt(layout.area)
+        if costs.max() > max_cost:
+            bound = 0.7**attempt * max_cost
         elif not is_folded or (is_required and attempt == 0):
             try:
-                found = grid_about(rounding, energy, 0)
-                if found.squares <= 2 * layout.area:
+                grid = grid_about(rounding, energy, 0)
+                if grid.squares <= 2 * layout.area:
                     break
-                why, found = f"squares would be {found.squares:,.0f}, not {layout.area:,.0f}", None
+                reason, grid = f"squares would be {grid.squares:,.0f}, not {layout.area:,.0f}", None
             except GridError as error:
-                why = str(error)
+                reason = str(error)
         edges = _long_chains(layout, lined.edges[costs[lined.chain] < bound])
-    found = found and replace(found, features=mesh.edges[lined.edges])
-    left = np.setdiff1d(sharp, lined.edges) if found else sharp
+    grid = grid and replace(grid, features=mesh.edges[lined.edges])
+    left = np.setdiff1d(sharp, lined.edges) if grid else sharp
     if not is_required or not len(left):
-        return found, "There are no sharp edges." if is_required and not len(sharp) else ""
+        return grid, "There are no sharp edges." if is_required and not len(sharp) else ""
     share = 100 * lengths_along(mesh, left).sum() / lengths_along(mesh, sharp).sum()
-    return found, Unmet(
-        f"{plural(len(left), 'sharp edge')} of {len(sharp):,}, {share:.1f} % of their length, not on grid lines: {why}."
+    return grid, Unmet(
+        f"{plural(len(left), 'sharp edge')} of {len(sharp):,}, {share:.1f} % of their length, not on "
+        f"grid lines: {reason}."
     )
 
 
@@ -89,8 +90,8 @@ def with_sides(layout: GridLayout) -> GridLayout:
 
 def _deviations(layout: GridLayout) -> FloatArray:
     """Return (e,) the angle of each edge from the nearest axis."""
-    one, (starts, ends) = layout.mesh.edge_halfedges[:, 0], layout.ends
-    return np.asarray(np.angle((layout.points[ends[one]] - layout.points[starts[one]]) ** 4) / 4)
+    halfedge, (starts, ends) = layout.mesh.edge_halfedges[:, 0], layout.ends
+    return np.asarray(np.angle((layout.points[ends[halfedge]] - layout.points[starts[halfedge]]) ** 4) / 4)
 
 
 def _long_chains(layout: GridLayout, edges: IntArray) -> IntArray:
@@ -113,22 +114,24 @@ class _Lined:
             moved: (u,) where the points move.
         """
         mesh, chains = before.mesh, int(self.chain.max()) + 1
-        one, two = map_factors((places := before.points[before.corners])[:, PREVIOUS] - places[:, NEXT])
+        derivative, conjugate_derivative = map_factors(
+            (places := before.points[before.corners])[:, PREVIOUS] - places[:, NEXT]
+        )
         after = moved[self.layout.corners]
         after = after - after[:, :1]
-        a, b = (np.abs((factor * after).sum(axis=1)) ** 2 for factor in (one, two))
+        a, b = (np.abs((factor * after).sum(axis=1)) ** 2 for factor in (derivative, conjugate_derivative))
         # The mean of the quasi-conformal distortion and its inverse, minus 1.
         is_folded = b >= 0.95 * a
         excess = np.where(is_folded, FOLDED_ENERGY, 2 * b / np.where(is_folded, 1.0, a - b))
         energy = before.double_areas() / 2 * np.minimum(excess, FOLDED_ENERGY)
         at = np.zeros(len(mesh.vertices), dtype=np.int64)
         at[mesh.edges[self.edges]] = self.chain[:, None]
-        on = np.unique(mesh.edges[self.edges])
-        nearest = dijkstra(before.graph(), indices=on, min_only=True, return_predecessors=True)[2]
-        near = np.flatnonzero(nearest[mesh.faces[:, 0]] >= 0)
-        chain = at[nearest[mesh.faces[near, 0]]]
+        vertices_on = np.unique(mesh.edges[self.edges])
+        nearest = dijkstra(before.graph(), indices=vertices_on, min_only=True, return_predecessors=True)[2]
+        near_faces = np.flatnonzero(nearest[mesh.faces[:, 0]] >= 0)
+        chain = at[nearest[mesh.faces[near_faces, 0]]]
         along = np.bincount(self.chain, lengths_along(mesh, self.edges), chains) / before.size
-        costs: FloatArray = np.bincount(chain, energy[near], chains) / along
+        costs: FloatArray = np.bincount(chain, energy[near_faces], chains) / along
         return costs, bool(is_folded.any())
 
 
@@ -160,22 +163,22 @@ def _with_lines(layout: GridLayout, edges: IntArray, off: FloatArray) -> _Lined:
             np.maximum.at(largest, ends_at, size)
         clashes = np.stack([is_same[tails], is_same[heads]])
         is_least = (clashes & (size + 1e-9 < np.stack([largest[tails], largest[heads]]))).any(axis=0)
-        if not len(same := edge[clashes.any(axis=0) & (size >= 0)]):
+        if not len(clashing := edge[clashes.any(axis=0) & (size >= 0)]):
             break
         # The farther of each two, unless a third one is still farther from the same direction.
-        edges = _long_chains(layout, np.setdiff1d(edges, np.setdiff1d(same, edge[is_least])))
+        edges = _long_chains(layout, np.setdiff1d(edges, np.setdiff1d(clashing, edge[is_least])))
     n = len(mesh.vertices)
     on, on_side = mask_of(n, mesh.edges[edges]), mask_of(n, layout.vertex[layout.sides.points])
     turns = np.bincount(cut.origin, minlength=n) != np.where(mesh.is_boundary_vertex, 1, 2)
     turns[cut.origin[cut.mesh.is_boundary_vertex & (quarters != 2)]] = True
     nodes = np.setdiff1d(np.flatnonzero(on & turns & (on_side | ~mesh.is_boundary_vertex)), layout.cones)
     opened = open_along(mesh, np.union1d(edges, point_seams(mesh, layout.corners)))
-    old = point_vertices(layout.corners, opened.mesh.faces, len(opened.origin))
+    point_before = point_vertices(layout.corners, opened.mesh.faces, len(opened.origin))
     sides = Sides(np.union1d(nodes, layout.sides.corners))
     parts, component = joined_charts(
-        replace(layout, corners=opened.mesh.faces, points=layout.points[old], sides=sides)
+        replace(layout, corners=opened.mesh.faces, points=layout.points[point_before], sides=sides)
     )
-    sides, chain = _sides(parts, edges, off, np.isin(old, layout.sides.points))
+    sides, chain = _sides(parts, edges, off, np.isin(point_before, layout.sides.points))
     return _Lined(at_origin(replace(parts, sides=sides), component), edges, chain)
 
 
@@ -191,11 +194,11 @@ def _sides(
     along = (points[left[:, 1]] - points[left[:, 0]]) * np.exp(-1j * off[edges])
     # The doubled angle makes opposite directions equal.
     double = np.bincount(chain, (along**2).real, len(numbers))
-    both = np.unique(np.stack([left.ravel(), chain.repeat(2)], axis=1), axis=0)
+    incidences = np.unique(np.stack([left.ravel(), chain.repeat(2)], axis=1), axis=0)
     sides = Sides(
         layout.sides.corners,
-        np.concatenate([border.points, both[:, 0]]),
-        np.concatenate([border.side, both[:, 1] + len(border.axis)]),
+        np.concatenate([border.points, incidences[:, 0]]),
+        np.concatenate([border.side, incidences[:, 1] + len(border.axis)]),
         np.concatenate([border.axis, np.where(double >= 0, 1, 0)]),
     )
     return sides, chain

@@ -44,16 +44,16 @@ class MapModel:
             share of the area.
         turns: (s, p + 1) four times the rotation of samples by a quarter turn.
         loops: (l, p + 1) the same for the rotations along handles.
-        least, most: (p + 1,) bounds of the curvatures.
+        min_quarters, max_quarters: (p + 1,) bounds of the curvatures.
         weight: the total weight of preferred directions.
     """
 
     def __init__(
         self,
         mesh: TriangleMesh,
-        wanted: ComplexArray,
-        least: int,
-        most: int,
+        preferred: ComplexArray,
+        min_quarters: int,
+        max_quarters: int,
         triangles: IntArray,
         log_scale: FloatArray | None = None,
     ) -> None:
@@ -61,25 +61,25 @@ class MapModel:
 
         Args:
             mesh: connected mesh.
-            wanted: (m,) preferred crosses of triangles, weighted.
-            least, most: bounds of the curvature of cones, in quarter turns.
+            preferred: (m,) preferred crosses of triangles, weighted.
+            min_quarters, max_quarters: bounds of the curvature of cones, in quarter turns.
             triangles: (n,) the number of triangles at each vertex in the mesh that gets the cones.
-            log_scale: (n,) the wanted log scale, up to a constant; None for 0.
+            log_scale: (n,) the target log scale, up to a constant; None for 0.
         """
         lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces), mesh)
         angles, count = corner_angles(lengths), len(mesh.vertices)
         areas, key = double_areas(lengths), tie_key(mesh.vertices)
         share = np.bincount(mesh.faces.ravel(), areas.repeat(3), count) / (3 * areas.sum())
         centres, region, larger = _regions(mesh, key)
-        self._wanted, self.weight = wanted, max(float(np.abs(wanted).sum()), np.finfo(float).tiny)
+        self._preferred, self.weight = preferred, max(float(np.abs(preferred).sum()), np.finfo(float).tiny)
         self._defect = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
         self._poisson = _Poisson(cotangent_laplacian(mesh.faces, cotangents(lengths), count), share)
-        self._wanted_scale = 0.0 if log_scale is None else log_scale - share @ log_scale
+        self._target_scale = 0.0 if log_scale is None else log_scale - share @ log_scale
         self._rotations = _Rotations(mesh, angles)
         self._means = _region_means(region, share)
         # A triangle belongs to the first region of its corners. The sample is its triangle of largest weight.
         of_face = larger[mesh.faces].min(axis=1)
-        rank = -np.round(np.abs(wanted) / self.weight, 9)
+        rank = -np.round(np.abs(preferred) / self.weight, 9)
         order = np.lexsort((key[mesh.faces].sum(axis=1), rank, of_face))
         samples = order[np.concatenate([[True], np.diff(of_face[order]) > 0])]
         self._number = np.searchsorted(of_face[samples], of_face)
@@ -95,9 +95,9 @@ class MapModel:
         border = mesh.is_boundary_vertex[self.places]
         straight = np.where(border, 2, 4)
         widest = np.floor(CONE_ANGLE_PER_TRIANGLE * triangles / (np.pi / 2)).astype(np.int64)
-        low = np.minimum(np.maximum(np.where(border, -1, least), straight - widest), 0)
-        self.least = np.append(low, -(10**9))
-        self.most = np.append(np.where(border, 1, np.where(triangles > 2, most, 0)), 10**9)
+        low = np.minimum(np.maximum(np.where(border, -1, min_quarters), straight - widest), 0)
+        self.min_quarters = np.append(low, -(10**9))
+        self.max_quarters = np.append(np.where(border, 1, np.where(triangles > 2, max_quarters, 0)), 10**9)
 
     def _functional(self, rows: csr_matrix) -> FloatArray:
         return np.pad(self._poisson.functional(rows, self.places), ((0, 0), (0, 1)))
@@ -108,9 +108,9 @@ class MapModel:
         curvature[self.places] += np.pi / 2 * indices[:-1]
         self._log_scale = self._poisson.solve(curvature[:, None])[:, 0]
         turned = self._rotations.of_frames(self._log_scale) + self._rotations.mean_change @ self._log_scale
-        crosses = self._wanted * np.exp(4j * turned)
+        crosses = self._preferred * np.exp(4j * turned)
         self._at, self._base = indices.copy(), complex_sums(self._number, crosses, len(self.turns))
-        self._excess = self._log_scale - self._wanted_scale
+        self._excess = self._log_scale - self._target_scale
         self._base_scale = self._means @ self._excess
         self._base_loops = np.exp(4j * self._rotations.around_loops(self._log_scale))
 
@@ -118,7 +118,7 @@ class MapModel:
     def spread(self) -> float:
         """The log of the ratio of the 95% and 5% quantiles of the areas of quads, for the cones of `linearise`.
 
-        Areas are relative to the wanted ones.
+        Areas are relative to the target ones.
         """
         order = np.argsort(self._excess)
         scale = self._log_scale[order] - self._log_scale.max()
@@ -129,9 +129,9 @@ class MapModel:
     def state(self, indices: IntArray) -> tuple[FloatArray, ComplexArray, ComplexArray]:
         """Return how far log scales of regions (r,) are off, crosses of samples (s,), and rotations of loops (l,)."""
         step = indices - self._at
-        used = np.flatnonzero(step)
-        turned, looped = (each[:, used] @ step[used] for each in (self.turns, self.loops))
-        scale = self._base_scale + self.scales[:, used] @ step[used]
+        changed = np.flatnonzero(step)
+        turned, looped = (matrix[:, changed] @ step[changed] for matrix in (self.turns, self.loops))
+        scale = self._base_scale + self.scales[:, changed] @ step[changed]
         return scale, self._base * np.exp(1j * turned), self._base_loops * np.exp(1j * looped)
 
 
@@ -149,9 +149,9 @@ def _regions(mesh: TriangleMesh, key: FloatArray) -> tuple[IntArray, IntArray, I
         farthest = np.flatnonzero(distance >= distance.max() - 1e-9 * scale)
         centre = int(farthest[np.argmax(key[farthest])])
         limit = np.inf if number == 0 else float(distance[centre])
-        found = dijkstra(graph, indices=centre, limit=limit)
-        nearer = found < distance - 1e-9 * scale
-        distance[nearer], region[nearer] = found[nearer], number
+        distance_from_centre = dijkstra(graph, indices=centre, limit=limit)
+        is_nearer = distance_from_centre < distance - 1e-9 * scale
+        distance[is_nearer], region[is_nearer] = distance_from_centre[is_nearer], number
         centres.append(centre)
         larger = region.copy() if number < SAMPLES else larger
     return np.array(centres), region, larger
@@ -173,17 +173,17 @@ class _Poisson:
     def solve(self, right: FloatArray) -> FloatArray:
         """Return (n, k) the solutions for right-hand sides (n, k)."""
         right = right - self.share[:, None] * right.sum(axis=0)
-        found = np.zeros_like(right)
-        found[1:] = self.factor.solve(np.ascontiguousarray(right[1:]))
-        return found - self.share @ found
+        solution = np.zeros_like(right)
+        solution[1:] = self.factor.solve(np.ascontiguousarray(right[1:]))
+        return solution - self.share @ solution
 
     def functional(self, rows: csr_matrix, places: IntArray) -> FloatArray:
         """Return (k, p) the values of linear functionals (k, n) of the log scale for a quarter turn at each place."""
-        found = np.empty((rows.shape[0], len(places)))
+        values = np.empty((rows.shape[0], len(places)))
         for start in range(0, rows.shape[0], 64):  # not all at once, which would take much memory
             block = slice(start, start + 64)
-            found[block] = np.pi / 2 * self.solve(rows[block].toarray().T)[places].T
-        return found
+            values[block] = np.pi / 2 * self.solve(rows[block].toarray().T)[places].T
+        return values
 
 
 class _Rotations:
@@ -191,28 +191,28 @@ class _Rotations:
 
     def __init__(self, mesh: TriangleMesh, angles: FloatArray) -> None:
         self.inner = np.flatnonzero(~mesh.is_boundary_edge)
-        one, two = mesh.edge_halfedges[self.inner].T
+        first, second = mesh.edge_halfedges[self.inner].T
         self.by_edge = edge_rotations(mesh, halfedge_angles(angles))
         # The linear model of the angles: see `_angle_changes`.
         change = _angle_changes(mesh, angles)
-        self.change = csr_matrix(change[one] - change[two])
+        self.change = csr_matrix(change[first] - change[second])
         # A triangle rotates as its three half-edges do on average.
         self.mean_change = csr_matrix((change[0::3] + change[1::3] + change[2::3]) / 3)
         centres = mesh.vertices[mesh.faces].mean(axis=1)
-        steps = np.linalg.norm(centres[one // 3] - centres[two // 3], axis=1)
+        steps = np.linalg.norm(centres[first // 3] - centres[second // 3], axis=1)
         root = int(np.argmax(tie_key(centres)))
         dual = MultiGraph(
-            len(mesh.faces), np.stack([one, two], axis=1) // 3, steps + 1e-9 * steps.max(initial=1.0)
+            len(mesh.faces), np.stack([first, second], axis=1) // 3, steps + 1e-9 * steps.max(initial=1.0)
         )
         paths = dual.shortest_paths(np.array([root]))
         self.root, self.before, self.edge = root, np.where(paths.before < 0, root, paths.before), paths.edge
-        self.sign = np.where(self.edge < 0, 0.0, np.where(one[self.edge] // 3 == self.before, 1.0, -1.0))
+        self.sign = np.where(self.edge < 0, 0.0, np.where(first[self.edge] // 3 == self.before, 1.0, -1.0))
         # Which inner edges each loop along a handle crosses, and in which direction.
         loops = [np.empty(0, np.int64), *handle_loops(mesh)]
         crossed, of_loop = np.concatenate(loops), np.arange(-1, len(loops) - 1).repeat([*map(len, loops)])
         edges = np.searchsorted(self.inner, mesh.halfedge_edges[crossed])
-        signs = np.where(one[edges] == crossed, 1.0, -1.0)
-        self._around = csr_matrix((signs, (of_loop, edges)), shape=(len(loops) - 1, len(one)))
+        signs = np.where(first[edges] == crossed, 1.0, -1.0)
+        self._around = csr_matrix((signs, (of_loop, edges)), shape=(len(loops) - 1, len(first)))
         # The matrix (l, n) from the log scale to the rotations of loops.
         self.loops = csr_matrix(self._around @ self.change)
 
@@ -227,13 +227,13 @@ class _Rotations:
 
     def to_frames(self, faces: IntArray) -> csr_matrix:
         """Return (k, n) the matrix from the log scale to the rotation of the first half-edges of triangles."""
-        row, here, passed = np.arange(len(faces)), faces, list[tuple[IntArray, IntArray]]()
-        while len(here):
-            kept = here != self.root
-            row, here = row[kept], here[kept]
-            passed.append((row, here))
-            here = self.before[here]
-        rows, on = (np.concatenate(each) for each in zip(*passed, strict=True))
+        row, face, path = np.arange(len(faces)), faces, list[tuple[IntArray, IntArray]]()
+        while len(face):
+            is_below_root = face != self.root
+            row, face = row[is_below_root], face[is_below_root]
+            path.append((row, face))
+            face = self.before[face]
+        rows, on = (np.concatenate(columns) for columns in zip(*path, strict=True))
         parts = self.sign[on], (rows, self.edge[on])
         return csr_matrix(csr_matrix(parts, shape=(len(faces), len(self.inner))) @ self.change)
 

@@ -111,13 +111,13 @@ def flattening_defaults(options: Mapping[str, Any]) -> dict[str, Any]:
     Raises:
         OptionError: curvatures of given cones are not multiples of pi/2.
     """
-    given = options.get("cones", "auto")
+    cones = options.get("cones", "auto")
     # With straight sides, bounds of cone angles apply to the double of the surface, two copies glued along the
     # boundary, where a corner of pi/2 is a cone of pi.
-    if isinstance(given, str):
+    if isinstance(cones, str):
         corners = {"min_cone_angle": math.pi / 2} if str(options.get("boundary")) == "straight" else {}
         return FLATTENING_OPTIONS | corners
-    parsed = WordOrVertices((), "cone").parse("cones", given)
+    parsed = WordOrVertices((), "cone").parse("cones", cones)
     for vertex, curvature in parsed.items() if isinstance(parsed, dict) else ():
         if curvature is None or not abs(math.remainder(curvature, math.pi / 2)) <= GRID_TOLERANCE:
             raise OptionError(

@@ -87,8 +87,8 @@ class QuadMesh:
     def triangle_corners(self) -> IntArray:
         """(2p, 3) corners of quads, 4 q + i, of the two triangles on both sides of each quad's shorter diagonal."""
         corners = self.vertices[self.quads]
-        one, two = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
-        turn = np.where(dots(one, one) <= dots(two, two), 0, 1)
+        first_diagonal, second_diagonal = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
+        turn = np.where(dots(first_diagonal, first_diagonal) <= dots(second_diagonal, second_diagonal), 0, 1)
         rolled = 4 * np.arange(len(self.quads))[:, None] + (np.arange(4) + turn[:, None]) % 4
         return rolled[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
 
@@ -179,9 +179,9 @@ class CoarseGridError(GridError):
 
 def opposite_sides(quads: IntArray) -> IntArray:
     """Return (4p,) the opposite half-edge of each side, 4 q + i, of quads (p, 4); -1 on the boundary."""
-    one, two = quads.ravel(), np.roll(quads, -1, axis=1).ravel()
+    tails, heads = quads.ravel(), np.roll(quads, -1, axis=1).ravel()
     count = int(quads.max(initial=0)) + 1
-    keys, back = one * count + two, two * count + one
+    keys, back = tails * count + heads, heads * count + tails
     order = np.argsort(keys)
     at = np.minimum(np.searchsorted(keys[order], back), len(order) - 1)
     return np.where(keys[order[at]] == back, order[at], -1)
@@ -193,9 +193,9 @@ def corner_fans(opposite: IntArray) -> tuple[int, IntArray]:
     opposite: (4p,) the opposite half-edge of each side of the quads; -1 on the boundary.
     """
     after = np.roll(np.arange(len(opposite)).reshape(-1, 4), -1, axis=1).ravel()
-    one = np.flatnonzero(opposite >= 0)
-    two = opposite[one]
-    ends = np.concatenate([one, after[one]]), np.concatenate([after[two], two])
+    sides = np.flatnonzero(opposite >= 0)
+    opposites = opposite[sides]
+    ends = np.concatenate([sides, after[sides]]), np.concatenate([after[opposites], opposites])
     return label_components(len(opposite), *ends)
 
 
@@ -223,9 +223,9 @@ def least_jacobians(points: FloatArray, quads: IntArray) -> FloatArray:
     corners = points[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normal /= np.maximum(np.sqrt(dots(normal, normal)), np.finfo(float).tiny)[:, None]
-    least = np.full(len(quads), np.inf)
+    jacobians = np.full(len(quads), np.inf)
     for i in range(4):
         a, b = corners[:, i - 1] - corners[:, i], corners[:, (i + 1) % 4] - corners[:, i]
         scale = np.maximum(np.sqrt(dots(a, a) * dots(b, b)), np.finfo(float).tiny)
-        least = np.minimum(least, dots(np.cross(b, a), normal) / scale)
-    return least
+        jacobians = np.minimum(jacobians, dots(np.cross(b, a), normal) / scale)
+    return jacobians

@@ -77,7 +77,7 @@ def quads(
     else:
         search = replace(GridSearch.of(mesh, faces, own, options), for_quads=True)
         stages = search.stages
-        source = search.result.source if search.result else search.source.given.source
+        source = search.result.source if search.result else search.source.input_mesh.source
         with stages("coarsen"):
             search, small = simplified(search)
         try:
@@ -95,7 +95,7 @@ def quads(
         small = None if has_all else SimplerMesh.of(search)
     with stages("smooth"):
         if small is not None:
-            found, features = small.moved(found), sharp_ends(small.given)
+            found, features = small.moved(found), sharp_ends(small.surface)
         found = smooth_quads(found, smooth, features)
         found = found if small is None else small.completed(found)
     _require_sound(found, search.limit if search else NO_LIMIT)

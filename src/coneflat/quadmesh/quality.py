@@ -63,12 +63,12 @@ class QuadMeasures:
         yield "quads", f"{self.quads:,}", f"Euler characteristic {self.euler_characteristic}, {euler}"
         irregular = f"inner vertices with a valence other than 4: {valences or 'none'}"
         yield "irregular", f"{self.irregular:,}", irregular
-        off = f"mean; 95% below {self.angle_p95:.1f}, worst {self.angle_max:.1f}"
-        yield "off 90 deg", f"{self.angle_mean:.2f}", off
+        off = f"mean; 95th percentile {self.angle_p95:.1f}, largest {self.angle_max:.1f}"
+        yield "angle deviation", f"{self.angle_mean:.2f}", off
         spread = f"standard deviation of edge lengths divided by their mean, {self.edge_mean:.4g}"
         yield "edge cv", f"{self.edge_cv:.3f}", spread
-        least = f"scaled, mean of each quad's minimum; minimum {self.jacobian_min:.3f}"
-        yield "Jacobian", f"{self.jacobian_mean:.3f}", least
+        jacobian = f"scaled, mean of each quad's minimum; minimum {self.jacobian_min:.3f}"
+        yield "Jacobian", f"{self.jacobian_mean:.3f}", jacobian
         edges = self.hausdorff / self.edge_mean
         distance = f"largest between quads and surface, at samples; {edges:.2f} edges"
         yield "distance", f"{self.hausdorff:.3g}", distance
@@ -105,13 +105,13 @@ def measure_quads(quads: QuadMesh) -> QuadMeasures:
     points = quads.vertices
     off = np.abs(corner_angles_of(quads) - 90.0)
     length = np.linalg.norm(points[quads.edges[:, 0]] - points[quads.edges[:, 1]], axis=1)
-    least = least_jacobians(points, quads.quads)
-    which, many = np.unique(quads.valences[quads.irregular], return_counts=True)
+    jacobians = least_jacobians(points, quads.quads)
+    valences, counts = np.unique(quads.valences[quads.irregular], return_counts=True)
     return QuadMeasures(
         vertices=len(points),
         quads=len(quads.quads),
         irregular=len(quads.irregular),
-        irregular_valences=dict(zip(which.tolist(), many.tolist(), strict=True)),
+        irregular_valences=dict(zip(valences.tolist(), counts.tolist(), strict=True)),
         euler_characteristic=quads.euler_characteristic,
         surface_euler=quads.surface_euler,
         angle_mean=float(off.mean()),
@@ -119,8 +119,8 @@ def measure_quads(quads: QuadMesh) -> QuadMeasures:
         angle_max=float(off.max()),
         edge_mean=float(length.mean()),
         edge_cv=float(length.std() / length.mean()),
-        jacobian_mean=float(least.mean()),
-        jacobian_min=float(least.min()),
+        jacobian_mean=float(jacobians.mean()),
+        jacobian_min=float(jacobians.min()),
         hausdorff=hausdorff_distance(quads),
         left_out=quads.left_out,
         area_left_out=quads.area_left_out,
@@ -130,16 +130,16 @@ def measure_quads(quads: QuadMesh) -> QuadMeasures:
 def corner_angles_of(quads: QuadMesh) -> FloatArray:
     """Return (p, 4) the corner angles of quads, degrees."""
     corners = quads.vertices[quads.quads]
-    one, two = np.roll(corners, 1, axis=1) - corners, np.roll(corners, -1, axis=1) - corners
-    scale = np.maximum(np.sqrt(dots(one, one) * dots(two, two)), np.finfo(float).tiny)
-    return np.degrees(np.arccos(np.clip(dots(one, two) / scale, -1.0, 1.0)))
+    backward, forward = np.roll(corners, 1, axis=1) - corners, np.roll(corners, -1, axis=1) - corners
+    scale = np.maximum(np.sqrt(dots(backward, backward) * dots(forward, forward)), np.finfo(float).tiny)
+    return np.degrees(np.arccos(np.clip(dots(backward, forward) / scale, -1.0, 1.0)))
 
 
 def hausdorff_distance(quads: QuadMesh) -> float:
     """Return the largest sampled distance from the quads to the surface, or from the surface to the quads.
 
-    Distances are exact, but measured at samples: at 5 x 5 points of the bilinear patch of each quad, and at points of
-    each triangle with a spacing of at most half the mean edge of the quads. Distances to quads are those to their two
+    Distances to nearest points are measured at 5 x 5 points of the bilinear patch of each quad, and at points of each
+    triangle with a spacing of at most half the mean edge of the quads. Distances to quads are those to their two
     triangles on both sides of the shorter diagonal.
     """
     mesh, corners = quads.surface, quads.vertices[quads.quads]
@@ -147,10 +147,10 @@ def hausdorff_distance(quads: QuadMesh) -> float:
     patch = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=1)
     # Corners are shared by several quads, so they are sampled once.
     inner = np.einsum("si,pix->psx", patch[patch.max(axis=1) < 1], corners).reshape(-1, 3)
-    there = surface_distances(mesh.vertices, mesh.faces, np.concatenate([quads.vertices, inner]))
+    to_surface = surface_distances(mesh.vertices, mesh.faces, np.concatenate([quads.vertices, inner]))
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    back = surface_distances(quads.vertices, quads.triangles, _samples(mesh, float(sides.mean()) / 2))
-    return float(max(there.max(), back.max()))
+    from_surface = surface_distances(quads.vertices, quads.triangles, _samples(mesh, float(sides.mean()) / 2))
+    return float(max(to_surface.max(), from_surface.max()))
 
 
 def _samples(mesh: TriangleMesh, spacing: float) -> FloatArray:

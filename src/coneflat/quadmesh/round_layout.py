@@ -31,8 +31,8 @@ def split_between_nodes(layout: GridLayout, lines: IntArray | None = None) -> Gr
     mesh = layout.mesh
     is_node = mask_of(len(mesh.vertices), layout.nodes)
     may_be = is_node if lines is None else is_node | mask_of(len(is_node), mesh.edges[lines])
-    one, two = mesh.edges.T
-    is_split = (is_node[one] & may_be[two]) | (may_be[one] & is_node[two])
+    tails, heads = mesh.edges.T
+    is_split = (is_node[tails] & may_be[heads]) | (may_be[tails] & is_node[heads])
     return split_edges(layout, is_split) if is_split.any() else layout
 
 
@@ -71,9 +71,9 @@ def grid_about(rounding: Rounding, energy: StretchEnergy, most: int) -> IntegerG
     return found
 
 
-def with_note(found: IntegerGrid, note: str) -> IntegerGrid:
+def with_note(grid: IntegerGrid, note: str) -> IntegerGrid:
     """Return a grid with one more note, unless it has this one, or the note is empty."""
-    return found if note in ("", *found.notes) else replace(found, notes=(*found.notes, note))
+    return grid if note in ("", *grid.notes) else replace(grid, notes=(*grid.notes, note))
 
 
 def _grid_near(rounding: Rounding, energy: StretchEnergy) -> tuple[IntegerGrid | None, str]:
@@ -117,7 +117,7 @@ def _folds_sides(layout: GridLayout, transitions: Transitions, points: ComplexAr
     """Return whether an edge on a side turns by more than a right angle if points move, which flips no triangle."""
     on = mask_of(len(points), layout.sides.points)
     sides = np.concatenate([layout.border, transitions.chains.halfedges.ravel()])
-    starts, ends = (each[sides] for each in layout.ends)
+    starts, ends = (points_of[sides] for points_of in layout.ends)
     turned = (points[ends] - points[starts]) * np.conj(layout.points[ends] - layout.points[starts])
     return bool((turned.real <= 0)[on[starts] & on[ends]].any())
 
@@ -141,7 +141,7 @@ def _relaxed(
     chains, count = transitions.chains, 2 * len(transitions.quarters)
     places = transitions.places(start, values.astype(np.float64))
     pinned = np.flatnonzero(transitions.fixed.all(axis=1))
-    _, one_of = np.unique(chains.chain, return_index=True)
+    _, edge_of_chain = np.unique(chains.chain, return_index=True)
     # The signed offset of a line is measured to the left of its direction, so that of a vertical line is -x.
     sides, lines = layout.sides, None
     if len(sides.axis):
@@ -152,7 +152,7 @@ def _relaxed(
         pinned=pinned,
         places=as_pairs(places[pinned]),
         lines=lines,
-        tied=chains.halfedges[one_of, 1],
+        tied=chains.halfedges[edge_of_chain, 1],
         translations=values[:count].reshape(-1, 2),
         stride=stride,
     )
@@ -172,12 +172,12 @@ def _relaxed(
     )
 
 
-def _snapped(found: Relaxed, transitions: Transitions, values: IntArray) -> ComplexArray:
+def _snapped(relaxed: Relaxed, transitions: Transitions, values: IntArray) -> ComplexArray:
     """Return the points rounded so that motions across seams are exact, and cones are exactly on grid points.
 
     Coordinates become multiples of a power of two for which sums with integers are exact.
     """
-    largest = float(np.abs(found.points).max(initial=1.0)) + float(np.abs(values).max(initial=0))
+    largest = float(np.abs(relaxed.points).max(initial=1.0)) + float(np.abs(values).max(initial=0))
     bits = min(40, 50 - int(np.ceil(np.log2(largest))))
-    rounded = np.ldexp(np.rint(np.ldexp(found.points, bits)), -bits)
+    rounded = np.ldexp(np.rint(np.ldexp(relaxed.points, bits)), -bits)
     return transitions.places(as_complex(rounded), values.astype(np.float64))

@@ -42,10 +42,10 @@ class Stiffness:
         ridged = csc_matrix(system + diags(np.full(system.shape[0], ridge)))
         self._factor = factorize(ridged.sorted_indices())
 
-    def displacement(self, given: FloatArray) -> FloatArray:
+    def displacement(self, prescribed: FloatArray) -> FloatArray:
         """Return the displacements (2u, k) of least energy for given ones (2u, k) of fixed coordinates and copies."""
-        right = -(self._turned.T @ (self._energy @ given))
-        return given + self._turned @ self._factor.solve(np.ascontiguousarray(right))
+        right = -(self._turned.T @ (self._energy @ prescribed))
+        return prescribed + self._turned @ self._factor.solve(np.ascontiguousarray(right))
 
     def gram(self, basis: IntArray) -> FloatArray:
         """Return (d, d) the Gram matrix of the columns of a basis (v, d) in the energy."""
@@ -99,13 +99,13 @@ class ConePairs:
 
     def disjoint(self, pairs: IntArray) -> IntArray:
         """Return the pairs that have no cone in common with previously selected pairs."""
-        seen, kept = set[int](), list[int]()
+        seen, disjoint = set[int](), list[int]()
         for pair in pairs.tolist():
             ends = set(self.ends[pair].tolist())
             if not ends & seen:
-                kept.append(pair)
+                disjoint.append(pair)
                 seen |= ends
-        return np.array(kept, dtype=np.int64)
+        return np.array(disjoint, dtype=np.int64)
 
     def collapsed(self, coordinates: IntArray, angle: float) -> IntArray:
         """Return the pairs that a lattice point merges or rotates by at least `angle`, the nearest pairs first."""
@@ -157,15 +157,15 @@ class Rounding:
         units = np.eye(len(self.start), dtype=np.int64)
         lattice = Lattice(np.zeros_like(self.start, dtype=np.int64), units, self.metric).reduced()
         for attempt in SEPARATIONS[: self.attempts]:
-            if (found := self._separated(lattice, *attempt)) is not None:
-                return np.asarray(self.basis @ found)
+            if (coordinates := self._separated(lattice, *attempt)) is not None:
+                return np.asarray(self.basis @ coordinates)
         raise GridError("near cones cannot be separated: use more quads")
 
     def displaced(self, values: FloatArray | IntArray) -> ComplexArray:
         """Return (u,) the points moved by the displacement of least energy to some values (v,)."""
         points, places = self.layout.points, self.transitions.places
-        given = as_pairs(places(points, values) - points).reshape(-1, 1)
-        shift = self.stiffness.displacement(given)
+        prescribed = as_pairs(places(points, values) - points).reshape(-1, 1)
+        shift = self.stiffness.displacement(prescribed)
         return places(points + as_complex(shift.reshape(-1, 2)), values)
 
     def _separated(
@@ -176,19 +176,19 @@ class Rounding:
         None if two cones cannot be separated after others, or more pairs are left than this number of rounds.
         """
         for left in range(rounds, 0, -1):  # each reduces the dimension of the lattice
-            rest: Lattice = lattice
-            found = lattice.nearest(self.start)
-            if not len(bad := self.pairs.collapsed(found, angle)):
-                return found
+            remaining: Lattice = lattice
+            coordinates = lattice.nearest(self.start)
+            if not len(bad := self.pairs.collapsed(coordinates, angle)):
+                return coordinates
             pairs = self.pairs.disjoint(bad)
             if at_once and len(pairs) >= left * at_once:
                 return None
             for pair in pairs[:at_once].tolist():
-                part = self._separate(pair, rest)
+                part = self._separate(pair, remaining)
                 if part is None and pair == bad[0]:
                     return None
-                rest = rest if part is None else part
-            lattice = rest.reduced()
+                remaining = remaining if part is None else part
+            lattice = remaining.reduced()
         return None
 
     def _separate(self, pair: int, lattice: Lattice) -> Lattice | None:
@@ -223,8 +223,8 @@ def find_rounding(layout: GridLayout) -> Rounding:
     stiffness = Stiffness(layout, transitions)
     metric = stiffness.gram(basis)
     # The least energy, to which sides that are not straight in the layout contribute.
-    given = as_pairs(transitions.places(layout.points, basis @ start) - layout.points).reshape(-1, 1)
-    shift = stiffness.displacement(given)
+    prescribed = as_pairs(transitions.places(layout.points, basis @ start) - layout.points).reshape(-1, 1)
+    shift = stiffness.displacement(prescribed)
     start -= np.linalg.solve(metric, (stiffness.pulls(basis).T @ shift)[:, 0])
     return Rounding(basis, start, metric, stiffness, layout, transitions)
 
@@ -243,28 +243,30 @@ def _near_pairs(
     ends = np.argwhere(np.triu(np.isfinite(distance[:, cones]), 1))
     paths = [[int(cones[i]), *_path_to(int(cones[j]), parents[i])[1:]] for i, j in ends.tolist()]
     count, sided = len(paths), _paths_to_sides(layout)
-    found = PathVectors.of(layout, transitions, [*paths, *sided])
+    vectors_along = PathVectors.of(layout, transitions, [*paths, *sided])
     # Pairs with sides are kept if they face each other: a line crosses both, or they are not nearly collinear. Their
     # negative indices count as having no cone in common with others.
-    known = np.argwhere(found.known_axes(transitions)[count:])
-    which, axis = known.T
-    facing = [len(sided[k]) == 2 or found.is_beside(count + k, i, layout) for k, i in known.tolist()]
-    least = np.where(facing, 1e-6, 0.45 * np.abs(found.places[count + which]))
+    determined = np.argwhere(vectors_along.determined_axes(transitions)[count:])
+    which, axis = determined.T
+    facing = [
+        len(sided[k]) == 2 or vectors_along.is_beside(count + k, i, layout) for k, i in determined.tolist()
+    ]
+    min_distance = np.where(facing, 1e-6, 0.45 * np.abs(vectors_along.places[count + which]))
     # Products of sparse matrices of integers are faster than those of dense ones, which no library accelerates.
-    products = (found.rows @ csr_matrix(basis))[np.append(np.arange(count), count + which)]
-    is_known = np.concatenate([np.ones((count, 2)), np.eye(2)[axis]]).T.reshape(-1, 1).astype(np.int64)
-    vectors = vstack([products.real, products.imag]).astype(np.int64).multiply(is_known)
+    products = (vectors_along.rows @ csr_matrix(basis))[np.append(np.arange(count), count + which)]
+    is_determined = np.concatenate([np.ones((count, 2)), np.eye(2)[axis]]).T.reshape(-1, 1).astype(np.int64)
+    vectors = vstack([products.real, products.imag]).astype(np.int64).multiply(is_determined)
     before = (vectors @ start).reshape(2, -1).T
-    kept = np.abs(before).max(axis=1) > np.append(np.full(count, -1.0), least)
+    is_apart = np.abs(before).max(axis=1) > np.append(np.full(count, -1.0), min_distance)
     indices = np.concatenate([ends, -1 - np.stack([which, which], axis=1)])
-    return ConePairs(csr_matrix(vectors)[np.tile(kept, 2)], before[kept], indices[kept])
+    return ConePairs(csr_matrix(vectors)[np.tile(is_apart, 2)], before[is_apart], indices[is_apart])
 
 
-def _path_to(vertex: int, before: IntArray) -> list[int]:
+def _path_to(vertex: int, parents: IntArray) -> list[int]:
     """Return the path to a vertex from the root of a tree of shortest paths, in which `before` (n,) are the parents."""
     path = [vertex]
-    while before[path[-1]] >= 0:
-        path.append(int(before[path[-1]]))
+    while parents[path[-1]] >= 0:
+        path.append(int(parents[path[-1]]))
     return path[::-1]
 
 
@@ -284,22 +286,24 @@ def _paths_to_sides(layout: GridLayout) -> list[list[int]]:
     inner = ~np.isin(on_side, cones)
     label[on_side[inner]] = sides.side[inner]
     # Edges along sides are not part of paths.
-    both = label[mesh.edges]
+    labels = label[mesh.edges]
     at_end = np.isin(mesh.edges, np.intersect1d(cones, on_side)).any(axis=1)
-    along = (both >= 0).all(axis=1) & (at_end | (both[:, 0] == both[:, 1]))
+    along = (labels >= 0).all(axis=1) & (at_end | (labels[:, 0] == labels[:, 1]))
     graph, at = layout.graph(~along[mesh.halfedge_edges]), np.flatnonzero(label >= 0)
-    distance, before, source = dijkstra(
+    distance, parents, source = dijkstra(
         graph, indices=at, limit=NEAR_CONE_DISTANCE, min_only=True, return_predecessors=True
     )
-    one, two = mesh.edges[~along & np.isfinite(distance)[mesh.edges].all(axis=1)].T
-    total = distance[one] + distance[two] + np.asarray(graph[one, two]).ravel()
-    pairs = np.sort(label[source[np.stack([one, two], axis=1)]], axis=1)
-    near = np.flatnonzero(
+    tails, heads = mesh.edges[~along & np.isfinite(distance)[mesh.edges].all(axis=1)].T
+    total = distance[tails] + distance[heads] + np.asarray(graph[tails, heads]).ravel()
+    pairs = np.sort(label[source[np.stack([tails, heads], axis=1)]], axis=1)
+    short = np.flatnonzero(
         (total <= NEAR_CONE_DISTANCE) & (pairs[:, 0] != pairs[:, 1]) & (pairs[:, 0] < side_count)
     )
-    near = near[np.lexsort((total[near], pairs[near, 1], pairs[near, 0]))]
-    _, first = np.unique(pairs[near], axis=0, return_index=True)
-    return [[*_path_to(int(one[k]), before), *_path_to(int(two[k]), before)[::-1]] for k in near[first]]
+    short = short[np.lexsort((total[short], pairs[short, 1], pairs[short, 0]))]
+    _, first = np.unique(pairs[short], axis=0, return_index=True)
+    return [
+        [*_path_to(int(tails[k]), parents), *_path_to(int(heads[k]), parents)[::-1]] for k in short[first]
+    ]
 
 
 @dataclass(frozen=True, eq=False)
@@ -330,27 +334,27 @@ class PathVectors:
         owner = np.repeat(np.arange(count), [len(path) - 1 for path in paths])
         pairs = np.array([pair for path in paths for pair in pairwise(path)], dtype=np.int64).reshape(-1, 2)
         # The points at the ends of each edge, in the triangle on its left if there is one.
-        at, other = mesh.edge_halfedges[edge_indices(mesh, pairs)].T
-        at = np.where((other >= 0) & (mesh.tails[other] == pairs[:, 0]), other, at)
+        at, opposite = mesh.edge_halfedges[edge_indices(mesh, pairs)].T
+        at = np.where((opposite >= 0) & (mesh.tails[opposite] == pairs[:, 0]), opposite, at)
         is_forth = mesh.tails[at] == pairs[:, 0]
-        one, two = np.where(is_forth, [starts[at], ends[at]], [ends[at], starts[at]])
+        starts_at, ends_at = np.where(is_forth, [starts[at], ends[at]], [ends[at], starts[at]])
         firsts = np.flatnonzero(np.diff(owner, prepend=-1))
         lasts = np.flatnonzero(np.diff(owner, append=count))
-        before = np.roll(two, 1)
-        before[firsts] = one[firsts]
-        total = np.cumsum(transitions.turn[before] - transitions.turn[one])
+        point_before = np.roll(ends_at, 1)
+        point_before[firsts] = starts_at[firsts]
+        total = np.cumsum(transitions.turn[point_before] - transitions.turn[starts_at])
         turn = (total - total[firsts][owner]) % 4
-        joints = np.flatnonzero(before != one)
+        joints = np.flatnonzero(point_before != starts_at)
         edges = np.concatenate([firsts, joints - 1, joints, lasts])
-        points = np.concatenate([one[firsts], before[joints], one[joints], two[lasts]])
+        points = np.concatenate([starts_at[firsts], point_before[joints], starts_at[joints], ends_at[lasts]])
         signs = np.repeat([-1, 1, -1, 1], [count, len(joints), len(joints), count])
         rows = csr_matrix((signs * UNITS[turn[edges]], (owner[edges], points)), (count, len(layout.points)))
-        places = complex_sums(owner, UNITS[turn] * (layout.points[two] - layout.points[one]), count)
+        places = complex_sums(owner, UNITS[turn] * (layout.points[ends_at] - layout.points[starts_at]), count)
         shifts = transitions.shifts[::2] + 1j * transitions.shifts[1::2]
         turns = np.stack([turn[firsts], turn[lasts]], axis=1)
-        return cls(rows @ shifts, places, np.stack([one[firsts], two[lasts]], axis=1), turns)
+        return cls(rows @ shifts, places, np.stack([starts_at[firsts], ends_at[lasts]], axis=1), turns)
 
-    def known_axes(self, transitions: Transitions) -> BoolArray:
+    def determined_axes(self, transitions: Transitions) -> BoolArray:
         """Return (p, 2) whether the variables determine each coordinate of both ends."""
         is_odd = (transitions.turn[self.ends] + self.turns) % 2 == 1
         fixed = transitions.fixed[transitions.base[self.ends]]
@@ -363,6 +367,6 @@ class PathVectors:
             side = sides.side[sides.points == point]
             side = side[sides.axis[side] == (axis + turn) % 2]
             on = np.append(sides.points[np.isin(sides.side, side)], point)
-            there = as_pairs(UNITS[turn] * (layout.points[on] - layout.points[point]) + place)
-            spans.append(there[:, 1 - axis])
-        return bool(max(each.min() for each in spans) <= min(each.max() for each in spans))
+            places = as_pairs(UNITS[turn] * (layout.points[on] - layout.points[point]) + place)
+            spans.append(places[:, 1 - axis])
+        return bool(max(span.min() for span in spans) <= min(span.max() for span in spans))

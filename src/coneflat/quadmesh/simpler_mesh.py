@@ -33,7 +33,7 @@ from .smooth import is_on_feature
 # seconds.
 MAX_COMPONENTS, MAX_HOLES, MAX_CORNERS = 64, 32, 400
 # A triangle is thin if its area is less than THIN times that of one with equal sides. If more than a tenth of them are,
-# as in files of CAD programs, few grids are found, so the surface is triangulated anew.
+# as in files of CAD programs, few grids are found, so the surface is remeshed.
 THIN = 0.3
 # Largest number of new triangles for each thin one, in meshes of more than COARSE: the plane parts of a surface are not
 # better the finer they are.
@@ -46,17 +46,17 @@ class SimplerMesh:
 
     Attributes:
         mesh: the simpler mesh, in model units; vertices in filled holes come last.
-        kept: its other vertices in the given mesh.
-        given: the given mesh, checked.
+        vertex_origin: its other vertices in the given mesh.
+        surface: the given mesh, checked.
         is_filling: (m,) whether each of its triangles is in a filled hole.
-        side: wanted edge length of quads.
+        side: requested edge length of quads.
         limit: largest number of quads.
         notes: on the given mesh.
     """
 
     mesh: TriangleMesh
-    kept: IntArray
-    given: TriangleMesh
+    vertex_origin: IntArray
+    surface: TriangleMesh
     is_filling: BoolArray
     side: float
     limit: SquareLimit = NO_LIMIT
@@ -81,27 +81,30 @@ class SimplerMesh:
         if self.is_filling.any():
             tree = TriangleTree(self.mesh.vertices, self.mesh.faces)
             is_over = self.is_filling[tree.nearest(quads.vertices[quads.quads].mean(axis=1))[0]]
-        mesh, surface, points = self.given, quads.surface, quads.vertices
-        label, part = mesh.components[1], surface.components[1]
-        off, which = cKDTree(self.mesh.vertices[: len(self.kept)]).query(surface.vertices)
+        mesh, simple, points = self.surface, quads.surface, quads.vertices
+        label, part = mesh.components[1], simple.components[1]
+        off, which = cKDTree(self.mesh.vertices[: len(self.vertex_origin)]).query(simple.vertices)
         # Where components touch, the vertex found may be of another one; most are not.
-        is_common, there = off == 0, label[self.kept[which]]
-        votes = csr_matrix((is_common.astype(np.int64), (part, there)))
+        is_common, home_of_vertex = off == 0, label[self.vertex_origin[which]]
+        votes = csr_matrix((is_common.astype(np.int64), (part, home_of_vertex)))
         homes = np.asarray(votes.argmax(axis=1)).ravel()[part]
-        stars, common = Stars.of(mesh.vertices, mesh.faces), np.flatnonzero(is_common & (there == homes))
-        faces, weights = _placed(surface, common, self.kept[which], stars)
-        corners = surface.faces[quads.faces, quads.barycentric.argmax(axis=1)]
+        stars, common = (
+            Stars.of(mesh.vertices, mesh.faces),
+            np.flatnonzero(is_common & (home_of_vertex == homes)),
+        )
+        faces, weights = _placed(simple, common, self.vertex_origin[which], stars)
+        corners = simple.faces[quads.faces, quads.barycentric.argmax(axis=1)]
         faces, weights = faces[corners], weights[corners]
         slide_near(stars, points, faces, weights)
         # Components are moved apart, so that the nearest edge is one of the same, or out of reach.
         apart = np.ptp(mesh.vertices, axis=0)
         places = mesh.vertices + 2 * np.outer(label, apart)
-        wanted = points + 2 * np.outer(homes[corners], apart)
+        targets = points + 2 * np.outer(homes[corners], apart)
         lengths = np.linalg.norm(np.diff(points[quads.edges], axis=1)[:, 0], axis=1)
         half = np.bincount(quads.edges.ravel(), lengths.repeat(2)) / quads.valences / 2
         sharp = edge_indices(mesh, sharp_ends(mesh)), half
         border = np.flatnonzero(mesh.is_boundary_edge), np.full(len(points), np.linalg.norm(apart))
-        is_on = is_on_feature(quads, sharp_ends(surface)), quads.is_boundary_vertex
+        is_on = is_on_feature(quads, sharp_ends(simple)), quads.is_boundary_vertex
         for moves, (edges, reach) in zip(is_on, (sharp, border), strict=True):
             if not (len(edges) and moves.any()):
                 continue
@@ -109,9 +112,9 @@ class SimplerMesh:
             tails, heads = mesh.ends_of(halfedges)
             # Each edge is a triangle without area.
             tree = TriangleTree(places, np.stack([tails, heads, heads], axis=1))
-            on, (share, *_) = (found.T for found in tree.nearest(wanted[moves]))
-            near = places[heads[on]] + share[:, None] * (places[tails[on]] - places[heads[on]])
-            within = np.linalg.norm(near - wanted[moves], axis=1) <= reach[moves]
+            on, (share, *_) = (rows.T for rows in tree.nearest(targets[moves]))
+            on_edges = places[heads[on]] + share[:, None] * (places[tails[on]] - places[heads[on]])
+            within = np.linalg.norm(on_edges - targets[moves], axis=1) <= reach[moves]
             at, halfedge, share = np.flatnonzero(moves)[within], halfedges[on[within]], share[within]
             faces[at], weights[at] = halfedge // 3, 0.0
             weights[at, np.take(NEXT, halfedge % 3)] = share
@@ -125,19 +128,20 @@ class SimplerMesh:
 
         Those of many triangles are simplified before. Long edges are split.
         """
-        mesh = self.given
+        mesh = self.surface
         label = mesh.components[1][mesh.faces[:, 0]]
         # Nothing of a component without area can be seen.
         is_bare = np.bincount(label, double_areas(edge_lengths(mesh.vertices, mesh.faces))) > 0
         is_bare[label[quads.faces]] = False
         if not is_bare.any():
             return quads
-        faces, (whole, _) = np.flatnonzero(is_bare[label]), _part(mesh, is_bare[label])
-        side = max(self.side, float(np.sqrt(_area(whole) / MAX_SQUARES)))
+        faces, (bare_mesh, _) = np.flatnonzero(is_bare[label]), _part(mesh, is_bare[label])
+        side = max(self.side, float(np.sqrt(_area(bare_mesh) / MAX_SQUARES)))
         # For about twice the quads that their areas need: these are less regular.
         count = 2 / 3 / side**2
         parts = [
-            coarse_mesh(part, max(16, int(count * _area(part))))[0] for part, _, _ in whole.split_components()
+            coarse_mesh(part, max(16, int(count * _area(part))))[0]
+            for part, _, _ in bare_mesh.split_components()
         ]
         small = without_pillows(joined(parts, np.cumsum([0, *(len(part.vertices) for part in parts)])))
         # More would be refused.
@@ -148,15 +152,15 @@ class SimplerMesh:
         corners = [
             (small.faces[:, i], n + middles[:, i - 1], centres, n + middles[:, (i + 1) % 3]) for i in range(3)
         ]
-        more = np.concatenate([np.stack(each, axis=1) for each in corners])
-        on, weights = TriangleTree(whole.vertices, whole.faces).nearest(np.concatenate(points))
-        places = np.einsum("qi,qix->qx", weights, whole.vertices[whole.faces[on]])
+        added = np.concatenate([np.stack(corners_of_quads, axis=1) for corners_of_quads in corners])
+        on, weights = TriangleTree(bare_mesh.vertices, bare_mesh.faces).nearest(np.concatenate(points))
+        places = np.einsum("qi,qix->qx", weights, bare_mesh.vertices[bare_mesh.faces[on]])
         bare = plural(int(is_bare.sum()), "component")
         note = Unmet(f"Made three quads of each triangle of {bare} without a grid.")
         return replace(
             quads,
             vertices=np.concatenate([quads.vertices, places]),
-            quads=np.concatenate([quads.quads, len(quads.vertices) + more]),
+            quads=np.concatenate([quads.quads, len(quads.vertices) + added]),
             faces=np.concatenate([quads.faces, faces[on]]),
             barycentric=np.concatenate([quads.barycentric, weights]),
             notes=(*quads.notes, note),
@@ -174,7 +178,9 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
     """
     # Weights, and options that are not simple values, name vertices. Required sharp edges are those of the given mesh.
     options = {**search.options, "boundary": search.boundary}
-    is_simple = all(one is None or isinstance(one, (str, Real)) or callable(one) for one in options.values())
+    is_simple = all(
+        choice is None or isinstance(choice, (str, Real)) or callable(choice) for choice in options.values()
+    )
     is_simple &= options.keys() <= declarations(QuadOptions).keys() - {"weights"}
     if not is_simple or search.sharp_angle is not None or search.result:
         return search, None
@@ -182,33 +188,46 @@ def simplified(search: GridSearch) -> tuple[GridSearch, SimplerMesh | None]:
     side = float(np.ldexp(search.size, checked.exponent))
     is_kept, walks, is_jagged = _manageable(mesh, side)
     walks, is_jagged = (walks, is_jagged) if search.boundary == "auto" else ([], False)
-    part, kept = _part(mesh, is_kept)
-    loops = [np.searchsorted(kept, mesh.tails[walk]) for walk in walks]
+    part, part_vertices = _part(mesh, is_kept)
+    loops = [np.searchsorted(part_vertices, mesh.tails[walk]) for walk in walks]
     filled = _filled(part, loops)
     quads, notes = _area(filled) / side**2, list(checked.notes)
     count = COARSE * max(1.0, quads / QUADS)
-    simple, some, of = filled, np.arange(len(filled.vertices)), np.arange(len(filled.faces))
+    simple, vertex_origin, face_origin = filled, np.arange(len(filled.vertices)), np.arange(len(filled.faces))
     if is_jagged:
         search = replace(search, boundary="free")
         notes.append(Unmet(f"The boundary cuts squares, because it has more than {MAX_CORNERS} corners."))
-    if _is_thin(filled).mean() > 0.1 and len(without_pillows(filled).faces) == len(of):
-        finest = min(count, max(COARSE, MAX_REFINEMENT * len(of)))
-        simple, some, of = _retriangulated(filled, int(np.clip(4 * quads, COARSE // 6, finest)))
+    if _is_thin(filled).mean() > 0.1 and len(without_pillows(filled).faces) == len(face_origin):
+        finest = min(count, max(COARSE, MAX_REFINEMENT * len(face_origin)))
+        simple, vertex_origin, face_origin = _retriangulated(
+            filled, int(np.clip(4 * quads, COARSE // 6, finest))
+        )
     if len(simple.faces) > 2 * count:
-        simple, some, of = coarse_mesh(filled, int(count))
+        simple, vertex_origin, face_origin = coarse_mesh(filled, int(count))
     elif simple is filled and is_kept.all() and not (loops or is_jagged):
         return search, None
     if loops:
-        notes.append(f"Filled {plural(len(loops), 'hole')}: small ones, and all but the {MAX_HOLES} longest.")
-    own, whole = kept[some[some < len(kept)]], SimplerMesh.of(search)
-    sizes = None if search.scales is None else np.exp(extended(-search.scales[own], simple))
+        notes.append(
+            f"Filled {plural(len(loops), 'hole')}: small ones, and those beyond the {MAX_HOLES} longest."
+        )
+    shared, unchanged = (
+        part_vertices[vertex_origin[vertex_origin < len(part_vertices)]],
+        SimplerMesh.of(search),
+    )
+    sizes = None if search.scales is None else np.exp(extended(-search.scales[shared], simple))
     simple = simple.moved_to(np.ldexp(simple.vertices, -checked.exponent))
     search = replace(search, source=Source(as_input(simple)), sizes=sizes)
-    return search, replace(whole, mesh=simple, kept=own, is_filling=of >= len(part.faces), notes=tuple(notes))
+    return search, replace(
+        unchanged,
+        mesh=simple,
+        vertex_origin=shared,
+        is_filling=face_origin >= len(part.faces),
+        notes=tuple(notes),
+    )
 
 
 def _placed(
-    simple: TriangleMesh, common: IntArray, there: IntArray, given: Stars
+    simple: TriangleMesh, common: IntArray, origin: IntArray, surface: Stars
 ) -> tuple[IntArray, FloatArray]:
     """Return (n,) the triangles and (n, 3) barycentric coordinates of vertices of a simpler mesh on the given one.
 
@@ -218,17 +237,17 @@ def _placed(
     Args:
         simple: the simpler mesh.
         common: (k,) its vertices that the given mesh has, too.
-        there: (n,) their numbers there; any for the others.
-        given: the given mesh.
+        origin: (n,) their numbers there; any for the others.
+        surface: the given mesh.
     """
     previous = dijkstra(vertex_graph(simple), indices=common, return_predecessors=True, min_only=True)[1]
     # Common vertices come after themselves.
-    previous = np.where(previous < 0, np.arange(len(there)), previous)
-    faces, is_placed = given.star[given.start[there]], mask_of(len(there), common)
-    weights = (given.faces[faces] == there[:, None]).astype(np.float64)
+    previous = np.where(previous < 0, np.arange(len(origin)), previous)
+    faces, is_placed = surface.star[surface.start[origin]], mask_of(len(origin), common)
+    weights = (surface.faces[faces] == origin[:, None]).astype(np.float64)
     while len(ready := np.flatnonzero(~is_placed & is_placed[previous])):
         on, at = faces[previous[ready]], weights[previous[ready]]
-        slide_near(given, simple.vertices[ready], on, at)
+        slide_near(surface, simple.vertices[ready], on, at)
         faces[ready], weights[ready], is_placed[ready] = on, at, True
     return faces, weights
 
@@ -240,18 +259,21 @@ def _is_thin(mesh: TriangleMesh) -> BoolArray:
 
 
 def _short_edges(
-    mesh: TriangleMesh, longest: float, most: float = np.inf, marked: BoolArray | None = None
+    mesh: TriangleMesh, longest: float, max_triangles: float = np.inf, marked: BoolArray | None = None
 ) -> tuple[TriangleMesh, IntArray]:
     """Return a mesh with marked edges (e,), and all longer ones, split, and the triangle here of each of its own.
 
     Splitting ends with more than `most` triangles.
     """
-    of, is_long = np.arange(len(mesh.faces)), lengths_along(mesh, np.arange(len(mesh.edges))) > longest
+    face_origin, is_long = (
+        np.arange(len(mesh.faces)),
+        lengths_along(mesh, np.arange(len(mesh.edges))) > longest,
+    )
     is_long |= False if marked is None else marked
-    while is_long.any() and len(mesh.faces) <= most:
-        mesh, own = split_edges(mesh, is_long)
-        of, is_long = of[own], lengths_along(mesh, np.arange(len(mesh.edges))) > longest
-    return mesh, of
+    while is_long.any() and len(mesh.faces) <= max_triangles:
+        mesh, origin = split_edges(mesh, is_long)
+        face_origin, is_long = face_origin[origin], lengths_along(mesh, np.arange(len(mesh.edges))) > longest
+    return mesh, face_origin
 
 
 def _retriangulated(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntArray, IntArray]:
@@ -262,26 +284,38 @@ def _retriangulated(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntAr
     returned; rounds end where it hardly gets smaller. New vertices come last, with an index beyond those of the mesh.
     """
     n, total = len(mesh.vertices), lengths_along(mesh, np.arange(len(mesh.edges))).sum()
-    # Where the area is almost none, edges are split into about four times as many pieces as triangles are wanted.
+    # Where the area is almost none, edges are split into about four times as many pieces as triangles are requested.
     longest = max(3 * (_area(mesh) / count) ** 0.5, total / (4 * count))
-    new, some, of = best = mesh, np.arange(n), np.arange(len(mesh.faces))
-    least, share, step = np.inf, _is_thin(mesh).mean(), 0
-    while step < 4 and share < 0.9 * least:
-        least = share
-        sides = new.halfedge_edges.reshape(-1, 3)[np.flatnonzero(_is_thin(new) & (step > 0))]
-        own = lengths_along(new, sides.ravel()).reshape(-1, 3).argmax(axis=1)[:, None]
-        marked = mask_of(len(new.edges), np.take_along_axis(sides, own, axis=1))
+    remeshed, vertex_origin, face_origin = best = mesh, np.arange(n), np.arange(len(mesh.faces))
+    smallest_share, share, step = np.inf, _is_thin(mesh).mean(), 0
+    while step < 4 and share < 0.9 * smallest_share:
+        smallest_share = share
+        sides = remeshed.halfedge_edges.reshape(-1, 3)[np.flatnonzero(_is_thin(remeshed) & (step > 0))]
+        origin = lengths_along(remeshed, sides.ravel()).reshape(-1, 3).argmax(axis=1)[:, None]
+        marked = mask_of(len(remeshed.edges), np.take_along_axis(sides, origin, axis=1))
         # More are needed only for very thin triangles, which stay so.
-        new, own = _short_edges(new, longest, 3 * count, marked)
-        of, some = of[own], np.append(some, np.full(len(new.vertices) - len(some), n))
-        new, kept, own = coarse_mesh(new, count)
-        some, of, step, share = some[kept], of[own], step + 1, _is_thin(new).mean()
-        best = (new, some, of) if share < least else best
+        remeshed, origin = _short_edges(remeshed, longest, 3 * count, marked)
+        face_origin, vertex_origin = (
+            face_origin[origin],
+            np.append(vertex_origin, np.full(len(remeshed.vertices) - len(vertex_origin), n)),
+        )
+        remeshed, remaining, origin = coarse_mesh(remeshed, count)
+        vertex_origin, face_origin, step, share = (
+            vertex_origin[remaining],
+            face_origin[origin],
+            step + 1,
+            _is_thin(remeshed).mean(),
+        )
+        best = (remeshed, vertex_origin, face_origin) if share < smallest_share else best
     if best[0] is mesh:
         return best
-    new, some, of = best
-    order = np.argsort(some, kind="stable")
-    return TriangleMesh(new.vertices[order], np.argsort(order)[new.faces]), some[order], of
+    remeshed, vertex_origin, face_origin = best
+    order = np.argsort(vertex_origin, kind="stable")
+    return (
+        TriangleMesh(remeshed.vertices[order], np.argsort(order)[remeshed.faces]),
+        vertex_origin[order],
+        face_origin,
+    )
 
 
 def _area(mesh: TriangleMesh) -> float:
@@ -290,8 +324,8 @@ def _area(mesh: TriangleMesh) -> float:
 
 def _part(mesh: TriangleMesh, is_in: BoolArray) -> tuple[TriangleMesh, IntArray]:
     """Return some triangles (m,) of a mesh, and their vertices there."""
-    kept, faces = np.unique(mesh.faces[is_in], return_inverse=True)
-    return TriangleMesh(mesh.vertices[kept], faces.reshape(-1, 3)), kept
+    vertices, faces = np.unique(mesh.faces[is_in], return_inverse=True)
+    return TriangleMesh(mesh.vertices[vertices], faces.reshape(-1, 3)), vertices
 
 
 def _filled(mesh: TriangleMesh, loops: list[IntArray]) -> TriangleMesh:

@@ -1,4 +1,4 @@
-"""Wanted sizes of quads: one for each vertex, or smaller ones where the surface is more curved."""
+"""Target sizes of quads: one for each vertex, or smaller ones where the surface is more curved."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from .features import vertex_graph
 from .integer_map import IntegerGrid
 
 
-def wanted_scales(source: Source, checked: CheckedMesh, sizes: Any) -> FloatArray:
-    """Return (n,) the wanted log scale of a flattening at the vertices of a checked mesh: minus the log of the sizes.
+def target_scales(source: Source, checked: CheckedMesh, sizes: Any) -> FloatArray:
+    """Return (n,) the target log scale of a flattening at the vertices of a checked mesh: minus the log of the sizes.
 
     Args:
         source: the input.
@@ -33,10 +33,10 @@ def wanted_scales(source: Source, checked: CheckedMesh, sizes: Any) -> FloatArra
     """
     if isinstance(sizes, str) and sizes == "curvature":
         return _scales_of_curvature(checked.mesh)
-    found = vertex_numbers("sizes", sizes, source.given, checked.vertex_origin)
-    if found is None or not found.min() > 0:
+    numbers = vertex_numbers("sizes", sizes, source.input_mesh, checked.vertex_origin)
+    if numbers is None or not numbers.min() > 0:
         raise OptionError("sizes must be positive; there are some of 0")
-    return -np.log(found)
+    return -np.log(numbers)
 
 
 def _scales_of_curvature(mesh: TriangleMesh, ratio: float = 4.0) -> FloatArray:
@@ -64,33 +64,33 @@ def extended(values: FloatArray, mesh: TriangleMesh) -> FloatArray:
 
     Refinement of a mesh appends vertices.
     """
-    found = np.zeros(len(mesh.vertices))
-    found[: len(values)] = values
-    known = np.arange(len(found)) < len(values)
-    near = csr_matrix((vertex_graph(mesh) > 0).astype(np.float64))
-    while not known.all():
-        count = near @ known.astype(np.float64)
-        reached = ~known & (count > 0)
-        found[reached] = (near @ (found * known))[reached] / count[reached]
-        known |= reached
-    return found
+    values_at = np.zeros(len(mesh.vertices))
+    values_at[: len(values)] = values
+    has_value = np.arange(len(values_at)) < len(values)
+    adjacency = csr_matrix((vertex_graph(mesh) > 0).astype(np.float64))
+    while not has_value.all():
+        count = adjacency @ has_value.astype(np.float64)
+        reached = ~has_value & (count > 0)
+        values_at[reached] = (adjacency @ (values_at * has_value))[reached] / count[reached]
+        has_value |= reached
+    return values_at
 
 
-def note_on_sizes(grid: IntegerGrid, wanted: FloatArray) -> str:
-    """Return a note on how well the sizes of the squares of a grid are the wanted ones, up to a common factor.
+def note_on_sizes(grid: IntegerGrid, target_scale: FloatArray) -> str:
+    """Return a note on how well the sizes of the squares of a grid agree with the target sizes, up to a common factor.
 
-    wanted: (k,) the log scale at the first vertices of the grid.
+    target_scale: (k,) the log scale at the first vertices of the grid.
     """
     mesh = TriangleMesh(grid.vertices, grid.faces)
     number = signed_double_areas(grid.corner_grid)
     area = double_areas(edge_lengths(grid.vertices, grid.faces))
     reached = np.log(np.maximum(area, np.finfo(float).tiny) / number) / 2
-    asked = -extended(wanted, mesh)[mesh.faces].mean(axis=1)
+    asked = -extended(target_scale, mesh)[mesh.faces].mean(axis=1)
     off, weight = reached - asked, number / number.sum()
     covariance = np.cov(np.stack([asked, reached]), aweights=weight)
     spread = np.sqrt(covariance[0, 0] * covariance[1, 1])
     low, high = (quantile(off, weight, part) for part in (0.05, 0.95))
     return (
-        f"Sizes of quads have a correlation of {covariance[0, 1] / spread if spread else 1.0:.2f} with the wanted "
+        f"Sizes of quads have a correlation of {covariance[0, 1] / spread if spread else 1.0:.2f} with the requested "
         f"ones; the ratio of both varies by a factor of {np.exp(high - low):.2f} over 90 % of the quads."
     )

@@ -55,11 +55,11 @@ class MovingQuads:
         points, quads = self.mesh.vertices, self.mesh.quads
         _, _, start, star = Stars.of(points, quads)
         for _ in range(8):
-            least = least_jacobians(points, quads)
-            bad = np.flatnonzero(least < below)
-            worst_first = quads[bad[np.argsort(least[bad], kind="stable")]].ravel()
-            tried = worst_first[np.sort(np.unique(worst_first, return_index=True)[1])]
-            queue = tried[movable[tried] & ~self.settled[tried]].tolist()
+            jacobians = least_jacobians(points, quads)
+            bad = np.flatnonzero(jacobians < below)
+            worst_first = quads[bad[np.argsort(jacobians[bad], kind="stable")]].ravel()
+            candidates = worst_first[np.sort(np.unique(worst_first, return_index=True)[1])]
+            queue = candidates[movable[candidates] & ~self.settled[candidates]].tolist()
             if not queue:
                 return
             while queue:
@@ -77,8 +77,8 @@ class MovingQuads:
     def untangle(self) -> None:
         """Move vertices around flipped quads, and in up to five rings around these, until no quad is flipped.
 
-        It may fail. Vertices on sharp edges move too, because a flipped quad is worse than an inexact edge. Those on
-        the boundary do not move.
+        It may fail. Vertices on sharp edges move too, because a flipped quad is worse than a sharp edge that is not
+        followed. Those on the boundary do not move.
         """
         quads = self.mesh.quads
         for rings in range(6):
@@ -113,14 +113,14 @@ class MovingQuads:
         moves_there = (around == moves[owner][:, None])[:, None, :, None]
         corners = np.where(moves_there, trials[owner][:, :, None], points[around][:, None])
         numbers = np.arange(corners.size // 3).reshape(-1, 4)
-        each = least_jacobians(corners.reshape(-1, 3), numbers).reshape(len(around), -1)
+        jacobians = least_jacobians(corners.reshape(-1, 3), numbers).reshape(len(around), -1)
         first = np.flatnonzero(np.diff(owner, prepend=-1))
-        inverts = np.logical_or.reduceat((each <= 0) & (each[:, -1:] > 0), first)
-        least = np.where(inverts, -np.inf, np.minimum.reduceat(each, first))
-        best = least[:, :-1].argmax(axis=1)
-        better = np.flatnonzero(least[np.arange(len(moves)), best] > least[:, -1])
-        v, chosen = moves[better], better * count + best[better]
-        points[v], faces[v], barycentric[v] = trials[better, best[better]], on[chosen], weights[chosen]
+        inverts = np.logical_or.reduceat((jacobians <= 0) & (jacobians[:, -1:] > 0), first)
+        worst = np.where(inverts, -np.inf, np.minimum.reduceat(jacobians, first))
+        best = worst[:, :-1].argmax(axis=1)
+        improved = np.flatnonzero(worst[np.arange(len(moves)), best] > worst[:, -1])
+        v, chosen = moves[improved], improved * count + best[improved]
+        points[v], faces[v], barycentric[v] = trials[improved, best[improved]], on[chosen], weights[chosen]
         self.settled[moves] = True
         self.settled[quads[mask_of(len(points), v)[quads].any(axis=1)]] = False
 
@@ -151,12 +151,12 @@ def smooth_quads(quads: QuadMesh, rounds: int = QuadOptions.smooth, features: Ar
     points, faces, barycentric = mesh.vertices, mesh.faces, mesh.barycentric
     movable = ~(quads.is_boundary_vertex | is_on_feature(quads, ends))
     for _ in range(rounds):
-        wanted = _squared(points, quads.quads)[movable]
-        on, weights, new = faces[movable], barycentric[movable], points.copy()
-        slide_near(stars, wanted, on, weights)
-        new[movable] = stars.at(on, weights)
-        gone = movable & ~_blocked(points, new, quads.quads)
-        points[gone], faces[gone], barycentric[gone] = new[gone], on[gone[movable]], weights[gone[movable]]
+        targets = _squared(points, quads.quads)[movable]
+        on, weights, moved = faces[movable], barycentric[movable], points.copy()
+        slide_near(stars, targets, on, weights)
+        moved[movable] = stars.at(on, weights)
+        gone = movable & ~_blocked(points, moved, quads.quads)
+        points[gone], faces[gone], barycentric[gone] = moved[gone], on[gone[movable]], weights[gone[movable]]
     if rounds:
         moving.improve_worst(movable)
         moving.untangle()
@@ -182,12 +182,12 @@ def _squared(points: FloatArray, quads: IntArray) -> FloatArray:
     return np.stack(sums, axis=1) / np.maximum(np.bincount(at, minlength=len(points)), 1)[:, None]
 
 
-def _blocked(old: FloatArray, new: FloatArray, quads: IntArray) -> BoolArray:
+def _blocked(before: FloatArray, moved: FloatArray, quads: IntArray) -> BoolArray:
     """Return (q,) whether each vertex must not move, so that no quad gets worse than MIN_JACOBIAN and than before."""
-    stays = np.zeros(len(old), dtype=bool)
-    bound = np.minimum(least_jacobians(old, quads), MIN_JACOBIAN)
+    stays = np.zeros(len(before), dtype=bool)
+    bound = np.minimum(least_jacobians(before, quads), MIN_JACOBIAN)
     while True:
-        bad = least_jacobians(np.where(stays[:, None], old, new), quads) < bound
+        bad = least_jacobians(np.where(stays[:, None], before, moved), quads) < bound
         bad &= ~stays[quads].all(axis=1)
         if not bad.any():
             return stays

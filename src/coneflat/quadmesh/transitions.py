@@ -114,11 +114,11 @@ class _Builder:
         off = points[chains.right] - UNITS[self.quarters[chains.chain], None] * points[chains.left]
         translation = complex_sums(chains.chain, off.mean(axis=1), self.chain_count)
         translation /= np.bincount(chains.chain)
-        both = np.concatenate([translation, points[self.cone_points]])
+        places = np.concatenate([translation, points[self.cone_points]])
         side = self.sides.side
         common = as_pairs(points[self.sides.points])[np.arange(len(side)), self.sides.axis[side]]
         means = np.bincount(side, common) / np.bincount(side)
-        values = np.concatenate([as_pairs(both).ravel(), means])
+        values = np.concatenate([as_pairs(places).ravel(), means])
         equations = np.array(self.equations, dtype=np.int64).reshape(len(self.equations), self.size)
         return Transitions(chains, self.quarters, self.base, self.turn, shifts, self.fixed, equations, values)
 
@@ -149,8 +149,8 @@ class _Builder:
         is_end = mask_of(len(self.points), np.stack([chains.left, chains.right])[:, at_node])
         points, side = self.sides.points, self.sides.side
         special = is_end[points] | self.fixed[points, 0]
-        for point, one in zip(points[special].tolist(), side[special].tolist(), strict=True):
-            self.sides_at[point].append(one)
+        for point, side_number in zip(points[special].tolist(), side[special].tolist(), strict=True):
+            self.sides_at[point].append(side_number)
         points, side = points[~special], side[~special]
         axis = self.sides.axis[side]
         self.fixed[points, axis] = True
@@ -184,32 +184,32 @@ class _Builder:
             axis = int(self.sides.axis[side])
             shift[axis, self.first_side + side] = 1
             self.fixed[start, axis] = True
-        known = {start: (0, shift)}
+        copies = {start: (0, shift)}
         left_over, waiting = deque(relations), 0
         while left_over:
             left, right, chain = left_over.popleft()
             quarter, across = int(self.quarters[chain]), np.zeros((2, self.size), dtype=np.int64)
             across[:, 2 * chain : 2 * chain + 2] = np.eye(2)
-            if left in known:
-                turn, shift = known[left]
+            if left in copies:
+                turn, shift = copies[left]
                 turn, shift = (turn + quarter) % 4, TURNS[quarter] @ shift + across
-                if right not in known:
-                    known[right] = turn, shift
+                if right not in copies:
+                    copies[right] = turn, shift
                     continue
-                if cone is None and known[right][0] != turn:
+                if cone is None and copies[right][0] != turn:
                     raise GridError(
-                        f"vertex {v} has an angle of {4 + known[right][0] - turn} quarter turns but is not a cone"
+                        f"vertex {v} has an angle of {4 + copies[right][0] - turn} quarter turns but is not a cone"
                     )
-                self.equations.extend(row for row in shift - known[right][1] if row.any())
-            elif right in known:
-                turn, shift = known[right]
-                known[left] = (turn - quarter) % 4, TURNS[-quarter % 4] @ (shift - across)
+                self.equations.extend(row for row in shift - copies[right][1] if row.any())
+            elif right in copies:
+                turn, shift = copies[right]
+                copies[left] = (turn - quarter) % 4, TURNS[-quarter % 4] @ (shift - across)
             else:
                 left_over.append((left, right, chain))  # until one of both is known
                 waiting += 1
                 if waiting > len(relations) ** 2:
                     raise GridError(f"the seams at vertex {v} do not connect all its copies")
-        for point, (turn, shift) in known.items():
+        for point, (turn, shift) in copies.items():
             if cone is None:
                 self.base[point], self.turn[point] = start, turn
             for side in self.sides_at.get(point, ()):  # the sides that contain the point

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of
+from ..base.progress import stage
 from ..base.text import plural
 from ..errors import OptionError, SeamError
 from ..geometry.operators import at_safe_scale
@@ -72,6 +73,7 @@ def find_seams(
     return np.flatnonzero(seams)
 
 
+@stage("cut")
 def cut_to_disk(mesh: TriangleMesh, cones: IntArray, costs: FloatArray, spec: SeamSpec) -> Cut:
     """Return a connected mesh cut open to a disk with the cones on its border (Section 4.2 of the paper).
 
@@ -128,11 +130,13 @@ def _loops(mesh: TriangleMesh, costs: FloatArray, is_cut: BoolArray, is_end: Boo
     paths = MultiGraph(len(mesh.vertices), mesh.edges, costs, mesh.incident_edges).shortest_paths(
         np.flatnonzero(is_end)
     )
-    is_left = ~is_cut
-    is_left[paths.edge[~is_end]] = False
-    left = np.flatnonzero(is_left)
-    dual = MultiGraph(len(mesh.faces), mesh.edge_faces[left], -_costs_over(mesh, costs, paths, left))
-    return _paths_over(mesh, paths, np.delete(left, dual.minimum_spanning_tree()))
+    is_uncovered = ~is_cut
+    is_uncovered[paths.edge[~is_end]] = False
+    uncovered = np.flatnonzero(is_uncovered)
+    dual = MultiGraph(
+        len(mesh.faces), mesh.edge_faces[uncovered], -_costs_over(mesh, costs, paths, uncovered)
+    )
+    return _paths_over(mesh, paths, np.delete(uncovered, dual.minimum_spanning_tree()))
 
 
 def _costs_over(mesh: TriangleMesh, costs: FloatArray, paths: Paths, edges: IntArray) -> FloatArray:
@@ -142,21 +146,21 @@ def _costs_over(mesh: TriangleMesh, costs: FloatArray, paths: Paths, edges: IntA
 
 def _paths_over(mesh: TriangleMesh, paths: Paths, edges: IntArray) -> BoolArray:
     """Return (e,) the edges of the paths through given edges (k,), from source to source."""
-    found = mask_of(len(mesh.edges), edges)
-    found[paths.edge[paths.nodes_to(mesh.edges[edges].ravel())]] = True
-    return found
+    on_paths = mask_of(len(mesh.edges), edges)
+    on_paths[paths.edge[paths.nodes_to(mesh.edges[edges].ravel())]] = True
+    return on_paths
 
 
 def without_loose_ends(mesh: TriangleMesh, is_cut: BoolArray) -> BoolArray:
     """Return (e,) the edges of a cut that are in loops or in paths between loops; dangling paths are removed."""
-    kept = is_cut.copy()
+    remaining = is_cut.copy()
     while True:
-        cut = np.flatnonzero(kept)
+        cut = np.flatnonzero(remaining)
         _, place, degree = np.unique(mesh.edges[cut], return_inverse=True, return_counts=True)
         is_loose = (degree[place.reshape(-1, 2)] == 1).any(axis=1)
         if not is_loose.any():
-            return kept
-        kept[cut[is_loose]] = False
+            return remaining
+        remaining[cut[is_loose]] = False
 
 
 def _lengthened(mesh: TriangleMesh, costs: FloatArray, seams: BoolArray) -> BoolArray:

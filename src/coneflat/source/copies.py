@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.arrays import FloatArray
 from ..stages import Layout
-from .parts import Part
+from .components import Component
 
 # Largest distance of the vertices of a copy from the transformed vertices of the first, relative to the largest
 # coordinates: rounding errors. And largest relative difference of side lengths: a tenth of the accuracy of metrics.
@@ -38,30 +38,30 @@ class Copy:
 
 
 def find_copies(
-    parts: Sequence[Part], others: Container[int] = (), rounding: float | None = None
+    components: Sequence[Component], others: Container[int] = (), rounding: float | None = None
 ) -> list[Copy | None]:
-    """Return for each part the part of which it is a copy, None for the first of a kind.
+    """Return for each component the component of which it is a copy, None for the first of a kind.
 
     Copies have the same connectivity with the same numbering and the same options for vertices and edges; a rotation, a
     translation and a uniform scaling map one to the other.
 
     Args:
-        parts: the parts.
-        others: indices of parts that are not compared.
+        components: the components.
+        others: indices of components that are not compared.
         rounding: largest distance of the vertices of a copy from those of the first, relative to the largest
             coordinates; None for copies that are exact up to the rounding of doubles.
     """
-    found: list[Copy | None] = [None] * len(parts)
-    if len(parts) == 1:
+    found: list[Copy | None] = [None] * len(components)
+    if len(components) == 1:
         return found
     kinds: dict[tuple[object, ...], list[int]] = {}
-    for i, part in enumerate(parts):
-        if i in others or _has_vertex_options(part):
+    for i, component in enumerate(components):
+        if i in others or _has_vertex_options(component):
             continue
-        key = _copy_key(part) if rounding is None else (part.mesh.faces.tobytes(),)
+        key = _copy_key(component) if rounding is None else (component.mesh.faces.tobytes(),)
         alike = kinds.setdefault(key, [])
         for first in alike[:MAX_COMPARED]:
-            scale = _scale_of_copy(parts[first], part, rounding)
+            scale = _scale_of_copy(components[first], component, rounding)
             if scale is not None:
                 found[i] = Copy(first, scale)
                 break
@@ -70,35 +70,40 @@ def find_copies(
     return found
 
 
-def copied(first: Layout, part: Part, scale: float) -> Layout:
+def copied(first: Layout, component: Component, scale: float) -> Layout:
     """Return the layout of a copy from the layout of the first component of its kind."""
-    return replace(first, mesh=part.mesh, lengths=part.lengths, points=scale * first.points)
+    return replace(first, mesh=component.mesh, lengths=component.lengths, points=scale * first.points)
 
 
-def _has_vertex_options(part: Part) -> bool:
-    """Return whether options name single vertices of a part."""
-    cones = part.cones
-    weights = cones.weights, part.seams.weights, part.seams.visibility
+def _has_vertex_options(component: Component) -> bool:
+    """Return whether options name single vertices of a component."""
+    cones = component.cones
+    weights = cones.weights, component.seams.weights, component.seams.visibility
     return bool(
-        len(cones.given)
-        or len(part.metric.corners)
+        len(cones.prescribed)
+        or len(component.metric.corners)
         or len(cones.required)
         or any(one is not None for one in weights)
     )
 
 
-def _copy_key(part: Part) -> tuple[object, ...]:
-    """Return a hash key that is equal for copies, and differs for most other parts."""
-    lengths = part.lengths
+def _copy_key(component: Component) -> tuple[object, ...]:
+    """Return a hash key that is equal for copies, and differs for most other components."""
+    lengths = component.lengths
     size = np.sqrt((lengths * lengths).sum())
     shape = [
         float(f"{value / size:.{MATCHED_DIGITS}g}") for value in (lengths[0, 0], lengths.sum(), lengths.max())
     ]
-    flags = part.seams.is_avoided, part.seams.is_forbidden, part.cones.is_allowed, part.metric.keeps_length
-    return (part.mesh.faces.tobytes(), *(each.tobytes() for each in flags), *shape)
+    flags = (
+        component.seams.is_avoided,
+        component.seams.is_forbidden,
+        component.cones.is_allowed,
+        component.metric.keeps_length,
+    )
+    return (component.mesh.faces.tobytes(), *(each.tobytes() for each in flags), *shape)
 
 
-def _scale_of_copy(first: Part, part: Part, rounding: float | None) -> float | None:
+def _scale_of_copy(first: Component, component: Component, rounding: float | None) -> float | None:
     """Return the size of a component relative to the component of which it is a copy; None if it is not a copy.
 
     rounding: as of `find_copies`.
@@ -106,7 +111,7 @@ def _scale_of_copy(first: Part, part: Part, rounding: float | None) -> float | N
     References:
         W. Kabsch, "A solution for the best rotation to relate two sets of vectors", 1976.
     """
-    one, two = (p.mesh.vertices - p.mesh.vertices.mean(axis=0) for p in (first, part))
+    one, two = (p.mesh.vertices - p.mesh.vertices.mean(axis=0) for p in (first, component))
     sizes = np.sqrt((one * one).sum()), np.sqrt((two * two).sum())
     if not (sizes[0] > 0 and sizes[1] > 0):
         return None
@@ -114,9 +119,9 @@ def _scale_of_copy(first: Part, part: Part, rounding: float | None) -> float | N
     left, _, right = np.linalg.svd(one.T @ two)
     handed = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
     off: FloatArray = np.abs((one @ ((left * handed) @ right)) * scale - two).max(axis=1)
-    reach = float(np.abs(part.mesh.vertices).max() + scale * np.abs(first.mesh.vertices).max())
-    sides = np.abs(scale * first.lengths - part.lengths)
+    reach = float(np.abs(component.mesh.vertices).max() + scale * np.abs(first.mesh.vertices).max())
+    sides = np.abs(scale * first.lengths - component.lengths)
     if rounding is not None:
         return scale if off.max() <= rounding * reach else None
-    is_copy = off.max() <= COPY_ROUNDING * reach and (sides <= SIDE_TOLERANCE * part.lengths).all()
+    is_copy = off.max() <= COPY_ROUNDING * reach and (sides <= SIDE_TOLERANCE * component.lengths).all()
     return scale if is_copy else None

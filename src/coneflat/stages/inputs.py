@@ -50,7 +50,7 @@ class ConeSpec:
     """Specification of the cones of a connected mesh with n vertices.
 
     Attributes:
-        strategy: "auto", "sparse", "greedy", "none", or "given" for `given`.
+        strategy: "auto", "sparse", "greedy", "none", or "prescribed" for `prescribed`.
         needs_sparse_search: an option is set that only the sparse search supports.
         distortion: largest area distortion of the linear model.
         count: number of cones instead of a distortion, or None.
@@ -58,7 +58,7 @@ class ConeSpec:
         min_angle, max_angle: bounds of cone angles, radians; None for no upper bound.
         positive_only: no cones of negative curvature.
         quantum: curvatures are multiples of it, radians; None for any.
-        given: cones given by the user, each with its curvature or NaN.
+        prescribed: cones chosen by the user, each with its curvature or NaN.
         required: vertices that every search must use as cones.
         is_allowed: (n,) vertices where a search may put a cone.
         weights: (n,) importance of each vertex, or None.
@@ -78,7 +78,7 @@ class ConeSpec:
     max_angle: float | None
     positive_only: bool
     quantum: float | None
-    given: VertexCurvatures
+    prescribed: VertexCurvatures
     required: IntArray
     is_allowed: BoolArray
     weights: FloatArray | None
@@ -224,8 +224,8 @@ class Surface:
         np.maximum.at(widest, mesh.faces.ravel(), angles.ravel())
         widest /= np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - curvature
         laplacian, areas = cotangent_laplacian(faces, cots, n), vertex_areas(faces, sides, n)
-        known = delaunay if len(faces) <= MEMORY_BOUND_TRIANGLES else None
-        return cls(mesh, lengths, laplacian, curvature, areas, widest, known_delaunay=known)
+        cached_delaunay = delaunay if len(faces) <= MEMORY_BOUND_TRIANGLES else None
+        return cls(mesh, lengths, laplacian, curvature, areas, widest, known_delaunay=cached_delaunay)
 
     @property
     def delaunay(self) -> tuple[IntrinsicTriangulation, IntArray]:

@@ -14,6 +14,9 @@ from ..geometry.operators import area_distortion
 from ..geometry.straight import FlatTriangles
 from ..mesh.connectivity import TriangleMesh
 
+# A log conformal factor that varies by less is constant.
+CONSTANT_SCALE = 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class LaplacianInverse:
@@ -34,15 +37,15 @@ class LaplacianInverse:
 
 @dataclass(frozen=True, eq=False)
 class ConeSolution:
-    """Cones of a mesh with n vertices, their curvatures, and the log scale that produces them to first order.
+    """Cones of a mesh with n vertices, their curvatures, and the log conformal factor of the linear model.
 
     Attributes:
         cones: (s,) cone vertices, in the order in which they were chosen.
         target: (n,) target curvature, radians: 0 except at cones and on the boundary.
         log_scale: (n,) phi with L phi = target - curvature; constant on cones and boundary where their curvature was
             not prescribed.
-        inverse: the factorized Laplacian that gave the log scale, if it still exists: solutions are zero on the
-            boundary, or have zero mean without one.
+        inverse: the factorized Laplacian that gave phi, if it still exists: solutions are zero on the boundary,
+            or have zero mean without one.
         is_searched: the sparse search chose the cones, so that others can be tried.
         notes: unmet requests, one sentence each.
     """
@@ -53,6 +56,11 @@ class ConeSolution:
     inverse: LaplacianInverse | None = None
     is_searched: bool = False
     notes: tuple[str, ...] = ()
+
+    @property
+    def is_polyhedral(self) -> bool:
+        """Whether lengths are not scaled: the surface is a polyhedron with the cones as corners."""
+        return bool(np.ptp(self.log_scale) < CONSTANT_SCALE)
 
     @property
     def curvatures(self) -> FloatArray:
@@ -112,16 +120,16 @@ class SolveStatistics:
     def of_all(cls, parts: Sequence[SolveStatistics], areas: Sequence[float]) -> SolveStatistics:
         """Return the combined statistics of components: sums of counts, maxima, and means weighted by area."""
         values = {}
-        for each in fields(cls):
-            every = np.array([getattr(part, each.name) for part in parts])
-            if each.name in ("newton_steps", "residual", "untangled_move", "qc_max_unrelaxed"):
-                values[each.name] = every.max().item()
-            elif each.name == "qc_mean_unrelaxed":
-                values[each.name] = float(np.average(every, weights=areas))
-            elif each.name.startswith("area_distortion"):
-                values[each.name] = float(np.sqrt(np.average(every**2, weights=areas)))
+        for statistic in fields(cls):
+            numbers = np.array([getattr(part, statistic.name) for part in parts])
+            if statistic.name in ("newton_steps", "residual", "untangled_move", "qc_max_unrelaxed"):
+                values[statistic.name] = numbers.max().item()
+            elif statistic.name == "qc_mean_unrelaxed":
+                values[statistic.name] = float(np.average(numbers, weights=areas))
+            elif statistic.name.startswith("area_distortion"):
+                values[statistic.name] = float(np.sqrt(np.average(numbers**2, weights=areas)))
             else:
-                values[each.name] = every.sum().item()
+                values[statistic.name] = numbers.sum().item()
         return cls(**values)
 
 
@@ -236,7 +244,7 @@ class Layout:
         """Return the layout with the area distortion of its metric, and of the linear model of its cones.
 
         Args:
-            linear: (n,) log scale of that model.
+            linear: (n,) log conformal factor of that model.
             areas: (n,) weight of each vertex.
         """
         of_linear, reached = (area_distortion(phi, areas) for phi in (linear, self.log_scale))

@@ -13,7 +13,7 @@ from ..errors import OptionError
 from ..mesh.connectivity import TriangleMesh
 from ..options import Options
 from ..result import Flattening
-from ..source import Part, Prepared, Source, result_numbering
+from ..source import Component, Prepared, Source, result_numbering
 
 # Largest distance of a vertex from the mirror image of another, and of a vertex on the plane from it, relative to the
 # extent of the mesh: files have six digits or more.
@@ -79,8 +79,10 @@ def half_of(prepared: Prepared, source: Source, options: Options) -> tuple[Mirro
     else:
         seams = pairs if seams is None else np.concatenate([np.asarray(seams), pairs])
     whole = source.prepared(replace(options, seams=seams))
-    parts = [_with_free(part, ends) for part in whole.parts if mirror.is_half[part.faces[0]]]
-    return mirror, replace(whole, parts=tuple(parts))
+    components = [
+        _with_free(component, ends) for component in whole.components if mirror.is_half[component.faces[0]]
+    ]
+    return mirror, replace(whole, components=tuple(components))
 
 
 def both_halves(half: Flattening, mirror: Mirror, prepared: Prepared) -> Flattening:
@@ -91,7 +93,7 @@ def both_halves(half: Flattening, mirror: Mirror, prepared: Prepared) -> Flatten
         mirror, prepared: as `half_of` returns them.
     """
     checked = prepared.checked
-    number, _ = result_numbering(checked, len(np.asarray(prepared.given.vertices)))
+    number, _ = result_numbering(checked, len(np.asarray(prepared.input_mesh.vertices)))
     faces, chosen, partner = number[checked.mesh.faces], mirror.corners[:, 0] // 3, mirror.images[:, 0] // 3
     image = np.arange(len(half.vertices))
     image[number] = number[mirror.vertices]
@@ -190,7 +192,9 @@ def _mirror_at(plane: FloatArray, mesh: TriangleMesh) -> Mirror | tuple[float, s
     return Mirror(plane, vertices, is_half, there[is_half], here[partner[is_half]], middle)
 
 
-def _with_free(part: Part, ends: IntArray) -> Part:
-    """Return a part whose sides along the mirror plane need not keep their lengths."""
-    keeps = part.metric.keeps_length & ~np.isin(part.vertices, ends)
-    return replace(part, metric=replace(part.metric, keeps_length=keeps, keeps_area=not keeps.any()))
+def _with_free(component: Component, ends: IntArray) -> Component:
+    """Return a component whose sides along the mirror plane need not keep their lengths."""
+    keeps = component.metric.keeps_length & ~np.isin(component.vertices, ends)
+    return replace(
+        component, metric=replace(component.metric, keeps_length=keeps, keeps_area=not keeps.any())
+    )

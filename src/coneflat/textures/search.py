@@ -20,7 +20,7 @@ from ..atlas import ChartLayout, Seams, with_charts
 from ..base import BoolArray, FloatArray, IntArray, has_any, mask_of
 from ..cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, close_search, with_corners
 from ..errors import MetricError, SeamError
-from ..flattening import Method, lay_out_once
+from ..flattening import Steps, lay_out_component
 from ..geometry import (
     coarse_mesh,
     double_areas,
@@ -32,7 +32,7 @@ from ..geometry import (
 )
 from ..mesh import nearby
 from ..seams import seam_costs, without_loose_ends
-from ..source import Part
+from ..source import Component
 from ..stages import Layout, Surface, VertexCurvatures
 from .free_seams import as_one_chart, freed, recut, seam_edges, separate_charts, side_by_side
 from .options import ENERGY_PER_AREA, ISOMETRIC
@@ -51,7 +51,7 @@ MANY_TRIANGLES = 60_000
 # Number of times that tips are moved to meet the bound, half as often if it is met already, and that a layout is
 # settled to avoid contacts.
 MAX_TRIES = 4
-# Charts below this fraction of the part's area are joined to others, and the number of seams that are tried. With 0.05
+# Charts below this fraction of the component's area are joined to others; the number of seams that are tried. With 0.05
 # instead, 42 models have seams and charts that are 3% and 13% less, but cover 0.02 less of the texture.
 SMALL_AREA, MAX_JOINS = 0.005, 8
 # Cost of seams that lowers the energy to that of an isometry, relative to the square root of the area.
@@ -84,22 +84,29 @@ class Candidate:
 
 
 class CutSearch:
-    """The search for the cut of a part.
+    """The search for the cut of a component.
 
     Args:
-        part: a connected part of the input.
+        component: a connected part of the input.
         max_energy: largest symmetric Dirichlet energy; infinite for no seams but those that are necessary. It may be
             changed, and candidates for other bounds are used again.
-        method: how the part is laid out.
-        is_coarse: whether the part is a coarse mesh already.
+        steps: the functions that lay the component out.
+        is_coarse: whether the component is a coarse mesh already.
         by_area: whether the bound is the energy that belongs to an area distortion, see `ENERGY_PER_AREA`.
     """
 
     def __init__(
-        self, part: Part, max_energy: float, method: Method, is_coarse: bool = False, by_area: bool = False
+        self,
+        component: Component,
+        max_energy: float,
+        steps: Steps,
+        is_coarse: bool = False,
+        by_area: bool = False,
     ) -> None:
-        self.part, self.max_energy, self._method, self._by_area = part, max_energy, method, by_area
-        self._has_coarse = len(part.faces) > 2 * COARSE and not (is_coarse or part.seams.is_forbidden.any())
+        self.component, self.max_energy, self._steps, self._by_area = component, max_energy, steps, by_area
+        self._has_coarse = len(component.faces) > 2 * COARSE and not (
+            is_coarse or component.seams.is_forbidden.any()
+        )
         self._found = list[Candidate]()
 
     @property
@@ -109,25 +116,25 @@ class CutSearch:
 
     @cached_property
     def _surface(self) -> Surface:
-        surface = Surface.of(self.part.mesh, self.part.lengths, self.part.is_exact)
+        surface = Surface.of(self.component.mesh, self.component.lengths, self.component.is_exact)
         surface.is_reused = True
         return surface
 
     @property
     def may_join(self) -> bool:
-        """Whether the part may be cut together with others, see `MinorParts`."""
-        is_bounded, forbidden = np.isfinite(self.max_energy), self.part.seams.is_forbidden
-        return bool(is_bounded and len(self.part.faces) <= 2 * COARSE and not forbidden.any())
+        """Whether the component may be cut together with others, see `MinorComponents`."""
+        is_bounded, forbidden = np.isfinite(self.max_energy), self.component.seams.is_forbidden
+        return bool(is_bounded and len(self.component.faces) <= 2 * COARSE and not forbidden.any())
 
     @cached_property
     def seam_costs(self) -> FloatArray:
         """(e,) the costs of cutting the edges."""
-        return seam_costs(self.part.mesh, self.part.lengths, self.part.seams)
+        return seam_costs(self.component.mesh, self.component.lengths, self.component.seams)
 
     @property
     def costs(self) -> FloatArray:
         """(e,) the costs of cutting the edges, infinite for edges to avoid."""
-        seams = self.part.seams
+        seams = self.component.seams
         return np.where(seams.is_avoided | seams.is_forbidden, np.inf, self.seam_costs)
 
     def best(self) -> Candidate:
@@ -162,7 +169,7 @@ class CutSearch:
             start: a candidate.
             layout: its layout, if that was cut further.
         """
-        start, is_large = self.separated(start), len(self.part.faces) > MANY_TRIANGLES
+        start, is_large = self.separated(start), len(self.component.faces) > MANY_TRIANGLES
         if layout is not None:
             start = replace(start, layout=layout, cost=self.cost_of(layout))
         if (layout is not None and not is_large) or self.max_energy < start.energy <= self._near:
@@ -178,8 +185,8 @@ class CutSearch:
 
     def small_joined(self, one: Candidate) -> Candidate:
         """Return a candidate in several charts, the smallest joined to others where they fit once their points move."""
-        seams, sizes = _chart_seams(one.layout), np.bincount(one.layout.chart, self.part.double_areas)
-        stretch = seams.stretches(self.part.mesh)
+        seams, sizes = _chart_seams(one.layout), np.bincount(one.layout.chart, self.component.double_areas)
+        stretch = seams.stretches(self.component.mesh)
         is_small = sizes[seams.charts].min(axis=1) < SMALL_AREA * sizes.sum()
         is_small &= seams.charts[:, 0] != seams.charts[:, 1]
         costs = np.bincount(stretch, self.seam_costs[seams.edges] * is_small)
@@ -192,7 +199,7 @@ class CutSearch:
 
     def _joined(self, one: Candidate, seams: Seams, at: BoolArray) -> Candidate | None:
         """Return a candidate joined across seam edges that are flagged (k,), or None if its triangles do not fit."""
-        layout, sizes = one.layout, np.bincount(one.layout.chart, self.part.double_areas)
+        layout, sizes = one.layout, np.bincount(one.layout.chart, self.component.double_areas)
         charts = np.unique(seams.charts[at])
         # Charts joined by an earlier seam: the edges are within one, closed from both ends, or beside a large one.
         if len(charts) < 2 or sizes[charts].min() >= SMALL_AREA * sizes.sum():
@@ -237,8 +244,8 @@ class CutSearch:
 
     def _with_fewest_seams(self) -> Candidate:
         """Return a candidate cut between the fewest cones, and only along closed curves where there are handles."""
-        mesh, spec = self.part.mesh, replace(self.part.cones, distortion=ANY_DISTORTION)
-        layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
+        mesh, spec = self.component.mesh, replace(self.component.cones, distortion=ANY_DISTORTION)
+        layout = lay_out_component(self._surface, replace(self.component, cones=spec), self._steps)
         close_search(self._surface)
         if len(layout.cones) and mesh.euler_characteristic < 2 and not mesh.is_boundary_edge.any():
             is_cut = mask_of(len(mesh.edges), seam_edges(layout))
@@ -249,12 +256,12 @@ class CutSearch:
 
     def _from_coarse(self) -> Candidate:
         """Return a candidate with the cones that are best on a coarse mesh, unless the mesh itself needs others."""
-        (coarse, kept), allowed = coarse_part(self.part, COARSE), self.max_energy - ISOMETRIC
+        (coarse, kept), allowed = coarse_component(self.component, COARSE), self.max_energy - ISOMETRIC
         bound = self.max_energy + COARSE_EXCESS * allowed
-        best = CutSearch(coarse, bound, self._method, True, self._by_area).best()
+        best = CutSearch(coarse, bound, self._steps, True, self._by_area).best()
         given = VertexCurvatures(kept[best.layout.cones], np.full(len(best.layout.cones), np.nan))
-        spec = replace(self.part.cones, strategy="given", given=given)
-        layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
+        spec = replace(self.component.cones, strategy="prescribed", prescribed=given)
+        layout = lay_out_component(self._surface, replace(self.component, cones=spec), self._steps)
         one = self._candidate(layout, layout.statistics.area_distortion_linear)
         if 0 < one.energy - self.max_energy <= MAX_EXCESS * allowed:
             one = self.shortened(one)
@@ -272,9 +279,9 @@ class CutSearch:
             distortion = self._next_distortion(tried)
             if distortion is None:
                 break
-            spec = replace(self.part.cones, distortion=distortion)
+            spec = replace(self.component.cones, distortion=distortion)
             # Cones that their triangles cannot hold are no problem for free seams.
-            layout, _ = lay_out_once(self._surface, self.part, spec, self._method)
+            layout = lay_out_component(self._surface, replace(self.component, cones=spec), self._steps)
             same = [i for i, each in enumerate(found) if np.array_equal(each.layout.cones, layout.cones)]
             known = found.pop(same[0]) if same else self._candidate(layout, distortion)
             reached, is_within = layout.statistics.area_distortion_linear, known.energy <= self.max_energy
@@ -286,11 +293,11 @@ class CutSearch:
 
     def _at_corners(self) -> list[Candidate]:
         """Return a candidate that is open at all corners of a polyhedron with few of them, if it is one."""
-        part = self.part
-        spec = with_corners(part.mesh, part.lengths, part.cones, MAX_POLYHEDRON_CORNERS)
+        component = self.component
+        spec = with_corners(component.mesh, component.lengths, component.cones, MAX_POLYHEDRON_CORNERS)
         if spec is None:
             return []
-        layout, _ = lay_out_once(self._surface, part, spec, self._method)
+        layout = lay_out_component(self._surface, replace(component, cones=spec), self._steps)
         return [self._candidate(layout, 0.0)]
 
     def _next_distortion(self, tried: int) -> float | None:
@@ -321,7 +328,7 @@ class CutSearch:
         self, layout: Layout, free: BoolArray | None = None, tolerance: float = 2 * TOLERANCE
     ) -> tuple[Layout, float]:
         """Return a layout with the least energy, and its energy or the one that belongs to its area distortion."""
-        spec = self.part.seams if np.isfinite(self.max_energy) else None
+        spec = self.component.seams if np.isfinite(self.max_energy) else None
         layout, energy = freed(layout, free, tolerance, spec)
         if self._by_area:
             places = layout.points[layout.corners]
@@ -337,9 +344,9 @@ class CutSearch:
 
     def separated(self, one: Candidate) -> Candidate:
         """Return a candidate whose overlaps are separated."""
-        if one.is_separated or not self._method.separates:
+        if one.is_separated or not self._steps.separates:
             return one
-        layout = separate_charts(one.layout, self.seam_costs, self.part.seams)
+        layout = separate_charts(one.layout, self.seam_costs, self.component.seams)
         return replace(one, layout=layout, cost=self.cost_of(layout), is_separated=True)
 
     def settled(self, one: Candidate) -> Candidate:
@@ -348,7 +355,7 @@ class CutSearch:
         for _ in range(MAX_TRIES):
             layout, energy = self._freed(one.layout, is_free)
             pairs = find_overlaps(side_by_side(layout).points[layout.corners]).pairs
-            if not (len(pairs) and self._method.separates):
+            if not (len(pairs) and self._steps.separates):
                 return replace(one, layout=layout, energy=energy)
             # Points where charts would touch themselves stay.
             corners = one.layout.corners
@@ -362,7 +369,7 @@ class CutSearch:
 
     def _moved(self, start: Candidate) -> list[Candidate]:
         """Return candidates with the tips of the seams moved, so that the energy is about the largest allowed."""
-        mesh, seams, found = self.part.mesh, seam_edges(start.layout), list[Candidate]()
+        mesh, seams, found = self.component.mesh, seam_edges(start.layout), list[Candidate]()
         tips = find_tips(start.layout, seams, self.costs)
         if not (np.isfinite(self.max_energy) and (tips.rates > 0).any()):
             return found
@@ -394,17 +401,17 @@ def _chart_seams(layout: Layout) -> Seams:
     return Seams(layout.mesh, ChartLayout(layout.points, layout.corners, layout.chart))
 
 
-def coarse_part(part: Part, count: int) -> tuple[Part, IntArray]:
-    """Return a part with about `count` triangles, and (k,) the vertices of the given part that it keeps."""
-    coarse, kept, faces = coarse_mesh(part.mesh, count)
+def coarse_component(component: Component, count: int) -> tuple[Component, IntArray]:
+    """Return a component with about `count` triangles, and (k,) the vertices of the given component that it keeps."""
+    coarse, kept, faces = coarse_mesh(component.mesh, count)
     own, none = edge_lengths(coarse.vertices, coarse.faces), np.zeros(len(coarse.edges), dtype=bool)
 
     def of_kept(spec: Any, *names: str) -> Any:
         given = [name for name in names if getattr(spec, name) is not None]
         return replace(spec, **{name: getattr(spec, name)[kept] for name in given})
 
-    cones = of_kept(part.cones, "is_allowed", "absorbs_curvature", "names")
-    metric = of_kept(part.metric, "keeps_length", "names")
-    seams = replace(of_kept(part.seams, "visibility", "weights"), is_avoided=none, is_forbidden=none)
-    near = coarse, part.vertices[kept], faces, mollify(own, coarse)[0], double_areas(own)
-    return Part(*near, cones, metric, seams), kept
+    cones = of_kept(component.cones, "is_allowed", "absorbs_curvature", "names")
+    metric = of_kept(component.metric, "keeps_length", "names")
+    seams = replace(of_kept(component.seams, "visibility", "weights"), is_avoided=none, is_forbidden=none)
+    near = coarse, component.vertices[kept], faces, mollify(own, coarse)[0], double_areas(own)
+    return Component(*near, cones, metric, seams), kept

@@ -10,7 +10,7 @@ import numpy as np
 from ..base import FloatArray, IntArray, mask_of, plural
 from ..mesh import weld
 from ..result import Flattening
-from ..source import Part, Prepared, find_copies, result_numbering
+from ..source import Component, Prepared, find_copies, result_numbering
 
 # Largest relative difference of the sizes of copies that share texels: those of other sizes would have another density.
 # And of their positions: files have six digits or more.
@@ -33,16 +33,18 @@ class Stacked:
 
 
 def without_copies(prepared: Prepared) -> tuple[Stacked, Prepared]:
-    """Return the copies among the parts of an input, and the input without them."""
-    parts = prepared.parts
+    """Return the copies among the components of an input, and the input without them."""
+    components = prepared.components
     corners, partners, left_out = list[IntArray](), list[IntArray](), set[int]()
     places = weld(prepared.checked.mesh.vertices)[1]
     sides = dict[bytes, int]()
-    # The corners, in an order of its own, that have the UV points of each part: its own, or those of an earlier part.
+    # The corners, in an order of their own, that have the UV points of each component or those of an earlier one.
     shown, orders = list[IntArray](), list[IntArray]()
-    for i, (part, copy) in enumerate(zip(parts, find_copies(parts, rounding=SAME_PLACE), strict=True)):
-        key, order = _ordered_corners(places[part.vertices][part.mesh.faces])
-        side, matched = sides.setdefault(key, i), _corners_of(part)
+    for i, (component, copy) in enumerate(
+        zip(components, find_copies(components, rounding=SAME_PLACE), strict=True)
+    ):
+        key, order = _ordered_corners(places[component.vertices][component.mesh.faces])
+        side, matched = sides.setdefault(key, i), _corners_of(component)
         if side != i:
             matched = np.empty_like(matched)
             matched[order] = shown[side][orders[side]]
@@ -50,13 +52,13 @@ def without_copies(prepared: Prepared) -> tuple[Stacked, Prepared]:
             matched = shown[copy.first]
         shown.append(matched)
         orders.append(order)
-        if matched[0] != _corners_of(part)[0]:
+        if matched[0] != _corners_of(component)[0]:
             left_out.add(i)
-            corners.append(_corners_of(part))
+            corners.append(_corners_of(component))
             partners.append(matched)
-    remaining = tuple(part for i, part in enumerate(parts) if i not in left_out)
+    remaining = tuple(component for i, component in enumerate(components) if i not in left_out)
     stacked = Stacked(_joined(corners), _joined(partners), len(left_out))
-    return stacked, replace(prepared, parts=remaining)
+    return stacked, replace(prepared, components=remaining)
 
 
 def with_copies_stacked(alone: Flattening, stacked: Stacked, prepared: Prepared) -> Flattening:
@@ -67,9 +69,9 @@ def with_copies_stacked(alone: Flattening, stacked: Stacked, prepared: Prepared)
         stacked, prepared: as `without_copies` returns them.
     """
     checked = prepared.checked
-    number, _ = result_numbering(checked, len(np.asarray(prepared.given.vertices)))
+    number, _ = result_numbering(checked, len(np.asarray(prepared.input_mesh.vertices)))
     faces = number[checked.mesh.faces]
-    chosen = np.sort(np.concatenate([part.faces for part in prepared.parts]))
+    chosen = np.sort(np.concatenate([component.faces for component in prepared.components]))
     of_corners = np.full(faces.size, -1)
     of_corners[(3 * chosen[:, None] + np.arange(3)).ravel()] = alone.uv_faces.ravel()
     of_corners[stacked.corners] = of_corners[stacked.partners]
@@ -130,9 +132,9 @@ def _seams_of_all(seams: IntArray, faces: IntArray, stacked: Stacked) -> IntArra
     return np.unique(np.concatenate([seams, own[is_seam]]), axis=0)
 
 
-def _corners_of(part: Part) -> IntArray:
-    """Return (3m,) the corners of a part's faces, as indices into all corners of the mesh."""
-    return (3 * part.faces[:, None] + np.arange(3)).ravel()
+def _corners_of(component: Component) -> IntArray:
+    """Return (3m,) the corners of a component's faces, as indices into all corners of the mesh."""
+    return (3 * component.faces[:, None] + np.arange(3)).ravel()
 
 
 def _joined(arrays: Sequence[IntArray]) -> IntArray:

@@ -9,22 +9,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base import TYPED_TOLERANCE, FloatArray, Stopwatch, Unmet, limit_threads, plural, warns
+from ..base import TYPED_TOLERANCE, FloatArray, Stopwatch, Unmet, limit_threads, plural, timing, warns
 from ..errors import ConvergenceError
 from ..evaluate import evaluate, packed_scale
-from ..flattening import Method, lay_out_flat_parts, with_copies
+from ..flattening import Steps
 from ..geometry import dihedral_angles, double_areas
+from ..groups import lay_out_flat_components, with_copies
 from ..io import as_input
 from ..measures.distortion import Distortion
 from ..metric import find_metric
 from ..optimise import joined as joined_meshes
 from ..options import Options, declarations, read_options, takes
 from ..result import Flattening
-from ..source import Part, Source, find_copies
-from ..stages import ConeSolution, FlatMetric, MetricSpec, RelaxSpec, Surface
+from ..source import Component, Source, find_copies
+from ..stages import ConeSolution, FlatMetric, MetricSpec, Surface
 from .density import MAX_RESOLUTION, expected_resolution, least_resolution
 from .free_seams import measured, seam_edges
-from .minor import MinorParts
+from .minor import MinorComponents
 from .mirror import both_halves, half_of
 from .options import ENERGY_PER_AREA, ISOMETRIC, TextureOptions, UnwrapOptions
 from .pack_cuts import cut_for_packing, cut_into
@@ -39,7 +40,7 @@ MINOR_SHARE = 0.03
 SHARP, CREASES = np.radians(40), 0.3
 # Options that the flattening does not have, or with other values.
 OWN = (*declarations(TextureOptions), "charts", "seams")
-# Triangles of a part from which several threads are faster than one.
+# Triangles of a component from which several threads are faster than one.
 PARALLEL = 20_000
 # Newton steps of the exact metric: most meshes take 10, bad ones 100 and more.
 MAX_NEWTON_STEPS = 25
@@ -80,7 +81,12 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         >>> result.distortion.energy < 4.1, result.distortion.flipped, result.distortion.overlapping_pairs
         (True, 0, 0)
     """
-    o = read_options(options, UnwrapOptions)
+    parsed = read_options(options, UnwrapOptions)
+    with timing(parsed.progress) as watch:
+        return _unwrapped(Source(as_input(mesh, faces)), parsed, watch)
+
+
+def _unwrapped(source: Source, o: UnwrapOptions, watch: Stopwatch) -> Flattening:
     common = {name: getattr(o, name) for name in declarations(UnwrapOptions) if name not in OWN}
     if o.texel_density is not None:  # the padding is limited by the largest resolution
         common["resolution"] = MAX_RESOLUTION
@@ -89,16 +95,16 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         seams=o.marked,
         charts="one" if o.charts == "one" else "atlas",
     )
-    watch, source = Stopwatch(o.progress), Source(as_input(mesh, faces))
     with watch("check"):
         prepared, mirror = source.prepared(shared), None
         if o.stack == "mirrored":
             mirror, prepared = half_of(prepared, source, shared)
         stacked, prepared = without_copies(prepared) if o.stack == "copies" else (None, prepared)
-    relax, separates = RelaxSpec("off", 0.0), shared.charts == "atlas"
-    method = Method(relax, separates, None, Stopwatch(), Surface.of, quick_metric, untangles=False)
-    parts, found = along_sharp_edges(prepared.parts), dict[int, Candidate]()
-    areas, sizes = np.array([(double_areas(part.lengths).sum(), len(part.faces)) for part in parts]).T
+    steps = Steps(find_metric=quick_metric, separates=shared.charts == "atlas", untangles=False)
+    components, found = along_sharp_edges(prepared.components), dict[int, Candidate]()
+    areas, sizes = np.array(
+        [(double_areas(component.lengths).sum(), len(component.faces)) for component in components]
+    ).T
     is_minor = areas < MINOR_SHARE * areas.sum()
     if o.texel_density is not None:
         with np.errstate(over="ignore"):  # a model that is too large for any texture
@@ -107,18 +113,21 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
             shared, resolution=expected_resolution(o.texel_density, model_areas, o.padding, o.tiles)
         )
     with limit_threads(o.threads if sizes.max() > PARALLEL else 1):
-        flat = lay_out_flat_parts(parts, watch)
+        with watch("layout"):
+            flat = lay_out_flat_components(components)
         found.update((i, Candidate(layout, ISOMETRIC, 0.0, 0.0, True)) for i, layout in flat.items())
         # Copies cannot have different numbers of charts.
         with watch("check"):
-            copies = [None] * len(parts) if isinstance(o.charts, int) else find_copies(parts, flat)
+            copies = [None] * len(components) if isinstance(o.charts, int) else find_copies(components, flat)
         originals = [i for i, copy in enumerate(copies) if copy is None]
-        searches = {i: CutSearch(parts[i], o.bound, method, by_area=o.area is not None) for i in originals}
+        searches = {
+            i: CutSearch(components[i], o.bound, steps, by_area=o.area is not None) for i in originals
+        }
         minor = [i for i, search in searches.items() if is_minor[i] and i not in flat and search.may_join]
         for group in _groups(minor, sizes):
             watch.share = float(0.8 * sizes[group].sum() / sizes.sum())
             with watch("search", 1.0):
-                together = MinorParts([searches[i] for i in group]).candidates()
+                together = MinorComponents([searches[i] for i in group]).candidates()
                 found.update((i, one) for i, one in zip(group, together, strict=True) if one is not None)
             watch.end_component()
         joined = set(found)
@@ -138,10 +147,10 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
 
             if isinstance(o.charts, int):
                 layouts = cut_into(layouts, costs, o.charts)
-            elif method.separates and o.up is None and np.isfinite(o.bound):
+            elif steps.separates and o.up is None and np.isfinite(o.bound):
                 layouts = cut_for_packing(layouts, costs, o.padding / shared.resolution)
             for (i, search), layout in zip(searches.items(), layouts, strict=True):
-                # Joined parts would each need a relaxation of their own.
+                # Joined components would each need a relaxation of their own.
                 one = replace(found[i], layout=layout) if i in joined else search.shortened(found[i], layout)
                 found[i] = search.small_joined(one) if o.charts == "atlas" and one.layout.chart.any() else one
         with watch("measure"):
@@ -149,10 +158,10 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
                 i: one.layout if one.layout is flat.get(i) else measured(one.layout)
                 for i, one in found.items()
             }
-            layouts = with_copies(known, parts, copies)
+            layouts = with_copies(known, components, copies)
             cut = [
-                part.seams.is_forbidden[seam_edges(one)].sum()
-                for part, one in zip(parts, layouts, strict=True)
+                component.seams.is_forbidden[seam_edges(one)].sum()
+                for component, one in zip(components, layouts, strict=True)
                 if len(one.seams)
             ]
     shared = replace(shared, method=FREE)
@@ -161,7 +170,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
             scale_at = packed_scale(prepared, layouts, shared)
             resolution = least_resolution(o.texel_density, o.padding, shared.resolution, scale_at)
         shared = replace(shared, resolution=resolution)
-    result = evaluate(prepared, layouts, shared, watch)
+    result = evaluate(prepared, layouts, shared)
     notes = (
         *result.notes,
         *map(Unmet, _notes(o, [one.energy for one in found.values()], int(sum(cut)), result.distortion)),
@@ -184,29 +193,35 @@ def quick_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> 
 
 
 def _groups(chosen: Sequence[int], sizes: FloatArray) -> Iterator[list[int]]:
-    """Yield groups of at least two parts with not many triangles."""
-    parts = np.array(chosen, dtype=np.int64)
-    total = np.cumsum(sizes[parts]) // MANY_TRIANGLES
-    for group in np.split(parts, np.flatnonzero(np.diff(total)) + 1):
+    """Yield groups of at least two components with not many triangles."""
+    components = np.array(chosen, dtype=np.int64)
+    total = np.cumsum(sizes[components]) // MANY_TRIANGLES
+    for group in np.split(components, np.flatnonzero(np.diff(total)) + 1):
         if len(group) > 1:
             yield group.tolist()
 
 
-def along_sharp_edges(parts: Sequence[Part]) -> list[Part]:
-    """Return parts with a preference for seams along sharp edges, as far as these are what bends their surfaces."""
-    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    mesh, count = joined_meshes([part.mesh for part in parts], starts), len(parts)
-    angles, lengths = np.abs(dihedral_angles(mesh)), np.concatenate([part.lengths.ravel() for part in parts])
+def along_sharp_edges(components: Sequence[Component]) -> list[Component]:
+    """Return components that prefer seams along sharp edges, as far as these are what bends their surfaces."""
+    starts = np.cumsum([0, *(len(component.vertices) for component in components)])
+    mesh, count = joined_meshes([component.mesh for component in components], starts), len(components)
+    angles, lengths = (
+        np.abs(dihedral_angles(mesh)),
+        np.concatenate([component.lengths.ravel() for component in components]),
+    )
     bending = angles * lengths[mesh.edge_halfedges[:, 0]]
     of = np.arange(count).repeat(np.diff(starts))[mesh.edges[:, 0]]
     sharp = np.bincount(of, np.where(angles > SHARP, bending, 0.0), count)
     shares = sharp / np.maximum(np.bincount(of, bending, count), 1e-300)
     creases = [
-        max(CREASES * share, part.seams.creases) for share, part in zip(shares.tolist(), parts, strict=True)
+        max(CREASES * share, component.seams.creases)
+        for share, component in zip(shares.tolist(), components, strict=True)
     ]
     return [
-        part if strength == part.seams.creases else replace(part, seams=replace(part.seams, creases=strength))
-        for strength, part in zip(creases, parts, strict=True)
+        component
+        if strength == component.seams.creases
+        else replace(component, seams=replace(component.seams, creases=strength))
+        for strength, component in zip(creases, components, strict=True)
     ]
 
 

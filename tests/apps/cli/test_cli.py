@@ -83,7 +83,7 @@ def test_paper_is_the_published_method(model, tmp_path):
         (["model.obj", "-o", "z.obj", "--report", "model.obj"], "is both the input and the report"),
         (["model.obj", "-o", "z.obj", "--report", "./z.obj"], "is both the output and the report"),
         (["model.obj", "--distortion", "few"], "not a valid float"),
-        (["model.obj", "--max-cones", "0"], "0 cones of at most 1.5 pi each cannot carry"),
+        (["model.obj", "--max-cones", "0"], "0 cones of at most 1.5 pi each cannot absorb"),
         (["model.obj", "--cones", "magic"], "magic"),
         (["model.obj", "--boundary", "1:pi,2"], "vertex 2 has none"),
         (["model.obj", "--cones", "1:pi", "--cones", "2:pi"], "sum to 6.283185 (2 pi)"),

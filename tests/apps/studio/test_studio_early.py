@@ -153,7 +153,7 @@ class TestKnownArrays:
 def test_a_change_cancels_the_separation_of_overlaps(tmp_path, monkeypatch):
     """The preview comes before the separation, which may take long, and the next change does not wait for it."""
     path = shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(5))
-    module, begun = sys.modules["coneflat.flatten"], threading.Event()
+    module, begun = sys.modules["coneflat.flattening"], threading.Event()
     separate = module.separate_overlaps
 
     def endless(*arguments):

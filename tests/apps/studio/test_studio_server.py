@@ -245,7 +245,7 @@ def test_a_refused_export_replaces_no_reason(page, session, ball):
         page.post("/act", json={"do": "remove", "vertex": vertex})
     assert session.wait_until_idle(120)
     reason = page.get("/state").json()["trouble"]["text"]
-    assert "needs cones to carry it" in reason
+    assert "needs cones to absorb it" in reason
     answer = page.post("/export/obj")
     assert answer.status_code == 400
     assert "there is nothing to save" in answer.text

@@ -41,7 +41,7 @@ class QuadFlags:
 @verbosity_options
 @click.pass_context
 def quads(
-    context: click.Context, /, mesh: Path, weld: bool | None, verbosity: str | None, **given: Any
+    context: click.Context, /, mesh: Path, weld: bool | None, verbosity: str | None, **flags_given: Any
 ) -> None:
     """Convert MESH to a mesh of quads only, with few irregular vertices.
 
@@ -64,7 +64,7 @@ def quads(
     from .run import Console, require_distinct, write_report
 
     _check_combinations(context, mesh)
-    flags, options = pop_flags(given, QuadFlags), keywords(given, QuadOptions)
+    flags, options = pop_flags(flags_given, QuadFlags), keywords(flags_given, QuadOptions)
     read_options(options, QuadOptions)
     if "quads" in options and isinstance(options.get("size"), float):
         raise click.UsageError("--quads (--faces) and a length as --size exclude each other: leave out one")
@@ -84,30 +84,30 @@ def quads(
             joined = None if mesh.suffix.lower() == ".npz" else read_joined(mesh, weld)
             source: Any = read_grid(mesh) if joined is None else joined.mesh
         options = {**({} if joined is None else joined.map_options(options)), "progress": console.part()}
-        found = measures = None
+        quad_mesh = measures = None
         if output is None and view is None:
             done = grid_map = source if joined is None else integer_grid(source, **options)
         else:
-            done = found = find_quads(source, **options, **rounds)
-            grid_map = found.grid
+            done = quad_mesh = find_quads(source, **options, **rounds)
+            grid_map = quad_mesh.grid
             with console.stage("measure"):
-                measures = measure_quads(found)
+                measures = measure_quads(quad_mesh)
         console.seconds.update(done.seconds)
         with console.stage("write"):
             if grid is not None:
                 grid_map.save(grid)
-            if found is not None and output is not None:
-                found.save(output)
-            if found is not None and view is not None:
-                write_page(page_of_quads(found, name=mesh.name), view)
+            if quad_mesh is not None and output is not None:
+                quad_mesh.save(output)
+            if quad_mesh is not None and view is not None:
+                write_page(page_of_quads(quad_mesh, name=mesh.name), view)
         notes = list(done.notes if joined is None else joined.all_notes(done.notes))
         endings = [path.suffix.lower() for path in (output, grid) if path is not None]
         for ending in dict.fromkeys(endings):
             notes += quads_left_out(None if joined is None else joined.mesh, ending)
         if flags.report is not None:
             measured = {} if measures is None else measures.report()
-            rest = {"grid": {"size": grid_map.size}, "seconds": dict(console.seconds), "notes": notes}
-            write_report(flags.report, {**measured, **rest})
+            run_report = {"grid": {"size": grid_map.size}, "seconds": dict(console.seconds), "notes": notes}
+            write_report(flags.report, {**measured, **run_report})
         console.say(f"note: {note}" for note in notes)
         console.finish([path for path in files.values() if path is not None])
         square = "square", f"{grid_map.size:.4g}", "side of a grid square in model units"
@@ -117,12 +117,12 @@ def quads(
 def _check_combinations(context: click.Context, mesh: Path) -> None:
     """Raise an error if an option would have no effect."""
     searched = [*declarations(ConeBounds), *declarations(ConeNumber), "max_cones"]
-    given = context.params["cones"] not in ((), ("auto",), ("sparse",))
+    are_cones_given = context.params["cones"] not in ((), ("auto",), ("sparse",))
     refuse(
         context,
         [
             (is_given(context, "cone_count"), ["distortion", "max_cones"], "--cone-count is given"),
-            (given, searched, "there is no search if the cones are given"),
+            (are_cones_given, searched, "there is no search if the cones are given"),
         ],
     )
     if mesh.suffix.lower() != ".npz":

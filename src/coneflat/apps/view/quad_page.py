@@ -52,12 +52,12 @@ def find_domains(mesh: QuadMesh) -> Domains:
     seeds = np.flatnonzero(odd)
     while True:
         _trace(seeds, starts, twin, is_cut, reached)
-        found, is_bad = _unfold(twin, is_cut, len(mesh.quads))
+        domains, is_bad = _unfold(twin, is_cut, len(mesh.quads))
         if not is_bad.any():
-            return found
+            return domains
         # Each domain that is not a rectangle gets one more start vertex: the first with an uncut side.
-        first = np.flatnonzero(is_bad[np.repeat(found.domain, 4)] & ~is_cut)
-        _, one_of = np.unique(np.repeat(found.domain, 4)[first], return_index=True)
+        first = np.flatnonzero(is_bad[np.repeat(domains.domain, 4)] & ~is_cut)
+        _, one_of = np.unique(np.repeat(domains.domain, 4)[first], return_index=True)
         seeds = np.unique(starts[first[one_of]])
 
 
@@ -97,12 +97,12 @@ def _unfold(twin: IntArray, is_cut: BoolArray, count: int) -> tuple[Domains, Boo
         sides = sides[turn[twin[sides] // 4] < 0]
         _, first = np.unique(twin[sides] // 4, return_index=True)
         sides = sides[first]
-        here, there = sides // 4, twin[sides] // 4
+        face, neighbour = sides // 4, twin[sides] // 4
         # The side has the opposite direction in the neighbouring quad.
-        turn[there] = (turn[here] + sides % 4 + 2 - twin[sides] % 4) % 4
-        end = origin[here] + rotated(turn[here], SQUARE[(sides + 1) % 4])
-        origin[there] = end - rotated(turn[there], SQUARE[twin[sides] % 4])
-        front = there
+        turn[neighbour] = (turn[face] + sides % 4 + 2 - twin[sides] % 4) % 4
+        end = origin[face] + rotated(turn[face], SQUARE[(sides + 1) % 4])
+        origin[neighbour] = end - rotated(turn[neighbour], SQUARE[twin[sides] % 4])
+        front = neighbour
     places = origin[:, None] + np.einsum("qxy,cy->qcx", TURNS[turn], SQUARE)
     low, high = np.full((number, 2), np.iinfo(np.int64).max), np.full((number, 2), np.iinfo(np.int64).min)
     np.minimum.at(low, domain, places.min(axis=1))

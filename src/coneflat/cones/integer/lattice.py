@@ -45,10 +45,10 @@ class Lattice:
 
     @property
     def fewest(self) -> int:
-        """The smallest number of cones that can carry the total curvature."""
+        """The smallest number of cones that can absorb the total curvature."""
         if not self.total:
             return 0
-        return -(-self.total // (self.quanta.most if self.total > 0 else self.quanta.least))
+        return -(-self.total // (self.quanta.upper if self.total > 0 else self.quanta.lower))
 
     def curvatures(self, cones: IndexedCones) -> FloatArray:
         """Return (s,) the curvatures of cones, radians."""
@@ -80,8 +80,8 @@ class Lattice:
 
     def grown_by_pair(self, cones: IndexedCones) -> IndexedCones | None:
         """Return cones with two cones more, of one quantum each and opposite sign, or None."""
-        model, (quantum, least, most, _) = self.model, self.quanta
-        if least > -1 or most < 1:
+        model, (quantum, lower, upper, _) = self.model, self.quanta
+        if lower > -1 or upper < 1:
             return None
         pair = best_pair(model.gram, model.slope, cones.members, cones.indices, quantum, model.usable)
         if pair is None:
@@ -103,14 +103,14 @@ class Lattice:
 
     def shrunk(self, cones: IndexedCones) -> IndexedCones | None:
         """Return the best set with one cone less, after moves, or None."""
-        found = None
+        best = None
         for place in range(len(self.model.fixed), len(cones)):
-            rest = self.merged(cones, place)
-            if rest is not None:
-                rest = self.descended(rest.members, rest.indices)
-                if found is None or rest.energy < found.energy:
-                    found = rest
-        return found
+            remaining = self.merged(cones, place)
+            if remaining is not None:
+                remaining = self.descended(remaining.members, remaining.indices)
+                if best is None or remaining.energy < best.energy:
+                    best = remaining
+        return best
 
     def exchanged(self, cones: IndexedCones) -> IndexedCones:
         """Return cones improved by removing one cone and adding another, until there is no gain or the limit."""
@@ -119,10 +119,10 @@ class Lattice:
         for _ in range(MAX_EXCHANGES // max(len(cones), 1)):
             if unchanged >= len(cones) - fixed:
                 break
-            rest = self.merged(cones, place)
-            again = None if rest is None or not len(rest) else self.grown(rest)
-            if again is not None and again.energy < cones.energy * (1 - MIN_RELATIVE_GAIN):
-                cones, unchanged = again, 0
+            remaining = self.merged(cones, place)
+            exchanged = None if remaining is None or not len(remaining) else self.grown(remaining)
+            if exchanged is not None and exchanged.energy < cones.energy * (1 - MIN_RELATIVE_GAIN):
+                cones, unchanged = exchanged, 0
             else:
                 unchanged += 1
             place = place + 1 if place + 1 < len(cones) else fixed
@@ -132,24 +132,26 @@ class Lattice:
         """Return cones with indices from rounding the best curvatures of members (s,); None if the sum is wrong.
 
         The curvature nearest to a multiple is rounded first, and the others are refitted: this is Babai's nearest plane
-        algorithm in a special order. Members that are rounded to 0 are left out unless they are required.
+        algorithm in a special order. Members that are rounded to 0 are removed unless they are required.
         """
-        model, (quantum, least, most, _) = self.model, self.quanta
+        model, (quantum, lower, upper, _) = self.model, self.quanta
         indices, is_open = np.zeros(len(members), dtype=np.int64), np.ones(len(members), dtype=bool)
         gram, slope = model.gram[np.ix_(members, members)], model.slope[members]
         best = np.full(len(members), np.nan)
         while is_open.any():
             places, done = np.flatnonzero(is_open), np.flatnonzero(~is_open)
-            part = slope[places] + gram[np.ix_(places, done)] @ (quantum * indices[done])
-            left = np.nan if self.total is None else quantum * (self.total - indices[done].sum())
-            low, high = (np.full(len(part), float(bound * quantum)) for bound in (least, most))
-            own = gram[np.ix_(places, places)]
-            best[places], _, feasible = fit_curvatures(own, part, low, high, float(left), best[places])
+            open_slope = slope[places] + gram[np.ix_(places, done)] @ (quantum * indices[done])
+            open_total = np.nan if self.total is None else quantum * (self.total - indices[done].sum())
+            low, high = (np.full(len(open_slope), float(bound * quantum)) for bound in (lower, upper))
+            open_gram = gram[np.ix_(places, places)]
+            best[places], _, feasible = fit_curvatures(
+                open_gram, open_slope, low, high, float(open_total), best[places]
+            )
             if not feasible:
                 return None
             nearest = np.round(best[places] / quantum)
             closest = int(np.argmin(np.abs(best[places] / quantum - nearest)))
-            place, value = places[closest], int(np.clip(nearest[closest], least, most))
+            place, value = places[closest], int(np.clip(nearest[closest], lower, upper))
             is_open[place] = False
             indices[place] = value if value or place >= len(model.fixed) else 1
         if self.total is not None and indices.sum() != self.total:
@@ -159,15 +161,15 @@ class Lattice:
 
     def initial_cones(self, count: int) -> IndexedCones | None:
         """Return initial cones, at most `count`, that satisfy sum and bounds; None if there are none."""
-        model, (_, least, most, _) = self.model, self.quanta
+        model, (_, lower, upper, _) = self.model, self.quanta
         steepest = np.flatnonzero(model.usable)[np.argsort(model.slope[model.usable], kind="stable")]
         members = np.concatenate([model.fixed, steepest])[:count]
         if self.total is None or not len(members):
             signs = np.where(model.slope[members] < 0, 1, -1)
-            indices = np.clip(signs, least, most)
+            indices = np.clip(signs, lower, upper)
             return self.descended(members[indices != 0], indices[indices != 0])
         share = np.full(len(members), self.total // len(members))
         share[: self.total - share.sum()] += 1
-        if (share == 0).any() or share.max() > most or share.min() < least:
+        if (share == 0).any() or share.max() > upper or share.min() < lower:
             return None
         return self.descended(members, share)

@@ -29,8 +29,8 @@ class Quanta(NamedTuple):
     """
 
     quantum: float
-    least: int
-    most: int
+    lower: int
+    upper: int
     has_sum: bool
 
 
@@ -70,7 +70,7 @@ def transfer(gram: FloatArray, gradient: FloatArray, s: int, t: int, k: float) -
 @compiled
 def is_within(index: int, quanta: Quanta) -> bool:
     """Return whether a cone may have an index."""
-    return index != 0 and quanta.least <= index <= quanta.most
+    return index != 0 and quanta.lower <= index <= quanta.upper
 
 
 @compiled
@@ -110,7 +110,7 @@ def descend(
     free = without_members(usable, members)
     for _ in range(100 + 20 * size):  # converges after a few moves per cone
         gradient = slopes(gram, slope, members, quantum, indices)
-        best, kind, one, other, amount = -TIE_TOLERANCE * abs(energy), 0, -1, -1, 0
+        best, kind, cone, target, amount = -TIE_TOLERANCE * abs(energy), 0, -1, -1, 0
         for i in range(size):
             s = members[i]
             if not quanta.has_sum:
@@ -118,7 +118,7 @@ def descend(
                     k = quantum * d
                     change = (2 * gradient[s] + k * gram[s, s]) * k
                     if change < best - TIE_TOLERANCE * abs(best) and is_within(indices[i] + d, quanta):
-                        best, kind, one, amount = change, 1, i, d
+                        best, kind, cone, amount = change, 1, i, d
             for j in range(size):
                 for d in range(1, MAX_QUANTA + 1 if i != j else 0):
                     change = transfer(gram, gradient, s, members[j], quantum * d)
@@ -127,23 +127,23 @@ def descend(
                         and is_within(indices[i] - d, quanta)
                         and is_within(indices[j] + d, quanta)
                     ):
-                        best, kind, one, other, amount = change, 2, i, j, d
+                        best, kind, cone, target, amount = change, 2, i, j, d
             for t in range(count if i >= fixed else 0):
                 if free[t]:
                     change = transfer(gram, gradient, s, t, quantum * indices[i])
                     if change < best - TIE_TOLERANCE * abs(best):
-                        best, kind, one, other = change, 3, i, t
+                        best, kind, cone, target = change, 3, i, t
         if kind == 0:
             break
         if kind == 1:
-            indices[one] += amount
+            indices[cone] += amount
         elif kind == 2:
-            indices[one] -= amount
-            indices[other] += amount
+            indices[cone] -= amount
+            indices[target] += amount
         else:
-            free[members[one]] = usable[members[one]]
-            members[one] = other
-            free[other] = False
+            free[members[cone]] = usable[members[cone]]
+            members[cone] = target
+            free[target] = False
         energy = energy_of(gram, slope, constant, members, indices, quantum)
     return energy
 

@@ -53,7 +53,7 @@ def align_handles(
     Args:
         search: the search that found the cones.
         quantised: the cones.
-        by_scale: (2 genus, n) derivative of the rotation along loops by the log scale.
+        by_scale: (2 genus, n) derivative of the rotation along loops by the log conformal factor.
         holonomy: function that returns (2 genus,) the rotations along loops in the metric with given cones, radians.
         bound: the allowed E.
     """
@@ -90,36 +90,41 @@ def moved_cones(
     curvatures = quantised.quantum * quantised.indices.astype(np.float64)
     before, penalty = (places, off), 1.0
     for _ in range(MAX_MOVES):
-        here = search.solution_of(places, curvatures).log_scale[operator.vertices]
-        slack = bound * bound - float(here @ operator.weighted(here))
+        log_scale = search.solution_of(places, curvatures).log_scale[operator.vertices]
+        slack = bound * bound - float(log_scale @ operator.weighted(log_scale))
         if slack < 0 and places is not before[0]:
             # The coarse model underestimated E: undo the move and increase its penalty.
             (places, off), penalty = before, 2 * penalty
             continue
-        score = operator.solve(operator.weighted(here))
+        score = operator.solve(operator.weighted(log_scale))
         cones, targets = _moves(search, places)
         if not len(cones):
             break
-        k, old = curvatures[cones], places[cones]
+        moved_curvatures, origins = curvatures[cones], places[cones]
         distances = np.concatenate(
             [search.exact.squared_distances(places[c], targets[cones == c]) for c in np.unique(cones)]
         )
-        costlier = 2 * k * (score[targets] - score[old]) + penalty * k**2 * distances
-        # Moves that no other makes cheap enough are left out. The last entry represents no move.
+        costlier = (
+            2 * moved_curvatures * (score[targets] - score[origins])
+            + penalty * moved_curvatures**2 * distances
+        )
+        # Moves that are too costly even together with another one are removed. The last entry represents no move.
         may = np.flatnonzero(costlier + min(costlier.min(), 0.0) <= max(slack, 0.0))
-        turns = np.vstack([(k[:, None] * (by_curvature[targets] - by_curvature[old]))[may], 0 * off])
+        turns = np.vstack(
+            [(moved_curvatures[:, None] * (by_curvature[targets] - by_curvature[origins]))[may], 0 * off]
+        )
         cones, targets, costlier = np.append(cones[may], -1), targets[may], np.append(costlier[may], 0.0)
-        missing = ((off + turns) ** 2).sum(axis=1)
-        pairs = missing[:, None] + missing - (off**2).sum() + 2 * turns @ turns.T
+        squared_errors = ((off + turns) ** 2).sum(axis=1)
+        pairs = squared_errors[:, None] + squared_errors - (off**2).sum() + 2 * turns @ turns.T
         pairs[(costlier[:, None] + costlier > max(slack, 0.0)) | (cones[:, None] == cones)] = np.inf
-        one, two = np.unravel_index(np.argmin(pairs), pairs.shape)
-        if not pairs[one, two] < 0.9 * (off**2).sum():
+        first, second = np.unravel_index(np.argmin(pairs), pairs.shape)
+        if not pairs[first, second] < 0.9 * (off**2).sum():
             break
         before, places = (places, off), places.copy()
-        for move in (one, two):
+        for move in (first, second):
             if cones[move] >= 0:
                 places[cones[move]] = targets[move]
-        off = off + turns[one] + turns[two]
+        off = off + turns[first] + turns[second]
     solution = search.solution_of(places, curvatures)
     inner = solution.log_scale[operator.vertices]
     energy = float(np.sqrt(inner @ operator.weighted(inner)))
@@ -130,8 +135,10 @@ def _moves(search: ConeSearch, places: IntArray) -> tuple[IntArray, IntArray]:
     """Return the cone and the target of all moves to usable vertices nearby; required cones are not moved."""
     cones, targets = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     for i in range(len(search.coarse.fixed), len(places)):
-        near = search.exact.near(int(places[i]), min(MAX_NEIGHBOURS, 1 + MAX_COMPARED // len(places)))
-        targets.append(near[~np.isin(near, places)])
+        neighbours = search.exact.neighbours(
+            int(places[i]), min(MAX_NEIGHBOURS, 1 + MAX_COMPARED // len(places))
+        )
+        targets.append(neighbours[~np.isin(neighbours, places)])
         cones.append(np.full(len(targets[-1]), i))
     return np.concatenate(cones), np.concatenate(targets)
 
@@ -159,7 +166,7 @@ def quantise_cones(
     *,
     distortion: float = DISTORTION,
     count: int | None = None,
-    most: int | None = None,
+    max_count: int | None = None,
 ) -> QuantisedCones:
     """Return the fewest cones with curvatures that are multiples of a quantum and E <= distortion.
 
@@ -168,20 +175,21 @@ def quantise_cones(
         quantum: radians, positive and at most 2 pi.
         distortion: the allowed E, positive.
         count: minimise E with at most this number of cones instead; None to find the fewest.
-        most: largest number of cones; None for no limit.
+        max_count: largest number of cones; None for no limit.
 
     Raises:
         CurvatureError: no multiples within the bounds sum to 2 pi chi.
     """
     lattice = make_lattice(search, quantum)
     goal = 0.0 if count is not None else distortion * distortion
-    most = min(limit for limit in (count, most, search.most_cones) if limit is not None)
-    search_coarse(search, lattice, goal, most)
+    max_count = min(limit for limit in (count, max_count, search.most_cones) if limit is not None)
+    search_coarse(search, lattice, goal, max_count)
     exact = Lattice(search.exact, lattice.quanta, lattice.total)
-    sizes = [size for size in lattice.best.sizes if size <= most]
+    sizes = [size for size in lattice.best.sizes if size <= max_count]
     if not sizes:
         raise CurvatureError(
-            f"{most} cones cannot carry the total curvature in multiples of {lattice.quanta.quantum / np.pi:.4g} pi: "
+            f"{max_count} cones cannot absorb the total curvature in multiples of "
+            f"{lattice.quanta.quantum / np.pi:.4g} pi: "
             f"{min(lattice.best.sizes, default=lattice.fewest)} or more are needed"
         )
     first = next(
@@ -191,14 +199,14 @@ def quantise_cones(
         if refine(search, lattice, exact, size) <= goal:
             break
     for size in reversed(sizes[: sizes.index(first)]):
-        near = lattice.best.energy(size) <= goal * COARSE_MODEL_ERROR
-        if not near or not refine(search, lattice, exact, size) <= goal:
+        is_near = lattice.best.energy(size) <= goal * COARSE_MODEL_ERROR
+        if not is_near or not refine(search, lattice, exact, size) <= goal:
             break
-    found = exact.best.fewest(goal)
-    order = _order_to_round_in(search, found.members)
-    places = search.exact.unknowns[found.members[order]]
-    solution = search.solution_of(places, lattice.curvatures(found)[order])
-    return QuantisedCones(solution, found.indices[order], lattice.quanta.quantum, math.sqrt(found.energy))
+    best = exact.best.fewest(goal)
+    order = _order_to_round_in(search, best.members)
+    places = search.exact.unknowns[best.members[order]]
+    solution = search.solution_of(places, lattice.curvatures(best)[order])
+    return QuantisedCones(solution, best.indices[order], lattice.quanta.quantum, math.sqrt(best.energy))
 
 
 def make_lattice(search: ConeSearch, quantum: float) -> Lattice:
@@ -219,18 +227,18 @@ def make_lattice(search: ConeSearch, quantum: float) -> Lattice:
                 f"curvatures must sum to 2 pi chi = {limits.total / np.pi:.6g} pi, which is not a multiple of "
                 f"{quantum / np.pi:.6g} pi"
             )
-    least = math.ceil(max(limits.least, -UNBOUNDED) / quantum - TYPED_TOLERANCE)
-    most = math.floor(limits.most / quantum + TYPED_TOLERANCE)
+    lower = math.ceil(max(limits.lower, -UNBOUNDED) / quantum - TYPED_TOLERANCE)
+    upper = math.floor(limits.upper / quantum + TYPED_TOLERANCE)
     if (
-        least > most
-        or least == most == 0
-        or (total is not None and (total > 0 >= most or total < 0 <= least))
+        lower > upper
+        or lower == upper == 0
+        or (total is not None and (total > 0 >= upper or total < 0 <= lower))
     ):
         raise CurvatureError(
             f"no multiple of {quantum / np.pi:.4g} pi lies within the bounds of cone curvatures, {limits.text()}, and "
             "contributes to their sum"
         )
-    return Lattice(search.coarse, Quanta(float(quantum), least, most, total is not None), total)
+    return Lattice(search.coarse, Quanta(float(quantum), lower, upper, total is not None), total)
 
 
 def _order_to_round_in(search: ConeSearch, members: IntArray) -> IntArray:
@@ -246,41 +254,41 @@ def _order_to_round_in(search: ConeSearch, members: IntArray) -> IntArray:
     return np.append(order[:required], order[required:][np.argsort(-steps, kind="stable")])
 
 
-def search_coarse(search: ConeSearch, lattice: Lattice, goal: float, most: int) -> None:
+def search_coarse(search: ConeSearch, lattice: Lattice, goal: float, max_count: int) -> None:
     """Find good sets of cones on the coarse model, of all sizes up to slightly more than needed."""
     model, best = search.coarse, lattice.best
     fewest = max(lattice.fewest, len(model.fixed))
-    most = min(most + 1, search.most_cones)
-    model.climb(goal / COARSE_MODEL_ERROR, most)
-    for found in model.best:
+    max_count = min(max_count + 1, search.most_cones)
+    model.climb(goal / COARSE_MODEL_ERROR, max_count)
+    for cones in model.best:
         # Of many sizes, fewer are rounded: growing finds the others.
-        if len(found) % max(1, len(found) // 32) == 0:
-            _offer(lattice, lattice.rounded(found.members))
+        if len(cones) % max(1, len(cones) // 32) == 0:
+            _offer(lattice, lattice.rounded(cones.members))
     if not best.sizes:
         start = lattice.initial_cones(fewest)
         if start is None:
             return
         best.offer(lattice.exchanged(start))
-    size, beyond, stalled, least = min(best.sizes), 0, 0, math.inf
-    while size < most and beyond < SIZES_PAST_GOAL and stalled < SIZES_PAST_STALL:
-        _offer(lattice, lattice.grown(best[size]), most)
-        size = min((other for other in best.sizes if other > size), default=most)
+    size, beyond, stalled, smallest = min(best.sizes), 0, 0, math.inf
+    while size < max_count and beyond < SIZES_PAST_GOAL and stalled < SIZES_PAST_STALL:
+        _offer(lattice, lattice.grown(best[size]), max_count)
+        size = min((larger for larger in best.sizes if larger > size), default=max_count)
         beyond += best.energy(size) <= goal
-        stalled = 0 if best.energy(size) < least * (1 - MIN_PROMISED_GAIN) else stalled + 1
-        least = min(least, best.energy(size))
+        stalled = 0 if best.energy(size) < smallest * (1 - MIN_PROMISED_GAIN) else stalled + 1
+        smallest = min(smallest, best.energy(size))
     # The fewest cones do not matter where none meet the goal.
     ratio = MAX_ENERGY_RATIO if best.fewest(goal).energy <= goal * COARSE_MODEL_ERROR else 0.0
     for size in reversed(best.sizes):
-        if best.energy(size) > goal * ratio and size < most:
+        if best.energy(size) > goal * ratio and size < max_count:
             break
-        _offer(lattice, lattice.shrunk(best[size]), most)
+        _offer(lattice, lattice.shrunk(best[size]), max_count)
 
 
-def _offer(lattice: Lattice, cones: IndexedCones | None, most: float = math.inf) -> None:
+def _offer(lattice: Lattice, cones: IndexedCones | None, max_count: float = math.inf) -> None:
     """Improve cones by exchanges and store them, unless they are too far from the best set of their size."""
     if (
         cones is not None
-        and len(cones) <= most
+        and len(cones) <= max_count
         and cones.energy < COARSE_MODEL_ERROR * lattice.best.energy(len(cones))
     ):
         lattice.best.offer(lattice.exchanged(cones))
@@ -292,9 +300,9 @@ def refine(search: ConeSearch, lattice: Lattice, exact: Lattice, size: int) -> f
     members = model.insert(search.places[start.members])
     cones = exact.exchanged(exact.descended(members, start.indices))
     for _ in range(MAX_ROUNDS):
-        known = len(model.unknowns)
+        known_count = len(model.unknowns)
         model.insert(model.targets(cones.members, exact.curvatures(cones), cones.energy))
-        if len(model.unknowns) == known:
+        if len(model.unknowns) == known_count:
             break
         moved = exact.exchanged(exact.descended(cones.members, cones.indices))
         stalled = not moved.energy < cones.energy * (1 - MIN_PROMISED_GAIN)

@@ -54,9 +54,9 @@ def coarse_basis(
         level = _without_rounding(level, level.diagonal())
         ratio = level.shape[0] / size
         steps = max(1, round(np.log(ratio) / np.log(MAX_AGGREGATE)))
-        most = size if steps == 1 else None
+        max_count = size if steps == 1 else None
         for min_coupling in (MIN_COUPLING, 0.0):  # 0 if all couplings are weak, as on slivers
-            part = _smoothed_aggregates(level, order, ratio ** (1 / steps), most, min_coupling)
+            part = _smoothed_aggregates(level, order, ratio ** (1 / steps), max_count, min_coupling)
             if part.shape[1] <= MAX_LEVEL_SHARE * level.shape[0]:
                 break
         else:
@@ -77,9 +77,9 @@ def _indicators(labels: IntArray, number: int) -> csr_matrix:
 
 
 def _smoothed_aggregates(
-    level: csr_matrix, order: IntArray, size: float, most: int | None, min_coupling: float
+    level: csr_matrix, order: IntArray, size: float, max_count: int | None, min_coupling: float
 ) -> csr_matrix:
-    """Return basis functions of about `size` vertices each, and about `most` functions if that is possible.
+    """Return basis functions of about `size` vertices each, and about `max_count` functions if that is possible.
 
     Couplings below the fraction `min_coupling` do not join vertices.
     """
@@ -88,9 +88,9 @@ def _smoothed_aggregates(
     rows = level.indptr.astype(np.int64), level.indices.astype(np.int64), level.data, diagonal, order
     labels, number = aggregate(*rows, size, min_coupling)
     before = count + 1
-    while most is not None and most * MAX_SIZE_RATIO < number < before:
+    while max_count is not None and max_count * MAX_SIZE_RATIO < number < before:
         # Leftover vertices make aggregates smaller than requested; another level instead would make the matrix dense.
-        size *= number / most
+        size *= number / max_count
         before = number
         labels, number = aggregate(*rows, size, min_coupling)
     pieces = _indicators(labels, number)
@@ -106,10 +106,10 @@ def _without_rounding(matrix: csr_matrix, sizes: FloatArray) -> csr_matrix:
     Edges opposite right angles have weights of about 0. Whether SciPy drops such an entry depends on rounding, and the
     order of the aggregates must not depend on it.
     """
-    kept = matrix.copy()
-    kept.data[np.abs(kept.data) <= RELATIVE_ROUNDING * np.repeat(sizes, np.diff(kept.indptr))] = 0.0
-    kept.eliminate_zeros()
-    return kept
+    cleaned = matrix.copy()
+    cleaned.data[np.abs(cleaned.data) <= RELATIVE_ROUNDING * np.repeat(sizes, np.diff(cleaned.indptr))] = 0.0
+    cleaned.eliminate_zeros()
+    return cleaned
 
 
 @compiled
@@ -139,9 +139,11 @@ def aggregate(
         free = 0
         taken = 0
         for e in range(indptr[vertex], indptr[vertex + 1]):
-            other = indices[e]
-            if other != vertex and -weights[e] > min_coupling * math.sqrt(diagonal[vertex] * diagonal[other]):
-                if labels[other] < 0:
+            neighbour = indices[e]
+            if neighbour != vertex and -weights[e] > min_coupling * math.sqrt(
+                diagonal[vertex] * diagonal[neighbour]
+            ):
+                if labels[neighbour] < 0:
                     free += 1
                 else:
                     taken += 1
@@ -154,11 +156,11 @@ def aggregate(
         while space >= 1:
             strongest, best = -1, min_coupling
             for e in range(indptr[vertex], indptr[vertex + 1]):
-                other = indices[e]
-                if other != vertex and labels[other] < 0:
-                    strength = -weights[e] / math.sqrt(diagonal[vertex] * diagonal[other])
+                neighbour = indices[e]
+                if neighbour != vertex and labels[neighbour] < 0:
+                    strength = -weights[e] / math.sqrt(diagonal[vertex] * diagonal[neighbour])
                     if strength > best * (1 + TIE_TOLERANCE):
-                        strongest, best = other, strength
+                        strongest, best = neighbour, strength
             if strongest < 0:
                 break
             labels[strongest] = number
@@ -170,9 +172,9 @@ def aggregate(
             continue
         strongest, best = -1, 0.0
         for e in range(indptr[vertex], indptr[vertex + 1]):
-            other = indices[e]
-            if other != vertex and labels[other] >= 0 and -weights[e] > best * (1 + TIE_TOLERANCE):
-                strongest, best = other, -weights[e]
+            neighbour = indices[e]
+            if neighbour != vertex and labels[neighbour] >= 0 and -weights[e] > best * (1 + TIE_TOLERANCE):
+                strongest, best = neighbour, -weights[e]
         if strongest >= 0:
             joined[vertex] = labels[strongest]
         else:

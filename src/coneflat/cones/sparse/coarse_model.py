@@ -52,10 +52,10 @@ class CoarseModel:
         scale = constant / self.constant if min(constant, self.constant) > TIE_TOLERANCE**2 else 1.0
         return CoarseModel(self.basis, self.kernel * scale, self.slope * scale, constant)
 
-    def squared_distances(self, one: int, others: IntArray) -> FloatArray:
-        """Return (p,) the squared norms of the differences of one Green's function and each of the others."""
+    def squared_distances(self, source: int, targets: IntArray) -> FloatArray:
+        """Return (p,) the squared distances of the Green's function of an unknown from those of the targets."""
         basis = self.basis
-        return squared_distances(basis.indptr, basis.indices, basis.data, self.kernel, one, others)
+        return squared_distances(basis.indptr, basis.indices, basis.data, self.kernel, source, targets)
 
 
 def coarse_model(operator: GreenOperator, curvature: FloatArray, size: int) -> CoarseModel:
@@ -112,32 +112,32 @@ def inverse_of_definite(matrix: FloatArray) -> FloatArray:
 
 @compiled
 def squared_distances(
-    indptr: IntArray, indices: IntArray, data: FloatArray, kernel: FloatArray, one: int, others: IntArray
+    indptr: IntArray, indices: IntArray, data: FloatArray, kernel: FloatArray, source: int, targets: IntArray
 ) -> FloatArray:
-    """Return (p,) the squared norms of the differences of row `one` and other rows of a sparse matrix.
+    """Return (p,) the squared norms of the differences of row `source` and other rows of a sparse matrix.
 
     With products of sparse matrices, a complete search for 20 to 50 cones takes 20% longer.
 
     Args:
         indptr, indices, data: the matrix (n, m) in CSR form.
         kernel: (m, m) matrix of the inner product.
-        one, others: a row, and (p,) rows.
+        source, targets: a row, and (p,) rows.
     """
-    found = np.zeros(len(others))
-    start, stop = indptr[one], indptr[one + 1]
-    own = 0.0
+    distances = np.zeros(len(targets))
+    start, stop = indptr[source], indptr[source + 1]
+    norm = 0.0
     image = np.zeros(len(kernel))
     for e in range(start, stop):
         for j in range(len(kernel)):
             image[j] += data[e] * kernel[indices[e], j]
     for e in range(start, stop):
-        own += data[e] * image[indices[e]]
-    for i in range(len(others)):
-        start, stop = indptr[others[i]], indptr[others[i] + 1]
-        value = own
+        norm += data[e] * image[indices[e]]
+    for i in range(len(targets)):
+        start, stop = indptr[targets[i]], indptr[targets[i] + 1]
+        value = norm
         for e in range(start, stop):
             value -= 2.0 * data[e] * image[indices[e]]
             for d in range(start, stop):
                 value += data[e] * data[d] * kernel[indices[e], indices[d]]
-        found[i] = max(value, 0.0)
-    return found
+        distances[i] = max(value, 0.0)
+    return distances

@@ -71,18 +71,18 @@ class BestSets(Generic[SetT]):
         """Return E^2 of the best set of a size, infinite if there is none."""
         return self._sets[size].energy if size in self._sets else math.inf
 
-    def offer(self, found: SetT) -> bool:
+    def offer(self, candidate: SetT) -> bool:
         """Store a set if it is the best of its size; return whether it is."""
-        is_better = found.energy < self.energy(len(found)) * (1 - MIN_RELATIVE_GAIN)
+        is_better = candidate.energy < self.energy(len(candidate)) * (1 - MIN_RELATIVE_GAIN)
         if is_better:
-            self._sets[len(found)] = found
+            self._sets[len(candidate)] = candidate
         return is_better
 
-    def fewest(self, goal: float, most: float = math.inf) -> SetT:
-        """Return the smallest set of at most `most` cones with E^2 <= goal; if there is none, that of smallest E^2."""
-        known = [found for found in self if len(found) <= most]
-        good = [found for found in known if found.energy <= goal]
-        return min(good, key=len) if good else min(known, key=lambda found: (found.energy, len(found)))
+    def fewest(self, goal: float, max_size: float = math.inf) -> SetT:
+        """Return the smallest set with E^2 <= goal, or that of smallest E^2, of at most `max_size` cones."""
+        small_enough = [cones for cones in self if len(cones) <= max_size]
+        good = [cones for cones in small_enough if cones.energy <= goal]
+        return min(good, key=len) if good else min(small_enough, key=lambda cones: (cones.energy, len(cones)))
 
 
 def nonnegative(energy: float) -> float:
@@ -114,9 +114,9 @@ def argmin_tied(values: FloatArray) -> int:
 
 def row_argmins(values: FloatArray) -> IntArray:
     """Return (r,) for each row of values (r, c) the first column whose value equals the minimum up to rounding."""
-    least = values.min(axis=1)
-    finite = np.where(np.isfinite(least), least, 0.0)
-    return (values <= (least + TIE_TOLERANCE * np.abs(finite))[:, None]).argmax(axis=1)
+    minima = values.min(axis=1)
+    finite = np.where(np.isfinite(minima), minima, 0.0)
+    return (values <= (minima + TIE_TOLERANCE * np.abs(finite))[:, None]).argmax(axis=1)
 
 
 @dataclass(eq=False)
@@ -128,7 +128,7 @@ class DenseModel:
         usable: (m,) whether a candidate may be chosen; False for required ones, which are in every set.
         fixed: the required candidates, which come first in every set.
         limits: bounds and sum of the curvatures.
-        least: (m,) lower bound of the curvature at each candidate, not below that of `limits`.
+        lower: (m,) lower bound of the curvature at each candidate, not below that of `limits`.
         best: the best set found of each number of cones.
     """
 
@@ -138,14 +138,14 @@ class DenseModel:
     usable: BoolArray
     fixed: IntArray
     limits: Limits
-    least: FloatArray
+    lower: FloatArray
     best: BestSets[ConeSet] = field(default_factory=BestSets)
 
     def fit(self, members: IntArray, guess: FloatArray | None = None) -> Fit:
         """Return the best curvatures of a set of candidates (s,), for which those of a similar set may be given."""
         gram, slope = self.gram[members[:, None], members], self.slope[members]
-        most = np.full(len(members), self.limits.most)
-        fitted = fit_curvatures(gram, slope, self.least[members], most, self.limits.total, guess)
+        upper = np.full(len(members), self.limits.upper)
+        fitted = fit_curvatures(gram, slope, self.lower[members], upper, self.limits.total, guess)
         curvatures, _, feasible = fitted
         energy = float(self.constant + (2 * slope + gram @ curvatures) @ curvatures) if feasible else math.inf
         return Fit(*fitted, nonnegative(energy))
@@ -169,32 +169,32 @@ class DenseModel:
         gradient = self._gradient(members, fitted)
         x = -gradient / np.where(is_independent, remain, 1.0)
         if fitted.feasible:
-            x = np.clip(x, self.least, limits.most)
+            x = np.clip(x, self.lower, limits.upper)
         return np.where(is_independent, (2 * gradient + remain * x) * x, 0.0)
 
     def swaps(self, members: IntArray, fitted: Fit) -> tuple[FloatArray, IntArray]:
         """Return (s,) the change of E^2 by the best replacement of each member, and (s,) this replacement.
 
         Removing a member is a rank-one change of the inverse, so scoring all candidates for all members costs little
-        more than scoring the candidates once. Members at a bound and required members are left out: their change is
+        more than scoring the candidates once. Members at a bound and required members are not replaced: their change is
         infinite and their replacement -1.
         """
         change, which = np.full(len(members), np.inf), np.full(len(members), -1)
         diagonal, places = self.gram.diagonal(), np.flatnonzero(self._between_bounds(members, fitted))
-        remain, rows, kept = self._project(members[places])
-        is_moved = (places >= len(self.fixed)) & (kept * diagonal[members[places]] > MIN_INDEPENDENT_SHARE)
+        remain, rows, pivots = self._project(members[places])
+        is_moved = (places >= len(self.fixed)) & (pivots * diagonal[members[places]] > MIN_INDEPENDENT_SHARE)
         is_open = self.usable.copy()
         is_open[members] = False
         candidates = np.flatnonzero(is_open)
         places = places[is_moved]
         if not len(places) or not len(candidates):
             return change, which
-        share, w = 1.0 / kept[is_moved, None], rows[is_moved][:, candidates]
+        share, w = 1.0 / pivots[is_moved, None], rows[is_moved][:, candidates]
         k = fitted.curvatures[places, None]
         h = remain[candidates] + w * w * share
         g = self._gradient(members, fitted)[candidates] - w * k * share
         is_independent = h > TIE_TOLERANCE * diagonal[candidates]
-        x = np.clip(-g / np.where(is_independent, h, 1.0), self.least[candidates], self.limits.most)
+        x = np.clip(-g / np.where(is_independent, h, 1.0), self.lower[candidates], self.limits.upper)
         values = np.where(is_independent, k * k * share + (2 * g + h * x) * x, np.inf)
         best = row_argmins(values)
         change[places], which[places] = values[np.arange(len(places)), best], candidates[best]
@@ -204,7 +204,7 @@ class DenseModel:
         """Return (s,) whether the curvature of a member is strictly between its bounds."""
         k = fitted.curvatures
         span = TIE_TOLERANCE * (1.0 + np.abs(k))
-        return (self.least[members] + span < k) & (k < self.limits.most - span)
+        return (self.lower[members] + span < k) & (k < self.limits.upper - span)
 
     def _gradient(self, members: IntArray, fitted: Fit) -> FloatArray:
         """Return (m,) half the derivative of the Lagrangian of E^2 and the sum by the curvature of each candidate."""
@@ -232,12 +232,12 @@ class DenseModel:
         is_open[members] = False
         if not is_open.any():
             return None
-        missing = self.limits.total - self.least[members].sum()
-        if missing < 0:  # too few to carry the total: prefer candidates that can carry the rest
+        missing = self.limits.total - self.lower[members].sum()
+        if missing < 0:  # too few to absorb the total: prefer candidates that can absorb the remainder
             for bound in (missing, 0.0):
-                can_carry = is_open & (self.least <= bound) & (self.least < 0)
-                if can_carry.any():
-                    is_open = can_carry
+                can_absorb = is_open & (self.lower <= bound) & (self.lower < 0)
+                if can_absorb.any():
+                    is_open = can_absorb
                     break
         candidates = np.flatnonzero(is_open)
         return np.append(members, candidates[argmin_tied(self.additions(members)[candidates])])
@@ -250,10 +250,10 @@ class DenseModel:
         fixed = len(self.fixed)
         if len(members) <= fixed:
             return None
-        _, _, kept = self._project(members)
-        loss = self.fit(members).curvatures ** 2 / np.maximum(kept, 1e-300)
-        rest = np.delete(members, fixed + argmin_tied(loss[fixed:]))
-        return rest if self.energy(rest) < math.inf else None
+        _, _, pivots = self._project(members)
+        loss = self.fit(members).curvatures ** 2 / np.maximum(pivots, 1e-300)
+        remaining = np.delete(members, fixed + argmin_tied(loss[fixed:]))
+        return remaining if self.energy(remaining) < math.inf else None
 
     def exchanged(self, members: IntArray) -> ConeSet:
         """Return the set after replacing members one at a time while E^2 decreases; required members stay."""
@@ -267,33 +267,33 @@ class DenseModel:
                 if not change[place] <= -MIN_RELATIVE_GAIN * fitted.energy:
                     break
                 change[place] = np.inf
-                tried = members.copy()
-                tried[place] = which[place]
-                found = self.fit(tried, fitted.curvatures)
-                if found.energy < fitted.energy * (1 - MIN_RELATIVE_GAIN):
-                    members, fitted, improved = tried, found, True
+                trial = members.copy()
+                trial[place] = which[place]
+                refitted = self.fit(trial, fitted.curvatures)
+                if refitted.energy < fitted.energy * (1 - MIN_RELATIVE_GAIN):
+                    members, fitted, improved = trial, refitted, True
                     # With many cones, scoring takes long: others are replaced before all are scored again.
                     change[(which == which[place]) | (len(members) < MAX_SEARCHED // 4)] = np.inf
         return ConeSet(fitted.energy, members)
 
-    def climb(self, bound: float, most: int, start: int | None = None) -> None:
-        """Add cones one at a time until E^2 <= bound or there are `most`.
+    def climb(self, bound: float, max_size: int, start: int | None = None) -> None:
+        """Add cones one at a time until E^2 <= bound or there are `max_size`.
 
         It starts from the required cones, or from the best set of the size `start`.
         """
         members: IntArray | None = self.best[start].members if start is not None else self.fixed
         while members is not None:
-            found = self.exchanged(members)
-            self.best.offer(found)
-            size, energy = len(found), self.best.energy(len(found))
+            improved = self.exchanged(members)
+            self.best.offer(improved)
+            size, energy = len(improved), self.best.energy(len(improved))
             is_stalled = energy >= STALL_FACTOR * self.best.energy(size - STALL_CONES) < math.inf
-            if size >= most or energy <= bound or is_stalled:
+            if size >= max_size or energy <= bound or is_stalled:
                 break
-            members = self.grown(self.best[size].members if size in self.best else found.members)
+            members = self.grown(self.best[size].members if size in self.best else improved.members)
 
-    def descend(self, least: int, most: int) -> None:
-        """Remove cones one at a time, from the best set of `most` cones to one of `least`."""
-        for size in range(most, max(least, len(self.fixed)), -1):
+    def descend(self, min_size: int, max_size: int) -> None:
+        """Remove cones one at a time, from the best set of `max_size` cones to one of `min_size`."""
+        for size in range(max_size, max(min_size, len(self.fixed)), -1):
             shrunk = self.shrunk(self.best[size].members) if size in self.best else None
             if shrunk is not None:
                 self.best.offer(self.exchanged(shrunk))

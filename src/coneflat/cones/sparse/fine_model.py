@@ -28,7 +28,7 @@ class ExactModel(DenseModel):
         linear: LinearModel,
         required: IntArray,
         limits: Limits,
-        least: FloatArray,
+        lower: FloatArray,
     ) -> None:
         none, coarse, operator, log_scale = np.empty(0), linear.coarse, linear.operator, linear.log_scale
         fixed = np.arange(len(required))
@@ -41,7 +41,7 @@ class ExactModel(DenseModel):
             np.zeros(len(log_scale), dtype=bool),
             np.empty(len(log_scale), np.int64),
         )
-        self._linear, self._least = linear, least
+        self._linear, self._lower = linear, lower
         # The Green's functions of the unknowns and their means, in blocks in the order in which they were added.
         self._responses: list[FloatArray] = []
         self._means: list[FloatArray] = []
@@ -59,9 +59,9 @@ class ExactModel(DenseModel):
         """Add those vertices that are not candidates yet; return the candidate number of each."""
         is_new = mask_of(len(self._log_scale), unknowns)
         is_new[self.unknowns] = False
-        new = np.flatnonzero(is_new)
-        for some in self._operator.batches(new):
-            self._add(some, self._operator.responses(some))
+        added = np.flatnonzero(is_new)
+        for batch in self._operator.batches(added):
+            self._add(batch, self._operator.responses(batch))
         order = np.argsort(self.unknowns, kind="stable")
         return order[np.searchsorted(self.unknowns, unknowns, sorter=order)]
 
@@ -73,41 +73,41 @@ class ExactModel(DenseModel):
         required = len(self.fixed)
         return np.append(np.arange(required), required + np.argsort(self.unknowns[members[required:]]))
 
-    def _add(self, new: IntArray, responses: FloatArray) -> None:
+    def _add(self, added: IntArray, responses: FloatArray) -> None:
         """Add k vertices with their Green's functions (k, f)."""
-        old = len(self.unknowns)
-        self.unknowns = np.concatenate([self.unknowns, new])
+        size = len(self.unknowns)
+        self.unknowns = np.concatenate([self.unknowns, added])
         areas = self._operator.areas
         weighted, means = responses * areas, responses @ areas
         self._responses.append(responses)
         self._means.append(means)
         blocks = zip(self._responses, self._means, strict=True)
-        rows = np.hstack([weighted @ block.T - np.outer(means, others) for block, others in blocks])
+        rows = np.hstack([weighted @ block.T - np.outer(means, block_means) for block, block_means in blocks])
         gram = np.empty((len(self.unknowns), len(self.unknowns)))
-        gram[:old, :old] = self.gram
-        gram[old:] = rows
-        gram[:old, old:] = rows[:, :old].T
-        gram[old:, old:] = (rows[:, old:] + rows[:, old:].T) / 2
+        gram[:size, :size] = self.gram
+        gram[size:] = rows
+        gram[:size, size:] = rows[:, :size].T
+        gram[size:, size:] = (rows[:, size:] + rows[:, size:].T) / 2
         self.gram = gram
         self.slope = self._linear.score[self.unknowns]
         self.usable = self._usable[self.unknowns]
         self.usable[self.fixed] = False
-        self.least = self._least[self.unknowns]
+        self.lower = self._lower[self.unknowns]
 
     def refine(self, members: IntArray) -> float:
         """Move cones over the mesh until E converges; return E^2 of the best set of this number of cones."""
-        found = self.exchanged(members)
-        self.best.offer(found)
+        cones = self.exchanged(members)
+        self.best.offer(cones)
         for _ in range(MAX_ROUNDS):
-            known, before = len(self.unknowns), found.energy
-            self.insert(self.targets(found.members, self.fit(found.members).curvatures, before))
-            if len(self.unknowns) == known:
+            known_count, before = len(self.unknowns), cones.energy
+            self.insert(self.targets(cones.members, self.fit(cones.members).curvatures, before))
+            if len(self.unknowns) == known_count:
                 break
-            found = self.exchanged(found.members)
-            self.best.offer(found)
-            if not found.energy < before * (1 - MIN_PROMISED_GAIN):
+            cones = self.exchanged(cones.members)
+            self.best.offer(cones)
+            if not cones.energy < before * (1 - MIN_PROMISED_GAIN):
                 break
-        return self.best.energy(len(found))
+        return self.best.energy(len(cones))
 
     def targets(self, members: IntArray, curvatures: FloatArray, energy: float) -> IntArray:
         """Return the unknowns to which cones should move, by the score and the distances of the coarse model.
@@ -123,19 +123,19 @@ class ExactModel(DenseModel):
         targets = []
         for place in range(len(self.fixed), len(members)):
             s, k = int(taken[place]), curvatures[place]
-            near = self._ball(s, size)
-            near = near[is_free[near]]
-            if not len(near) or k == 0:
+            neighbours = self._ball(s, size)
+            neighbours = neighbours[is_free[neighbours]]
+            if not len(neighbours) or k == 0:
                 continue
-            change = 2 * k * (score[near] - score[s]) + k * k * self.squared_distances(s, near)
+            change = 2 * k * (score[neighbours] - score[s]) + k * k * self.squared_distances(s, neighbours)
             best = argmin_tied(change)
             if change[best] < -MIN_PROMISED_GAIN * energy:
-                targets.append(int(near[best]))
+                targets.append(int(neighbours[best]))
         return np.unique(np.array(targets, dtype=np.int64))
 
-    def extended(self, members: IntArray, goal: float, most: int) -> IntArray:
+    def extended(self, members: IntArray, goal: float, max_size: int) -> IntArray:
         """Return members with up to half as many added where the score is a local maximum, until E^2 <= goal."""
-        room, fitted = min(most - len(members), len(members) // 2 + 1), self.fit(members)
+        room, fitted = min(max_size - len(members), len(members) // 2 + 1), self.fit(members)
         score = np.abs(self._score(members, fitted.curvatures) + fitted.multiplier)
         score[~self._usable] = -1.0
         peaks = np.flatnonzero(score >= np.maximum.reduceat(score[self._indices], self._indptr[:-1]))
@@ -151,24 +151,24 @@ class ExactModel(DenseModel):
         log_scale = self._log_scale.copy()
         first = 0
         for block in self._responses:
-            own = (members >= first) & (members < first + len(block))
-            log_scale += curvatures[own] @ block[members[own] - first]
+            is_member = (members >= first) & (members < first + len(block))
+            log_scale += curvatures[is_member] @ block[members[is_member] - first]
             first += len(block)
         return self._operator.solve(self._operator.weighted(log_scale))
 
-    def near(self, unknown: int, size: int) -> IntArray:
+    def neighbours(self, unknown: int, size: int) -> IntArray:
         """Return the usable unknowns among the `size` nearest to an unknown."""
-        near = self._ball(unknown, size)
-        return near[self._usable[near]]
+        ball = self._ball(unknown, size)
+        return ball[self._usable[ball]]
 
     def _ball(self, centre: int, size: int) -> IntArray:
         """Return the unknowns nearest to one in steps along edges, in complete rings until `size` are reached."""
         count = fill_ball(self._indptr, self._indices, centre, size, self._is_reached, self._reached)
         return self._reached[:count].copy()
 
-    def squared_distances(self, one: int, others: IntArray) -> FloatArray:
+    def squared_distances(self, unknown: int, targets: IntArray) -> FloatArray:
         """Return (p,) approximate squared norms of the differences of one Green's function and each of the others."""
-        return self._coarse.squared_distances(one, others)
+        return self._coarse.squared_distances(unknown, targets)
 
 
 @compiled

@@ -22,8 +22,8 @@ MAX_STEPS_AT_ONCE = 20
 def fit_curvatures(
     gram: FloatArray,
     slope: FloatArray,
-    least: FloatArray,
-    most: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
     total: float,
     guess: FloatArray | None = None,
 ) -> tuple[FloatArray, float, bool]:
@@ -35,7 +35,7 @@ def fit_curvatures(
     Args:
         gram: (s, s) Gram matrix.
         slope: (s,) linear term.
-        least, most: (s,) bounds, radians.
+        lower, upper: (s,) bounds, radians.
         total: sum of the curvatures, radians; NaN for none.
         guess: (s,) curvatures that are expected to be at the same bounds, which saves steps; None if unknown.
 
@@ -47,13 +47,13 @@ def fit_curvatures(
     if not len(slope):
         return np.zeros(0), 0.0, not has_sum or abs(total) < TIE_TOLERANCE
     slack = 1e-12 * (1.0 + abs(total))
-    feasible = not has_sum or bool(least.sum() - slack <= total <= most.sum() + slack)
+    feasible = not has_sum or bool(lower.sum() - slack <= total <= upper.sum() + slack)
     if not feasible:
-        least, most = np.full(len(slope), -np.inf), np.full(len(slope), np.inf)
+        lower, upper = np.full(len(slope), -np.inf), np.full(len(slope), np.inf)
     guess = np.full(len(slope), np.nan) if guess is None else guess
-    curvatures, multiplier, is_optimal = change_at_once(gram, slope, least, most, total, guess)
+    curvatures, multiplier, is_optimal = change_at_once(gram, slope, lower, upper, total, guess)
     if not is_optimal:
-        curvatures, multiplier = change_one_by_one(gram, slope, least, most, total, curvatures)
+        curvatures, multiplier = change_one_by_one(gram, slope, lower, upper, total, curvatures)
     return curvatures, multiplier, feasible
 
 
@@ -74,25 +74,25 @@ def inverse_with_sum(gram: FloatArray, has_sum: bool) -> FloatArray:
 
 
 def change_one_by_one(
-    gram: FloatArray, slope: FloatArray, least: FloatArray, most: FloatArray, total: float, start: FloatArray
+    gram: FloatArray, slope: FloatArray, lower: FloatArray, upper: FloatArray, total: float, start: FloatArray
 ) -> tuple[FloatArray, float]:
     """Return the optimum (s,) and the multiplier by a primal active set method, which always terminates.
 
     The states (s,) of the variables are -1 at the lower bound, 1 at the upper, and 0 for free ones.
     """
     size, has_sum, multiplier = len(slope), not math.isnan(total), 0.0
-    curvatures = _allowed(least, most, total, start)
-    state = (curvatures >= most).astype(np.int64) - (curvatures <= least)
+    curvatures = _allowed(lower, upper, total, start)
+    state = (curvatures >= upper).astype(np.int64) - (curvatures <= lower)
     for _ in range(20 * size + 20):
         free, best, multiplier = best_free(gram, slope, total, state, curvatures)
         # Move towards the best values as far as the bounds allow.
-        here = curvatures[free]
-        is_above, is_beyond = best > most[free], (best > most[free]) | (best < least[free])
-        bound, parts = np.where(is_above, most[free], least[free]), np.where(is_beyond, 0.0, 1.0)
-        np.divide(bound - here, best - here, out=parts, where=is_beyond & (best != here))
+        current = curvatures[free]
+        is_above, is_beyond = best > upper[free], (best > upper[free]) | (best < lower[free])
+        bound, parts = np.where(is_above, upper[free], lower[free]), np.where(is_beyond, 0.0, 1.0)
+        np.divide(bound - current, best - current, out=parts, where=is_beyond & (best != current))
         parts = np.maximum(parts, 0.0)  # rounding can leave curvatures beyond a bound
         step = float(parts.min(initial=1.0))
-        curvatures[free] += step * (best - here)
+        curvatures[free] += step * (best - current)
         if step < 1.0:
             first = int(parts.argmin())
             blocking = free[first]
@@ -122,16 +122,16 @@ def change_one_by_one(
     return curvatures, multiplier
 
 
-def _allowed(least: FloatArray, most: FloatArray, total: float, start: FloatArray) -> FloatArray:
+def _allowed(lower: FloatArray, upper: FloatArray, total: float, start: FloatArray) -> FloatArray:
     """Return (s,) curvatures within the bounds with the given sum, after a uniform change of the given ones."""
     size, has_sum = len(start), not math.isnan(total)
-    curvatures = np.clip(start, least, most)
+    curvatures = np.clip(start, lower, upper)
     for _ in range(size if has_sum else 0):
         missing = total - float(curvatures.sum())
-        movable = np.count_nonzero(curvatures < most if missing > 0 else curvatures > least)
+        movable = np.count_nonzero(curvatures < upper if missing > 0 else curvatures > lower)
         if missing == 0.0 or movable == 0:
             break
-        curvatures = np.clip(curvatures + missing / movable, least, most)
+        curvatures = np.clip(curvatures + missing / movable, lower, upper)
     return curvatures
 
 
@@ -150,7 +150,7 @@ def best_free(
             variables[count] = j
             count += 1
     free, largest, left = variables[:count], 0.0, total
-    best, ones, lower = np.empty(count), np.empty(count), np.empty((count, count))
+    best, ones, cholesky = np.empty(count), np.empty(count), np.empty((count, count))
     for i in range(count):
         best[i], ones[i] = -slope[free[i]], 1.0
     for j in range(len(state)):
@@ -165,20 +165,20 @@ def best_free(
         for j in range(i + 1):
             value = gram[free[i], free[j]]
             for m in range(j):
-                value -= lower[i, m] * lower[j, m]
-            lower[i, j] = math.sqrt(max(value, MIN_PIVOT * largest)) if i == j else value / lower[j, j]
+                value -= cholesky[i, m] * cholesky[j, m]
+            cholesky[i, j] = math.sqrt(max(value, MIN_PIVOT * largest)) if i == j else value / cholesky[j, j]
         for j in range(i):
-            best[i] -= lower[i, j] * best[j]
-            ones[i] -= lower[i, j] * ones[j]
-        best[i] /= lower[i, i]
-        ones[i] /= lower[i, i]
+            best[i] -= cholesky[i, j] * best[j]
+            ones[i] -= cholesky[i, j] * ones[j]
+        best[i] /= cholesky[i, i]
+        ones[i] /= cholesky[i, i]
     sum_best, sum_ones = 0.0, 0.0
     for i in range(count - 1, -1, -1):
         for j in range(i + 1, count):
-            best[i] -= lower[j, i] * best[j]
-            ones[i] -= lower[j, i] * ones[j]
-        best[i] /= lower[i, i]
-        ones[i] /= lower[i, i]
+            best[i] -= cholesky[j, i] * best[j]
+            ones[i] -= cholesky[j, i] * ones[j]
+        best[i] /= cholesky[i, i]
+        ones[i] /= cholesky[i, i]
         sum_best += best[i]
         sum_ones += ones[i]
     if math.isnan(total) or count == 0:
@@ -191,7 +191,7 @@ def best_free(
 
 @compiled
 def change_at_once(
-    gram: FloatArray, slope: FloatArray, least: FloatArray, most: FloatArray, total: float, guess: FloatArray
+    gram: FloatArray, slope: FloatArray, lower: FloatArray, upper: FloatArray, total: float, guess: FloatArray
 ) -> tuple[FloatArray, float, bool]:
     """Return the optimum (s,) and the multiplier, by updating all active bounds at once, and whether this converged.
 
@@ -201,8 +201,8 @@ def change_at_once(
     size = len(slope)
     state, curvatures, gradient = np.zeros(size, np.int64), np.zeros(size), np.empty(size)
     for i in range(size):
-        state[i] = int(guess[i] >= most[i]) - int(guess[i] <= least[i])
-        curvatures[i] = most[i] if state[i] > 0 else least[i]
+        state[i] = int(guess[i] >= upper[i]) - int(guess[i] <= lower[i])
+        curvatures[i] = upper[i] if state[i] > 0 else lower[i]
     for _ in range(MAX_STEPS_AT_ONCE):
         free, best, multiplier = best_free(gram, slope, total, state, curvatures)
         if not len(free):
@@ -216,15 +216,15 @@ def change_at_once(
                 gradient[i] += gram[i, j] * curvatures[j]
             nothing = max(nothing, RELEASE_TOLERANCE * abs(gradient[i]))
         for i in range(size):
-            new = state[i]
-            if new == 0:
-                new = int(curvatures[i] > most[i]) - int(curvatures[i] < least[i])
-            elif new * (gradient[i] + multiplier) > nothing:
-                new = 0
-            is_same = is_same and new == state[i]
-            state[i] = new
+            next_state = state[i]
+            if next_state == 0:
+                next_state = int(curvatures[i] > upper[i]) - int(curvatures[i] < lower[i])
+            elif next_state * (gradient[i] + multiplier) > nothing:
+                next_state = 0
+            is_same = is_same and next_state == state[i]
+            state[i] = next_state
         if is_same:
             return curvatures, multiplier, True
         for i in range(size):
-            curvatures[i] = min(max(curvatures[i], least[i]), most[i])
+            curvatures[i] = min(max(curvatures[i], lower[i]), upper[i])
     return curvatures, 0.0, False

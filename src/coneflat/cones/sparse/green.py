@@ -44,9 +44,9 @@ class GreenOperator:
         if np.array_equal(areas, self._share):
             return self
         _ = self._factor  # computed here, so that the copy shares it
-        other = copy(self)
-        other.areas, other._share = areas[self.vertices], areas
-        return other
+        reweighted = copy(self)
+        reweighted.areas, reweighted._share = areas[self.vertices], areas
+        return reweighted
 
     @cached_property
     def _factor(self) -> Factor:

@@ -25,8 +25,8 @@ class Limits:
         total: sum of the curvatures, radians; NaN on a mesh with boundary, which absorbs the remaining curvature.
     """
 
-    least: float
-    most: float
+    lower: float
+    upper: float
     total: float
 
     @classmethod
@@ -54,22 +54,22 @@ class Limits:
             raise OptionError(
                 f"the largest cone angle ({max_cone_angle:g} radians) must exceed the smallest ({min_cone_angle:g})"
             )
-        least = -math.inf if max_cone_angle is None else math.tau - max_cone_angle
+        lower = -math.inf if max_cone_angle is None else math.tau - max_cone_angle
         if positive_only:
-            least = max(least, 0.0)
-        most = math.tau - min_cone_angle
-        if positive_only and most <= 0:
+            lower = max(lower, 0.0)
+        upper = math.tau - min_cone_angle
+        if positive_only and upper <= 0:
             raise OptionError("cones of positive curvature have angles below 2 pi: allow smaller angles")
         if euler_characteristic is None:
-            return cls(least, most, math.nan)
+            return cls(lower, upper, math.nan)
         total = math.tau * euler_characteristic
-        if (total > 0 and most <= 0) or (total < 0 and least >= 0):
+        if (total > 0 and upper <= 0) or (total < 0 and lower >= 0):
             kind = "positive" if total < 0 else "negative"
             raise CurvatureError(
                 f"a surface of Euler characteristic {euler_characteristic:g} has a total curvature of "
-                f"{2 * euler_characteristic:g} pi, which cones of {kind} curvature alone cannot carry"
+                f"{2 * euler_characteristic:g} pi, which cones of {kind} curvature alone cannot absorb"
             )
-        return cls(least, most, total)
+        return cls(lower, upper, total)
 
     @property
     def has_sum(self) -> bool:
@@ -78,27 +78,27 @@ class Limits:
 
     @property
     def fewest(self) -> int:
-        """The smallest number of cones that can carry the total curvature."""
+        """The smallest number of cones that can absorb the total curvature."""
         if not self.has_sum or abs(self.total) < TIE_TOLERANCE:
             return 0
-        bound = self.most if self.total > 0 else self.least
+        bound = self.upper if self.total > 0 else self.lower
         return math.ceil(self.total / bound - 1e-9) if math.isfinite(bound) else 1
 
     @property
     def largest(self) -> int | None:
         """The largest number of cones that the total curvature allows; None for any."""
-        if self.has_sum and self.total > 0 and self.least > 0:
-            return int(self.total / self.least + 1e-9)
+        if self.has_sum and self.total > 0 and self.lower > 0:
+            return int(self.total / self.lower + 1e-9)
         return None
 
     def text(self) -> str:
         """Return the bounds as text for a message."""
-        if not math.isfinite(self.least):
-            return f"up to {self.most / math.pi:.4g} pi"
-        return f"{self.least / math.pi:.4g} pi to {self.most / math.pi:.4g} pi"
+        if not math.isfinite(self.lower):
+            return f"up to {self.upper / math.pi:.4g} pi"
+        return f"{self.lower / math.pi:.4g} pi to {self.upper / math.pi:.4g} pi"
 
     def check_available(self, usable: BoolArray, required: IntArray) -> None:
-        """Raise CurvatureError if cones at the usable (n,) and the required vertices cannot carry the curvature."""
+        """Raise CurvatureError if cones at the usable (n,) and the required vertices cannot absorb the curvature."""
         if self.fewest > MAX_SEARCHED + len(required):
             raise CurvatureError(
                 f"a total curvature of {self.total / np.pi:.4g} pi needs {self.fewest:,} cones or more within these "
@@ -113,15 +113,15 @@ class Limits:
             )
 
     def check_count(self, count: int, required: int) -> None:
-        """Raise an error if `count` cones, of which `required` are given, cannot carry the curvature."""
+        """Raise an error if `count` cones, of which `required` are given, cannot absorb the curvature."""
         if isinstance(count, bool) or count != int(count) or count < 0:
             raise OptionError(f"the number of cones must be an integer and not negative, got {count!r}")
         if count < required:
             raise CurvatureError(f"{plural(required, 'cone')} required, but only {count} allowed")
         if count < self.fewest:
-            bound = self.most if self.total > 0 else self.least
-            each = f" of at most {abs(bound) / np.pi:.4g} pi each" if np.isfinite(bound) else ""
+            bound = self.upper if self.total > 0 else self.lower
+            share = f" of at most {abs(bound) / np.pi:.4g} pi each" if np.isfinite(bound) else ""
             raise CurvatureError(
-                f"{plural(count, 'cone')}{each} cannot carry this surface's total curvature of "
+                f"{plural(count, 'cone')}{share} cannot absorb this surface's total curvature of "
                 f"{self.total / np.pi:.4g} pi: {self.fewest} or more are needed"
             )

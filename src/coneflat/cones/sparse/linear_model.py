@@ -20,7 +20,7 @@ VERTICES_PER_UNKNOWN, MIN_SIZE, MAX_SIZE = 12, 600, 1200
 
 
 class LinearModel:
-    """The data shared by the log scales of all sets of cones on a connected mesh; computed when first needed.
+    """The data shared by all sets of cones on a connected mesh; computed when first needed.
 
     Attributes:
         laplacian: (n, n) cotangent Laplacian.
@@ -68,7 +68,7 @@ class LinearModel:
 
     @cached_property
     def log_scale(self) -> FloatArray:
-        """(f,) phi_0, the log scale without cones."""
+        """(f,) phi_0, the log conformal factor without cones."""
         return -self.operator.solve(self.inner)
 
     @cached_property

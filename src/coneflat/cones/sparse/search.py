@@ -46,7 +46,7 @@ class SparseCones:
 
     Attributes:
         solution: the cones.
-        distortion: E of the linear model, the area-weighted standard deviation of its log scale.
+        distortion: E of the linear model, the area-weighted standard deviation of its log conformal factor.
     """
 
     solution: ConeSolution
@@ -56,8 +56,8 @@ class SparseCones:
 class ConeSearch:
     """A search for cones on a connected mesh; the Laplacian is factorized once for any number of queries.
 
-    It is made by `from_mesh`. The distortion E is the area-weighted standard deviation of the linear log scale. A
-    boundary has phi = 0 and absorbs the remaining curvature.
+    It is made by `from_mesh`. The distortion E is the area-weighted standard deviation of the linear log conformal
+    factor. A boundary has phi = 0 and absorbs the remaining curvature.
 
         search = ConeSearch.from_mesh(mesh)
         search.fewest(0.2).solution.cones
@@ -103,11 +103,11 @@ class ConeSearch:
         self.progress: Callable[[str], None] = lambda _: None
         self._linear, self.operator, self._coarse_model = linear, linear.operator, linear.coarse
         vertices = self.operator.vertices
-        self._least = np.full(len(vertices), limits.least)
+        self._lower = np.full(len(vertices), limits.lower)
         if max_angles is not None:
-            self._least = np.maximum(self._least, np.minimum(math.tau - max_angles[vertices], 0.0))
+            self._lower = np.maximum(self._lower, np.minimum(math.tau - max_angles[vertices], 0.0))
         self._required = self.operator.unknowns_of(cones)
-        self.exact = ExactModel(linear, self._required, limits, self._least)
+        self.exact = ExactModel(linear, self._required, limits, self._lower)
         self._usable = np.empty(0, dtype=bool)
         # The exact model will need the score; it is computed while the coarse model is set up.
         with concurrently(lambda: linear.score, 2 * len(vertices)):
@@ -144,7 +144,7 @@ class ConeSearch:
         """Restrict the search to the usable vertices (n,); if they are the same as before, sets found stay known.
 
         Raises:
-            CurvatureError: cones at these vertices cannot carry the curvature.
+            CurvatureError: cones at these vertices cannot absorb the curvature.
         """
         required, operator = self._required, self.operator
         if np.array_equal(usable, self._usable):
@@ -152,8 +152,8 @@ class ConeSearch:
         self.limits.check_available(usable, operator.vertices[required])
         is_usable = usable[operator.vertices]
         is_usable[required] = False
-        # On the coarse model, a neighbourhood is represented by a vertex that can hold a wide cone.
-        excess = np.maximum(-self._least, 0.0)
+        # On the coarse model, a neighbourhood is represented by a vertex that can have a wide cone angle.
+        excess = np.maximum(-self._lower, 0.0)
         fitness = 0.5 + 0.5 * excess / excess.max() if 0 < excess.max(initial=0.0) < math.inf else 1.0
         self.places = np.concatenate([required, candidates(self._coarse_model, is_usable * fitness)])
         kernel, slope = self._coarse_model.at(self.places)
@@ -165,7 +165,7 @@ class ConeSearch:
             mask,
             np.arange(len(required)),
             self.limits,
-            self._least[self.places],
+            self._lower[self.places],
         )
         self.exact.restrict(is_usable)
         self._usable, self._refined, self._stalled = usable.copy(), dict[int, tuple[float, ...]](), set[int]()
@@ -173,32 +173,36 @@ class ConeSearch:
     @property
     def most_cones(self) -> int:
         """The largest number of cones searched for."""
-        most = min(MAX_SEARCHED + len(self._required), len(self.places))
-        return most if self.limits.largest is None else min(most, self.limits.largest)
+        largest = min(MAX_SEARCHED + len(self._required), len(self.places))
+        return largest if self.limits.largest is None else min(largest, self.limits.largest)
 
-    def fewest(self, distortion: float = DISTORTION, most: int | None = None) -> SparseCones:
-        """Return the fewest cones found with E <= distortion; if more than `most` are needed, the best `most` cones.
+    def fewest(self, distortion: float = DISTORTION, max_count: int | None = None) -> SparseCones:
+        """Return the fewest cones found with E <= distortion, or the best `max_count` cones if more are needed.
 
         Args:
             distortion: the allowed E, positive.
-            most: largest number of cones; None for no limit.
+            max_count: largest number of cones; None for no limit.
 
         Raises:
-            OptionError: `distortion` or `most` is not valid.
-            CurvatureError: `most` cones cannot carry the curvature.
+            OptionError: `distortion` or `max_count` is not valid.
+            CurvatureError: `max_count` cones cannot absorb the curvature.
         """
         if not 0 < distortion < math.inf:
             raise OptionError(f"the distortion allowed must be a positive number, got {distortion:g}")
-        if most is not None:
-            self.limits.check_count(most, len(self._required))
-        most = self.most_cones if most is None else min(most, self.most_cones)
+        if max_count is not None:
+            self.limits.check_count(max_count, len(self._required))
+        max_count = self.most_cones if max_count is None else min(max_count, self.most_cones)
         goal = distortion * distortion
-        count = self._find_sufficient(self._search_coarse(goal, most), goal, most)
+        count = self._find_sufficient(self._search_coarse(goal, max_count), goal, max_count)
         while count > max(self.limits.fewest, len(self._required)) and self._refine(count - 1) <= goal:
             count -= 1
-        # If it is not reached, few cones that are nearly as good as more.
-        least = self.exact.best.fewest(goal, most).energy
-        return self._cones(self.exact.best.fewest(goal if least <= goal else least / STALL_FACTOR, most))
+        # If it is not reached: the fewest cones that are nearly as good as the best set.
+        smallest_energy = self.exact.best.fewest(goal, max_count).energy
+        return self._cones(
+            self.exact.best.fewest(
+                goal if smallest_energy <= goal else smallest_energy / STALL_FACTOR, max_count
+            )
+        )
 
     def best_of(self, count: int) -> SparseCones:
         """Return the cones of smallest E that were found, at most `count` of them.
@@ -208,66 +212,66 @@ class ConeSearch:
 
         Raises:
             OptionError: `count` is not valid.
-            CurvatureError: `count` cones cannot carry the curvature.
+            CurvatureError: `count` cones cannot absorb the curvature.
         """
         self.limits.check_count(count, len(self._required))
         count = min(count, self.most_cones)
         self._climb(0.0, count + 1, count)
         self.coarse.descend(count - 2, count + 1)
         self._refine(max(size for size in self.coarse.best.sizes if size <= count))
-        some = 2 * count // 3
-        if self._refine(some) < math.inf:
-            self.exact.refine(self.exact.extended(self.exact.best[some].members, 0.0, count))
+        fewer = 2 * count // 3
+        if self._refine(fewer) < math.inf:
+            self.exact.refine(self.exact.extended(self.exact.best[fewer].members, 0.0, count))
         return self._cones(self.exact.best.fewest(-1.0, count))
 
-    def curve(self, most: int) -> list[SparseCones]:
-        """Return the best cones found for each number up to `most`, if their E is below that of fewer cones.
+    def curve(self, max_count: int) -> list[SparseCones]:
+        """Return the best cones found for each number up to `max_count`, if their E is below that of fewer cones.
 
         Args:
-            most: largest number of cones.
+            max_count: largest number of cones.
         """
-        most = min(most, self.most_cones)
-        self.coarse.climb(0.0, most)
-        self.coarse.descend(1, most)
+        max_count = min(max_count, self.most_cones)
+        self.coarse.climb(0.0, max_count)
+        self.coarse.descend(1, max_count)
         # First upwards, then downwards: the best set may be the next larger set without one of its cones.
-        for count in (*range(most + 1), *range(most, -1, -1)):
+        for count in (*range(max_count + 1), *range(max_count, -1, -1)):
             self._refine(count)
-        found: list[SparseCones] = []
+        curve: list[SparseCones] = []
         for count in self.exact.best.sizes:
             cones = self._cones(self.exact.best[count])
-            if count <= most and (not found or cones.distortion < found[-1].distortion - TIE_TOLERANCE):
-                found.append(cones)
-        return found
+            if count <= max_count and (not curve or cones.distortion < curve[-1].distortion - TIE_TOLERANCE):
+                curve.append(cones)
+        return curve
 
-    def _search_coarse(self, goal: float, most: int) -> int:
+    def _search_coarse(self, goal: float, max_count: int) -> int:
         """Find good sets on the coarse model, of all sizes up to slightly more than needed; return the needed size."""
-        self._climb(goal / COARSE_MODEL_ERROR, most, most)
-        count = len(self.coarse.best.fewest(goal, most))
+        self._climb(goal / COARSE_MODEL_ERROR, max_count, max_count)
+        count = len(self.coarse.best.fewest(goal, max_count))
         self.coarse.descend(count - 3, count + 1)
-        return len(self.coarse.best.fewest(goal, most))
+        return len(self.coarse.best.fewest(goal, max_count))
 
-    def _find_sufficient(self, count: int, goal: float, most: int) -> int:
-        """Return how many cones reach E^2 <= goal on the mesh, or gain as much as more; `count` are tried first."""
+    def _find_sufficient(self, count: int, goal: float, max_count: int) -> int:
+        """Return how many cones reach E^2 <= goal on the mesh, or stall; the search starts with `count`."""
         exact, best = self.exact, self.exact.best
         self._refine(count)
-        while best.fewest(goal, most).energy > goal:
-            start = max(size for size in best.sizes if size <= most)
-            if start in {most, *self._stalled}:
+        while best.fewest(goal, max_count).energy > goal:
+            start = max(size for size in best.sizes if size <= max_count)
+            if start in {max_count, *self._stalled}:
                 break
-            added = exact.extended(best[start].members, goal, most)
+            added = exact.extended(best[start].members, goal, max_count)
             if not exact.refine(added) < STALL_FACTOR * best.energy(start):
                 self._stalled |= {start, len(added)}
-        return len(best.fewest(goal, most))
+        return len(best.fewest(goal, max_count))
 
-    def _climb(self, bound: float, most: int, count: int) -> None:
-        """Find sets of at most `most` cones on the coarse model; raise CurvatureError if none has at most `count`."""
+    def _climb(self, bound: float, max_count: int, count: int) -> None:
+        """Find sets of up to `max_count` cones on the coarse model; raise CurvatureError if all exceed `count`."""
         best = self.coarse.best
-        known = [size for size in best.sizes if size <= most]
-        if all(best.energy(size) > bound for size in known):
-            self.coarse.climb(bound, most, max(known, default=None))
+        known_sizes = [size for size in best.sizes if size <= max_count]
+        if all(best.energy(size) > bound for size in known_sizes):
+            self.coarse.climb(bound, max_count, max(known_sizes, default=None))
         if min(self.coarse.best.sizes, default=count + 1) > count:
             raise CurvatureError(
-                f"no set of {count} cones was found that carries a total curvature of "
+                f"no set of {count} cones was found that absorbs a total curvature of "
                 f"{self.limits.total / np.pi:.4g} pi within their bounds: allow more cones or other angles, or choose "
                 "the greedy search (--cones greedy), which has no bounds"
             )
@@ -295,18 +299,20 @@ class ConeSearch:
             exact.refine(min(starts, key=exact.energy))
         return exact.best.energy(count)
 
-    def _cones(self, found: ConeSet) -> SparseCones:
-        """Return the cones of a set on the mesh; cones of zero curvature are left out unless they are required."""
+    def _cones(self, best: ConeSet) -> SparseCones:
+        """Return the cones of a set on the mesh; cones of zero curvature are removed unless they are required."""
         unknowns, required = self.exact.unknowns, len(self._required)
-        members = found.members[self.exact.in_order(found.members)]
+        members = best.members[self.exact.in_order(best.members)]
         curvatures = self.exact.fit(members).curvatures
-        keep = np.abs(curvatures) > TIE_TOLERANCE
-        keep[:required] = True
-        kept = curvatures[keep]
-        if self.limits.has_sum and len(kept):
-            # Correct the sum for rounding and for the cones left out: a metric must have exactly this sum.
-            kept += (self.limits.total - kept.sum()) / len(kept)
-        return SparseCones(self.solution_of(unknowns[members[keep]], kept), math.sqrt(found.energy))
+        is_kept = np.abs(curvatures) > TIE_TOLERANCE
+        is_kept[:required] = True
+        kept_curvatures = curvatures[is_kept]
+        if self.limits.has_sum and len(kept_curvatures):
+            # Correct the sum for rounding and for the removed cones: a metric must have exactly this sum.
+            kept_curvatures += (self.limits.total - kept_curvatures.sum()) / len(kept_curvatures)
+        return SparseCones(
+            self.solution_of(unknowns[members[is_kept]], kept_curvatures), math.sqrt(best.energy)
+        )
 
     def solution_of(self, unknowns: IntArray, curvatures: FloatArray) -> ConeSolution:
         """Return the solution of cones at unknowns (s,) with given curvatures (s,), radians."""
@@ -320,7 +326,7 @@ def required_vertices(required: Iterable[int], is_boundary: BoolArray) -> IntArr
     if len(bad):
         raise OptionError(f"required cones are not vertices of the mesh: {list_some(bad)}")
     if len(np.unique(cones)) < len(cones):
-        raise OptionError("a required cone is given twice")
+        raise OptionError("a required cone is repeated")
     if is_boundary[cones].any():
         raise OptionError(f"required cones lie on the boundary: {list_some(cones[is_boundary[cones]])}")
     return cones

@@ -27,7 +27,7 @@ from .rounding import named_rounding, rounding_notes
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class Component:
     """A connected part of the input with n vertices and m faces, and the specifications of its stages.
 
     Attributes:
@@ -53,59 +53,61 @@ class Part:
         return self.metric.method == "exact"
 
     @property
-    def where(self) -> str:
-        """A description of the part, for error messages."""
+    def location(self) -> str:
+        """The vertex and the number of triangles by which messages name the component."""
         return f"in the component of vertex {self.cones.names[0]} ({len(self.faces):,} triangles)"
 
-    def with_distortion(self, factor: float) -> Part:
-        """Return the part with another bound of the area distortion, multiplied by a factor."""
+    def with_distortion(self, factor: float) -> Component:
+        """Return the component with another bound of the area distortion, multiplied by a factor."""
         return replace(self, cones=replace(self.cones, distortion=factor * self.cones.distortion))
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """The checked input, split into parts.
+    """The checked input, split into components.
 
     Attributes:
-        given: the input.
+        input_mesh: the input.
         checked: the mesh, scaled to about unit size.
         notes: notes on opened triangles without area, on marked edges that cut nothing, and on a missing boundary.
-        parts: connected parts of the mesh, which marked seams also separate.
+        components: connected parts of the mesh, which marked seams also separate.
         seams: (k, 2) vertices of the edges marked as seams.
-        own_lengths: (m, 3) the side lengths given by the user instead of distances between vertices, or None.
+        user_lengths: (m, 3) the side lengths given by the user instead of distances between vertices, or None.
     """
 
-    given: InputMesh
+    input_mesh: InputMesh
     checked: CheckedMesh
     notes: tuple[str, ...]
-    parts: tuple[Part, ...]
+    components: tuple[Component, ...]
     seams: IntArray
-    own_lengths: FloatArray | None
+    user_lengths: FloatArray | None
 
-    def pieces_of(self, coarser: Prepared, chosen: Sequence[int]) -> dict[int, list[Part]]:
-        """Return the parts that lie in chosen parts of the same input with fewer seams."""
-        whole = np.full(len(self.checked.mesh.faces), -1)
+    def pieces_of(self, coarser: Prepared, chosen: Sequence[int]) -> dict[int, list[Component]]:
+        """Return the components that lie in chosen components of the same input with fewer seams."""
+        coarse_component = np.full(len(self.checked.mesh.faces), -1)
         for i in chosen:
-            whole[coarser.parts[i].faces] = i
-        pieces: dict[int, list[Part]] = {i: [] for i in chosen}
-        for part in self.parts:
-            if (i := int(whole[part.faces[0]])) >= 0:
-                pieces[i].append(part)
+            coarse_component[coarser.components[i].faces] = i
+        pieces: dict[int, list[Component]] = {i: [] for i in chosen}
+        for component in self.components:
+            if (i := int(coarse_component[component.faces[0]])) >= 0:
+                pieces[i].append(component)
         return pieces
 
-    def with_pieces(self, finer: Prepared, pieces: Mapping[int, Sequence[Part]]) -> Prepared:
-        """Return the input with some parts replaced by their pieces, and with the seams between these.
+    def with_pieces(self, finer: Prepared, pieces: Mapping[int, Sequence[Component]]) -> Prepared:
+        """Return the input with some components replaced by their pieces, and with the seams between these.
 
         Args:
             finer: the same input with more seams.
-            pieces: the pieces of parts, from `pieces_of`.
+            pieces: the pieces of components, from `pieces_of`.
         """
         is_cut = mask_of(
-            len(self.checked.mesh.vertices), np.concatenate([self.parts[i].vertices for i in pieces])
+            len(self.checked.mesh.vertices), np.concatenate([self.components[i].vertices for i in pieces])
         )
         seams = np.concatenate([self.seams, finer.seams[is_cut[finer.seams].all(axis=1)]])
-        parts = [piece for i, part in enumerate(self.parts) for piece in pieces.get(i, [part])]
-        return replace(self, parts=tuple(parts), seams=np.unique(seams, axis=0))
+        components = [
+            piece for i, component in enumerate(self.components) for piece in pieces.get(i, [component])
+        ]
+        return replace(self, components=tuple(components), seams=np.unique(seams, axis=0))
 
 
 #: A connected mesh, the indices of its vertices and faces in the whole mesh, and its (m, 3) side lengths.
@@ -118,30 +120,30 @@ class LatestCache(Generic[Value]):
     """A cache of one value: the value that was computed last, and its key."""
 
     def __init__(self) -> None:
-        self._known: tuple[Hashable, Value] | None = None
+        self._entry: tuple[Hashable, Value] | None = None
 
     def of(self, key: Hashable, compute: Callable[[], Value]) -> Value:
         """Return the cached value if the key is the same, else compute and cache the value.
 
         If the computation raises an exception, the cache does not change.
         """
-        if self._known is None or self._known[0] != key:
-            self._known = key, compute()
-        return self._known[1]
+        if self._entry is None or self._entry[0] != key:
+            self._entry = key, compute()
+        return self._entry[1]
 
 
 class Source:
     """An input, with a cache of the values that depend on few options.
 
-    The latest values are cached; another repair, other lengths or other marked seams replace them. Until then, parts
-    share the same mesh objects.
+    The latest values are cached; another repair, other lengths or other marked seams replace them. Until then,
+    components share the same mesh objects.
 
     Attributes:
-        given: the input, which must not be modified.
+        input_mesh: the input, which must not be modified.
     """
 
-    def __init__(self, given: InputMesh) -> None:
-        self.given = given
+    def __init__(self, input_mesh: InputMesh) -> None:
+        self.input_mesh = input_mesh
         self._checked: LatestCache[tuple[CheckedMesh, BoolArray]] = LatestCache()
         self._lengths: LatestCache[tuple[FloatArray, str | None]] = LatestCache()
         self._seen: LatestCache[FloatArray] = LatestCache()
@@ -157,7 +159,7 @@ class Source:
         return self._checked.of(repair, lambda: self._check(repair))[0]
 
     def prepared(self, options: Options) -> Prepared:
-        """Return the checked input, split into parts with the specifications that the options give.
+        """Return the checked input, split into components with the specifications that the options give.
 
         Raises:
             MeshError: the mesh cannot be flattened.
@@ -165,20 +167,24 @@ class Source:
             SeamError: an edge is both marked as a seam and forbidden.
             TooLargeError: the mesh does not fit into the free memory.
         """
-        given = self.given
+        input_mesh = self.input_mesh
         checked, is_diagonal = self._checked.of(options.repair, lambda: self._check(options.repair))
-        own = _own_lengths(given, checked, options)
-        metric = options.repair, options.strict, None if own is None else own.tobytes()
-        with named_rounding(given.vertices, given.faces):
-            lengths, note = self._lengths.of(metric, lambda: _open_triangles(checked, own, options.strict))
-        constraints = locate_constraints(checked, options, given)
+        user_lengths = _user_lengths(input_mesh, checked, options)
+        metric = options.repair, options.strict, None if user_lengths is None else user_lengths.tobytes()
+        with named_rounding(input_mesh.vertices, input_mesh.faces):
+            lengths, note = self._lengths.of(
+                metric, lambda: _open_triangles(checked, user_lengths, options.strict)
+            )
+        constraints = locate_constraints(checked, options, input_mesh)
         notes = [] if note is None else [note]
-        if note is not None or len(checked.face_origin) < len(np.asarray(given.faces)):
-            notes += rounding_notes(given.vertices, given.faces)
-        forbidden = forbidden_edges(checked, options, len(np.asarray(given.vertices)))
+        if note is not None or len(checked.face_origin) < len(np.asarray(input_mesh.faces)):
+            notes += rounding_notes(input_mesh.vertices, input_mesh.faces)
+        forbidden = forbidden_edges(checked, options, len(np.asarray(input_mesh.vertices)))
         marked = np.empty(0, dtype=np.int64)
         if options.marks_seams:
-            marked, isolated = effective_marks(checked.mesh, marked_edges(checked, options, given, forbidden))
+            marked, isolated = effective_marks(
+                checked.mesh, marked_edges(checked, options, input_mesh, forbidden)
+            )
             if len(isolated):
                 notes.append(_isolated_note(constraints.names[checked.mesh.edges[isolated]]))
             constraints.check_off_seams(checked.mesh.edges[marked])
@@ -188,10 +194,10 @@ class Source:
         seen = self._visibility(checked, options) if options.hide_seams else None
         is_forbidden = forbidden[checked.mesh.halfedge_edges].reshape(-1, 3)
         areas = double_areas(
-            edge_lengths(checked.mesh.vertices, checked.mesh.faces) if own is None else lengths
+            edge_lengths(checked.mesh.vertices, checked.mesh.faces) if user_lengths is None else lengths
         )
-        parts = tuple(
-            _part(
+        components = tuple(
+            _component(
                 piece,
                 constraints.within(piece[1]),
                 is_diagonal[piece[2]],
@@ -205,17 +211,21 @@ class Source:
         # The memory is checked once only, because cached values are no longer free.
         count = len(checked.mesh.faces)
         self._fits.of(count, lambda: check_memory(count))
-        if options.boundary_kind != "free" and not any(part.mesh.is_boundary_vertex.any() for part in parts):
+        if options.boundary_kind != "free" and not any(
+            component.mesh.is_boundary_vertex.any() for component in components
+        ):
             notes.append("The surface has no boundary, so the option boundary has no effect.")
-        return Prepared(given, checked, tuple(notes), parts, checked.mesh.edges[marked], own)
+        return Prepared(
+            input_mesh, checked, tuple(notes), components, checked.mesh.edges[marked], user_lengths
+        )
 
     def _check(self, repair: bool) -> tuple[CheckedMesh, BoolArray]:
         """Return the checked mesh, and (m, 3) which of its sides are inside a polygon of the input."""
-        dropped = _short_faces(self.given, repair)
-        with named_rounding(self.given.vertices, self.given.faces):
-            checked = at_unit_size(check_mesh(self.given.vertices, self.given.faces, repair=repair))
+        dropped = _short_faces(self.input_mesh, repair)
+        with named_rounding(self.input_mesh.vertices, self.input_mesh.faces):
+            checked = at_unit_size(check_mesh(self.input_mesh.vertices, self.input_mesh.faces, repair=repair))
         checked = replace(checked, notes=(*dropped, *checked.notes))
-        return checked, reorder_corners(checked, ~self.given.is_side())
+        return checked, reorder_corners(checked, ~self.input_mesh.is_side())
 
     def _visibility(self, checked: CheckedMesh, options: Options) -> FloatArray:
         up = None if options.up is None else np.array(options.up)
@@ -223,13 +233,13 @@ class Source:
         return self._seen.of(key, lambda: visible_share(checked.mesh.vertices, checked.mesh.faces, up))
 
 
-def _short_faces(given: InputMesh, repair: bool) -> tuple[str, ...]:
+def _short_faces(input_mesh: InputMesh, repair: bool) -> tuple[str, ...]:
     """Return a note on faces of the file with fewer than three corners, which are left out.
 
     Raises:
         DegenerateFaceError: there are some, and the mesh is not repaired.
     """
-    count = 0 if given.source is None else given.source.short_faces
+    count = 0 if input_mesh.source is None else input_mesh.source.short_faces
     if not count:
         return ()
     if not repair:
@@ -240,29 +250,31 @@ def _short_faces(given: InputMesh, repair: bool) -> tuple[str, ...]:
 
 
 def _open_triangles(
-    checked: CheckedMesh, own: FloatArray | None, strict: bool
+    checked: CheckedMesh, user_lengths: FloatArray | None, strict: bool
 ) -> tuple[FloatArray, str | None]:
     """Return (m, 3) side lengths with which every triangle has area, and a note if lengths were changed."""
-    lengths = edge_lengths(checked.mesh.vertices, checked.mesh.faces) if own is None else own
+    lengths = (
+        edge_lengths(checked.mesh.vertices, checked.mesh.faces) if user_lengths is None else user_lengths
+    )
     return mollify(lengths, checked.mesh, strict=strict, names=checked.face_origin)
 
 
 def _pieces(mesh: TriangleMesh, marked: IntArray, lengths: FloatArray) -> tuple[Piece, ...]:
     """Return the connected parts of a mesh after cutting it along edges (k,)."""
     opened = open_along(mesh, marked) if len(marked) else CutMesh(mesh, np.arange(len(mesh.vertices)))
-    parts = opened.mesh.split_components()
-    return tuple((part, opened.origin[at], faces, lengths[faces]) for part, at, faces in parts)
+    components = opened.mesh.split_components()
+    return tuple((component, opened.origin[at], faces, lengths[faces]) for component, at, faces in components)
 
 
-def _own_lengths(given: InputMesh, checked: CheckedMesh, options: Options) -> FloatArray | None:
+def _user_lengths(input_mesh: InputMesh, checked: CheckedMesh, options: Options) -> FloatArray | None:
     """Return (m, 3) the side lengths given by the user, or None."""
     if options.lengths is None:
         return None
-    if given.source is not None:
+    if input_mesh.source is not None:
         raise OptionError(
             "lengths can be given for a mesh of arrays only: give vertices and faces, not a file"
         )
-    return lengths_of_input(checked, options.lengths, len(np.asarray(given.faces)))
+    return lengths_of_input(checked, options.lengths, len(np.asarray(input_mesh.faces)))
 
 
 def _isolated_note(pairs: IntArray) -> Unmet:
@@ -272,7 +284,7 @@ def _isolated_note(pairs: IntArray) -> Unmet:
     )
 
 
-def _part(
+def _component(
     piece: Piece,
     limits: Constraints,
     is_diagonal: BoolArray,
@@ -280,8 +292,8 @@ def _part(
     visibility: FloatArray | None,
     areas: FloatArray,
     options: Options,
-) -> Part:
-    """Return a part with its specifications.
+) -> Component:
+    """Return a component with its specifications.
 
     Args:
         piece: the mesh.
@@ -306,7 +318,7 @@ def _part(
         max_angle=options.max_cone_angle,
         positive_only=options.positive_only,
         quantum=options.quantise,
-        given=limits.cones,
+        prescribed=limits.cones,
         required=limits.required.vertices,
         is_allowed=limits.is_allowed,
         weights=limits.weights,
@@ -338,4 +350,4 @@ def _part(
         is_avoided=is_diagonal.ravel()[sides],
         is_forbidden=is_forbidden.ravel()[sides],
     )
-    return Part(mesh, vertices, faces, lengths, areas, cones, metric, seams)
+    return Component(mesh, vertices, faces, lengths, areas, cones, metric, seams)

@@ -27,8 +27,8 @@ def cones_at(
 ) -> ConeSolution:
     """Return cones at given vertices of a connected mesh with curvatures that follow from phi = 0 (Section 3.1).
 
-    The section is that of the paper. The log scale solves a Dirichlet problem: phi = 0 at cones and boundary, and
-    L phi = -K elsewhere. The target curvature is then K + L phi.
+    The section is that of the paper. The log conformal factor solves a Dirichlet problem: phi = 0 at cones and
+    boundary, and L phi = -K elsewhere. The target curvature is then K + L phi.
 
     Args:
         laplacian: (n, n) cotangent Laplacian L.
@@ -47,7 +47,7 @@ def cones_at(
         if euler_characteristic != 0:
             raise CurvatureError(
                 f"a closed surface of Euler characteristic {euler_characteristic} has a total curvature of "
-                f"{2 * euler_characteristic} pi and needs cones to carry it, but has none: give or allow some"
+                f"{2 * euler_characteristic} pi and needs cones to absorb it, but has none: give or allow some"
             )
         grounded[0] = True
     phi = GroundedLaplacian(laplacian, grounded).solve(-curvature)
@@ -63,7 +63,7 @@ def cones_with_curvature(
     cones: IntArray,
     curvatures: FloatArray,
 ) -> ConeSolution:
-    """Return the log scale of cones with given curvatures (Eq. 1 of the paper) on a connected mesh.
+    """Return the log conformal factor of cones with given curvatures (Eq. 1 of the paper) on a connected mesh.
 
     On a mesh with boundary, phi = 0 on the boundary, which absorbs the remaining curvature.
 
@@ -102,13 +102,13 @@ def checked_sum(curvatures: FloatArray, euler_characteristic: int | None) -> Flo
     if euler_characteristic is None:
         return curvatures
     needed = 2 * np.pi * euler_characteristic
-    found = float(np.sum(curvatures))
-    if abs(found - needed) > TYPED_TOLERANCE:
+    total = float(np.sum(curvatures))
+    if abs(total - needed) > TYPED_TOLERANCE:
         raise CurvatureError(
             f"cone curvatures must sum to 2 pi chi = {needed:.7g} ({2 * euler_characteristic} pi) on this "
-            f"closed surface, but sum to {found:.7g} ({found / np.pi:.6g} pi): off by {found - needed:.3g}"
+            f"closed surface, but sum to {total:.7g} ({total / np.pi:.6g} pi): off by {total - needed:.3g}"
         )
-    return curvatures + (needed - found) / len(curvatures) if len(curvatures) else curvatures
+    return curvatures + (needed - total) / len(curvatures) if len(curvatures) else curvatures
 
 
 def fitted_cones(
@@ -122,8 +122,8 @@ def fitted_cones(
 ) -> ConeSolution:
     """Return cones with given curvatures; those that are not given minimise E.
 
-    With the Green's functions g_i of the cones, the linear log scale is phi_0 + sum k_i g_i, and E is its area-weighted
-    standard deviation. This is a convex quadratic program in the curvatures that are not given.
+    With the Green's functions g_i of the cones, the linear log conformal factor is phi_0 + sum k_i g_i, and E is its
+    area-weighted standard deviation. This is a convex quadratic program in the curvatures that are not given.
 
     Args:
         linear: the linear model of the connected mesh.
@@ -146,14 +146,19 @@ def fitted_cones(
     prescribed = curvatures[~is_free]
     total = np.nan if euler is None else 2 * np.pi * euler - prescribed.sum()
     count = int(is_free.sum())
-    own, rest = np.ascontiguousarray(gram[np.ix_(is_free, is_free)]), gram[np.ix_(is_free, ~is_free)]
-    least, most = np.full(count, limits.least), np.full(count, limits.most)
-    found, _, _ = fit_curvatures(own, slope[is_free] + rest @ prescribed, least, most, float(total))
+    gram_of_free, coupling = (
+        np.ascontiguousarray(gram[np.ix_(is_free, is_free)]),
+        gram[np.ix_(is_free, ~is_free)],
+    )
+    lower, upper = np.full(count, limits.lower), np.full(count, limits.upper)
+    fitted, _, _ = fit_curvatures(
+        gram_of_free, slope[is_free] + coupling @ prescribed, lower, upper, float(total)
+    )
     filled = curvatures.copy()
-    filled[is_free] = found
+    filled[is_free] = fitted
     return linear.solution_of(cones, checked_sum(filled, euler))
 
 
-def _covariances(one: FloatArray, other: FloatArray, areas: FloatArray) -> FloatArray:
+def _covariances(first: FloatArray, second: FloatArray, areas: FloatArray) -> FloatArray:
     """Return (k, l) the area-weighted covariances of functions (k, f) and (l, f)."""
-    return (one * areas) @ other.T - np.outer(one @ areas, other @ areas)
+    return (first * areas) @ second.T - np.outer(first @ areas, second @ areas)

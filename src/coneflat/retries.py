@@ -1,0 +1,292 @@
+"""Policies: when and how a component is laid out again, each one function with its reason."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from .base.progress import stage
+from .bounds import TOLERATED_EXCESS, borders_and_distortion, excess, is_too_distorted, rank
+from .cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, close_search, uses_sparse_search, with_corners
+from .errors import ConvergenceError, CurvatureError, MetricError, OptionError, SeamError
+from .flattening import (
+    Steps,
+    finish_component,
+    infeasible_cones,
+    lay_out_component,
+    relax_components,
+)
+from .geometry import dihedral_angles
+from .geometry.opening import RISKY_AREA, thickness, with_slack
+from .groups import ComponentProgress, groups_of_small
+from .mesh.connectivity import TriangleMesh
+from .optimise import mean_qc
+from .options import Options
+from .source.components import Component, Prepared, Source
+from .stages import Layout
+
+# Largest number of cone searches per component.
+MAX_SEARCHES = 4
+# A component beyond the allowed area distortion is relaxed with this stretch, then flattened with tighter bounds of the
+# search: at most so often, and by at most this factor each time.
+MAX_CORRECTIONS, MAX_TIGHTENING, CORRECTING_STRETCH = 2, 2.0, 0.1
+# Dihedral angle, radians, above which edges are cut where a solid is too distorted otherwise. The edges between half of
+# it and itself then bend the surface by at most this share of what sharper ones do: 0 to 0.07 of it on plates, gears
+# and rings, 0.15 and more on noise.
+SHARP_ANGLE, MAX_BETWEEN = np.radians(40), 0.1
+# Fraction of the work that computes the layouts; the rest relaxes and separates them.
+LAYING_OUT = 0.8
+#: Errors of a component that a retry may solve, and after which its earlier layout remains.
+FAILURES = CurvatureError, MetricError, SeamError
+
+
+def lay_out_components(components: Mapping[int, Component], steps: Steps) -> dict[int, Layout]:
+    """Return the layout of each component in one chart."""
+    progress = ComponentProgress(components, LAYING_OUT, steps.names_components)
+    layouts = {}
+    for i, component in components.items():
+        with progress.at(component):
+            layouts[i] = lay_out_with_thick_triangles(component, steps)
+    return layouts
+
+
+def lay_out_with_thick_triangles(component: Component, steps: Steps) -> Layout:
+    """Return the layout of a component in one chart.
+
+    If no metric is found because of thin triangles, such as those that rounded coordinates leave, all are opened more.
+    """
+    try:
+        return lay_out_with_feasible_cones(component, steps)
+    except ConvergenceError:
+        if not (thickness(component.lengths) < RISKY_AREA).any():
+            raise
+    return lay_out_with_feasible_cones(replace(component, lengths=with_slack(component.lengths)), steps)
+
+
+def lay_out_with_feasible_cones(component: Component, steps: Steps) -> Layout:
+    """Return the layout of a component in one chart.
+
+    The triangles around a cone may be unable to form the cone angle, which is known only after the layout. Then other
+    cones are searched for: each search forbids the cones that were infeasible before. A later search may have more
+    infeasible cones, so the best layout of all searches is returned.
+    """
+    with stage("cones"):
+        surface = steps.surface(component)
+    may_repeat = component.is_exact and uses_sparse_search(component.mesh, component.cones)
+    layouts = list[Layout]()
+    for _ in range(MAX_SEARCHES):
+        layouts.append(lay_out_component(surface, component, steps))
+        infeasible = infeasible_cones(layouts[-1])
+        if not (may_repeat and len(infeasible)):
+            break
+        component = replace(component, cones=component.cones.without(infeasible))
+    close_search(surface)
+    return min(layouts, key=lambda layout: (len(layout.notes), len(infeasible_cones(layout))))
+
+
+def finish_components(
+    components: Mapping[int, Component], layouts: Mapping[int, Layout], steps: Steps
+) -> dict[int, Layout]:
+    """Return relaxed layouts without inverted triangles, and without overlaps if these are separated."""
+    progress = ComponentProgress(components, 1 - LAYING_OUT, steps.names_components)
+    finished = dict[int, Layout]()
+    for group in groups_of_small(components, steps.relax):
+        relaxed = relax_components([components[i] for i in group], [layouts[i] for i in group], steps)
+        for i, layout in zip(group, relaxed, strict=True):
+            with progress.at(components[i]):
+                finished[i] = finish_component(components[i], layout, steps)
+    return finished
+
+
+def finish_within_bound(
+    components: Mapping[int, Component], layouts: Mapping[int, Layout], steps: Steps
+) -> dict[int, Layout]:
+    """Return finished layouts whose area distortion is at most the one allowed, as far as possible.
+
+    The cone search bounds the distortion of the linear model. On coarse meshes, that of the triangles in the plane may
+    be larger.
+    """
+    finished = finish_components(components, layouts, steps)
+    finished |= open_at_corners(components, finished, steps)
+    beyond = {
+        i: component
+        for i, component in components.items()
+        if excess([component], [finished[i]]) > TOLERATED_EXCESS
+    }
+    finished |= relax_areas(beyond, layouts, finished, steps)
+    return finished | search_more_cones(beyond, finished, with_relaxed_areas(steps))
+
+
+def open_at_corners(
+    components: Mapping[int, Component], finished: Mapping[int, Layout], steps: Steps
+) -> dict[int, Layout]:
+    """Return the better layouts of polyhedra with all their corners as cones.
+
+    The cones that a search finds need not be corners, and triangles around them are distorted; a polyhedron opened at
+    all of its corners keeps its shape. One with few corners is tried, and any that is too distorted. An open surface
+    that needs no cone gets none.
+    """
+    polyhedra = {}
+    for i, component in components.items():
+        is_distorted = is_too_distorted(component, finished[i])
+        if not is_distorted and not len(finished[i].cones) and component.mesh.is_boundary_vertex.any():
+            continue
+        largest_count = MAX_SEARCHED if is_distorted else MAX_POLYHEDRON_CORNERS
+        cones = with_corners(component.mesh, component.lengths, component.cones, largest_count)
+        if cones is not None:
+            polyhedra[i] = replace(component, cones=cones)
+    return retried(polyhedra, components, finished, steps)
+
+
+def relax_areas(
+    beyond: Mapping[int, Component],
+    layouts: Mapping[int, Layout],
+    finished: Mapping[int, Layout],
+    steps: Steps,
+) -> dict[int, Layout]:
+    """Return the better layouts of components beyond the bound, with all triangles relaxed with some weight on areas.
+
+    Args:
+        beyond: these components.
+        layouts, finished: their layouts before relaxing, and the best so far.
+        steps: the functions of the stages.
+    """
+    relaxed = with_relaxed_areas(steps)
+    if not beyond or relaxed is steps:
+        return {}
+    return better_layouts(finish_components(beyond, layouts, relaxed), finished, beyond)
+
+
+def with_relaxed_areas(steps: Steps) -> Steps:
+    """Return steps that relax with some weight on areas, unless nothing is relaxed or areas have more weight."""
+    if steps.relax.is_off or steps.relax.stretch >= CORRECTING_STRETCH:
+        return steps
+    return replace(steps, relax=replace(steps.relax, stretch=CORRECTING_STRETCH))
+
+
+def search_more_cones(
+    beyond: Mapping[int, Component], finished: Mapping[int, Layout], steps: Steps
+) -> dict[int, Layout]:
+    """Return the better layouts of components beyond the bound that a tighter bound of the cone search gives."""
+    improved = dict[int, Layout]()
+    attempts = dict(beyond)
+    for _ in range(MAX_CORRECTIONS):
+        latest = {**finished, **improved}
+        tightened = dict[int, Component]()
+        for i, attempt in attempts.items():
+            factor = min(excess([beyond[i]], [latest[i]]), MAX_TIGHTENING)
+            # About that many times as many cones are needed; a search without enough of them takes longest.
+            if factor > TOLERATED_EXCESS and factor * len(latest[i].cones) <= MAX_SEARCHED:
+                tightened[i] = attempt.with_distortion(TOLERATED_EXCESS / factor)
+        better = retried(tightened, beyond, latest, steps)
+        improved |= better
+        attempts = {i: tightened[i] for i in better}
+    return improved
+
+
+def retried(
+    attempts: Mapping[int, Component],
+    components: Mapping[int, Component],
+    finished: Mapping[int, Layout],
+    steps: Steps,
+) -> dict[int, Layout]:
+    """Return the layouts of components with other cones that are better than the finished ones.
+
+    Args:
+        attempts: the components with other cones; one that fails is left out.
+        components: the components with the cones that the options require.
+        finished: their layouts.
+        steps: the functions of the stages.
+    """
+    better = dict[int, Layout]()
+    for group in groups_of_small(attempts, steps.relax):
+        members = {i: attempts[i] for i in group}
+        with suppress(*FAILURES):
+            candidates = finish_components(members, lay_out_components(members, steps), steps)
+            better |= better_layouts(candidates, finished, components)
+    return better
+
+
+def better_layouts(
+    candidates: Mapping[int, Layout], finished: Mapping[int, Layout], components: Mapping[int, Component]
+) -> dict[int, Layout]:
+    """Return the candidates that rank before the finished layouts of the same components."""
+    return {
+        i: candidate
+        for i, candidate in candidates.items()
+        if rank([components[i]], [candidate]) < rank([components[i]], [finished[i]])
+    }
+
+
+def cut_along_sharp_edges(
+    source: Source,
+    prepared: Prepared,
+    layouts: Sequence[Layout],
+    options: Options,
+    flatten_pieces: Callable[[Sequence[Component]], list[Layout]],
+) -> tuple[Prepared, list[Layout]]:
+    """Return the input with sharp edges as seams in solids that are too distorted otherwise, and the layouts.
+
+    Args:
+        source, prepared, options: the mesh, its components, and the options.
+        layouts: the layouts of the components.
+        flatten_pieces: returns the finished layouts of components.
+    """
+    if options.charts != "atlas" or options.sharp_angle is not None:
+        return prepared, list(layouts)
+    distorted = [
+        i
+        for i, (component, layout) in enumerate(zip(prepared.components, layouts, strict=True))
+        if is_machined(component.mesh) and is_too_distorted(component, layout)
+    ]
+    if not distorted:
+        return prepared, list(layouts)
+    try:
+        sharp = source.prepared(replace(options, sharp_angle=SHARP_ANGLE))
+    except (OptionError, SeamError):  # options name vertices or edges that such seams exclude
+        return prepared, list(layouts)
+    pieces_of = sharp.pieces_of(prepared, distorted)
+    try:
+        layouts_of_pieces = iter(flatten_pieces([piece for i in distorted for piece in pieces_of[i]]))
+    except FAILURES:
+        return prepared, list(layouts)
+    replaced = {}
+    for i in distorted:
+        component, pieces = prepared.components[i], pieces_of[i]
+        cut = [next(layouts_of_pieces) for _ in pieces]
+        if is_worth_its_seams(pieces, cut, component, layouts[i]):
+            note = (
+                f"Edges above {np.degrees(SHARP_ANGLE):g} degrees are seams {component.location}: without them its "
+                f"mean QC distortion is {mean_qc(layouts[i]):.3g}."
+            )
+            replaced[i] = [cut[0].with_notes(note), *cut[1:]]
+    if not replaced:
+        return prepared, list(layouts)
+    prepared = prepared.with_pieces(sharp, {i: pieces_of[i] for i in replaced})
+    return prepared, [layout for i, uncut in enumerate(layouts) for layout in replaced.get(i, [uncut])]
+
+
+def is_worth_its_seams(
+    pieces: Sequence[Component], cut: Sequence[Layout], component: Component, uncut: Layout
+) -> bool:
+    """Return whether layouts of pieces of a component are better than its layout, and cost less with their seams."""
+    is_better = rank(pieces, cut) < rank([component], [uncut])
+    return is_better and borders_and_distortion(pieces, cut) < borders_and_distortion([component], [uncut])
+
+
+def is_machined(mesh: TriangleMesh) -> bool:
+    """Return whether a mesh is a solid whose edges are either sharp or nearly flat.
+
+    On noise, which bends at all angles, sharp edges would cut a surface into hundreds of charts, and a sheet is rarely
+    meant to fall apart.
+    """
+    if mesh.is_boundary_vertex.any():
+        return False
+    angles = np.abs(dihedral_angles(mesh))
+    ends = mesh.vertices[mesh.edges]
+    bending = angles * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    is_between = (angles > SHARP_ANGLE / 2) & (angles <= SHARP_ANGLE)
+    return bool(bending[is_between].sum() < MAX_BETWEEN * bending[angles > SHARP_ANGLE].sum())
