@@ -19,9 +19,8 @@ import shapes  # noqa: E402
 import stored  # noqa: E402
 
 from coneflat import ConeflatError, Flattening, check_mesh, flatten, read_mesh  # noqa: E402
-from coneflat.apps.cli.values import parse_angle  # noqa: E402
 from coneflat.mesh.connectivity import TriangleMesh  # noqa: E402
-from coneflat.options import Options, declarations  # noqa: E402
+from coneflat.options import Options, declarations, parse_angle  # noqa: E402
 
 #: The folder of models: `../shared/meshes`, or those of `tests/data`.
 MODELS = stored.model_folder()

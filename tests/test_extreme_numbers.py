@@ -59,7 +59,7 @@ def test_an_extreme_number_leads_to_a_finite_result_or_to_one_of_our_errors(func
 
 
 @pytest.mark.parametrize(("function", "name"), NUMBERS)
-def test_what_is_not_a_number_is_refused_by_name(function, name):
+def test_values_that_are_not_numbers_are_refused_by_name(function, name):
     noun = name.replace("_", " ").removeprefix("min ").removeprefix("max ")
     text = outcome(FUNCTIONS[function][1], **with_size(function, name, np.nan))
     assert name in text or noun in text
@@ -80,7 +80,7 @@ def test_the_ends_of_the_range_of_area_distortions_are_valid(area):
 def test_extreme_numbers_for_a_cortex(tmp_path):
     nibabel = pytest.importorskip("nibabel")
     from coneflat.apps.brains import flatten_cortex
-    from coneflat.apps.cli.more import BrainOptions
+    from coneflat.apps.cli.brain_command import BrainOptions
 
     nibabel.freesurfer.write_geometry(tmp_path / "lh.pial", *shapes.sphere(2))
     names = [name for name, one in declarations(BrainOptions).items() if isinstance(one.kind, Number)]

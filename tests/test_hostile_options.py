@@ -65,7 +65,7 @@ def test_extreme_values_lead_to_a_result_or_to_one_of_our_errors(name):
 
 @pytest.mark.parametrize("shape", [shapes.grid, shapes.cylinder, lambda: shapes.grid(1, 1)])
 @pytest.mark.parametrize("count", [0, 1, 2, 5])
-def test_a_number_of_cones_on_what_is_flat_already(shape, count):
+def test_a_number_of_cones_on_a_flat_surface(shape, count):
     vertices, faces = shape()
     result = coneflat.flatten(vertices, faces, cone_count=count)
     assert len(result.cones) <= count
@@ -73,7 +73,7 @@ def test_a_number_of_cones_on_what_is_flat_already(shape, count):
     assert coneflat.find_cones(vertices, faces, cone_count=count).distortion < 1e-6
 
 
-def test_the_curve_of_what_is_flat_is_one_point():
+def test_the_curve_of_a_flat_surface_is_one_point():
     curve = coneflat.cone_curve(*shapes.grid(8, 6))
     assert curve.counts.tolist() == [0]
     assert curve.distortions[0] < 1e-6
@@ -115,7 +115,7 @@ def test_costs_of_seams_that_overflow_when_summed():
 
 
 @pytest.mark.parametrize("quantum", [1e-20, 1e-300, MIN_QUANTUM / 2, math.inf, -1.0, 7.0])
-def test_a_quantum_outside_its_bounds_is_refused_with_them(quantum):
+def test_a_quantum_outside_its_bounds_is_refused(quantum):
     with pytest.raises(errors.OptionError, match="quantise must be from 0.0001 radians"):
         coneflat.flatten(*shapes.sphere(1), quantise=quantum)
 
@@ -132,7 +132,7 @@ def test_the_least_quantum_gives_its_multiples():
     assert np.allclose(units, np.round(units), atol=1e-5)
 
 
-def test_angles_without_bound_are_no_bound():
+def test_infinite_angles_are_no_bound():
     vertices, faces = shapes.torus(10, 8)
     plain = coneflat.flatten(vertices, faces, max_cone_angle=None)
     for bound in (1e300, math.inf, "none"):

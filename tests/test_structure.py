@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import re
 import sys
 from graphlib import CycleError
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 from structure import (
     STAGES,
     Module,
+    file_circles,
     imported_packages,
     levels,
     module_paths,
@@ -38,6 +41,21 @@ def test_packages_do_not_import_each_other_in_circles():
     except CycleError as error:
         pytest.fail(f"packages import each other in a circle: {' -> '.join(error.args[1])}")
     assert max(level for name, level in found.items() if is_core(name)) <= LEVELS
+
+
+def test_files_do_not_import_each_other_in_circles():
+    circles = file_circles(read_modules())
+    assert [circle for circle in circles if "quadmesh.files" not in circle] == []
+
+
+def test_entry_points_are_functions_of_the_package():
+    """Names of functions in text, which imports do not check."""
+    texts = [path.read_text(encoding="utf-8") for path in NAMES.values()]
+    targets = {target for text in texts for target in re.findall(r'\bEntryPoint\[.*\]\("(.+?)"\)', text)}
+    assert len(targets) > 9
+    for target in targets:
+        module, _, name = target.partition(":")
+        assert callable(getattr(import_module(f"coneflat.{module}"), name)), target
 
 
 @pytest.mark.parametrize("stage", STAGES)
@@ -72,7 +90,7 @@ def test_applications_do_not_import_what_is_inside_others():
 @pytest.mark.parametrize("name", sorted(filter(is_core, NAMES)))
 def test_the_core_imports_no_application(name: str):
     module = read_modules()[name]
-    allowed = name in ("", "result", "__main__", "quadmesh.quad_mesh")
+    allowed = name in ("", "__main__", "quadmesh.quad_mesh")
     imported = set() if allowed else module.imports | module.late_imports
     assert [other for other in imported if not is_core(other)] == []
 
@@ -94,4 +112,5 @@ def test_the_check_sees_what_it_should(tmp_path):
     assert found["files"].imports == {"mesh"}
     with pytest.raises(CycleError):
         levels(found)
+    assert file_circles(found) == [["files", "mesh"]]
     assert ast.parse((tmp_path / "mesh.py").read_text())

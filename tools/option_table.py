@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from coneflat.apps.cli.flags import flag_name, shown_default
 from coneflat.apps.cli.main import cli
-from coneflat.apps.cli.options import flag_name, shown_default
 from coneflat.options import declarations, kinds
 from coneflat.options.declared import (
     AtlasOptions,

@@ -129,10 +129,32 @@ def imported_packages(modules: dict[str, Module]) -> dict[str, frozenset[str]]:
         others = {package_of(other) for other in module.imports | module.late_imports}
         if own == "":
             others = set()
-        if name in ("result", "quadmesh.quad_mesh"):  # their `save` and `view`
+        if name == "quadmesh.quad_mesh":  # its `save` and `view`
             others = {package_of(other) for other in module.imports}
         found.setdefault(own, set()).update(others - {own, ""})
     return {name: frozenset(others) for name, others in found.items()}
+
+
+def file_circles(modules: dict[str, Module]) -> list[list[str]]:
+    """Return the groups of modules that import each other in circles, late imports counted.
+
+    A group is a strongly connected component with several modules. What only type checkers import does not count, nor
+    do names of modules in text: public names of a package's `__init__`, and `EntryPoint`.
+    """
+    reached = {name: _reached(name, modules) for name in modules}
+    circles = {tuple(sorted(other for other in reached[name] if name in reached[other])) for name in modules}
+    return [list(circle) for circle in sorted(circles) if circle]
+
+
+def _reached(name: str, modules: dict[str, Module]) -> set[str]:
+    """Return the modules that a module imports, directly or through others."""
+    reached, waiting = set[str](), [name]
+    while waiting:
+        module = modules[waiting.pop()]
+        unvisited = (module.imports | module.late_imports) & modules.keys() - reached
+        reached |= unvisited
+        waiting += unvisited
+    return reached
 
 
 def levels(modules: dict[str, Module]) -> dict[str, int]:

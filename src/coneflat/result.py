@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .base.arrays import FloatArray, IntArray, rows_of
+from .base.entry_points import EntryPoint
 from .base.notes import new_notes, warn_of, warns
 from .base.text import plural
 from .stages import SolveStatistics
@@ -22,6 +23,17 @@ if TYPE_CHECKING:
     from .io.mesh_file import MeshFile
     from .measures.distortion import Distortion
     from .measures.seam_data import Rotations, SeamData
+
+#: Functions of measures, files and the viewer, which import results.
+_REPORT = EntryPoint[dict[str, Any]]("measures.report:as_dict")
+_SEAM_DATA = EntryPoint["SeamData"]("measures.seam_data:seam_data")
+_WRITE = EntryPoint[tuple[Path, "Flattening"]]("io.write:write_stored")
+_AS_WRITTEN = EntryPoint["Flattening"]("io.write:as_written")
+_TO_TRIMESH = EntryPoint["trimesh.Trimesh"]("io.packages:to_trimesh")
+_TO_PYVISTA = EntryPoint["pyvista.PolyData"]("io.packages:to_pyvista")
+_TO_MESHIO = EntryPoint["meshio.Mesh"]("io.packages:to_meshio")
+_SHOW_PAGE = EntryPoint[Path]("apps.view.page.webpage:show_page")
+_NOTEBOOK_HTML = EntryPoint[str]("apps.view.page.webpage:notebook_html")
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,15 +112,11 @@ class Flattening:
     @cached_property
     def seam_data(self) -> SeamData:
         """The cut as arrays: both sides of each seam edge and the motion between them, charts, cone angles, scales."""
-        from .measures.seam_data import seam_data
-
-        return seam_data(self)
+        return _SEAM_DATA(self)
 
     def report(self) -> dict[str, Any]:
         """Return all measures as plain Python values, ready for JSON."""
-        from .measures.report import as_dict
-
-        return as_dict(self)
+        return _REPORT(self)
 
     def save(self, path: str | PathLike[str], *, texture: str | PathLike[str] | None = None) -> Path:
         """Write the mesh with its UVs to a file and return its path.
@@ -122,9 +130,7 @@ class Flattening:
             MeshFileError: the file cannot be written, or the texture cannot be read.
             OptionError: the format cannot contain a texture, or Pillow is not installed.
         """
-        from .io.write import write_stored
-
-        written, stored = write_stored(self, path, texture)
+        written, stored = _WRITE(self, path, texture)
         # Rounding to the numbers of the format can break guarantees.
         warn_of(new_notes(stored, self), f"result.as_written('{written.suffix.lower()}').notes")
         return written
@@ -142,9 +148,7 @@ class Flattening:
         Raises:
             MeshFileError: numbers are too large for the format.
         """
-        from .io.write import as_written
-
-        return as_written(self, ending)
+        return _AS_WRITTEN(self, ending)
 
     def to_trimesh(self) -> trimesh.Trimesh:
         """Return a textured trimesh mesh, whose vertices are split at seams.
@@ -154,9 +158,7 @@ class Flattening:
         Raises:
             OptionError: trimesh is not installed.
         """
-        from .io.packages import to_trimesh
-
-        return to_trimesh(self)
+        return _TO_TRIMESH(self)
 
     def to_pyvista(self) -> pyvista.PolyData:
         """Return a PyVista surface with 32-bit active texture coordinates, whose points are split at seams.
@@ -166,9 +168,7 @@ class Flattening:
         Raises:
             OptionError: PyVista is not installed.
         """
-        from .io.packages import to_pyvista
-
-        return to_pyvista(self)
+        return _TO_PYVISTA(self)
 
     def to_meshio(self) -> meshio.Mesh:
         """Return a meshio mesh, whose points are split at seams; UVs are the point data `obj:vt`.
@@ -178,9 +178,7 @@ class Flattening:
         Raises:
             OptionError: meshio is not installed.
         """
-        from .io.packages import to_meshio
-
-        return to_meshio(self)
+        return _TO_MESHIO(self)
 
     def view(
         self,
@@ -212,24 +210,13 @@ class Flattening:
             ArrayShapeError, MeshError: there are no UVs, or the mesh cannot be simplified to so few triangles.
             UnknownFormatError, MeshFileError: a file cannot be read or written.
         """
-        from .apps.view import check_page, open_page, page_html, write_page
-        from .options.declared import MAX_SHOWN_TRIANGLES
-
-        if path is not None:
-            check_page(path)
-        most = MAX_SHOWN_TRIANGLES if most_triangles is None else most_triangles
-        page = write_page(
-            page_html(self, texture=texture, up=up, show=show, most_triangles=most, color=color), path
+        return _SHOW_PAGE(
+            self, path, texture=texture, up=up, show=show, most_triangles=most_triangles, color=color
         )
-        if path is None:
-            open_page(page)
-        return page
 
     def _repr_html_(self) -> str:
         """Return the page as an HTML frame for notebooks."""
-        from .apps.view import notebook_html
-
-        return notebook_html(self)
+        return _NOTEBOOK_HTML(self)
 
     def __repr__(self) -> str:
         return (

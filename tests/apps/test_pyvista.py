@@ -59,7 +59,7 @@ def test_quads_are_four_sided(ball):
     assert mesh.n_open_edges == 0
 
 
-def test_what_is_written_is_read_back(ball, tmp_path):
+def test_written_surfaces_are_read_back(ball, tmp_path):
     mesh = ball.coneflat.flatten()
     mesh.save(tmp_path / "ball.ply")
     mesh.save(tmp_path / "ball.vtp")

@@ -46,7 +46,7 @@ class TestAgainstDefinitions:
         assert found["flipped"] > 0
         assert found["overlapping_pairs"] > 0
 
-    def test_what_flatten_writes(self, tmp_path):
+    def test_files_that_flatten_writes(self, tmp_path):
         result = coneflat.flatten(*shapes.genus(2), charts="atlas")
         found = agree(result.save(tmp_path / "out.obj"))
         for measure in ("qc_mean", "area_std", "flipped", "seam_length", "overlapping_pairs"):
@@ -283,7 +283,7 @@ class TestFormats:
         assert found["packing_efficiency"] == pytest.approx(result.packing_efficiency)
         assert found["angle_sum_error"] < 1e-9
 
-    def test_no_manifold_is_measured_all_the_same(self, tmp_path):
+    def test_meshes_that_are_not_manifold_are_measured(self, tmp_path):
         """Three faces at an edge, one of them given twice: overlaps are those of all."""
         text = (
             SQUARE
@@ -299,7 +299,7 @@ class TestFormats:
         with pytest.raises(errors.NonManifoldError):
             measure_uv(path, strict=True)
 
-    def test_soups_of_overlaps_end_in_time(self):
+    def test_a_soup_of_overlapping_triangles_takes_bounded_time(self):
         """Every triangle on every other one."""
         faces = np.arange(3 * 2000).reshape(-1, 3)
         vertices = np.random.default_rng(0).random((faces.size, 3))

@@ -68,6 +68,6 @@ def test_meshes_of_such_objects_are_read():
         (F.astype(object) + 10**300, "faces must be an array of vertex indices"),
     ],
 )
-def test_faces_that_are_no_indices(faces, message):
+def test_faces_that_are_not_indices_are_refused(faces, message):
     with pytest.raises(errors.ArrayShapeError, match=message):
         coneflat.flatten(V, faces)

@@ -64,7 +64,7 @@ def test_a_kernel_is_compiled_once(folder):
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="another name of the temporary folder")
-def test_a_chosen_folder_gets_what_others_contain(folder, monkeypatch):
+def test_a_chosen_folder_gets_the_kernels_of_other_folders(folder, monkeypatch):
     compiled(copy_of(product))(np.arange(4.0), 2.0)
     monkeypatch.setattr(tempfile, "gettempdir", lambda: str(folder.parent))
     folder.rename(folder.parent / f"coneflat-{os.getuid()}")
@@ -217,7 +217,7 @@ class TestFolders:
         assert len(done.stderr.splitlines()) == 1
 
     @pytest.mark.skipif(sys.platform != "linux", reason="other folders")
-    def test_the_home(self, tmp_path):
+    def test_the_home_folder_is_used(self, tmp_path):
         home = tmp_path / "home"
         home.mkdir()
         assert self.folder(tmp_path, HOME=str(home)) == str(home / ".cache" / "coneflat")

@@ -37,7 +37,7 @@ def caught(call, *args):
     return found
 
 
-def test_information_is_no_warning():
+def test_information_does_not_warn():
     assert caught(inner, "Dropped 2 faces.") == []
     assert caught(inner) == []
 

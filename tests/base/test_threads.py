@@ -27,7 +27,7 @@ def test_on_one_thread_and_on_small_or_huge_meshes_the_inside_begins_afterwards(
     assert not working.result()
 
 
-def test_otherwise_both_run_at_the_same_time():
+def test_two_calls_run_at_the_same_time():
     begun = threading.Event()
     with concurrently(begun.wait, 10_000) as working:
         assert not working.done()

@@ -60,7 +60,7 @@ def changed(place, value):
 
 
 class TestGltf:
-    def test_positions_of_eleven_gigabytes_that_are_nowhere(self):
+    def test_positions_that_would_take_eleven_gigabytes_are_refused(self):
         make = square()
         make.tree["accessors"][0] = {"componentType": 5126, "count": 10**9, "type": "VEC3"}
         refused(make.glb(), "a.glb", "not in the file")
@@ -71,7 +71,7 @@ class TestGltf:
         }
         refused(make.glb(), "a.glb", "1,000,000,000 elements, more than the file has bytes")
 
-    def test_a_mesh_shown_for_ever(self):
+    def test_meshes_repeated_without_bound_are_refused(self):
         make = square()
         make.tree["nodes"] = [{"children": [1, 1]}, {"children": [0]}, {"mesh": 0}]
         refused(make.glb(), "a.glb", "reached twice")
@@ -82,7 +82,7 @@ class TestGltf:
         make.tree["meshes"][0]["primitives"] = [one] * 400
         refused(make.glb(), "a.glb", "so often that there are over 10,000,000 corners", most=MOST * 8)
 
-    def test_names_that_are_no_text(self):
+    def test_names_that_are_not_text_are_refused(self):
         make = square()
         make.tree["nodes"] = [{"mesh": 0, "name": 1.5}]
         refused(make.glb(), "a.glb", "the name of nodes 0 is 1.5, not a string")
@@ -155,7 +155,7 @@ class TestGltf:
             (17, "is not a string"),
         ],
     )
-    def test_buffers_that_are_not_to_be_had(self, uri, match, tmp_path, monkeypatch):
+    def test_missing_buffers_are_named(self, uri, match, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
         tree = opened(square().glb())[0]
         if uri is not None:
@@ -178,7 +178,7 @@ class TestGltf:
     def test_deep_json(self):
         refused(b'{"a":' * 100_000, "a.gltf", "nested too deeply|invalid JSON")
 
-    def test_sparse_positions_are_those_meant(self):
+    def test_sparse_positions_replace_those_of_the_buffer(self):
         make = square()
         where = make.view(np.array([2], "<u2").tobytes())
         new = make.view(np.array([5, 6, 7], "<f4").tobytes())
@@ -199,7 +199,7 @@ class TestGltf:
         mesh = read_mesh_from(make.glb(), "a.glb")
         assert mesh.vertices[:, :2].tolist() == [[0, 0], [1, 0], [1, -1], [0, 64 / 127]]
 
-    def test_a_byte_changed_anywhere_ends_in_an_error_of_ours_or_a_mesh(self, tmp_path):
+    def test_a_changed_byte_leads_to_a_mesh_or_a_named_error(self, tmp_path):
         whole = rich_scene()
         length = struct.unpack_from("<I", whole, 12)[0]
         rng = np.random.default_rng(1)
@@ -231,19 +231,19 @@ class TestNpz:
     @pytest.mark.parametrize(
         "change", [{"qc_mean": "a"}, {"seconds": {"a": []}}, {"notes": [3]}, {"residual": {}}]
     )
-    def test_reports_that_are_none_are_refused(self, saved, tmp_path, change):
+    def test_invalid_reports_are_refused(self, saved, tmp_path, change):
         with np.load(saved) as archive:
             report = json.loads(str(archive["report"])) | change
         with pytest.raises(MeshFileError, match=r"b\.npz"):
             coneflat.read_flattening(self.written(saved, tmp_path, report=np.array(json.dumps(report))))
 
-    def test_what_is_saved_again_is_the_same(self, saved, tmp_path):
+    def test_saving_a_read_result_again_gives_the_same_file(self, saved, tmp_path):
         result = coneflat.read_flattening(saved)
         for ending in (".npz", ".obj", ".ply", ".glb"):
             result.save(tmp_path / f"c{ending}")
         assert coneflat.read_flattening(tmp_path / "c.npz").report() == result.report()
 
-    def test_a_bomb_is_not_unpacked(self, saved, tmp_path):
+    def test_a_compression_bomb_is_refused(self, saved, tmp_path):
         bomb = tmp_path / "bomb.npz"
         with np.load(saved) as archive, zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as out:
             for name in archive.files:

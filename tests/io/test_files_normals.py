@@ -106,7 +106,7 @@ def test_without_normals_or_groups_the_surface_is_smooth(tmp_path):
     assert (np.einsum("mki,mi->mk", normals, side) < 0.9).all()
 
 
-def test_normals_that_are_none_are_passed_over(tmp_path):
+def test_unusable_normals_are_ignored(tmp_path):
     path = cube_obj(tmp_path / "cube.obj")
     text = path.read_text().replace("vn 2.5 0.0 0.0", "vn 0 0 0").replace("vn 0.0 2.5 0.0", "vn -1.#IND 0 0")
     path.write_text(text.replace("//6", "//99"))

@@ -33,7 +33,7 @@ def contents():
     return exported
 
 
-def test_content_tells_the_format(contents):
+def test_formats_are_recognized_by_content(contents):
     assert {ending.split()[0] for ending in contents} == set(INPUT_FORMATS) - {".gltf", ".gii", *FREESURFER}
     for ending, content in contents.items():
         there = read_mesh_from(content, "-", weld=False)
@@ -54,7 +54,7 @@ def test_a_gltf_with_its_data_within_goes_through_a_pipe(contents):
 
 
 @pytest.mark.parametrize("form", ["obj", "ply", "glb", "npz"])
-def test_results_go_out_as_they_would_into_a_file(contents, tmp_path, form):
+def test_a_pipe_gets_the_bytes_of_the_file(contents, tmp_path, form):
     ran = piped(contents[".ply"], "-", "-o", "-", "--format", form)
     assert ran.exit_code == 0, ran.output
     # The table stands on stderr.
@@ -73,7 +73,7 @@ def test_results_go_out_as_they_would_into_a_file(contents, tmp_path, form):
         np.testing.assert_array_equal(one.uv, other.uv)
 
 
-def test_what_comes_from_a_pipe_goes_to_one(contents):
+def test_a_mesh_from_a_pipe_is_written_to_a_pipe(contents):
     ran = piped(contents[".stl"], "-", "-q")
     assert ran.exit_code == 0
     assert ran.stdout_bytes.startswith(b"v ")
@@ -83,7 +83,7 @@ def test_what_comes_from_a_pipe_goes_to_one(contents):
 @pytest.mark.parametrize(
     ("content", "reason"), [(b"", "standard input is empty"), (b"hello\n", "- has no vertices")]
 )
-def test_what_is_no_mesh_is_refused(content, reason):
+def test_invalid_meshes_in_pipes_are_refused(content, reason):
     ran = piped(content, "-", "-o", "-")
     assert ran.exit_code != 0
     assert reason in str(ran.exception)
@@ -99,7 +99,7 @@ def test_what_is_no_mesh_is_refused(content, reason):
     ],
     ids=lambda arguments: arguments[0],
 )
-def test_what_is_no_mesh_goes_into_no_file_of_the_pipes_name(contents, tmp_path, monkeypatch, arguments):
+def test_an_invalid_mesh_leaves_no_file_named_as_the_pipe(contents, tmp_path, monkeypatch, arguments):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "hill.off").write_bytes(contents[".off"])
     ran = CliRunner().invoke(cli, arguments)

@@ -99,7 +99,7 @@ class TestFormats:
         loose = read_mesh(path, weld=False)
         assert (len(loose.vertices), loose.welded) == (12, 0)
 
-    def test_weld_takes_minus_zero_as_zero_and_nothing_else(self, tmp_path):
+    def test_welding_merges_minus_zero_and_zero_only(self, tmp_path):
         nearly = float(np.nextafter(1.0, 2))
         text = f"v 0 0 -0.0\nv 1 0 0\nv 0 1 0\nv -0 0 0.0\nv {nearly!r} 0 0\nv 5 5 5\nf 1 2 3\nf 4 3 5\n"
         path = written(tmp_path, "slit.obj", text)
@@ -153,7 +153,7 @@ class TestFormats:
         np.testing.assert_allclose(mesh.vertices.min(0), [-0.5, -0.5, -0.5], atol=1e-6)
         np.testing.assert_allclose(mesh.vertices.max(0), [3, 0.5, 0.5], atol=1e-6)
 
-    def test_unknown_ending_names_the_known(self, tmp_path):
+    def test_an_unknown_ending_lists_the_formats(self, tmp_path):
         for name in ("mesh.xyz", "mesh"):
             with pytest.raises(UnknownFormatError, match=r"\.obj.*\.glb"):
                 read_mesh(tmp_path / name)

@@ -59,7 +59,7 @@ class TestBlocks:
         }
 
     @pytest.mark.parametrize("ending", TEXTS)
-    def test_of_any_size_give_the_same(self, tmp_path, whole, small_blocks, ending):
+    def test_the_result_does_not_depend_on_the_block_size(self, tmp_path, whole, small_blocks, ending):
         mesh, expected = read_mesh(tmp_path / ("whole" + ending)), whole[ending]
         for name in ("vertices", "corners", "offsets"):
             assert getattr(mesh, name).tobytes() == getattr(expected, name).tobytes(), name
@@ -70,7 +70,7 @@ class TestBlocks:
             np.testing.assert_array_equal(mesh.normal, expected.normal)
             assert mesh.obj.newline == b"\r\n"
 
-    def test_obj_is_read_as_meant(self, whole):
+    def test_obj_with_all_kinds_of_lines(self, whole):
         mesh = whole[".obj"]
         np.testing.assert_array_equal(mesh.vertices, [[0, 0, 0], [1, 0.5, 1e-3], [1, 1, 0], [0.5, 2, np.nan]])
         assert mesh.corners.tolist() == [0, 1, 2, 0, 1, 2, 3, 2, 1, 0]
@@ -146,7 +146,7 @@ class TestDecimals:
         assert np.isnan(read) if np.isnan(expected) else str(float(read)) == str(expected)
 
     @pytest.mark.parametrize("word", NO_NUMBERS)
-    def test_all_else_is_refused(self, tmp_path, word):
+    def test_other_words_are_refused(self, tmp_path, word):
         with pytest.raises(MeshFileError, match="line 1: .* is not a number"):
             self.words_read(tmp_path, [word, "0", "0"])
 

@@ -59,7 +59,7 @@ class TestReadingResults:
             ("report", np.array('{"notes": 1}'), "bad.npz"),
         ],
     )
-    def test_what_is_no_result(self, result, tmp_path, name, value, message):
+    def test_archives_without_a_result_are_refused(self, result, tmp_path, name, value, message):
         with np.load(result.save(tmp_path / "out.npz")) as archive:
             arrays = dict(archive)
         if value is None:
@@ -98,7 +98,7 @@ class TestTargets:
             write_flattening(cut_bar(bar), tmp_path / name)
         assert not (tmp_path / name).exists()
 
-    def test_folder_in_the_way(self, bar, tmp_path):
+    def test_a_folder_of_the_same_name_is_an_error(self, bar, tmp_path):
         (tmp_path / "x.obj").mkdir()
         with pytest.raises(MeshFileError, match="it is a folder"):
             write_flattening(cut_bar(bar), tmp_path / "x.obj")
@@ -141,7 +141,7 @@ class TestTargets:
 
 
 @pytest.mark.parametrize("name", [None, 3, 2.5, object(), ["a.obj"], np.zeros(3), {"a": 1}])
-def test_what_is_no_path_is_refused_by_name(name):
+def test_invalid_paths_are_refused_by_name(name):
     result = coneflat.flatten(*shapes.hill(4, 4))
     for call in (coneflat.read_mesh, coneflat.read_flattening, result.save, read_picture):
         with pytest.raises(MeshFileError, match=f"got {type(name).__name__}"):

@@ -32,22 +32,22 @@ class TestObj:
         found = corner_uv(written(tmp_path, "a.obj", text))
         np.testing.assert_array_equal(found, PLACES[[0, 1, 2, 0, 2, 3]])
 
-    def test_corners_without(self, tmp_path):
+    def test_corners_without_uv(self, tmp_path):
         text = SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nf 1 3 4\nf 1/1 2/2 3/3\nf 1//1 3 4/1\n"
         mesh = read_mesh(written(tmp_path, "a.obj", text))
         assert mesh.texture.tolist() == [-1, -1, -1, 0, 1, 2, -1, -1, 0]
 
-    def test_none_at_all(self, tmp_path):
+    def test_a_file_without_uv(self, tmp_path):
         mesh = read_mesh(written(tmp_path, "a.obj", SQUARE + "vt 0 0\nf 1 2 3\n"))
         assert mesh.texture is None
         assert mesh.uv is None
 
-    def test_numbers_of_points_that_are_not_in_the_file_do_not_keep_it_from_being_flattened(self, tmp_path):
+    def test_a_file_with_invalid_uv_indices_can_be_flattened(self, tmp_path):
         path = written(tmp_path, "a.obj", SQUARE + "f 1/1 2/2 3/3 4/4\n")
         assert read_mesh(path).uv is None
         assert flatten(path).distortion.flipped == 0
 
-    def test_what_is_no_number_is_kept_as_it_is(self, tmp_path):
+    def test_invalid_uv_numbers_become_nan(self, tmp_path):
         text = SQUARE + "vt nan 0\nvt 1 inf\nvt 1 1\nf 1/1 2/2 3/3\n"
         found = corner_uv(written(tmp_path, "a.obj", text))
         assert np.isfinite(found).tolist() == [[False, True], [True, False], [True, True]]
@@ -64,7 +64,7 @@ class TestObj:
     @pytest.mark.parametrize(
         ("line", "message"), [("vt", "line 5: a UV point needs"), ("vt a b", "line 5: 'a' is not")]
     )
-    def test_what_is_no_point(self, tmp_path, line, message):
+    def test_incomplete_uv_points_are_refused(self, tmp_path, line, message):
         with pytest.raises(errors.MeshFileError, match=message):
             read_mesh(written(tmp_path, "a.obj", SQUARE + f"{line}\nf 1/1 2/1 3/1\n"))
 
@@ -116,7 +116,7 @@ class TestPly:
             read_mesh(written(tmp_path, "a.ply", head + body))
 
 
-def test_points_written_for_each_corner_are_no_seams(tmp_path):
+def test_uv_points_repeated_for_each_corner_make_no_seams(tmp_path):
     """As sets of places: many programs write a point for every corner, of which neighbours have the same."""
     vt = "".join(f"vt {x} {y}\n" for x, y in PLACES[[0, 1, 2, 0, 2, 3]])
     path = written(tmp_path, "a.obj", SQUARE + vt + "f 1/1 2/2 3/3\nf 1/4 3/5 4/6\n")

@@ -217,7 +217,7 @@ class TestSplitFormats:
         np.testing.assert_allclose(board[row, column][inside], 255 * expected[inside], atol=1)
         assert inside.mean() > 0.8
 
-    def test_what_is_no_texture(self, bar, tmp_path, monkeypatch):
+    def test_invalid_textures_are_refused(self, bar, tmp_path, monkeypatch):
         pytest.importorskip("PIL")
         result = cut_bar(bar)
         (tmp_path / "text.png").write_text("no image")

@@ -34,7 +34,7 @@ class TestTrimesh:
         check(result, mesh.vertices, mesh.faces, mesh.visual.uv, mesh.vertex_attributes["vertex"])
         np.testing.assert_array_equal(mesh.face_attributes["chart"], result.seam_data.face_chart)
 
-    def test_what_it_exports_has_uvs(self, result, tmp_path):
+    def test_its_exports_have_uvs(self, result, tmp_path):
         pytest.importorskip("trimesh")
         result.to_trimesh().export(tmp_path / "out.glb")
         assert len(coneflat.read_mesh(tmp_path / "out.glb").uv) == len(result.uv)
@@ -51,7 +51,7 @@ class TestMeshio:
 
 
 class TestPyVista:
-    def test_what_it_is_given(self, result, monkeypatch):
+    def test_the_arguments_that_it_gets(self, result, monkeypatch):
         """Points, padded faces and texture coordinates, by a module that only takes them."""
         fake = ModuleType("pyvista")
         fake.PolyData = lambda points, faces: SimpleNamespace(
@@ -81,7 +81,7 @@ class TestPyVista:
 
 
 @pytest.mark.parametrize("module", ["trimesh", "pyvista", "meshio"])
-def test_what_is_missing_is_named(result, monkeypatch, module):
+def test_missing_packages_are_named(result, monkeypatch, module):
     monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(coneflat.errors.OptionError, match=f"pip install {module}") as caught:
         getattr(result, f"to_{module}")()

@@ -14,7 +14,7 @@ from shapes import sphere, write_obj
 
 import coneflat
 from coneflat import IntegerGrid, QuadMesh, measure_quads
-from coneflat.apps.cli.quads import quads as command
+from coneflat.apps.cli.quads_command import quads as command
 from coneflat.errors import ConeflatError, OptionError
 
 

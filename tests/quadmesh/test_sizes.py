@@ -8,7 +8,7 @@ import shapes
 from click.testing import CliRunner
 
 import coneflat
-from coneflat.apps.cli.quads import quads as command
+from coneflat.apps.cli.quads_command import quads as command
 from coneflat.errors import GridError, MeshFileError, OptionError
 from coneflat.mesh.connectivity import TriangleMesh
 from coneflat.quadmesh.features import split_around

@@ -26,10 +26,15 @@ RARE_GROUP = "Less common"
 
 def controls_of(options: type, hidden: Collection[str] = ()) -> list[dict[str, Any]]:
     """Return the controls of a group of options but the hidden ones, group by group as in the help of commands."""
-    shown = [each for each in declarations(options).values() if each.flag and each.name not in hidden]
-    controls = [control_of(each) for each in shown]
-    order = [*dict.fromkeys(each["group"] for each in controls if each["group"] != RARE_GROUP), RARE_GROUP]
-    return sorted(controls, key=lambda each: order.index(each["group"]))
+    shown = [
+        declaration
+        for declaration in declarations(options).values()
+        if declaration.flag and declaration.name not in hidden
+    ]
+    controls = [control_of(declaration) for declaration in shown]
+    groups = dict.fromkeys(control["group"] for control in controls)
+    order = [*(group for group in groups if group != RARE_GROUP), RARE_GROUP]
+    return sorted(controls, key=lambda control: order.index(control["group"]))
 
 
 def control_of(declaration: Declaration) -> dict[str, Any]:
@@ -48,7 +53,7 @@ def control_of(declaration: Declaration) -> dict[str, Any]:
     match kind:
         case Number():
             word = "angle" if kind.is_angle else "integer" if kind.is_integer else "number"
-            control |= {"least": max(kind.least, 0), "most": min(kind.most, 2**30)}
+            control |= {"least": max(kind.minimum, 0), "most": min(kind.maximum, 2**30)}
             return {**control, "kind": word, "default": default or 0, "is_optional": default is None}
         case Flag():
             return {**control, "kind": "flag", "default": default}

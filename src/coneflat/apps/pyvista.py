@@ -57,19 +57,26 @@ class ConeflatAccessor:
             ConeflatError: as of `coneflat.quads`.
         """
         with inner_calls():
-            found = quads(self._mesh, **options)
-        warn_of(found.notes, NOTES)
-        return pyvista.PolyData(found.vertices, np.insert(found.quads, 0, 4, axis=1).ravel())
+            mesh = quads(self._mesh, **options)
+        warn_of(mesh.notes, NOTES)
+        return pyvista.PolyData(mesh.vertices, np.insert(mesh.quads, 0, 4, axis=1).ravel())
 
     def _with_data(self, result: Flattening) -> pyvista.PolyData:
         """Return a result as a surface with the data of the input's points and cells; its measures are field data."""
-        own, cut = self._mesh, result.to_pyvista()
+        surface, cut = self._mesh, result.to_pyvista()
         vertex = np.asarray(result.vertex_origin)[cut.point_data["vertex"]]
         # A polygon of k corners becomes k - 2 triangles; the cells of a surface begin with its points and lines.
-        sizes = np.diff(pyvista.convert_array(own.GetPolys().GetOffsetsArray()))
-        cell = own.n_verts + own.n_lines + np.repeat(np.arange(len(sizes)), sizes - 2)[result.face_origin]
-        for old, new, at in ((own.point_data, cut.point_data, vertex), (own.cell_data, cut.cell_data, cell)):
-            new.update({name: np.asarray(old[name])[at] for name in old if name not in new})
+        sizes = np.diff(pyvista.convert_array(surface.GetPolys().GetOffsetsArray()))
+        cell = (
+            surface.n_verts
+            + surface.n_lines
+            + np.repeat(np.arange(len(sizes)), sizes - 2)[result.face_origin]
+        )
+        for source, target, at in (
+            (surface.point_data, cut.point_data, vertex),
+            (surface.cell_data, cut.cell_data, cell),
+        ):
+            target.update({name: np.asarray(source[name])[at] for name in source if name not in target})
         measures = ("qc_mean", "area_std", "flipped", "overlap", "charts")
         cut.field_data.update({name: [getattr(result.distortion, name)] for name in measures})
         return cut

@@ -149,19 +149,19 @@ def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:
         MissingUVError: no triangle has finite UVs at all corners.
         MeshError: there is no mesh to measure, or, if strict, it is not manifold.
     """
-    known = mapped.has_uv
+    has_uv = mapped.has_uv
     checked, corner_uv = surface_of(mapped, strict=strict)
     exponent = unit_exponent(corner_uv)
     unit = np.ldexp(corner_uv, -exponent)
     scaled = at_unit_size(checked)
-    texture = np.zeros(len(known), np.int64) if mapped.texture is None else mapped.texture
-    textures = np.unique(texture[known])
-    owner = texture[known][checked.face_origin]
+    texture = np.zeros(len(has_uv), np.int64) if mapped.texture is None else mapped.texture
+    textures = np.unique(texture[has_uv])
+    owner = texture[has_uv][checked.face_origin]
     distortion = measure_map(scaled.mesh, unit, texture=owner).rescaled(
         (scaled.exponent + exponent) * np.log(2)
     )
-    every = mapped.corner_uv[known]
-    cover = _cover_of_textures(np.ldexp(every, -exponent), texture[known])
+    all_uv = mapped.corner_uv[has_uv]
+    cover = _cover_of_textures(np.ldexp(all_uv, -exponent), texture[has_uv])
     points, corners = uv_points(checked.mesh, unit)
     tiles = sum(len(chart_tiles(points, corners[owner == number], exponent)) for number in textures)
     with np.errstate(over="ignore"):  # A value that is not finite is reported as unknown.
@@ -172,10 +172,10 @@ def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:
         "vertices": len(np.unique(mapped.faces)),
         "polygons": mapped.polygons,
         "triangles": len(mapped.faces),
-        "triangles_without_uv": int(np.count_nonzero(~known)),
+        "triangles_without_uv": int(np.count_nonzero(~has_uv)),
         "corners_without_uv": mapped.without,
         "corners_not_finite": mapped.not_finite,
-        "outside": int(((every < 0) | (every > 1)).any(axis=(1, 2)).sum()),
+        "outside": int(((all_uv < 0) | (all_uv > 1)).any(axis=(1, 2)).sum()),
         "textures": len(textures),
         "tiles": tiles,
         "packing_efficiency": covered / tiles,
@@ -191,8 +191,8 @@ def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:
         path=None if mapped.source is None else mapped.source.path,
     )
     notes = [*measures.notes, *undefined_measures(measures.values(), distortion.qc)]
-    if distortion.degenerate_input or len(checked.mesh.faces) < len(every):
-        notes += rounding_notes(mapped.vertices, mapped.faces[known])
+    if distortion.degenerate_input or len(checked.mesh.faces) < len(all_uv):
+        notes += rounding_notes(mapped.vertices, mapped.faces[has_uv])
     return replace(measures, notes=tuple(notes))
 
 
@@ -203,13 +203,13 @@ def surface_of(mapped: UVMesh, *, strict: bool = False) -> tuple[CheckedMesh, Fl
         MissingUVError: no triangle has UVs.
         MeshError: the triangles are not a mesh.
     """
-    known = np.flatnonzero(mapped.has_uv)
-    if not len(known):
+    mapped_faces = np.flatnonzero(mapped.has_uv)
+    if not len(mapped_faces):
         raise MissingUVError(
             f"none of {plural(len(mapped.faces), 'triangle')} has finite UVs at all its corners"
         )
-    checked = check_mesh(mapped.vertices, mapped.faces[known], repair=not strict)
-    corner_uv = mapped.corner_uv[known][checked.face_origin]
+    checked = check_mesh(mapped.vertices, mapped.faces[mapped_faces], repair=not strict)
+    corner_uv = mapped.corner_uv[mapped_faces][checked.face_origin]
     corner_uv[checked.is_flipped] = corner_uv[checked.is_flipped][:, [0, 2, 1]]
     return checked, corner_uv
 
@@ -302,26 +302,26 @@ def _cover(corner_uv: FloatArray) -> _Cover:
     total = float(np.abs(signed_double_areas(corner_uv)).sum()) / 2
     square = float(np.ptp(corner_uv, axis=(0, 1)).max()) ** 2
     limit = max(MIN_PAIRS, MAX_PAIRS_EACH * len(corner_uv))
-    found = find_overlaps(corner_uv, limit=limit)
-    if np.isfinite(found.fraction):
-        area = found.area / found.fraction if found.fraction > 0 else total
-        return _Cover(len(found.pairs), found.fraction, area, total, square)
+    overlaps = find_overlaps(corner_uv, limit=limit)
+    if np.isfinite(overlaps.fraction):
+        area = overlaps.area / overlaps.fraction if overlaps.fraction > 0 else total
+        return _Cover(len(overlaps.pairs), overlaps.fraction, area, total, square)
     twice, area = approximate_overlap_areas(corner_uv)
-    more = (
+    reason = (
         ""
-        if found.complete
+        if overlaps.complete
         else f"More than {limit:,} pairs of triangles overlap; the rest was not counted. "
     )
-    note = Unmet(f"{more}The overlap was counted in {MAX_CELLS:,} x {MAX_CELLS:,} pixels.")
-    return _Cover(len(found.pairs), twice / area if area > 0 else 0.0, area, total, square, (note,))
+    note = Unmet(f"{reason}The overlap was counted in {MAX_CELLS:,} x {MAX_CELLS:,} pixels.")
+    return _Cover(len(overlaps.pairs), twice / area if area > 0 else 0.0, area, total, square, (note,))
 
 
 def _notes(mapped: UVMesh, checked: CheckedMesh) -> tuple[str, ...]:
     """Return notes on what the measures leave out, and on repairs of the mesh."""
     corners = ((mapped.without, "no UV"), (mapped.not_finite, "a UV that is not finite"))
-    why = " and ".join(f"{plural(count, 'corner')} with {what}" for count, what in corners if count)
+    missing = " and ".join(f"{plural(count, 'corner')} with {defect}" for count, defect in corners if count)
     triangles = plural(int(np.count_nonzero(~mapped.has_uv)), "triangle")
-    notes = [f"{why}: {triangles} left out of the measures."] if why else []
+    notes = [f"{missing}: {triangles} left out of the measures."] if missing else []
     repairs = [note for note in checked.notes if note != left_out_of(mapped, checked)]
     if repairs:
         notes.append(f"The mesh was repaired before it was measured: {' '.join(repairs)}")

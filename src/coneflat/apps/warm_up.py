@@ -64,8 +64,8 @@ def _tube(closed: bool, around: int = 40, across: int = 24) -> tuple[FloatArray,
         ((u + i) % around * across + (v + j) % across).ravel() for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))
     ]
     faces = np.concatenate([np.stack(corners[:3], 1), np.stack([corners[0], corners[2], corners[3]], 1)])
-    used, faces = np.unique(faces, return_inverse=True)
-    return points[used], faces.reshape(-1, 3)
+    vertices, faces = np.unique(faces, return_inverse=True)
+    return points[vertices], faces.reshape(-1, 3)
 
 
 if __name__ == "__main__":

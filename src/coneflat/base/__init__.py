@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from .defaults import DISTORTION, MAX_CONE_ANGLE, MAX_CONES, MIN_CONE_ANGLE, TYPED_TOLERANCE
+from .entry_points import EntryPoint
 from .notes import Unmet, inner_calls, warn_of, warns
 from .progress import Progress, Stopwatch, cancel_with, check_cancelled, report_detail, stage, timing
 from .text import MAX_LISTED, exit_text, list_some, plural, printable, short_repr
@@ -31,11 +32,11 @@ if TYPE_CHECKING:
     from .kernel_cache import cache_folder, compilation
 
 __all__ = [
-    "BoolArray", "ComplexArray", "DISTORTION", "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE", "MAX_LISTED",
-    "MIN_CONE_ANGLE", "Progress", "Stopwatch", "THREADS", "TYPED_TOLERANCE", "Unmet", "as_floats", "as_indices",
-    "cache_folder", "cancel_with", "check_cancelled", "compilation", "compiled", "dots", "exit_text", "has_any",
-    "inner_calls", "limit_threads", "list_some", "mask_of", "plural", "printable", "report_detail", "short_repr",
-    "stage", "timing", "unit_exponent", "warn_of", "warns",
+    "BoolArray", "ComplexArray", "DISTORTION", "EntryPoint", "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE",
+    "MAX_LISTED", "MIN_CONE_ANGLE", "Progress", "Stopwatch", "THREADS", "TYPED_TOLERANCE", "Unmet", "as_floats",
+    "as_indices", "cache_folder", "cancel_with", "check_cancelled", "compilation", "compiled", "dots", "exit_text",
+    "has_any", "inner_calls", "limit_threads", "list_some", "mask_of", "plural", "printable", "report_detail",
+    "short_repr", "stage", "timing", "unit_exponent", "warn_of", "warns",
 ]  # fmt: skip
 
 

@@ -18,9 +18,9 @@ BoolArray: TypeAlias = NDArray[np.bool_]
 Numbers = TypeVar("Numbers", FloatArray, IntArray)
 
 
-def dots(one: FloatArray, other: FloatArray) -> FloatArray:
+def dots(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return the inner products of vectors along the last axis; several times faster than a sum of products."""
-    return np.einsum("...i,...i->...", one, other)
+    return np.einsum("...i,...i->...", a, b)
 
 
 def rows_of(values: Numbers, places: IntArray) -> Numbers:
@@ -30,10 +30,10 @@ def rows_of(values: Numbers, places: IntArray) -> Numbers:
 
 def has_any(mask: BoolArray, sets: IntArray) -> BoolArray:
     """Return (m,) whether each row of `sets` (m, k) has an index that is True in `mask`; much faster than `any`."""
-    found = np.zeros(len(sets), dtype=bool)
+    result = np.zeros(len(sets), dtype=bool)
     for column in range(sets.shape[1]):
-        found |= mask[sets[:, column]]
-    return found
+        result |= mask[sets[:, column]]
+    return result
 
 
 def mask_of(count: int, places: IntArray | BoolArray) -> BoolArray:

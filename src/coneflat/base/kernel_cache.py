@@ -186,9 +186,9 @@ def cache_folder() -> Path:
     """
     folder, chosen = writable_folder(), _chosen_folder()
     if folder is None or (chosen is not None and folder != chosen):
-        tried = list(_user_folders()) if chosen is None else [chosen]
+        candidates = map(str, _user_folders() if chosen is None else [chosen])
         raise CacheError(
-            f"no cache folder is writable (tried: {', '.join(map(str, tried))}); set {CACHE_VARIABLE} to one that is"
+            f"no cache folder is writable (tried: {', '.join(candidates)}); set {CACHE_VARIABLE} to one that is"
         )
     return folder
 

@@ -49,9 +49,9 @@ def counted_notes(notes: Iterable[Iterable[str]]) -> list[str]:
         for note in of_component:
             similar.setdefault((type(note), _NUMBER.sub("#", note)), []).append(note)
     counted = []
-    for first, *others in similar.values():
-        ending = f" (and similarly {plural(len(others), 'component')} more)."
-        counted.append(type(first)(first.rstrip(".") + ending) if others else first)
+    for first, *repeated in similar.values():
+        ending = f" (and similarly {plural(len(repeated), 'component')} more)."
+        counted.append(type(first)(first.rstrip(".") + ending) if repeated else first)
     return counted
 
 

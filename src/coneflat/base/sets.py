@@ -62,11 +62,11 @@ def label_nodes(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntA
 
 
 @compiled
-def unite(parent: IntArray, one: int, two: int) -> bool:
+def unite(parent: IntArray, a: int, b: int) -> bool:
     """Join the union-find trees of two nodes; return whether the trees were different.
 
     The root with the larger index becomes a child of the other.
     """
-    one, two = find_root(parent, one), find_root(parent, two)
-    parent[max(one, two)] = min(one, two)
-    return one != two
+    a, b = find_root(parent, a), find_root(parent, b)
+    parent[max(a, b)] = min(a, b)
+    return a != b

@@ -23,8 +23,8 @@ def list_some(items: Iterable[object], total: int | None = None) -> str:
     total: the number of items, if `items` does not contain all.
     """
     shown = list(islice(iter(items), MAX_LISTED + 1))
-    more = len(shown) > MAX_LISTED or (total is not None and total > MAX_LISTED)
-    return ", ".join(str(item) for item in shown[:MAX_LISTED]) + (", ..." if more else "")
+    is_cut = len(shown) > MAX_LISTED or (total is not None and total > MAX_LISTED)
+    return ", ".join(str(item) for item in shown[:MAX_LISTED]) + (", ..." if is_cut else "")
 
 
 def printable(text: object) -> str:

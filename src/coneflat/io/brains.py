@@ -79,8 +79,8 @@ def parse_freesurfer(path: Path, content: bytes) -> MeshFile:
     if content[:3] in _QUADS:
         return _parse_quads(path, content)
     # FreeSurfer skips a line and all white space after it; nibabel skips two lines, and the second may be a comment.
-    rest = content.partition(b"\n")[2].lstrip()
-    for body in (rest, rest.partition(b"\n")[2]) if content.startswith(_TRIANGLES) else ():
+    text = content.partition(b"\n")[2].lstrip()
+    for body in (text, text.partition(b"\n")[2]) if content.startswith(_TRIANGLES) else ():
         vertices, faces = (int(count) for count in np.frombuffer(body[:8].ljust(8, b"\xff"), ">i4"))
         if min(vertices, faces) >= 0 and len(body) >= 8 + 12 * (vertices + faces):
             points = np.frombuffer(body, ">f4", 3 * vertices, 8).reshape(-1, 3)
@@ -217,14 +217,14 @@ def read_label(text: str, count: int | None = None) -> IntArray:
     with readable(path, "label"), _with_logged_warnings(path):
         if ending == ".annot":
             values, _, names = package.freesurfer.read_annot(path)
-            keys = {one.decode(): number for number, one in enumerate(names)}
+            keys = {text.decode(): number for number, text in enumerate(names)}
             # FreeSurfer leaves vertices without a label; nibabel numbers them -1.
             if (values < 0).any():
                 values = np.where(values < 0, keys.setdefault("unknown", -1), values)
         else:
             values = read_vertex_values(path)
             labels = package.load(path).labeltable.labels if ending == ".gii" else ()
-            keys = {one.label: one.key for one in labels}
+            keys = {label.label: label.key for label in labels}
     if count is not None and len(values) != count:
         raise OptionError(
             f"{path} must be of the surface, which has {count:,} vertices, got a file of {len(values):,} vertices"

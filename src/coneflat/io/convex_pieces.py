@@ -130,8 +130,8 @@ def _convex_pieces(
     complete[split] = False
     if complete.all():
         return Pieces(loops, points[loops], sizes, np.arange(len(sizes)), split)
-    kept = np.repeat(complete, sizes)
-    intact = (loops[kept], points[loops[kept]], sizes[complete], np.flatnonzero(complete))
+    is_complete = np.repeat(complete, sizes)
+    intact = (loops[is_complete], points[loops[is_complete]], sizes[complete], np.flatnonzero(complete))
     parts = _convex_parts(uv, uv_faces, face_corners, polygons.owner, ~complete, in_triangles)
     corners, flat, counts, names = map(np.concatenate, zip(intact, parts, strict=True))
     order = np.argsort(names, kind="stable")
@@ -153,12 +153,12 @@ def _convex_parts(
     names, first = np.unique(owner[faces], return_index=True)
     pieces: list[Loop] = []
     polygons: list[int] = []
-    whole = set(in_triangles.tolist())
+    triangulated = set(in_triangles.tolist())
     # Some of the polygons, or all of them, may have no remaining triangles.
     for name, members in zip(names.tolist(), np.split(faces, first)[1:], strict=True):
         corners = np.stack([face_corners[members], uv_faces[members]], axis=2).tolist()
         loops = [[(c, p) for c, p in triangle] for triangle in corners]
-        loops = loops if name in whole else merge_convex(uv, loops)
+        loops = loops if name in triangulated else merge_convex(uv, loops)
         pieces += loops
         polygons += [name] * len(loops)
     rows = np.array([node for loop in pieces for node in loop], dtype=np.int64).reshape(-1, 2)
@@ -179,18 +179,18 @@ def merge_convex(uv: FloatArray, loops: list[Loop]) -> list[Loop]:
     owner = {side: i for i, loop in enumerate(loops) for side in _sides(loop)}
     merged = dict(enumerate(loops))
     for a, b in [(a, b) for a, b in owner if a < b and (b, a) in owner]:
-        here, there = owner[a, b], owner[b, a]
-        if here == there:
+        piece, neighbour = owner[a, b], owner[b, a]
+        if piece == neighbour:
             continue
-        one, two = merged[here], merged[there]
+        first_loop, next_loop = merged[piece], merged[neighbour]
         # The first loop traverses the common side from a to b, the second from b to a.
-        i, j = one.index(b), two.index(a)
-        joined = (one[i:] + one[:i]) + (two[j:] + two[:j])[1:-1]
+        i, j = first_loop.index(b), next_loop.index(a)
+        joined = (first_loop[i:] + first_loop[:i]) + (next_loop[j:] + next_loop[:j])[1:-1]
         if _is_convex(uv, joined):
-            merged[here] = joined
-            del merged[there]
+            merged[piece] = joined
+            del merged[neighbour]
             for side in _sides(joined):
-                owner[side] = here
+                owner[side] = piece
     return sorted(loop[k:] + loop[:k] for loop in merged.values() for k in [loop.index(min(loop))])
 
 

@@ -54,8 +54,8 @@ def read_bytes(path: Path) -> bytes:
         is_file = stat.S_ISREG(mode) or stat.S_ISDIR(mode)
         content = path.read_bytes() if is_file else b""
     except FileNotFoundError as error:
-        why = ": it is a broken link" if path.is_symlink() else ""
-        raise MeshFileError(f"{path}: there is no such file{why}") from error
+        advice = ": it is a broken link" if path.is_symlink() else ""
+        raise MeshFileError(f"{path}: there is no such file{advice}") from error
     except (IsADirectoryError, PermissionError) as error:
         reason = "is a folder, not a file" if os.path.isdir(path) else "cannot be read (no permission)"
         raise MeshFileError(f"{path} {reason}") from error
@@ -124,13 +124,13 @@ def as_path(path: object) -> Path:
         raise MeshFileError(f"a file name must be text or a path, got {type(path).__name__}") from error
 
 
-def known_ending(path: Path, endings: Collection[str], what: str) -> str:
+def known_ending(path: Path, endings: Collection[str], usage: str) -> str:
     """Return the ending of a path in lower case if it is known.
 
     Args:
         path: the path.
         endings: the known endings.
-        what: how files with these endings are used, for the message: "meshes are read from".
+        usage: how files with these endings are used, for the message: "meshes are read from".
 
     Raises:
         UnknownFormatError: the ending is not known.
@@ -138,7 +138,7 @@ def known_ending(path: Path, endings: Collection[str], what: str) -> str:
     ending = path.suffix.lower()
     if ending not in endings:
         wrong = f"ends with {path.suffix!r}, which is not a known format" if path.suffix else "has no ending"
-        raise UnknownFormatError(f"{path} {wrong}; {what} {', '.join(endings)}")
+        raise UnknownFormatError(f"{path} {wrong}; {usage} {', '.join(endings)}")
     return ending
 
 
@@ -159,13 +159,13 @@ def inner_path(folder: Path, name: str) -> Path:
     return folder / name
 
 
-def moved_path(name: bytes, here: str, there: str) -> bytes:
+def moved_path(name: bytes, source: str, target: str) -> bytes:
     """Return a path relative to folder `here` rewritten relative to folder `there`, separated by slashes."""
     if os.path.isabs(name):
         return name
-    full = os.path.join(os.fsencode(here), name)
+    full = os.path.join(os.fsencode(source), name)
     try:
-        relative = os.path.relpath(full, os.fsencode(there))
+        relative = os.path.relpath(full, os.fsencode(target))
     except ValueError:
         # A file on another drive can be reached only by its full path.
         relative = full
@@ -201,7 +201,7 @@ def check_target(path: PathName) -> Path:
     raise MeshFileError(f"{path} cannot be written: {reason}")
 
 
-def checked_target(path: PathName, endings: Collection[str], what: str) -> Path:
+def checked_target(path: PathName, endings: Collection[str], usage: str) -> Path:
     """Return a path if it has a known ending and can be expected to be writable, see `known_ending`, `check_target`.
 
     Raises:
@@ -209,7 +209,7 @@ def checked_target(path: PathName, endings: Collection[str], what: str) -> Path:
         MeshFileError: the file cannot be written.
     """
     path = as_path(path)
-    known_ending(path, endings, what)
+    known_ending(path, endings, usage)
     check_target(path)
     return path
 

@@ -30,20 +30,20 @@ class Joined:
 
     Attributes:
         mesh: the mesh, with the same number of vertices as the file.
-        used: (n,) the vertex that is used for each vertex of the file.
+        representative: (n,) the vertex that is used for each vertex of the file.
         edges: number of edges that were joined.
         left: number of open edges that coincide with others and stay open.
     """
 
     mesh: MeshFile
-    used: IntArray
+    representative: IntArray
     edges: int = 0
     left: int = 0
 
     @property
     def merged(self) -> int:
         """Return the number of vertices that are replaced by another one."""
-        return int(np.count_nonzero(self.used != np.arange(len(self.used))))
+        return int(np.count_nonzero(self.representative != np.arange(len(self.representative))))
 
     def notes(self) -> tuple[str, ...]:
         """Return notes on what was merged on reading, one sentence each."""
@@ -69,9 +69,11 @@ class Joined:
 
     def all_notes(self, notes: Sequence[str]) -> tuple[str, ...]:
         """Return these notes and those of a result; replaced vertices are not counted as left out."""
-        kept = [note for note in notes if not (self.merged and is_left_out(note))]
-        lone = len(self.used) - len(np.unique(self.mesh.corners)) - self.merged if self.merged else 0
-        return (*self.notes(), *kept, *[left_out(lone)] * (lone > 0))
+        others_notes = [note for note in notes if not (self.merged and is_left_out(note))]
+        lone = (
+            len(self.representative) - len(np.unique(self.mesh.corners)) - self.merged if self.merged else 0
+        )
+        return (*self.notes(), *others_notes, *[left_out(lone)] * (lone > 0))
 
     def map_options(self, options: Mapping[str, Any]) -> dict[str, Any]:
         """Return arguments of `coneflat.flatten` with vertices replaced by those that are used for them.
@@ -81,38 +83,43 @@ class Joined:
         """
         if not self.merged:
             return dict(options)
-        found = dict(options)
+        replaced = dict(options)
         for name in ("cones", "boundary"):
-            given = found.get(name)
-            if isinstance(given, Mapping):
-                seen: dict[int, int] = {}
-                for vertex in given:
-                    other = seen.setdefault(self._used(vertex), vertex)
-                    if other != vertex:
-                        raise OptionError(
-                            f"vertices {other} and {vertex} have the same position and were merged: use one of "
-                            "them, or add --no-weld"
-                        )
-                found[name] = dict(zip(seen, given.values(), strict=True))
+            if isinstance(curvatures := replaced.get(name), Mapping):
+                replaced[name] = self._replaced_keys(curvatures)
         for name in ("required_cones", "forbidden_cones"):
-            if found.get(name) is not None:
-                found[name] = tuple(dict.fromkeys(self._used(v) for v in found[name]))
-        if isinstance(found.get("weights"), Mapping):
-            found["weights"] = {self._used(v): weight for v, weight in found["weights"].items()}
+            if replaced.get(name) is not None:
+                replaced[name] = tuple(dict.fromkeys(self._replaced(v) for v in replaced[name]))
+        if isinstance(replaced.get("weights"), Mapping):
+            replaced["weights"] = {self._replaced(v): weight for v, weight in replaced["weights"].items()}
         for name in ("seams", "no_seams"):
-            given = found.get(name)
-            if isinstance(given, tuple) and len(given) == 2 and isinstance(given[0], str):
-                found[name] = (given[0], self._used_pairs(np.asarray(given[1])))
-            elif isinstance(given, np.ndarray):
-                found[name] = self._used_pairs(given)
-        return found
+            edges = replaced.get(name)
+            if isinstance(edges, tuple) and len(edges) == 2 and isinstance(edges[0], str):
+                replaced[name] = (edges[0], self._replaced_pairs(np.asarray(edges[1])))
+            elif isinstance(edges, np.ndarray):
+                replaced[name] = self._replaced_pairs(edges)
+        return replaced
 
-    def _used_pairs(self, pairs: IntArray) -> IntArray:
-        return np.array([self._used(v) for v in pairs.ravel().tolist()], dtype=np.int64).reshape(pairs.shape)
+    def _replaced_keys(self, curvatures: Mapping[int, Any]) -> dict[int, Any]:
+        """Return a map from vertices with the vertices replaced; raise OptionError if two become the same."""
+        vertex_of: dict[int, int] = {}
+        for vertex in curvatures:
+            first_vertex = vertex_of.setdefault(self._replaced(vertex), vertex)
+            if first_vertex != vertex:
+                raise OptionError(
+                    f"vertices {first_vertex} and {vertex} have the same position and were merged: use one of "
+                    "them, or add --no-weld"
+                )
+        return dict(zip(vertex_of, curvatures.values(), strict=True))
 
-    def _used(self, vertex: int) -> int:
+    def _replaced_pairs(self, pairs: IntArray) -> IntArray:
+        return np.array([self._replaced(v) for v in pairs.ravel().tolist()], dtype=np.int64).reshape(
+            pairs.shape
+        )
+
+    def _replaced(self, vertex: int) -> int:
         """Return the vertex that is used for another; invalid indices are returned unchanged and rejected later."""
-        return int(self.used[vertex]) if 0 <= vertex < len(self.used) else vertex
+        return int(self.representative[vertex]) if 0 <= vertex < len(self.representative) else vertex
 
 
 def join_borders(mesh: MeshFile) -> Joined:
@@ -125,40 +132,40 @@ def join_borders(mesh: MeshFile) -> Joined:
     # Triangles with a repeated vertex are not part of the surface.
     faces = faces[(faces != faces[:, [1, 2, 0]]).all(axis=1)]
     tails, heads = faces.reshape(-1), faces[:, [1, 2, 0]].reshape(-1)
-    every = np.arange(len(mesh.vertices))
-    order, first = sort_pairs(tails, heads, len(every))
+    vertices = np.arange(len(mesh.vertices))
+    order, first = sort_pairs(tails, heads, len(vertices))
     # Half-edges without a twin.
     border = np.sort(order[first & np.append(first[1:], True)])
     if not len(border):
-        return Joined(mesh, every)
+        return Joined(mesh, vertices)
     place = number_places(mesh.vertices)[1]
-    one, two, coinciding = _opposite(border, place[tails], place[heads], len(every))
-    bad = _inconsistent(tails, heads, len(every))
+    first_side, second_side, coinciding = _opposite(border, place[tails], place[heads], len(vertices))
+    bad = _inconsistent(tails, heads, len(vertices))
     # Two sheets back to back, as of a leaf, are not a gap: the triangles on both sides have the same positions.
     apexes = place[faces[:, [2, 0, 1]].reshape(-1)]
-    folded = apexes[one] == apexes[two]
-    fits = ~(bad[tails[one]] | bad[tails[two]] | folded)
+    folded = apexes[first_side] == apexes[second_side]
+    fits = ~(bad[tails[first_side]] | bad[tails[second_side]] | folded)
     coinciding -= 2 * int(np.count_nonzero(folded))
-    one, two = one[fits], two[fits]
-    used = every
-    while len(one):
-        used = _merged(tails, heads, one, two, len(every))
-        invalid = _invalid(used[tails], used[heads], bad, len(every))
-        keep = ~(invalid[used[tails[one]]] | invalid[used[heads[one]]])
+    first_side, second_side = first_side[fits], second_side[fits]
+    representative = vertices
+    while len(first_side):
+        representative = _merged(tails, heads, first_side, second_side, len(vertices))
+        invalid = _invalid(representative[tails], representative[heads], bad, len(vertices))
+        keep = ~(invalid[representative[tails[first_side]]] | invalid[representative[heads[first_side]]])
         if keep.all():
             break
-        one, two, used = one[keep], two[keep], every
-    left = coinciding - 2 * len(one)
-    if not len(one):
-        return Joined(mesh, every, left=left)
+        first_side, second_side, representative = first_side[keep], second_side[keep], vertices
+    left = coinciding - 2 * len(first_side)
+    if not len(first_side):
+        return Joined(mesh, vertices, left=left)
     joined = replace(
         mesh,
-        corners=used[mesh.corners],
+        corners=representative[mesh.corners],
         unwelded=mesh.corners,
-        welded=int(np.count_nonzero(used != every)),
-        merged_properties=differing_properties(mesh, used),
+        welded=int(np.count_nonzero(representative != vertices)),
+        merged_properties=differing_properties(mesh, representative),
     )
-    return Joined(joined, used, len(one), left)
+    return Joined(joined, representative, len(first_side), left)
 
 
 def _opposite(
@@ -178,9 +185,9 @@ def _opposite(
     starts = np.flatnonzero(first)
     sizes = np.diff(np.append(starts, len(order)))
     pairs = starts[sizes == 2]
-    one, two = border[order[pairs]], border[order[pairs + 1]]
-    opposed = tails[one] == heads[two]
-    return one[opposed], two[opposed], int(sizes[sizes > 1].sum())
+    first_side, second_side = border[order[pairs]], border[order[pairs + 1]]
+    opposed = tails[first_side] == heads[second_side]
+    return first_side[opposed], second_side[opposed], int(sizes[sizes > 1].sum())
 
 
 def _inconsistent(tails: IntArray, heads: IntArray, count: int) -> BoolArray:
@@ -195,10 +202,14 @@ def _repeated(tails: IntArray, heads: IntArray, count: int) -> BoolArray:
     return np.asarray(counts[number.reshape(-1)] > 1)
 
 
-def _merged(tails: IntArray, heads: IntArray, one: IntArray, two: IntArray, count: int) -> IntArray:
+def _merged(
+    tails: IntArray, heads: IntArray, first_side: IntArray, second_side: IntArray, count: int
+) -> IntArray:
     """Return (n,) for each vertex the first of the vertices that are merged with it by joining half-edges."""
     _, label = label_components(
-        count, np.concatenate([tails[one], heads[one]]), np.concatenate([heads[two], tails[two]])
+        count,
+        np.concatenate([tails[first_side], heads[first_side]]),
+        np.concatenate([heads[second_side], tails[second_side]]),
     )
     return np.asarray(np.unique(label, return_index=True)[1][label])
 

@@ -129,9 +129,9 @@ def _of_result(result: Flattening) -> UVMesh:
 
 
 def _of_arrays(vertices: ArrayLike, faces: ArrayLike, corner_uv: ArrayLike | None) -> UVMesh:
-    given = as_input(vertices, faces)
-    points = np.atleast_1d(as_floats("vertices", given.vertices))
-    triangles = as_faces(given.faces, len(points))
+    surface = as_input(vertices, faces)
+    points = np.atleast_1d(as_floats("vertices", surface.vertices))
+    triangles = as_faces(surface.faces, len(points))
     if corner_uv is None:
         raise MissingUVError("vertices and faces alone have no UV coordinates: give corner_uv as well")
     uv = as_floats("corner_uv", corner_uv)

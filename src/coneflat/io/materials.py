@@ -164,8 +164,10 @@ def _scene_texture(data: GltfData, index: Any) -> ImageTexture:
     """Return a texture of a glTF file."""
     texture = data.item("textures", index)
     extensions = data.entry(texture, "extensions", dict)
-    known = [data.entry(extensions, name, dict) for name in _IMAGE_EXTENSIONS if name in extensions]
-    source = next((item["source"] for item in (*known, texture) if "source" in item), None)
+    image_extensions = [
+        data.entry(extensions, name, dict) for name in _IMAGE_EXTENSIONS if name in extensions
+    ]
+    source = next((item["source"] for item in (*image_extensions, texture) if "source" in item), None)
     if source is None:
         names = f" ({', '.join(extensions)})" if extensions else ""
         data.fail(f"texture {index} has no image of a format that is read{names}")
@@ -193,7 +195,7 @@ def _scene_texture(data: GltfData, index: Any) -> ImageTexture:
 def _of_obj(folder: Path, text: ObjText, count: int) -> Materials:
     """Return the materials that an OBJ file in a folder uses."""
     names, polygon = materials_of_polygons(text, count)
-    found: dict[str, tuple[Path, MtlMaterial]] = {}
+    library_materials: dict[str, tuple[Path, MtlMaterial]] = {}
     notes = []
     for library in libraries_of(text, folder) if names else []:
         try:
@@ -204,16 +206,19 @@ def _of_obj(folder: Path, text: ObjText, count: int) -> Materials:
             notes.append(f"The material library cannot be read: {error}.")
             continue
         for name, material in materials.items():
-            found.setdefault(name, (library.parent, material))
-    unknown = tuple(name for name in names if name not in found)
+            library_materials.setdefault(name, (library.parent, material))
+    unknown = tuple(name for name in names if name not in library_materials)
     if unknown:
         notes.append(f"Materials that are in no library are white: {list_some(unknown)}.")
     textures: dict[tuple[Path, bool], ImageTexture] = {}
     items = [
-        _as_item(name, *found[name], textures) if name in found else {"name": name, **PLAIN} for name in names
+        _as_item(name, *library_materials[name], textures)
+        if name in library_materials
+        else {"name": name, **PLAIN}
+        for name in names
     ]
     for name in names:
-        material = found[name][1] if name in found else MtlMaterial()
+        material = library_materials[name][1] if name in library_materials else MtlMaterial()
         if material.left_out:
             notes.append(f"Not read of the material {name}: {', '.join(material.left_out)}.")
         if material.image is not None and not any(material.colour):

@@ -99,7 +99,7 @@ def _without(material: MtlMaterial, name: str) -> MtlMaterial:
 
 def _with_image(material: MtlMaterial, text: str) -> MtlMaterial:
     """Return a material with the image of a `map_Kd` line, whose options precede the file name."""
-    given: dict[str, tuple[str, ...]] = {}
+    arguments: dict[str, tuple[str, ...]] = {}
     while (words := text.split(None, 1)) and words[0].lower() in _OPTIONS:
         option, text = words[0].lower(), words[1] if len(words) > 1 else ""
         values: list[str] = []
@@ -108,18 +108,18 @@ def _with_image(material: MtlMaterial, text: str) -> MtlMaterial:
                 break
             values.append(words[0])
             text = words[1] if len(words) > 1 else ""
-        given[option] = tuple(values)
+        arguments[option] = tuple(values)
     if not text:
         raise ValueError("there is no file name")
-    left_out = [f"{option} of map_Kd" for option in given if _changes_colours(option, given[option])]
+    left_out = [f"{option} of map_Kd" for option in arguments if _changes_colours(option, arguments[option])]
     for name in left_out:
         material = _without(material, name)
     return replace(
         material,
         image=text.strip('"'),
-        offset=_pair(given.get("-o", ()), 0.0),
-        scale=_pair(given.get("-s", ()), 1.0),
-        is_clamped=given.get("-clamp", ("off",))[0].lower() == "on",
+        offset=_pair(arguments.get("-o", ()), 0.0),
+        scale=_pair(arguments.get("-s", ()), 1.0),
+        is_clamped=arguments.get("-clamp", ("off",))[0].lower() == "on",
     )
 
 
@@ -158,12 +158,12 @@ def materials_of_polygons(text: ObjText, count: int) -> tuple[list[str], IntArra
     count: number of polygons.
     """
     numbers: dict[str, int] = {}
-    starts, used = [0], [-1]
+    starts, materials = [0], [-1]
     for polygon in sorted(text.gaps):
         for name in _statements(text.gaps[polygon], b"usemtl"):
             starts.append(polygon)
-            used.append(numbers.setdefault(name, len(numbers)))
-    return list(numbers), np.repeat(used, np.diff([*starts, count]))
+            materials.append(numbers.setdefault(name, len(numbers)))
+    return list(numbers), np.repeat(materials, np.diff([*starts, count]))
 
 
 def libraries_of(text: ObjText, folder: Path) -> list[Path]:

@@ -152,11 +152,11 @@ class CheckedArrays:
     def __init__(self, path: Path, arrays: dict[str, NDArray[Any]]) -> None:
         self.path, self.arrays = path, arrays
 
-    def need(self, names: Iterable[str], what: str) -> None:
+    def need(self, names: Iterable[str], content: str) -> None:
         """Raise MeshFileError if arrays are missing; `what` is the expected content of the file."""
         for name in names:
             if name not in self.arrays:
-                raise MeshFileError(f"{self.path} holds no {what}: {name!r} is missing")
+                raise MeshFileError(f"{self.path} holds no {content}: {name!r} is missing")
 
     def floats(self, name: str, shape: tuple[int | None, ...]) -> FloatArray:
         """Return an array of numbers of a given shape, in which None stands for any length.
@@ -166,13 +166,13 @@ class CheckedArrays:
         """
         values = self.arrays[name]
         fits = len(shape) == values.ndim and all(
-            length in (None, given) for length, given in zip(shape, values.shape, strict=True)
+            length in (None, size) for length, size in zip(shape, values.shape, strict=True)
         )
         if values.dtype.kind not in "iuf" or not fits:
-            wanted = ", ".join("any" if length is None else f"{length}" for length in shape)
+            expected = ", ".join("any" if length is None else f"{length}" for length in shape)
             raise MeshFileError(
                 f"{self.path}: {name!r} has the shape {values.shape} and the type {values.dtype}, not the shape "
-                f"({wanted}) and a numeric type"
+                f"({expected}) and a numeric type"
             )
         return values.astype(np.float64)
 
@@ -196,8 +196,8 @@ class CheckedArrays:
         values = self.floats(name, shape)
         end = 2**53 if bound is None else bound
         if not np.all((values >= 0) & (values < end) & (values == np.floor(values))):
-            there = "integers" if bound is None else f"{bound} elements"
-            raise MeshFileError(f"{self.path}: {name!r} has indices outside the range of {there}")
+            indexed = "integers" if bound is None else f"{bound} elements"
+            raise MeshFileError(f"{self.path}: {name!r} has indices outside the range of {indexed}")
         return values.astype(np.int64)
 
     def notes(self, report: dict[str, Any]) -> tuple[str, ...]:

@@ -93,7 +93,7 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
         rows = np.flatnonzero(kinds == _FACE)
         words = block.words(rows, first=1)
         counts = words.counts
-        given, texture, normal = words.corners()
+        position, texture, normal = words.corners()
         del words  # free its text before the next block is read
         above = len(vertices) + np.cumsum(kinds == _VERTEX)[rows]
         for polygon, text in _texts(block, kinds, newline):
@@ -114,16 +114,16 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
             beyond = len(directions) + np.cumsum(kinds == _NORMAL)[rows]
             normal = np.where(normal < 0, np.repeat(beyond, counts) + normal + 1, normal)
         directions.add(_directions(block, np.flatnonzero(kinds == _NORMAL)))
-        for known, found, none in ((textures, texture, -1), (normals, normal, 0)):
-            if found is not None:
-                known.add(np.full(len(corners) - len(known), none))
-                known.add(found)
+        for indices, block_indices, none in ((textures, texture, -1), (normals, normal, 0)):
+            if block_indices is not None:
+                indices.add(np.full(len(corners) - len(indices), none))
+                indices.add(block_indices)
         # A negative index counts back from the last vertex above the face.
-        corners.add(np.where(given < 0, np.repeat(above, counts) + given, given - 1))
+        corners.add(np.where(position < 0, np.repeat(above, counts) + position, position - 1))
     check_filled(path, len(vertices), len(sizes))
-    for known, none in ((textures, -1), (normals, 0)):
-        if len(known):
-            known.add(np.full(len(corners) - len(known), none))
+    for indices, none in ((textures, -1), (normals, 0)):
+        if len(indices):
+            indices.add(np.full(len(corners) - len(indices), none))
     has_colours = len(colours) == len(vertices)
     obj_text = ObjText({polygon: bytes(gaps.pop(polygon)) for polygon in list(gaps)}, newline)
     mesh = MeshFile(
@@ -207,8 +207,8 @@ def _texts(block: TextBlock, kinds: NDArray[np.uint8], newline: bytes) -> Iterat
         kinds[rows[kinds[rows] == _FACE]] = _COMMENTED_FACE
     runs = np.flatnonzero((np.diff(kinds, prepend=-1) != 0) | (np.diff(polygons, prepend=-1) != 0))
     starts = block.line_starts[np.append(runs, len(kinds))]
-    kept = (kinds[runs] != _FACE) & (kinds[runs] != _TEXTURE)
-    for i in np.flatnonzero(kept).tolist():
+    is_text = (kinds[runs] != _FACE) & (kinds[runs] != _TEXTURE)
+    for i in np.flatnonzero(is_text).tolist():
         kind, text = kinds[runs[i]], block.raw[starts[i] : starts[i + 1]]
         if kind == _ELEMENT:
             # Indices of texture coordinates are removed, as the new ones differ.
@@ -222,16 +222,16 @@ def _check_corners(path: Path, content: bytes, mesh: MeshFile) -> None:
     """Raise FaceIndexError for the first corner with an invalid index of a vertex or UV point."""
     c = first_bad_corner(mesh.corners, len(mesh.vertices))
     if c is not None:
-        line, given = _corner_line(path, content, c, 0)
-        known = "OBJ counts from 1" if given == 0 else f"there are {len(mesh.vertices)} vertices"
-        raise FaceIndexError(f"{path}, line {line}: a face refers to vertex {given}, but {known}")
+        line, index = _corner_line(path, content, c, 0)
+        reason = "OBJ counts from 1" if index == 0 else f"there are {len(mesh.vertices)} vertices"
+        raise FaceIndexError(f"{path}, line {line}: a face refers to vertex {index}, but {reason}")
     if mesh.texture is None or mesh.uv is None:
         return
     c = first_bad_corner(np.where(mesh.texture == -1, 0, mesh.texture), len(mesh.uv))
     if c is not None:
-        line, given = _corner_line(path, content, c, 1)
+        line, index = _corner_line(path, content, c, 1)
         raise FaceIndexError(
-            f"{path}, line {line}: a face refers to UV point {given}, but there are {len(mesh.uv)} (vt lines)"
+            f"{path}, line {line}: a face refers to UV point {index}, but there are {len(mesh.uv)} (vt lines)"
         )
 
 
@@ -319,14 +319,16 @@ def _ended(text: bytes, newline: bytes, is_last: bool) -> bytes:
     return text + newline if text and not is_last and not text.endswith((b"\n", b"\r")) else text
 
 
-def relocated(text: ObjText, old: Path, new: Path) -> ObjText:
+def relocated(text: ObjText, source_folder: Path, target_folder: Path) -> ObjText:
     """Return the text with paths of material libraries rewritten relative to another folder."""
-    here, there = os.path.realpath(old), os.path.realpath(new)
-    if here == there:
+    source, target = os.path.realpath(source_folder), os.path.realpath(target_folder)
+    if source == target:
         return text
 
     def line(match: re.Match[bytes]) -> bytes:
-        return match[1] + b" ".join(moved_path(name, here, there) for name in _library_names(match[2], here))
+        return match[1] + b" ".join(
+            moved_path(name, source, target) for name in _library_names(match[2], source)
+        )
 
     gaps = {i: _MATERIALS.sub(line, gap) if b"mtllib" in gap else gap for i, gap in text.gaps.items()}
     return replace(text, gaps=gaps)

@@ -48,8 +48,8 @@ def parse_off(path: Path, content: bytes) -> MeshFile:
         shades = _shades(points[:, 3 + 3 * has_normals :], keyword)
         if shades is not None:
             colours.add(shades)
-        others = 3 + 3 * has_normals + 2 * (b"S" in keyword)
-        if (block.counts[rows[:of_vertices]] > others).any():
+        columns_before_colours = 3 + 3 * has_normals + 2 * (b"S" in keyword)
+        if (block.counts[rows[:of_vertices]] > columns_before_colours).any():
             attributes[VERTEX_COLOURS] = None
         counts, named = _polygons(block, rows[of_vertices:of_faces])
         if (block.counts[rows[of_vertices:of_faces]] > 1 + counts).any():
@@ -59,8 +59,8 @@ def parse_off(path: Path, content: bytes) -> MeshFile:
         lines += len(rows)
     if lines < vertex_count:
         raise MeshFileError(f"{path} ends after {lines} of the {vertex_count} vertices in its header")
-    if (found := lines - vertex_count) < face_count:
-        raise MeshFileError(f"{path} ends after {found} of the {face_count} faces in its header")
+    if (read_faces := lines - vertex_count) < face_count:
+        raise MeshFileError(f"{path} ends after {read_faces} of the {face_count} faces in its header")
     properties: dict[str, FloatArray] = {}
     if len(colours) == vertex_count > 0:
         shades = colours.done()

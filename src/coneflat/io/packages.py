@@ -65,11 +65,13 @@ def _from_arrays(vertices: ArrayLike, faces: ArrayLike) -> InputMesh:
 
 
 def _from_meshio(mesh: Any) -> InputMesh:
-    known = [block for block in mesh.cells if block.type in ("triangle", "quad", "polygon")]
-    if not known:
+    surface_blocks = [block for block in mesh.cells if block.type in ("triangle", "quad", "polygon")]
+    if not surface_blocks:
         kinds = ", ".join(sorted({str(block.type) for block in mesh.cells})) or "none"
         raise ArrayShapeError(f"the mesh has no triangles, quads or polygons; its cells are: {kinds}")
-    return _from_polygons(mesh.points, [row for block in known for row in np.asarray(block.data).tolist()])
+    return _from_polygons(
+        mesh.points, [row for block in surface_blocks for row in np.asarray(block.data).tolist()]
+    )
 
 
 def _from_pyvista(mesh: Any) -> InputMesh:
@@ -111,7 +113,7 @@ def to_trimesh(result: Flattening) -> Any:
         split.vertices,
         split.faces,
         visual=trimesh.visual.TextureVisuals(uv=split.uv),
-        vertex_attributes={"vertex": split.own.astype(np.uint32)},  # the integers of glTF
+        vertex_attributes={"vertex": split.vertex.astype(np.uint32)},  # the integers of glTF
         face_attributes={"chart": result.seam_data.face_chart},
         process=False,
     )
@@ -124,7 +126,7 @@ def to_pyvista(result: Flattening) -> Any:
     # Each triangle is preceded by its number of corners.
     padded = np.insert(split.faces, 0, 3, axis=1)
     mesh = pyvista.PolyData(split.vertices, padded.ravel())
-    mesh.point_data["vertex"] = split.own
+    mesh.point_data["vertex"] = split.vertex
     mesh.cell_data["chart"] = result.seam_data.face_chart
     # VTK's writer of PLY crashes at 64-bit texture coordinates.
     mesh.active_texture_coordinates = split.uv.astype(np.float32)
@@ -139,6 +141,6 @@ def to_meshio(result: Flattening) -> Any:
         split.vertices,
         [("triangle", split.faces)],
         # The name that meshio uses to read and write UVs.
-        point_data={"obj:vt": split.uv, "vertex": split.own},
+        point_data={"obj:vt": split.uv, "vertex": split.vertex},
         cell_data={"chart": [result.seam_data.face_chart]},
     )

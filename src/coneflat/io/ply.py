@@ -111,7 +111,7 @@ def parse_ply(path: Path, content: bytes) -> MeshFile:
         content, start = _text_values(path, content, start, elements), 0
     columns_of: dict[str, list[Column]] = {}
     for element in elements:
-        chosen_properties = _wanted(path, element)
+        chosen_properties = _mesh_properties(path, element)
         try:
             columns, start = _decode(content, start, _stored(element, form), chosen_properties)
         except _EndOfFile as error:
@@ -148,7 +148,7 @@ def _vertices(
     vertices, properties = np.empty((0, 3)), dict[str, FloatArray]()
     if "vertex" in columns_of:
         element, columns = elements["vertex"], columns_of["vertex"]
-        declared = [element.properties[i] for i in _wanted(path, element)]
+        declared = [element.properties[i] for i in _mesh_properties(path, element)]
         vertices = np.stack([np.asarray(c, np.float64) for c in columns[:3]], axis=1)
         properties = {p.name: _shade(p, c) for p, c in zip(declared[3:], columns[3:], strict=True)}
     return MeshFile(path, vertices, np.empty(0, np.int64), np.zeros(1, np.int64), properties=properties)
@@ -157,7 +157,7 @@ def _vertices(
 def _with_faces(path: Path, mesh: MeshFile, element: _Element, columns: list[Column]) -> MeshFile:
     """Return a mesh with its faces, their properties and the UVs of their corners."""
     sizes, corners = columns[0].astype(np.int64), _as_integers(path, columns[1])
-    chosen_properties = [element.properties[i] for i in _wanted(path, element)]
+    chosen_properties = [element.properties[i] for i in _mesh_properties(path, element)]
     lists = sum(p.count is not None for p in chosen_properties)
     texture, uv = _corner_uv(path, sizes, *columns[2:4]) if lists == 2 else (None, None)
     properties = {
@@ -272,10 +272,10 @@ def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int, tuple
                     raise ValueError("a negative count")
             elif words[:1] == ["property"]:
                 if words[1] == "list":
-                    new = _Property(words[4], _TYPES[words[3]], _TYPES[words[2]], words[3])
+                    declared = _Property(words[4], _TYPES[words[3]], _TYPES[words[2]], words[3])
                 else:
-                    new = _Property(words[2], _TYPES[words[1]], None, words[1])
-                elements[-1] = replace(elements[-1], properties=(*elements[-1].properties, new))
+                    declared = _Property(words[2], _TYPES[words[1]], None, words[1])
+                elements[-1] = replace(elements[-1], properties=(*elements[-1].properties, declared))
         except (IndexError, KeyError, ValueError) as error:
             raise MeshFileError(f"{path}, line {i + 1}: invalid line in a PLY header: {line!r}") from error
     if form not in ("ascii", "binary_little_endian", "binary_big_endian"):
@@ -283,7 +283,7 @@ def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int, tuple
     return form, elements, start, tuple(comments)
 
 
-def _wanted(path: Path, element: _Element) -> list[int]:
+def _mesh_properties(path: Path, element: _Element) -> list[int]:
     """Return the indices of the properties of an element that are part of the mesh."""
     if element.name == "vertex":
         names = [p.name for p in element.properties]
@@ -324,7 +324,7 @@ class _EndOfFile(Exception):
     """Signals that the file is shorter than its header declares."""
 
 
-def _decode(content: bytes, start: int, element: _Element, wanted: list[int]) -> tuple[list[Column], int]:
+def _decode(content: bytes, start: int, element: _Element, chosen: list[int]) -> tuple[list[Column], int]:
     """Return the wanted columns of an element, a list as two columns (lengths, items), and its end position."""
     lists = [i for i, p in enumerate(element.properties) if p.count]
     first = _row(content, start, element)[1] if element.length else [0] * len(lists)
@@ -338,18 +338,18 @@ def _decode(content: bytes, start: int, element: _Element, wanted: list[int]) ->
         rows = np.frombuffer(content, row, element.length, start)
         if all(np.all(rows[f"n{i}"] == lengths[i]) for i in lists):
             columns: list[Column] = []
-            for i in wanted:
+            for i in chosen:
                 if i in lengths:
                     columns.append(np.full(element.length, lengths[i], dtype=np.int64))
                 columns.append(rows[f"p{i}"].reshape(-1))
             return columns, stop
     if not lists or element.length > len(content):
         raise _EndOfFile
-    return _decode_ragged(content, start, element, wanted)
+    return _decode_ragged(content, start, element, chosen)
 
 
 def _decode_ragged(
-    content: bytes, start: int, element: _Element, wanted: list[int]
+    content: bytes, start: int, element: _Element, chosen: list[int]
 ) -> tuple[list[Column], int]:
     """Return the same as `_decode` for an element whose lists differ in length."""
     codes = np.frombuffer(content, np.uint8)
@@ -369,12 +369,12 @@ def _decode_ragged(
         if p.count:
             lengths = read(places, p.count).astype(np.int64)
             places = places + np.dtype(p.count).itemsize
-        if i in wanted:
+        if i in chosen:
             within = np.arange(lengths.sum()) - np.repeat(np.cumsum(lengths) - lengths, lengths)
             items = read(np.repeat(places, lengths) + within * size, p.kind)
             columns[i] = [lengths, items] if p.count else [items]
         places = places + lengths * size
-    return [column for i in wanted for column in columns[i]], starts[-1]
+    return [column for i in chosen for column in columns[i]], starts[-1]
 
 
 def _row(content: bytes, start: int, element: _Element) -> tuple[int, list[int]]:
@@ -492,7 +492,7 @@ def ply_has_textures(source: MeshFile) -> bool:
 
 
 def _kept_properties(source: MeshFile) -> list[str]:
-    """Return the names of the vertex properties that `write_ply` keeps: all but UVs and what it writes anew."""
+    """Return the names of the vertex properties that `write_ply` keeps: except UVs and those that it computes."""
     replaced = (*_WRITTEN, *(() if source.ply is None else source.ply.uv))
     return [name for name in source.properties if name not in replaced]
 
@@ -516,7 +516,7 @@ def write_ply(result: Flattening, stream: IO[bytes], folder: Path) -> None:
     doubles["s t"] = mesh.uv
     names = " ".join(doubles).split()
     source = None if result.face_corners is None else result.source
-    columns = [] if source is None else list(_vertex_columns(source, input_vertices(result)[mesh.own]))
+    columns = [] if source is None else list(_vertex_columns(source, input_vertices(result)[mesh.vertex]))
     kind: list[tuple[Any, ...]] = [("doubles", "<f8", len(names)), ("source_vertex", "<i4")]
     kind += [(f"p{i}", values.dtype.newbyteorder("<")) for i, (_, _, values) in enumerate(columns)]
     vertices = np.empty(len(mesh.vertices), kind)
@@ -561,13 +561,13 @@ def _face_columns(result: Flattening) -> dict[str, NDArray[Any]]:
     return {name: values[polygon] for name, values in result.source.face_properties.items()}
 
 
-def _moved(header: PlyHeader, old: Path, new: Path) -> Iterator[str]:
+def _moved(header: PlyHeader, source_folder: Path, target_folder: Path) -> Iterator[str]:
     """Yield the comments of a file, with paths of textures relative to another folder."""
-    here, there = os.path.realpath(old), os.path.realpath(new)
+    source, target = os.path.realpath(source_folder), os.path.realpath(target_folder)
     for line in header.comments:
         name = _texture_name(line)
-        if name and here != there:
-            line = _TEXTURE + moved_path(name.encode("latin-1"), here, there).decode("latin-1")
+        if name and source != target:
+            line = _TEXTURE + moved_path(name.encode("latin-1"), source, target).decode("latin-1")
         yield line
 
 

@@ -160,15 +160,15 @@ def is_utf16(content: bytes) -> bool:
 def _welded(mesh: MeshFile) -> MeshFile:
     """Return a mesh with vertices at the same position merged, separately for each node of a scene."""
     blocks = (0, len(mesh.vertices)) if mesh.scene is None else mesh.scene.blocks
-    kept, merged, count = [], [], 0
+    first_vertices, merged, count = [], [], 0
     for begin, end in pairwise(blocks):
         first, number = weld_vertices(mesh.vertices[begin:end])
-        kept.append(first + begin)
+        first_vertices.append(first + begin)
         merged.append(number + count)
         count += len(first)
     if count == len(mesh.vertices):
         return mesh
-    every, number = np.concatenate(kept), np.concatenate(merged)
+    every, number = np.concatenate(first_vertices), np.concatenate(merged)
     return replace(
         mesh,
         vertices=mesh.vertices[every],

@@ -39,7 +39,7 @@ class SplitMesh(NamedTuple):
         vertices: (k, 3) positions.
         uv: (k, 2) UV points.
         faces: (m, 3) triangles.
-        own: (k,) the vertex of the result for each vertex.
+        vertex: (k,) the vertex of the result for each vertex.
         origin: (k,) the vertex of the input for each vertex.
         normals: (k, 3) normals, if they were given.
     """
@@ -47,7 +47,7 @@ class SplitMesh(NamedTuple):
     vertices: FloatArray
     uv: FloatArray
     faces: IntArray
-    own: IntArray
+    vertex: IntArray
     origin: IntArray
     normals: FloatArray | None = None
 
@@ -59,14 +59,16 @@ def split_at_seams(result: Flattening, normals: CornerNormals | None = None) -> 
         result: the flattening.
         normals: normals of the triangle corners; vertices are also split where these differ.
     """
-    own, point, faces = distinct_pairs(result.faces.reshape(-1), result.uv_faces.reshape(-1), len(result.uv))
+    vertex, point, faces = distinct_pairs(
+        result.faces.reshape(-1), result.uv_faces.reshape(-1), len(result.uv)
+    )
     shading = None
     if normals is not None:
         corners = normals.corners.reshape(-1)
         pair, normal, faces = distinct_pairs(faces, corners, len(normals.normals))
-        own, point, shading = own[pair], point[pair], normals.normals[normal]
-    origin = input_vertices(result)[own]
-    return SplitMesh(result.vertices[own], result.uv[point], faces.reshape(-1, 3), own, origin, shading)
+        vertex, point, shading = vertex[pair], point[pair], normals.normals[normal]
+    origin = input_vertices(result)[vertex]
+    return SplitMesh(result.vertices[vertex], result.uv[point], faces.reshape(-1, 3), vertex, origin, shading)
 
 
 def input_vertices(result: Flattening) -> IntArray:
@@ -85,9 +87,9 @@ def distinct_pairs(
 def usable_normals(normals: FloatArray, corners: IntArray) -> IntArray | None:
     """Return (c,) the index of each corner into (k, 3) normals, -1 for unusable normals; None if all are unusable."""
     is_usable = np.append(np.isfinite(normals).all(axis=1) & normals.any(axis=1), False)
-    known = np.where((corners >= 0) & (corners < len(normals)), corners, -1)
-    known = np.where(is_usable[known], known, -1)
-    return known if np.any(known >= 0) else None
+    usable = np.where((corners >= 0) & (corners < len(normals)), corners, -1)
+    usable = np.where(is_usable[usable], usable, -1)
+    return usable if np.any(usable >= 0) else None
 
 
 def source_normals(result: Flattening) -> CornerNormals | None:
@@ -110,25 +112,25 @@ def source_normals(result: Flattening) -> CornerNormals | None:
     if missing.any():
         corners = np.where(missing, len(normals) + result.faces, corners)
         normals = np.concatenate([normals, vertex_normals(result.vertices, result.faces)])
-    used, numbers = np.unique(corners, return_inverse=True)
+    used_normals, numbers = np.unique(corners, return_inverse=True)
     # Many files have a normal for every corner, most of them equal.
-    shown = shading_normals(normals[used])
-    kept, merged = weld(shown)
-    return CornerNormals(shown[kept], merged[numbers.reshape(corners.shape)])
+    shown = shading_normals(normals[used_normals])
+    distinct, merged = weld(shown)
+    return CornerNormals(shown[distinct], merged[numbers.reshape(corners.shape)])
 
 
 def _smoothing_groups(source: MeshFile) -> IntArray | None:
     """Return (p,) the smoothing group of each polygon of an OBJ file, 0 for none; None if groups have no effect."""
     if source.obj is None:
         return None
-    known: dict[bytes, int] = {}
+    numbers: dict[bytes, int] = {}
     starts, groups = [0], [0]
     for polygon in sorted(source.obj.gaps):
         names = _SMOOTHING.findall(source.obj.gaps[polygon])
         if names:
             name = names[-1].lower()
             starts.append(polygon)
-            groups.append(0 if name in (b"off", b"0") else known.setdefault(name, len(known) + 1))
+            groups.append(0 if name in (b"off", b"0") else numbers.setdefault(name, len(numbers) + 1))
     of_polygon = np.repeat(groups, np.diff([*starts, len(source.offsets) - 1]))
     if len(starts) == 1 or (of_polygon[0] > 0 and np.all(of_polygon == of_polygon[0])):
         return None

@@ -43,8 +43,8 @@ def parse_stl(path: Path, content: bytes) -> MeshFile:
         points = _text_points(path, content)
         attributes = (SOLIDS,) if _has_names(content) else ()
     elif needed:
-        found = (len(content) - _HEADER.itemsize) // _TRIANGLE.itemsize
-        raise MeshFileError(f"{path} ends after {found} of the {declared} triangles in its header")
+        complete = (len(content) - _HEADER.itemsize) // _TRIANGLE.itemsize
+        raise MeshFileError(f"{path} ends after {complete} of the {declared} triangles in its header")
     else:
         raise MeshFileError(f"{path} is not an STL file: it is shorter than an STL header")
     if not len(points):

@@ -115,9 +115,11 @@ class TextBlock:
         counts = self.counts[rows]
         begins = self._first_words[rows] + first
         counts = np.maximum((counts if stop is None else np.minimum(stop, counts)) - first, 0)
-        some = counts > 0
+        is_filled = counts > 0
         places = np.append(self._word_starts, len(self._codes))
-        bounds = np.stack([places[begins[some]], places[(begins + counts)[some]]], axis=1).reshape(-1)
+        bounds = np.stack([places[begins[is_filled]], places[(begins + counts)[is_filled]]], axis=1).reshape(
+            -1
+        )
         lengths = np.diff(bounds, prepend=0, append=len(self._codes))
         chosen = np.repeat(np.arange(len(lengths)) % 2 == 1, lengths)
         return Words(self, rows, counts, self._codes[chosen].tobytes())
@@ -172,14 +174,14 @@ class Words:
         numbers = _numbers(self._text, int(self.counts.sum()), np.float64)
         return self._reject(_FLOAT) if numbers is None else numbers
 
-    def integers(self, what: str = "a number") -> IntArray:
+    def integers(self, noun: str = "a number") -> IntArray:
         """Return all words as integers.
 
         Raises:
             MeshFileError: a word is not an integer; the message says that it is not `what`.
         """
         numbers = _numbers(self._text, int(self.counts.sum()), np.int64)
-        return self._reject(_INTEGER, what) if numbers is None else numbers
+        return self._reject(_INTEGER, noun) if numbers is None else numbers
 
     def corners(self) -> tuple[IntArray, IntArray | None, IntArray | None]:
         """Return the parts of words `v`, `v/vt`, `v//vn` or `v/vt/vn`.
@@ -213,14 +215,14 @@ class Words:
         )
         return numbers[first], texture if texture.any() else None, normals if normals.any() else None
 
-    def _reject(self, form: re.Pattern[bytes], what: str = "a number") -> NoReturn:
+    def _reject(self, form: re.Pattern[bytes], noun: str = "a number") -> NoReturn:
         """Raise MeshFileError for the first word that does not match a pattern."""
         words = self._text.split()
         i = next((i for i, word in enumerate(words) if not form.fullmatch(word)), len(words) - 1)
         row = self._rows[np.searchsorted(np.cumsum(self.counts), i, side="right")]
         # Quoted, and truncated if it is long.
         shown = repr(words[i].decode("utf-8", "replace")[:40])
-        self._block.fail(int(row), f"{shown} is not {what}")
+        self._block.fail(int(row), f"{shown} is not {noun}")
 
 
 def _plain_lines(text: bytes, comments: bool, continued: bool) -> bytes:

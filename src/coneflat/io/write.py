@@ -176,9 +176,9 @@ def _in_single_precision(result: Flattening) -> Flattening:
     """
     vertices = result.vertices
     if result.source is None or result.source.scene is None:
-        used = np.unique(result.faces)
+        shown = np.unique(result.faces)
         vertices = vertices.copy()
-        vertices[used] = local_positions(vertices[used]).vertices
+        vertices[shown] = local_positions(vertices[shown]).vertices
     is_stored = np.array_equal(stored_in_glb(result.uv), result.uv)
     if is_stored and np.array_equal(vertices, result.vertices, equal_nan=True):
         return result
@@ -243,7 +243,9 @@ def left_out(result: Flattening, ending: str, has_texture: bool = False) -> tupl
     hidden = {VERTEX_COLOURS, ALPHA} if has_texture and source.scene is None else set()
     kept_attributes = KEPT[ending](source) - hidden
     lost_attributes = set(source.attributes) - kept_attributes
-    better = (name for name, attributes_of in KEPT.items() if lost_attributes <= attributes_of(source))
-    notes = losses(source, ending, kept_attributes, next(better, ""))
+    complete_endings = (
+        name for name, attributes_of in KEPT.items() if lost_attributes <= attributes_of(source)
+    )
+    notes = losses(source, ending, kept_attributes, next(complete_endings, ""))
     has_textures = ending in HAS_TEXTURES and HAS_TEXTURES[ending](source)
     return (*notes, old_textures("the file")) if has_textures else notes

@@ -40,11 +40,20 @@ from .kinds import (
     strength,
 )
 from .reading import read_options, settings, takes
+from .texts import (
+    parse_angle,
+    read_edges,
+    read_numbers,
+    read_vertices,
+    read_vertices_or_pairs,
+    read_word_or_vertex_map,
+)
 
 __all__ = [
     "ANGLE", "ANGLE_OR_NONE", "AtlasOptions", "CONES", "COUNT", "Choice", "ConeBounds", "ConeNumber", "ConeOptions",
     "CurveOptions", "Declaration", "Direction", "Edges", "FORMATS", "FindOptions", "Flag", "Kind",
     "MAX_SHOWN_TRIANGLES", "MetricOptions", "Number", "Options", "PAPER", "RARE", "RunOptions", "SHOWS",
     "Vertices", "VerticesOrEdges", "Weights", "WordOrVertices", "as_number", "as_integer", "declarations", "option",
-    "SEARCH_OPTIONS", "SeamOptions", "read_options", "settings", "strength", "takes",
+    "SEARCH_OPTIONS", "SeamOptions", "parse_angle", "read_edges", "read_numbers", "read_options", "read_vertices",
+    "read_vertices_or_pairs", "read_word_or_vertex_map", "settings", "strength", "takes",
 ]  # fmt: skip

@@ -40,12 +40,12 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
 
     def _cone_errors(self) -> Iterator[str]:
         """Yield an error message for each conflict of the cone options."""
-        least, widest, quantum = self.min_cone_angle, self.max_cone_angle, self.quantise
-        if not 0 < least <= WIDEST_CONE:
-            most = f"{WIDEST_CONE / math.pi:g} pi"
-            yield f"the smallest cone angle must be positive and at most {most}, got {least:g} radians"
-        if widest is not None and not widest > least:
-            yield f"the largest cone angle ({widest:g} radians) must exceed the smallest ({least:g})"
+        smallest, widest, quantum = self.min_cone_angle, self.max_cone_angle, self.quantise
+        if not 0 < smallest <= WIDEST_CONE:
+            largest = f"{WIDEST_CONE / math.pi:g} pi"
+            yield f"the smallest cone angle must be positive and at most {largest}, got {smallest:g} radians"
+        if widest is not None and not widest > smallest:
+            yield f"the largest cone angle ({widest:g} radians) must exceed the smallest ({smallest:g})"
         if not self.searches_cones:
             # The curvatures of given cones without one minimize the weighted area distortion. If all are given, handles
             # can be corrected to a quantum, and a straight boundary has corners among them.
@@ -67,8 +67,8 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
     def _other_errors(self) -> Iterator[str]:
         """Yield an error message for each conflict of the options of seams and atlas."""
         if not 0 <= self.padding < self.resolution / 4:
-            most = f"a quarter of the resolution of {self.resolution:,}"
-            yield f"padding must be from 0 to {most}, got {self.padding:g}"
+            largest = f"a quarter of the resolution of {self.resolution:,}"
+            yield f"padding must be from 0 to {largest}, got {self.padding:g}"
         if self.sharp_angle is not None and not 0 < self.sharp_angle < math.pi:
             yield f"the sharp angle must be between 0 and pi, got {self.sharp_angle:g} radians"
 

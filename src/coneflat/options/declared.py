@@ -100,27 +100,33 @@ class Declaration:
     doc: str = ""
 
 
-def option(default: Any, kind: Kind, **more: Any) -> Any:
+def option(default: Any, kind: Kind, **properties: Any) -> Any:
     """Return a dataclass field with the declaration of an option."""
-    return field(default=default, metadata={"declared": Declaration(kind, **more)})
+    return field(default=default, metadata={"declared": Declaration(kind, **properties)})
 
 
 @cache
 def declarations(group: Any) -> dict[str, Declaration]:
     """Return the options of a group by name: its own fields, then those of its base classes, in their order."""
-    known = {each.name: each for each in fields(group)}
-    found: dict[str, Declaration] = {}
+    fields_by_name = {option_field.name: option_field for option_field in fields(group)}
+    declared: dict[str, Declaration] = {}
     for base in group.__mro__:
         text = inspect.cleandoc(base.__doc__ or "")
         title = re.split(r"\W", text)[0]
         docs = dict(re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", text, re.MULTILINE))
         for name in inspect.get_annotations(base):
-            if name in known and name not in found:
-                of = known[name]
+            if name in fields_by_name and name not in declared:
+                declared_field = fields_by_name[name]
                 doc = " ".join(docs.get(name, "").split())
-                data = {"name": name, "group": title, "doc": doc, "type": of.type, "default": of.default}
-                found[name] = replace(of.metadata["declared"], **data)
-    return found
+                data = {
+                    "name": name,
+                    "group": title,
+                    "doc": doc,
+                    "type": declared_field.type,
+                    "default": declared_field.default,
+                }
+                declared[name] = replace(declared_field.metadata["declared"], **data)
+    return declared
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,8 +158,8 @@ class ConeNumber:
     """Cones: their number.
 
     Attributes:
-        distortion: Largest area distortion allowed: the standard deviation of the log scale, weighted by area. A
-            smaller value needs more cones.
+        distortion: Largest area distortion allowed: the standard deviation of the log conformal factor,
+            weighted by area. A smaller value needs more cones.
         cone_count: Number of cones per component, instead of a distortion. They are placed for the least area
             distortion.
     """
@@ -164,7 +170,7 @@ class ConeNumber:
 
 @dataclass(frozen=True, kw_only=True)
 class ConeQuanta:
-    """Cones: quantised curvatures.
+    """Cones: quantised curvatures (integer cones).
 
     Attributes:
         quantise: Cone curvatures are multiples of this angle, for example pi/2. Rotations across seams are then
@@ -226,9 +232,10 @@ class SeamOptions:
 
     Attributes:
         seams: Edges that must be cut, as pairs of vertices; or input, for the seams of the UVs in the file. In Python,
-            ("input", pairs) gives both. They act like a boundary. A single edge without a neighbouring seam is not cut.
+            ("input", pairs) combines both. Marked edges act as boundaries. A single edge without a neighbouring seam is
+            not cut.
         no_seams: Edges that must not be cut, as pairs of vertices; or vertices, for all edges between two of them.
-            This also excludes sharp edges and seams of the file. No search puts a cone where no seam can reach it.
+            This also excludes sharp edges and seams of the file. Cones are placed only where seams can reach them.
             Cuts that are added later to remove overlaps avoid these edges if possible.
         sharp_angle: Cut edges with a larger dihedral angle, for example 40deg for CAD parts. Other seams prefer
             sharp edges: the cost of an edge is its length up to 20 degrees, and falls to a tenth of it at 60 degrees.
@@ -253,7 +260,7 @@ class AtlasOptions:
         charts: atlas: move seams and add cuts until no triangles overlap. one: a single chart per component, as in the
             paper, which may overlap itself; PAPER and --paper use it.
         resolution: Texels along a side of the texture. Padding is measured in these.
-        padding: Least distance between charts, and between charts and the border, in texels; at most a quarter of a
+        padding: Smallest distance between charts, and between charts and the border, in texels; at most a quarter of a
             side.
         tiles: Number of textures (UDIM tiles) over which charts are distributed, all at one scale.
         up: Upward direction of the model; charts are rotated so that it points up in the texture. Without it, charts

@@ -71,15 +71,15 @@ class Number(Kind):
     """A number; an angle is in radians, a strength is from 0 and also accepts True (1) and False (0).
 
     Attributes:
-        least, most: inclusive bounds.
+        minimum, maximum: inclusive bounds.
         is_integer: the number must be an integer.
         is_positive: the number must be finite and above 0.
         is_angle, is_strength: the number is an angle, or a strength.
         optional: None is allowed, also as the word "none".
     """
 
-    least: float = -math.inf
-    most: float = math.inf
+    minimum: float = -math.inf
+    maximum: float = math.inf
     is_integer: bool = False
     is_positive: bool = False
     is_angle: bool = False
@@ -92,7 +92,7 @@ class Number(Kind):
         if self.is_strength and type(value).__name__ in ("bool", "bool_"):
             value = float(value)
         number = as_integer(name, value) if self.is_integer else as_number(name, value)
-        if not self.least <= number <= self.most or (self.is_positive and not 0 < number < math.inf):
+        if not self.minimum <= number <= self.maximum or (self.is_positive and not 0 < number < math.inf):
             raise OptionError(f"{name} must be {self.text}, got {number:,{'' if self.is_integer else '.6g'}}")
         return number
 
@@ -100,11 +100,11 @@ class Number(Kind):
     def text(self) -> str:
         """A description of the valid numbers, for messages."""
         noun = "an integer" if self.is_integer else "a number"
-        if self.is_positive or self.least == -math.inf:
+        if self.is_positive or self.minimum == -math.inf:
             return f"{noun} above 0" if self.is_positive else noun
-        if self.most == math.inf:
-            return f"{noun}, {self.least:g} or more"
-        return f"{noun} from {self.least:g} to {self.most:,g}"
+        if self.maximum == math.inf:
+            return f"{noun}, {self.minimum:g} or more"
+        return f"{noun} from {self.minimum:g} to {self.maximum:,g}"
 
 
 ANGLE, ANGLE_OR_NONE = Number(is_angle=True), Number(is_angle=True, optional=True)
@@ -112,14 +112,14 @@ POSITIVE = Number(is_positive=True)
 COUNT = Number(0, is_integer=True, optional=True)
 
 
-def strength(most: float) -> Number:
+def strength(maximum: float) -> Number:
     """Return the kind of a strength from 0 to `most`."""
-    return Number(0, most, is_strength=True)
+    return Number(0, maximum, is_strength=True)
 
 
-def integer(most: float = math.inf) -> Number:
+def integer(maximum: float = math.inf) -> Number:
     """Return the kind of an integer from 1 to `most`."""
-    return Number(1, most, is_integer=True)
+    return Number(1, maximum, is_integer=True)
 
 
 @dataclass(frozen=True)
@@ -154,10 +154,10 @@ class WordOrVertices(Kind):
     def parse(self, name: str, value: Any) -> str | dict[int, float | None]:
         if isinstance(value, str):
             return Choice(self.words).parse(name, value)
-        given = given_vertices(self.noun, value, self.may_differ)
-        if self.empty_error and not given:
+        curvatures = given_vertices(self.noun, value, self.may_differ)
+        if self.empty_error and not curvatures:
             raise OptionError(self.empty_error)
-        return given
+        return curvatures
 
 
 @dataclass(frozen=True)
@@ -183,13 +183,17 @@ class VerticesOrEdges(Kind):
 
         if value is None:
             return None
-        given = _indices(name, value)
-        if given.ndim not in (1, 2) or given.shape[1:] not in ((), (2,)) or given.dtype.kind not in "iu":
+        indices = _indices(name, value)
+        if (
+            indices.ndim not in (1, 2)
+            or indices.shape[1:] not in ((), (2,))
+            or indices.dtype.kind not in "iu"
+        ):
             raise OptionError(
-                f"{name} must be vertices (k,) or pairs of vertices (k, 2), got shape {given.shape} and type "
-                f"{given.dtype}"
+                f"{name} must be vertices (k,) or pairs of vertices (k, 2), got shape {indices.shape} and type "
+                f"{indices.dtype}"
             )
-        return given.astype(np.int64)
+        return indices.astype(np.int64)
 
 
 @dataclass(frozen=True)
@@ -259,17 +263,17 @@ def _array(name: str, value: object) -> NDArray[Any]:
         raise OptionError(f"{name}: {error}") from error
 
 
-def _indices(name: str, given: object) -> NDArray[Any]:
+def _indices(name: str, value: object) -> NDArray[Any]:
     """Return a value as an array, of integers if it is empty."""
-    values = _array(name, list(given) if isinstance(given, (set, frozenset)) else given)
+    values = _array(name, list(value) if isinstance(value, (set, frozenset)) else value)
     return values if values.size else values.astype("i8")
 
 
-def _pairs(noun: str, given: object) -> IntArray:
+def _pairs(noun: str, value: object) -> IntArray:
     """Return (k, 2) pairs of vertices."""
     import numpy as np
 
-    pairs = _indices(noun, given)
+    pairs = _indices(noun, value)
     if not pairs.size:
         return np.empty((0, 2), dtype=np.int64)
     if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.dtype.kind not in "iu":
@@ -293,7 +297,7 @@ def given_vertices(noun: str, vertices: object, may_differ: bool = False) -> dic
     import numpy as np
 
     if isinstance(vertices, Mapping):
-        given: dict[int, float | None] = {
+        curvatures: dict[int, float | None] = {
             as_integer(f"a {noun}'s vertex", v): None if k is None else as_number(f"a {noun}'s curvature", k)
             for v, k in vertices.items()
         }
@@ -301,8 +305,8 @@ def given_vertices(noun: str, vertices: object, may_differ: bool = False) -> dic
         if isinstance(vertices, np.ndarray) and np.ndim(vertices) != 1:
             raise OptionError(f"{noun}s must be a list of vertices, got {short_repr(vertices)}")
         listed = [as_integer(f"a {noun}'s vertex", v) for v in vertices]
-        given = dict.fromkeys(listed)
-        if len(given) < len(listed):
+        curvatures = dict.fromkeys(listed)
+        if len(curvatures) < len(listed):
             twice = next(v for i, v in enumerate(listed) if v in listed[:i])
             raise OptionError(f"vertex {twice} is given as a {noun} twice")
     else:
@@ -311,13 +315,14 @@ def given_vertices(noun: str, vertices: object, may_differ: bool = False) -> dic
         raise OptionError(
             f"{noun}s must be vertices, or a map from vertex to curvature, got {type(vertices).__name__}{advice}"
         )
-    unknown = [v for v, k in given.items() if k is None]
-    if unknown and len(unknown) < len(given) and not may_differ:
+    unknown = [v for v, k in curvatures.items() if k is None]
+    if unknown and len(unknown) < len(curvatures) and not may_differ:
+        known_count = len(curvatures) - len(unknown)
         raise OptionError(
-            f"{len(given) - len(unknown)} of {len(given)} {noun}s have a curvature and vertex {unknown[0]} has "
+            f"{known_count} of {len(curvatures)} {noun}s have a curvature and vertex {unknown[0]} has "
             "none: give curvatures for all, or for none"
         )
-    for v, k in given.items():
+    for v, k in curvatures.items():
         if k is not None and not math.isfinite(k):
             raise OptionError(f"the curvature of {noun} {v} must be finite, got {k}")
-    return given
+    return curvatures

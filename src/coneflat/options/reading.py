@@ -26,26 +26,26 @@ R_co = TypeVar("R_co", covariant=True)
 SPELLINGS = {"quantize": "quantise"}
 
 
-def read_options(given: Mapping[str, Any], group: type[G] = Options) -> G:  # type: ignore[assignment]
+def read_options(values: Mapping[str, Any], group: type[G] = Options) -> G:  # type: ignore[assignment]
     """Return parsed options from keywords.
 
     Args:
-        given: map from name to value.
+        values: map from name to value.
         group: the class with the allowed options.
 
     Raises:
         OptionError: an option is unknown, a value is invalid, or options contradict each other.
     """
-    known = declarations(cast(type, group))
+    declared = declarations(cast(type, group))
     parsed: dict[str, Any] = {}
-    for name, value in given.items():
+    for name, value in values.items():
         name = SPELLINGS.get(name, name)
-        if name not in known:
-            near = difflib.get_close_matches(name, list(known), 1)
-            raise OptionError(f"unknown option {name}" + (f"; did you mean {near[0]}?" if near else ""))
+        if name not in declared:
+            similar = difflib.get_close_matches(name, list(declared), 1)
+            raise OptionError(f"unknown option {name}" + (f"; did you mean {similar[0]}?" if similar else ""))
         if name in parsed:
             raise OptionError(f"{name} is given twice, in different spellings")
-        parsed[name] = known[name].kind.parse(name, value)
+        parsed[name] = declared[name].kind.parse(name, value)
     widest = parsed.get("max_cone_angle")
     if widest is not None and WIDEST_CONE < widest <= math.inf:
         parsed["max_cone_angle"] = None  # no bound
@@ -55,12 +55,12 @@ def read_options(given: Mapping[str, Any], group: type[G] = Options) -> G:  # ty
 def settings(options: Options) -> dict[str, Any]:
     """Return options as plain Python values, for a report."""
     values: dict[str, Any] = {}
-    for name, each in declarations(cast(type, type(options))).items():
+    for name, declaration in declarations(cast(type, type(options))).items():
         value = getattr(options, name)
-        if isinstance(each.kind, (Edges, VerticesOrEdges)):
+        if isinstance(declaration.kind, (Edges, VerticesOrEdges)):
             value = [value[0], value[1].tolist()] if isinstance(value, tuple) else value
             value = value.tolist() if hasattr(value, "tolist") else value
-        elif isinstance(each.kind, Weights) or name == "lengths":
+        elif isinstance(declaration.kind, Weights) or name == "lengths":
             value = value if value is None or isinstance(value, str) else "given"
         if name != "progress" and (name != "lengths" or value is not None):
             values[name] = value
@@ -86,19 +86,27 @@ def takes(declared: Callable[P, Any]) -> Callable[[Callable[..., R]], OfMesh[P, 
     """
 
     def decorate(function: Callable[..., R]) -> OfMesh[P, R]:
-        known = declarations(cast(type, declared)).values()
+        declarations_of_group = declarations(cast(type, declared)).values()
         signature = inspect.signature(function)
-        before = [each for each in signature.parameters.values() if each.kind is not each.VAR_KEYWORD]
+        parameters = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
         keywords = [
             inspect.Parameter(
-                each.name, inspect.Parameter.KEYWORD_ONLY, default=each.default, annotation=each.type
+                declaration.name,
+                inspect.Parameter.KEYWORD_ONLY,
+                default=declaration.default,
+                annotation=declaration.type,
             )
-            for each in known
+            for declaration in declarations_of_group
         ]
-        function.__signature__ = signature.replace(parameters=[*before, *keywords])  # type: ignore[attr-defined]
+        function.__signature__ = signature.replace(parameters=[*parameters, *keywords])  # type: ignore[attr-defined]
         lines = (
-            textwrap.fill(f"{each.name}: {each.doc}", 110, initial_indent=" " * 8, subsequent_indent=" " * 12)
-            for each in known
+            textwrap.fill(
+                f"{declaration.name}: {declaration.doc}",
+                110,
+                initial_indent=" " * 8,
+                subsequent_indent=" " * 12,
+            )
+            for declaration in declarations_of_group
         )
         function.__doc__ = (function.__doc__ or "").replace("        options: see below.", "\n".join(lines))
         return cast("OfMesh[P, R]", function)

@@ -70,7 +70,7 @@ _HEAD = (
 
 def check_quads_output(path: str | PathLike[str]) -> Path:
     """Return a path that `write_quads` can write, or raise the same errors in advance."""
-    target = checked_target(path, endings=QUAD_FORMATS, what="quads are written as")
+    target = checked_target(path, endings=QUAD_FORMATS, usage="quads are written as")
     if target.suffix.lower() in _MESHIO:
         imported("meshio", "meshes of meshio need meshio", "meshio")
     return target
@@ -78,7 +78,7 @@ def check_quads_output(path: str | PathLike[str]) -> Path:
 
 def check_grid_output(path: str | PathLike[str]) -> Path:
     """Return a path that `write_grid` can write, or raise the same errors in advance."""
-    return checked_target(path, endings=GRID_FORMATS, what="integer grids are written as")
+    return checked_target(path, endings=GRID_FORMATS, usage="integer grids are written as")
 
 
 def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:

@@ -21,7 +21,7 @@ from command import command as run
 import coneflat
 from coneflat import errors, flatten, read_mesh
 from coneflat.apps.cli.main import main
-from coneflat.apps.cli.values import parse_curvature
+from coneflat.options.texts import parse_curvature
 
 #: A line of progress, which comes by the clock.
 PROGRESS = re.compile(r" *\d+\.\d s +\d+%  .*")
@@ -136,12 +136,12 @@ def test_cones_from_a_file(model, tmp_path):
     [("1.5", 1.5), ("pi", np.pi), ("-pi/2", -np.pi / 2), ("0.5pi", np.pi / 2), ("3pi/2", 1.5 * np.pi),
      ("90deg", np.pi / 2), ("1e-1", 0.1), ("π", np.pi), ("-.25 pi", -np.pi / 4), ("2 * pi", 2 * np.pi)],
 )  # fmt: skip
-def test_curvatures_as_people_write_them(text, value):
+def test_forms_of_curvatures(text, value):
     assert parse_curvature(text, "here") == pytest.approx(value)
 
 
 @pytest.mark.parametrize("text", ["", "x", "pi/0", "1..2", "pipi", "-", "deg", "nan", "1 2"])
-def test_what_is_no_curvature(text):
+def test_invalid_curvatures_are_refused(text):
     with pytest.raises(errors.OptionError, match="here"):
         parse_curvature(text, "here")
 

@@ -44,7 +44,7 @@ def run(*words):
 
 
 class TestJoining:
-    def test_a_soup_becomes_the_surface_that_it_is(self):
+    def test_the_borders_of_a_triangle_soup_are_joined(self):
         vertices, faces = shapes.sphere(2)
         joined = join_borders(mesh_file(*soup(vertices, faces)))
         assert joined.edges == 3 * len(faces) // 2
@@ -53,7 +53,7 @@ class TestJoining:
         assert len(mesh.vertices) == len(vertices)
         assert not mesh.is_boundary_edge.any()
 
-    def test_what_is_closed_or_far_apart_is_left_alone(self):
+    def test_closed_or_distant_borders_are_not_joined(self):
         for vertices, faces in (shapes.sphere(1), shapes.hill(4, 3)):
             mesh = mesh_file(vertices, faces)
             assert join_borders(mesh).mesh is mesh
@@ -66,7 +66,7 @@ class TestJoining:
         assert "3 open edges at the same positions as others, left open; --weld" in joined.notes()[0]
 
     @pytest.mark.slow
-    def test_what_was_manifold_stays_so(self):
+    def test_joining_keeps_a_mesh_manifold(self):
         """Triangles between few places, and two parts of a ball with vertices of their own and a few holes."""
         random = np.random.default_rng(7)
         ball, faces = shapes.sphere(1)
@@ -113,7 +113,7 @@ class TestJoining:
         monkeypatch.chdir(tmp_path)
         vertices, faces = soup(*shapes.sphere(1))
         path = shapes.write_obj(tmp_path / "soup.obj", vertices, faces)
-        used = read_joined(path).used
+        used = read_joined(path).representative
         merged = np.flatnonzero(used != np.arange(len(used)))
         words = [word for v in merged[[5, 40, 80]] for word in ("--required-cones", v)]
         done = run("flatten", path, "-q", "-o", "a.obj", "--report", "a.json", *words)
@@ -169,7 +169,7 @@ class TestOwnUVs:
         return shapes.write_obj(tmp_path / "own.obj", vertices, faces, uv=0.5 * vertices[:, :2])
 
     @pytest.mark.parametrize(("command", "ending"), [("view", "html"), ("figure", "png")])
-    def test_they_are_shown_and_it_is_said(self, square, command, ending):
+    def test_uvs_of_a_file_are_shown_with_a_note(self, square, command, ending):
         if command == "figure":
             pytest.importorskip("matplotlib")
         done = run(command, square, "-o", f"a.{ending}")
@@ -191,7 +191,7 @@ class TestOwnUVs:
         assert done.exit_code == 2
         assert "--unwrap needs a mesh, and own.npz is a result" in done.output
 
-    def test_they_are_those_of_the_file(self, square):
+    def test_uvs_of_a_page_are_those_of_the_file(self, square):
         from coneflat.apps.view.from_uv import own_flattening
         from coneflat.io.read import read_joined
 

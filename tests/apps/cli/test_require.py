@@ -49,7 +49,7 @@ class TestForm:
             ("beauty=1", "unknown measure 'beauty': choose from .*area_std, .*flipped, .*overlap, "),
         ],
     )
-    def test_what_is_none(self, text, message):
+    def test_invalid_requirements_are_refused(self, text, message):
         with pytest.raises(errors.OptionError, match=message):
             parse_requirements([text], REPORTED)
 
@@ -75,13 +75,13 @@ class TestMeeting:
 
 
 class TestFlatten:
-    def test_not_met_is_exit_code_3_and_the_file_is_written(self, folder):
+    def test_an_unmet_requirement_gives_exit_code_3_and_the_file_is_written(self, folder):
         done = run("flatten", "hill.obj", "-q", "-o", "a.obj", "--require", "flipped=0,qc_mean<=1,charts>5")
         assert done.exit_code == 3
         lines = done.stderr.splitlines()
         assert [line.split(" is ")[0] for line in lines] == [
-            "coneflat: not met: qc_mean",
-            "coneflat: not met: charts",
+            "coneflat: requirement failed: qc_mean",
+            "coneflat: requirement failed: charts",
             "coneflat: a.obj",
         ]
         assert (folder / "a.obj").exists()
@@ -92,12 +92,12 @@ def test_measure(folder):
     assert run("measure", "a.obj", "--require", "flipped=0,overlap=0,corners_without_uv=0").exit_code == 0
     done = run("measure", "a.obj", "-q", "--require", "packing_efficiency>=1")
     assert done.exit_code == 3
-    assert done.stderr.startswith("coneflat: not met: packing_efficiency is 0.")
+    assert done.stderr.startswith("coneflat: requirement failed: packing_efficiency is 0.")
     assert done.stderr.count("\n") == 1
 
 
 @pytest.mark.slow
-def test_batch_counts_what_is_not_met_as_failed(folder):
+def test_batch_counts_unmet_requirements_as_failures(folder):
     done = run("batch", "ball.obj", "hill.obj", "--out", "flat", "--jobs", "1", "--require", "triangles=60")
     assert done.exit_code == 1
     with open("flat/summary.csv", newline="") as file:

@@ -59,7 +59,7 @@ def test_a_full_stdout_is_one_line_and_exit_code_1(tmp_path, words, code):
 
 @pytest.mark.slow
 @pytest.mark.skipif(not FULL.exists(), reason="there is no full device")
-def test_a_full_stderr_stops_no_work(tmp_path):
+def test_a_full_stderr_does_not_stop_the_work(tmp_path):
     with FULL.open("w") as full:
         done = run(tmp_path, "flatten", "a.obj", "-o", "b.obj", "-v", stderr=full)
         assert (done.returncode, (tmp_path / "b.obj").exists()) == (0, True)

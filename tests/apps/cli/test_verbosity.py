@@ -64,7 +64,7 @@ def test_quiet_says_nothing(folder, name):
     assert len(list(folder.iterdir())) == 2
 
 
-def test_lines_come_a_second_apart_if_it_takes_long(capsys, monkeypatch):
+def test_progress_lines_are_a_second_apart(capsys, monkeypatch):
     now = [0.0]
     monkeypatch.setattr("coneflat.apps.cli.run.time.perf_counter", lambda: now[0])
     with Console() as console:

@@ -293,7 +293,7 @@ class TestObj:
         assert np.array_equal(texels[::2], PIXELS[np.ix_(rows, columns)])
         assert baked.notes == ()
 
-    def test_what_is_not_read_is_named(self, tmp_path):
+    def test_ignored_material_properties_are_named(self, tmp_path):
         solid([255, 0, 0], tmp_path / "x.png")
         library = "newmtl a\nKe 1 0 0\nmap_Kd -mm 0.1 2 x.png\nmap_Bump -bm 2 y.png\nnorm z.png\nnewmtl b\n"
         baked = transfer(painted_obj(tmp_path, library), two_squares(tmp_path), resolution=4)

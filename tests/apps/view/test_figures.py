@@ -16,7 +16,7 @@ from coneflat.errors import OptionError
 
 pytest.importorskip("matplotlib")
 
-from coneflat.apps.cli import figure as figure_command
+from coneflat.apps.cli import figure_commands
 from coneflat.apps.view.figures.kinds import KINDS
 from coneflat.apps.view.figures.uv_layout import chart_paths
 
@@ -85,7 +85,7 @@ class TestFigures:
             ("checker", {"cells": -1}, "must be positive, got -1"),
         ],
     )
-    def test_what_makes_no_sense(self, result, kind, look, message):
+    def test_invalid_looks_are_refused(self, result, kind, look, message):
         with pytest.raises(OptionError, match=message):
             coneflat.make_figure(result, kind, **look)
 
@@ -107,11 +107,11 @@ class TestCommand:
         return call
 
     def test_the_kinds_are_those_of_the_package(self):
-        assert figure_command.KINDS == KINDS
+        assert figure_commands.KINDS == KINDS
 
     @pytest.mark.slow
     @pytest.mark.parametrize("kind", KINDS)
-    def test_of_a_mesh(self, run, tmp_path, kind):
+    def test_figure_of_a_mesh(self, run, tmp_path, kind):
         vertices = coneflat.read_mesh(tmp_path / "ball.obj").vertices
         np.save(tmp_path / "x.npy", vertices[:, 0])
         own = ["--color", "x.npy"] if kind == "color" else []
@@ -121,7 +121,7 @@ class TestCommand:
         assert (tmp_path / f"ball_{kind}.png").stat().st_size > 2000
 
     @pytest.mark.parametrize("kind", ["layout", "curve"])
-    def test_of_a_result(self, run, tmp_path, kind):
+    def test_figure_of_a_result(self, run, tmp_path, kind):
         coneflat.flatten(tmp_path / "ball.obj", cone_count=5).save(tmp_path / "ball.npz")
         assert run("ball.npz", "--kind", kind, "-o", "out.svg", "-q") == (0, "", "")
         assert len(list(groups(tmp_path / "out.svg"))) > 3
@@ -171,7 +171,7 @@ class TestCommand:
 
 
 @pytest.mark.parametrize("shown", [None, 3, np.eye(3), "layout"])
-def test_what_is_no_result_has_no_figure(shown):
+def test_figures_need_a_result(shown):
     with pytest.raises(OptionError, match="expected a result of `coneflat.flatten`, got"):
         coneflat.make_figure(shown, "layout")
 

@@ -67,12 +67,12 @@ class TestQuantity:
             (np.array(["a"] * 165), "got an array of shape"),
         ],
     )
-    def test_what_fits_nothing(self, ball, tmp_path, values, message):
+    def test_arrays_of_wrong_length_are_refused(self, ball, tmp_path, values, message):
         np.save(tmp_path / "v.npy", values)
         with pytest.raises(OptionError, match=message):
             own_quantity(coneflat.flatten(ball), str(tmp_path / "v.npy"))
 
-    def test_what_is_not_there(self, ball, tmp_path):
+    def test_missing_properties_and_files_are_named(self, ball, tmp_path):
         result = coneflat.flatten(ball)
         np.savez(tmp_path / "m.npz", one=np.zeros(3))
         with pytest.raises(OptionError, match="no vertex property 'cold'; it has heat"):

@@ -63,7 +63,7 @@ class TestPage:
         assert np.linalg.norm(places, axis=1).max() == pytest.approx(1.0)
         assert head["rows"] == [list(row) for row in as_rows(result)]
 
-    def test_it_names_no_other_place(self, result):
+    def test_it_refers_to_no_other_address(self, result):
         page = page_html(result)
         assert not re.findall(r"https?:|//[a-z]+\.|\bfetch\(|XMLHttpRequest|WebSocket|@import|url\(", page)
         assert re.findall(r'(?:src|href)="?([^"> ]+)', page) == ["data:,"]
@@ -86,7 +86,7 @@ class TestPage:
 
 
 class TestPictures:
-    def test_content_counts_not_the_ending(self, tmp_path):
+    def test_pictures_are_recognized_by_content(self, tmp_path):
         for name, content, kind in (
             ("a.png", PIXEL, "image/png"),
             ("b.txt", b"\xff\xd8\xff\xe0 jpeg", "image/jpeg"),
@@ -96,7 +96,7 @@ class TestPictures:
             (tmp_path / name).write_bytes(content)
             assert read_picture(tmp_path / name) == (content, kind)
 
-    def test_what_is_none(self, tmp_path):
+    def test_invalid_requirements_are_refused(self, tmp_path):
         with pytest.raises(MeshFileError, match="there is no such file"):
             read_picture(tmp_path / "none.png")
         with pytest.raises(MeshFileError, match="is a folder, not a file"):
@@ -113,18 +113,18 @@ class TestPictures:
 
 class TestContent:
     @pytest.mark.parametrize(("model", "chi"), [(sphere(3), 2), (shapes.torus(), 0), (shapes.genus(2), -2)])
-    def test_curvature_sums_to_two_pi_chi_before_and_after(self, model, chi):
+    def test_curvature_sums_to_two_pi_chi_on_the_model_and_in_the_plane(self, model, chi):
         content = content_of(coneflat.flatten(*model), 10**6)
         assert content.curvature.sum() == pytest.approx(2 * chi, abs=1e-9)
         assert content.flat.sum() == pytest.approx(2 * chi, abs=1e-9)
 
-    def test_boundaries_have_none(self):
+    def test_boundaries_have_no_curvature(self):
         content = content_of(coneflat.flatten(*shapes.hill()), 10**6)
         mesh = coneflat.TriangleMesh(*shapes.hill())
         for values in (content.curvature, content.flat):
             np.testing.assert_array_equal(np.isnan(values), mesh.is_boundary_vertex)
 
-    def test_after_it_is_at_the_cones_alone(self, result):
+    def test_flat_curvature_is_at_cones_only(self, result):
         content = content_of(result, 10**6)
         np.testing.assert_allclose(content.flat[content.cones] * np.pi, content.cone_curvatures, atol=1e-9)
         assert np.abs(np.delete(content.flat, content.cones)).max() < 1e-9
@@ -147,7 +147,7 @@ def fine():
 
 class TestThinning:
     @pytest.mark.slow
-    def test_as_few_triangles_as_asked_and_not_far_fewer(self, fine):
+    def test_simplification_keeps_almost_the_requested_number_of_triangles(self, fine):
         whole = content_of(fine, 10**6)
         assert whole.left_out == 0
         for most in (12_000, 6_000):
@@ -170,7 +170,7 @@ class TestThinning:
         np.testing.assert_array_equal(outline(whole), outline(thinned))
         assert whole.seams == thinned.seams
 
-    def test_too_few_to_be_had(self, fine):
+    def test_a_number_of_triangles_that_cannot_be_reached_is_an_error(self, fine):
         with pytest.raises(
             MeshError, match=r"20,480 triangles cannot be reduced to 50 for display: \d+ of them lie along"
         ):
@@ -182,7 +182,7 @@ class TestThinning:
 class TestFiles:
     def test_without_a_path_it_is_opened(self, result, monkeypatch):
         opened = []
-        monkeypatch.setattr("coneflat.apps.view.open_page", opened.append)
+        monkeypatch.setattr("coneflat.apps.view.page.webpage.open_page", opened.append)
         path = result.view()
         assert opened == [path]
         assert path.read_text(encoding="utf-8").startswith("<!doctype html>")
@@ -207,7 +207,7 @@ def saved(result, tmp_path_factory):
 
 
 class TestCommand:
-    def test_what_goes_wrong_is_said_in_one_line(self, saved, tmp_path):
+    def test_errors_are_one_line(self, saved, tmp_path):
         with np.load(saved) as archive:
             np.savez(tmp_path / "bare.npz", **{k: v for k, v in archive.items() if k != "uv"})
         for arguments, message in (

@@ -29,7 +29,7 @@ def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
         unmet = breaches(parse_requirements(job["required"], REPORTED), report)
         row |= {
             "status": "failed" if unmet else "done",
-            "error": f"not met: {'; '.join(unmet)}" if unmet else "",
+            "error": f"requirement failed: {'; '.join(unmet)}" if unmet else "",
         } | {name: report[name] for name in COLUMNS}
         row["notes"] = " ".join(source.all_notes(report["notes"]))
     except ConeflatError as error:

@@ -16,16 +16,18 @@ import click
 
 from ... import ConeflatError, __version__
 from ...base import inner_calls
-from .batch import batch
-from .cones import cones
-from .figure import demo, figure
-from .flatten import flatten, unwrap
-from .measure import measure
-from .more import blender, brain, transfer
-from .quads import quads
-from .shared import ExitCode
-from .view import studio, view
-from .warm_up import warm_up
+from .batch_command import batch
+from .blender_command import blender
+from .brain_command import brain
+from .cones_command import cones
+from .figure_commands import demo, figure
+from .flags import ExitCode
+from .flatten_commands import flatten, unwrap
+from .measure_command import measure
+from .quads_command import quads
+from .transfer_command import transfer
+from .view_commands import studio, view
+from .warm_up_command import warm_up
 
 
 class Interrupted(KeyboardInterrupt):
@@ -141,15 +143,15 @@ def _open_streams() -> list[IO[Any]]:
             setattr(sys, name, opened[-1])
     is_replaced = sys.stdout is not sys.__stdout__  # By a test.
     if not is_replaced and not (os.name == "nt" and sys.stdout.isatty()):
-        own = os.dup(1)
+        stdout = os.dup(1)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        sys.stdout = open(own, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)  # noqa: SIM115
+        sys.stdout = open(stdout, "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)  # noqa: SIM115
         opened.append(sys.stdout)
     return opened
 
 
 def _close_streams(opened: list[IO[Any]], code: int) -> int:
-    """Print what is left, close the streams that were opened, and return the exit code; 1 if it cannot be printed."""
+    """Print buffered output, close the opened streams, and return the exit code; 1 if it cannot be printed."""
     error = _flush(sys.stdout)
     if error is not None and code == 0:
         code = _fail_to_print(error)
@@ -160,7 +162,7 @@ def _close_streams(opened: list[IO[Any]], code: int) -> int:
 
 
 def _flush(stream: IO[Any]) -> OSError | None:
-    """Print what is left in a stream; return the error if that fails, after what is left has been discarded."""
+    """Print the buffered output of a stream; if that fails, discard it and return the error."""
     try:
         stream.flush()
     except OSError as error:
@@ -170,7 +172,7 @@ def _flush(stream: IO[Any]) -> OSError | None:
 
 
 def _discard(stream: IO[Any]) -> None:
-    """Connect a stream to the null device, so that Python can print what is left at its exit."""
+    """Connect a stream to the null device, so that Python can flush it at its exit."""
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, stream.fileno())
     os.close(null)

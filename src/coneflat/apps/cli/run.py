@@ -24,7 +24,7 @@ from ...base import Progress as Listener
 from ...base import Stopwatch, printable
 from ...errors import OptionError
 from ...io import PIPE, Joined, as_written, atomic_write, has_uv, read_joined, write_measured, write_stream
-from .shared import QUIET, VERBOSE, repair_keywords
+from .flags import QUIET, VERBOSE, repair_keywords
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -153,10 +153,10 @@ class Console:
 
     def _time_text(self) -> str:
         elapsed = self.elapsed
-        # Loading modules and printing are no stages.
+        # Loading modules and printing are not stages.
         seconds = {**self.seconds, "other": max(elapsed - sum(self.seconds.values()), 0.0)}
-        each = ", ".join(f"{stage} {taken:.2f}" for stage, taken in seconds.items())
-        return f"{elapsed:.2f} s: {each}"
+        stages = ", ".join(f"{stage} {taken:.2f}" for stage, taken in seconds.items())
+        return f"{elapsed:.2f} s: {stages}"
 
     def _result_rows(self, result: Flattening) -> list[tuple[str, str, str]]:
         """Return the main measures; if verbose, all measures and the statistics of the solvers."""
@@ -166,11 +166,11 @@ class Console:
         first = [rows.pop(name) for name in FIRST_ROWS if name in rows]
         if not self.verbose:
             return first
-        found = asdict(result.solve)
+        statistics = asdict(result.solve)
         return [
             *first,
             *rows.values(),
-            *((name.replace("_", " "), f"{value:.3g}", "") for name, value in found.items()),
+            *((name.replace("_", " "), f"{value:.3g}", "") for name, value in statistics.items()),
         ]
 
     def table(self, rows: Iterable[tuple[str, str, str]]) -> None:
@@ -193,12 +193,12 @@ def _lines_of_table(rows: Sequence[tuple[str, str, str]]) -> Iterator[str]:
     """
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 110
     names, values = (max((len(row[column]) for row in rows), default=0) for column in (0, 1))
-    rest = max(width - names - values - 4, 20)
+    available = max(width - names - values - 4, 20)
     for name, value, meaning in rows:
-        first, *more = textwrap.wrap(meaning, rest) or [""]
+        first, *continued = textwrap.wrap(meaning, available) or [""]
         cells = click.style(f"{name:{names}}", bold=True), f"{value:{values}}", click.style(first, dim=True)
         yield "  ".join(cells if first else cells[:2]).rstrip()
-        yield from (" " * (names + values + 4) + click.style(line, dim=True) for line in more)
+        yield from (" " * (names + values + 4) + click.style(line, dim=True) for line in continued)
 
 
 @contextmanager
@@ -233,9 +233,9 @@ def open_result(
         from ..view import own_flattening
 
         with console.stage("measure", console.READ):
-            own = own_flattening(source, strict=not repair)
-        if own is not None:
-            return replace(own, notes=(f"The UVs of {file.name} are shown; {AGAIN}.", *own.notes))
+            shown = own_flattening(source, strict=not repair)
+        if shown is not None:
+            return replace(shown, notes=(f"The UVs of {file.name} are shown; {AGAIN}.", *shown.notes))
     return flatten_joined(source, console, {"charts": "atlas", **repair_keywords(repair)}, by)
 
 

@@ -213,9 +213,9 @@ def with_all_triangles(head: Head, block: bytes, model: Model, result: Flattenin
 
     arrays = {
         "whole_places": model.places.astype(np.float32),
-        "whole_faces": np.searchsorted(model.used, model.mesh.faces).astype(np.uint32),
+        "whole_faces": np.searchsorted(model.vertices, model.mesh.faces).astype(np.uint32),
     }
-    numbers = model.used if result.vertex_origin is None else result.vertex_origin[model.used]
+    numbers = model.vertices if result.vertex_origin is None else result.vertex_origin[model.vertices]
     if not np.array_equal(numbers, np.arange(len(numbers))):
         arrays["whole_numbers"] = numbers.astype(np.int32)
     return with_arrays(head, block, arrays)

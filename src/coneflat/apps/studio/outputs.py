@@ -178,7 +178,7 @@ def own_picture(mesh: MeshFile) -> tuple[Texture, FloatArray] | None:
     """
     with suppress(ConeflatError, AttributeError, TypeError):  # Materials that are not valid are not shown.
         painted = Painted(mesh.path, None)
-        layers = {i: layer for i in painted.used if (layer := painted.layer(BASE, i)) is not None}
+        layers = {i: layer for i in painted.shown if (layer := painted.layer(BASE, i)) is not None}
         material = max(layers, key=np.bincount(painted.material).item, default=None)
         if material is not None:
             places = np.where(

@@ -89,16 +89,16 @@ class Painted:
     Attributes:
         vertices, faces: (n, 3), (m, 3) the mesh.
         material: (m,) the material of each triangle.
-        used: the materials that triangles have.
+        shown: the materials that triangles have.
         items: all materials as in glTF.
         notes: what of the colours is left out, one sentence each.
     """
 
     def __init__(self, path: Path, picture: Path | None) -> None:
         self.mesh = read_mesh(path, weld=False)
-        given = as_input(self.mesh)
-        self.vertices, self.faces = self.mesh.vertices, np.asarray(given.faces)
-        self._corners = np.asarray(given.face_corners)
+        surface = as_input(self.mesh)
+        self.vertices, self.faces = self.mesh.vertices, np.asarray(surface.faces)
+        self._corners = np.asarray(surface.face_corners)
         if not np.isfinite(self.vertices[self.faces]).all():
             raise NonFiniteError(f"{path} has positions that are NaN or infinite")
         with readable(path, "model with materials"):
@@ -106,12 +106,12 @@ class Painted:
             self._materials = read_materials(self.mesh) if picture is None else _picture(picture, polygons)
             self.items = self._materials.items
             self.material = self._materials.polygon[polygon_of(self._corners, self.mesh.offsets)]
-            self.used: list[int] = np.unique(self.material).tolist()
+            self.shown: list[int] = np.unique(self.material).tolist()
             self._layers = self._read_layers()
             self._factors = {
                 (channel.name, i): _factor(path, channel, self.items[i])
                 for channel in CHANNELS
-                for i in self.used
+                for i in self.shown
             }
         self._uses_scene = self.mesh.scene is not None and picture is None
         self._has_picture = picture is not None
@@ -122,7 +122,7 @@ class Painted:
     @property
     def is_unlit(self) -> bool:
         """Return True if all materials are shown without light."""
-        return all(UNLIT in self.items[i].get("extensions", {}) for i in self.used)
+        return all(UNLIT in self.items[i].get("extensions", {}) for i in self.shown)
 
     @cached_property
     def colours(self) -> FloatArray | None:
@@ -140,7 +140,7 @@ class Painted:
     @property
     def alpha_mode(self) -> str:
         """Return the most transparent alpha mode of the materials, and of vertex colours without a material."""
-        modes = [mode for i in self.used if (mode := self.items[i].get("alphaMode")) in ALPHA_MODES]
+        modes = [mode for i in self.shown if (mode := self.items[i].get("alphaMode")) in ALPHA_MODES]
         is_shown = not self._uses_scene and not self._layers
         if is_shown and self.colours is not None and self.colours[..., 3].min() < 1:
             modes.append(ALPHA_MODES[-1])
@@ -150,7 +150,7 @@ class Painted:
         """Return the image of each channel and used material that has one."""
         layers = {}
         for channel in CHANNELS:
-            for i in self.used:
+            for i in self.shown:
                 slot = slot_of(self.items[i], channel.name)
                 if slot:
                     layers[channel.name, i] = self._layer(slot)
@@ -205,15 +205,15 @@ class Painted:
     def _left_out(self) -> tuple[str, ...]:
         """Return notes on what of the materials is not baked."""
         notes, name = [], self.mesh.path.name
-        used = [self.items[i] for i in self.used]
-        extensions = dict.fromkeys(key for item in used for key in item.get("extensions", {}))
+        materials = [self.items[i] for i in self.shown]
+        extensions = dict.fromkeys(key for item in materials for key in item.get("extensions", {}))
         if SPECULAR in extensions:
             notes.append(f"Specular colours of {name} ({SPECULAR}) are left out: diffuse colours are kept.")
         if UNLIT in extensions and not self.is_unlit:
             notes.append(f"Some materials of {name} are unlit ({UNLIT}); the baked one is lit.")
-        others = [key for key in extensions if key not in (SPECULAR, UNLIT)]
-        if others:
-            notes.append(f"Extensions of the materials of {name} are left out: {', '.join(others)}.")
+        ignored = [key for key in extensions if key not in (SPECULAR, UNLIT)]
+        if ignored:
+            notes.append(f"Extensions of the materials of {name} are left out: {', '.join(ignored)}.")
         has_image = any(channel == BASE.name for channel, _ in self._layers)
         if has_image and not self._uses_scene and self.colours is not None:
             notes.append(f"Vertex colours of {name} are left out where it has a texture.")
@@ -235,7 +235,7 @@ class Painted:
     def normal_uv(self) -> FloatArray:
         """Return (m, 3, 2) the UVs of normal maps, 0 for triangles without one."""
         points = np.zeros((len(self.faces), 3, 2))
-        for i in self.used:
+        for i in self.shown:
             chosen, layer = self.material == i, self.layer(NORMAL, i)
             points[chosen] = 0.0 if layer is None else np.nan_to_num(self.uv(layer.uv_set)[chosen])
         return points
@@ -264,24 +264,24 @@ class Painted:
         Raises:
             OptionError: there are none, and no vertex colours.
         """
-        found = [
+        channels = [
             channel
             for channel in CHANNELS
-            if any((channel.name, i) in self._layers for i in self.used)
-            or np.ptp([self._factors[channel.name, i] for i in self.used], axis=0).any()
+            if any((channel.name, i) in self._layers for i in self.shown)
+            or np.ptp([self._factors[channel.name, i] for i in self.shown], axis=0).any()
         ]
-        if not found and self.colours is None:
+        if not channels and self.colours is None:
             raise OptionError(
                 f"{self.mesh.path} must have textures or vertex colours, got neither: give a texture"
                 + "".join(f" ({note})" for note in self._materials.notes[:1])
             )
-        return found if BASE in found else [BASE, *found]
+        return channels if BASE in channels else [BASE, *channels]
 
     def at(self, channel: Channel, faces: IntArray, weights: FloatArray) -> FloatArray:
         """Return (q, 4) the linear values of a channel at points given by triangles and barycentric coordinates."""
         values = np.tile([0.5, 0.5, 1.0, 1.0] if channel is NORMAL else [1.0] * 4, (len(faces), 1))
         is_sampled = np.zeros(len(faces), bool)
-        for i in self.used:
+        for i in self.shown:
             rows, layer = np.flatnonzero(self.material[faces] == i), self.layer(channel, i)
             if layer is not None:
                 points = np.einsum("qi,qic->qc", weights[rows], self.uv(layer.uv_set)[faces[rows]])

@@ -63,10 +63,8 @@ class Baked:
         """Return a note on what a file with the ending of a path does not keep, if anything."""
         if as_path(path).suffix.lower() != ".png":
             return ()
-        others = [name for name in self.images if name != BASE.name]
-        return (
-            (f"A .png has the base colour only, not {', '.join(others)}: .glb keeps all.",) if others else ()
-        )
+        lost = [name for name in self.images if name != BASE.name]
+        return (f"A .png has the base colour only, not {', '.join(lost)}: .glb keeps all.",) if lost else ()
 
     def save(self, path: str | PathLike[str]) -> Path:
         """Write the model with its textures (.glb), or the image of its base colour (.png), and return the path.
@@ -116,8 +114,8 @@ def transfer(
     painted = Painted(as_path(old), None if texture is None else as_path(texture))
     new = as_path(new)
     target = io.as_uv_mesh(new, weld=False)
-    known = np.flatnonzero(target.has_uv & (signed_double_areas(target.corner_uv) != 0))
-    corner_uv, corners = target.corner_uv[known], target.vertices[target.faces[known]]
+    measured = np.flatnonzero(target.has_uv & (signed_double_areas(target.corner_uv) != 0))
+    corner_uv, corners = target.corner_uv[measured], target.vertices[target.faces[measured]]
     if not np.isfinite(corners).all():
         raise NonFiniteError(f"{new} has positions that are NaN or infinite")
     if corner_uv.min(initial=0) < -1 / side or corner_uv.max(initial=1) > 1 + 1 / side:
@@ -144,16 +142,16 @@ def transfer(
     return Baked(filled, _material(painted, filled), tuple(notes), new, target)
 
 
-def _replaced(old: MeshFile, new: MeshFile | None) -> list[str]:
+def _replaced(source: MeshFile, target: MeshFile | None) -> list[str]:
     """Return notes on what the material of a GLB replaces."""
-    old_tree, new_tree = (
-        {} if model is None or model.scene is None else model.scene.data.tree for model in (old, new)
+    source_tree, target_tree = (
+        {} if model is None or model.scene is None else model.scene.data.tree for model in (source, target)
     )
     notes = []
-    primitives = [primitive for mesh in new_tree.get("meshes", []) for primitive in mesh["primitives"]]
+    primitives = [primitive for mesh in target_tree.get("meshes", []) for primitive in mesh["primitives"]]
     if any("TANGENT" in primitive["attributes"] for primitive in primitives):
         notes.append("Tangents are left out of a GLB: viewers compute those of the new UVs.")
-    if any(VARIANTS in tree.get("extensions", {}) for tree in (old_tree, new_tree)):
+    if any(VARIANTS in tree.get("extensions", {}) for tree in (source_tree, target_tree)):
         notes.append(f"Variants of materials ({VARIANTS}) are left out: the default ones are kept.")
     return notes
 
@@ -227,16 +225,16 @@ def _owners(texels: FloatArray, side: int) -> tuple[IntArray, int]:
 
 def _material(painted: Painted, names: Collection[str]) -> dict[str, Any]:
     """Return a glTF material without images, like the first one of a model; `names`: channels that get images."""
-    used = [painted.items[i] for i in painted.used]
-    surface = used[0].get("pbrMetallicRoughness", {"metallicFactor": 0.0})
-    kept = () if "metallicRoughnessTexture" in names else ("metallicFactor", "roughnessFactor")
-    item: dict[str, Any] = {"doubleSided": any(each.get("doubleSided", False) for each in used)}
-    item |= {name: used[0][name] for name in ("alphaCutoff", "emissiveFactor") if name in used[0]}
+    items = [painted.items[i] for i in painted.shown]
+    surface = items[0].get("pbrMetallicRoughness", {"metallicFactor": 0.0})
+    factors = () if "metallicRoughnessTexture" in names else ("metallicFactor", "roughnessFactor")
+    item: dict[str, Any] = {"doubleSided": any(material.get("doubleSided", False) for material in items)}
+    item |= {name: items[0][name] for name in ("alphaCutoff", "emissiveFactor") if name in items[0]}
     item |= {"emissiveFactor": [1.0] * 3} if "emissiveTexture" in names else {}
     item["alphaMode"] = painted.alpha_mode
     if painted.is_unlit:
         item["extensions"] = {UNLIT: {}}
-    return item | {"pbrMetallicRoughness": {name: surface[name] for name in kept if name in surface}}
+    return item | {"pbrMetallicRoughness": {name: surface[name] for name in factors if name in surface}}
 
 
 def _with_material(baked: Baked) -> io.Glb:

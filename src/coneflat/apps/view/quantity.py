@@ -91,8 +91,8 @@ class Quantity:
 
     def counted(self) -> tuple[FloatArray, FloatArray]:
         """Return the defined numbers with positive weight, and their weights."""
-        known = np.isfinite(self.values) & (self.weights > 0.0)
-        return self.values[known], self.weights[known]
+        is_counted = np.isfinite(self.values) & (self.weights > 0.0)
+        return self.values[is_counted], self.weights[is_counted]
 
     def percentile(self, percent: float) -> float:
         """Return the number below which the given percentage of the weight lies."""
@@ -131,13 +131,13 @@ def conformal_distortion(result: Flattening) -> Quantity:
 def stretch(result: Flattening) -> Quantity:
     """Return the scale factor of lengths in every triangle, divided by the mean."""
     log_scale, areas = result.distortion.log_area_scale, _areas(result)
-    known = np.isfinite(log_scale)
-    mean = np.average(log_scale[known], weights=areas[known]) if known.any() else 0.0
+    is_known = np.isfinite(log_scale)
+    mean = np.average(log_scale[is_known], weights=areas[is_known]) if is_known.any() else 0.0
     factor = np.exp(log_scale - mean)
-    extreme = quantile(np.abs(log_scale[known] - mean), areas[known], 0.95) if known.any() else 0.0
+    extreme = quantile(np.abs(log_scale[is_known] - mean), areas[is_known], 0.95) if is_known.any() else 0.0
     reached = max(float(np.exp(extreme)), 1 + MIN_RANGE) * (1 - 1e-9)
     rounded = (1.05, 1.1, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 100.0)
-    top = next((each for each in rounded if each >= reached), reached)
+    top = next((limit for limit in rounded if limit >= reached), reached)
     ticks = ((1 / top, f"{1 / top:.3g}"), (1.0, "1"), (top, f"{top:.3g}"))
     return Quantity("Scale", factor, areas, ColorScale(1 / top, top, "PuOr_r", "log", ticks), ".3f")
 
@@ -217,10 +217,10 @@ def own_quantity(result: Flattening, name: str, archive: Path | None = None) -> 
         weights = _areas(result)
     else:
         weights = np.bincount(corners.ravel(), minlength=len(values)).astype(np.float64)
-    known = np.isfinite(values) & (weights > 0)
-    if not known.any():
+    is_known = np.isfinite(values) & (weights > 0)
+    if not is_known.any():
         raise OptionError(f"{label} has no finite number on this mesh")
-    return Quantity(label, values, weights, _scale(values[known], weights[known]), ".4g", corners)
+    return Quantity(label, values, weights, _scale(values[is_known], weights[is_known]), ".4g", corners)
 
 
 def _named(result: Flattening, name: str, archive: Path | None) -> tuple[str, FloatArray]:
@@ -241,13 +241,13 @@ def _named(result: Flattening, name: str, archive: Path | None) -> tuple[str, Fl
 
 def _read(path: Path, array: str) -> FloatArray:
     try:
-        found = np.load(path, allow_pickle=False)
-        if isinstance(found, np.ndarray):
-            return found
-        with found:
-            if array in found.files:
-                return np.asarray(found[array])
-            has = ", ".join(found.files) or "none"
+        loaded = np.load(path, allow_pickle=False)
+        if isinstance(loaded, np.ndarray):
+            return loaded
+        with loaded:
+            if array in loaded.files:
+                return np.asarray(loaded[array])
+            has = ", ".join(loaded.files) or "none"
     except (OSError, ValueError, TypeError, EOFError, BadZipFile) as error:
         raise MeshFileError(f"cannot read numbers from {path}: {' '.join(str(error).split())}") from error
     raise OptionError(f"{path} has no array {short_repr(array)}: it has {has}")

@@ -82,8 +82,8 @@ class GltfData:
         if not version.startswith("2."):
             raise MeshFileError(f"{path} is glTF of version {version[:20]}; convert it to version 2.0")
         self._buffers = self._find_buffers(binary)
-        different = {id(one): len(one) for one in self._buffers if one is not None}
-        self.total_bytes = len(content) + sum(different.values())
+        sizes = {id(buffer): len(buffer) for buffer in self._buffers if buffer is not None}
+        self.total_bytes = len(content) + sum(sizes.values())
         self._refuse_compressed()
         self._check_names()
 
@@ -219,44 +219,44 @@ class GltfData:
     def _with_sparse(self, index: Any, sparse: Item, rows: ByteRows) -> ByteRows:
         """Return an array with the elements replaced that the sparse accessor lists."""
         count = self.count(sparse, "count")
-        where, new = self.entry(sparse, "indices", dict), self.entry(sparse, "values", dict)
-        form = COMPONENTS.get(self.count(where, "componentType"))
+        indices, values = self.entry(sparse, "indices", dict), self.entry(sparse, "values", dict)
+        form = COMPONENTS.get(self.count(indices, "componentType"))
         if form is None or form[1] != "u":
             self.fail(f"the sparse indices of accessor {index} have an unknown type")
         width = np.dtype(form).itemsize
-        places = np.ascontiguousarray(self._rows(index, where, count, width)).view(form).reshape(-1)
+        places = np.ascontiguousarray(self._rows(index, indices, count, width)).view(form).reshape(-1)
         if len(places) and places.max() >= len(rows):
             self.fail(f"accessor {index} replaces element {places.max()} of {len(rows)}")
         rows = rows.copy()
-        rows[places] = self._rows(index, new, count, rows.shape[1])
+        rows[places] = self._rows(index, values, count, rows.shape[1])
         return rows
 
     def _find_buffers(self, binary: bytes | None) -> list[bytes | None]:
         """Return the content of each buffer; None for a placeholder of compressed data."""
-        known: dict[Path, bytes] = {}
+        contents: dict[Path, bytes] = {}
         buffers: list[bytes | None] = []
         for i, item in enumerate(self.items("buffers")):
             uri, length = item.get("uri"), self.count(item, "byteLength")
             if uri is None:
-                found = binary if i == 0 else None
+                buffer = binary if i == 0 else None
             elif not isinstance(uri, str):
                 self.fail(f"the URI of buffer {i} is not a string")
             elif uri.startswith("data:"):
-                found = self.decoded(uri, f"buffer {i}")
+                buffer = self.decoded(uri, f"buffer {i}")
             elif "://" in uri:
                 self.fail(f"buffer {i} is at {uri[:60]!r}, but remote files are not loaded")
             else:
                 try:
                     path = self.resolve(uri)
-                    found = known[path] = known[path] if path in known else read_bytes(path)
+                    buffer = contents[path] = contents[path] if path in contents else read_bytes(path)
                 except ConeflatError as error:
                     raise MeshFileError(f"{self.path}: buffer {i} cannot be read: {error}") from error
-            if found is not None and len(found) < length:
-                self.fail(f"buffer {i} has {len(found):,} of the {length:,} bytes it should have")
-            buffers.append(found)
+            if buffer is not None and len(buffer) < length:
+                self.fail(f"buffer {i} has {len(buffer):,} of the {length:,} bytes it should have")
+            buffers.append(buffer)
         return buffers
 
-    def decoded(self, uri: str, what: str) -> bytes:
+    def decoded(self, uri: str, owner: str) -> bytes:
         """Return the decoded content of a data URI."""
         head, comma, body = uri.partition(",")
         try:
@@ -264,7 +264,7 @@ class GltfData:
                 raise ValueError("no comma")
             return base64.b64decode(unquote(body)) if head.endswith(";base64") else unquote_to_bytes(body)
         except (binascii.Error, ValueError) as error:
-            raise MeshFileError(f"{self.path}: the data URI of {what} is invalid: {error}") from error
+            raise MeshFileError(f"{self.path}: the data URI of {owner} is invalid: {error}") from error
 
     def _buffer_of(self, view: Item) -> bytes | None:
         self.item("buffers", view.get("buffer"))
@@ -299,15 +299,15 @@ def _chunks(path: Path, content: bytes) -> tuple[bytes, bytes | None]:
         raise MeshFileError(
             f"{path} is truncated: it has {len(content):,} of the {total:,} bytes that its header declares"
         )
-    found: dict[bytes, bytes] = {}
+    chunks: dict[bytes, bytes] = {}
     place = _HEADER.size
     while place + _CHUNK.size <= total:
         length, kind = _CHUNK.unpack_from(content, place)
         place += _CHUNK.size
         if place + length > total:
             raise MeshFileError(f"{path} ends within one of its chunks")
-        found.setdefault(kind, content[place : place + length])
+        chunks.setdefault(kind, content[place : place + length])
         place += length
-    if b"JSON" not in found:
+    if b"JSON" not in chunks:
         raise MeshFileError(f"{path} is not a readable GLB file: it has no JSON chunk")
-    return found[b"JSON"], found.get(b"BIN\0")
+    return chunks[b"JSON"], chunks.get(b"BIN\0")

@@ -96,7 +96,7 @@ class _Reading:
 
     def __init__(self, data: GltfData) -> None:
         self.data = data
-        self._most = max(MAX_CORNERS, MAX_CORNERS_PER_BYTE * data.total_bytes)
+        self._max_corners = max(MAX_CORNERS, MAX_CORNERS_PER_BYTE * data.total_bytes)
         self._parts: list[ScenePart] = []
         self._vertices: list[FloatArray] = [np.empty((0, 3))]
         self._corners: list[IntArray] = [np.empty(0, np.int64)]
@@ -171,18 +171,18 @@ class _Reading:
     def _check_copied(self, primitive: Item, count: int) -> None:
         """Raise an error for attribute arrays with fewer entries than the primitive has vertices."""
         data = self.data
-        for each in (primitive["attributes"], *data.entry(primitive, "targets", list)):
-            for name, index in each.items():
+        for arrays in (primitive["attributes"], *data.entry(primitive, "targets", list)):
+            for name, index in arrays.items():
                 if len(data.raw(index)) < count:
                     data.fail(f"a primitive has {name} for {len(data.raw(index))} of its {count} vertices")
 
     def _take(self, count: int) -> None:
         """Count the vertices or corners of a part before it is added; raise an error if there are too many."""
         self._taken += count
-        if self._taken > self._most:
+        if self._taken > self._max_corners:
             self.data.fail(
-                f"its scene repeats meshes so often that there are over {self._most:,} corners, many times those in "
-                "the file; write each mesh once"
+                f"its scene repeats meshes so often that there are over {self._max_corners:,} corners, many times "
+                "those in the file; write each mesh once"
             )
 
     def _refuse_packed(self, primitive: Item, position: Any) -> None:
@@ -220,7 +220,7 @@ class _Rows:
     def __init__(self, columns: int) -> None:
         self._rows: list[FloatArray] = []
         self._corners: list[IntArray] = []
-        self._known: dict[tuple[int, int], int] = {}
+        self._starts: dict[tuple[int, int], int] = {}
         self._count, self._columns = 0, columns
 
     def add(
@@ -233,20 +233,20 @@ class _Rows:
         if index is None:
             self._corners.append(np.full(len(corners), -1))
             return
-        if (node, index) not in self._known:
+        if (node, index) not in self._starts:
             rows = data.values(index, self._columns)
             self._rows.append(rows if linear is None else rows @ linear.T)
-            self._known[node, index] = self._count
+            self._starts[node, index] = self._count
             self._count += len(rows)
-        self._corners.append(corners + self._known[node, index])
+        self._corners.append(corners + self._starts[node, index])
 
     def numbered(self) -> tuple[FloatArray | None, IntArray | None]:
         """Return the distinct rows, and (c,) the row of each corner, -1 for none; None, None without any."""
         if not self._rows:
             return None, None
         rows = np.concatenate(self._rows)
-        kept, number = weld(rows)
-        return rows[kept], np.append(number, -1)[np.concatenate(self._corners)]
+        distinct, number = weld(rows)
+        return rows[distinct], np.append(number, -1)[np.concatenate(self._corners)]
 
 
 def _cofactors(linear: FloatArray) -> FloatArray:

@@ -60,17 +60,21 @@ def _references(data: GltfData) -> Iterator[tuple[str, Any]]:
         for item in entry(tree, kind, list):
             yield from (("nodes", node) for node in entry(item, name, list))
     for mesh in entry(tree, "meshes", list):
-        yield from (("materials", one["material"]) for one in mesh["primitives"] if "material" in one)
+        yield from (
+            ("materials", primitive["material"])
+            for primitive in mesh["primitives"]
+            if "material" in primitive
+        )
 
 
 def accessors_of_arrays(tree: Item) -> Iterator[int]:
     """Yield the accessors that meshes, skins and animations refer to."""
     for mesh in tree.get("meshes", []):
-        for one in mesh["primitives"]:
-            yield from one.get("attributes", {}).values()
-            if "indices" in one:
-                yield one["indices"]
-            for target in one.get("targets", []):
+        for primitive in mesh["primitives"]:
+            yield from primitive.get("attributes", {}).values()
+            if "indices" in primitive:
+                yield primitive["indices"]
+            for target in primitive.get("targets", []):
                 yield from target.values()
     for skin in tree.get("skins", []):
         if "inverseBindMatrices" in skin:
@@ -89,7 +93,7 @@ def view_owners(accessor: Item) -> list[Item]:
     """Return the parts of an accessor that have a buffer view."""
     sparse = accessor.get("sparse", {})
     parts = (accessor, sparse.get("indices", {}), sparse.get("values", {}))
-    return [one for one in parts if "bufferView" in one]
+    return [part for part in parts if "bufferView" in part]
 
 
 def numbers_in_extensions(tree: Any) -> Iterator[int]:
@@ -98,8 +102,8 @@ def numbers_in_extensions(tree: Any) -> Iterator[int]:
     while stack:
         item, is_inside = stack.pop()
         if isinstance(item, dict):
-            kept = ((key, value) for key, value in item.items() if key not in _NO_ARRAYS)
-            stack += [(value, is_inside or key == "extensions") for key, value in kept]
+            entries = ((key, value) for key, value in item.items() if key not in _NO_ARRAYS)
+            stack += [(value, is_inside or key == "extensions") for key, value in entries]
         elif isinstance(item, list):
             stack += [(value, is_inside) for value in item]
         elif is_inside and isinstance(item, int):

@@ -87,20 +87,20 @@ class Glb:
         self._length += len(self._pieces[-1])
         return start
 
-    def add_view(self, content: bytes, **more: int) -> int:
+    def add_view(self, content: bytes, **properties: int) -> int:
         """Add a buffer view, and return its index."""
-        view = {"buffer": 0, "byteOffset": self.append(content), "byteLength": len(content), **more}
+        view = {"buffer": 0, "byteOffset": self.append(content), "byteLength": len(content), **properties}
         return self.add("bufferViews", view)
 
     def add_array(self, rows: NDArray[Any], form: Item, target: int | None = None) -> int:
         """Add an accessor of (k, c) values, or of their bytes, with further keys, and return its index."""
         content = np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), -1)
-        more = {} if target is None else {"target": target}
+        properties = {} if target is None else {"target": target}
         if content.shape[1] % 4 and target == FOR_VERTICES:
             # Vertex attributes must be aligned to multiples of four bytes.
             content = np.pad(content, ((0, 0), (0, -content.shape[1] % 4)))
-            more["byteStride"] = content.shape[1]
-        view = self.add_view(content.tobytes(), **more)
+            properties["byteStride"] = content.shape[1]
+        view = self.add_view(content.tobytes(), **properties)
         return self.add("accessors", {"bufferView": view, "componentType": 0, "count": len(rows)} | form)
 
     def add_material(self, texture: Texture) -> int:
@@ -118,7 +118,7 @@ class Glb:
         accessors, views = maybe.union(accessors_of_arrays(tree)), maybe.union(views_of_images(tree))
         for i, accessor in enumerate(tree.get("accessors", [])):
             if i in accessors:
-                views |= {one["bufferView"] for one in view_owners(accessor)}
+                views |= {item["bufferView"] for item in view_owners(accessor)}
             else:
                 # The placeholder is the smallest possible accessor.
                 self.release("accessors", i, {"componentType": 5121, "count": 1, "type": "SCALAR"})
@@ -130,9 +130,10 @@ class Glb:
                     view.get("extensions", {}).pop(name, None)
             else:
                 self.release("bufferViews", i, {"buffer": 0, "byteLength": 1})
-        used = set(keys_of(tree))
+        names = set(keys_of(tree))
         for name in ("extensionsUsed", "extensionsRequired"):
-            left = [one for one in tree.pop(name, []) if one not in (DRACO, *COMPRESSED) or one in used]
+            removed = {DRACO, *COMPRESSED} - names
+            left = [extension for extension in tree.pop(name, []) if extension not in removed]
             if left:
                 tree[name] = left
 
@@ -167,9 +168,9 @@ def write_glb(result: Flattening, stream: IO[bytes], texture: Texture | None, fo
     For a mesh that was read from a glTF scene, the scene is written with new UVs. Otherwise the file has one mesh, with
     a two-sided material that is plain or has a texture. Every vertex has its UV as TEXCOORD_0 (with v pointing down, as
     glTF defines it), the input's normal or else that of the uncut surface, its colour as COLOR_0 if the input has
-    colours and there is no texture, and its vertex in the input as _SOURCE_VERTEX. All but colours are 32-bit floats,
-    the only type that glTF has for them: source vertices are exact up to 2^24. Positions of a model far from the origin
-    are relative to its node, whose translation is in doubles.
+    colours and there is no texture, and its vertex in the input as _SOURCE_VERTEX. All these except colours are 32-bit
+    floats, the only type that glTF has for them: source vertices are exact up to 2^24. Positions of a model far from
+    the origin are relative to its node, whose translation is in doubles.
 
     Args:
         result: the result to write.
@@ -190,10 +191,10 @@ def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
     split = split_at_seams(result, source_normals(result))
     normals = split.normals
     if normals is None:
-        normals = shading_normals(vertex_normals(result.vertices, result.faces))[split.own]
+        normals = shading_normals(vertex_normals(result.vertices, result.faces))[split.vertex]
     places, colours = local_positions(split.vertices), None
     if texture is None and result.source is not None and result.face_corners is not None:
-        colours = linear_colours(result.source, input_vertices(result)[split.own])
+        colours = linear_colours(result.source, input_vertices(result)[split.vertex])
     primitive: Item = {"attributes": {}, "indices": 0, "material": 0}
     glb = Glb(
         {
@@ -254,7 +255,7 @@ def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: 
     """Return a glTF scene with the UVs of a result.
 
     In each primitive, TEXCOORD_0 is new, and every vertex is repeated for each of its UVs; all other attributes and
-    morph targets are copied bit for bit, but for tangents of the old UVs, which are those of the normal map. A mesh
+    morph targets are copied bit for bit, except tangents of the old UVs, which are those of the normal map. A mesh
     that several nodes show is copied for each node. Image files are embedded in the buffer. All other data is
     unchanged.
 
@@ -323,7 +324,7 @@ def scene_losses(result: Flattening, has_texture: bool = False) -> tuple[str, ..
             f"{plural(bare, 'primitive')} without a material got the default material of glTF, because some programs "
             "read no UVs without one."
         )
-    if any("TANGENT" in one["attributes"] and "TANGENT" in _replaced(data, one) for one in primitives):
+    if any("TANGENT" in item["attributes"] and "TANGENT" in _replaced(data, item) for item in primitives):
         notes.append("Tangents of the old UVs are not in the file: viewers compute them from the new ones.")
     unread_images = [
         printable(image["uri"])[:MAX_NAME]
@@ -335,8 +336,10 @@ def scene_losses(result: Flattening, has_texture: bool = False) -> tuple[str, ..
             f"{plural(len(unread_images), 'image file is', 'image files are')} not embedded, because nothing can be "
             f"read there, or because it is outside the folder of the scene: {list_some(unread_images)}."
         )
-    used = {one["material"] for one in primitives if "material" in one}
-    painted = [i for i in used if any(name.endswith("Texture") for name in keys_of(tree["materials"][i]))]
+    shown_materials = {item["material"] for item in primitives if "material" in item}
+    painted = [
+        i for i in shown_materials if any(name.endswith("Texture") for name in keys_of(tree["materials"][i]))
+    ]
     if painted and not has_texture:
         notes.append(old_textures(plural(len(painted), "material")))
     return tuple(notes)
@@ -366,12 +369,12 @@ def _fill(
     glb: Glb, data: GltfData, target: Item, before: Item, vertices: IntArray, points: IntArray, uv: FloatArray
 ) -> None:
     """Write the triangles of a primitive, with its vertex and the point in the plane of every corner."""
-    own, point, number = distinct_pairs(vertices, points, len(uv))
+    vertex, point, number = distinct_pairs(vertices, points, len(uv))
     replaced = _replaced(data, before)
 
     def gathered(arrays: dict[str, int]) -> dict[str, int]:
-        kept = ((name, index) for name, index in arrays.items() if name not in replaced)
-        return {name: _gathered(glb, data, index, own, name == "POSITION") for name, index in kept}
+        copied = ((name, index) for name, index in arrays.items() if name not in replaced)
+        return {name: _gathered(glb, data, index, vertex, name == "POSITION") for name, index in copied}
 
     target["attributes"] = gathered(before["attributes"])
     # v points down in glTF.
@@ -380,7 +383,7 @@ def _fill(
     corners = number.astype("<u4").reshape(-1, 1)
     target["indices"] = glb.add_array(corners, {"componentType": 5125, "type": "SCALAR"}, FOR_INDICES)
     if "targets" in before:
-        target["targets"] = [gathered(one) for one in before["targets"]]
+        target["targets"] = [gathered(arrays) for arrays in before["targets"]]
     if before.get("mode", Mode.TRIANGLES) != Mode.TRIANGLES:
         target["mode"] = Mode.TRIANGLES.value
 
@@ -391,14 +394,14 @@ def _replaced(data: GltfData, primitive: Item) -> tuple[str, ...]:
     return (UV,) if data.uv_set(data.entry(material, "normalTexture", dict)) else (UV, "TANGENT")
 
 
-def _gathered(glb: Glb, data: GltfData, index: int, own: IntArray, has_bounds: bool) -> int:
+def _gathered(glb: Glb, data: GltfData, index: int, elements: IntArray, has_bounds: bool) -> int:
     """Add an array with some elements of another one, and return its index."""
     old = data.item("accessors", index)
-    rows = np.take(data.raw(index), own, axis=0)
-    kept: Item = {key: old[key] for key in _KEPT if key in old}
+    rows = np.take(data.raw(index), elements, axis=0)
+    form: Item = {key: old[key] for key in _KEPT if key in old}
     if has_bounds:
-        kept |= bounds(rows.view(data.accessor(index).kind))
-    return glb.add_array(rows, kept, FOR_VERTICES)
+        form |= bounds(rows.view(data.accessor(index).kind))
+    return glb.add_array(rows, form, FOR_VERTICES)
 
 
 def _embed_images(glb: Glb, data: GltfData, folder: Path) -> None:
@@ -408,8 +411,8 @@ def _embed_images(glb: Glb, data: GltfData, folder: Path) -> None:
         content = _content_of(data, uri)
         kind = image_kind(content)
         if kind is None or kind == "image/gif":  # glTF does not support GIF
-            old, new = (os.path.realpath(place) for place in (data.path.parent, folder))
-            image["uri"] = quote(moved_path(os.fsencode(unquote(uri)), old, new))
+            source, target = (os.path.realpath(place) for place in (data.path.parent, folder))
+            image["uri"] = quote(moved_path(os.fsencode(unquote(uri)), source, target))
             continue
         del image["uri"]
         image |= {"bufferView": glb.add_view(content), "mimeType": kind}
@@ -438,10 +441,10 @@ def _drop_empty(glb: Glb, targets: list[Item]) -> None:
         return
     for node in glb.tree["nodes"]:
         mesh = glb.tree["meshes"][node["mesh"]] if "mesh" in node else None
-        if mesh is not None and all(id(one) in empty for one in mesh["primitives"]):
+        if mesh is not None and all(id(primitive) in empty for primitive in mesh["primitives"]):
             del node["mesh"]
     for mesh in glb.tree["meshes"]:
-        left = [one for one in mesh["primitives"] if id(one) not in empty]
+        left = [primitive for primitive in mesh["primitives"] if id(primitive) not in empty]
         if not left:
             # Meshes must not be empty, even if no node shows them: they get a point.
             zero = {"componentType": 5126, "count": 1, "type": "VEC3"} | bounds(np.zeros((1, 3)))

@@ -37,9 +37,9 @@ class Camera:
 
     def project(self, points: ArrayLike) -> FloatArray:
         """Return (..., 3) pixel coordinates of points: x to the right, y downwards, depth away from the eye."""
-        right, up, near = np.moveaxis((np.asarray(points) - self.centre) @ self.axes.T, -1, 0)
+        right, up, depth = np.moveaxis((np.asarray(points) - self.centre) @ self.axes.T, -1, 0)
         x, y = self.width / 2 + self.scale * right, self.height / 2 - self.scale * up
-        return np.stack([x, y, -self.scale * near], axis=-1)
+        return np.stack([x, y, -self.scale * depth], axis=-1)
 
     def enlarged(self, factor: int) -> Camera:
         """Return the same view in a picture of `factor` times the width and height."""
@@ -62,13 +62,13 @@ def fit_camera(
         OptionError: `up` or `eye` is not valid.
     """
     vertices = np.asarray(vertices, dtype=np.float64)
-    upward, near = _upward(up), eye_direction(eye, up)
-    near = near / np.linalg.norm(near)
-    right = np.cross(upward, near)
+    upward, backward = _upward(up), eye_direction(eye, up)
+    backward = backward / np.linalg.norm(backward)
+    right = np.cross(upward, backward)
     if np.linalg.norm(right) < 1e-9:  # From above or below, another axis points up.
-        right = np.cross(np.roll(upward, 1), near)
+        right = np.cross(np.roll(upward, 1), backward)
     right /= np.linalg.norm(right)
-    axes = np.stack([right, np.cross(near, right), near])
+    axes = np.stack([right, np.cross(backward, right), backward])
     rotated = vertices @ axes.T
     low, high = rotated.min(axis=0), rotated.max(axis=0)
     extent = np.maximum(high - low, np.finfo(np.float64).tiny)
@@ -114,10 +114,10 @@ def eye_direction(eye: Eye, up: str = "y") -> FloatArray:
     if len(words) == 1:
         return sides[eye]
     # The view shows three sides of a box, one of them the top.
-    one, two = (sides[word] for word in words)
-    if one @ two:
+    first, second = (sides[word] for word in words)
+    if first @ second:
         raise OptionError(f"unknown eye {eye!r}: {words[0]} and {words[1]} cannot be combined")
-    return np.asarray(0.75 * one + 0.55 * two + 0.38 * upward * (not (one + two) @ upward))
+    return np.asarray(0.75 * first + 0.55 * second + 0.38 * upward * (not (first + second) @ upward))
 
 
 def _upward(up: str) -> FloatArray:

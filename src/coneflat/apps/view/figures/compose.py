@@ -116,16 +116,16 @@ def compose(
     above = [Inches.LABEL * any(panel.label for panel in row.panels) for row in rows]
     fixed = sum(above) + Inches.GAP * (len(rows) - 1) + 2 * Inches.MARGIN
     fixed += Inches.TITLE * bool(title) + Inches.LEGEND * bool(marks)
-    least = [max(Inches.CARD_HEIGHT * len(row.quantities), 0.3) for row in rows]
+    minima = [max(Inches.CARD_HEIGHT * len(row.quantities), 0.3) for row in rows]
     if size is None:
         natural = [min(_panel_space(row, width) / _aspect(row), row.tallest) for row in rows]
         spare = min(_panel_space(row, width) - h * _aspect(row) for row, h in zip(rows, natural, strict=True))
         width = max(width - spare, _legend_width(marks))
-        heights = np.maximum(natural, least).tolist()
+        heights = np.maximum(natural, minima).tolist()
         size = width, sum(heights) + fixed
     else:
         heights = [(size[1] - fixed) / len(rows)] * len(rows)
-        if heights[0] < max(least) or min(_panel_space(row, size[0]) for row in rows) < 0.3:
+        if heights[0] < max(minima) or min(_panel_space(row, size[0]) for row in rows) < 0.3:
             raise OptionError(f"{size[0]:g} by {size[1]:g} inches are too small for the pictures")
     check_pixels(size, dpi)
     figure = new_figure(*size, dpi=dpi)
@@ -190,9 +190,9 @@ def _draw_row(figure: Figure, row: Row, floor: float, height: float) -> None:
 def _draw_card(figure: Figure, quantity: Quantity, left: float, floor: float, height: float) -> None:
     """Draw the colour bar, the histogram and the percentiles of a quantity."""
     lines = [("median", 50), ("95% below", 95), ("99% below", 99), ("largest", 100)]
-    used = Inches.LABEL + Inches.TICKS + (len(lines) + 0.7) * Inches.LINE
-    graph = min(max(height - used, 0.25), 0.7)
-    top = floor + min(height, (height + used + graph) / 2)
+    text_height = Inches.LABEL + Inches.TICKS + (len(lines) + 0.7) * Inches.LINE
+    graph = min(max(height - text_height, 0.25), 0.7)
+    top = floor + min(height, (height + text_height + graph) / 2)
     _write(figure, left, top, quantity.label, space=Inches.CARD - 0.05, size=Points.LABEL, va="top")
     draw_histogram(
         _add_axes(figure, left + 0.05, top - Inches.LABEL - graph, Inches.CARD - 0.15, graph), quantity

@@ -191,15 +191,15 @@ def demo_figure(result: Flattening) -> Figure:
     Raises:
         OptionError: matplotlib is not installed.
     """
-    front, both = Look(dpi=220.0), Look(dpi=220.0, eyes=("front-right", "back-left"))
+    front, two_sided = Look(dpi=220.0), Look(dpi=220.0, eyes=("front-right", "back-left"))
     quality = conformal_distortion(result)
     panels = [
         *front.views(result, draw_checker, "Model, textured by its UVs", cones=True),
         Panel(layout_aspect(result, crop=True), partial(draw_layout, result, crop=True), "UV layout"),
-        *both.views(result, draw_quantity, "Distortion, front and back", quantity=quality),
+        *two_sided.views(result, draw_quantity, "Distortion, front and back", quantity=quality),
     ]
     rows = [Row(panels, [quality])]
-    return compose(rows, title=title(result), marks=mark_handles(result), dpi=both.dpi, width=10.0)
+    return compose(rows, title=title(result), marks=mark_handles(result), dpi=two_sided.dpi, width=10.0)
 
 
 def title(result: Flattening) -> str:

@@ -138,7 +138,7 @@ def draw_cone_curve(curve: ConeCurve, axes: Axes, *, distortion: float = DISTORT
     top, look = (curve.knee, axes.get_ylim()[1]), {"ha": "left", "va": "top"}
     note(f"knee: {curve.knee} cones", top, xytext=(3, 0), color=KNEE_COLOR, **look)
     axes.set_xlabel("number of cones")
-    axes.set_ylabel("area distortion E (std. of the log scale)")
+    axes.set_ylabel("area distortion E (std. of the log conformal factor)")
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)

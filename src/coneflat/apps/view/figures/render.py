@@ -271,10 +271,10 @@ _Shader: TypeAlias = Callable[[IntArray, FloatArray], FloatArray]
 
 def _plain(colors: ArrayLike) -> _Shader:
     """Return a function for the colours of samples: that of the face, or interpolated between its corners."""
-    given = np.asarray(colors, dtype=np.float64)
+    colours = np.asarray(colors, dtype=np.float64)
 
     def paint(seen: IntArray, weights: FloatArray) -> FloatArray:
-        colour = given[seen]
+        colour = colours[seen]
         return colour if colour.ndim == 2 else np.einsum("kc,kcd->kd", weights, colour)
 
     return paint

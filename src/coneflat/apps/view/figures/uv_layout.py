@@ -115,11 +115,11 @@ def frame_layout(axes: Axes, result: Flattening, crop: bool) -> None:
 
 def layout_box(result: Flattening, crop: bool) -> tuple[FloatArray, FloatArray]:
     """Return the (2,) lower left and upper right corners of the box around the charts and, unless `crop`, the tiles."""
-    used = result.uv[np.unique(result.uv_faces)]
+    points = result.uv[np.unique(result.uv_faces)]
     if not crop:
         tiles = chart_tiles(result.uv, result.uv_faces)
-        used = np.concatenate([tiles, tiles + 1, used])
-    return used.min(axis=0), used.max(axis=0)
+        points = np.concatenate([tiles, tiles + 1, points])
+    return points.min(axis=0), points.max(axis=0)
 
 
 def layout_aspect(result: Flattening, crop: bool) -> float:

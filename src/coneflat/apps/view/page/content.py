@@ -23,7 +23,7 @@ CELLS = 4095
 
 
 def simplify(
-    places: FloatArray, uv: FloatArray, faces: IntArray, fixed: BoolArray, most: int
+    places: FloatArray, uv: FloatArray, faces: IntArray, fixed: BoolArray, max_triangles: int
 ) -> tuple[IntArray, IntArray]:
     """Return a simplified mesh of at most `most` triangles: the (k,) faces that remain, and their (k, 3) new corners.
 
@@ -36,7 +36,7 @@ def simplify(
         uv: (u, 2) the same points in the plane.
         faces: (m, 3) triangles.
         fixed: (u,) whether a point must remain.
-        most: largest number of triangles.
+        max_triangles: largest number of triangles.
 
     Raises:
         MeshError: there are more triangles than that along outlines alone.
@@ -48,7 +48,7 @@ def simplify(
     coordinates -= coordinates.min(axis=0)
     extent = float(coordinates.max())
     # A cell contains about two triangles.
-    size = float(np.sqrt(area / most))
+    size = float(np.sqrt(area / max_triangles))
     for _ in range(60):
         unmerged = fixed
         while True:
@@ -65,24 +65,24 @@ def simplify(
             unmerged[faces[crossing]] = True
         remain[folded] = False
         count = int(remain.sum())
-        if count <= most:
+        if count <= max_triangles:
             chosen = np.flatnonzero(remain)
             return chosen, corners[chosen]
         if size > extent:
             break
-        size *= float(np.clip(np.sqrt(count / most), 1.1, 2.0))
+        size *= float(np.clip(np.sqrt(count / max_triangles), 1.1, 2.0))
     raise MeshError(
-        f"the mesh of {len(faces):,} triangles cannot be reduced to {most:,} for display: {count:,} of them lie along "
-        "seams or boundaries; allow more"
+        f"the mesh of {len(faces):,} triangles cannot be reduced to {max_triangles:,} for display: {count:,} of them "
+        "lie along seams or boundaries; allow more"
     )
 
 
 def _representatives(coordinates: FloatArray, fixed: BoolArray, size: float) -> IntArray:
     """Return (u,) the point into which each point is merged."""
-    new = np.arange(len(coordinates))
+    representative = np.arange(len(coordinates))
     free = np.flatnonzero(~fixed)
     if not len(free):
-        return new
+        return representative
     cells = np.floor(coordinates[free] / size).astype(np.int64)
     key = np.zeros(len(free), dtype=np.int64)
     for column in cells.T:
@@ -95,8 +95,8 @@ def _representatives(coordinates: FloatArray, fixed: BoolArray, size: float) -> 
         squared += (column - (np.bincount(cell, weights=column) / members)[cell]) ** 2
     order = np.lexsort([squared, cell])
     first = np.concatenate([[0], np.cumsum(members)[:-1]])
-    new[free] = free[order[first]][cell]
-    return new
+    representative[free] = free[order[first]][cell]
+    return representative
 
 
 def sides(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -127,7 +127,7 @@ class Content:
         face_numbers: (m,) index of each triangle in the result.
         left_out: number of triangles that are not shown.
         scales: the colour scale of each quantity.
-        own: quantity given by the user, at the vertices or triangles that are shown.
+        quantity: quantity given by the user, at the vertices or triangles that are shown.
     """
 
     model: Model
@@ -149,7 +149,7 @@ class Content:
     face_numbers: IntArray
     left_out: int
     scales: dict[str, ColorScale]
-    own: Quantity | None
+    quantity: Quantity | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,7 +158,7 @@ class Model:
 
     Attributes:
         mesh: the mesh.
-        used: (v,) the vertices that have triangles.
+        vertices: (v,) the vertices that have triangles.
         places: (v, 3) their positions, moved and scaled into the unit ball.
         centre, radius: centre and radius of this ball in model units.
         curvature: (v,) curvature in units of pi; NaN on the boundary.
@@ -166,7 +166,7 @@ class Model:
     """
 
     mesh: TriangleMesh
-    used: IntArray
+    vertices: IntArray
     places: FloatArray
     centre: FloatArray
     radius: float
@@ -178,16 +178,16 @@ class Model:
         """Return the surface of a result."""
         mesh = TriangleMesh(result.vertices, result.faces)
         is_used = mask_of(len(mesh.vertices), mesh.faces)
-        used = np.flatnonzero(is_used)
-        places, centre, radius = _into_unit_ball(result.vertices[used])
-        curvature = angle_defects(result, False, mesh)[used] / np.pi
+        vertices = np.flatnonzero(is_used)
+        places, centre, radius = _into_unit_ball(result.vertices[vertices])
+        curvature = angle_defects(result, False, mesh)[vertices] / np.pi
         number = np.cumsum(is_used) - 1
         corners = places[number[mesh.faces]]
         centroids = corners.mean(axis=1)
         # Most normals of an outward orientation point away from the middle.
         away = (centroids - centroids.mean(axis=0)) * np.cross(*sides(corners))
         outward = -1 if float(away.sum()) < 0 else 1
-        return cls(mesh, used, places, centre, radius, curvature, outward)
+        return cls(mesh, vertices, places, centre, radius, curvature, outward)
 
     def is_of(self, result: Flattening) -> bool:
         """Return whether this is the surface of a result."""
@@ -196,56 +196,58 @@ class Model:
 
 
 def content_of(
-    result: Flattening, most: int, model: Model | None = None, own: Quantity | None = None
+    result: Flattening, max_triangles: int, model: Model | None = None, quantity: Quantity | None = None
 ) -> Content:
     """Return the content of a page of a result.
 
     Args:
         result: the flattening.
-        most: largest number of triangles.
+        max_triangles: largest number of triangles.
         model: its surface, if it has been computed already.
-        own: quantity given by the user.
+        quantity: quantity given by the user.
 
     Raises:
         ArrayShapeError: the result has no UVs, or no triangles.
         MeshError: it cannot be reduced to `most` triangles.
         OptionError: `most` is not positive.
     """
-    if most < 1:
-        raise OptionError(f"most_triangles must be 1 or more, got {most}")
+    if max_triangles < 1:
+        raise OptionError(f"most_triangles must be 1 or more, got {max_triangles}")
     if not len(result.faces) or not len(result.uv) or np.shape(result.uv_faces) != np.shape(result.faces):
         raise ArrayShapeError(
             f"the result cannot be shown: it has {len(result.faces):,} triangles, {len(result.uv):,} UV points and "
             f"{len(result.uv_faces):,} UV triangles"
         )
     split, model = split_at_seams(result), Model.of(result) if model is None else model
-    used, places = model.used, model.places
-    vertex = np.searchsorted(used, split.own)
+    mesh_vertices, places = model.vertices, model.places
+    vertex = np.searchsorted(mesh_vertices, split.vertex)
     outline, seams = outline_halfedges(model.mesh, split.faces)
     chart = _charts(split.faces, split.uv)
     qc, scale = conformal_distortion(result), stretch(result)
-    flat_curvature = angle_defects(result, True, model.mesh)[used] / np.pi
-    cone = np.searchsorted(used, result.cones)
+    flat_curvature = angle_defects(result, True, model.mesh)[mesh_vertices] / np.pi
+    cone = np.searchsorted(mesh_vertices, result.cones)
 
     # Without simplification, every point and every vertex has a triangle.
     shown, faces = np.arange(len(split.faces)), split.faces
-    points, vertices, point_vertex = np.arange(len(split.uv)), np.arange(len(used)), vertex
-    if len(shown) > most:
+    points, vertices, point_vertex = np.arange(len(split.uv)), np.arange(len(mesh_vertices)), vertex
+    if len(shown) > max_triangles:
         fixed = np.zeros(len(split.uv), dtype=bool)
         for end in end_corners(outline):
             fixed[split.faces.reshape(-1)[end]] = True
         fixed |= np.isin(vertex, cone)
-        shown, corners = simplify(places[vertex], split.uv, split.faces, fixed, most)
+        shown, corners = simplify(places[vertex], split.uv, split.faces, fixed, max_triangles)
         # All triangles at outlines remain, because their third corner is not merged with the other two.
         outline = 3 * np.searchsorted(shown, outline // 3) + outline % 3
         points, faces = np.unique(corners, return_inverse=True)
         vertices, point_vertex = np.unique(vertex[points], return_inverse=True)
     numbers = np.arange(len(result.vertices)) if result.vertex_origin is None else result.vertex_origin
     scales = _scales(qc, scale, model.curvature)
-    if own is not None:
-        colors = "diverging" if own.scale.low < 0 < own.scale.high else "sequential"
-        scales = {"own": replace(own.scale, colors=colors), **scales}
-        own = replace(own, values=own.values[shown if own.corners is None else used[vertices]])
+    if quantity is not None:
+        colors = "diverging" if quantity.scale.low < 0 < quantity.scale.high else "sequential"
+        scales = {"own": replace(quantity.scale, colors=colors), **scales}
+        quantity = replace(
+            quantity, values=quantity.values[shown if quantity.corners is None else mesh_vertices[vertices]]
+        )
     return Content(
         model=model,
         places=places[vertices],
@@ -262,11 +264,11 @@ def content_of(
         flat=flat_curvature[vertices],
         cones=np.searchsorted(vertices, cone),
         cone_curvatures=result.curvatures,
-        vertex_numbers=numbers[used[vertices]],
+        vertex_numbers=numbers[mesh_vertices[vertices]],
         face_numbers=shown,
         left_out=len(split.faces) - len(shown),
         scales=scales,
-        own=own,
+        quantity=quantity,
     )
 
 
@@ -285,8 +287,8 @@ def _scales(qc: Quantity, area: Quantity, curvature: FloatArray) -> dict[str, Co
     superscripts = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
     powers = (top, top - 2)
     ticks = [(10.0**power, f"10{str(power).translate(superscripts)}" if power else "1") for power in powers]
-    both = [*((-value, f"−{label}") for value, label in ticks), (0.0, "0"), *reversed(ticks)]
-    bent = ColorScale(10.0 ** (top - 4), 10.0**top, "diverging", "signed log", tuple(both))
+    signed_ticks = [*((-value, f"−{label}") for value, label in ticks), (0.0, "0"), *reversed(ticks)]
+    bent = ColorScale(10.0 ** (top - 4), 10.0**top, "diverging", "signed log", tuple(signed_ticks))
     return {
         "qc": replace(qc.scale, colors="sequential"),
         "area": replace(area.scale, colors="diverging"),

@@ -92,7 +92,7 @@ def head_and_block(
     """
     if text is None:
         text = PageText(title(replace(result, source=None)), shown_rows(result))
-    own, arrays = content.own, _arrays(content)
+    quantity, arrays = content.quantity, _arrays(content)
     if picture is not None:
         arrays["picture"] = np.frombuffer(picture.content, dtype=np.uint8)
     listed, block = pack(arrays)
@@ -115,10 +115,10 @@ def head_and_block(
         "squares": text.squares,
         "crease_cosine": CREASE_COSINE,
         "scales": {
-            key: _plain_scale(TITLES[key] if own is None or key != "own" else own.label, scale)
+            key: _plain_scale(TITLES[key] if quantity is None or key != "own" else quantity.label, scale)
             for key, scale in content.scales.items()
         },
-        "own": None if own is None else "faces" if own.corners is None else "vertices",
+        "own": None if quantity is None else "faces" if quantity.corners is None else "vertices",
         "picture": None if picture is None else picture.kind,
         "show": show,
         "arrays": listed,
@@ -142,9 +142,11 @@ def _plain_scale(title: str, scale: ColorScale) -> dict[str, Any]:
 
 def _color_table(colors: str) -> NDArray[np.uint8]:
     """Return (256, 3) colours interpolated between the given ones."""
-    known = np.array([list(bytes.fromhex(color)) for color in colors.split()])
-    place = np.linspace(0, len(known) - 1, 256)
-    table = np.stack([np.interp(place, np.arange(len(known)), column) for column in known.T], axis=1)
+    table_colors = np.array([list(bytes.fromhex(color)) for color in colors.split()])
+    place = np.linspace(0, len(table_colors) - 1, 256)
+    table = np.stack(
+        [np.interp(place, np.arange(len(table_colors)), column) for column in table_colors.T], axis=1
+    )
     return np.round(table).astype(np.uint8)
 
 
@@ -172,8 +174,8 @@ def _arrays(content: Content) -> dict[str, NDArray[Any]]:
     arrays["tints"] = np.array([list(bytes.fromhex(colour[1:])) for colour in CHART_COLORS], dtype=np.uint8)
     if not np.array_equal(content.vertex_numbers, np.arange(len(content.places))):
         arrays["vertex_numbers"] = content.vertex_numbers.astype("i4")
-    if content.own is not None:
-        arrays["own"] = content.own.values.astype("f4")
+    if content.quantity is not None:
+        arrays["own"] = content.quantity.values.astype("f4")
     if content.left_out:
         arrays["face_numbers"] = content.face_numbers.astype("u4")
     return arrays

@@ -11,7 +11,7 @@ from functools import cache
 from importlib.resources import files
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ....base import short_repr
 from ....errors import OptionError
@@ -69,9 +69,9 @@ def page_html(
     if not isinstance(show, str) or (show not in SHOWS and (show != "own" or color is None)):
         raise OptionError(f"unknown show {short_repr(show)}: choose from {', '.join(SHOWS)}")
     picture = None if texture is None else read_picture(texture)
-    most = as_integer("most_triangles", most_triangles)
-    own = color if color is None or isinstance(color, Quantity) else own_quantity(result, color)
-    content = content_of(result, most, own=own)
+    max_triangles = as_integer("most_triangles", most_triangles)
+    quantity = color if color is None or isinstance(color, Quantity) else own_quantity(result, color)
+    content = content_of(result, max_triangles, quantity=quantity)
     if name is None:
         name = "Flattening" if result.source is None else result.source.path.name
     head, arrays = as_payload(*head_and_block(result, content, picture, name, up, show, text))
@@ -103,6 +103,22 @@ def write_page(page: str, path: str | PathLike[str] | None) -> Path:
     with atomic_write(path, "w") as stream:
         stream.write(page)
     return path
+
+
+def show_page(
+    result: Flattening, path: str | PathLike[str] | None, *, most_triangles: int | None, **look: Any
+) -> Path:
+    """Write the page of a flattening, and open it in the browser if no path is given; see `Flattening.view`.
+
+    look: further arguments of `page_html`.
+    """
+    if path is not None:
+        check_page(path)
+    max_triangles = MAX_SHOWN_TRIANGLES if most_triangles is None else most_triangles
+    page = write_page(page_html(result, most_triangles=max_triangles, **look), path)
+    if path is None:
+        open_page(page)
+    return page
 
 
 def open_page(path: Path) -> bool:
@@ -138,8 +154,8 @@ def _template() -> tuple[str, str, str]:
     data = """<script type="application/json" id="head">{{head}}</script>
 <script type="text/plain" id="arrays">{{arrays}}</script>"""
     page = page_around(POLICY, data, script=_read("from_page.js"))
-    before, rest = page.split("{{head}}")
-    between, after = rest.split("{{arrays}}")
+    before, body = page.split("{{head}}")
+    between, after = body.split("{{arrays}}")
     return before, between, after
 
 

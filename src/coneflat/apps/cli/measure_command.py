@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .shared import QUIET, check_required, input_options, require_option, verbosity_options
+from .flags import QUIET, check_required, input_options, require_option, verbosity_options
 
 if TYPE_CHECKING:
     from ...measures import Row
@@ -60,16 +60,16 @@ def measure(
         with console.stage("measure", 0.3):
             flat = None if surface is None else measure_flat(mapped, strict=not repair)
             measured = measure_mapped(mapped, strict=not repair) if flat is None else flat.uv
-        found = (flat or measured).report()
+        measures = (flat or measured).report()
         if report is not None:
-            write_report(report, found)
+            write_report(report, measures)
         if as_json and verbosity != QUIET:
-            click.echo(json.dumps(found, indent=2))
+            click.echo(json.dumps(measures, indent=2))
         elif not as_json:
             console.say(f"note: {note}" for note in measured.notes)
             console.table(rows_of_measures(measured, flat))
             console.finish([] if report is None else [report])
-    check_required(requirements, found)
+    check_required(requirements, measures)
 
 
 def rows_of_measures(measured: UVMeasures, flat: FlatMeasures | None = None) -> list[Row]:

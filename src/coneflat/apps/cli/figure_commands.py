@@ -8,8 +8,21 @@ from typing import Any
 
 import click
 
-from .options import flag, flag_name, is_given, option_flags, parse_eye, path_flag, pop_flags
-from .shared import again_option, color_option, input_options, repair_keywords, up_option, verbosity_options
+from .flags import (
+    again_option,
+    color_option,
+    flag,
+    flag_name,
+    input_options,
+    is_given,
+    option_flags,
+    parse_eye,
+    path_flag,
+    pop_flags,
+    repair_keywords,
+    up_option,
+    verbosity_options,
+)
 
 KINDS = ("layout", "checker", "quality", "cones", "curvature", "color", "curve")
 
@@ -78,7 +91,7 @@ def figure(
     repair: bool,
     weld: bool | None,
     verbosity: str | None,
-    **given: Any,
+    **params: Any,
 ) -> None:
     """Draw a figure of MESH and its UVs for print.
 
@@ -95,7 +108,7 @@ def figure(
     from ..view import Look, check_figure, make_figure, new_figure, own_quantity, save_figure
     from .run import Console, archive_path, open_result
 
-    flags = pop_flags(given, FigureFlags)
+    flags = pop_flags(params, FigureFlags)
     kind = "color" if color is not None and not is_given(context, "kind") else flags.kind
     if color is None and kind == "color":
         raise click.UsageError("--kind color needs --color", context)

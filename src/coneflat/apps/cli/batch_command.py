@@ -13,17 +13,20 @@ import click
 from ...base import plural, printable
 from ...options import FORMATS, Options, declarations, read_options
 from ...textures.options import MAX_ENERGY, TextureOptions, UnwrapOptions
-from .options import (
+from .flags import (
+    GroupedCommand,
     check_combinations,
     flag,
     flag_name,
+    input_options,
     keywords,
     option_flags,
     paper_option,
     path_flag,
     pop_flags,
+    require_option,
+    verbosity_options,
 )
-from .shared import GroupedCommand, input_options, require_option, verbosity_options
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +69,7 @@ def batch(
     weld: bool | None,
     required: tuple[str, ...],
     verbosity: str | None,
-    **given: Any,
+    **params: Any,
 ) -> None:
     """Flatten all meshes that match the patterns: files, folders, or names with *, ? and ** in quotes.
 
@@ -86,11 +89,11 @@ def batch(
     from .run import Console
 
     check_combinations(context)
-    flags = pop_flags(given, BatchFlags)
+    flags = pop_flags(params, BatchFlags)
     if flags.jobs is not None and flags.dask is not None:
         raise click.UsageError("--jobs has no effect with --dask: leave out --jobs", context)
-    textures = {name: given[name] for name in declarations(TextureOptions) if given[name] is not None}
-    options = keywords(given) | ({"max_energy": MAX_ENERGY, **textures} if textures else {})
+    textures = {name: params[name] for name in declarations(TextureOptions) if params[name] is not None}
+    options = keywords(params) | ({"max_energy": MAX_ENERGY, **textures} if textures else {})
     _refuse_vertices(context, options)
     parse_requirements(required, REPORTED)
     # Options are checked before the work starts.
@@ -102,15 +105,15 @@ def batch(
 
         def report(row: dict[str, Any], done: int, count: int) -> None:
             rows.append(row)
-            first, *more = _lines(row, console.verbose)
+            first, *details = _lines(row, console.verbose)
             console.say(
-                [f"{done:>{len(str(count))}}/{count}  {printable(Path(row['mesh']).name)}  {first}", *more]
+                [f"{done:>{len(str(count))}}/{count}  {printable(Path(row['mesh']).name)}  {first}", *details]
             )
             console.progress(f"{done} of {plural(count, 'mesh', 'meshes')}", done / count)
 
         console.say([f"flattening {plural(len(todo), 'mesh', 'meshes')} into {printable(flags.out)}"])
         console.progress("flatten", 0.0)
-        found = run_batch(
+        outcome = run_batch(
             todo,
             flags.out.absolute(),
             processes=flags.jobs,
@@ -120,14 +123,16 @@ def batch(
             summary=flags.summary,
             listener=report,
         )
-        before = f", {found.skipped:,} of them before" if found.skipped else ""
-        failed = f"; {found.failed:,} failed" if found.failed else ""
-        console.say(f"note: {note}" for note in found.notes)
-        console.say([f"{len(todo) - found.failed:,} of {len(todo):,} meshes are flattened{before}{failed}"])
+        before = f", {outcome.skipped:,} of them before" if outcome.skipped else ""
+        failed = f"; {outcome.failed:,} failed" if outcome.failed else ""
+        console.say(f"note: {note}" for note in outcome.notes)
+        console.say([f"{len(todo) - outcome.failed:,} of {len(todo):,} meshes are flattened{before}{failed}"])
         console.say(_slowest(rows, console.elapsed))
         console.finish([table := flags.summary or flags.out / "summary.csv"])
-    if found.failed:
-        sys.exit(f"coneflat: error: {found.failed:,} of {len(todo):,} meshes failed, see {printable(table)}")
+    if outcome.failed:
+        sys.exit(
+            f"coneflat: error: {outcome.failed:,} of {len(todo):,} meshes failed, see {printable(table)}"
+        )
 
 
 def _lines(row: dict[str, Any], verbose: bool) -> Iterator[str]:
@@ -152,7 +157,7 @@ def _slowest(rows: Sequence[dict[str, Any]], elapsed: float) -> Iterator[str]:
 
 def _refuse_vertices(context: click.Context, options: dict[str, Any]) -> None:
     """Raise an error if an option refers to the vertices of one mesh."""
-    for name, what in (
+    for name, reason in (
         ("cones", "a list of vertices applies to one mesh only"),
         ("boundary", "a list of corners applies to one mesh only"),
         ("seams", "a file of seams applies to one mesh only: write input"),
@@ -160,4 +165,4 @@ def _refuse_vertices(context: click.Context, options: dict[str, Any]) -> None:
         ("seam_weights", "a file of weights applies to one mesh only: give the name of a property"),
     ):
         if not isinstance(options.get(name, ""), str):
-            raise click.UsageError(f"{flag_name(name)}: {what}", context)
+            raise click.UsageError(f"{flag_name(name)}: {reason}", context)

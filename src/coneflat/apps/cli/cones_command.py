@@ -12,8 +12,17 @@ import click
 
 from ...base import DISTORTION, MAX_CONES, plural
 from ...options import FindOptions
-from .options import flag, is_given, keywords, option_flags, path_flag, pop_flags
-from .shared import GroupedCommand, input_options, verbosity_options
+from .flags import (
+    GroupedCommand,
+    flag,
+    input_options,
+    is_given,
+    keywords,
+    option_flags,
+    path_flag,
+    pop_flags,
+    verbosity_options,
+)
 
 if TYPE_CHECKING:
     from ... import ConeCurve
@@ -45,7 +54,7 @@ class ConeFlags:
 @verbosity_options
 @click.pass_context
 def cones(
-    context: click.Context, /, mesh: Path, weld: bool | None, verbosity: str | None, **given: Any
+    context: click.Context, /, mesh: Path, weld: bool | None, verbosity: str | None, **params: Any
 ) -> None:
     """Find the cones of the largest component of MESH, without flattening it.
 
@@ -59,7 +68,7 @@ def cones(
     from ..view import check_figure, make_figure, new_figure, save_figure
     from .run import Console
 
-    flags, options = pop_flags(given, ConeFlags), keywords(given, FindOptions)
+    flags, options = pop_flags(params, ConeFlags), keywords(params, FindOptions)
     picture = None
     if flags.curve:
         new_figure(1, 1)  # A missing package is reported before the work starts.
@@ -78,19 +87,19 @@ def cones(
                 source, progress=console.part(end=0.5 if flags.curve else console.FLATTENED), **options
             )
         console.say(f"note: {note}" for note in joined.notes())
-        wanted = options.pop("distortion", DISTORTION)
+        distortion = options.pop("distortion", DISTORTION)
         options.pop("cone_count", None)
         if flags.curve:
             with console.stage("curve", 0.5):
-                most = max(flags.most, len(found_cones.vertices))
-                found = cone_curve(source, most=most, progress=console.part(0.5), **options)
-            console.say(_curve_lines(found, wanted))
+                max_count = max(flags.most, len(found_cones.vertices))
+                curve = cone_curve(source, most=max_count, progress=console.part(0.5), **options)
+            console.say(_curve_lines(curve, distortion))
         else:
             console.say(_cone_lines(found_cones))
             console.say(f"note: {note}" for note in found_cones.notes)
         if picture is not None:
             with console.stage("draw"):
-                save_figure(make_figure(found, "curve", distortion=wanted, title=mesh.name), picture)
+                save_figure(make_figure(curve, "curve", distortion=distortion, title=mesh.name), picture)
         if flags.output is not None:
             with atomic_write(flags.output, "w") as file:
                 for vertex, curvature in zip(found_cones.vertices, found_cones.curvatures, strict=True):
@@ -98,12 +107,14 @@ def cones(
         console.finish([path for path in (picture, flags.output) if path is not None])
 
 
-def _curve_lines(curve: ConeCurve, wanted: float) -> Iterator[str]:
+def _curve_lines(curve: ConeCurve, distortion: float) -> Iterator[str]:
     yield "cones  area distortion E"
-    for each in curve.sets:
-        number = len(each.vertices)
-        marks = ["knee"] * (number == curve.knee) + [f"<= {wanted:g}"] * (each.distortion <= wanted)
-        yield f"{number:5d}  {each.distortion:.4f}  {', '.join(marks)}".rstrip()
+    for cone_set in curve.sets:
+        number = len(cone_set.vertices)
+        marks = ["knee"] * (number == curve.knee) + [f"<= {distortion:g}"] * (
+            cone_set.distortion <= distortion
+        )
+        yield f"{number:5d}  {cone_set.distortion:.4f}  {', '.join(marks)}".rstrip()
 
 
 def _cone_lines(cones: FoundCones) -> Iterator[str]:

@@ -10,8 +10,17 @@ import click
 
 from ...options import ConeBounds, ConeNumber, declarations, read_options
 from ...quadmesh.options import QuadOptions
-from .options import is_given, keywords, option_flags, path_flag, pop_flags, refuse
-from .shared import GroupedCommand, input_options, verbosity_options
+from .flags import (
+    GroupedCommand,
+    input_options,
+    is_given,
+    keywords,
+    option_flags,
+    path_flag,
+    pop_flags,
+    refuse,
+    verbosity_options,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +50,7 @@ class QuadFlags:
 @verbosity_options
 @click.pass_context
 def quads(
-    context: click.Context, /, mesh: Path, weld: bool | None, verbosity: str | None, **flags_given: Any
+    context: click.Context, /, mesh: Path, weld: bool | None, verbosity: str | None, **params: Any
 ) -> None:
     """Convert MESH to a mesh of quads only, with few irregular vertices.
 
@@ -64,7 +73,7 @@ def quads(
     from .run import Console, require_distinct, write_report
 
     _check_combinations(context, mesh)
-    flags, options = pop_flags(flags_given, QuadFlags), keywords(flags_given, QuadOptions)
+    flags, options = pop_flags(params, QuadFlags), keywords(params, QuadOptions)
     read_options(options, QuadOptions)
     if "quads" in options and isinstance(options.get("size"), float):
         raise click.UsageError("--quads (--faces) and a length as --size exclude each other: leave out one")
@@ -106,8 +115,8 @@ def quads(
             notes += quads_left_out(None if joined is None else joined.mesh, ending)
         if flags.report is not None:
             measured = {} if measures is None else measures.report()
-            run_report = {"grid": {"size": grid_map.size}, "seconds": dict(console.seconds), "notes": notes}
-            write_report(flags.report, {**measured, **run_report})
+            run = {"grid": {"size": grid_map.size}, "seconds": dict(console.seconds), "notes": notes}
+            write_report(flags.report, {**measured, **run})
         console.say(f"note: {note}" for note in notes)
         console.finish([path for path in files.values() if path is not None])
         square = "square", f"{grid_map.size:.4g}", "side of a grid square in model units"
@@ -117,12 +126,12 @@ def quads(
 def _check_combinations(context: click.Context, mesh: Path) -> None:
     """Raise an error if an option would have no effect."""
     searched = [*declarations(ConeBounds), *declarations(ConeNumber), "max_cones"]
-    are_cones_given = context.params["cones"] not in ((), ("auto",), ("sparse",))
+    are_given = context.params["cones"] not in ((), ("auto",), ("sparse",))
     refuse(
         context,
         [
             (is_given(context, "cone_count"), ["distortion", "max_cones"], "--cone-count is given"),
-            (are_cones_given, searched, "there is no search if the cones are given"),
+            (are_given, searched, "there is no search if the cones are given"),
         ],
     )
     if mesh.suffix.lower() != ".npz":

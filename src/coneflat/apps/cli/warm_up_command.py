@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from .shared import GroupedCommand, verbosity_options
+from .flags import GroupedCommand, verbosity_options
 
 
 @click.command(

@@ -11,18 +11,22 @@ import click
 
 from ...options import FORMATS, Options, declarations
 from ...textures.options import UnwrapOptions
-from .options import (
+from .flags import (
+    GroupedCommand,
     check_combinations,
+    check_required,
     flag,
     flag_name,
+    input_options,
     is_given,
     keywords,
     option_flags,
     paper_option,
     path_flag,
     pop_flags,
+    require_option,
+    verbosity_options,
 )
-from .shared import GroupedCommand, check_required, input_options, require_option, verbosity_options
 
 if TYPE_CHECKING:
     from ... import Flattening
@@ -61,7 +65,7 @@ class FileFlags:
 @require_option
 @verbosity_options
 @click.pass_context
-def flatten(context: click.Context, /, **given: Any) -> None:
+def flatten(context: click.Context, /, **params: Any) -> None:
     """Flatten MESH and write it with UV coordinates.
 
     MESH is a file (.obj, .ply, .stl, .off, .gltf, .glb, .gii, lh.pial), or - for standard input.
@@ -79,13 +83,13 @@ def flatten(context: click.Context, /, **given: Any) -> None:
     if context.args:
         raise click.UsageError(
             f"expected one mesh, got {1 + len(context.args)}: `coneflat batch "
-            f"{given['mesh']} {context.args[0]} ... --out FOLDER` flattens many",
+            f"{params['mesh']} {context.args[0]} ... --out FOLDER` flattens many",
             context,
         )
     from ... import flatten as find
 
     check_combinations(context)
-    _flatten_and_save(context, find, Options, **given)
+    _flatten_and_save(context, find, Options, **params)
 
 
 @click.command(cls=GroupedCommand, short_help="Unwrap a mesh for textures, with short seams.")
@@ -96,7 +100,7 @@ def flatten(context: click.Context, /, **given: Any) -> None:
 @require_option
 @verbosity_options
 @click.pass_context
-def unwrap(context: click.Context, /, **given: Any) -> None:
+def unwrap(context: click.Context, /, **params: Any) -> None:
     """Write MESH with UV coordinates for a texture: nearly isometric, with the shortest seams.
 
     MESH is a file (.obj, .ply, .stl, .off, .gltf, .glb, .gii, lh.pial), or - for standard input.
@@ -109,7 +113,7 @@ def unwrap(context: click.Context, /, **given: Any) -> None:
     """
     from ... import unwrap as find
 
-    _flatten_and_save(context, find, UnwrapOptions, **given)
+    _flatten_and_save(context, find, UnwrapOptions, **params)
 
 
 def _flatten_and_save(
@@ -121,20 +125,20 @@ def _flatten_and_save(
     required: tuple[str, ...],
     weld: bool | None,
     verbosity: str | None,
-    **given: Any,
+    **params: Any,
 ) -> None:
     """Flatten a file by a function with a group of options, and write the result and its report."""
     from ...io import PIPE, check_output, check_target
     from ...measures import REPORTED, parse_requirements
     from .run import Console, flatten_file, redirect_prints, require_distinct, save
 
-    flags, add_notes = pop_flags(given, FileFlags), None
+    flags, add_notes = pop_flags(params, FileFlags), None
     if flags.project is not None:
         mesh, options, add_notes = _project_arguments(context, flags.project, group)
     elif mesh is None:
         raise click.MissingParameter(ctx=context, param_hint="'MESH'", param_type="argument")
     else:
-        options = keywords(given, group)
+        options = keywords(params, group)
     requirements = parse_requirements(required, REPORTED)
     ending = f".{flags.format or 'obj'}"
     output = flags.output or (PIPE if mesh == PIPE else Path(f"{mesh.stem}_uv{ending}"))
@@ -163,8 +167,8 @@ def _project_arguments(
 
     for name in (*declarations(group), "mesh", "paper", "weld"):
         if name in context.params and is_given(context, name):
-            what = "MESH" if name == "mesh" else flag_name(name)
-            raise click.UsageError(f"a project contains mesh and options: leave out {what}", context)
+            argument = "MESH" if name == "mesh" else flag_name(name)
+            raise click.UsageError(f"a project contains mesh and options: leave out {argument}", context)
     opened = read_project(project)
     opened.check_mesh()
     choices = opened.choices.with_texture(group is UnwrapOptions)

@@ -1,4 +1,4 @@
-"""Parsers for the values of options: vertices, curvatures, pairs, weights, angles, and files of these."""
+"""Values of options from text, as commands take them: vertices, curvatures, pairs, weights, and files of these."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from ...errors import MeshFileError, OptionError
+from ..errors import MeshFileError, OptionError
 
 if TYPE_CHECKING:
-    from ...base import FloatArray, IntArray
+    from ..base.arrays import FloatArray, IntArray
 
 
 _CURVATURE = re.compile(
@@ -20,6 +20,19 @@ _CURVATURE = re.compile(
     re.IGNORECASE,
 )
 _UNITS = {"pi": math.pi, "π": math.pi, "deg": math.pi / 180, "°": math.pi / 180, "rad": 1.0, None: 1.0}
+
+
+def read_word_or_vertex_map(flag: str, noun: str, texts: Sequence[str]) -> str | dict[int, float | None]:
+    """Return the word of an option that takes one, or else its vertices as `read_vertex_map` does.
+
+    Raises:
+        OptionError: there are several words, or as of `read_vertex_map`.
+        MeshFileError: a file cannot be read.
+    """
+    words = [text for text in texts if text.replace("-", "").isalpha() and not is_file(text)]
+    if words and len(texts) > 1:
+        raise OptionError(f"{flag} takes one choice, got {texts[0]} and {texts[1]}")
+    return words[0] if words else read_vertex_map(flag, noun, texts)
 
 
 def read_vertex_map(flag: str, noun: str, texts: Sequence[str]) -> dict[int, float | None]:
@@ -35,7 +48,7 @@ def read_vertex_map(flag: str, noun: str, texts: Sequence[str]) -> dict[int, flo
         OptionError: a text cannot be parsed, or a vertex is given twice.
         MeshFileError: the file cannot be read.
     """
-    given: dict[int, float | None] = {}
+    curvatures: dict[int, float | None] = {}
     for text, where in _entries(flag, noun, texts):
         parts = re.split(r"[\s,:;]+", text, maxsplit=1)
         try:
@@ -44,10 +57,10 @@ def read_vertex_map(flag: str, noun: str, texts: Sequence[str]) -> dict[int, flo
             raise OptionError(
                 f"{where} {text!r} is not VERTEX or VERTEX:CURVATURE, and there is no such file"
             ) from error
-        if vertex in given:
+        if vertex in curvatures:
             raise OptionError(f"{where} vertex {vertex} is given as a {noun} twice")
-        given[vertex] = parse_curvature(parts[1], f"{where} {text!r}") if len(parts) > 1 else None
-    return given
+        curvatures[vertex] = parse_curvature(parts[1], f"{where} {text!r}") if len(parts) > 1 else None
+    return curvatures
 
 
 def _entries(flag: str, noun: str, texts: Sequence[str]) -> Iterator[tuple[str, str]]:
@@ -97,6 +110,25 @@ def read_pairs(name: str) -> IntArray:
     if not pairs:
         raise OptionError(f"{path} contains no pairs of vertices")
     return np.array(pairs, dtype=np.int64)
+
+
+def read_edges(flag: str, words: Sequence[str], texts: Sequence[str]) -> Any:
+    """Return the (k, 2) pairs in files, one of the words of an option, or the word and the pairs.
+
+    Raises:
+        OptionError: a word is given twice, or a line of a file is not a pair of vertices.
+        MeshFileError: a file cannot be read.
+    """
+    import numpy as np
+
+    chosen = [text for text in texts if text in words]
+    if len(chosen) > 1:
+        raise OptionError(f"{flag} {chosen[0]} is given twice")
+    files = [text for text in texts if text not in words]
+    pairs = np.concatenate([read_pairs(text) for text in files]) if files else None
+    if chosen and pairs is not None:
+        return chosen[0], pairs
+    return chosen[0] if chosen else pairs
 
 
 def read_vertices_or_pairs(option: str, texts: Sequence[str]) -> IntArray:

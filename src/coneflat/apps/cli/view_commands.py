@@ -9,13 +9,16 @@ from typing import Any
 import click
 
 from ...options import SHOWS
-from .options import flag, option_flags, path_flag, pop_flags
-from .shared import (
+from .flags import (
     QUIET,
     again_option,
     color_option,
+    flag,
     input_options,
     most_option,
+    option_flags,
+    path_flag,
+    pop_flags,
     up_option,
     verbosity_options,
 )
@@ -54,7 +57,7 @@ def view(
     repair: bool,
     weld: bool | None,
     verbosity: str | None,
-    **given: Any,
+    **params: Any,
 ) -> None:
     """Write a page that shows FILE and its layout side by side.
 
@@ -79,14 +82,14 @@ def view(
     from .run import Console, archive_path, open_result
 
     # Errors that writing would raise are reported before the work starts.
-    flags = pop_flags(given, ViewFlags)
+    flags = pop_flags(params, ViewFlags)
     page = check_page(Path(f"{file.stem}_view.html") if flags.output is None else flags.output)
     if flags.unwrap and archive_path(file) is not None:
         raise click.UsageError(f"--unwrap needs a mesh, and {file.name} is a result: leave it out")
     if flags.texture is not None:
         read_picture(flags.texture)
     with Console(verbosity) as console:
-        look = {"name": file.name, "texture": flags.texture, "show": flags.show, **given}
+        look = {"name": file.name, "texture": flags.texture, "show": flags.show, **params}
         result = None
         if holds_quads(file):
             if color is not None:
