@@ -121,7 +121,7 @@ def test_a_cone_without_room_is_refused():
     for method in ABF_METHODS:
         with pytest.raises(
             errors.CurvatureError,
-            match=r"1 cone with angles too large .* 5 of them cannot hold an angle of 5.5 pi",
+            match=r"1 cone with angles too large .* 5 of them cannot have an angle of 5.5 pi",
         ):
             flatten_by(method, *shapes.sphere(3), cones=cones)
 

@@ -261,7 +261,7 @@ def measure_map(
 
 
 def _symmetric_dirichlet(qc: FloatArray, log_scale: FloatArray, weights: FloatArray) -> float:
-    """Return the mean symmetric Dirichlet energy at the best scale, from QC distortions and log scales."""
+    """Return the mean symmetric Dirichlet energy at the best scale, from QC distortions and log conformal factors."""
     ratio = qc + 1 / qc
     squares, inverses = (_mean(ratio * np.exp(sign * 2 * log_scale), weights) for sign in (1, -1))
     return 2 * float(np.sqrt(squares * inverses))

@@ -155,7 +155,7 @@ def map_rows(d: Distortion) -> dict[str, Row]:
         (
             "area distortion",
             number_text(d.area_std, ".4f"),
-            "standard deviation of the log scale, weighted by area",
+            "standard deviation of the log conformal factor, weighted by area",
         ),
         (
             "energy",
