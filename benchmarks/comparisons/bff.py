@@ -25,8 +25,8 @@ def boundary_first(mesh: TriangleMesh, lengths: FloatArray, solution: ConeSoluti
     Args:
         mesh: a connected mesh.
         lengths: (m, 3) side lengths, model units.
-        solution: cones and the linear log conformal factor, which solves the discrete Cherrier problem of the paper: L u is target
-            minus curvature at inner vertices, u = 0 on the boundary.
+        solution: cones and the linear log conformal factor, which solves the discrete Cherrier problem of the paper:
+            L u is target minus curvature at inner vertices, u = 0 on the boundary.
 
     Raises:
         MetricError: scales differ so much that lengths overflow.
