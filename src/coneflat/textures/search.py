@@ -18,7 +18,7 @@ import numpy as np
 
 from ..atlas import ChartLayout, Seams, with_charts
 from ..base import BoolArray, FloatArray, IntArray, has_any, mask_of
-from ..cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, close_search, with_corners
+from ..cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, ConeSurface, with_corners
 from ..errors import MetricError, SeamError
 from ..flattening import Steps, lay_out_component
 from ..geometry import (
@@ -33,7 +33,7 @@ from ..geometry import (
 from ..mesh import nearby
 from ..seams import seam_costs, without_loose_ends
 from ..source import Component
-from ..stages import Layout, Surface, VertexCurvatures
+from ..stages import Layout, VertexCurvatures
 from .free_seams import as_one_chart, freed, recut, seam_edges, separate_charts, side_by_side
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .tips import RINGS, find_tips, moved_tips, moves_for
@@ -115,8 +115,8 @@ class CutSearch:
         return self.max_energy + 2 * TOLERANCE * (self.max_energy - ISOMETRIC)
 
     @cached_property
-    def _surface(self) -> Surface:
-        surface = Surface.of(self.component.mesh, self.component.lengths, self.component.is_exact)
+    def _surface(self) -> ConeSurface:
+        surface = ConeSurface.of(self.component.mesh, self.component.lengths, self.component.is_exact)
         surface.is_reused = True
         return surface
 
@@ -157,7 +157,7 @@ class CutSearch:
         near.sort(key=self._expected_cost)
         if near and near[0].energy > self.max_energy:
             near.append(self.shortened(near[0]))
-        close_search(self._surface)
+        self._surface.close_search()
         within = [candidate for candidate in near if candidate.energy <= self.max_energy]
         least = min([*near, *candidates], key=lambda candidate: candidate.energy)
         return self.separated(min(within, key=self._expected_cost, default=least))
@@ -246,7 +246,7 @@ class CutSearch:
         """Return a candidate cut between the fewest cones, and only along closed curves where there are handles."""
         mesh, spec = self.component.mesh, replace(self.component.cones, distortion=ANY_DISTORTION)
         layout = lay_out_component(self._surface, replace(self.component, cones=spec), self._steps)
-        close_search(self._surface)
+        self._surface.close_search()
         if len(layout.cones) and mesh.euler_characteristic < 2 and not mesh.is_boundary_edge.any():
             is_cut = mask_of(len(mesh.edges), seam_edges(layout))
             layout = replace(layout, points=0 * layout.points, cones=np.empty(0, dtype=np.int64))
@@ -269,7 +269,7 @@ class CutSearch:
             # The bound is too low, or the surface too noisy, for the cones of a coarse mesh.
             self._has_coarse, self._found = False, [one]
             return self.best()
-        close_search(self._surface)
+        self._surface.close_search()
         return self.separated(one)
 
     def _by_distortion(self) -> list[Candidate]:
