@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+import coneflat
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 from structure import (
     STAGES,
@@ -93,6 +95,12 @@ def test_the_core_imports_no_application(name: str):
     allowed = name in ("", "__main__", "quadmesh.quad_mesh")
     imported = set() if allowed else module.imports | module.late_imports
     assert [module_name for module_name in imported if not is_core(module_name)] == []
+
+
+def test_no_module_has_the_name_of_a_public_function():
+    """But the application `studio`, which `coneflat.studio` opens."""
+    functions = {name for name in coneflat.__all__ if callable(getattr(coneflat, name))}
+    assert {name for name in NAMES if name.split(".")[-1] in functions} == {"apps.studio"}
 
 
 def test_tests_mirror_the_packages():
