@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import gltf_scenes
 import numpy as np
-import scenes
 import shapes
 
 from .commands import run_command
@@ -301,7 +301,7 @@ def read_ply(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 def glb_rows(path: Path, name: str) -> np.ndarray:
     """Return the rows of an attribute of the first primitive of a GLB."""
-    tree, accessor, _ = scenes.opened(path.read_bytes())
+    tree, accessor, _ = gltf_scenes.opened(path.read_bytes())
     return np.asarray(accessor(tree["meshes"][0]["primitives"][0]["attributes"][name]))
 
 
@@ -338,7 +338,7 @@ def make_stl(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
 
 
 def make_glb(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
-    make, n = scenes.SceneMaker(), len(vertices)
+    make, n = gltf_scenes.SceneMaker(), len(vertices)
     points = vertices.astype("<f4")
     arrays: dict[str, tuple[np.ndarray, int, dict[str, Any]]] = {
         "TEXCOORD_1": (rng.random((n, 2)), 5126, {}),
@@ -435,7 +435,7 @@ def _glb_check(name: str, points: np.ndarray, values: np.ndarray) -> Check:
 
 
 def _tree(test: Callable[[dict[str, Any]], Any]) -> Check:
-    return lambda path: bool(test(scenes.opened(path.read_bytes())[0]))
+    return lambda path: bool(test(gltf_scenes.opened(path.read_bytes())[0]))
 
 
 def _has_paint(tree: dict[str, Any]) -> bool:
