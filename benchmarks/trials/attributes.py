@@ -158,74 +158,119 @@ def _colours(shades: np.ndarray, further: Mapping[str, Check]) -> Planted:
 
 
 def make_ply(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
-    n, m = len(vertices), len(faces)
-    shades, alpha = rng.integers(0, 256, (n, 3)), rng.integers(0, 256, n)
-    of_vertex = {
-        "quality": ("float", rng.normal(size=n).astype("f4")),
-        "label": ("int", rng.integers(-(2**31), 2**31, n)),
-        "weight": ("double", rng.normal(size=n)),
-        "small": ("uchar", rng.integers(0, 256, n)),
-    }
-    of_face = {
-        "texnumber": ("int", rng.integers(0, 4, m)),
-        "red": ("uchar", rng.integers(0, 256, m)),
-        "area": ("float", rng.random(m).astype("f4")),
-        "segment": ("short", rng.integers(-(2**15), 2**15, m)),
-    }
-    planted = chosen_attributes(
-        rng,
-        [
-            _colours(shades, {}),
-            *(
-                Planted(
-                    name, rf"vertex properties \([^)]*\b{name}\b", {".ply": _vertex_check(name, word, values)}
-                )
-                for name, (word, values) in of_vertex.items()
-            ),
-            *(
-                Planted(
-                    f"face {name}",
-                    rf"face properties \([^)]*\b{name}\b",
-                    {".ply": _face_check(name, values, faces)},
-                )
-                for name, (word, values) in of_face.items()
-            ),
+    properties = PlyProperties.random(rng, len(vertices), len(faces))
+    planted = chosen_attributes(rng, properties.attributes(faces))
+    names = {attribute.name for attribute in planted}
+    if "colours" in names and rng.random() < 0.5:
+        planted.append(properties.alpha_attribute())
+        names.add("alpha")
+    form = str(rng.choice(["ascii", "binary_little_endian", "binary_big_endian"]))
+    columns = properties.vertex_columns(vertices, names)
+    on_faces = [(word, name, x) for name, (word, x) in properties.of_face.items() if f"face {name}" in names]
+    head = ply_header(form, len(vertices), len(faces), columns, on_faces, names)
+    return head + ply_body(form, ply_rows(faces, columns, on_faces, names)), planted
+
+
+#: The type, the name and the values of a property.
+Column = tuple[str, str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class PlyProperties:
+    """Random properties of a PLY file.
+
+    Attributes:
+        shades: (n, 3) colours of the vertices.
+        alpha: (n,) their opacity.
+        of_vertex, of_face: type and values of further properties by name.
+    """
+
+    shades: np.ndarray
+    alpha: np.ndarray
+    of_vertex: Mapping[str, tuple[str, np.ndarray]]
+    of_face: Mapping[str, tuple[str, np.ndarray]]
+
+    @classmethod
+    def random(cls, rng: Random, n: int, m: int) -> PlyProperties:
+        """Return properties of n vertices and m faces."""
+        return cls(
+            rng.integers(0, 256, (n, 3)),
+            rng.integers(0, 256, n),
+            {
+                "quality": ("float", rng.normal(size=n).astype("f4")),
+                "label": ("int", rng.integers(-(2**31), 2**31, n)),
+                "weight": ("double", rng.normal(size=n)),
+                "small": ("uchar", rng.integers(0, 256, n)),
+            },
+            {
+                "texnumber": ("int", rng.integers(0, 4, m)),
+                "red": ("uchar", rng.integers(0, 256, m)),
+                "area": ("float", rng.random(m).astype("f4")),
+                "segment": ("short", rng.integers(-(2**15), 2**15, m)),
+            },
+        )
+
+    def attributes(self, faces: np.ndarray) -> list[Planted]:
+        """Return all data that a file may have in addition to the mesh."""
+        of_vertex = [
             Planted(
-                "textures",
-                r"texture files \([^)]*skin\.png",
-                {".ply": _has(rb"^comment TextureFile skin.png$")},
-            ),
+                name, rf"vertex properties \([^)]*\b{name}\b", {".ply": _vertex_check(name, word, values)}
+            )
+            for name, (word, values) in self.of_vertex.items()
+        ]
+        of_face = [
+            Planted(
+                f"face {name}",
+                rf"face properties \([^)]*\b{name}\b",
+                {".ply": _face_check(name, values, faces)},
+            )
+            for name, (_, values) in self.of_face.items()
+        ]
+        comment = {".ply": _has(rb"^comment TextureFile skin.png$")}
+        return [
+            _colours(self.shades, {}),
+            *of_vertex,
+            *of_face,
+            Planted("textures", r"texture files \([^)]*skin\.png", comment),
             Planted("edges", r"elements \([^)]*\bedge\b"),
             Planted("vertex lists", r"vertex properties \([^)]*\bnear\b"),
             Planted("face lists", r"face properties \([^)]*\bcurve\b"),
-        ],
-    )
-    names = {attribute.name for attribute in planted}
-    with_alpha = "colours" in names and rng.random() < 0.5
-    if with_alpha:
-        planted.append(
-            Planted(
-                "alpha",
-                r"vertex properties \([^)]*\balpha\b",
-                {".ply": _vertex_check("alpha", "uchar", alpha), ".glb": _alpha_in_glb(alpha)},
-            )
-        )
-    columns = [("double", axis, vertices[:, i]) for i, axis in enumerate("xyz")]
-    if "colours" in names:
-        columns += [("uchar", name, shades[:, i]) for i, name in enumerate(("red", "green", "blue"))]
-    columns += [("uchar", "alpha", alpha)] * with_alpha
-    columns += [(word, name, values) for name, (word, values) in of_vertex.items() if name in names]
-    on_faces = [(word, name, values) for name, (word, values) in of_face.items() if f"face {name}" in names]
-    form = str(rng.choice(["ascii", "binary_little_endian", "binary_big_endian"]))
-    head = ["ply", f"format {form} 1.0", *["comment TextureFile skin.png"] * ("textures" in names)]
-    head += [f"element vertex {n}", *(f"property {word} {name}" for word, name, _ in columns)]
-    head += ["property list uchar int near"] * ("vertex lists" in names)
-    head += [f"element face {m}", "property list uchar int vertex_indices"]
-    head += [f"property {word} {name}" for word, name, _ in on_faces]
-    head += ["property list uchar float curve"] * ("face lists" in names)
-    head += ["element edge 1", "property int vertex1", "property int vertex2"] if "edges" in names else []
-    rows = []
-    for i in range(n):
+        ]
+
+    def alpha_attribute(self) -> Planted:
+        """Return the opacity of the colours."""
+        checks = {".ply": _vertex_check("alpha", "uchar", self.alpha), ".glb": _alpha_in_glb(self.alpha)}
+        return Planted("alpha", r"vertex properties \([^)]*\balpha\b", checks)
+
+    def vertex_columns(self, vertices: np.ndarray, names: set[str]) -> list[Column]:
+        """Return the columns of the vertices: their positions and the chosen properties."""
+        columns: list[Column] = [("double", axis, vertices[:, i]) for i, axis in enumerate("xyz")]
+        if "colours" in names:
+            columns += [("uchar", name, self.shades[:, i]) for i, name in enumerate(("red", "green", "blue"))]
+        columns += [("uchar", "alpha", self.alpha)] * ("alpha" in names)
+        return columns + [(word, name, x) for name, (word, x) in self.of_vertex.items() if name in names]
+
+
+def ply_header(
+    form: str, n: int, m: int, columns: list[Column], on_faces: list[Column], names: set[str]
+) -> bytes:
+    """Return the header of a PLY file with the chosen data."""
+    lines = ["ply", f"format {form} 1.0", *["comment TextureFile skin.png"] * ("textures" in names)]
+    lines += [f"element vertex {n}", *(f"property {word} {name}" for word, name, _ in columns)]
+    lines += ["property list uchar int near"] * ("vertex lists" in names)
+    lines += [f"element face {m}", "property list uchar int vertex_indices"]
+    lines += [f"property {word} {name}" for word, name, _ in on_faces]
+    lines += ["property list uchar float curve"] * ("face lists" in names)
+    lines += ["element edge 1", "property int vertex1", "property int vertex2"] if "edges" in names else []
+    return ("\n".join([*lines, "end_header"]) + "\n").encode()
+
+
+def ply_rows(
+    faces: np.ndarray, columns: list[Column], on_faces: list[Column], names: set[str]
+) -> list[list[tuple[str, Any]]]:
+    """Return the rows of vertices, faces and edges: each value with its type."""
+    rows: list[list[tuple[str, Any]]] = []
+    for i in range(len(columns[0][2])):
         rows.append([(word, values[i]) for word, _, values in columns])
         rows[-1] += [("uchar", 2), ("int", 0), ("int", 1)] if "vertex lists" in names else []
     for i, face in enumerate(faces.tolist()):
@@ -233,19 +278,21 @@ def make_ply(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
             [("uchar", 3), *(("int", v) for v in face), *((word, values[i]) for word, _, values in on_faces)]
         )
         rows[-1] += [("uchar", 1), ("float", 0.5)] if "face lists" in names else []
-    rows += [[("int", 0), ("int", 1)]] if "edges" in names else []
-    text = "\n".join([*head, "end_header"]) + "\n"
+    return rows + [[("int", 0), ("int", 1)]] * ("edges" in names)
+
+
+def ply_body(form: str, rows: list[list[tuple[str, Any]]]) -> bytes:
+    """Return the rows of a PLY file as text, or in binary."""
     if form == "ascii":
-        body = "".join(
+        return "".join(
             " ".join(repr(value.item() if hasattr(value, "item") else value) for _, value in row) + "\n"
             for row in rows
-        )
-        return (text + body).encode(), planted
+        ).encode()
     order = "<" if "little" in form else ">"
-    return text.encode() + b"".join(
+    return b"".join(
         struct.pack(order + "".join(CODES[word] for word, _ in row), *(value for _, value in row))
         for row in rows
-    ), planted
+    )
 
 
 CODES = {"uchar": "B", "short": "h", "int": "i", "float": "f", "double": "d"}
