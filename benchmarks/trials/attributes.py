@@ -384,41 +384,28 @@ def make_stl(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
     ]
 
 
+#: Data of a glTF file that are not arrays of vertices, and the words of a note that names them.
+GLTF_DATA = {
+    "materials": r"\bmaterials\b",
+    "cameras": r"\bcameras\b",
+    "extras": r"\bextras\b",
+    "morph targets": r"\bmorph targets\b",
+    "lines": r"\blines and points\b",
+    "nodes": r"\bnodes\b",
+    "extension": r"extensions \([^)]*KHR_lights_punctual",
+    "animations": r"\banimations\b",
+}
+
+
 def make_glb(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
-    make, n = gltf_scenes.SceneMaker(), len(vertices)
-    points = vertices.astype("<f4")
-    arrays: dict[str, tuple[np.ndarray, int, dict[str, Any]]] = {
-        "TEXCOORD_1": (rng.random((n, 2)), 5126, {}),
-        "COLOR_0": (rng.integers(0, 256, (n, 4)), 5121, {"normalized": True}),
-        "COLOR_1": (rng.random((n, 3)), 5126, {}),
-        "JOINTS_0": (np.zeros((n, 4)), 5121, {}),
-        "WEIGHTS_0": (np.tile([1.0, 0, 0, 0], (n, 1)), 5126, {}),
-        "_HEAT": (rng.random((n, 1)), 5126, {}),
-    }
-    entries = {
-        "materials": r"\bmaterials\b",
-        "cameras": r"\bcameras\b",
-        "extras": r"\bextras\b",
-        "morph targets": r"\bmorph targets\b",
-        "lines": r"\blines and points\b",
-        "nodes": r"\bnodes\b",
-        "extension": r"extensions \([^)]*KHR_lights_punctual",
-        "animations": r"\banimations\b",
-    }
-    planted = chosen_attributes(
-        rng,
-        [
-            *(
-                Planted(
-                    name,
-                    rf"vertex attributes \([^)]*\b{name}\b",
-                    {".glb": _glb_check(name, points, array[0])},
-                )
-                for name, array in arrays.items()
-            ),
-            *(Planted(name, words, {".glb": _TREE_CHECKS[name]}) for name, words in entries.items()),
-        ],
-    )
+    make, points = gltf_scenes.SceneMaker(), vertices.astype("<f4")
+    arrays = random_arrays(rng, len(vertices))
+    of_vertex = [
+        Planted(name, rf"vertex attributes \([^)]*\b{name}\b", {".glb": _glb_check(name, points, array[0])})
+        for name, array in arrays.items()
+    ]
+    of_file = [Planted(name, words, {".glb": _TREE_CHECKS[name]}) for name, words in GLTF_DATA.items()]
+    planted = chosen_attributes(rng, [*of_vertex, *of_file])
     names = {attribute.name for attribute in planted}
     primitive: dict[str, Any] = {
         "attributes": {"POSITION": make.accessor(points)},
@@ -427,23 +414,48 @@ def make_glb(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
     for name, (values, code, options) in arrays.items():
         if name in names:
             primitive["attributes"][name] = make.accessor(values, code, **options)
+    add_primitive_data(rng, make, primitive, names, len(vertices))
     primitives = [primitive]
-    nodes: list[dict[str, Any]] = [{"mesh": 0, "name": "thing"}]
-    if "materials" in names:
-        make.tree["materials"] = [
-            {"name": "paint", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}}
-        ]
-        primitive["material"] = 0
-    if "cameras" in names:
-        make.tree["cameras"] = [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.01}}]
-    if "extras" in names:
-        primitive["extras"] = {"part": 7}
-    if "morph targets" in names:
-        primitive["targets"] = [{"POSITION": make.accessor(rng.normal(size=(n, 3)))}]
     if "lines" in names:
         primitives.append(
             {"attributes": dict(primitive["attributes"]), "indices": make.accessor([0, 1], 5121), "mode": 1}
         )
+    add_scene_data(make, names)
+    make.tree["meshes"] = [{"primitives": primitives}]
+    return make.glb(), planted
+
+
+def random_arrays(rng: Random, n: int) -> dict[str, tuple[np.ndarray, int, dict[str, Any]]]:
+    """Return attributes of n vertices: values, the code of their type, and properties of the accessor."""
+    return {
+        "TEXCOORD_1": (rng.random((n, 2)), 5126, {}),
+        "COLOR_0": (rng.integers(0, 256, (n, 4)), 5121, {"normalized": True}),
+        "COLOR_1": (rng.random((n, 3)), 5126, {}),
+        "JOINTS_0": (np.zeros((n, 4)), 5121, {}),
+        "WEIGHTS_0": (np.tile([1.0, 0, 0, 0], (n, 1)), 5126, {}),
+        "_HEAT": (rng.random((n, 1)), 5126, {}),
+    }
+
+
+def add_primitive_data(
+    rng: Random, make: gltf_scenes.SceneMaker, primitive: dict[str, Any], names: set[str], n: int
+) -> None:
+    """Add those of `GLTF_DATA` that belong to a primitive of n vertices."""
+    if "materials" in names:
+        paint = {"name": "paint", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}}
+        make.tree["materials"] = [paint]
+        primitive["material"] = 0
+    if "extras" in names:
+        primitive["extras"] = {"part": 7}
+    if "morph targets" in names:
+        primitive["targets"] = [{"POSITION": make.accessor(rng.normal(size=(n, 3)))}]
+
+
+def add_scene_data(make: gltf_scenes.SceneMaker, names: set[str]) -> None:
+    """Add a scene, and those of `GLTF_DATA` that belong to it."""
+    nodes: list[dict[str, Any]] = [{"mesh": 0, "name": "thing"}]
+    if "cameras" in names:
+        make.tree["cameras"] = [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.01}}]
     if "nodes" in names:
         nodes = [{"name": "root", "children": [1]}, {**nodes[0], "translation": [1.0, 2, 3]}]
     if "extension" in names:
@@ -453,13 +465,7 @@ def make_glb(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
         times, turns = make.accessor([0.0, 1.0]), make.accessor([[0.0, 0, 0, 1], [0, 0, 1, 0]])
         channel = {"sampler": 0, "target": {"node": 0, "path": "rotation"}}
         make.tree["animations"] = [{"channels": [channel], "samplers": [{"input": times, "output": turns}]}]
-    make.tree |= {
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": nodes,
-        "meshes": [{"primitives": primitives}],
-    }
-    return make.glb(), planted
+    make.tree |= {"scene": 0, "scenes": [{"nodes": [0]}], "nodes": nodes}
 
 
 def make_gltf(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
