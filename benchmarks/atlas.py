@@ -39,7 +39,9 @@ def main() -> None:
     parser.add_argument(
         "--models", default=GALLERY, help='names with commas, or "" for all models and a bumpy sphere'
     )
-    parser.add_argument("--more", type=float, default=0.05, help="distortion allowed with more cones")
+    parser.add_argument(
+        "--distortion", type=float, default=0.05, help="area distortion of the second flattening"
+    )
     parser.add_argument("--largest", type=int, default=120_000, help="triangles")
     parser.add_argument(
         "--matched", action="store_true", help="ours at the area distortion of each other one"
@@ -54,15 +56,15 @@ def main() -> None:
     sums: dict[str, list[tuple[float, ...]]] = {}
     for name, mesh in chosen([word for word in arguments.models.split(",") if word], arguments.largest):
         for method, result, seconds in (
-            matched(mesh) if arguments.matched else flattened(mesh, arguments.more)
+            matched(mesh) if arguments.matched else flattened(mesh, arguments.distortion)
         ):
-            found, packed = result.distortion, result.packing_efficiency
-            flipped = found.flipped + found.degenerate
+            measures, packed = result.distortion, result.packing_efficiency
+            flipped = measures.flipped + measures.degenerate
             sums.setdefault(method, []).append(
-                (found.charts, found.seam_length, found.qc_mean, found.area_std, packed,
-                 flipped, found.overlap > 0, seconds)
+                (measures.charts, measures.seam_length, measures.qc_mean, measures.area_std, packed,
+                 flipped, measures.overlap > 0, seconds)
             )  # fmt: skip
-            print(row(name, mesh, method, found, packed, seconds), flush=True)
+            print(row(name, mesh, method, measures, packed, seconds), flush=True)
     print(f"\n{HEADINGS}\n" + "| --- " * HEADINGS.count(" | ") + "| --- |")
     for method, values in sums.items():
         charts, length, qc, std, packed, *_ = np.mean(values, axis=0)
@@ -79,17 +81,23 @@ def chosen(names: list[str], largest: int) -> Iterator[tuple[str, TriangleMesh]]
             yield name, mesh
 
 
-def row(name: str, mesh: TriangleMesh, method: str, found: Distortion, packed: float, seconds: float) -> str:
+def row(
+    name: str, mesh: TriangleMesh, method: str, measures: Distortion, packed: float, seconds: float
+) -> str:
+    flipped = measures.flipped + measures.degenerate
     return (
-        f"| {name} | {len(mesh.faces):,} | {method} | {found.charts} | {found.seam_length:.2f} | {found.qc_mean:.4f} | "
-        f"{found.area_std:.3f} | {found.flipped + found.degenerate} | {found.overlapping_pairs} | {packed:.2f} | "
+        f"| {name} | {len(mesh.faces):,} | {method} | {measures.charts} | {measures.seam_length:.2f} | "
+        f"{measures.qc_mean:.4f} | {measures.area_std:.3f} | {flipped} | {measures.overlapping_pairs} | {packed:.2f} | "
         f"{seconds:.2f} |"
     )
 
 
-def flattened(mesh: TriangleMesh, more: float) -> Iterator[tuple[str, Flattening, float]]:
+def flattened(mesh: TriangleMesh, distortion: float) -> Iterator[tuple[str, Flattening, float]]:
     """Yield the result of each method on a mesh, and its seconds."""
-    for method, options in (("coneflat", {}), (f"coneflat, distortion {more:g}", {"distortion": more})):
+    for method, options in (
+        ("coneflat", {}),
+        (f"coneflat, distortion {distortion:g}", {"distortion": distortion}),
+    ):
         start = time.perf_counter()
         ours = flatten(mesh.vertices, mesh.faces, charts="atlas", **options)
         yield method, ours, time.perf_counter() - start
@@ -116,8 +124,8 @@ def matched(mesh: TriangleMesh) -> Iterator[tuple[str, Flattening, float]]:
         start = time.perf_counter()
         ours = at_area_std(mesh, std)
         if ours is not None:
-            what = f"coneflat as {name}, stretched, {len(ours.cones)} cones"
-            yield what, ours, time.perf_counter() - start
+            label = f"coneflat as {name}, stretched, {len(ours.cones)} cones"
+            yield label, ours, time.perf_counter() - start
         start = time.perf_counter()
         ours = with_cones_for(mesh.vertices, mesh.faces, std)
         yield f"coneflat as {name}, {len(ours.cones)} cones", ours, time.perf_counter() - start
@@ -126,18 +134,18 @@ def matched(mesh: TriangleMesh) -> Iterator[tuple[str, Flattening, float]]:
 def at_area_std(mesh: TriangleMesh, std: float) -> Flattening | None:
     """Return a flattening with bounded area distortion: the fewest cones, and the least stretch with them."""
     for allowed in ALLOWED:
-        found = flatten(mesh.vertices, mesh.faces, distortion=allowed, stretch=1.0)
-        if found.distortion.area_std > std:
+        result = flatten(mesh.vertices, mesh.faces, distortion=allowed, stretch=1.0)
+        if result.distortion.area_std > std:
             continue
         low, high = 0.0, 1.0
         for _ in range(ROUNDS):
             middle = (low + high) / 2
-            tried = flatten(mesh.vertices, mesh.faces, distortion=allowed, stretch=middle)
-            if tried.distortion.area_std <= std:
-                found, high = tried, middle
+            attempt = flatten(mesh.vertices, mesh.faces, distortion=allowed, stretch=middle)
+            if attempt.distortion.area_std <= std:
+                result, high = attempt, middle
             else:
                 low = middle
-        return found
+        return result
     return None
 
 

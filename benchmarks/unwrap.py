@@ -47,8 +47,8 @@ def main() -> None:
             start = time.perf_counter()
             corner_uv = run(mesh)
             seconds = time.perf_counter() - start
-            found = measure(mesh, corner_uv)
-            values = *(float(getattr(found, key)) for key in COLUMNS), covered(corner_uv), seconds
+            measures = measure(mesh, corner_uv)
+            values = *(float(getattr(measures, key)) for key in COLUMNS), covered(corner_uv), seconds
             rows[package].append(values)
             energy, std, flipped, overlaps, charts, seams, share, _ = values
             print(
@@ -169,8 +169,8 @@ def letters() -> tuple[np.ndarray, np.ndarray]:
         count = len(flat)
         # Sides of the outline, oriented as in the top.
         sides = np.concatenate([top[:, [0, 1]], top[:, [1, 2]], top[:, [2, 0]]])
-        known = set(map(tuple, sides.tolist()))
-        border = np.array([side for side in known if side[::-1] not in known])
+        side_set = set(map(tuple, sides.tolist()))
+        border = np.array([side for side in side_set if side[::-1] not in side_set])
         walls = np.concatenate(
             [np.column_stack([border[:, ::-1], border[:, 0] + count]),
              np.column_stack([border[:, 0] + count, border[:, 1] + count, border[:, 1]])]
@@ -196,8 +196,10 @@ def assembly() -> tuple[np.ndarray, np.ndarray]:
 
 def covered(corner_uv: np.ndarray) -> float:
     """Return the fraction of the unit square inside triangles."""
-    one, two = corner_uv[:, 1] - corner_uv[:, 0], corner_uv[:, 2] - corner_uv[:, 0]
-    return float(np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]).sum() / 2)
+    first_side, second_side = corner_uv[:, 1] - corner_uv[:, 0], corner_uv[:, 2] - corner_uv[:, 0]
+    return float(
+        np.abs(first_side[:, 0] * second_side[:, 1] - first_side[:, 1] * second_side[:, 0]).sum() / 2
+    )
 
 
 def by_coneflat(mesh: TriangleMesh) -> np.ndarray:
@@ -220,8 +222,8 @@ def by_xatlas(mesh: TriangleMesh) -> np.ndarray:
 def by_uvunwrap(mesh: TriangleMesh) -> np.ndarray:
     import uvunwrap
 
-    given = uvunwrap.Mesh(mesh.vertices.ravel().tolist(), mesh.faces.ravel().tolist())
-    return np.array(uvunwrap.generate([given]).meshes[0].corner_uvs, dtype=np.float64).reshape(-1, 3, 2)
+    uv_mesh = uvunwrap.Mesh(mesh.vertices.ravel().tolist(), mesh.faces.ravel().tolist())
+    return np.array(uvunwrap.generate([uv_mesh]).meshes[0].corner_uvs, dtype=np.float64).reshape(-1, 3, 2)
 
 
 PACKAGES: dict[str, Callable[[TriangleMesh], np.ndarray]] = {

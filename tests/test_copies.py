@@ -22,7 +22,7 @@ Mesh = tuple[FloatArray, IntArray]
 
 def joined(*meshes: Mesh) -> Mesh:
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in meshes)])
-    faces = [own + start for (_, own), start in zip(meshes, starts, strict=False)]
+    faces = [faces_of_mesh + start for (_, faces_of_mesh), start in zip(meshes, starts, strict=False)]
     return np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(faces)
 
 
@@ -43,10 +43,10 @@ def parts_of(mesh: Mesh, options: Options) -> tuple[Component, ...]:
     return Source(as_input(*mesh)).prepared(options).components
 
 
-def sides_of(found: coneflat.Flattening) -> FloatArray:
+def sides_of(result: coneflat.Flattening) -> FloatArray:
     """Return (m, 3) the lengths of sides in the plane, in units of length in space."""
-    corners = found.uv[found.uv_faces]
-    return np.linalg.norm(corners[:, [1, 2, 0]] - corners, axis=2) / found.uv_scale
+    corners = result.uv[result.uv_faces]
+    return np.linalg.norm(corners[:, [1, 2, 0]] - corners, axis=2) / result.uv_scale
 
 
 def test_turned_scaled_copies_are_found_and_others_are_not() -> None:
@@ -54,8 +54,8 @@ def test_turned_scaled_copies_are_found_and_others_are_not() -> None:
     mirrored = mesh[0] * (-1.0, 1.0, 1.0), mesh[1][:, ::-1]
     dented = mesh[0].copy(), mesh[1]
     dented[0][7] *= 1 + 1e-6
-    whole = joined(mesh, turned(mesh, 1), dented, turned(mesh, 2, 3.0), mirrored, turned(dented, 4))
-    copies = find_copies(parts_of(whole, Options()))
+    model = joined(mesh, turned(mesh, 1), dented, turned(mesh, 2, 3.0), mirrored, turned(dented, 4))
+    copies = find_copies(parts_of(model, Options()))
     assert [None if copy is None else copy.first for copy in copies] == [None, 0, None, 0, None, 2]
     assert [copy.scale for copy in copies if copy is not None] == pytest.approx([1.0, 3.0, 1.0], rel=1e-12)
 
@@ -63,7 +63,7 @@ def test_turned_scaled_copies_are_found_and_others_are_not() -> None:
 @pytest.mark.parametrize(
     "options", [{"required_cones": (3,)}, {"weights": {3: 5.0}}, {"cones": {3: None, 9: None}}]
 )
-def test_a_component_of_which_something_is_said_is_no_copy(options: dict[str, object]) -> None:
+def test_components_with_options_for_vertices_are_not_copies(options: dict[str, object]) -> None:
     asked = coneflat.options.read_options(options)
     mesh = bump()
     assert find_copies(parts_of(joined(mesh, turned(mesh, 1)), asked)) == [None, None]
@@ -86,29 +86,31 @@ def test_creases_of_the_same_lengths_are_no_copies() -> None:
 
 @pytest.mark.parametrize("mesh", [bump(), shapes.hill(9, 8)])
 def test_copies_are_laid_out_as_each_by_itself(mesh: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = joined(mesh, turned(mesh, 1), turned(mesh, 2, 2.5), turned(mesh, 3, 0.3))
+    model = joined(mesh, turned(mesh, 1), turned(mesh, 2, 2.5), turned(mesh, 3, 0.3))
     calls = []
     lay_out = retries.lay_out_with_thick_triangles
     monkeypatch.setattr(
         retries, "lay_out_with_thick_triangles", lambda *inputs: calls.append(inputs) or lay_out(*inputs)
     )
-    found = coneflat.flatten(*whole)
+    result = coneflat.flatten(*model)
     assert len(calls) == 1
-    monkeypatch.setattr(flattener, "find_copies", lambda parts, _: [None] * len(parts))
-    alone = coneflat.flatten(*whole)
+    monkeypatch.setattr(flattener, "find_copies", lambda components, _: [None] * len(components))
+    alone = coneflat.flatten(*model)
     assert len(calls) == 1 + 4
-    assert np.array_equal(found.cones, alone.cones)
-    assert np.array_equal(found.seams, alone.seams)
-    assert np.allclose(found.log_scale, alone.log_scale, rtol=0, atol=1e-7)
-    assert np.allclose(sides_of(found), sides_of(alone), rtol=1e-7)
-    assert found.distortion.flipped == 0
+    assert np.array_equal(result.cones, alone.cones)
+    assert np.array_equal(result.seams, alone.seams)
+    assert np.allclose(result.log_scale, alone.log_scale, rtol=0, atol=1e-7)
+    assert np.allclose(sides_of(result), sides_of(alone), rtol=1e-7)
+    assert result.distortion.flipped == 0
 
 
 def test_the_search_is_linear_where_copies_are_rounded(monkeypatch: pytest.MonkeyPatch) -> None:
     """Copies in single precision differ by more than double precision allows: each is a kind of its own."""
     module, calls = import_module("coneflat.source.copies"), []
     compare = module._scale_of_copy
-    monkeypatch.setattr(module, "_scale_of_copy", lambda *some: calls.append(some) or compare(*some))
+    monkeypatch.setattr(
+        module, "_scale_of_copy", lambda *arguments: calls.append(arguments) or compare(*arguments)
+    )
     copies = [turned(bump(), seed) for seed in range(40)]
     vertices, faces = joined(*((np.asarray(v, dtype=np.float32).astype(float), f) for v, f in copies))
     assert find_copies(parts_of((vertices, faces), Options())) == [None] * 40

@@ -42,8 +42,8 @@ def unwrap_mesh(
     from coneflat.options import declarations
     from coneflat.textures.options import UnwrapOptions
 
-    given = make_options(rng, vertices, faces)
-    options = {name: value for name, value in given.items() if name in declarations(UnwrapOptions)} | fixed
+    drawn = make_options(rng, vertices, faces)
+    options = {name: value for name, value in drawn.items() if name in declarations(UnwrapOptions)} | fixed
     if rng.random() < 0.5:
         options["max_energy"] = float(rng.choice([4.001, 4.02, 4.05, 4.2, 4.5, 6.0, 40.0]))
     if rng.random() < 0.05 and "resolution" not in options:
@@ -67,21 +67,21 @@ def check_energy(outcome: Outcome, result: Any, bound: float) -> None:
     at = np.ldexp(at, -int(np.frexp(np.abs(at).max())[1]))
     component = Topology.of(result.faces, len(result.vertices)).component[result.faces[:, 0]]
     energy = np.zeros((component.max() + 1, 3))
-    space, planar = (one[:, 1:] - one[:, :1] for one in (at, flat))
+    space, planar = (corners[:, 1:] - corners[:, :1] for corners in (at, flat))
     gram = space @ space.transpose(0, 2, 1)
     area = np.sqrt(np.maximum(np.linalg.det(gram), 0)) / 2
     # Orientation and energy of triangles almost without area are not known.
-    known = area > 1e-9 * (gram[:, 0, 0] + gram[:, 1, 1])
-    shape = np.linalg.solve(gram[known], planar[known] @ planar[known].transpose(0, 2, 1))
+    has_area = area > 1e-9 * (gram[:, 0, 0] + gram[:, 1, 1])
+    shape = np.linalg.solve(gram[has_area], planar[has_area] @ planar[has_area].transpose(0, 2, 1))
     stretch = np.trace(shape, axis1=1, axis2=2)
     ratio = np.linalg.det(shape)
     with np.errstate(divide="ignore"):
-        rows = np.stack([area[known], area[known] * stretch, area[known] * stretch / ratio], axis=1)
-    np.add.at(energy, component[known], rows)
+        rows = np.stack([area[has_area], area[has_area] * stretch, area[has_area] * stretch / ratio], axis=1)
+    np.add.at(energy, component[has_area], rows)
     energy = energy[energy[:, 0] > 0]
     # At the best scale of each component.
     mean = 2 * np.sqrt(energy[:, 1] * energy[:, 2]) / energy[:, 0]
-    if mean.max(initial=4.0) > bound + 2e-3 + 1e-3 * (bound - 4) and known.all():
+    if mean.max(initial=4.0) > bound + 2e-3 + 1e-3 * (bound - 4) and has_area.all():
         outcome.breach("energy above the bound", f"{mean.max():.5g}; notes {list(result.notes)}")
 
 
@@ -91,24 +91,24 @@ def check_xatlas(outcome: Outcome, vertices: np.ndarray, faces: np.ndarray, made
     from coneflat.geometry import find_overlaps
 
     outcome.recipe = f"xatlas {made}"
-    found = None
+    mapped = None
     with np.errstate(over="ignore"):
         single = vertices.astype(np.float32)
     with outcome.guarded(expects_nan=True), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        found = coneflat.xatlas.parametrize(single, faces)
-    unmet = [each.message for each in caught if isinstance(each.message, coneflat.GuaranteeWarning)]
+        mapped = coneflat.xatlas.parametrize(single, faces)
+    unmet = [record.message for record in caught if isinstance(record.message, coneflat.GuaranteeWarning)]
     notes = " ".join(note for warning in unmet for note in warning.notes)
-    if len(unmet) > 1 or any(each.filename != __file__ for each in caught):
-        outcome.breach("xatlas: warnings", [str(each) for each in caught])
-    for each in caught:
-        if each.category is not coneflat.GuaranteeWarning:
-            outcome.breach(f"xatlas: warning {each.message}", each.filename)
-    if found is None:
+    if len(unmet) > 1 or any(record.filename != __file__ for record in caught):
+        outcome.breach("xatlas: warnings", [str(record) for record in caught])
+    for record in caught:
+        if record.category is not coneflat.GuaranteeWarning:
+            outcome.breach(f"xatlas: warning {record.message}", record.filename)
+    if mapped is None:
         if len(faces) and faces.min() >= 0 and faces.max() < len(vertices):
             outcome.breach("xatlas: refused", outcome.message)
         return
-    mapping, indices, uvs = found
+    mapping, indices, uvs = mapped
     if (mapping.dtype, indices.dtype, uvs.dtype) != (np.uint32, np.uint32, np.float32):
         outcome.breach("xatlas: types", (mapping.dtype, indices.dtype, uvs.dtype))
     if not np.array_equal(mapping[indices], faces):

@@ -40,8 +40,15 @@ def spiral(turns=1.4, around=120, across=4):
 
 
 def upright(points, faces):
-    one, two = points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]]
-    return faces[:, ::-1] if (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]).sum() < 0 else faces
+    first_side, second_side = (
+        points[faces[:, 1]] - points[faces[:, 0]],
+        points[faces[:, 2]] - points[faces[:, 0]],
+    )
+    return (
+        faces[:, ::-1]
+        if (first_side[:, 0] * second_side[:, 1] - first_side[:, 1] * second_side[:, 0]).sum() < 0
+        else faces
+    )
 
 
 def charts_of(points, faces):
@@ -70,24 +77,24 @@ class TestSeparate:
         disk = flat_grid(seed=seed)
         rng = np.random.default_rng(seed)
         costs = rng.integers(1, 50, len(disk.edges))
-        one, other = np.zeros((2, len(disk.faces)), dtype=bool)
+        first_set, second_set = np.zeros((2, len(disk.faces)), dtype=bool)
         first, second = rng.choice(len(disk.faces), 2, replace=False)
         if seed % 2:  # on the border
             first = disk.edge_faces[disk.halfedge_edges[disk.boundary_walks()[0]][0], 0]
         if first == second:
             second = (first + 1) % len(disk.faces)
-        one[first] = other[second] = True
+        first_set[first] = second_set[second] = True
         sheet = Sheet(disk, costs.astype(float)[disk.halfedge_edges])
-        assert len(sheet.separate(0, one, other)) > 1
+        assert len(sheet.separate(0, first_set, second_set)) > 1
         pieces = sheet.piece
         assert pieces[first] != pieces[second]
         inside = np.flatnonzero(~disk.is_boundary_edge)
         a, b = disk.edge_faces[inside].T
         cost = costs[inside][pieces[a] != pieces[b]].sum()
         count = len(disk.faces)
-        both = np.concatenate([a, b]), np.concatenate([b, a])
+        both_orders = np.concatenate([a, b]), np.concatenate([b, a])
         capacity = csr_matrix(
-            (np.tile(costs[inside], 2).astype(np.int32), both), shape=(count, count), dtype=np.int32
+            (np.tile(costs[inside], 2).astype(np.int32), both_orders), shape=(count, count), dtype=np.int32
         )
         flow = maximum_flow(capacity, int(first), int(second)).flow_value
         on_border = disk.is_boundary_edge[disk.halfedge_edges.reshape(-1, 3)].any(axis=1)
@@ -102,27 +109,27 @@ class TestSeparate:
         rng = np.random.default_rng(seed)
         sheet = Sheet(disk, lengths_of(disk)[disk.halfedge_edges])
         inside = ~disk.is_boundary_edge
-        known = 1
+        piece_count = 1
         for _ in range(8):
-            own = int(rng.choice(np.flatnonzero(np.bincount(sheet.piece) > 1)))
-            members = np.flatnonzero(sheet.piece == own)
+            chosen_piece = int(rng.choice(np.flatnonzero(np.bincount(sheet.piece) > 1)))
+            members = np.flatnonzero(sheet.piece == chosen_piece)
             before = sheet.piece.copy()
-            one, other = np.zeros((2, len(disk.faces)), dtype=bool)
+            first_set, second_set = np.zeros((2, len(disk.faces)), dtype=bool)
             first, second = rng.choice(members, 2, replace=False)
-            one[first] = other[second] = True
-            pieces = sheet.separate(own, one, other)
+            first_set[first] = second_set[second] = True
+            pieces = sheet.separate(chosen_piece, first_set, second_set)
             assert pieces is not None
             assert sheet.piece[first] != sheet.piece[second]
-            assert own in pieces
+            assert chosen_piece in pieces
             assert set(pieces) == set(sheet.piece[members])
-            assert np.array_equal(before[before != own], sheet.piece[before != own])
+            assert np.array_equal(before[before != chosen_piece], sheet.piece[before != chosen_piece])
             lowest = [np.flatnonzero(sheet.piece == piece)[0] for piece in pieces]
             assert lowest == sorted(lowest)
-            known += len(pieces) - 1
+            piece_count += len(pieces) - 1
             across = sheet.piece[disk.edge_faces]
             count, _ = label_charts(disk, inside & (across[:, 0] == across[:, 1]))
-            assert count == known == sheet.piece.max() + 1
-        for piece in range(known):
+            assert count == piece_count == sheet.piece.max() + 1
+        for piece in range(piece_count):
             border = sheet.border(piece)
             sides = sheet.piece[np.arange(disk.faces.size) // 3] == piece
             twins = np.where(
@@ -140,25 +147,25 @@ class TestSeparate:
         disk = flat_grid(9, 9)
         middle = disk.vertices[disk.faces].mean(axis=1)
         centre = int(np.argmin(np.abs(middle - middle.mean(axis=0)).sum(axis=1)))
-        one, other = np.zeros((2, len(disk.faces)), dtype=bool)
-        one[centre] = True
-        other[np.setdiff1d(np.arange(len(other)), centre)] = True
+        first_set, second_set = np.zeros((2, len(disk.faces)), dtype=bool)
+        first_set[centre] = True
+        second_set[np.setdiff1d(np.arange(len(second_set)), centre)] = True
         sheet = Sheet(disk, np.ones(disk.faces.size))
         # Of what lies around, a single triangle will do.
-        assert len(sheet.separate(0, one, other)) > 1
+        assert len(sheet.separate(0, first_set, second_set)) > 1
 
     def test_widened_sets_stay_apart_and_reach_the_area(self):
         disk = flat_grid(30, 20)
-        one, other = np.zeros((2, len(disk.faces)), dtype=bool)
-        one[0] = other[-1] = True
+        first_set, second_set = np.zeros((2, len(disk.faces)), dtype=bool)
+        first_set[0] = second_set[-1] = True
         areas = np.ones(len(disk.faces))
         sheet = Sheet(disk, np.ones(disk.faces.size))
-        wide, far = sheet.widened(0, one, other, areas, 50.0)
-        assert wide.sum() == far.sum() == 50
-        assert wide[0]
-        assert far[-1]
-        assert not (wide & far).any()
-        narrow, _ = sheet.widened(0, one, other, areas, 0.0)
+        wider_first, wider_second = sheet.widened(0, first_set, second_set, areas, 50.0)
+        assert wider_first.sum() == wider_second.sum() == 50
+        assert wider_first[0]
+        assert wider_second[-1]
+        assert not (wider_first & wider_second).any()
+        narrow, _ = sheet.widened(0, first_set, second_set, areas, 0.0)
         assert narrow.sum() == 1
 
 
@@ -192,9 +199,9 @@ class TestSplit:
         # Cheapest at the start of the strip.
         costs = (lengths_of(mesh) * (1 + mesh.edges[:, 0]))[mesh.halfedge_edges]
         pairs = find_overlaps(points, faces).pairs
-        given = as_disk(points, faces), costs, areas, pairs
-        small = np.bincount(split_overlaps(*given)).min()
-        large = np.bincount(split_overlaps(*given, 0.2 * len(faces))).min()
+        arguments = as_disk(points, faces), costs, areas, pairs
+        small = np.bincount(split_overlaps(*arguments)).min()
+        large = np.bincount(split_overlaps(*arguments, 0.2 * len(faces))).min()
         assert small < 0.2 * len(faces) <= large
 
     @pytest.mark.parametrize("seed", range(2))
@@ -206,13 +213,15 @@ class TestSplit:
         count, region = label_components(2 * len(pairs), *np.hstack([steps, steps ^ 1]))
         # Each region is there twice, its layers in either order.
         every = [_layers(pairs, np.flatnonzero(region == i)) for i in range(count)]
-        assert all(not len(np.intersect1d(one, other)) for one, other in every)
+        assert all(not len(np.intersect1d(first_layer, second_layer)) for first_layer, second_layer in every)
         assert len(every) > 2
-        sizes = [min(areas[one].sum(), areas[other].sum()) for one, other in every]
-        for found, largest in zip(
+        sizes = [
+            min(areas[first_layer].sum(), areas[second_layer].sum()) for first_layer, second_layer in every
+        ]
+        for layer, largest in zip(
             largest_layers(pairs, steps, areas), every[int(np.argmax(sizes))], strict=True
         ):
-            assert np.array_equal(found, largest)
+            assert np.array_equal(layer, largest)
 
     @pytest.mark.slow
     @pytest.mark.parametrize("seed", range(2))
@@ -230,11 +239,11 @@ class TestSplit:
     def test_too_many_charts_are_given_up(self):
         points, faces = spiral(3.5, 300)
         mesh = TriangleMesh(np.column_stack([points, np.zeros(len(points))]), faces)
-        given = as_disk(points, faces), lengths_of(mesh)[mesh.halfedge_edges], np.ones(len(faces))
+        arguments = as_disk(points, faces), lengths_of(mesh)[mesh.halfedge_edges], np.ones(len(faces))
         pairs = find_overlaps(points, faces).pairs
-        count = split_overlaps(*given, pairs).max() + 1
-        assert split_overlaps(*given, pairs, most=2) is None
-        assert split_overlaps(*given, pairs, most=count).max() + 1 == count
+        count = split_overlaps(*arguments, pairs).max() + 1
+        assert split_overlaps(*arguments, pairs, max_charts=2) is None
+        assert split_overlaps(*arguments, pairs, max_charts=count).max() + 1 == count
 
 
 class TestGlue:
@@ -255,8 +264,8 @@ class TestGlue:
         middle = result.corner_uv.mean(axis=1)
         low, high = np.quantile(middle[:, 0], [0.0, 1.0])
         chart = (middle[:, 0] < low + 0.2 * (high - low)).astype(np.int64)
-        whole = ChartLayout(result.uv, result.uv_faces, np.zeros(len(faces), dtype=np.int64))
-        layout = glue_charts(TriangleMesh(result.vertices, result.faces), whole.split(chart), length)
+        single_chart = ChartLayout(result.uv, result.uv_faces, np.zeros(len(faces), dtype=np.int64))
+        layout = glue_charts(TriangleMesh(result.vertices, result.faces), single_chart.split(chart), length)
         assert len(np.unique(layout.chart)) == 1
         assert overlapping(layout) == 0
 
@@ -274,31 +283,31 @@ class TestGlue:
         assert layout.chart.max() == 0
         assert len(layout.points) == len(disk.vertices)
         assert overlapping(layout) == 0
-        here = lengths_of(TriangleMesh(layout.points, layout.corners))
-        assert np.allclose(np.sort(here), np.sort(lengths_of(disk)))
+        flat_lengths = lengths_of(TriangleMesh(layout.points, layout.corners))
+        assert np.allclose(np.sort(flat_lengths), np.sort(lengths_of(disk)))
 
 
 @pytest.mark.parametrize("seed", range(2))
 def test_nothing_overlaps_and_seams_still_fit(seed):
     vertices, faces = shapes.sphere(3, bumps=0.5, seed=seed)
-    one = coneflat.flatten(vertices, faces, distortion=0.05)
+    result = coneflat.flatten(vertices, faces, distortion=0.05)
     atlas = coneflat.flatten(vertices, faces, distortion=0.05, charts="atlas")
     assert atlas.distortion.overlapping_pairs == 0
     assert atlas.distortion.overlap == 0
     assert atlas.distortion.flipped == 0
     assert atlas.distortion.seam_mismatch_max < 1e-9
-    assert atlas.distortion.qc_mean == pytest.approx(one.distortion.qc_mean, rel=1e-9)
+    assert atlas.distortion.qc_mean == pytest.approx(result.distortion.qc_mean, rel=1e-9)
     assert atlas.distortion.charts <= 4
     assert atlas.report()["overlap"] == 0
-    assert one.report()["overlapping_pairs"] == len(find_overlaps(one.corner_uv).pairs)
+    assert result.report()["overlapping_pairs"] == len(find_overlaps(result.corner_uv).pairs)
 
 
 def test_charts_do_not_depend_on_the_numbering():
     vertices, faces = shapes.sphere(3, bumps=0.6, seed=3)
-    one = coneflat.flatten(vertices, faces, distortion=0.05, charts="atlas")
-    other = coneflat.flatten(*shapes.renumber(vertices, faces)[:2], distortion=0.05, charts="atlas")
-    assert other.distortion.charts == one.distortion.charts
-    assert other.distortion.seam_length == pytest.approx(one.distortion.seam_length, rel=1e-9)
+    result = coneflat.flatten(vertices, faces, distortion=0.05, charts="atlas")
+    renumbered = coneflat.flatten(*shapes.renumber(vertices, faces)[:2], distortion=0.05, charts="atlas")
+    assert renumbered.distortion.charts == result.distortion.charts
+    assert renumbered.distortion.seam_length == pytest.approx(result.distortion.seam_length, rel=1e-9)
 
 
 def test_handles_and_borders():

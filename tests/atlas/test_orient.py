@@ -33,9 +33,9 @@ def test_straight_charts(angle):
 def test_straight_charts_have_the_least_rectangle():
     points = as_complex(star(8, 0.5, 1.0, 3)).ravel()
     turned = points * np.exp(1j * np.linspace(0, np.pi, 20001))[:, None]
-    least = (np.ptp(turned.real, axis=1) * np.ptp(turned.imag, axis=1)).min()
+    smallest_area = (np.ptp(turned.real, axis=1) * np.ptp(turned.imag, axis=1)).min()
     straight = points * np.exp(1j * straight_angle(points, NONE))
-    assert np.ptp(straight.real) * np.ptp(straight.imag) <= least * (1 + 1e-12)
+    assert np.ptp(straight.real) * np.ptp(straight.imag) <= smallest_area * (1 + 1e-12)
     assert np.ptp(straight.real) >= np.ptp(straight.imag)
 
 

@@ -23,8 +23,8 @@ def signed_areas(corners):
 def ring(size: float, hole: float = 0.7, around: int = 24):
     angle = 2 * np.pi * np.arange(around + 1) / around
     inner, outer = (r * size * np.column_stack([np.cos(angle), np.sin(angle)]) for r in (hole, 1.0))
-    one = np.stack([inner[:-1], outer[:-1], outer[1:]], axis=1)
-    return np.concatenate([one, np.stack([inner[:-1], outer[1:], inner[1:]], axis=1)])
+    lower_triangles = np.stack([inner[:-1], outer[:-1], outer[1:]], axis=1)
+    return np.concatenate([lower_triangles, np.stack([inner[:-1], outer[1:], inner[1:]], axis=1)])
 
 
 def charts_of(*parts):
@@ -41,9 +41,9 @@ def without_symmetry():
     return charts_of(*(star(3 + c % 4, 0.5, 1 + c % 3, c) for c in range(7)))
 
 
-def distance(one, two):
+def distance(first_chart, second_chart):
     """The distance between two sets of triangles; 0 if any of them overlap."""
-    pairs = np.repeat(one, len(two), axis=0), np.tile(two, (len(one), 1, 1))
+    pairs = np.repeat(first_chart, len(second_chart), axis=0), np.tile(second_chart, (len(first_chart), 1, 1))
     apart, best = np.zeros(len(pairs[0]), dtype=bool), np.inf
     for first, second in (pairs, pairs[::-1]):
         way = np.roll(first, -1, axis=1) - first
@@ -61,7 +61,7 @@ def least_distance(corners, chart):
 
 def similarity(before, after):
     """The factor of the similarity that takes one set of points to the other, and what it leaves, relatively."""
-    p, q = (as_complex(each).ravel() - as_complex(each).mean() for each in (before, after))
+    p, q = (as_complex(corners).ravel() - as_complex(corners).mean() for corners in (before, after))
     factor = np.vdot(p, q) / np.vdot(p, p)
     return factor, np.abs(q - factor * p).max() / np.abs(q).max()
 
@@ -95,8 +95,8 @@ def test_charts_are_turned_moved_and_scaled_alike_and_nothing_else(rotate):
     corners, chart = a_few()
     packed = pack_charts(corners, chart, rotate=rotate)
     for c in range(7):
-        factor, rest = similarity(corners[chart == c], packed.corner_uv[chart == c])
-        assert rest < 1e-12
+        factor, residual = similarity(corners[chart == c], packed.corner_uv[chart == c])
+        assert residual < 1e-12
         assert abs(factor) == pytest.approx(packed.scale, rel=1e-12)
         assert abs(np.exp(1j * packed.angle_of_chart[c]) - factor / abs(factor)) < 1e-12
     if rotate == "none":
@@ -104,7 +104,7 @@ def test_charts_are_turned_moved_and_scaled_alike_and_nothing_else(rotate):
     assert packed.efficiency == pytest.approx(signed_areas(packed.corner_uv).sum(), rel=1e-12)
 
 
-def test_nothing_but_points_and_lines():
+def test_charts_without_area_are_packed():
     for corners in (np.zeros((4, 3, 2)), np.linspace(0, 1, 12).repeat(2).reshape(4, 3, 2)):
         for chart in (None, np.arange(4)):
             packed = pack_charts(corners, chart)
@@ -128,7 +128,7 @@ def bars(*boxes):
     return np.concatenate([low * [r - x, t - y] + [x, y] for x, y, r, t in boxes])
 
 
-def test_a_chart_that_must_keep_to_the_right():
+def test_a_chart_may_be_forced_to_the_right():
     """A foot that does not reach the left border, below a block that does: neither may lie lowest and leftmost."""
     corners, chart = charts_of(bars((1, 0, 3, 1), (3, 0, 4, 4)), bars((0, 0, 2.98, 2.98)))
     assert pack_charts(corners, chart, rotate="none", padding=0).efficiency > 0.9
@@ -167,15 +167,17 @@ def test_a_square_on_its_corner_and_a_triangle_alone():
 @pytest.mark.slow
 def test_tiles():
     corners, chart = charts_of(*(star(5, 0.5, 1.0, seed) for seed in range(24)))
-    one, many = pack_charts(corners, chart), pack_charts(corners, chart, tiles=12)
-    assert many.scale > 2.5 * one.scale
-    assert set(many.tile_of_chart.tolist()) == set(range(12))
-    tile = many.tile_of_chart[chart]
-    inside = many.corner_uv - np.stack([tile % 10, tile // 10], axis=1)[:, None]
+    one_tile, twelve_tiles = pack_charts(corners, chart), pack_charts(corners, chart, tiles=12)
+    assert twelve_tiles.scale > 2.5 * one_tile.scale
+    assert set(twelve_tiles.tile_of_chart.tolist()) == set(range(12))
+    tile = twelve_tiles.tile_of_chart[chart]
+    inside = twelve_tiles.corner_uv - np.stack([tile % 10, tile // 10], axis=1)[:, None]
     assert inside.min() >= 2 / 1024 - 1e-12
     assert inside.max() <= 1 - 2 / 1024 + 1e-12
-    assert least_distance(many.corner_uv * 1024, chart) >= 2 * (1 - 1e-9)
-    assert many.efficiency == pytest.approx(signed_areas(many.corner_uv).sum() / 12, rel=1e-12)
+    assert least_distance(twelve_tiles.corner_uv * 1024, chart) >= 2 * (1 - 1e-9)
+    assert twelve_tiles.efficiency == pytest.approx(
+        signed_areas(twelve_tiles.corner_uv).sum() / 12, rel=1e-12
+    )
 
 
 def test_more_tiles_than_charts():
@@ -200,17 +202,18 @@ def test_many_charts():
             np.ceil(triangle.max(axis=0) * 1024).astype(int),
         )
         cells = np.s_[low[1] : high[1], low[0] : high[0]]
-        here = points.reshape(1024, 1024, 2)[cells]
+        cell_points = points.reshape(1024, 1024, 2)[cells]
         sides = np.roll(triangle, -1, axis=0) - triangle
         count[cells] += np.all(
-            [cross(side, here - start) > 0 for side, start in zip(sides, triangle, strict=True)], axis=0
+            [cross(side, cell_points - start) > 0 for side, start in zip(sides, triangle, strict=True)],
+            axis=0,
         )
     assert count.max() == 1
     assert count.sum() / 1024**2 == pytest.approx(packed.efficiency, rel=0.01)
 
 
 @pytest.mark.slow
-def test_the_same_again_and_in_any_order():
+def test_packing_is_deterministic_and_independent_of_the_order_of_triangles():
     corners, chart = without_symmetry()
     packed = pack_charts(corners, chart)
     np.testing.assert_array_equal(packed.corner_uv, pack_charts(corners, chart).corner_uv)
@@ -221,7 +224,7 @@ def test_the_same_again_and_in_any_order():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("factor", [1e-6, 1.0, 1e6])
-def test_turned_and_scaled_before_makes_no_difference(factor):
+def test_packing_is_invariant_under_rotation_and_scale(factor):
     corners, chart = without_symmetry()
     turn = factor * np.array([[0.6, 0.8], [-0.8, 0.6]])
     packed, again = pack_charts(corners, chart), pack_charts(corners @ turn + 3 * factor, chart)
@@ -233,8 +236,8 @@ def test_the_winding_of_an_outline_is_what_triangles_cover():
     """Of a strip that lies over itself, the sides between its triangles are no outline."""
     angle = np.linspace(0, 2.5 * np.pi, 60)
     inner, outer = np.exp(1j * angle), 1.5 * np.exp(1j * angle)
-    one = np.stack([inner[:-1], outer[:-1], outer[1:]], axis=1)
-    corners = np.concatenate([one, np.stack([inner[:-1], outer[1:], inner[1:]], axis=1)])
+    lower_triangles = np.stack([inner[:-1], outer[:-1], outer[1:]], axis=1)
+    corners = np.concatenate([lower_triangles, np.stack([inner[:-1], outer[1:], inner[1:]], axis=1)])
     charts = read_charts(np.stack([corners.real, corners.imag], axis=2), None)
     outlines = charts.outlines()
     assert len(outlines.sides) == 2 * 59 + 2
@@ -254,8 +257,8 @@ def test_a_flattening(shared):
     packed = pack_charts(result.corner_uv, chart)
     assert packed.efficiency > 0.6
     for c in range(4):
-        _, rest = similarity(result.corner_uv[chart == c], packed.corner_uv[chart == c])
-        assert rest < 1e-12
+        _, residual = similarity(result.corner_uv[chart == c], packed.corner_uv[chart == c])
+        assert residual < 1e-12
 
 
 def test_bad_input():
@@ -280,12 +283,12 @@ def test_bad_input():
     ):
         with pytest.raises(error, match=said):
             pack_charts(corners, labels)
-    for name, given in (
+    for name, argument in (
         ("corner_uv", ("charts", chart)),
         ("chart_of_triangle", (corners, [[0], [1, 2]])),
     ):
         with pytest.raises(ArrayShapeError, match=f"{name} must be an array of numbers") as caught:
-            pack_charts(*given)
+            pack_charts(*argument)
         assert "\n" not in str(caught.value)
 
 

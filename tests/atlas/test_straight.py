@@ -19,9 +19,9 @@ ANGLES = (0.0, np.pi / 4, 1.234)
 def squares(places, cells: int = 1, turn: float = 0.0, noise: float = 0.0):
     """Unit squares at places, each of so many cells a side, turned, their points off by noise."""
     steps = np.linspace(0, 1, cells + 1)[:-1]
-    x, y = (each.ravel()[:, None] for each in np.meshgrid(steps, steps))
-    one = np.concatenate([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]]).reshape(2, 3, 2) / cells
-    cell = (one[None] + np.stack([x, y], axis=2)[:, None]).reshape(-1, 3, 2)
+    x, y = (coordinates.ravel()[:, None] for coordinates in np.meshgrid(steps, steps))
+    lower_left = np.concatenate([[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]]).reshape(2, 3, 2) / cells
+    cell = (lower_left[None] + np.stack([x, y], axis=2)[:, None]).reshape(-1, 3, 2)
     corners = np.concatenate([cell + place for place in np.asarray(places, dtype=float)])
     points, number = np.unique(np.round(corners.reshape(-1, 2), 9), axis=0, return_inverse=True)
     points = points + noise * np.random.default_rng(0).normal(size=points.shape)
@@ -59,7 +59,7 @@ def test_the_net_of_a_cube_lies_along_the_axes(turn, cells):
 
 
 @pytest.mark.parametrize("turn", ANGLES)
-def test_noise_hardly_turns_it(turn):
+def test_noise_hardly_rotates_a_straight_chart(turn):
     """The mean of 14 sides, the ends of each off by 1e-3, is off by less than that."""
     laid = pack_charts(squares(CROSS, 8, turn, noise=1e-3)).corner_uv
     angles = np.angle(sides_of(laid)[0])
@@ -139,10 +139,10 @@ def test_a_disk_has_no_straight_border(count):
     assert len(straight_directions(as_sides(polygon(count)))) == 0
 
 
-def test_free_forms_have_none():
+def test_free_forms_have_no_straight_border():
     result = coneflat.flatten(*shapes.sphere(4, bumps=0.6))
     charts = read_charts(result.corner_uv, result.seam_data.face_chart)
-    assert not any(len(found) for found in border_directions(charts.outlines()))
+    assert not any(len(directions) for directions in border_directions(charts.outlines()))
 
 
 def test_rounded_corners_do_not_turn_a_box():
@@ -155,8 +155,8 @@ def test_rounded_corners_do_not_turn_a_box():
 
 def turn_of(before, after):
     """The angle that a chart was turned by."""
-    one, two = (corners[0, 1] - corners[0, 0] for corners in (before, after))
-    return np.angle(complex(*two) / complex(*one))
+    side_before, side_after = (corners[0, 1] - corners[0, 0] for corners in (before, after))
+    return np.angle(complex(*side_after) / complex(*side_before))
 
 
 @pytest.mark.parametrize("up", [None, (0.0, 1.0, 0.0), (1.0, 1.0, 0.0)])
@@ -195,7 +195,7 @@ def arranged(corners, chart, quantum, up):
 
 
 @pytest.mark.parametrize("turn", ANGLES[1:])
-def test_turned_and_renumbered_before_makes_no_difference(turn):
+def test_packing_is_invariant_under_rotation_and_renumbering(turn):
     places = np.array([(0, 0), (1, 0), (2, 0), (3, 0), (0, 1), (1, 1), (0, 2)])
     parts = [squares(places[: 4 + c], 3, 0.3 * c) * (1 + c % 3) for c in (1, 2, 3)]
     chart = np.repeat(np.arange(3), [len(part) for part in parts])

@@ -136,28 +136,28 @@ def test_any_triangles_become_a_manifold_with_all_faces_however_they_are_numbere
         vertices = rng.normal(size=(count, 3))
         number, order = rng.permutation(count), rng.permutation(len(faces))
         layers, _ = layers_of(vertices, faces)
-        others, _ = layers_of(vertices[np.argsort(number)], number[faces][order])
-        assert sorted(map(len, layers)) == sorted(map(len, others))
+        renumbered, _ = layers_of(vertices[np.argsort(number)], number[faces][order])
+        assert sorted(map(len, layers)) == sorted(map(len, renumbered))
 
 
 @pytest.mark.parametrize("command", [flatten, unwrap])
 def test_maps_of_both_sides_are_those_of_one(command):
-    both = command(V, np.concatenate([F, BACK]), repair=True, charts="one")
+    doubled = command(V, np.concatenate([F, BACK]), repair=True, charts="one")
     alone = command(V, F, charts="one")
-    assert len(both.faces) == 2 * len(F)
-    assert both.distortion.charts == 2 * alone.distortion.charts
-    assert both.distortion.flipped == 0
+    assert len(doubled.faces) == 2 * len(F)
+    assert doubled.distortion.charts == 2 * alone.distortion.charts
+    assert doubled.distortion.flipped == 0
     for name in ("qc_mean", "energy"):
-        assert getattr(both.distortion, name) == pytest.approx(getattr(alone.distortion, name), rel=1e-6)
+        assert getattr(doubled.distortion, name) == pytest.approx(getattr(alone.distortion, name), rel=1e-6)
     # Seams are relative to the root of the area.
-    assert both.distortion.seam_length == pytest.approx(2**0.5 * alone.distortion.seam_length, rel=1e-6)
+    assert doubled.distortion.seam_length == pytest.approx(2**0.5 * alone.distortion.seam_length, rel=1e-6)
 
 
 @pytest.mark.parametrize("command", [flatten, unwrap])
 def test_the_atlas_is_that_of_two_sheets_with_vertices_of_their_own(command):
     shared = command(V, np.concatenate([F, BACK]), repair=True)
-    own = command(np.concatenate([V, V]), np.concatenate([F, BACK + len(V)]))
-    np.testing.assert_array_equal(shared.uv[shared.uv_faces], own.uv[own.uv_faces])
+    separate = command(np.concatenate([V, V]), np.concatenate([F, BACK + len(V)]))
+    np.testing.assert_array_equal(shared.uv[shared.uv_faces], separate.uv[separate.uv_faces])
 
 
 def test_no_primitive_of_a_file_is_lost(tmp_path):
@@ -191,9 +191,9 @@ def test_two_sides_with_other_diagonals_are_two_sheets(shift):
 
 def test_solids_that_touch_along_an_edge_stay_apart():
     vertices, faces = shapes.box(1, (1.0, 1.0, 1.0))
-    both = shapes.join((vertices, faces), (vertices + np.array([1.0, 1.0, 0.0]), faces))
-    kept, place = weld(np.round(both[0], 9))
-    checked = check_mesh(np.round(both[0], 9)[kept], place[both[1]], repair=True)
+    two_boxes = shapes.join((vertices, faces), (vertices + np.array([1.0, 1.0, 0.0]), faces))
+    first, place = weld(np.round(two_boxes[0], 9))
+    checked = check_mesh(np.round(two_boxes[0], 9)[first], place[two_boxes[1]], repair=True)
     assert checked.mesh.components[0] == 2
 
 

@@ -50,8 +50,8 @@ def test_components_keep_their_numbers():
 
 
 def test_components_have_the_connectivity_that_they_would_have_alone():
-    whole = shapes.renumber(*shapes.join(shapes.hill(3, 2), shapes.torus(6, 5), shapes.annulus(7, 2)))
-    for part, _, _ in TriangleMesh(*whole[:2]).split_components():
+    joined = shapes.renumber(*shapes.join(shapes.hill(3, 2), shapes.torus(6, 5), shapes.annulus(7, 2)))
+    for part, _, _ in TriangleMesh(*joined[:2]).split_components():
         alone = TriangleMesh(part.vertices, part.faces)
         for name in ("edges", "halfedge_edges", "edge_halfedges", "is_boundary_edge", "is_boundary_vertex"):
             np.testing.assert_array_equal(getattr(part, name), getattr(alone, name), err_msg=name)
@@ -106,15 +106,15 @@ def test_seams_are_where_sides_have_different_points_and_charts_what_is_left_bet
 
 
 @pytest.mark.parametrize("value", [1.0, -1.0, 0.75, 3e-310, 1e300, 0.5 - 2.0**-54])
-def test_by_its_exponent_a_value_is_brought_to_between_a_half_and_one(value):
+def test_unit_exponents_scale_values_to_between_a_half_and_one(value):
     scaled = np.ldexp(value, -unit_exponent(np.array([value, value / 3])))
     assert 0.5 <= abs(scaled) < 1
 
 
 def test_pairs_are_sorted_stably_by_the_smaller_index_first():
-    one, two = np.random.default_rng(0).integers(0, 9, (2, 200))
-    order, first = sort_pairs(one, two, 9)
-    low, high = np.minimum(one, two), np.maximum(one, two)
+    tails, heads = np.random.default_rng(0).integers(0, 9, (2, 200))
+    order, first = sort_pairs(tails, heads, 9)
+    low, high = np.minimum(tails, heads), np.maximum(tails, heads)
     assert order.tolist() == np.lexsort((high, low)).tolist()
     keys = (9 * low + high)[order]
     assert first.tolist() == [True, *(np.diff(keys) > 0).tolist()]
@@ -122,10 +122,10 @@ def test_pairs_are_sorted_stably_by_the_smaller_index_first():
 
 def test_ends_of_some_sides_are_those_of_all():
     mesh = TriangleMesh(*shapes.hill(7, 5))
-    some = np.array([5, 0, 17, 5])
-    tails, heads = mesh.ends_of(some)
-    np.testing.assert_array_equal(tails, mesh.tails[some])
-    np.testing.assert_array_equal(heads, mesh.heads[some])
+    sides = np.array([5, 0, 17, 5])
+    tails, heads = mesh.ends_of(sides)
+    np.testing.assert_array_equal(tails, mesh.tails[sides])
+    np.testing.assert_array_equal(heads, mesh.heads[sides])
     np.testing.assert_array_equal(mesh.tails.reshape(-1, 3)[:, 0], mesh.faces[:, 1])
 
 

@@ -60,7 +60,7 @@ def test_colours_of_an_obj(tmp_path, ball):
     np.testing.assert_array_equal(flatten(model, cone_count=5, weights="color").cones, by_array.cones)
 
 
-def test_places(ball):
+def test_required_cones_are_used_and_forbidden_ones_are_not(ball):
     vertices, faces, important = ball
     required = flatten(vertices, faces, required_cones=[5, 77])
     assert {5, 77} <= set(required.cones.tolist())
@@ -76,7 +76,7 @@ def test_a_required_cone_that_no_seam_can_reach_is_refused():
         flatten(vertices, faces, required_cones=[6], no_seams=inside, method="linear")
 
 
-def test_bounds(ball):
+def test_curvatures_and_numbers_of_cones_are_within_their_bounds(ball):
     vertices, faces, _ = ball
     result = flatten(*shapes.genus(2), min_cone_angle=np.pi, max_cone_angle=3 * np.pi)
     assert result.curvatures.max() <= np.pi + 1e-9
@@ -129,7 +129,7 @@ def test_cones_that_triangles_cannot_hold_are_avoided():
         ({"boundary": "straight", "cones": "greedy"}, errors.OptionError, "sparse"),
     ],
 )
-def test_constraints_that_make_no_sense(options, kind, message):
+def test_invalid_constraints_are_refused(options, kind, message):
     with pytest.raises(kind, match=message):
         flatten(*shapes.sphere(2), **options)
 
@@ -179,7 +179,7 @@ def test_a_constraint_brings_cones_where_the_boundary_is_prescribed():
     assert len(flatten(vertices, faces, boundary="disk", cone_count=3).cones) == 3
 
 
-def test_distortion_that_is_missed_is_noted():
+def test_a_distortion_above_the_bound_is_noted():
     vertices, faces = shapes.sphere(3)
     weighted = flatten(vertices, faces, distortion=0.01, max_cones=4, weights=1 + vertices[:, 0] ** 2)
     assert any("above the 0.01 allowed" in note for note in weighted.notes)
@@ -188,9 +188,9 @@ def test_distortion_that_is_missed_is_noted():
 
 def test_the_linear_metric_takes_the_cones_of_the_search():
     vertices, faces = shapes.sphere(3)
-    found = find_cones(vertices, faces, distortion=0.1)
+    solution = find_cones(vertices, faces, distortion=0.1)
     linear = flatten(vertices, faces, distortion=0.1, method="linear")
-    assert set(linear.cones) == set(found.vertices)
+    assert set(linear.cones) == set(solution.vertices)
     assert not linear.notes
 
 
@@ -235,12 +235,12 @@ class TestRegions:
         plain = flatten(vertices, faces, cone_count=9)
         assert region[plain.cones].any()
         assert region[self.seams(plain)].all(axis=1).any()
-        whole = flatten(vertices, faces, cone_count=9, no_seams=np.flatnonzero(region))
-        assert not region[self.seams(whole)].all(axis=1).any()
+        result = flatten(vertices, faces, cone_count=9, no_seams=np.flatnonzero(region))
+        assert not region[self.seams(result)].all(axis=1).any()
         mesh = TriangleMesh(vertices, faces)
         inner = np.setdiff1d(np.flatnonzero(region), mesh.edges[region[mesh.edges].sum(axis=1) == 1])
         assert len(inner)
-        assert not np.isin(whole.cones, inner).any()
+        assert not np.isin(result.cones, inner).any()
 
     def test_a_belt_keeps_cones_on_its_larger_side(self, ball):
         vertices, faces, _ = ball
@@ -270,9 +270,11 @@ class TestRegions:
 
     def test_weights_of_some(self, ball):
         vertices, faces, important = ball
-        some = dict.fromkeys(np.flatnonzero(important).tolist(), 100.0)
-        whole = flatten(vertices, faces, cone_count=5, weights=np.where(important, 100.0, 1.0))
-        np.testing.assert_array_equal(flatten(vertices, faces, cone_count=5, weights=some).uv, whole.uv)
+        weights = dict.fromkeys(np.flatnonzero(important).tolist(), 100.0)
+        from_array = flatten(vertices, faces, cone_count=5, weights=np.where(important, 100.0, 1.0))
+        np.testing.assert_array_equal(
+            flatten(vertices, faces, cone_count=5, weights=weights).uv, from_array.uv
+        )
         with pytest.raises(errors.OptionError, match="weights: 100000 is not a vertex"):
             flatten(vertices, faces, weights={100000: 2.0})
         with pytest.raises(errors.OptionError, match="that of vertex 3 must be a number"):
@@ -287,8 +289,8 @@ class TestRegions:
 
 
 def test_all_copies_of_a_corner_that_repair_splits_are_corners():
-    one, two = shapes.grid(3, 3), shapes.grid(3, 3)
-    vertices, faces = shapes.join(one, (two[0] + np.array([1.0, 1, 0]), two[1]))
+    first, second = shapes.grid(3, 3), shapes.grid(3, 3)
+    vertices, faces = shapes.join(first, (second[0] + np.array([1.0, 1, 0]), second[1]))
     faces[faces == 16] = 15  # two squares with a common corner
     result = flatten(vertices, faces, boundary=[0, 3, 12, 15, 19, 28, 31], repair=True)
     copies = np.flatnonzero(result.vertex_origin == 15)

@@ -61,9 +61,9 @@ def test_seams_through_numbers_and_settings():
     by_name = coneflat.flatten(vertices, faces, seams=sharp)
     assert seam_pairs(by_name) == seam_pairs(by_angle)
     assert by_name.report()["settings"]["seams"] == sharp.tolist()
-    shuffled, turned, new = shapes.renumber(vertices, faces)
-    other = coneflat.flatten(shuffled, turned, seams=new[sharp])
-    assert other.distortion.seam_length == pytest.approx(by_name.distortion.seam_length)
+    shuffled, turned, number = shapes.renumber(vertices, faces)
+    renumbered = coneflat.flatten(shuffled, turned, seams=number[sharp])
+    assert renumbered.distortion.seam_length == pytest.approx(by_name.distortion.seam_length)
 
 
 @pytest.mark.parametrize(
@@ -86,7 +86,7 @@ def test_seams_through_numbers_and_settings():
         ({"charts": "many"}, "unknown charts"),
     ],
 )
-def test_what_makes_no_sense(options, message):
+def test_invalid_seams_are_refused(options, message):
     with pytest.raises(errors.OptionError, match=message):
         coneflat.flatten(*shapes.torus(), **options)
 
@@ -115,10 +115,10 @@ def test_seams_are_the_edges_with_two_places(shape, charts):
     pairs = seam_pairs(result)
     assert len(pairs) == len(result.seams)
     inside = np.flatnonzero(~mesh.is_boundary_edge)
-    here, there = (
+    first_ends, second_ends = (
         result.uv_faces.ravel()[np.stack(end_corners(h), axis=1)] for h in mesh.edge_halfedges[inside].T
     )
-    cut = (here != there[:, ::-1]).any(axis=1)
+    cut = (first_ends != second_ends[:, ::-1]).any(axis=1)
     assert {tuple(pair) for pair in mesh.edges[inside[cut]].tolist()} == pairs
 
 
@@ -150,10 +150,10 @@ def test_forbidden_edges_are_not_marked():
         coneflat.flatten(vertices, faces, seams=top, no_seams=top[:1])
 
 
-def test_one_part_may_weigh_nothing():
+def test_all_weights_of_a_component_may_be_zero():
     """Weights that are 0 all over one of the components say nothing about it."""
-    one, other = shapes.sphere(2, seed=1), shapes.sphere(2, seed=2)
-    vertices, faces = shapes.join(one, (other[0] + 5, other[1]))
+    first, second = shapes.sphere(2, seed=1), shapes.sphere(2, seed=2)
+    vertices, faces = shapes.join(first, (second[0] + 5, second[1]))
     weights = (vertices[:, 0] < 2.5).astype(float)
     plain = coneflat.flatten(vertices, faces)
     weighed = coneflat.flatten(vertices, faces, weights=weights, seam_weights=weights)
@@ -171,9 +171,9 @@ def test_errors_name_the_component():
 
 
 def test_no_seams_change_nothing():
-    one = coneflat.flatten(*shapes.torus())
+    unmarked = coneflat.flatten(*shapes.torus())
     none = coneflat.flatten(*shapes.torus(), seams=[])
-    assert np.array_equal(np.sort(one.cones), np.sort(none.cones))
+    assert np.array_equal(np.sort(unmarked.cones), np.sort(none.cones))
 
 
 class TestPolyhedra:

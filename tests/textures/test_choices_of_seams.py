@@ -40,8 +40,10 @@ def plus(arm=8, width=4):
         - vertices[:, :2].min(axis=0)
     )
     cell = np.ptp(vertices[:, 0]) / size
-    used, faces = np.unique(faces[(np.abs(middle) < width / 2 * cell).any(axis=1)], return_inverse=True)
-    return vertices[used], faces.reshape(-1, 3), width * cell
+    vertices_used, faces = np.unique(
+        faces[(np.abs(middle) < width / 2 * cell).any(axis=1)], return_inverse=True
+    )
+    return vertices[vertices_used], faces.reshape(-1, 3), width * cell
 
 
 def test_a_disk_needs_no_seams():
@@ -78,7 +80,7 @@ def test_overlaps_are_separated_also_without_seams():
     assert is_valid(result)
 
 
-def test_no_seams_but_those_given():
+def test_no_seams_beyond_the_marked_ones():
     vertices, faces = shapes.hill()
     edges = coneflat.TriangleMesh(vertices, faces).edges
     across = edges[np.isclose(vertices[edges][:, :, 0], np.unique(vertices[:, 0])[12]).all(axis=1)]
@@ -102,8 +104,8 @@ def test_there_are_as_many_charts_as_requested(shape):
 
 
 def test_charts_are_counted_over_all_components():
-    one = shapes.sphere(2)
-    result = unwrap(*shapes.join(one, (one[0] + 5, one[1])), charts=7)
+    component = shapes.sphere(2)
+    result = unwrap(*shapes.join(component, (component[0] + 5, component[1])), charts=7)
     assert result.distortion.charts == 7
 
 
@@ -121,8 +123,8 @@ def test_charts_are_cut_where_they_are_narrow():
 def test_more_charts_than_can_be_cut_give_a_note():
     result = unwrap(*shapes.box(1), charts=100)
     assert is_valid(result)
-    found = int(re.search(r"has (\d+) charts instead of 100: no further cut", result.notes[-1])[1])
-    assert found == result.distortion.charts < 100
+    chart_count = int(re.search(r"has (\d+) charts instead of 100: no further cut", result.notes[-1])[1])
+    assert chart_count == result.distortion.charts < 100
 
 
 def test_fewer_charts_than_components_give_a_note():
@@ -179,7 +181,7 @@ def test_an_area_distortion_that_no_cut_reaches_gives_a_note():
         ({"stack": "copied"}, "unknown stack 'copied': choose from none, mirrored"),
     ],
 )
-def test_what_cannot_be_is_refused(options, message):
+def test_contradictory_options_are_refused(options, message):
     with pytest.raises(errors.OptionError, match=message):
         read_options(options, UnwrapOptions)
 
@@ -195,13 +197,13 @@ def test_scale_motion_and_numbering_change_nothing(options):
         (vertices @ shapes.rotation().T, faces),
         (other_vertices, other_faces),
     ):
-        found = unwrap(*mesh, **options).distortion
-        assert found.energy == pytest.approx(base.energy, rel=1e-6)
-        assert found.seam_length == pytest.approx(base.seam_length, rel=1e-6)
+        measures = unwrap(*mesh, **options).distortion
+        assert measures.energy == pytest.approx(base.energy, rel=1e-6)
+        assert measures.seam_length == pytest.approx(base.seam_length, rel=1e-6)
 
 
 @pytest.mark.slow
-def test_the_commands_take_them(tmp_path):
+def test_commands_accept_the_choices_of_seams(tmp_path):
     mesh = shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(2))
     done = command(
         "unwrap", mesh, "-o", tmp_path / "six.glb", "--charts", "6", "--report", tmp_path / "six.json"

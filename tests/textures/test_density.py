@@ -10,14 +10,15 @@ import shapes
 
 from coneflat import errors, unwrap
 from coneflat.errors import OptionError
-from coneflat.textures.density import MAX_PACKINGS, MAX_RESOLUTION, expected_resolution, least_resolution
+from coneflat.textures.density import MAX_PACKINGS, expected_resolution, least_resolution
+from coneflat.textures.options import MAX_RESOLUTION
 
 
 class Packer:
     """Squares of one side in rows with padding, and a packing that is up to some per cent worse, at random."""
 
     def __init__(self, count=1, side=1.0, padding=2.0, noise=0.0):
-        self.count, self.side, self.padding, self.noise, self.tried = count, side, padding, noise, []
+        self.count, self.side, self.padding, self.noise, self.attempts = count, side, padding, noise, []
 
     def density(self, resolution):
         rows = np.ceil(np.sqrt(self.count))
@@ -26,7 +27,7 @@ class Packer:
         return max(free, 0.0) / rows / self.side / worse
 
     def scale(self, resolution):
-        self.tried.append(resolution)
+        self.attempts.append(resolution)
         if not (density := self.density(resolution)):
             raise OptionError("the padding leaves no space")
         return density / resolution
@@ -37,15 +38,15 @@ class Packer:
     ("count", "padding", "density"),
     [(1, 2.0, 300.0), (1, 0.0, 0.3), (300, 16.0, 2.0), (300, 64.0, 1e-9), (50, 2.5, 7000.0)],
 )
-def test_it_is_the_smallest_multiple_of_four_where_the_density_rises(count, padding, density, start):
+def test_the_resolution_is_the_smallest_multiple_of_four_if_the_density_rises(count, padding, density, start):
     packer = Packer(count, 1.0, padding)
-    found = least_resolution(density, padding, start, packer.scale)
-    assert found % 4 == 0
-    assert found > 4 * padding
-    below = found - 4
-    assert packer.density(found) >= density
+    resolution = least_resolution(density, padding, start, packer.scale)
+    assert resolution % 4 == 0
+    assert resolution > 4 * padding
+    below = resolution - 4
+    assert packer.density(resolution) >= density
     assert below <= 4 * padding or packer.density(below) < density
-    assert len(packer.tried) == len(set(packer.tried)) <= MAX_PACKINGS
+    assert len(packer.attempts) == len(set(packer.attempts)) <= MAX_PACKINGS
 
 
 @pytest.mark.parametrize("noise", [0.01, 0.1, 0.5])
@@ -53,20 +54,20 @@ def test_it_is_the_smallest_multiple_of_four_where_the_density_rises(count, padd
 def test_four_texels_less_do_not_suffice_where_packings_differ(density, noise):
     for padding in (0.0, 2.0, 16.0):
         packer = Packer(30, 1.0, padding, noise)
-        found = least_resolution(density, padding, 128, packer.scale)
-        assert packer.density(found) >= density
-        assert all(packer.density(tried) < density for tried in packer.tried if tried < found)
-        assert len(packer.tried) <= MAX_PACKINGS
-        if len(packer.tried) < MAX_PACKINGS and found - 4 > 4 * padding:
-            assert packer.density(found - 4) < density
+        resolution = least_resolution(density, padding, 128, packer.scale)
+        assert packer.density(resolution) >= density
+        assert all(packer.density(smaller) < density for smaller in packer.attempts if smaller < resolution)
+        assert len(packer.attempts) <= MAX_PACKINGS
+        if len(packer.attempts) < MAX_PACKINGS and resolution - 4 > 4 * padding:
+            assert packer.density(resolution - 4) < density
 
 
 def test_the_largest_texture_is_tried_before_a_density_is_refused():
     packer = Packer(9, 1.0, 4.0)
-    most = packer.density(MAX_RESOLUTION)
-    assert least_resolution(most, 4.0, 64, packer.scale) == MAX_RESOLUTION
+    largest_density = packer.density(MAX_RESOLUTION)
+    assert least_resolution(largest_density, 4.0, 64, packer.scale) == MAX_RESOLUTION
     with pytest.raises(OptionError, match=r"at most 65,536 texels per side have about 2.18e\+04 texels"):
-        least_resolution(1.01 * most, 4.0, 64, packer.scale)
+        least_resolution(1.01 * largest_density, 4.0, 64, packer.scale)
 
 
 def test_no_texture_that_charts_cover_entirely_is_refused_in_advance():

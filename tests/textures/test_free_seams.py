@@ -42,11 +42,11 @@ def test_vertices_around_which_triangles_wind_twice_are_cut_open(forbidden):
 
 
 def test_the_two_sides_of_closed_seams_meet_in_the_middle():
-    whole = fan(np.full(6, np.pi / 3))
-    spoke = np.flatnonzero((whole.mesh.edges == 0).any(axis=1))[:1]
-    cut = recut(whole, spoke)
-    assert len(cut.points) == len(whole.points) + 1
-    ends = np.flatnonzero(np.linalg.norm(cut.points - whole.points[1], axis=1) < 1e-12)
+    disk = fan(np.full(6, np.pi / 3))
+    spoke = np.flatnonzero((disk.mesh.edges == 0).any(axis=1))[:1]
+    cut = recut(disk, spoke)
+    assert len(cut.points) == len(disk.points) + 1
+    ends = np.flatnonzero(np.linalg.norm(cut.points - disk.points[1], axis=1) < 1e-12)
     assert len(ends) == 2
     cut.points[ends] += [[0, 0.25], [0, -0.25]]
-    np.testing.assert_allclose(recut(cut, NO_EDGES).points, whole.points, atol=1e-12)
+    np.testing.assert_allclose(recut(cut, NO_EDGES).points, disk.points, atol=1e-12)

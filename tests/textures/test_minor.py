@@ -12,7 +12,6 @@ from coneflat import unwrap
 from coneflat.geometry import double_areas, edge_lengths, triangle_energies
 from coneflat.mesh import label_faces
 from coneflat.textures import unwrapping as unwrap_module
-from coneflat.textures.search import CutSearch
 
 KINDS = {
     "icosphere": shapes.sphere(2),
@@ -41,7 +40,7 @@ def crumbs(kinds, count: int, seed: int = 0):
 @pytest.fixture
 def every_part_is_minor(monkeypatch):
     monkeypatch.setattr(unwrap_module, "MINOR_SHARE", 1.0)
-    monkeypatch.setattr(CutSearch, "best", lambda self: pytest.fail("a part is searched alone"))
+    monkeypatch.setattr(unwrap_module, "best_cut", lambda _: pytest.fail("a component is searched alone"))
 
 
 @pytest.mark.slow
@@ -53,11 +52,11 @@ def test_promises_hold_for_every_kind_of_component(name, every_part_is_minor):
     assert (d.flipped, d.degenerate, d.overlapping_pairs, result.notes) == (0, 0, 0, ())
     component = label_faces(result.faces, len(result.vertices))[1]
     for i in range(6):
-        own = component == i
+        is_inside = component == i
         energy = triangle_energies(
-            edge_lengths(vertices, faces[own]), result.corner_uv[own] / result.uv_scale
+            edge_lengths(vertices, faces[is_inside]), result.corner_uv[is_inside] / result.uv_scale
         )
-        area = double_areas(edge_lengths(vertices, faces[own])).sum() / 2
+        area = double_areas(edge_lengths(vertices, faces[is_inside])).sum() / 2
         assert energy.sum() < 4.1 * (1 + 1e-3) * area  # at the scale that all components share
     assert d.energy < 4.1
 
@@ -76,9 +75,9 @@ def test_seams_are_as_short_as_when_components_are_cut_alone(monkeypatch):
 
 
 def test_sizes_that_differ_by_a_million_change_nothing(every_part_is_minor):
-    one, other = (crumbs([KINDS["icosphere"]], 2, seed) for seed in (0, 1))
-    seams = len(unwrap(*shapes.join(one, other), charts="one").seams)
-    assert len(unwrap(*shapes.join(one, (1e-6 * other[0], other[1])), charts="one").seams) == seams
+    first, second = (crumbs([KINDS["icosphere"]], 2, seed) for seed in (0, 1))
+    seams = len(unwrap(*shapes.join(first, second), charts="one").seams)
+    assert len(unwrap(*shapes.join(first, (1e-6 * second[0], second[1])), charts="one").seams) == seams
 
 
 def test_a_needle_whose_tips_are_neighbours_gives_no_warning(every_part_is_minor):
@@ -102,10 +101,10 @@ def test_the_numbering_of_components_changes_nothing(every_part_is_minor):
     component = label_faces(faces, len(vertices))[1]
     order = np.random.default_rng(3).permutation(component.max() + 1)
     shuffled = np.concatenate([np.flatnonzero(component == i) for i in order])
-    one, other = unwrap(vertices, faces), unwrap(vertices, faces[shuffled])
-    assert len(one.seams) == len(other.seams)
-    assert one.distortion.energy == pytest.approx(other.distortion.energy, rel=1e-6)
-    assert set(map(tuple, np.sort(one.seams))) == set(map(tuple, np.sort(other.seams)))
+    result, renumbered = unwrap(vertices, faces), unwrap(vertices, faces[shuffled])
+    assert len(result.seams) == len(renumbered.seams)
+    assert result.distortion.energy == pytest.approx(renumbered.distortion.energy, rel=1e-6)
+    assert set(map(tuple, np.sort(result.seams))) == set(map(tuple, np.sort(renumbered.seams)))
 
 
 @pytest.mark.slow

@@ -68,8 +68,8 @@ def test_each_face_has_the_points_of_its_mirror_image(stacked):
     image, turned = image_of_faces(stacked)
     corners, uv = stacked.vertices[stacked.faces], stacked.corner_uv
     for face in range(len(image)):
-        same = ((turned[face][:, None] - corners[image[face]][None]) ** 2).sum(axis=2).argmin(axis=1)
-        np.testing.assert_array_equal(uv[face], uv[image[face]][same])
+        matched = ((turned[face][:, None] - corners[image[face]][None]) ** 2).sum(axis=2).argmin(axis=1)
+        np.testing.assert_array_equal(uv[face], uv[image[face]][matched])
     signs = signed_double_areas(uv) > 0
     assert (signs != signs[image]).all()
 
@@ -78,11 +78,11 @@ def test_the_measures_are_those_of_one_half(stacked):
     d = stacked.distortion
     half = stacked.vertices[stacked.faces][:, :, 0].mean(axis=1) > 0
     mesh = coneflat.check_mesh(stacked.vertices, stacked.faces[half]).mesh
-    own = coneflat.measure(mesh, stacked.corner_uv[half])
+    measures = coneflat.measure(mesh, stacked.corner_uv[half])
     assert 4 <= d.energy <= 4.1
-    assert (own.flipped, own.overlapping_pairs, own.mirrored_charts) == (0, 0, 0)
-    assert (d.flipped, d.overlapping_pairs, d.charts) == (0, 0, own.charts)
-    assert d.energy == pytest.approx(own.energy, rel=1e-12)
+    assert (measures.flipped, measures.overlapping_pairs, measures.mirrored_charts) == (0, 0, 0)
+    assert (d.flipped, d.overlapping_pairs, d.charts) == (0, 0, measures.charts)
+    assert d.energy == pytest.approx(measures.energy, rel=1e-12)
     assert len(d.qc) == len(stacked.faces)
     assert "share their texels" in stacked.notes[-1]
 
@@ -105,7 +105,7 @@ def test_the_middle_is_a_seam(stacked):
 
 
 @pytest.mark.parametrize("ending", [".glb", ".obj", ".ply", ".npz"])
-def test_what_is_written_is_measured_as_half(stacked, ending):
+def test_measures_of_written_files_are_those_of_one_half(stacked, ending):
     written = stacked.as_written(ending)
     d = written.distortion
     assert (d.flipped, d.overlapping_pairs, d.charts) == (0, 0, stacked.distortion.charts)
@@ -155,9 +155,9 @@ def test_scale_motion_and_numbering_change_nothing():
         (other_vertices, other_faces),
         (vertices.astype(np.float32), faces),
     ):
-        found = unwrap(*mesh, stack="mirrored").distortion
-        assert found.energy == pytest.approx(base.energy, rel=1e-4)
-        assert found.seam_length == pytest.approx(base.seam_length, rel=1e-4)
+        measures = unwrap(*mesh, stack="mirrored").distortion
+        assert measures.energy == pytest.approx(base.energy, rel=1e-4)
+        assert measures.seam_length == pytest.approx(base.seam_length, rel=1e-4)
 
 
 def test_seams_of_the_user_are_added():
@@ -183,11 +183,12 @@ def flipped_edge(vertices, faces):
     inner = mesh.edge_halfedges[
         (mesh.edge_halfedges >= 0).all(axis=1) & (vertices[mesh.edges][:, :, 0] > 0).all(axis=1)
     ]
-    one, other = inner[len(inner) // 2]
+    halfedge, twin = inner[len(inner) // 2]
     faces = faces.copy()
-    tail, head = mesh.faces.ravel()[[3 * (one // 3) + (one + 1) % 3, 3 * (one // 3) + (one + 2) % 3]]
-    left, right = mesh.faces.ravel()[[one, other]]
-    faces[one // 3], faces[other // 3] = (left, tail, right), (right, head, left)
+    face = 3 * (halfedge // 3)
+    tail, head = mesh.faces.ravel()[[face + (halfedge + 1) % 3, face + (halfedge + 2) % 3]]
+    left, right = mesh.faces.ravel()[[halfedge, twin]]
+    faces[halfedge // 3], faces[twin // 3] = (left, tail, right), (right, head, left)
     return vertices, faces
 
 
@@ -205,7 +206,7 @@ def flipped_edge(vertices, faces):
         ),
     ],
 )
-def test_what_is_not_mirrored_is_refused(shape, message):
+def test_models_without_a_mirror_plane_are_refused(shape, message):
     with pytest.raises(errors.OptionError, match=f"stack mirrored needs a model that is mirrored.*{message}"):
         unwrap(*shape, stack="mirrored")
 
@@ -218,7 +219,7 @@ def test_faces_across_the_plane_are_refused_with_their_number():
         unwrap(*shapes.join(SHAPES["ball"], across), stack="mirrored")
 
 
-def test_the_command_says_why(tmp_path):
+def test_the_command_measures_one_half_and_names_refused_models(tmp_path):
     mesh = shapes.write_obj(tmp_path / "ball.obj", *SHAPES["ball"])
     done = command(
         "unwrap", mesh, "-o", tmp_path / "out.obj", "--stack", "mirrored", "--require", "overlap=0,flipped=0"

@@ -25,15 +25,15 @@ GAP = 2 / 1024
 def grid(inside, count=48):
     """The triangles of a flat grid of the square [0, 1]^2 whose middles are inside."""
     at = np.arange((count + 1) ** 2).reshape(count + 1, count + 1)
-    one = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:]], axis=-1).reshape(-1, 3)
+    lower_triangles = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:]], axis=-1).reshape(-1, 3)
     two = np.stack([at[:-1, :-1], at[1:, 1:], at[:-1, 1:]], axis=-1).reshape(-1, 3)
     x, y = np.divmod(np.arange(at.size), count + 1)
     points = np.column_stack([x, y, 0 * x]) / count
-    faces = np.concatenate([one, two])
+    faces = np.concatenate([lower_triangles, two])
     middle = points[faces].mean(axis=1)
     faces = faces[inside(middle[:, 0], middle[:, 1])]
-    used, faces = np.unique(faces, return_inverse=True)
-    return points[used], faces.reshape(-1, 3)
+    points_used, faces = np.unique(faces, return_inverse=True)
+    return points[points_used], faces.reshape(-1, 3)
 
 
 def plus(x, y):
@@ -63,10 +63,10 @@ def seam_length(layout, costs):
 
 
 def efficiency(*layouts):
-    flat = np.concatenate([one.points[one.corners] for one in layouts])
-    before = np.cumsum([0, *(one.chart.max() + 1 for one in layouts)])
+    flat = np.concatenate([layout.points[layout.corners] for layout in layouts])
+    before = np.cumsum([0, *(layout.chart.max() + 1 for layout in layouts)])
     return pack_charts(
-        flat, np.concatenate([one.chart + n for one, n in zip(layouts, before, strict=False)])
+        flat, np.concatenate([layout.chart + n for layout, n in zip(layouts, before, strict=False)])
     ).efficiency
 
 
@@ -77,46 +77,46 @@ def branching(request):
 
 
 def test_a_branching_chart_is_cut_and_packs_more_tightly(branching):
-    layout, _, found = branching
-    assert found.chart.max() > layout.chart.max()
-    assert efficiency(found) > 1.2 * efficiency(layout)
+    layout, _, cut_layout = branching
+    assert cut_layout.chart.max() > layout.chart.max()
+    assert efficiency(cut_layout) > 1.2 * efficiency(layout)
 
 
 def test_pieces_are_connected_and_large_and_are_only_moved_apart(branching):
-    layout, _, found = branching
-    np.testing.assert_array_equal(found.points[found.corners], layout.points[layout.corners])
-    count, label = label_faces(found.corners, len(found.points))
-    assert count == found.chart.max() + 1
+    layout, _, cut_layout = branching
+    np.testing.assert_array_equal(cut_layout.points[cut_layout.corners], layout.points[layout.corners])
+    count, label = label_faces(cut_layout.corners, len(cut_layout.points))
+    assert count == cut_layout.chart.max() + 1
     np.testing.assert_array_equal(
-        np.unique(np.column_stack([label, found.chart]), axis=0)[:, 1], np.arange(count)
+        np.unique(np.column_stack([label, cut_layout.chart]), axis=0)[:, 1], np.arange(count)
     )
     for chart in range(count):
-        piece = TriangleMesh(*compact(found.points, found.corners[found.chart == chart]))
+        piece = TriangleMesh(*compact(cut_layout.points, cut_layout.corners[cut_layout.chart == chart]))
         assert (piece.euler_characteristic, piece.components[0]) == (1, 1)
-    areas = np.bincount(found.chart, signed_double_areas(found.points[found.corners]))
+    areas = np.bincount(cut_layout.chart, signed_double_areas(cut_layout.points[cut_layout.corners]))
     assert areas.min() >= MIN_PIECE * areas.sum() * (1 - 1e-9)
 
 
 def compact(points, corners):
-    used, corners = np.unique(corners, return_inverse=True)
-    return points[used], corners.reshape(-1, 3)
+    points_used, corners = np.unique(corners, return_inverse=True)
+    return points[points_used], corners.reshape(-1, 3)
 
 
 def test_the_added_seams_are_bounded(branching):
-    layout, costs, found = branching
-    present, after = (seam_length(one, costs) for one in (layout, found))
+    layout, costs, cut_layout = branching
+    present, after = (seam_length(version, costs) for version in (layout, cut_layout))
     borders = costs[layout.mesh.is_boundary_edge].sum() + 2 * present
     assert present < after <= present + SHARE * borders * (1 + 1e-9)
 
 
 def test_edges_of_infinite_cost_are_not_cut(branching):
-    layout, costs, found = branching
+    layout, costs, cut_layout = branching
     cut = np.isin(
         np.sort(layout.mesh.edges, axis=1) @ [len(layout.mesh.vertices), 1],
-        np.sort(found.seams, axis=1) @ [len(layout.mesh.vertices), 1],
+        np.sort(cut_layout.seams, axis=1) @ [len(layout.mesh.vertices), 1],
     )
-    other = cut_for_packing([layout], [np.where(cut, np.inf, costs)].__getitem__, GAP)[0]
-    assert np.isfinite(seam_length(other, np.where(cut, np.inf, costs)))
+    constrained = cut_for_packing([layout], [np.where(cut, np.inf, costs)].__getitem__, GAP)[0]
+    assert np.isfinite(seam_length(constrained, np.where(cut, np.inf, costs)))
     assert cut_for_packing([layout], [np.full(len(costs), np.inf)].__getitem__, GAP)[0] is layout
 
 
@@ -129,9 +129,9 @@ def test_a_square_is_not_cut():
 def test_only_large_charts_of_several_layouts_are_cut():
     (large, large_costs), (small, small_costs) = layout_of(*grid(plus)), layout_of(*grid(plus, 20))
     small = replace(small, points=small.points / 20)
-    one, other = cut_for_packing([large, small], [large_costs, small_costs].__getitem__, GAP)
-    assert one.chart.max() > large.chart.max()
-    assert other is small
+    large_cut, small_cut = cut_for_packing([large, small], [large_costs, small_costs].__getitem__, GAP)
+    assert large_cut.chart.max() > large.chart.max()
+    assert small_cut is small
 
 
 @pytest.mark.slow
@@ -140,17 +140,18 @@ def test_scale_motion_and_numbering_change_nothing():
     # Without equal paths, among which the numbering would choose.
     vertices = vertices + np.random.default_rng(0).uniform(-0.2, 0.2, vertices.shape) / 48 * [1, 1, 0]
     layout, costs = layout_of(vertices, faces)
-    found = cut_for_packing([layout], [costs].__getitem__, GAP)[0]
+    cut_layout = cut_for_packing([layout], [costs].__getitem__, GAP)[0]
     other_vertices, other_faces, _ = shapes.renumber(vertices, faces)
     turned = other_vertices @ shapes.rotation().T * 7 + 3
-    other, other_costs = layout_of(turned, other_faces)
-    again = cut_for_packing([other], [other_costs].__getitem__, GAP)[0]
-    assert again.chart.max() == found.chart.max()
+    turned_layout, turned_costs = layout_of(turned, other_faces)
+    again = cut_for_packing([turned_layout], [turned_costs].__getitem__, GAP)[0]
+    assert again.chart.max() == cut_layout.chart.max()
     relative = [
-        seam_length(one, cost) / np.sqrt(one.area) for one, cost in ((found, costs), (again, other_costs))
+        seam_length(version, cost) / np.sqrt(version.area)
+        for version, cost in ((cut_layout, costs), (again, turned_costs))
     ]
     assert relative[1] == pytest.approx(relative[0], rel=1e-6)
-    assert cut_for_packing([layout], [costs].__getitem__, GAP)[0].chart.tolist() == found.chart.tolist()
+    assert cut_for_packing([layout], [costs].__getitem__, GAP)[0].chart.tolist() == cut_layout.chart.tolist()
 
 
 @pytest.mark.slow

@@ -73,8 +73,8 @@ def test_written_files_share_texels_too(ending, tmp_path):
 
 def test_copies_of_another_size_have_their_own_texels():
     vertices, faces = shapes.hill(8, 6)
-    both = shapes.join((vertices, faces), (3 * vertices + 10, faces))
-    result = unwrap(*both, stack="copies")
+    model = shapes.join((vertices, faces), (3 * vertices + 10, faces))
+    result = unwrap(*model, stack="copies")
     np.testing.assert_allclose(
         result.distortion.log_area_scale.mean(), result.distortion.log_area_scale, atol=0.2
     )

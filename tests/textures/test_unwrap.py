@@ -20,9 +20,11 @@ from coneflat.io import as_input
 from coneflat.options import Options
 from coneflat.retries import lay_out_with_thick_triangles
 from coneflat.source import Source
+from coneflat.textures import unwrapping
+from coneflat.textures.coarse import coarse_component
+from coneflat.textures.creases import along_sharp_edges
 from coneflat.textures.free_seams import freed
-from coneflat.textures.search import CutSearch, coarse_component
-from coneflat.textures.unwrapping import along_sharp_edges
+from coneflat.textures.small_charts import join_small_charts
 
 CLOSED = {"sphere": shapes.sphere(3), "two handles": shapes.genus(2), "box": shapes.box()}
 OPEN = {"hill": shapes.hill(), "annulus": shapes.annulus(), "cylinder": shapes.cylinder()}
@@ -46,7 +48,7 @@ def test_the_search_goes_on_where_the_first_candidates_have_the_same_cones(monke
 
 
 @pytest.mark.slow
-def test_noise_that_a_coarse_mesh_does_not_show():
+def test_noise_that_a_coarse_mesh_does_not_have_needs_its_own_cones():
     """The cones of the coarse mesh leave an energy of 4.116, and with sets of the coarse model only, seams are 10.8."""
     result = unwrap(*noisy("noisy-torus"))
     d = result.distortion
@@ -76,9 +78,9 @@ def test_the_exact_metric_need_not_converge(shape, monkeypatch):
 @pytest.mark.parametrize("height", [1e-3, 1e-6, 1e-9, 1e-12])
 def test_a_triangle_nearly_without_area_does_not_raise_the_energy(height):
     vertices, faces = shapes.sphere(2)
-    (a, b, c), new = faces[0], len(vertices)
+    (a, b, c), apex = faces[0], len(vertices)
     point = (1 - height) * (vertices[a] + vertices[b]) / 2 + height * vertices[c]
-    split = np.vstack([faces[1:], [[a, b, new], [b, c, new], [c, a, new]]])
+    split = np.vstack([faces[1:], [[a, b, apex], [b, c, apex], [c, a, apex]]])
     measures = unwrap(np.vstack([vertices, point]), split).distortion
     assert measures.energy < 4.1
     # The plane has the shape of triangles that are a millionth as high as long, and a thicker one of others.
@@ -98,7 +100,7 @@ def fandisk(shared):
 
 @pytest.mark.slow
 def test_models_have_short_seams_within_the_bound(shared, cow, fandisk):
-    for result, most in (
+    for result, bound in (
         (cow, 4.5),
         (unwrap(shared("rocker-arm.obj")), 3.7),
         (fandisk, 3.4),
@@ -108,7 +110,7 @@ def test_models_have_short_seams_within_the_bound(shared, cow, fandisk):
         assert d.energy <= 4.1
         assert d.area_std <= 0.08
         assert (d.flipped, d.overlapping_pairs) == (0, 0)
-        assert d.seam_length <= most
+        assert d.seam_length <= bound
 
 
 def test_a_smaller_bound_needs_longer_seams():
@@ -136,8 +138,8 @@ def test_a_flipped_start_is_replaced():
     points = layout.points.copy()
     inner = int(np.flatnonzero(~component.mesh.is_boundary_vertex)[0])
     points[layout.corners[component.mesh.faces == inner][0]] += 100.0
-    wanted, found = freed(layout)[1], freed(replace(layout, points=points))[1]
-    assert found == pytest.approx(wanted, rel=1e-3)
+    expected, energy = freed(layout)[1], freed(replace(layout, points=points))[1]
+    assert energy == pytest.approx(expected, rel=1e-3)
 
 
 @pytest.mark.slow
@@ -145,13 +147,13 @@ def test_few_flipped_triangles_are_untangled_in_place(monkeypatch):
     """Embedding the whole chart anew takes many more steps."""
     component = Source(as_input(*shapes.hill(20, 20))).prepared(Options()).components[0]
     layout = lay_out_with_thick_triangles(component, Steps())
-    wanted, points = freed(layout)[1], layout.points.copy()
+    expected, points = freed(layout)[1], layout.points.copy()
     at = layout.corners[component.mesh.faces == np.flatnonzero(~component.mesh.is_boundary_vertex)[150]]
     points[at[0]] += 2 * np.ptp(points[layout.corners[(layout.corners == at[0]).any(axis=1)]], axis=(0, 1))
     assert (signed_double_areas(points[layout.corners]) <= 0).any()
     for module in ("textures.free_seams", "optimise.seam_untangling"):
         monkeypatch.setattr(import_module(f"coneflat.{module}"), "embedded_disks", None)
-    assert freed(replace(layout, points=points))[1] == pytest.approx(wanted, rel=1e-3)
+    assert freed(replace(layout, points=points))[1] == pytest.approx(expected, rel=1e-3)
 
 
 @pytest.mark.slow
@@ -166,15 +168,15 @@ def test_scale_motion_and_numbering_change_nothing(shape):
         (vertices @ shapes.rotation().T, faces),
         (other_vertices, other_faces),
     ):
-        found = unwrap(*mesh).distortion
-        assert found.energy == pytest.approx(base.energy, rel=1e-6)
-        assert found.seam_length == pytest.approx(base.seam_length, rel=1e-6)
+        measures = unwrap(*mesh).distortion
+        assert measures.energy == pytest.approx(base.energy, rel=1e-6)
+        assert measures.seam_length == pytest.approx(base.seam_length, rel=1e-6)
 
 
 def test_the_same_input_gives_the_same_output():
-    one, two = unwrap(*shapes.genus(2)), unwrap(*shapes.genus(2))
-    np.testing.assert_array_equal(one.uv, two.uv)
-    np.testing.assert_array_equal(one.uv_faces, two.uv_faces)
+    first, second = unwrap(*shapes.genus(2)), unwrap(*shapes.genus(2))
+    np.testing.assert_array_equal(first.uv, second.uv)
+    np.testing.assert_array_equal(first.uv_faces, second.uv_faces)
 
 
 def test_components_have_one_texel_density():
@@ -245,29 +247,29 @@ def test_the_energy_of_a_stretched_square():
 @pytest.mark.slow
 def test_branching_charts_are_cut_to_fill_the_texture(shared, cow, monkeypatch):
     monkeypatch.setattr("coneflat.textures.unwrapping.cut_for_packing", lambda layouts, *_: layouts)
-    whole = unwrap(shared("spot.obj"))
-    assert cow.packing_efficiency > max(0.65, 1.15 * whole.packing_efficiency)
-    assert cow.distortion.seam_length <= 1.35 * whole.distortion.seam_length
-    assert max(cow.distortion.energy, whole.distortion.energy) <= 4.1
+    uncut = unwrap(shared("spot.obj"))
+    assert cow.packing_efficiency > max(0.65, 1.15 * uncut.packing_efficiency)
+    assert cow.distortion.seam_length <= 1.35 * uncut.distortion.seam_length
+    assert max(cow.distortion.energy, uncut.distortion.energy) <= 4.1
 
 
 @pytest.mark.slow
 def test_a_chart_with_short_seams_is_cut_as_well(shared, fandisk, monkeypatch):
     """Cuts may cost as much as the root of the area, even if the seams are hardly longer; sharp edges cost less."""
-    found = fandisk
+    joined = fandisk
     monkeypatch.setattr("coneflat.textures.unwrapping.cut_for_packing", lambda layouts, *_: layouts)
-    whole = unwrap(shared("fandisk.obj"))
-    assert whole.distortion.charts == 1
-    assert found.distortion.charts <= 4
-    assert found.packing_efficiency > max(0.7, 1.2 * whole.packing_efficiency)
-    assert found.distortion.seam_length <= whole.distortion.seam_length + 1.5
+    separate = unwrap(shared("fandisk.obj"))
+    assert separate.distortion.charts == 1
+    assert joined.distortion.charts <= 4
+    assert joined.packing_efficiency > max(0.7, 1.2 * separate.packing_efficiency)
+    assert joined.distortion.seam_length <= separate.distortion.seam_length + 1.5
 
 
 @pytest.mark.slow
 def test_small_charts_are_joined_to_others_where_they_fit(shared, monkeypatch):
     path, bound = shared("spot.obj"), 4.02
     result = unwrap(path, max_energy=bound)
-    monkeypatch.setattr("coneflat.textures.search.CutSearch.small_joined", lambda _, one: one)
+    monkeypatch.setattr("coneflat.textures.unwrapping.join_small_charts", lambda _, candidate: candidate)
     joined, apart = result.distortion, unwrap(path, max_energy=bound).distortion
     assert joined.charts <= apart.charts - 2
     assert joined.seam_length < 0.99 * apart.seam_length
@@ -342,18 +344,18 @@ def test_a_coarse_component_keeps_what_belongs_to_its_vertices():
     weights = np.arange(1.0, len(vertices) + 1)
     options = Options(forbidden_cones=[3, 50], boundary="lengths", seam_weights=weights)
     component = Source(as_input(vertices, faces)).prepared(options).components[0]
-    coarse, kept = coarse_component(component, 300)
-    assert np.array_equal(coarse.vertices, component.vertices[kept])
-    assert np.array_equal(coarse.mesh.vertices, component.mesh.vertices[kept])
-    for one, every in (
+    coarse, vertices_kept = coarse_component(component, 300)
+    assert np.array_equal(coarse.vertices, component.vertices[vertices_kept])
+    assert np.array_equal(coarse.mesh.vertices, component.mesh.vertices[vertices_kept])
+    for coarse_values, fine_values in (
         (coarse.cones.is_allowed, component.cones.is_allowed),
         (coarse.cones.absorbs_curvature, component.cones.absorbs_curvature),
         (coarse.cones.names, component.cones.names),
         (coarse.metric.keeps_length, component.metric.keeps_length),
         (coarse.seams.weights, component.seams.weights),
     ):
-        assert np.array_equal(one, every[kept])
-        assert len(np.unique(one)) > 1
+        assert np.array_equal(coarse_values, fine_values[vertices_kept])
+        assert len(np.unique(coarse_values)) > 1
 
 
 @pytest.mark.slow
@@ -369,24 +371,28 @@ def test_forbidden_edges_that_are_cut_are_counted(shared):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "most"),
+    ("name", "max_length"),
     [("rocker-arm.obj", 1.85), ("fandisk.obj", 1.5), *((name, 2.6) for name in at_hand("elephant.obj"))],
 )
-def test_the_search_for_a_loose_bound_on_a_coarse_mesh_tries_other_cones(shared, name, most, monkeypatch):
+def test_the_search_for_a_loose_bound_on_a_coarse_mesh_tries_other_cones(
+    shared, name, max_length, monkeypatch
+):
     """With those of the first search alone, the elephant's seams are longer by a third."""
     monkeypatch.setattr("coneflat.textures.unwrapping.cut_for_packing", lambda layouts, *_: layouts)
-    assert unwrap(shared(name), max_energy=5.0).distortion.seam_length < most
+    assert unwrap(shared(name), max_energy=5.0).distortion.seam_length < max_length
 
 
 def test_small_charts_inside_another_one_are_joined(monkeypatch):
     """The second join closes edges of the third seam as well."""
-    found = []
-    best = CutSearch.best
-    monkeypatch.setattr(CutSearch, "best", lambda self: found.append((self, best(self))) or found[-1][1])
+    searches = []
+    best_cut = unwrapping.best_cut
+    monkeypatch.setattr(
+        unwrapping, "best_cut", lambda model: searches.append((model, best_cut(model))) or searches[-1][1]
+    )
     vertices, faces = shapes.grid(40, 40)
     unwrap(vertices, faces)
-    ((search, one),) = found
-    layout = one.layout
+    ((model, candidate),) = searches
+    layout = candidate.layout
     inner = np.flatnonzero(~layout.mesh.is_boundary_vertex)
     offsets = np.abs(layout.mesh.vertices - layout.mesh.vertices.mean(axis=0)).sum(axis=1)
     middle = inner[np.argmin(offsets[inner])]
@@ -394,6 +400,6 @@ def test_small_charts_inside_another_one_are_joined(monkeypatch):
     chart = layout.chart.copy()
     chart[around], chart[around[0]] = 1, 2
     charts = ChartLayout(layout.points, layout.corners, layout.chart).split(chart).renumbered()
-    joined = search.small_joined(replace(one, layout=with_charts(layout, charts)))
+    joined = join_small_charts(model, replace(candidate, layout=with_charts(layout, charts)))
     assert joined.layout.chart.max() == 0
     assert joined.energy == pytest.approx(4)

@@ -40,8 +40,11 @@ class Charts:
     @cached_property
     def areas(self) -> FloatArray:
         """Return (m,) the signed areas of the triangles."""
-        one, two = self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0]
-        return (np.conj(one) * two).imag / 2
+        first_side, second_side = (
+            self.corners[:, 1] - self.corners[:, 0],
+            self.corners[:, 2] - self.corners[:, 0],
+        )
+        return (np.conj(first_side) * second_side).imag / 2
 
     def sums(self, values: FloatArray) -> FloatArray:
         """Return (k,) the sum over each chart of (m,) values per triangle."""
@@ -51,10 +54,10 @@ class Charts:
     def has_area(self) -> NDArray[np.bool_]:
         """Return (k,) flags, False for charts that are degenerate to lines or points."""
         low, high = bounds(self.places)
-        least, most = np.full((self.count, 2), np.inf), np.full((self.count, 2), -np.inf)
-        np.minimum.at(least, self.chart, low)
-        np.maximum.at(most, self.chart, high)
-        return np.abs(self.sums(self.areas)) > NO_AREA * (most - least).max(axis=1) ** 2
+        lowest, highest = np.full((self.count, 2), np.inf), np.full((self.count, 2), -np.inf)
+        np.minimum.at(lowest, self.chart, low)
+        np.maximum.at(highest, self.chart, high)
+        return np.abs(self.sums(self.areas)) > NO_AREA * (highest - lowest).max(axis=1) ** 2
 
     @property
     def places(self) -> FloatArray:
@@ -70,19 +73,21 @@ class Charts:
         """
         corners, chart, is_flipped = self.corners, self.chart, self.areas < 0
         # The sides, each starting at its corner, that are not known to cancel in pairs.
-        kept = np.ones(corners.shape, dtype=bool)
+        is_outline = np.ones(corners.shape, dtype=bool)
         if self.edge_halfedges is not None:
             group = np.where(is_flipped, -1, chart)
-            kept = open_sides(self.edge_halfedges, self.places, group).reshape(-1, 3)[:, PREVIOUS]
+            is_outline = open_sides(self.edge_halfedges, self.places, group).reshape(-1, 3)[:, PREVIOUS]
         if is_flipped.any():
             corners = np.where(is_flipped[:, None], corners[:, [0, 2, 1]], corners)
-        triangle, corner = np.nonzero(kept)
+        triangle, corner = np.nonzero(is_outline)
         sides = np.stack([corners[triangle, corner], corners[triangle, NEXT[corner]]], axis=1)
-        same, balance = cancel_sides(sides, chart[triangle])
-        kept[triangle, corner] = balance[same] != 0
+        label, balance = cancel_sides(sides, chart[triangle])
+        is_outline[triangle, corner] = balance[label] != 0
         # If all sides of a chart cancel, it has no area: all its sides are used as the outline.
-        kept |= (np.bincount(chart, weights=kept.any(axis=1), minlength=self.count) == 0)[chart][:, None]
-        triangle, corner = np.nonzero(kept)
+        is_outline |= (np.bincount(chart, weights=is_outline.any(axis=1), minlength=self.count) == 0)[chart][
+            :, None
+        ]
+        triangle, corner = np.nonzero(is_outline)
         order = np.argsort(chart[triangle], kind="stable")
         triangle, corner = triangle[order], corner[order]
         sides = np.stack([corners[triangle, corner], corners[triangle, NEXT[corner]]], axis=1)
@@ -189,8 +194,8 @@ class ChartLayout:
     def split(self, chart: IntArray) -> ChartLayout:
         """Return the layout split into smaller charts, (m,) the chart of each triangle, with separate points."""
         keys = chart[:, None] * len(self.points) + self.corners
-        used, corners = numbered(keys)
-        return ChartLayout(self.points[used % len(self.points)], corners, chart)
+        distinct, corners = numbered(keys)
+        return ChartLayout(self.points[distinct % len(self.points)], corners, chart)
 
     def joined(self, pairs: IntArray) -> ChartLayout:
         """Return the layout with pairs of points (k, 2) merged into the point with the smallest index."""
@@ -200,25 +205,25 @@ class ChartLayout:
 
     def renumbered(self) -> ChartLayout:
         """Return the layout without unused points and with charts numbered from 0."""
-        used, corners = numbered(self.corners)
+        distinct, corners = numbered(self.corners)
         chart = numbered(self.chart)[1]
-        return ChartLayout(self.points[used], corners, chart, self.seams)
+        return ChartLayout(self.points[distinct], corners, chart, self.seams)
 
 
 def numbered(values: IntArray) -> tuple[IntArray, IntArray]:
     """Return the sorted distinct values, and the index of each value among them."""
-    used, places = np.unique(values, return_inverse=True)
-    return used, places.reshape(values.shape)
+    distinct, places = np.unique(values, return_inverse=True)
+    return distinct, places.reshape(values.shape)
 
 
 def same_points(count: int, pairs: IntArray) -> IntArray:
     """Return (count,) for each point the smallest index among the points that pairs (k, 2) merge with it."""
-    same = np.arange(count)
-    used, index = np.unique(pairs, return_inverse=True)
-    _, label = label_components(len(used), *index.reshape(-1, 2).T)
+    representative = np.arange(count)
+    merged, index = np.unique(pairs, return_inverse=True)
+    _, label = label_components(len(merged), *index.reshape(-1, 2).T)
     _, first = np.unique(label, return_index=True)
-    same[used] = used[first[label]]
-    return same
+    representative[merged] = merged[first[label]]
+    return representative
 
 
 class Seams:
@@ -226,13 +231,14 @@ class Seams:
 
     Attributes:
         edges: (k,) edge indices in the mesh.
-        here, there: (k, 2) the points at the two ends of each edge, in the faces of its first and second half-edge.
+        first_points, second_points: (k, 2) the points at the two ends of each edge, in the faces of its first and
+            second half-edge.
         charts: (k, 2) the charts of these two faces.
     """
 
     def __init__(self, mesh: TriangleMesh, layout: ChartLayout) -> None:
         self.edges = point_seams(mesh, layout.corners, layout.seams)
-        self.here, self.there = both_sides(mesh, self.edges, layout.corners)
+        self.first_points, self.second_points = both_sides(mesh, self.edges, layout.corners)
         self.charts = layout.chart[mesh.edge_halfedges[self.edges] // 3]
 
     def within(self, *charts: int) -> IntArray:
@@ -247,10 +253,13 @@ class Seams:
             chosen: indices of seam edges.
             tolerance: largest distance of coinciding points, relative to the length of the edge.
         """
-        here, there = places[self.here[chosen]], places[self.there[chosen]]
-        gap = np.abs(here - there).max(axis=1, initial=0.0)
-        same = gap <= tolerance * np.abs(here[:, 1] - here[:, 0])
-        return np.stack([self.here[chosen][same].ravel(), self.there[chosen][same].ravel()], axis=1)
+        first_places, second_places = places[self.first_points[chosen]], places[self.second_points[chosen]]
+        gap = np.abs(first_places - second_places).max(axis=1, initial=0.0)
+        coincides = gap <= tolerance * np.abs(first_places[:, 1] - first_places[:, 0])
+        return np.stack(
+            [self.first_points[chosen][coincides].ravel(), self.second_points[chosen][coincides].ravel()],
+            axis=1,
+        )
 
     def stretches(self, mesh: TriangleMesh) -> IntArray:
         """Return (k,) the stretch of each edge: a chain of seam edges between the same two charts, without branches."""
@@ -258,7 +267,7 @@ class Seams:
         low, high = self.charts.min(axis=1), self.charts.max(axis=1)
         order = np.argsort(at, kind="stable")
         meet = at[order[1:]] == at[order[:-1]]
-        one, two = order[:-1][meet] // 2, order[1:][meet] // 2
+        before, after = order[:-1][meet] // 2, order[1:][meet] // 2
         goes_on = np.bincount(at, minlength=len(mesh.vertices))[at[order[:-1][meet]]] == 2
-        goes_on &= (low[one] == low[two]) & (high[one] == high[two])
-        return label_components(len(self.edges), one[goes_on], two[goes_on])[1]
+        goes_on &= (low[before] == low[after]) & (high[before] == high[after])
+        return label_components(len(self.edges), before[goes_on], after[goes_on])[1]

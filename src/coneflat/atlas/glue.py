@@ -78,10 +78,10 @@ class _Gluing:
         for best in np.argsort(-total, kind="stable"):
             check_cancelled()
             members = self.stretches[best]
-            one, other = self.seams.charts[members[0]]
-            sizes = len(self.faces[one]), len(self.faces[other])
+            first_chart, second_chart = self.seams.charts[members[0]]
+            sizes = len(self.faces[first_chart]), len(self.faces[second_chart])
             key = (int(self.seams.edges[members[0]]), len(members), *sizes)
-            if one == other or key in rejected:
+            if first_chart == second_chart or key in rejected:
                 continue
             if self._glue_at(members):
                 glued = True
@@ -92,34 +92,43 @@ class _Gluing:
     def _glue_at(self, members: IntArray) -> bool:
         """Move the smaller of two charts to continue the other if it fits there; return True if it does."""
         seams = self.seams
-        here, there = self.places[seams.here[members]], self.places[seams.there[members]]
-        longest = np.argmax(np.abs(here[:, 1] - here[:, 0]))
-        (kept, moved), here, there = seams.charts[members[longest]], here[longest], there[longest]
-        if len(self.faces[kept]) < len(self.faces[moved]):
-            kept, moved, here, there = moved, kept, there, here
-        across = there[1] - there[0]
-        turn = (here[1] - here[0]) / across if across else 0.0
+        fixed_ends, moved_ends = (
+            self.places[seams.first_points[members]],
+            self.places[seams.second_points[members]],
+        )
+        longest = np.argmax(np.abs(fixed_ends[:, 1] - fixed_ends[:, 0]))
+        (fixed, moved), fixed_ends, moved_ends = (
+            seams.charts[members[longest]],
+            fixed_ends[longest],
+            moved_ends[longest],
+        )
+        if len(self.faces[fixed]) < len(self.faces[moved]):
+            fixed, moved, fixed_ends, moved_ends = moved, fixed, moved_ends, fixed_ends
+        across = moved_ends[1] - moved_ends[0]
+        turn = (fixed_ends[1] - fixed_ends[0]) / across if across else 0.0
         if not abs(abs(turn) - 1) <= CONGRUENCE_TOLERANCE:
             return False
         points = np.unique(self.corners[self.faces[moved]])
         before, self.places = self.places, self.places.copy()
-        self.places[points] = (before[points] - there.mean()) * (turn / abs(turn)) + here.mean()
-        pairs = seams.coinciding(self.places, seams.within(kept, moved), CONGRUENCE_TOLERANCE)
+        self.places[points] = (before[points] - moved_ends.mean()) * (turn / abs(turn)) + fixed_ends.mean()
+        pairs = seams.coinciding(self.places, seams.within(fixed, moved), CONGRUENCE_TOLERANCE)
         # The points of a pair become one point, so they must be equal bit for bit.
         pairs = np.where(np.isin(pairs[:, :1], points), pairs[:, ::-1], pairs)
         self.places[pairs[:, 1]] = self.places[pairs[:, 0]]
         joined = same_points(len(before), pairs)
         self.places = self.places[joined]
-        if not self._fits(kept, moved):
+        if not self._fits(fixed, moved):
             self.places = before
             return False
         is_joined = mask_of(len(before), pairs)
-        own = self.faces[kept]
-        changed = np.concatenate([own[has_any(is_joined, self.corners[own])], self.faces[moved]])
+        fixed_faces = self.faces[fixed]
+        changed = np.concatenate(
+            [fixed_faces[has_any(is_joined, self.corners[fixed_faces])], self.faces[moved]]
+        )
         self.corners[changed] = joined[self.corners[changed]]
-        seams.here, seams.there = joined[seams.here], joined[seams.there]
-        seams.charts[seams.charts == moved] = self.chart[self.faces[moved]] = kept
-        self.faces[kept] = np.concatenate([self.faces[kept], self.faces[moved]])
+        seams.first_points, seams.second_points = joined[seams.first_points], joined[seams.second_points]
+        seams.charts[seams.charts == moved] = self.chart[self.faces[moved]] = fixed
+        self.faces[fixed] = np.concatenate([self.faces[fixed], self.faces[moved]])
         self.faces[moved] = self.faces[moved][:0]
         self.low[changed], self.high[changed] = bounds(self._corners(changed))
         return True
@@ -127,19 +136,21 @@ class _Gluing:
     def _corners(self, faces: IntArray) -> FloatArray:
         return as_pairs(self.places[self.corners[faces]])
 
-    def _fits(self, kept: int, moved: int) -> bool:
+    def _fits(self, fixed: int, moved: int) -> bool:
         """Return True if the moved chart's triangles are positively oriented and do not overlap the other chart."""
         corners = self._corners(self.faces[moved])
         if not (signed_double_areas(corners) > 0).all():
             return False
         low, high = bounds(corners)
-        others = self.faces[kept]
-        others = others[_touch(self.low[others], self.high[others], low.min(axis=0), high.max(axis=0))]
-        if not len(others):
+        fixed_faces = self.faces[fixed]
+        fixed_faces = fixed_faces[
+            _touch(self.low[fixed_faces], self.high[fixed_faces], low.min(axis=0), high.max(axis=0))
+        ]
+        if not len(fixed_faces):
             return True
-        least, most = self.low[others].min(axis=0), self.high[others].max(axis=0)
-        near = _touch(low, high, least, most)
-        together = np.concatenate([corners[near], self._corners(others)])
+        lowest, highest = self.low[fixed_faces].min(axis=0), self.high[fixed_faces].max(axis=0)
+        is_close = _touch(low, high, lowest, highest)
+        together = np.concatenate([corners[is_close], self._corners(fixed_faces)])
         return not len(find_overlaps(together, limit=1).pairs)
 
 
@@ -148,7 +159,7 @@ def _members(label: IntArray, numbers: IntArray) -> list[IntArray]:
     return np.split(numbers[np.argsort(label, kind="stable")], np.cumsum(np.bincount(label))[:-1])
 
 
-def _touch(low: FloatArray, high: FloatArray, least: FloatArray, most: FloatArray) -> BoolArray:
-    """Return (k,) True for boxes from `low` to `high` (k, 2) that touch the box from `least` to `most` (2,)."""
-    does_touch = (high >= least) & (low <= most)
+def _touch(low: FloatArray, high: FloatArray, box_low: FloatArray, box_high: FloatArray) -> BoolArray:
+    """Return (k,) True for boxes from `low` to `high` (k, 2) that touch the box from `box_low` to `box_high` (2,)."""
+    does_touch = (high >= box_low) & (low <= box_high)
     return does_touch[:, 0] & does_touch[:, 1]

@@ -50,31 +50,31 @@ def injective_charts(
         disk: a mesh whose faces are the corners, with a vertex for each point; None to compute it.
         tries: how many of the minimum areas of a chart are tried: one for the cheapest cuts, all for few charts.
     """
-    whole = ChartLayout(points, corners, np.zeros(len(corners), dtype=np.int64))
+    single_chart = ChartLayout(points, corners, np.zeros(len(corners), dtype=np.int64))
     places = rows_of(points, corners)
     areas = signed_double_areas(places)
     pairs = overlaps_of_mesh(mesh.edge_halfedges, places).pairs
     # An inverted triangle cannot be separated from its neighbours.
     pairs = pairs[(areas[pairs] > 0).all(axis=1)]
     if not len(pairs):
-        return glue_charts(mesh, whole, lengths).renumbered()
+        return glue_charts(mesh, single_chart, lengths).renumbered()
     disk = as_disk(points, corners) if disk is None else unpinched(disk.moved_to(points))
-    found: list[tuple[int, int, float, int, ChartLayout]] = []
+    candidates: list[tuple[int, int, float, int, ChartLayout]] = []
     shares = MIN_CHART_AREAS[:tries]
     for share in shares:
-        least = share * float(np.abs(areas).sum())
-        most = MAX_SMALL_CHARTS if share < shares[-1] else np.inf
-        chart = split_overlaps(disk, lengths[mesh.halfedge_edges], np.abs(areas), pairs, least, most)
+        min_area = share * float(np.abs(areas).sum())
+        max_charts = MAX_SMALL_CHARTS if share < shares[-1] else np.inf
+        chart = split_overlaps(disk, lengths[mesh.halfedge_edges], np.abs(areas), pairs, min_area, max_charts)
         if chart is None:
             continue
-        layout = glue_charts(mesh, whole.split(chart), lengths).renumbered()
+        layout = glue_charts(mesh, single_chart.split(chart), lengths).renumbered()
         sizes = np.bincount(layout.chart, weights=np.abs(areas))
         slivers = int((sizes < SLIVER_AREA * sizes.sum()).sum())
         cost = float(lengths[Seams(mesh, layout).edges].sum())
-        found.append((slivers, len(sizes), cost, len(found), layout))
+        candidates.append((slivers, len(sizes), cost, len(candidates), layout))
         if len(sizes) == 1 or (not slivers and len(corners) > LARGE_TRIANGLES):
             break
-    return min(found, key=lambda one: one[:-1])[-1]
+    return min(candidates, key=lambda candidate: candidate[:-1])[-1]
 
 
 @stage("atlas")

@@ -98,39 +98,39 @@ def rectangle_angles(
         count = corners if is_free else ends[c] - begin
         angle, width, height = np.empty(count), np.empty(count), np.empty(count)
         # The corners that are farthest along a side of the hull, at a right angle to it, and against it.
-        far, top, near = 0, 0, 0
+        ahead, top, behind = 0, 0, 0
         for i in range(count):
             if is_free:
-                here, there = first + hull[i], first + hull[(i + 1) % corners]
-                angle[i] = math.atan2(points[there, 1] - points[here, 1], points[there, 0] - points[here, 0])
+                tail, head = first + hull[i], first + hull[(i + 1) % corners]
+                angle[i] = math.atan2(points[head, 1] - points[tail, 1], points[head, 0] - points[tail, 0])
                 x, y = math.cos(angle[i]), math.sin(angle[i])
-                far = climb(points, hull, corners, first, max(far, i), x, y)
-                top = climb(points, hull, corners, first, max(top, far), -y, x)
-                near = climb(points, hull, corners, first, max(near, top), -x, -y)
+                ahead = climb(points, hull, corners, first, max(ahead, i), x, y)
+                top = climb(points, hull, corners, first, max(top, ahead), -y, x)
+                behind = climb(points, hull, corners, first, max(behind, top), -x, -y)
                 f, t, n = (
-                    first + hull[far % corners],
+                    first + hull[ahead % corners],
                     first + hull[top % corners],
-                    first + hull[near % corners],
+                    first + hull[behind % corners],
                 )
                 width[i] = (points[f, 0] - points[n, 0]) * x + (points[f, 1] - points[n, 1]) * y
-                height[i] = (points[t, 1] - points[here, 1]) * x - (points[t, 0] - points[here, 0]) * y
+                height[i] = (points[t, 1] - points[tail, 1]) * x - (points[t, 0] - points[tail, 0]) * y
             else:
                 angle[i] = directions[begin + i]
                 x, y = math.cos(angle[i]), math.sin(angle[i])
-                least_x, least_y, most_x, most_y = np.inf, np.inf, -np.inf, -np.inf
+                low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf
                 for k in range(corners):
                     u, v = points[first + hull[k], 0], points[first + hull[k], 1]
                     along, across = u * x + v * y, v * x - u * y
-                    least_x, most_x = min(least_x, along), max(most_x, along)
-                    least_y, most_y = min(least_y, across), max(most_y, across)
-                width[i], height[i] = most_x - least_x, most_y - least_y
-        least, longest, best = np.inf, -1.0, 0
+                    low_x, high_x = min(low_x, along), max(high_x, along)
+                    low_y, high_y = min(low_y, across), max(high_y, across)
+                width[i], height[i] = high_x - low_x, high_y - low_y
+        smallest, longest, best = np.inf, -1.0, 0
         for i in range(count):
-            least = min(least, width[i] * height[i])
+            smallest = min(smallest, width[i] * height[i])
         for i in range(count):
             # Among rectangles of equal area, as around many quadrilaterals, the longest is chosen.
             longer = max(width[i], height[i])
-            if width[i] * height[i] <= least * (1 + RELATIVE_TOLERANCE) and longer > longest:
+            if width[i] * height[i] <= smallest * (1 + RELATIVE_TOLERANCE) and longer > longest:
                 longest, best = longer, i
         angles[c] = -angle[best] + (HALF_PI if height[best] > width[best] else 0.0)
     return angles
@@ -149,8 +149,8 @@ def climb(points: FloatArray, hull: IntArray, corners: int, first: int, at: int,
         x, y: the direction in which points rise.
     """
     for _ in range(corners):
-        here, there = first + hull[at % corners], first + hull[(at + 1) % corners]
-        if (points[there, 0] - points[here, 0]) * x + (points[there, 1] - points[here, 1]) * y <= 0.0:
+        tail, head = first + hull[at % corners], first + hull[(at + 1) % corners]
+        if (points[head, 0] - points[tail, 0]) * x + (points[head, 1] - points[tail, 1]) * y <= 0.0:
             break
         at += 1
     return at
@@ -269,13 +269,13 @@ def common_directions(
         start: (k + 1,) the first run of each chart.
         borders: (k,) the length of each chart's border.
     """
-    most = 0
+    max_runs = 0
     for c in range(len(borders)):
-        most = max(most, start[c + 1] - start[c])
+        max_runs = max(max_runs, start[c + 1] - start[c])
     # The runs of a chart three times, a quarter turn apart: their angles, and the sums of the lengths before each.
-    around, total = np.empty(3 * most), np.empty(3 * most + 1)
-    begin, end, alike = np.empty(most, np.int64), np.empty(most, np.int64), np.empty(most)
-    found, count, ends = np.empty(len(angles)), 0, np.empty(len(borders), np.int64)
+    around, total = np.empty(3 * max_runs), np.empty(3 * max_runs + 1)
+    begin, end, alike = np.empty(max_runs, np.int64), np.empty(max_runs, np.int64), np.empty(max_runs)
+    directions, count, ends = np.empty(len(angles)), 0, np.empty(len(borders), np.int64)
     for c in range(len(borders)):
         size, first = start[c + 1] - start[c], count
         total[0] = 0.0
@@ -307,14 +307,14 @@ def common_directions(
                 after += 1
             middle = ((around[before] + around[after]) / 2) % HALF_PI
             is_new = True
-            for other in range(first, count):
-                off = (middle - found[other] + HALF_PI / 2) % HALF_PI - HALF_PI / 2
+            for earlier in range(first, count):
+                off = (middle - directions[earlier] + HALF_PI / 2) % HALF_PI - HALF_PI / 2
                 is_new = is_new and abs(off) > SAME_DIRECTION
             if is_new:
-                found[count] = middle
+                directions[count] = middle
                 count += 1
         ends[c] = count
-    return found[:count], ends
+    return directions[:count], ends
 
 
 def along_axes(directions: list[FloatArray], turned: FloatArray, angles: FloatArray) -> BoolArray:
@@ -475,17 +475,17 @@ def follow_curves(following: IntArray, begins: BoolArray) -> tuple[IntArray, Int
     """
     order, first = np.empty(len(following), np.int64), np.empty(len(following) + 1, np.int64)
     done = np.zeros(len(following), dtype=np.bool_)
-    found, curves = 0, 0
+    count, curves = 0, 0
     for closed in (False, True):
         for side in range(len(following)):
             if done[side] or not (begins[side] or closed):
                 continue
-            first[curves] = found
+            first[curves] = count
             curves += 1
             while side >= 0 and not done[side]:
                 done[side] = True
-                order[found] = side
-                found += 1
+                order[count] = side
+                count += 1
                 side = following[side]
-    first[curves] = found
+    first[curves] = count
     return order, first[: curves + 1]

@@ -41,12 +41,12 @@ class Effort:
     Attributes:
         columns: minimum number of columns of the grid.
         tries: number of changes that are tried.
-        most: largest side that is of use; the search ends after a third of the tries if it is not reached.
+        max_side: largest side that is of use; the search ends after a third of the tries if it is not reached.
     """
 
     columns: int = 400
     tries: int = 150
-    most: float = np.inf
+    max_side: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +128,7 @@ def cover(
         size: (j, 2) number of columns and rows of cells from there.
         cell: width of a cell.
     """
-    runs, found, first = np.empty((1024, 3), np.int64), 0, np.zeros(angles.size + 1, np.int64)
+    runs, count, first = np.empty((1024, 3), np.int64), 0, np.zeros(angles.size + 1, np.int64)
     for j in range(angles.size):
         chart, t = j // angles.shape[1], j % angles.shape[1]
         left, below = low[chart, t].real / cell, low[chart, t].imag / cell
@@ -164,19 +164,19 @@ def cover(
                 on += touched[row, column]
                 is_in = around != 0 or on > 0
                 if is_in and not inside:
-                    if found == len(runs):
-                        larger = np.empty((2 * found, 3), np.int64)
-                        for i in range(found):
+                    if count == len(runs):
+                        larger = np.empty((2 * count, 3), np.int64)
+                        for i in range(count):
                             for x in range(3):
                                 larger[i, x] = runs[i, x]
                         runs = larger
-                    runs[found, 0], runs[found, 1], runs[found, 2] = row, column, columns - 1
-                    found += 1
+                    runs[count, 0], runs[count, 1], runs[count, 2] = row, column, columns - 1
+                    count += 1
                 elif inside and not is_in:
-                    runs[found - 1, 2] = column - 1
+                    runs[count - 1, 2] = column - 1
                 inside = is_in
-        first[j + 1] = found
-    return runs[:found], first
+        first[j + 1] = count
+    return runs[:count], first
 
 
 class Plan(NamedTuple):
@@ -267,24 +267,24 @@ def pack(
         width += width // (12 if failures < MANY_FAILURES else 4) + 1
         if width > widest:
             raise _no_space(gap, len(order))
-    last, least, step, work = best, int(longest / masks.cell) + 1, width // 16, 0
-    wanted = int(min(effort.most / masks.cell, width)) + 1
-    for tried in range(effort.tries):
-        goal = max(min(width - step, wanted), least)
-        if goal >= width or work > MAX_WORK or (width > wanted and tried > effort.tries // 3):
+    last, min_width, step, work = best, int(longest / masks.cell) + 1, width // 16, 0
+    useful_width = int(min(effort.max_side / masks.cell, width)) + 1
+    for attempt in range(effort.tries):
+        goal = max(min(width - step, useful_width), min_width)
+        if goal >= width or work > MAX_WORK or (width > useful_width and attempt > effort.tries // 3):
             break
         check_cancelled()
         limit = goal + goal // 4 if last is best else min(last.height, goal + goal // 4)
         plan = best.plan if last is best else _changed(last.plan, start.allowed, rng)
-        found = fill(plan, goal, limit)
-        work += found.work
-        if found.height <= goal:
-            best, last, width = found, found, goal
-            step = max(1, min((goal - found.height) // 2, goal // 16))
-        elif step > 1 and width <= wanted:
+        candidate = fill(plan, goal, limit)
+        work += candidate.work
+        if candidate.height <= goal:
+            best, last, width = candidate, candidate, goal
+            step = max(1, min((goal - candidate.height) // 2, goal // 16))
+        elif step > 1 and width <= useful_width:
             step //= 2
-        elif last is best or found.height <= last.height:
-            last = found
+        elif last is best or candidate.height <= last.height:
+            last = candidate
     tile, column, row = best.place.T
     shift = (column + 1j * row) * masks.cell - masks.low[best.chosen]
     # The tile is cropped to the charts, not to the cells.
@@ -306,11 +306,11 @@ def _changed(plan: Plan, permitted: BoolArray, rng: np.random.Generator) -> Plan
 
     With few charts, the offset of a chart may change too. permitted: (j,) the shapes that may be allowed.
     """
-    order, allowed, offset = (each.copy() for each in plan)
+    order, allowed, offset = (array.copy() for array in plan)
     count = len(order)
     turns = len(permitted) // count
-    for one, two in (rng.random((int(3 * rng.random()), 2)) * count).astype(np.int64):
-        order[[one, two]] = order[[two, one]]
+    for first_place, second_place in (rng.random((int(3 * rng.random()), 2)) * count).astype(np.int64):
+        order[[first_place, second_place]] = order[[second_place, first_place]]
     for chart in (rng.random(1 + int(2 * rng.random())) * count).astype(np.int64):
         shapes = slice(chart * turns, (chart + 1) * turns)
         allowed[shapes] = permitted[shapes] & (rng.random(turns) < rng.choice([0.3, 0.6, 1.0]))
@@ -357,16 +357,17 @@ def place_all(
             for x in range(width):
                 taken[t, y, x] = clear[t, y, x] = width
     floor = np.zeros((tiles, group.max() + 1), np.int64)
-    top, work, far, widest = 0, tiles * limit, len(reach) - 1, reach.max()
+    top, work, reach_rows, widest = 0, tiles * limit, len(reach) - 1, reach.max()
     for c in plan.order:
         best, shape, tile, column, row = limit + 1, -1, 0, 0, 0
         for j in range(c * turns, (c + 1) * turns):
             if not plan.allowed[j] or size[j, 0] > width:
                 continue
-            own, right = runs[first[j] : first[j + 1]], width - size[j, 0]
+            shape_runs, right = runs[first[j] : first[j + 1]], width - size[j, 0]
             for t in range(tiles):
                 x, y, steps = find_lowest(
-                    taken[t], clear[t], own, int(plan.offset[c] * right), right, floor[t, group[c]], best - size[j, 1]
+                    taken[t], clear[t], shape_runs, int(plan.offset[c] * right), right, floor[t, group[c]],
+                    best - size[j, 1],
                 )  # fmt: skip
                 work += steps
                 if y >= 0:
@@ -377,12 +378,14 @@ def place_all(
         floor[tile, group[c]] = row
         top = max(top, best)
         for k in range(first[shape], first[shape + 1]):
-            for y in range(max(row + runs[k, 0] - far, 0), min(row + runs[k, 0] + far + 1, limit)):
+            for y in range(
+                max(row + runs[k, 0] - reach_rows, 0), min(row + runs[k, 0] + reach_rows + 1, limit)
+            ):
                 out = reach[abs(y - row - runs[k, 0])]
                 for x in range(max(column + runs[k, 1] - out, 0), min(column + runs[k, 2] + out + 1, width)):
                     taken[tile, y, x] = x
         left, right = max(column - widest, 0), min(column + size[shape, 0] + widest, width)
-        for y in range(max(row - far, 0), min(best + far, limit)):
+        for y in range(max(row - reach_rows, 0), min(best + reach_rows, limit)):
             following, free = width, width
             if right < width:
                 following, free = taken[tile, y, right], clear[tile, y, right]
@@ -394,7 +397,10 @@ def place_all(
                     break  # What follows is the same as before, and so it is for all cells to the left.
                 taken[tile, y, x], clear[tile, y, x] = following, free
         # About 50 cells are visited in the time of a comparison.
-        work += ((best - row + 2 * far) * width + 4 * far * far * (first[shape + 1] - first[shape])) // 50
+        work += (
+            (best - row + 2 * reach_rows) * width
+            + 4 * reach_rows * reach_rows * (first[shape + 1] - first[shape])
+        ) // 50
     return top, work, chosen, place
 
 

@@ -38,37 +38,44 @@ class Sheet:
         self._is_cut = np.zeros(len(disk.halfedge_edges), dtype=bool)
         self._edge_costs = costs[disk.edge_halfedges[:, 0]]
 
-    def border(self, own: int) -> IntArray:
+    def border(self, index: int) -> IntArray:
         """Return (b,) the half-edges on the border of a piece in order, with the piece on their left."""
-        around: IntArray = walk_border(self._twins, self.piece, self._start[own])
+        around: IntArray = walk_border(self._twins, self.piece, self._start[index])
         return np.roll(around, -int(np.argmin(self.disk.halfedge_edges[around])))
 
-    def is_pinched(self, own: int) -> bool:
+    def is_pinched(self, index: int) -> bool:
         """Return True if the border of a piece passes through a vertex more than once."""
-        border = self.border(own)
+        border = self.border(index)
         return len(np.unique(self.disk.ends_of(border)[0])) < len(border)
 
-    def separate(self, own: int, one: BoolArray, other: BoolArray) -> list[int] | None:
+    def separate(self, index: int, first_set: BoolArray, second_set: BoolArray) -> list[int] | None:
         """Cut a piece between two sets of its triangles; return the new pieces, sorted by their first triangles.
 
         Args:
-            own: the piece; one of the new pieces keeps its index.
-            one, other: (m,) True for the triangles to separate: two disjoint connected sets.
+            index: the piece; one of the new pieces keeps its index.
+            first_set, second_set: (m,) True for the triangles to separate: two disjoint connected sets.
 
         Returns:
             Two or more pieces, or None if each set, even reduced to a single triangle, separates the other from the
             border.
         """
-        border = self.border(own)
-        both = self._both_to_the_border(own, border // 3, one, other)
-        if both is None:
+        border = self.border(index)
+        widened = self._both_to_the_border(index, border // 3, first_set, second_set)
+        if widened is None:
             return None
-        one, other = both
-        mark = np.where(one[border // 3], 1, np.where(other[border // 3], 2, 0))
+        first_set, second_set = widened
+        mark = np.where(first_set[border // 3], 1, np.where(second_set[border // 3], 2, 0))
         starts, ends = (self.disk.ends_of(sides)[0] for sides in _between(border, mark))
-        cut = self.disk.edge_halfedges[self._path(own, one, other, starts, ends)]
+        cut = self.disk.edge_halfedges[self._path(index, first_set, second_set, starts, ends)]
         ids, first, start = split_piece(
-            self._twins, self.piece, own, cut, self._owner, self._is_cut, len(self._first), self._first[own]
+            self._twins,
+            self.piece,
+            index,
+            cut,
+            self._owner,
+            self._is_cut,
+            len(self._first),
+            self._first[index],
         )
         if len(ids) < 2:
             return None
@@ -78,11 +85,13 @@ class Sheet:
             self._first[piece], self._start[piece] = low, side
         return ids[np.argsort(first)].tolist()
 
-    def _path(self, own: int, one: BoolArray, other: BoolArray, starts: IntArray, ends: IntArray) -> IntArray:
+    def _path(
+        self, index: int, first_set: BoolArray, second_set: BoolArray, starts: IntArray, ends: IntArray
+    ) -> IntArray:
         """Return the edges of the cheapest path in a piece from starts to ends that avoids two sets of triangles."""
         # The last entry is for the outside of the boundary, which is in no piece.
         kind = np.zeros(len(self.piece) + 1, dtype=np.uint8)
-        kind[:-1] = np.where(one, 2, np.where(other, 3, self.piece == own))
+        kind[:-1] = np.where(first_set, 2, np.where(second_set, 3, self.piece == index))
         left, right = kind[self.disk.edge_faces.T]
         is_open = (left > 0) & (right > 0) & ((left != right) | (left == 1))
         costs = np.where(is_open, self._edge_costs, np.inf)
@@ -93,47 +102,49 @@ class Sheet:
         return paths.edge[paths.nodes_to(nearest)]
 
     def widened(
-        self, own: int, one: BoolArray, other: BoolArray, areas: FloatArray, least: float
+        self, index: int, first_set: BoolArray, second_set: BoolArray, areas: FloatArray, min_area: float
     ) -> tuple[BoolArray, BoolArray]:
         """Return two sets of a piece's triangles, each extended by triangles that are closer to it than to the other.
 
         Args:
-            own: the piece.
-            one, other: (m,) True for the triangles of the sets.
+            index: the piece.
+            first_set, second_set: (m,) True for the triangles of the sets.
             areas: (m,) areas of the triangles.
-            least: area up to which each set is extended, where possible.
+            min_area: area up to which each set is extended, where possible.
         """
-        disk, inside = self.disk, self._inside(own)
+        disk, inside = self.disk, self._inside(index)
         a, b, c = (disk.vertices[disk.faces[:, corner]] for corner in range(3))
         middles = a + b + c
         steps = (middles[inside[:, 0]] - middles[inside[:, 1]]) / 3
         lengths = np.hypot(steps[:, 0], steps[:, 1])
-        paths = MultiGraph(len(disk.faces), inside, lengths).shortest_paths(np.flatnonzero(one | other))
-        return grown(paths, one, areas, least), grown(paths, other, areas, least)
+        paths = MultiGraph(len(disk.faces), inside, lengths).shortest_paths(
+            np.flatnonzero(first_set | second_set)
+        )
+        return grown(paths, first_set, areas, min_area), grown(paths, second_set, areas, min_area)
 
-    def _inside(self, own: int) -> IntArray:
+    def _inside(self, index: int) -> IntArray:
         """Return (k, 2) the pairs of triangles of a piece that share an edge, in the order of edges."""
         pairs = self.disk.edge_faces[~self.disk.is_boundary_edge]
-        return pairs[(self.piece[pairs[:, 0]] == own) & (self.piece[pairs[:, 1]] == own)]
+        return pairs[(self.piece[pairs[:, 0]] == index) & (self.piece[pairs[:, 1]] == index)]
 
     def _both_to_the_border(
-        self, own: int, border: IntArray, one: BoolArray, other: BoolArray
+        self, index: int, border: IntArray, first_set: BoolArray, second_set: BoolArray
     ) -> tuple[BoolArray, BoolArray] | None:
         """Return two sets, each extended by a path to the border, or None if this is impossible.
 
         A set that encloses the other is reduced to a single triangle. border: the triangles along the border.
         """
-        for second, first in product((other, _single(other)), (one, _single(one))):
-            wide = self._to_the_border(own, border, first, second)
+        for second, first in product((second_set, _single(second_set)), (first_set, _single(first_set))):
+            wide = self._to_the_border(index, border, first, second)
             if wide is None:
                 continue
-            wider = self._to_the_border(own, border, second, wide)
+            wider = self._to_the_border(index, border, second, wide)
             if wider is not None:
                 return wide, wider
         return None
 
     def _to_the_border(
-        self, own: int, border: IntArray, chosen: BoolArray, blocked: BoolArray
+        self, index: int, border: IntArray, chosen: BoolArray, blocked: BoolArray
     ) -> BoolArray | None:
         """Return the chosen triangles, extended by the shortest path to the border if none of them is there.
 
@@ -141,7 +152,7 @@ class Sheet:
         """
         if chosen[border].any():
             return chosen
-        inside = self._inside(own)
+        inside = self._inside(index)
         inside = inside[~blocked[inside].any(axis=1)]
         dual = MultiGraph(len(chosen), inside, np.ones(len(inside)))
         free = border[~blocked[border]]
@@ -154,13 +165,13 @@ class Sheet:
         return widened
 
 
-def grown(paths: Paths, chosen: BoolArray, areas: FloatArray, least: float) -> BoolArray:
-    """Return (m,) the chosen triangles and those whose nearest source they are, up to a total added area `least`."""
-    near = np.flatnonzero((paths.source >= 0) & chosen[paths.source])
-    near = near[np.argsort(paths.distance[near], kind="stable")]
-    before = np.cumsum(areas[near]) - areas[near]
+def grown(paths: Paths, chosen: BoolArray, areas: FloatArray, min_area: float) -> BoolArray:
+    """Return (m,) the chosen triangles and those whose nearest source they are, up to a total added area `min_area`."""
+    gained = np.flatnonzero((paths.source >= 0) & chosen[paths.source])
+    gained = gained[np.argsort(paths.distance[gained], kind="stable")]
+    before = np.cumsum(areas[gained]) - areas[gained]
     grown = chosen.copy()
-    grown[near[before < least]] = True
+    grown[gained[before < min_area]] = True
     return grown
 
 
@@ -190,19 +201,19 @@ def walk_border(twins: IntArray, piece: IntArray, start: int) -> IntArray:
 
     twins: (3m,) the other half-edge of each edge, -1 on the boundary. piece: (m,) the piece of each triangle.
     """
-    own, around = piece[start // 3], np.empty(0, np.int64)
-    for is_known in (False, True):  # the first pass counts them, the second stores them
+    index, around = piece[start // 3], np.empty(0, np.int64)
+    for is_storing in (False, True):  # the first pass counts them, the second stores them
         count, h = 0, start
         while count == 0 or h != start:
-            if is_known:
+            if is_storing:
                 around[count] = h
             count += 1
             h = h - h % 3 + (h + 1) % 3
             t = twins[h]
-            while t >= 0 and piece[t // 3] == own:
+            while t >= 0 and piece[t // 3] == index:
                 h = t - t % 3 + (t + 1) % 3
                 t = twins[h]
-        if not is_known:
+        if not is_storing:
             around = np.empty(count, np.int64)
     return around
 
@@ -210,16 +221,16 @@ def walk_border(twins: IntArray, piece: IntArray, start: int) -> IntArray:
 @compiled
 def join_lists(parent: IntArray, head: IntArray, last: IntArray, after: IntArray, i: int, j: int) -> int:
     """Merge two sets and their queues of triangles; return the root of the merged set."""
-    one, two = find_root(parent, i), find_root(parent, j)
-    if unite(parent, one, two):
-        kept, gone = min(one, two), max(one, two)
-        if head[gone] >= 0:
-            if head[kept] < 0:
-                head[kept] = head[gone]
+    first_root, second_root = find_root(parent, i), find_root(parent, j)
+    if unite(parent, first_root, second_root):
+        remaining, absorbed = min(first_root, second_root), max(first_root, second_root)
+        if head[absorbed] >= 0:
+            if head[remaining] < 0:
+                head[remaining] = head[absorbed]
             else:
-                after[last[kept]] = head[gone]
-            last[kept] = last[gone]
-            head[gone] = -1
+                after[last[remaining]] = head[absorbed]
+            last[remaining] = last[absorbed]
+            head[absorbed] = -1
     return find_root(parent, i)
 
 
@@ -238,7 +249,7 @@ def append_to(head: IntArray, last: IntArray, after: IntArray, i: int, f: int) -
 def split_piece(
     twins: IntArray,
     piece: IntArray,
-    own: int,
+    index: int,
     cut: IntArray,
     owner: IntArray,
     is_cut: BoolArray,
@@ -253,7 +264,7 @@ def split_piece(
     Args:
         twins: (3m,) the other half-edge of each edge, -1 on the boundary.
         piece: (m,) the piece of each triangle, changed in place.
-        own: the piece to split.
+        index: the piece to split.
         cut: (k, 2) both half-edges of the edges, between triangles of the piece.
         owner, is_cut: (m,) -1 and (3m,) False, work arrays that are reset on return.
         following: index of the next new piece.
@@ -261,7 +272,7 @@ def split_piece(
     """
     sets = 2 * len(cut)
     parent, head, last = np.empty(sets, np.int64), np.empty(sets, np.int64), np.empty(sets, np.int64)
-    after, known, count = np.empty(len(piece), np.int64), np.empty(len(piece), np.int64), 0
+    after, visited, count = np.empty(len(piece), np.int64), np.empty(len(piece), np.int64), 0
     growing, number, left = np.empty(sets, np.int64), np.empty(sets, np.int64), sets
     for i in range(sets):
         parent[i], head[i], last[i], growing[i], number[i] = i, -1, -1, i, -1
@@ -271,7 +282,7 @@ def split_piece(
         if owner[f] < 0:
             owner[f] = i
             append_to(head, last, after, i, f)
-            known[count] = f
+            visited[count] = f
             count += 1
         else:
             join_lists(parent, head, last, after, i, owner[f])
@@ -287,40 +298,40 @@ def split_piece(
             head[i] = after[f]
             for h in range(3 * f, 3 * f + 3):
                 t = twins[h]
-                if t < 0 or is_cut[h] or piece[t // 3] != own:
+                if t < 0 or is_cut[h] or piece[t // 3] != index:
                     continue
                 g = t // 3
                 if owner[g] < 0:
                     owner[g] = i
                     append_to(head, last, after, find_root(parent, i), g)
-                    known[count] = g
+                    visited[count] = g
                     count += 1
                 else:
                     join_lists(parent, head, last, after, i, owner[g])
         left = still
-    rest = find_root(parent, growing[0]) if sets > 0 else -1
+    remainder = find_root(parent, growing[0]) if sets > 0 else -1
     ids, low, start = np.empty(sets + 1, np.int64), np.empty(sets + 1, np.int64), np.empty(sets + 1, np.int64)
     for i in range(sets + 1):
-        ids[i], low[i], start[i] = own, len(piece), -1
-    found = 1
+        ids[i], low[i], start[i] = index, len(piece), -1
+    pieces = 1
     for i in range(count):
-        f = known[i]
+        f = visited[i]
         root = find_root(parent, owner[f])
         owner[f] = -1
-        if root == rest:
+        if root == remainder:
             continue
         if number[root] < 0:
-            number[root] = found
-            ids[found] = following + found - 1
-            found += 1
+            number[root] = pieces
+            ids[pieces] = following + pieces - 1
+            pieces += 1
         piece[f] = ids[number[root]]
         low[number[root]] = min(low[number[root]], f)
-    while piece[first] != own:
+    while piece[first] != index:
         first += 1
     low[0] = first
     for i in range(sets):
         h, t = cut[i // 2, i % 2], cut[i // 2, 1 - i % 2]
         is_cut[h] = False
         if piece[h // 3] != piece[t // 3]:
-            start[0 if piece[h // 3] == own else piece[h // 3] - following + 1] = h
-    return ids[:found], low[:found], start[:found]
+            start[0 if piece[h // 3] == index else piece[h // 3] - following + 1] = h
+    return ids[:pieces], low[:pieces], start[:pieces]

@@ -15,8 +15,8 @@ def split_overlaps(
     costs: FloatArray,
     areas: FloatArray,
     pairs: IntArray,
-    least: float = 0.0,
-    most: float = np.inf,
+    min_area: float = 0.0,
+    max_charts: float = np.inf,
 ) -> IntArray | None:
     """Return (m,) the chart of each triangle, from 0, such that no chart has both triangles of a pair.
 
@@ -28,33 +28,35 @@ def split_overlaps(
         costs: (3m,) positive cost of cutting the side opposite each corner.
         areas: (m,) areas of the triangles, by which overlaps are compared.
         pairs: (k, 2) triangles to separate, one pair or more, in lexicographic order.
-        least: minimum area that a chart should have.
-        most: number of charts at which splitting stops.
+        min_area: minimum area that a chart should have.
+        max_charts: number of charts at which splitting stops.
 
     Returns:
-        The charts, or None if `most` charts are not enough.
+        The charts, or None if `max_charts` charts are not enough.
     """
     chart, count = np.zeros(len(areas), dtype=np.int64), 1
     sheets = [_Sheet(disk, costs, areas, np.arange(len(areas)), 0)]
     # Pieces of sheets, with the pairs in each and the steps between them.
     waiting = [(sheets[0], 0, pairs, _steps(pairs, disk.faces))]
-    while waiting and count < most:
+    while waiting and count < max_charts:
         check_cancelled()
-        sheet, own, pairs, steps = waiting.pop()
-        if len(sheet.chart) > 1 and sheet.is_pinched(own):
-            sheet, own, pairs = sheet.opened(own, pairs)
+        sheet, index, pairs, steps = waiting.pop()
+        if len(sheet.chart) > 1 and sheet.is_pinched(index):
+            sheet, index, pairs = sheet.opened(index, pairs)
             sheets.append(sheet)
-        one, other = np.zeros((2, len(sheet.faces)), dtype=bool)
-        for layer, members in zip((one, other), largest_layers(pairs, steps, sheet.areas), strict=True):
+        first_layer, second_layer = np.zeros((2, len(sheet.faces)), dtype=bool)
+        for layer, members in zip(
+            (first_layer, second_layer), largest_layers(pairs, steps, sheet.areas), strict=True
+        ):
             layer[members] = True
-        if least > 0:
-            one, other = sheet.widened(own, one, other, sheet.areas, least)
-        pieces = sheet.separate(own, one, other)
+        if min_area > 0:
+            first_layer, second_layer = sheet.widened(index, first_layer, second_layer, sheet.areas, min_area)
+        pieces = sheet.separate(index, first_layer, second_layer)
         if pieces is None:
             # The layers cannot be separated: the overlap remains and is reported by the measures.
             continue
         sheet.chart += [0] * (len(pieces) - 1)
-        number = sheet.chart[own]
+        number = sheet.chart[index]
         for i, piece in enumerate(pieces):
             sheet.chart[piece] = number if i == 0 else count
             count += i > 0
@@ -81,12 +83,12 @@ class _Sheet(Sheet):
         super().__init__(disk, costs)
         self.areas, self.faces, self.chart = areas, faces, [chart]
 
-    def opened(self, own: int, pairs: IntArray) -> tuple[_Sheet, int, IntArray]:
+    def opened(self, index: int, pairs: IntArray) -> tuple[_Sheet, int, IntArray]:
         """Return a pinched piece as a sheet cut open at its pinch points, its piece index, and its pairs."""
-        members = np.flatnonzero(self.piece == own)
+        members = np.flatnonzero(self.piece == index)
         disk = as_disk(self.disk.vertices, self.disk.faces[members])
         costs = self.costs.reshape(-1, 3)[members].ravel()
-        sheet = _Sheet(disk, costs, self.areas[members], self.faces[members], self.chart[own])
+        sheet = _Sheet(disk, costs, self.areas[members], self.faces[members], self.chart[index])
         return sheet, 0, np.searchsorted(members, pairs)
 
 
@@ -109,8 +111,8 @@ def unpinched(mesh: TriangleMesh) -> TriangleMesh:
 
 def _steps_between(steps: IntArray, chosen: BoolArray) -> IntArray:
     """Return the steps between chosen pairs (k,), renumbered, see `_steps`."""
-    number, kept = np.cumsum(chosen) - 1, chosen[steps // 2].all(axis=0)
-    return np.asarray(2 * number[steps[:, kept] // 2] + steps[:, kept] % 2)
+    number, is_within = np.cumsum(chosen) - 1, chosen[steps // 2].all(axis=0)
+    return np.asarray(2 * number[steps[:, is_within] // 2] + steps[:, is_within] % 2)
 
 
 def largest_layers(pairs: IntArray, steps: IntArray, areas: FloatArray) -> tuple[IntArray, IntArray]:
@@ -125,23 +127,27 @@ def largest_layers(pairs: IntArray, steps: IntArray, areas: FloatArray) -> tuple
         areas: (m,) areas of the triangles.
     """
     count, label = label_components(2 * len(pairs), *np.concatenate([steps, steps ^ 1], axis=1))
-    kept, moved, n = pairs.ravel(), pairs[:, ::-1].ravel(), len(areas)
-    layer, swapped = np.unique(label * n + kept), np.empty(count, dtype=np.int64)
+    firsts, seconds, n = pairs.ravel(), pairs[:, ::-1].ravel(), len(areas)
+    layer, swapped = np.unique(label * n + firsts), np.empty(count, dtype=np.int64)
     swapped[label] = label.reshape(-1, 2)[:, ::-1].ravel()
     size = np.bincount(layer // n, areas[layer % n], count)
     size = np.minimum(size, size[swapped])
     _, first = np.unique(label, return_index=True)
     wound = np.unique(layer[np.isin(layer, swapped[layer // n] * n + layer % n)] // n)
-    size[wound] = np.minimum(areas[kept], areas[moved])[first[wound]]
+    size[wound] = np.minimum(areas[firsts], areas[seconds])[first[wound]]
     size[first % 2 == 1] = -1.0
     return _layers(pairs, np.flatnonzero(label == np.argmax(size)))
 
 
 def _layers(pairs: IntArray, members: IntArray) -> tuple[IntArray, IntArray]:
     """Return the first and second triangles of pairs numbered as in `_steps`; those of one pair if they intersect."""
-    kept, moved = pairs.ravel()[members], pairs.ravel()[members ^ 1]
-    one, other = np.unique(kept), np.unique(moved)
-    return (kept[:1], moved[:1]) if len(np.intersect1d(one, other)) else (one, other)
+    firsts, seconds = pairs.ravel()[members], pairs.ravel()[members ^ 1]
+    first_layer, second_layer = np.unique(firsts), np.unique(seconds)
+    return (
+        (firsts[:1], seconds[:1])
+        if len(np.intersect1d(first_layer, second_layer))
+        else (first_layer, second_layer)
+    )
 
 
 def _steps(pairs: IntArray, triangles: IntArray) -> IntArray:
@@ -152,21 +158,21 @@ def _steps(pairs: IntArray, triangles: IntArray) -> IntArray:
     # The triangles of pairs are renumbered, as most triangles are in no pair.
     chosen, index = np.unique(pairs, return_inverse=True)
     pairs, count = index.reshape(-1, 2), len(chosen)
-    one, two = _neighbours(triangles[chosen])
-    two = two[np.argsort(one, kind="stable")]
-    degree = np.bincount(one, minlength=count)
+    triangle, neighbour = _neighbours(triangles[chosen])
+    neighbour = neighbour[np.argsort(triangle, kind="stable")]
+    degree = np.bincount(triangle, minlength=count)
     starts = np.cumsum(degree) - degree
     # Every pair in both orders; the second triangle moves to each of its neighbours.
-    kept, moved = pairs.ravel(), pairs[:, ::-1].ravel()
+    fixed, moved = pairs.ravel(), pairs[:, ::-1].ravel()
     first, degree = starts[moved], degree[moved]
     source = np.repeat(np.arange(len(moved)), degree)
     step = np.arange(len(source)) - np.repeat(np.cumsum(degree) - degree - first, degree)
-    kept, moved = kept[source], two[step]
+    fixed, moved = fixed[source], neighbour[step]
     keys = pairs[:, 0] * count + pairs[:, 1]
-    wanted = np.minimum(kept, moved) * count + np.maximum(kept, moved)
-    place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-    found = keys[place] == wanted
-    return np.stack([source[found], 2 * place[found] + (kept > moved)[found]])
+    step_keys = np.minimum(fixed, moved) * count + np.maximum(fixed, moved)
+    place = np.minimum(np.searchsorted(keys, step_keys), len(keys) - 1)
+    is_pair = keys[place] == step_keys
+    return np.stack([source[is_pair], 2 * place[is_pair] + (fixed > moved)[is_pair]])
 
 
 def _neighbours(triangles: IntArray) -> tuple[IntArray, IntArray]:
@@ -175,5 +181,5 @@ def _neighbours(triangles: IntArray) -> tuple[IntArray, IntArray]:
     corners = corner.reshape(-1, 3)
     order, first = sort_pairs(corners.ravel(), corners[:, NEXT].ravel(), len(points))
     again = np.flatnonzero(~first)
-    one, two = order[again - 1] // 3, order[again] // 3
-    return np.concatenate([one, two]), np.concatenate([two, one])
+    triangle, neighbour = order[again - 1] // 3, order[again] // 3
+    return np.concatenate([triangle, neighbour]), np.concatenate([neighbour, triangle])

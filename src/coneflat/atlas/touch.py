@@ -47,8 +47,8 @@ def separate_touching(
     )
     if stored is not None:
         points = stored(points)
-    best, found = points, find_overlaps(points, corners)
-    overlaps = found
+    best, remaining = points, find_overlaps(points, corners)
+    overlaps = remaining
     for _ in range(MAX_ROUNDS):
         moves = _moves(points @ np.array([1, 1j]), corners, overlaps.pairs, touching * extent, gap * extent)
         if not moves.any():
@@ -57,9 +57,9 @@ def separate_touching(
         if stored is not None:
             points = stored(points)
         overlaps = find_overlaps(points, corners)
-        if len(overlaps.pairs) < len(found.pairs):
-            best, found = points, overlaps
-    return best, found
+        if len(overlaps.pairs) < len(remaining.pairs):
+            best, remaining = points, overlaps
+    return best, remaining
 
 
 def _moves(
@@ -72,20 +72,20 @@ def _moves(
     moves = np.zeros(len(places), dtype=np.complex128)
     if not len(pairs):
         return moves
-    both = corners[pairs]
-    across, depth = _least_depth(places[both])
+    corner_pairs = corners[pairs]
+    across, depth = _least_depth(places[corner_pairs])
     is_touching = depth < touching
-    both, across, move = both[is_touching], across[is_touching], depth[is_touching] / 2 + gap
+    corner_pairs, across, move = corner_pairs[is_touching], across[is_touching], depth[is_touching] / 2 + gap
     # Points that the two triangles share stay in place.
     shared = (
-        (both[:, 0, :, None] == both[:, 1, None, :]).any(axis=2),
-        (both[:, 1, :, None] == both[:, 0, None, :]).any(axis=2),
+        (corner_pairs[:, 0, :, None] == corner_pairs[:, 1, None, :]).any(axis=2),
+        (corner_pairs[:, 1, :, None] == corner_pairs[:, 0, None, :]).any(axis=2),
     )
     for side, sign in ((0, -1.0), (1, 1.0)):
-        ahead = sign * (np.conj(across[:, None]) * places[both[:, side]]).real
+        ahead = sign * (np.conj(across[:, None]) * places[corner_pairs[:, side]]).real
         reaches = (ahead - ahead.min(axis=1, keepdims=True) < 2 * move[:, None]) & ~shared[side]
         step = np.broadcast_to((sign * move * across)[:, None], reaches.shape)
-        np.add.at(moves, both[:, side][reaches], step[reaches])
+        np.add.at(moves, corner_pairs[:, side][reaches], step[reaches])
     return moves
 
 
@@ -151,16 +151,18 @@ def _unflipped(
     steps = np.stack(np.meshgrid(along, along, indexing="ij"), axis=-1).reshape(-1, 2)
     steps = steps[np.argsort((steps**2).sum(axis=1), kind="stable")]
     for _ in range(MAX_ROUNDS):
-        bad = np.flatnonzero((signed_double_areas(points[corners]) <= 0) & is_positive)
-        if not 0 < len(bad) <= MAX_FLIPPED:
+        flipped = np.flatnonzero((signed_double_areas(points[corners]) <= 0) & is_positive)
+        if not 0 < len(flipped) <= MAX_FLIPPED:
             break
-        near = np.flatnonzero(np.isin(corners, corners[bad]).any(axis=1) & is_positive)
-        for point in np.unique(corners[bad]).tolist():
-            star = corners[near[(corners[near] == point).any(axis=1)]]
+        candidates = np.flatnonzero(np.isin(corners, corners[flipped]).any(axis=1) & is_positive)
+        for point in np.unique(corners[flipped]).tolist():
+            star = corners[candidates[(corners[candidates] == point).any(axis=1)]]
             places = stored(points[point] + steps * max(1.0, np.abs(points[point]).max()))
             flat = np.repeat(points[star][None], len(places), axis=0)
             flat[:, star == point] = places[:, None]
-            least = signed_double_areas(flat.reshape(-1, 3, 2)).reshape(len(places), -1).min(axis=1)
-            if least[0] <= 0 and least.max() > least[0]:
-                points[point] = places[np.argmax(least > 0) if (least > 0).any() else np.argmax(least)]
+            smallest = signed_double_areas(flat.reshape(-1, 3, 2)).reshape(len(places), -1).min(axis=1)
+            if smallest[0] <= 0 and smallest.max() > smallest[0]:
+                points[point] = places[
+                    np.argmax(smallest > 0) if (smallest > 0).any() else np.argmax(smallest)
+                ]
     return points

@@ -90,7 +90,7 @@ def component_at_work(place: str, share: float) -> Iterator[None]:
     if stopwatch is None:
         yield
         return
-    stopwatch.component, stopwatch.share = place, share
+    stopwatch.begin_component(place, share)
     yield
     stopwatch.end_component()
 
@@ -138,6 +138,10 @@ class Stopwatch:
             _stopwatch.reset(token)
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
         self._within = until
+
+    def begin_component(self, place: str, share: float) -> None:
+        """Report what follows as work on a component; arguments as of `component_at_work`."""
+        self._within, self.component, self.share = 0.0, place, share
 
     def end_component(self) -> None:
         """Count the current component as done."""

@@ -29,8 +29,8 @@ def both_sides(mesh: TriangleMesh, edges: IntArray, at_corners: Values) -> tuple
         at_corners: (m, 3, ...) values at the corners.
     """
     flat = at_corners.reshape(-1, *at_corners.shape[2:])
-    one, two = (end_corners(mesh.edge_halfedges[edges, side]) for side in (0, 1))
-    return flat[np.stack(one, axis=1)], flat[np.stack(two[::-1], axis=1)]
+    first_face, second_face = (end_corners(mesh.edge_halfedges[edges, side]) for side in (0, 1))
+    return flat[np.stack(first_face, axis=1)], flat[np.stack(second_face[::-1], axis=1)]
 
 
 def point_seams(mesh: TriangleMesh, corners: IntArray, among: IntArray | None = None) -> IntArray:
@@ -42,8 +42,8 @@ def point_seams(mesh: TriangleMesh, corners: IntArray, among: IntArray | None = 
         among: edges to choose from; None: all.
     """
     inner = np.flatnonzero(~mesh.is_boundary_edge) if among is None else among[~mesh.is_boundary_edge[among]]
-    here, there = both_sides(mesh, inner, corners)
-    return inner[(here[:, 0] != there[:, 0]) | (here[:, 1] != there[:, 1])]
+    first_side, second_side = both_sides(mesh, inner, corners)
+    return inner[(first_side[:, 0] != second_side[:, 0]) | (first_side[:, 1] != second_side[:, 1])]
 
 
 def point_vertices(faces: IntArray, corners: IntArray, count: int) -> IntArray:
@@ -62,9 +62,11 @@ def joined_edges(mesh: TriangleMesh, corner_uv: FloatArray) -> BoolArray:
     """Return (e,) True for inner edges whose two sides coincide in the plane; `corner_uv` is (m, 3, 2)."""
     uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
     inner = np.flatnonzero(~mesh.is_boundary_edge)
-    here, there = both_sides(mesh, inner, uv.view(np.complex128)[..., 0])
-    gap = np.abs(here - there).max(axis=1)
-    length = np.maximum(np.abs(here[:, 1] - here[:, 0]), np.abs(there[:, 1] - there[:, 0]))
+    first_side, second_side = both_sides(mesh, inner, uv.view(np.complex128)[..., 0])
+    gap = np.abs(first_side - second_side).max(axis=1)
+    length = np.maximum(
+        np.abs(first_side[:, 1] - first_side[:, 0]), np.abs(second_side[:, 1] - second_side[:, 0])
+    )
     joined = np.zeros(len(mesh.edges), dtype=bool)
     joined[inner] = gap <= JOIN_TOLERANCE * length
     return joined

@@ -149,17 +149,17 @@ class _Check:
         Raises:
             DegenerateFaceError: a face uses a vertex twice and the mesh is not repaired.
         """
-        one, two, three = self.faces.T
-        bad = (one == two) | (two == three) | (three == one)
-        if bad.any():
-            where = np.flatnonzero(bad)
+        a, b, c = self.faces.T
+        repeats_vertex = (a == b) | (b == c) | (c == a)
+        if repeats_vertex.any():
+            degenerate = np.flatnonzero(repeats_vertex)
             if not self.repair:
                 raise DegenerateFaceError(
-                    f"{plural(len(where), 'face')} with the same vertex twice: {list_some(where)}; "
+                    f"{plural(len(degenerate), 'face')} with the same vertex twice: {list_some(degenerate)}; "
                     f"{REPAIR_ADVICE} to drop them"
                 )
-            self._keep(~bad)
-            self.notes.append(f"Dropped {plural(len(where), 'face')} with the same vertex twice.")
+            self._keep(~repeats_vertex)
+            self.notes.append(f"Dropped {plural(len(degenerate), 'face')} with the same vertex twice.")
 
     def pair_halfedges(self) -> None:
         """Find the pairs (k, 2) of half-edges that are glued; at edges with three or more faces, only layers are.
@@ -180,8 +180,10 @@ class _Check:
         glued = glue_layers(self.vertices, self.faces, groups)
         self.pairs = glued.pairs
         if glued.stacked:
-            what = plural(glued.stacked, "face")
-            self.notes.append(f"Put {what} on the same three vertices as others into separate layers.")
+            stacked_faces = plural(glued.stacked, "face")
+            self.notes.append(
+                f"Put {stacked_faces} on the same three vertices as others into separate layers."
+            )
         if glued.separated:
             self.notes.append(f"Separated the faces at {plural(glued.separated, 'edge')} with more than two.")
 
@@ -197,18 +199,18 @@ class _Check:
         if not same_way.any():
             return
         pairs = self.pairs // 3
-        one, two = pairs.T
+        first_face, second_face = pairs.T
         tree = np.flatnonzero(grow_forest(pairs, count))
         # There are two copies of each face, one per orientation; a spanning tree joins them to two mirrored halves.
         crossing = same_way[tree] * count
-        first, second = one[tree], two[tree]
+        tree_first, tree_second = first_face[tree], second_face[tree]
         _, half = label_components(
             2 * count,
-            np.concatenate([first, first + count]),
-            np.concatenate([second + crossing, second + count - crossing]),
+            np.concatenate([tree_first, tree_first + count]),
+            np.concatenate([tree_second + crossing, tree_second + count - crossing]),
         )
         flip = half[:count] > half[count:]
-        conflict = same_way ^ flip[one] ^ flip[two]
+        conflict = same_way ^ flip[first_face] ^ flip[second_face]
         if conflict.any():
             if not self.repair:
                 raise NonOrientableError(
@@ -218,7 +220,7 @@ class _Check:
                 )
             self.pairs = self.pairs[~conflict]
             self.notes.append(f"Cut the non-orientable surface at {plural(int(conflict.sum()), 'edge')}.")
-        components, component = label_components(count, one[tree], two[tree])
+        components, component = label_components(count, first_face[tree], second_face[tree])
         sizes = np.bincount(component, minlength=components)
         flipped = np.bincount(component, weights=flip, minlength=components)
         flip ^= (flipped > sizes / 2)[component]

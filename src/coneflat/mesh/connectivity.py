@@ -32,7 +32,7 @@ def label_components(count: int, tails: IntArray, heads: IntArray) -> tuple[int,
         count: number of nodes.
         tails, heads: (e,) the nodes that each edge connects.
     """
-    ends = (np.ascontiguousarray(each, dtype=np.int64) for each in (tails, heads))
+    ends = (np.ascontiguousarray(nodes, dtype=np.int64) for nodes in (tails, heads))
     number, labels = label_nodes(count, *ends)
     return int(number), labels
 
@@ -56,21 +56,21 @@ def sort_by_counting(keys: IntArray, bound: int) -> IntArray:
     return rows.tocsc().indices
 
 
-def sort_pairs(one: IntArray, two: IntArray, bound: int) -> tuple[IntArray, BoolArray]:
+def sort_pairs(tails: IntArray, heads: IntArray, bound: int) -> tuple[IntArray, BoolArray]:
     """Return the stable order of unordered pairs by smaller, then larger index, and a mask of first occurrences.
 
     Args:
-        one, two: (k,) the indices of each pair, from 0 to bound - 1.
+        tails, heads: (k,) the indices of each pair, from 0 to bound - 1.
         bound: number of indices.
 
     Returns:
         (k,) the order; (k,) True where a pair in this order differs from the one before.
     """
-    low, high = np.minimum(one, two), np.maximum(one, two)
+    low, high = np.minimum(tails, heads), np.maximum(tails, heads)
     order: IntArray = np.argsort(low * np.int64(bound) + high, kind="stable")
-    first = np.ones(len(order), dtype=bool)
-    first[1:] = (np.diff(low[order]) != 0) | (np.diff(high[order]) != 0)
-    return order, first
+    is_first = np.ones(len(order), dtype=bool)
+    is_first[1:] = (np.diff(low[order]) != 0) | (np.diff(high[order]) != 0)
+    return order, is_first
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,14 +103,14 @@ class TriangleMesh:
         edge_of[order] = np.cumsum(is_first) - 1
         starts = np.flatnonzero(is_first)
         ends = np.append(starts[1:], len(order)) - 1
-        one = order[starts]
-        pairs = np.sort(np.stack([tails[one], heads[one]], axis=1), axis=1)
-        return pairs, edge_of, np.stack([one, np.where(ends > starts, order[ends], -1)], axis=1)
+        first = order[starts]
+        pairs = np.sort(np.stack([tails[first], heads[first]], axis=1), axis=1)
+        return pairs, edge_of, np.stack([first, np.where(ends > starts, order[ends], -1)], axis=1)
 
     def moved_to(self, vertices: FloatArray) -> TriangleMesh:
         """Return the mesh with other vertex positions (n, 3); cached connectivity is shared."""
-        moved, known = TriangleMesh(vertices, self.faces), self.__dict__
-        moved.__dict__.update({name: known[name] for name in CONNECTIVITY if name in known})
+        moved, cached = TriangleMesh(vertices, self.faces), self.__dict__
+        moved.__dict__.update({name: cached[name] for name in CONNECTIVITY if name in cached})
         return moved
 
     @cached_property
@@ -184,10 +184,10 @@ class TriangleMesh:
         sides, walks = self.edge_halfedges[self.is_boundary_edge, 0], list[list[int]]()
         ends = np.stack([*self.ends_of(sides), sides], axis=1).tolist()
         leaving = {tail: (head, side) for tail, head, side in ends}
-        for here in list(leaving):
+        for vertex in list(leaving):
             walks.append([])
-            while here in leaving:
-                here, side = leaving.pop(here)
+            while vertex in leaving:
+                vertex, side = leaving.pop(vertex)
                 walks[-1].append(side)
         return [np.array(walk) for walk in walks if walk]
 
@@ -269,12 +269,12 @@ def nearby(faces: IntArray, seeds: BoolArray, rings: int) -> BoolArray:
     return inside
 
 
-def corner_fans(faces: IntArray, one: IntArray, two: IntArray) -> tuple[int, IntArray]:
+def corner_fans(faces: IntArray, halfedges: IntArray, partners: IntArray) -> tuple[int, IntArray]:
     """Return the number of fans, and (m, 3) the fan of each corner; corners joined across half-edges share a fan.
 
     Args:
         faces: (m, 3) vertex indices.
-        one, two: (k,) half-edges glued to each other, on the same pair of vertices.
+        halfedges, partners: (k,) half-edges glued to each other, on the same pair of vertices.
 
     Returns:
         The number of fans (classes of joined corners) and the fan of each corner (m, 3). If all interior edges are
@@ -282,17 +282,22 @@ def corner_fans(faces: IntArray, one: IntArray, two: IntArray) -> tuple[int, Int
     """
     flat = faces.ravel()
     # The end corners of both half-edges, ordered so that the same vertex comes first.
-    start_one, end_one = end_corners(one)
-    start_two, end_two = end_corners(two)
-    opposed = flat[start_one] == flat[end_two]
-    start_two, end_two = np.where(opposed, end_two, start_two), np.where(opposed, start_two, end_two)
+    start, end = end_corners(halfedges)
+    partner_start, partner_end = end_corners(partners)
+    opposed = flat[start] == flat[partner_end]
+    partner_start, partner_end = (
+        np.where(opposed, partner_end, partner_start),
+        np.where(opposed, partner_start, partner_end),
+    )
     count, labels = label_components(
-        faces.size, np.concatenate([start_one, end_one]), np.concatenate([start_two, end_two])
+        faces.size, np.concatenate([start, end]), np.concatenate([partner_start, partner_end])
     )
     return count, labels.reshape(faces.shape)
 
 
-def split_vertices(faces: IntArray, count: int, one: IntArray, two: IntArray) -> tuple[IntArray, IntArray]:
+def split_vertices(
+    faces: IntArray, count: int, halfedges: IntArray, partners: IntArray
+) -> tuple[IntArray, IntArray]:
     """Return the vertex of each fan, ascending, and (m, 3) the fan of each corner.
 
     The fans of a vertex are in the order of their first corners.
@@ -300,9 +305,9 @@ def split_vertices(faces: IntArray, count: int, one: IntArray, two: IntArray) ->
     Args:
         faces: (m, 3) vertex indices.
         count: number of vertices.
-        one, two: (k,) half-edges glued to each other, on the same pair of vertices.
+        halfedges, partners: (k,) half-edges glued to each other, on the same pair of vertices.
     """
-    fans, fan = corner_fans(faces, one, two)
+    fans, fan = corner_fans(faces, halfedges, partners)
     origin = np.empty(fans, dtype=np.int64)
     origin[fan] = faces
     order = sort_by_counting(origin, count)
@@ -349,10 +354,10 @@ def measure_sides(vertices: FloatArray, faces: IntArray) -> FloatArray:
     lengths = np.empty(faces.shape)
     for f in range(len(faces)):
         for i in range(3):
-            one, two = faces[f, (i + 1) % 3], faces[f, (i + 2) % 3]
+            tail, head = faces[f, (i + 1) % 3], faces[f, (i + 2) % 3]
             square = 0.0
             for x in range(vertices.shape[1]):
-                side = vertices[two, x] - vertices[one, x]
+                side = vertices[head, x] - vertices[tail, x]
                 square += side * side
             lengths[f, i] = math.sqrt(square)
     return lengths

@@ -21,14 +21,14 @@ def _shape_vectors(centred: FloatArray) -> tuple[FloatArray | None, FloatArray |
         centred: (n, 3) vertices relative to their centre, at a distance of at most 1.
     """
     squares = dots(centred, centred)
-    one, two = squares @ centred, squares**2 @ centred
-    (a, b, c), (d, e, f) = one.tolist(), two.tolist()
+    first_moment, second_moment = squares @ centred, squares**2 @ centred
+    (a, b, c), (d, e, f) = first_moment.tolist(), second_moment.tolist()
     across = np.array([b * f - c * e, c * d - a * f, a * e - b * d])
-    lengths = [math.sqrt(vector @ vector) for vector in (one, two, across)]
+    lengths = [math.sqrt(vector @ vector) for vector in (first_moment, second_moment, across)]
     # Vectors that vanish up to rounding have no meaningful direction.
-    has_one = lengths[0] > 1e-6 * len(centred)
+    has_moment = lengths[0] > 1e-6 * len(centred)
     has_across = lengths[2] > 1e-6 * max(lengths[0] * lengths[1], 1e-12 * len(centred) ** 2)
-    return one / lengths[0] if has_one else None, across / lengths[2] if has_across else None
+    return first_moment / lengths[0] if has_moment else None, across / lengths[2] if has_across else None
 
 
 def _centred(vertices: FloatArray) -> FloatArray:
@@ -46,9 +46,9 @@ def shape_axes(vertices: FloatArray) -> FloatArray:
     axes: list[FloatArray] = []
     for vector in (*_shape_vectors(_centred(vertices)), *np.eye(3)):
         if vector is not None and len(axes) < 2:
-            rest = vector - sum(axis * (axis @ vector) for axis in axes)
-            if np.linalg.norm(2 * rest) > 1:
-                axes.append(rest / np.linalg.norm(rest))
+            remainder = vector - sum(axis * (axis @ vector) for axis in axes)
+            if np.linalg.norm(2 * remainder) > 1:
+                axes.append(remainder / np.linalg.norm(remainder))
     return np.stack([axes[0], axes[1], np.cross(axes[0], axes[1])])
 
 
@@ -64,10 +64,10 @@ def tie_key(vertices: FloatArray) -> FloatArray:
         vertices: (n, 3) positions.
     """
     centred = _centred(vertices)
-    one, across = _shape_vectors(centred)
+    moment, across = _shape_vectors(centred)
     key: FloatArray = dots(centred, centred)
-    if one is not None:
-        key += 0.3 * (centred @ one)
+    if moment is not None:
+        key += 0.3 * (centred @ moment)
     if across is not None:
         key += 0.1 * (centred @ across)
     # On symmetric shapes many vertices are equivalent. Which of them comes first does not matter, but the order of the
@@ -81,10 +81,10 @@ def tie_key(vertices: FloatArray) -> FloatArray:
 
 def mesh_tie_key(mesh: TriangleMesh) -> FloatArray:
     """Return the tie key (n,) of a mesh, which is cached with the mesh."""
-    known = mesh.__dict__
-    if "_tie_key" not in known:
-        known["_tie_key"] = tie_key(mesh.vertices)
-    return known["_tie_key"]
+    cache = mesh.__dict__
+    if "_tie_key" not in cache:
+        cache["_tie_key"] = tie_key(mesh.vertices)
+    return cache["_tie_key"]
 
 
 def argmax_tied(values: FloatArray, key: FloatArray) -> int:

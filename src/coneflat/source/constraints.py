@@ -73,18 +73,18 @@ def _weights_within(weights: FloatArray | None, component: IntArray) -> FloatArr
     return None if weights is None or not weights[component].any() else at_unit_scale(weights[component])
 
 
-def locate_constraints(checked: CheckedMesh, options: Options, given: InputMesh) -> Constraints:
+def locate_constraints(checked: CheckedMesh, options: Options, input_mesh: InputMesh) -> Constraints:
     """Return the constraints of the options, in the numbering of the checked mesh.
 
     Args:
         checked: the mesh.
         options: the options with the constraints.
-        given: the input.
+        input_mesh: the input.
 
     Raises:
         OptionError: a vertex does not exist or cannot be a cone or a corner; weights are invalid.
     """
-    names, count = checked.vertex_origin, len(np.asarray(given.vertices))
+    names, count = checked.vertex_origin, len(np.asarray(input_mesh.vertices))
     required = _locate(checked, "cone", dict.fromkeys(options.required_cones))
     for vertex in options.forbidden_cones:
         if not 0 <= vertex < count:
@@ -99,18 +99,18 @@ def locate_constraints(checked: CheckedMesh, options: Options, given: InputMesh)
         _locate(checked, "corner", options.corners),
         required,
         is_allowed,
-        vertex_numbers("weights", options.weights, given, names),
-        vertex_numbers("seam weights", options.seam_weights, given, names),
+        vertex_numbers("weights", options.weights, input_mesh, names),
+        vertex_numbers("seam weights", options.seam_weights, input_mesh, names),
     )
 
 
-def _locate(checked: CheckedMesh, noun: str, given: Mapping[int, float | None]) -> VertexCurvatures:
+def _locate(checked: CheckedMesh, noun: str, prescribed: Mapping[int, float | None]) -> VertexCurvatures:
     """Return given cones, which must be inner vertices, given corners, which must be on the boundary, or both."""
-    names, origin = np.array(list(given), dtype=np.int64), checked.vertex_origin
+    names, origin = np.array(list(prescribed), dtype=np.int64), checked.vertex_origin
     for name in np.setdiff1d(names, origin):
         raise OptionError(f"{noun} {name} is not a vertex of a face: indices are from 0 to {origin[-1]}")
-    found = np.searchsorted(origin, names)
-    on_boundary = checked.mesh.is_boundary_vertex[found]
+    vertices = np.searchsorted(origin, names)
+    on_boundary = checked.mesh.is_boundary_vertex[vertices]
     if noun == "cone":
         for name in names[on_boundary]:
             raise OptionError(
@@ -119,11 +119,13 @@ def _locate(checked: CheckedMesh, noun: str, given: Mapping[int, float | None]) 
             )
     elif noun == "corner":
         # Repair may have split a corner. All of its copies on the boundary are corners.
-        found = np.flatnonzero(np.isin(origin, names) & checked.mesh.is_boundary_vertex)
-        for name in np.setdiff1d(names, origin[found]):
+        vertices = np.flatnonzero(np.isin(origin, names) & checked.mesh.is_boundary_vertex)
+        for name in np.setdiff1d(names, origin[vertices]):
             raise OptionError(f"corner {name} does not lie on the boundary")
-    values = (given[name] for name in origin[found].tolist())
-    return VertexCurvatures(found, np.array([np.nan if k is None else k for k in values], dtype=np.float64))
+    values = (prescribed[name] for name in origin[vertices].tolist())
+    return VertexCurvatures(
+        vertices, np.array([np.nan if k is None else k for k in values], dtype=np.float64)
+    )
 
 
 def _weights_of_some(noun: str, weights: Mapping[Any, Any], count: int) -> FloatArray:
@@ -137,13 +139,13 @@ def _weights_of_some(noun: str, weights: Mapping[Any, Any], count: int) -> Float
     return values
 
 
-def vertex_numbers(noun: str, weights: object, given: InputMesh, names: IntArray) -> FloatArray | None:
+def vertex_numbers(noun: str, weights: object, input_mesh: InputMesh, names: IntArray) -> FloatArray | None:
     """Return (n,) nonnegative numbers for the vertices `names` of the input, such as their importance; None for None.
 
     Args:
         noun: what the numbers are, for messages.
         weights: one number for each vertex of the input, a map for some, or the name of a vertex property.
-        given: the input.
+        input_mesh: the input.
         names: (n,) vertices.
 
     Raises:
@@ -151,9 +153,9 @@ def vertex_numbers(noun: str, weights: object, given: InputMesh, names: IntArray
     """
     if weights is None:
         return None
-    count = len(np.asarray(given.vertices))
+    count = len(np.asarray(input_mesh.vertices))
     if isinstance(weights, str):
-        weights = _property(noun, weights, given)
+        weights = _property(noun, weights, input_mesh)
     if isinstance(weights, Mapping):
         weights = _weights_of_some(noun, weights, count)
     try:
@@ -175,12 +177,12 @@ def vertex_numbers(noun: str, weights: object, given: InputMesh, names: IntArray
     return values[names]
 
 
-def _property(noun: str, name: str, given: InputMesh) -> FloatArray:
+def _property(noun: str, name: str, input_mesh: InputMesh) -> FloatArray:
     """Return (n,) a vertex property of the input's file; "color" stands for the saturation of the vertex colour."""
-    known = {} if given.source is None else given.source.properties
-    if name == "color" and all(colour in known for colour in COLOURS):
-        return 1.0 + PAINTED * np.ptp(np.stack([known[colour] for colour in COLOURS]), axis=0)
-    if name not in known:
-        has = "it has " + ", ".join(known) if known else "it has none"
+    properties = {} if input_mesh.source is None else input_mesh.source.properties
+    if name == "color" and all(colour in properties for colour in COLOURS):
+        return 1.0 + PAINTED * np.ptp(np.stack([properties[colour] for colour in COLOURS]), axis=0)
+    if name not in properties:
+        has = "it has " + ", ".join(properties) if properties else "it has none"
         raise OptionError(f"the mesh has no vertex property {name!r} for {noun}; {has}")
-    return known[name]
+    return properties[name]

@@ -38,7 +38,7 @@ class Copy:
 
 
 def find_copies(
-    components: Sequence[Component], others: Container[int] = (), rounding: float | None = None
+    components: Sequence[Component], excluded: Container[int] = (), rounding: float | None = None
 ) -> list[Copy | None]:
     """Return for each component the component of which it is a copy, None for the first of a kind.
 
@@ -47,27 +47,27 @@ def find_copies(
 
     Args:
         components: the components.
-        others: indices of components that are not compared.
+        excluded: indices of components that are not compared.
         rounding: largest distance of the vertices of a copy from those of the first, relative to the largest
             coordinates; None for copies that are exact up to the rounding of doubles.
     """
-    found: list[Copy | None] = [None] * len(components)
+    copies: list[Copy | None] = [None] * len(components)
     if len(components) == 1:
-        return found
+        return copies
     kinds: dict[tuple[object, ...], list[int]] = {}
     for i, component in enumerate(components):
-        if i in others or _has_vertex_options(component):
+        if i in excluded or _has_vertex_options(component):
             continue
         key = _copy_key(component) if rounding is None else (component.mesh.faces.tobytes(),)
         alike = kinds.setdefault(key, [])
         for first in alike[:MAX_COMPARED]:
             scale = _scale_of_copy(components[first], component, rounding)
             if scale is not None:
-                found[i] = Copy(first, scale)
+                copies[i] = Copy(first, scale)
                 break
         else:
             alike.append(i)
-    return found
+    return copies
 
 
 def copied(first: Layout, component: Component, scale: float) -> Layout:
@@ -83,7 +83,7 @@ def _has_vertex_options(component: Component) -> bool:
         len(cones.prescribed)
         or len(component.metric.corners)
         or len(cones.required)
-        or any(one is not None for one in weights)
+        or any(per_vertex is not None for per_vertex in weights)
     )
 
 
@@ -100,7 +100,7 @@ def _copy_key(component: Component) -> tuple[object, ...]:
         component.cones.is_allowed,
         component.metric.keeps_length,
     )
-    return (component.mesh.faces.tobytes(), *(each.tobytes() for each in flags), *shape)
+    return (component.mesh.faces.tobytes(), *(flag.tobytes() for flag in flags), *shape)
 
 
 def _scale_of_copy(first: Component, component: Component, rounding: float | None) -> float | None:
@@ -111,14 +111,14 @@ def _scale_of_copy(first: Component, component: Component, rounding: float | Non
     References:
         W. Kabsch, "A solution for the best rotation to relate two sets of vectors", 1976.
     """
-    one, two = (p.mesh.vertices - p.mesh.vertices.mean(axis=0) for p in (first, component))
-    sizes = np.sqrt((one * one).sum()), np.sqrt((two * two).sum())
+    first_centred, centred = (p.mesh.vertices - p.mesh.vertices.mean(axis=0) for p in (first, component))
+    sizes = np.sqrt((first_centred * first_centred).sum()), np.sqrt((centred * centred).sum())
     if not (sizes[0] > 0 and sizes[1] > 0):
         return None
     scale = float(sizes[1] / sizes[0])
-    left, _, right = np.linalg.svd(one.T @ two)
+    left, _, right = np.linalg.svd(first_centred.T @ centred)
     handed = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    off: FloatArray = np.abs((one @ ((left * handed) @ right)) * scale - two).max(axis=1)
+    off: FloatArray = np.abs((first_centred @ ((left * handed) @ right)) * scale - centred).max(axis=1)
     reach = float(np.abs(component.mesh.vertices).max() + scale * np.abs(first.mesh.vertices).max())
     sides = np.abs(scale * first.lengths - component.lengths)
     if rounding is not None:

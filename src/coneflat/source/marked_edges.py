@@ -21,13 +21,15 @@ from .input_mesh import InputMesh, reorder_corners
 TIE_BREAK = 1e-6
 
 
-def marked_edges(checked: CheckedMesh, options: Options, given: InputMesh, forbidden: BoolArray) -> BoolArray:
+def marked_edges(
+    checked: CheckedMesh, options: Options, input_mesh: InputMesh, forbidden: BoolArray
+) -> BoolArray:
     """Return (e,) whether each edge is an inner edge marked as a seam: named, sharp, or a seam of the input's UVs.
 
     Args:
         checked: the mesh with e edges.
         options: the options.
-        given: the input.
+        input_mesh: the input.
         forbidden: (e,) edges that must not be cut, even if they are sharp.
 
     Raises:
@@ -38,17 +40,17 @@ def marked_edges(checked: CheckedMesh, options: Options, given: InputMesh, forbi
     marked = np.zeros(len(mesh.edges), dtype=bool)
     word, pairs = _word_and_pairs(options.seams)
     if word is not None:
-        marked |= _seams_of_input(checked, given)
+        marked |= _seams_of_input(checked, input_mesh)
     if options.sharp_angle is not None:
         marked |= np.abs(dihedral_angles(mesh)) > options.sharp_angle
     marked &= ~forbidden
     if pairs is not None:
         named = named_edges(checked, pairs)
-        both = named[forbidden[named]]
-        if len(both):
-            pair = checked.vertex_origin[mesh.edges[both[0]]]
+        contradictory = named[forbidden[named]]
+        if len(contradictory):
+            tail, head = checked.vertex_origin[mesh.edges[contradictory[0]]]
             raise SeamError(
-                f"{plural(len(both), 'edge')} given both as seams and as no_seams: the first is {pair[0]}-{pair[1]}"
+                f"{plural(len(contradictory), 'edge')} given both as seams and as no_seams: the first is {tail}-{head}"
             )
         marked[named] = True
     return marked & ~mesh.is_boundary_edge
@@ -85,15 +87,15 @@ def named_edges(checked: CheckedMesh, pairs: IntArray) -> IntArray:
     ends = np.sort(origin[checked.mesh.edges], axis=1)
     keys = ends[:, 0] * bound + ends[:, 1]
     low, high = pairs.min(axis=1), pairs.max(axis=1)
-    wanted = np.where((low >= 0) & (high < bound), low * bound + high, -1)
-    missing = np.flatnonzero(~np.isin(wanted, keys))
+    named_keys = np.where((low >= 0) & (high < bound), low * bound + high, -1)
+    missing = np.flatnonzero(~np.isin(named_keys, keys))
     if len(missing):
         names = [f"{a}-{b}" for a, b in pairs[missing[:5]].tolist()]
         raise OptionError(
             f"{plural(len(missing), 'seam')} of {len(pairs):,} between vertices that no edge connects: "
             f"{list_some(names, len(missing))}"
         )
-    return np.flatnonzero(np.isin(keys, wanted))
+    return np.flatnonzero(np.isin(keys, named_keys))
 
 
 def forbidden_edges(checked: CheckedMesh, options: Options, count: int) -> BoolArray:
@@ -107,13 +109,13 @@ def forbidden_edges(checked: CheckedMesh, options: Options, count: int) -> BoolA
     Raises:
         OptionError: a vertex or an edge does not exist.
     """
-    given = np.asarray(() if options.no_seams is None else options.no_seams, dtype=np.int64)
-    if given.ndim == 2:
-        return mask_of(len(checked.mesh.edges), named_edges(checked, given))
-    invalid = given[(given < 0) | (given >= count)]
+    named = np.asarray(() if options.no_seams is None else options.no_seams, dtype=np.int64)
+    if named.ndim == 2:
+        return mask_of(len(checked.mesh.edges), named_edges(checked, named))
+    invalid = named[(named < 0) | (named >= count)]
     if len(invalid):
         raise OptionError(f"no_seams: {invalid[0]} is not a vertex: indices are from 0 to {count - 1}")
-    inside = mask_of(count, given)
+    inside = mask_of(count, named)
     ends: BoolArray = inside[checked.vertex_origin][checked.mesh.edges]
     return ends[:, 0] & ends[:, 1]
 
@@ -138,9 +140,9 @@ def unreachable(mesh: TriangleMesh, is_forbidden: BoolArray) -> IntArray:
     return np.flatnonzero(label != np.argmax(sizes))
 
 
-def _seams_of_input(checked: CheckedMesh, given: InputMesh) -> BoolArray:
+def _seams_of_input(checked: CheckedMesh, input_mesh: InputMesh) -> BoolArray:
     """Return (e,) whether the two sides of each edge have different UVs in the input's file."""
-    texture = given.corner_texture()
+    texture = input_mesh.corner_texture()
     if texture is None:
         raise OptionError("the input has no UV coordinates, so it has no seams to use")
     mesh = checked.mesh

@@ -36,14 +36,14 @@ def coarse_step(vertices: FloatArray, faces: IntArray) -> tuple[float, int]:
     """
     if not faces.size or not vertices.size or not np.isfinite(vertices[np.unique(faces)]).all():
         return 0.0, 0
-    used = vertices[np.unique(faces)]
-    has_extent = np.ptp(used, axis=0) > 0
-    used = used[:, has_extent if has_extent.any() else used.any(axis=0)]
-    if not used.size:
+    coordinates = vertices[np.unique(faces)]
+    has_extent = np.ptp(coordinates, axis=0) > 0
+    coordinates = coordinates[:, has_extent if has_extent.any() else coordinates.any(axis=0)]
+    if not coordinates.size:
         return 0.0, 0
-    step = _single_step(used) or _decimal_step(used)
+    step = _single_step(coordinates) or _decimal_step(coordinates)
     # Scaling by a power of two avoids underflow and overflow of squared lengths.
-    exponent = unit_exponent(used)
+    exponent = unit_exponent(coordinates)
     lengths = edge_lengths(np.ldexp(vertices, -exponent), faces)
     longest, unit = lengths.max(axis=1), float(np.ldexp(step, -exponent))
     is_flat = double_areas(lengths) <= ZERO_AREA * longest**2

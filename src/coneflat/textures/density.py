@@ -9,9 +9,10 @@ import numpy as np
 
 from ..base import FloatArray
 from ..errors import OptionError
+from .options import MAX_RESOLUTION
 
-#: Largest number of texels along a side. Resolutions are multiples of STEP texels.
-MAX_RESOLUTION, STEP = 2**16, 4
+#: Resolutions are multiples of it, in texels.
+STEP = 4
 #: Rough fraction of a texture that charts and their padding cover.
 COVERED = 0.65
 #: Largest number of packings of a search. It ends after 4 to 8 unless the density is not monotone.
@@ -31,10 +32,10 @@ def expected_resolution(density: float, areas: FloatArray, padding: float, tiles
         OptionError: no texture is large enough, even if charts cover all of it.
     """
     sides = np.sqrt(areas / tiles)
-    whole = math.sqrt(float((sides**2).sum()))
+    charts_side = math.sqrt(float((sides**2).sum()))
     # Charts that overlap themselves may need half of this side.
-    if density * whole > 2 * MAX_RESOLUTION:
-        raise _too_large(MAX_RESOLUTION / whole)
+    if density * charts_side > 2 * MAX_RESOLUTION:
+        raise _too_large(MAX_RESOLUTION / charts_side)
     padded = math.sqrt(float(((density * sides + padding / math.sqrt(tiles)) ** 2).sum()) / COVERED)
     # Charts need some space next to the padding.
     return STEP * math.ceil(min(max(padded, 16 * padding, STEP), MAX_RESOLUTION) / STEP)
@@ -67,9 +68,9 @@ class _Search:
         densities: those of the numbers of steps that were tried.
     """
 
-    def __init__(self, density: float, scale_at: Callable[[int], float], below: int, most: int) -> None:
-        """Set up the search from `below` (exclusive) to `most` steps."""
-        self.density, self.scale_at, self.below, self.most = density, scale_at, below, most
+    def __init__(self, density: float, scale_at: Callable[[int], float], below: int, limit: int) -> None:
+        """Set up the search from `below` (exclusive) to `limit` steps."""
+        self.density, self.scale_at, self.below, self.limit = density, scale_at, below, limit
         self.densities: dict[int, float] = {}
 
     def suffices(self, steps: int) -> bool:
@@ -83,13 +84,13 @@ class _Search:
 
     def bracket(self, start: int) -> tuple[int, int]:
         """Return a number of steps that does not suffice, or the one below all, and a larger one that does."""
-        low, steps = self.below, min(max(start, self.below + 1), self.most)
+        low, steps = self.below, min(max(start, self.below + 1), self.limit)
         while not self.suffices(steps):
-            if steps == self.most:
+            if steps == self.limit:
                 raise _too_large(self.densities[steps])
             # Near the end of a line that is nearly level, extrapolation takes many small steps.
-            least = 2 * steps if len(self.densities) > 5 else steps + 1
-            low, steps = steps, min(max(self._crossing(low, steps), least), self.most)
+            next_steps = 2 * steps if len(self.densities) > 5 else steps + 1
+            low, steps = steps, min(max(self._crossing(low, steps), next_steps), self.limit)
         return low, steps
 
     def narrowed(self, low: int, high: int) -> int:
@@ -106,9 +107,13 @@ class _Search:
 
     def _crossing(self, low: int, high: int) -> int:
         """Return the number of steps with the density on the line through two numbers; twice the larger for none."""
-        one, two = self.densities.get(low, 0.0), self.densities[high]
-        steps = low + (self.density - one) / (two - one) * (high - low) if two > one else 2.0 * high
-        return math.ceil(min(steps, self.most))
+        low_density, high_density = self.densities.get(low, 0.0), self.densities[high]
+        steps = (
+            low + (self.density - low_density) / (high_density - low_density) * (high - low)
+            if high_density > low_density
+            else 2.0 * high
+        )
+        return math.ceil(min(steps, self.limit))
 
 
 def _too_large(possible: float) -> OptionError:

@@ -51,11 +51,11 @@ def freed(
         points, free = embedded_disks(disk, layout.chart, areas), None
     free = None if free is None or len(free) != len(points) else free
     energy, sides = StretchEnergy(1.0), layout.lengths
-    found = relax(
+    relaxed = relax(
         disk, points, layout.corners, energy, lengths=sides, free=free, tolerance=tolerance, to_scale=True
     )
-    energies = triangle_energies(sides, found.points[layout.corners])
-    return replace(layout, points=found.points), float(energies.sum() / areas.sum())
+    energies = triangle_energies(sides, relaxed.points[layout.corners])
+    return replace(layout, points=relaxed.points), float(energies.sum() / areas.sum())
 
 
 def _untangled(layout: Layout, disk: TriangleMesh, spec: SeamSpec | None) -> Layout:
@@ -65,16 +65,16 @@ def _untangled(layout: Layout, disk: TriangleMesh, spec: SeamSpec | None) -> Lay
     """
     fixed = np.zeros(len(layout.points), dtype=bool)
     points, *_ = untangled_disk(disk, layout.points, layout.lengths, fixed, may_wind=spec is not None)
-    found, places = replace(layout, points=points), points[disk.faces]
+    untangled, places = replace(layout, points=points), points[disk.faces]
     winding = np.flatnonzero((layout_curvature(disk, places) < -np.pi) & ~disk.is_boundary_vertex)
     if spec is None or not len(winding) or not (signed_double_areas(places) > 0).all():
-        return found
+        return untangled
     sides = disk.edge_halfedges[:, 0]
     edges, lengths = layout.mesh.halfedge_edges[sides], layout.lengths.ravel()[sides]
     forbidden = np.flatnonzero(spec.is_forbidden[edges])
     with suppress(SeamError):
         paths = find_seams(disk, winding, lengths, spec.is_avoided[edges], forbidden=forbidden)
-        return recut(found, np.union1d(seam_edges(layout), edges[paths]))
+        return recut(untangled, np.union1d(seam_edges(layout), edges[paths]))
     return layout
 
 
@@ -115,8 +115,8 @@ def measured(layout: Layout) -> Layout:
     mesh, places = layout.mesh, layout.points[layout.corners]
     areas, flat = double_areas(layout.lengths) / 2, np.abs(signed_double_areas(places)) / 2
     curvature, is_open = layout_curvature(mesh, places), np.ones(len(mesh.vertices), dtype=bool)
-    found = replace(layout, log_scale=vertex_log_scale(mesh, areas, flat), curvature=curvature)
-    return replace(found, target=curvature, is_open=is_open, is_fixed=~is_open)
+    layout_with_scales = replace(layout, log_scale=vertex_log_scale(mesh, areas, flat), curvature=curvature)
+    return replace(layout_with_scales, target=curvature, is_open=is_open, is_fixed=~is_open)
 
 
 def recut(layout: Layout, seams: IntArray) -> Layout:
@@ -148,11 +148,11 @@ def separate_charts(layout: Layout, costs: FloatArray, spec: SeamSpec) -> Layout
     label = layout.chart.copy()
     for chart in np.unique(layout.chart[pairs[:, 0]]).tolist():
         faces = np.flatnonzero(layout.chart == chart)
-        one = as_one_chart(layout, faces)
-        sides = one.mesh.edge_halfedges[:, 0]
+        chart_layout = as_one_chart(layout, faces)
+        sides = chart_layout.mesh.edge_halfedges[:, 0]
         edges = layout.mesh.halfedge_edges[3 * faces[sides // 3] + sides % 3]
-        own = replace(spec, is_avoided=spec.is_avoided[edges], is_forbidden=spec.is_forbidden[edges])
-        pieces = separate_overlaps(one, costs[edges], own, 1).chart
+        chart_spec = replace(spec, is_avoided=spec.is_avoided[edges], is_forbidden=spec.is_forbidden[edges])
+        pieces = separate_overlaps(chart_layout, costs[edges], chart_spec, 1).chart
         label[faces] = np.where(pieces > 0, label.max() + pieces, chart)
     charts = ChartLayout(layout.points, layout.corners, layout.chart)
     return with_charts(layout, charts.split(label).renumbered())
@@ -163,11 +163,15 @@ def as_one_chart(layout: Layout, faces: IntArray) -> Layout:
 
     What the layout says of vertices, cones and seams remains that of the whole mesh.
     """
-    used, corners = np.unique(layout.corners[faces], return_inverse=True)
-    points, lengths, chart = layout.points[used], layout.lengths[faces], np.zeros(len(faces), dtype=np.int64)
+    points_used, corners = np.unique(layout.corners[faces], return_inverse=True)
+    points, lengths, chart = (
+        layout.points[points_used],
+        layout.lengths[faces],
+        np.zeros(len(faces), dtype=np.int64),
+    )
     mesh = TriangleMesh(np.pad(points, ((0, 0), (0, 1))), corners.reshape(-1, 3))
-    own = replace(layout, mesh=mesh, points=points, corners=mesh.faces, disk=None)
-    return replace(own, lengths=lengths, chart=chart)
+    chart_layout = replace(layout, mesh=mesh, points=points, corners=mesh.faces, disk=None)
+    return replace(chart_layout, lengths=lengths, chart=chart)
 
 
 def seam_edges(layout: Layout) -> IntArray:

@@ -14,6 +14,7 @@ from ..options import (
     Edges,
     Kind,
     Number,
+    Options,
     RunOptions,
     SeamOptions,
     as_integer,
@@ -29,6 +30,8 @@ ISOMETRIC, MAX_ENERGY = 4.0, 4.1
 #: The energy above that of an isometry, relative to the squared area distortion, of layouts with the least energy:
 #: 17 to 27 on seven models.
 ENERGY_PER_AREA = 20.0
+#: Largest number of texels along a side.
+MAX_RESOLUTION = 2**16
 #: Bounds of the area distortion allowed. Below, the energy would be that of an isometry up to rounding; above, areas
 #: differ by factors that no number holds.
 MIN_AREA, MAX_AREA = 1e-6, 100.0
@@ -40,18 +43,18 @@ class ChartNumber(Kind):
 
     words: tuple[str, ...] = ("atlas", "one")
     metavar: ClassVar[str] = "atlas|one|NUMBER"
-    most: int = 10_000
+    limit: int = 10_000
 
     def parse(self, name: str, value: Any) -> str | int:
         text = value if isinstance(value, str) else ""
         if text in self.words:
             return text
-        given = int(text) if text.isdecimal() and len(text) < 19 else 0
-        number = given if text else as_integer(name, value)
-        if not 1 <= number <= self.most:
+        typed = int(text) if text.isdecimal() and len(text) < 19 else 0
+        number = typed if text else as_integer(name, value)
+        if not 1 <= number <= self.limit:
             expected = ", ".join(self.words)
             raise OptionError(
-                f"{name} must be {expected} or an integer from 1 to {self.most:,}, got {short_repr(value)}"
+                f"{name} must be {expected} or an integer from 1 to {self.limit:,}, got {short_repr(value)}"
             )
         return number
 
@@ -100,7 +103,7 @@ class UnwrapOptions(TextureOptions, SeamOptions, AtlasOptions, RunOptions):
             raise OptionError(
                 f"max_energy must be above 4, the energy of an isometry, got {self.max_energy:g}"
             )
-        for one, other, are_both in (
+        for first_option, second_option, are_both in (
             ("resolution", "texel_density", self._differs("texel_density") and self._differs("resolution")),
             ("area", "max_energy", self._differs("area") and self._differs("max_energy")),
             ("seams none", "max_energy", not math.isfinite(self.bound) and self._differs("max_energy")),
@@ -108,7 +111,9 @@ class UnwrapOptions(TextureOptions, SeamOptions, AtlasOptions, RunOptions):
             (f"stack {self.stack}", "lengths", self._differs("stack") and self.lengths is not None),
         ):
             if are_both:
-                raise OptionError(f"{one} and {other} cannot be combined: leave out one of them")
+                raise OptionError(
+                    f"{first_option} and {second_option} cannot be combined: leave out one of them"
+                )
 
     def _differs(self, name: str) -> bool:
         """Return whether an option is not its default."""
@@ -122,8 +127,25 @@ class UnwrapOptions(TextureOptions, SeamOptions, AtlasOptions, RunOptions):
         return None if isinstance(self.seams, str) and self.seams == "none" else self.seams
 
     @property
+    def has_no_bound(self) -> bool:
+        """Whether the option `seams` contains the word none."""
+        return self.marked is not self.seams
+
+    @property
     def bound(self) -> float:
         """The largest energy, or the energy that belongs to the largest area distortion; infinite without a bound."""
-        if self.marked is not self.seams:
+        if self.has_no_bound:
             return math.inf
         return self.max_energy if self.area is None else ISOMETRIC + ENERGY_PER_AREA * self.area**2
+
+
+#: Options that the flattening does not have, or with other values.
+OWN_NAMES = (*declarations(TextureOptions), "charts", "seams")
+
+
+def options_of_stages(options: UnwrapOptions) -> Options:
+    """Return the options of the flattening that the stages get."""
+    common = {name: getattr(options, name) for name in declarations(UnwrapOptions) if name not in OWN_NAMES}
+    if options.texel_density is not None:  # the padding is limited by the largest resolution
+        common["resolution"] = MAX_RESOLUTION
+    return Options(**common, seams=options.marked, charts="one" if options.charts == "one" else "atlas")

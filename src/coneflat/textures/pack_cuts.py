@@ -47,10 +47,10 @@ def cut_for_packing(
         gap: minimum distance between charts, relative to the side of the square.
     """
     charts = _largest_charts(layouts, costs)
-    area = sum(one.shape.area for one in charts)
+    area = sum(chart.shape.area for chart in charts)
     if not area > 0:
         return list(layouts)
-    borders = sum(float(one.border_costs[np.isfinite(one.border_costs)].sum()) for one in charts)
+    borders = sum(float(chart.border_costs[np.isfinite(chart.border_costs)].sum()) for chart in charts)
     return _cut(layouts, charts, _search(charts, area, max(SHARE * borders, area**0.5), gap).pieces)
 
 
@@ -64,7 +64,7 @@ def cut_into(layouts: Sequence[Layout], costs: Callable[[int], FloatArray], coun
         count: the number of all charts.
     """
     charts = _largest_charts(layouts, costs, 1 / (4 * count))
-    pieces, missing = list(charts), count - sum(int(one.chart.max()) + 1 for one in layouts)
+    pieces, missing = list(charts), count - sum(int(layout.chart.max()) + 1 for layout in layouts)
     while missing > 0:
         check_cancelled()
         cuts = [min(piece.cuts, key=lambda cut: cut.score) for piece in pieces if piece.cuts]
@@ -78,15 +78,17 @@ def cut_into(layouts: Sequence[Layout], costs: Callable[[int], FloatArray], coun
 
 def _cut(layouts: Sequence[Layout], charts: Sequence[_Piece], pieces: Sequence[_Piece]) -> list[Layout]:
     """Return layouts in which pieces replace the charts that they are pieces of."""
-    label = [one.chart.copy() for one in layouts]
+    label = [layout.chart.copy() for layout in layouts]
     for piece in pieces:
         if piece not in charts:
             label[piece.layout][piece.faces] = label[piece.layout].max() + 1
     return [
-        with_charts(one, ChartLayout(one.points, one.corners, one.chart).split(own).renumbered())
-        if own.max() > one.chart.max()
-        else one
-        for one, own in zip(layouts, label, strict=True)
+        with_charts(
+            layout, ChartLayout(layout.points, layout.corners, layout.chart).split(chart).renumbered()
+        )
+        if chart.max() > layout.chart.max()
+        else layout
+        for layout, chart in zip(layouts, label, strict=True)
     ]
 
 
@@ -150,7 +152,7 @@ class _Cut:
         joined = ~self.piece.disk.is_boundary_edge
         joined[self.edges] = False
         count, label = label_charts(self.piece.disk, joined)
-        return tuple(self.piece.part(label == each) for each in range(count))
+        return tuple(self.piece.part(label == i) for i in range(count))
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,20 +164,20 @@ class _Piece:
         faces: (m,) indices of its triangles there.
         disk: the triangles as a mesh in the plane.
         costs: (3m,) cost of cutting the side opposite each corner.
-        least: smallest area of a piece to cut off.
+        min_area: smallest area of a piece to cut off.
     """
 
     layout: int
     faces: IntArray
     disk: TriangleMesh
     costs: FloatArray
-    least: float
+    min_area: float
 
     def part(self, chosen: BoolArray) -> _Piece:
         """Return the chosen triangles (m,) as a piece."""
         disk = as_disk(self.disk.vertices, self.disk.faces[chosen])
         costs = self.costs.reshape(-1, 3)[chosen].ravel()
-        return _Piece(self.layout, self.faces[chosen], disk, costs, self.least)
+        return _Piece(self.layout, self.faces[chosen], disk, costs, self.min_area)
 
     @cached_property
     def _places(self) -> ComplexArray:
@@ -219,50 +221,50 @@ class _Piece:
     @cached_property
     def cuts(self) -> list[_Cut]:
         """Cuts that differ from each other, the shortest ones relative to the area that they separate."""
-        if self.shape.area < 2 * self.least or self.disk.boundary_loops[0] > 1:
+        if self.shape.area < 2 * self.min_area or self.disk.boundary_loops[0] > 1:
             return []
         loop = self._places[self._rim]
         swept = np.append(0.0, np.cumsum((np.conj(loop) * np.roll(loop, -1)).imag))
         chosen = np.unique(np.searchsorted(self._along, np.arange(SAMPLES) / SAMPLES, side="right") - 1)
-        one, other = chosen[np.stack(np.triu_indices(len(chosen), 1))]
+        starts, ends = chosen[np.stack(np.triu_indices(len(chosen), 1))]
         # The area between the border from one to the other and the chord between them.
-        part = (swept[other] - swept[one] + (np.conj(loop[other]) * loop[one]).imag) / 2
+        part = (swept[ends] - swept[starts] + (np.conj(loop[ends]) * loop[starts]).imag) / 2
         smaller = np.minimum(part, self.shape.area - part)
-        score = np.abs(loop[other] - loop[one]) / np.sqrt(np.maximum(smaller, self.least))
+        score = np.abs(loop[ends] - loop[starts]) / np.sqrt(np.maximum(smaller, self.min_area))
         order = np.argsort(score, kind="stable")
-        order = order[smaller[order] > self.least]
-        one, other, found = one[order], other[order], list[_Cut]()
+        order = order[smaller[order] > self.min_area]
+        starts, ends, cuts = starts[order], ends[order], list[_Cut]()
         for _ in range(3 * TRIED):
-            if not len(one) or len(found) == TRIED:
+            if not len(starts) or len(cuts) == TRIED:
                 break
-            cut = self._cut_between(one[0], other[0])
-            found += [] if cut is None else [cut]
-            straight = np.maximum(self._away(one, one[0]), self._away(other, other[0]))
-            crossed = np.maximum(self._away(one, other[0]), self._away(other, one[0]))
+            cut = self._cut_between(starts[0], ends[0])
+            cuts += [] if cut is None else [cut]
+            straight = np.maximum(self._away(starts, starts[0]), self._away(ends, ends[0]))
+            crossed = np.maximum(self._away(starts, ends[0]), self._away(ends, starts[0]))
             is_other = np.minimum(straight, crossed) >= MIN_SEPARATION
-            one, other = one[is_other], other[is_other]
-        return found
+            starts, ends = starts[is_other], ends[is_other]
+        return cuts
 
-    def _cut_between(self, one: IntArray, other: IntArray) -> _Cut | None:
+    def _cut_between(self, start: IntArray, end: IntArray) -> _Cut | None:
         """Return the shortest cut between the surroundings of two vertices of the border, if it makes two pieces."""
         every = np.arange(len(self._rim))
-        starts, ends = (self._rim[self._away(every, at) < MIN_SEPARATION / 3] for at in (one, other))
+        starts, ends = (self._rim[self._away(every, at) < MIN_SEPARATION / 3] for at in (start, end))
         paths = self.graph.shortest_paths(starts, ends)
         nearest = ends[np.argsort(paths.distance[ends], kind="stable")[:1]]
         path = np.append(paths.nodes_to(nearest), paths.source[nearest])
         inner, edges = path[1:-1], paths.edge[path[:-1]]
         if len(path) < 2 or path[-1] < 0 or self.disk.is_boundary_vertex[inner].any():
             return None
-        low, high = (int(np.flatnonzero(self._rim == end)[0]) for end in (path[-1], path[0]))
+        low, high = (int(np.flatnonzero(self._rim == corner)[0]) for corner in (path[-1], path[0]))
         if low > high:
             low, high, inner = high, low, inner[::-1]
         loops = (
             np.concatenate([self._rim[low : high + 1], inner]),
             np.concatenate([self._rim[high:], self._rim[: low + 1], inner[::-1]]),
         )
-        one_side, other_side = (self._places[np.column_stack([own, np.roll(own, -1)])] for own in loops)
+        one_side, other_side = (self._places[np.column_stack([loop, np.roll(loop, -1)])] for loop in loops)
         area = min(_swept(sides).sum() for sides in (one_side, other_side))
-        if area < self.least:
+        if area < self.min_area:
             return None
         return _Cut(self, edges, float(self.graph.costs[edges].sum()), (one_side, other_side), float(area))
 
@@ -286,44 +288,53 @@ def _largest_charts(
     layouts: Sequence[Layout], costs: Callable[[int], FloatArray], min_piece: float = MIN_PIECE
 ) -> list[_Piece]:
     """Return the largest charts of layouts, of which pieces may have a minimum share of the area."""
-    found = []
-    for i, one in enumerate(layouts):
-        sides = one.points[one.corners[:, 1:]] - one.points[one.corners[:, :1]]
-        areas = np.bincount(one.chart, np.abs(np.linalg.det(sides)) / 2)
-        found += [(float(areas[c]), i, int(c)) for c in np.argsort(-areas, kind="stable")[:MAX_CHARTS]]
-    found.sort(key=lambda chart: -chart[0])
-    least = min_piece * sum(chart[0] for chart in found)
+    largest = []
+    for i, layout in enumerate(layouts):
+        sides = layout.points[layout.corners[:, 1:]] - layout.points[layout.corners[:, :1]]
+        areas = np.bincount(layout.chart, np.abs(np.linalg.det(sides)) / 2)
+        largest += [(float(areas[c]), i, int(c)) for c in np.argsort(-areas, kind="stable")[:MAX_CHARTS]]
+    largest.sort(key=lambda chart: -chart[0])
+    min_area = min_piece * sum(chart[0] for chart in largest)
     charts = []
-    for _, i, c in found[:MAX_CHARTS]:
+    for _, i, c in largest[:MAX_CHARTS]:
         faces = np.flatnonzero(layouts[i].chart == c)
         disk = as_disk(layouts[i].points, layouts[i].corners[faces])
         cost = costs(i)[layouts[i].mesh.halfedge_edges].reshape(-1, 3)[faces].ravel()
-        charts.append(_Piece(i, faces, disk, cost, least))
+        charts.append(_Piece(i, faces, disk, cost, min_area))
     return charts
 
 
 def _search(charts: Sequence[_Piece], area: float, budget: float, gap: float) -> _State:
     """Return the pieces of charts with the largest value; their cuts cost at most `budget`."""
-    best = _State(tuple(charts), 0.0, _covered([one.shape for one in charts], area, gap))
+    best = _State(tuple(charts), 0.0, _covered([piece.shape for piece in charts], area, gap))
     states, without_gain = [best], 0
     while states and without_gain < PATIENCE:
         check_cancelled()
-        tried: list[tuple[float, float, _State, _Cut]] = []
+        trials: list[tuple[float, float, _State, _Cut]] = []
         for state in states:
             cuts = [cut for piece in state.pieces for cut in piece.cuts if state.cost + cut.cost <= budget]
             for cut in sorted(cuts, key=lambda cut: cut.score)[:TRIED]:
                 cost = state.cost + cut.cost
-                if any(abs(cost - known) <= 1e-9 * cost for _, known, *_ in tried):  # in another order
+                if any(
+                    abs(cost - trial_cost) <= 1e-9 * cost for _, trial_cost, *_ in trials
+                ):  # in another order
                     continue
                 price = PRICE * cost / area**0.5
-                shapes = [one.shape for one in state.pieces if one is not cut.piece]
-                needed = price + tried[CONTINUED - 1][0] if len(tried) >= CONTINUED else 0.0
+                shapes = [piece.shape for piece in state.pieces if piece is not cut.piece]
+                needed = price + trials[CONTINUED - 1][0] if len(trials) >= CONTINUED else 0.0
                 covered = _covered([*shapes, *cut.shapes], area, gap, needed)
-                tried.append((covered - price, cost, state, cut))
-                tried.sort(key=lambda one: -one[0])
+                trials.append((covered - price, cost, state, cut))
+                trials.sort(key=lambda trial: -trial[0])
         states = [
-            _State((*(one for one in state.pieces if one is not cut.piece), *cut.pieces), cost, value)
-            for value, cost, state, cut in tried[:CONTINUED]
+            _State(
+                (
+                    *(piece for piece in state.pieces if piece is not cut.piece),
+                    *cut.pieces,
+                ),
+                cost,
+                value,
+            )
+            for value, cost, state, cut in trials[:CONTINUED]
         ]
         without_gain += 1
         if states and states[0].value > best.value:
@@ -340,13 +351,13 @@ def _covered(shapes: Sequence[_Shape], area: float, gap: float, needed: float = 
         points = shapes[0].sides.ravel()
         points = points * np.exp(1j * square_angle(points, np.empty(0)))
         return float(area / max(np.ptp(points.real), np.ptp(points.imag)) ** 2)
-    shapes = sorted(shapes, key=lambda one: -one.area)
-    start = np.cumsum([0, *(len(one.sides) for one in shapes)])
-    outlines = Outlines(np.concatenate([one.sides for one in shapes]), start)
+    shapes = sorted(shapes, key=lambda shape: -shape.area)
+    start = np.cumsum([0, *(len(shape.sides) for shape in shapes)])
+    outlines = Outlines(np.concatenate([shape.sides for shape in shapes]), start)
     angles = np.tile(np.arange(0, 2 * np.pi, np.pi / 4), (len(shapes), 1))
-    effort = replace(QUICK, most=(area / max(needed, 1e-9)) ** 0.5)
+    effort = replace(QUICK, max_side=(area / max(needed, 1e-9)) ** 0.5)
     try:
-        found = pack(outlines, area, angles, np.ones(angles.shape, dtype=bool), gap, 1, effort)
+        packing = pack(outlines, area, angles, np.ones(angles.shape, dtype=bool), gap, 1, effort)
     except OptionError:
         return 0.0
-    return area / found.side**2
+    return area / packing.side**2

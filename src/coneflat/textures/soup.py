@@ -15,8 +15,7 @@ from ..io import stored_in_glb
 from ..mesh import EdgeGroups, end_corners, glue_layers, label_faces, split_vertices, weld
 from ..optimise import rest_sides
 from ..options import read_options
-from .density import MAX_RESOLUTION
-from .options import UnwrapOptions
+from .options import MAX_RESOLUTION, UnwrapOptions
 from .unwrapping import unwrap
 
 
@@ -58,8 +57,8 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
     o = read_options(options, UnwrapOptions)
     corner_uv, chart = np.zeros((len(faces), 3, 2)), np.full(len(faces), -1)
     first, place = weld(vertices)
-    one, two, three = place[faces].T
-    is_face = (one != two) & (two != three) & (three != one) & np.isfinite(vertices[faces]).all(axis=(1, 2))
+    a, b, c = place[faces].T
+    is_face = (a != b) & (b != c) & (c != a) & np.isfinite(vertices[faces]).all(axis=(1, 2))
     chosen = np.flatnonzero(is_face)
     left_out, notes = len(faces) - len(chosen), list[str]()
     if left_out:
@@ -78,7 +77,7 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
         corner_uv[chosen], chart[chosen] = packed.corner_uv, np.arange(len(chosen))
         return UnwrappedSoup(corner_uv, chart, packed.efficiency, packed.scale, resolution, tuple(notes))
     assert result.face_origin is not None
-    known = chosen[result.face_origin]
+    unwrapped = chosen[result.face_origin]
     # Where charts touch themselves, rounding to single precision may make overlaps.
     uv, overlaps = round_safely(result.uv, result.uv_faces, stored_in_glb)
     notes.extend(result.notes)
@@ -88,7 +87,7 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
     flipped = int(np.count_nonzero(signed_double_areas(uv[result.uv_faces]) < 0))
     if flipped > result.distortion.flipped:
         notes.append(Unmet(f"{plural(flipped, 'triangle is', 'triangles are')} flipped in single precision."))
-    corner_uv[known], chart[known] = uv[result.uv_faces], label_faces(result.uv_faces, len(uv))[1]
+    corner_uv[unwrapped], chart[unwrapped] = uv[result.uv_faces], label_faces(result.uv_faces, len(uv))[1]
     resolution = result.settings["resolution"]
     return UnwrappedSoup(
         corner_uv, chart, result.packing_efficiency, result.uv_scale, resolution, tuple(notes)

@@ -87,13 +87,13 @@ def moved_tips(layout: Layout, seams: IntArray, tips: Tips, moves: FloatArray) -
     """
     mesh = layout.mesh
     closed, opened, ends = [seams[:0]], [seams], dict[int, int]()
-    each = zip(tips.vertices.tolist(), tips.behind, tips.ahead, moves.tolist(), strict=True)
-    for tip, behind, ahead, move in each:
+    tip_paths = zip(tips.vertices.tolist(), tips.behind, tips.ahead, moves.tolist(), strict=True)
+    for tip, behind, ahead, move in tip_paths:
         path = behind if move > 0 else ahead
-        part = path[: _steps(mesh, path, abs(move))]
-        (closed if move > 0 else opened).append(part)
+        steps = path[: _steps(mesh, path, abs(move))]
+        (closed if move > 0 else opened).append(steps)
         # A seam that is closed as a whole needs no cone.
-        ends[tip] = -1 if move > 0 and len(part) == len(behind) else _end(mesh, tip, part)
+        ends[tip] = -1 if move > 0 and len(steps) == len(behind) else _end(mesh, tip, steps)
     cones = np.array([ends.get(cone, cone) for cone in layout.cones.tolist()], dtype=np.int64)
     seams = np.setdiff1d(np.concatenate(opened), np.concatenate(closed))
     return seams, np.intersect1d(cones, mesh.edges[seams])
@@ -112,19 +112,19 @@ def _walk(
         is_allowed: (e,) the edges of the path.
         passes: (n,) vertices at which the path does not end. With a direction, all its vertices are among them.
     """
-    path, here, length, points = list[int](), tip, 0.0, mesh.vertices
+    path, vertex, length, points = list[int](), tip, 0.0, mesh.vertices
     starts, edges = mesh.incident_edges
     ahead = None if before is None else _unit(2 * points[tip] - points[mesh.edges[before]].sum(axis=0))
-    while length < size and (here == tip or passes[here]):
-        around = edges[starts[here] : starts[here + 1]]
-        others = mesh.edges[around].sum(axis=1) - here
+    while length < size and (vertex == tip or passes[vertex]):
+        around = edges[starts[vertex] : starts[vertex + 1]]
+        neighbours = mesh.edges[around].sum(axis=1) - vertex
         chosen = is_allowed[around] & (~np.isin(around, path[-1:]))
         if ahead is not None:
-            chosen &= passes[others]
-        around, others = around[chosen], others[chosen]
+            chosen &= passes[neighbours]
+        around, neighbours = around[chosen], neighbours[chosen]
         if not len(around):
             break
-        steps = points[others] - points[here]
+        steps = points[neighbours] - points[vertex]
         sizes = np.maximum(np.sqrt((steps**2).sum(axis=1)), np.finfo(float).tiny)
         best = 0
         if ahead is not None:
@@ -135,7 +135,7 @@ def _walk(
             ahead = _unit(ahead + steps[best] / sizes[best])
         path.append(int(around[best]))
         length += sizes[best]
-        here = int(others[best])
+        vertex = int(neighbours[best])
     return np.array(path, dtype=np.int64)
 
 
@@ -158,19 +158,19 @@ def _end(mesh: TriangleMesh, start: int, path: IntArray) -> int:
 
 def _gains(layout: Layout, seams: IntArray, paths: list[IntArray]) -> FloatArray:
     """Return for each path how much the energy falls if it is cut and only the triangles around it move."""
-    mesh, near = layout.mesh, np.full(len(layout.mesh.vertices), -1)
+    mesh, path_of = layout.mesh, np.full(len(layout.mesh.vertices), -1)
     for i, path in enumerate(paths):
-        near[mesh.edges[path]] = i
+        path_of[mesh.edges[path]] = i
     for _ in range(RINGS):
-        known = near.copy()
-        for one, other in (mesh.edges.T, mesh.edges[:, ::-1].T):
-            reached = (near[other] < 0) & (known[one] >= 0)
-            near[other[reached]] = known[one[reached]]
+        previous = path_of.copy()
+        for tail, head in (mesh.edges.T, mesh.edges[:, ::-1].T):
+            reached = (path_of[head] < 0) & (previous[tail] >= 0)
+            path_of[head[reached]] = previous[tail[reached]]
     longer = recut(layout, np.concatenate([seams, *paths]))
     is_near = np.zeros(len(longer.points), dtype=bool)
-    is_near[longer.corners] = near[mesh.faces] >= 0
+    is_near[longer.corners] = path_of[mesh.faces] >= 0
     moved, _ = freed(longer, is_near)
-    before, after = (triangle_energies(one.lengths, one.points[one.corners]) for one in (layout, moved))
+    before, after = (triangle_energies(tail.lengths, tail.points[tail.corners]) for tail in (layout, moved))
     change = (before - after) / layout.area
-    nearest = near[mesh.faces].max(axis=1)
+    nearest = path_of[mesh.faces].max(axis=1)
     return np.bincount(nearest[nearest >= 0], change[nearest >= 0], len(paths)).astype(np.float64)

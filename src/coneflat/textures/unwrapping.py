@@ -1,51 +1,56 @@
-"""Unwrapping of meshes for textures."""
+"""Unwrapping of meshes for textures: `unwrap_source` is the method, top to bottom."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base import TYPED_TOLERANCE, FloatArray, Stopwatch, Unmet, limit_threads, plural, timing, warns
+from ..base import FloatArray, IntArray, limit_threads, stage, timing, warns
+from ..base.progress import component_at_work
 from ..errors import ConvergenceError
 from ..evaluate import evaluate, packed_scale
 from ..flattening import Steps
-from ..geometry import dihedral_angles, double_areas
+from ..geometry import double_areas
 from ..groups import lay_out_flat_components, with_copies
 from ..io import as_input
-from ..measures.distortion import Distortion
 from ..metric import find_metric
-from ..optimise import joined as joined_meshes
-from ..options import Options, declarations, read_options, takes
+from ..options import Options, read_options, takes
 from ..result import Flattening
-from ..source import Component, Source, find_copies
-from ..stages import ConeSolution, FlatMetric, MetricSpec, Surface
-from .density import MAX_RESOLUTION, expected_resolution, least_resolution
+from ..source import Component, Prepared, Source, find_copies
+from ..source.copies import Copy
+from ..stages import ConeSolution, FlatMetric, Layout, MetricSpec, Surface
+from .candidates import Candidate, CutModel
+from .creases import along_sharp_edges
+from .density import expected_resolution, least_resolution
+from .energy import EnergyBound
 from .free_seams import measured, seam_edges
-from .minor import MinorComponents
-from .mirror import both_halves, half_of
-from .options import ENERGY_PER_AREA, ISOMETRIC, TextureOptions, UnwrapOptions
+from .minor import cuts_together, is_searchable_together
+from .mirror import half_of
+from .notes import FREE, with_notes
+from .options import ISOMETRIC, UnwrapOptions, options_of_stages
 from .pack_cuts import cut_for_packing, cut_into
-from .search import MANY_TRIANGLES, Candidate, CutSearch
-from .stacked import with_copies_stacked, without_copies
+from .search import best_cut
+from .sharing import SharedTexels, with_shared_texels
+from .shortening import MANY_TRIANGLES, cut_further
+from .small_charts import join_small_charts
+from .stacked import without_copies
 
-# Parts with less than this share of the area are cut together. With 0.05 instead, 26 models in one file take 40% less
-# time, and their seams are 10% longer.
+# Components with less than this share of the area are cut together. With 0.05 instead, 26 models in one file take 40%
+# less time, and their seams are 10% longer.
 MINOR_SHARE = 0.03
-# Dihedral angle of sharp edges in radians; and the preference for seams along them if only they bend the surface: twice
-# their length costs as much as that of other edges.
-SHARP, CREASES = np.radians(40), 0.3
-# Options that the flattening does not have, or with other values.
-OWN = (*declarations(TextureOptions), "charts", "seams")
+# Fraction of the work that searches for the cuts; the rest packs and measures.
+SEARCHING = 0.8
 # Triangles of a component from which several threads are faster than one.
 PARALLEL = 20_000
 # Newton steps of the exact metric: most meshes take 10, bad ones 100 and more.
 MAX_NEWTON_STEPS = 25
-#: The `method` in the settings of a result.
-FREE = "free seams"
+
+#: The components that are cut, by their index: those that are no copies of others.
+Models: TypeAlias = Mapping[int, CutModel]
 
 
 @takes(UnwrapOptions)
@@ -82,106 +87,92 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
         (True, 0, 0)
     """
     parsed = read_options(options, UnwrapOptions)
-    with timing(parsed.progress) as watch:
-        return _unwrapped(Source(as_input(mesh, faces)), parsed, watch)
+    with timing(parsed.progress):
+        return unwrap_source(Source(as_input(mesh, faces)), parsed)
 
 
-def _unwrapped(source: Source, o: UnwrapOptions, watch: Stopwatch) -> Flattening:
-    common = {name: getattr(o, name) for name in declarations(UnwrapOptions) if name not in OWN}
-    if o.texel_density is not None:  # the padding is limited by the largest resolution
-        common["resolution"] = MAX_RESOLUTION
-    shared = Options(
-        **common,
-        seams=o.marked,
-        charts="one" if o.charts == "one" else "atlas",
-    )
-    with watch("check"):
-        prepared, mirror = source.prepared(shared), None
-        if o.stack == "mirrored":
-            mirror, prepared = half_of(prepared, source, shared)
-        stacked, prepared = without_copies(prepared) if o.stack == "copies" else (None, prepared)
-    steps = Steps(find_metric=quick_metric, separates=shared.charts == "atlas", untangles=False)
-    components, found = along_sharp_edges(prepared.components), dict[int, Candidate]()
-    areas, sizes = np.array(
-        [(double_areas(component.lengths).sum(), len(component.faces)) for component in components]
-    ).T
-    is_minor = areas < MINOR_SHARE * areas.sum()
-    if o.texel_density is not None:
-        with np.errstate(over="ignore"):  # a model that is too large for any texture
-            model_areas = np.ldexp(areas / 2, -2 * prepared.checked.exponent)
-        shared = replace(
-            shared, resolution=expected_resolution(o.texel_density, model_areas, o.padding, o.tiles)
-        )
-    with limit_threads(o.threads if sizes.max() > PARALLEL else 1):
-        with watch("layout"):
+def unwrap_source(source: Source, options: UnwrapOptions) -> Flattening:
+    """Return the UVs of a mesh by parsed options; see `unwrap`.
+
+    The cut of each component is searched for (`search.py`): few cones and short seams for which the layout with free
+    seams is within the bound of the energy. Charts are cut further for packing (`pack_cuts.py`), and the ends of seams
+    are moved again to meet the bound.
+    """
+    of_stages = options_of_stages(options)
+    with stage("check"):
+        prepared, shared = _without_shared(source, of_stages, options.stack)
+    components = along_sharp_edges(prepared.components)
+    of_stages = _with_expected_resolution(of_stages, options, components, prepared.checked.exponent)
+    is_parallel = max(len(component.faces) for component in components) > PARALLEL
+    with limit_threads(options.threads if is_parallel else 1):
+        with stage("layout"):
             flat = lay_out_flat_components(components)
-        found.update((i, Candidate(layout, ISOMETRIC, 0.0, 0.0, True)) for i, layout in flat.items())
-        # Copies cannot have different numbers of charts.
-        with watch("check"):
-            copies = [None] * len(components) if isinstance(o.charts, int) else find_copies(components, flat)
-        originals = [i for i, copy in enumerate(copies) if copy is None]
-        searches = {
-            i: CutSearch(components[i], o.bound, steps, by_area=o.area is not None) for i in originals
-        }
-        minor = [i for i, search in searches.items() if is_minor[i] and i not in flat and search.may_join]
-        for group in _groups(minor, sizes):
-            watch.share = float(0.8 * sizes[group].sum() / sizes.sum())
-            with watch("search", 1.0):
-                together = MinorComponents([searches[i] for i in group]).candidates()
-                found.update((i, one) for i, one in zip(group, together, strict=True) if one is not None)
-            watch.end_component()
-        joined = set(found)
-        alone = [i for i in searches if i not in joined]
-        for number, i in enumerate(alone):
-            watch.component = f"component {number + 1:,} of {len(alone):,}" if len(alone) > 1 else ""
-            watch.share = float(0.8 * sizes[i] / sizes.sum())
-            with watch("search", 1.0):
-                found[i] = searches[i].best()
-            watch.end_component()
-        layouts = [found[i].layout for i in searches]
-        with watch("pack"):
-            in_order = list(searches.values())
+        with stage("check"):
+            # Copies cannot have different numbers of charts.
+            is_counted = isinstance(options.charts, int)
+            copies = [None] * len(components) if is_counted else find_copies(components, flat)
+        models = _cut_models(components, copies, options)
+        candidates = _search(models, flat, components)
+        with stage("pack"):
+            candidates = _cut_to_pack(models, candidates, options, of_stages)
+        with stage("measure"):
+            layouts = _measured_layouts(candidates, flat, components, copies)
+    of_stages = _with_least_resolution(of_stages, options, prepared, layouts)
+    result = evaluate(prepared, layouts, replace(of_stages, method=FREE))
+    energies = [candidate.energy for candidate in candidates.values()]
+    result = with_notes(result, options, energies, _count_forbidden(components, layouts))
+    return result if shared is None else with_shared_texels(result, shared, prepared)
 
-            def costs(i: int) -> FloatArray:
-                return in_order[i].costs
 
-            if isinstance(o.charts, int):
-                layouts = cut_into(layouts, costs, o.charts)
-            elif steps.separates and o.up is None and np.isfinite(o.bound):
-                layouts = cut_for_packing(layouts, costs, o.padding / shared.resolution)
-            for (i, search), layout in zip(searches.items(), layouts, strict=True):
-                # Joined components would each need a relaxation of their own.
-                one = replace(found[i], layout=layout) if i in joined else search.shortened(found[i], layout)
-                found[i] = search.small_joined(one) if o.charts == "atlas" and one.layout.chart.any() else one
-        with watch("measure"):
-            known = {
-                i: one.layout if one.layout is flat.get(i) else measured(one.layout)
-                for i, one in found.items()
-            }
-            layouts = with_copies(known, components, copies)
-            cut = [
-                component.seams.is_forbidden[seam_edges(one)].sum()
-                for component, one in zip(components, layouts, strict=True)
-                if len(one.seams)
-            ]
-    shared = replace(shared, method=FREE)
-    if o.texel_density is not None:
-        with watch("pack"):
-            scale_at = packed_scale(prepared, layouts, shared)
-            resolution = least_resolution(o.texel_density, o.padding, shared.resolution, scale_at)
-        shared = replace(shared, resolution=resolution)
-    result = evaluate(prepared, layouts, shared)
-    notes = (
-        *result.notes,
-        *map(Unmet, _notes(o, [one.energy for one in found.values()], int(sum(cut)), result.distortion)),
-    )
-    own = {name: getattr(o, name) for name in OWN if name != "seams"}
-    if o.marked is not o.seams:
-        own["seams"] = "none" if o.marked is None else ["none", result.settings["seams"]]
-    result = replace(result, settings={**result.settings, **own}, notes=notes)
-    if stacked is not None:
-        return with_copies_stacked(result, stacked, prepared)
-    return result if mirror is None else both_halves(result, mirror, prepared)
+def _without_shared(source: Source, options: Options, stack: str) -> tuple[Prepared, SharedTexels | None]:
+    """Return the input without triangles that share the texels of others, and these; see the option `stack`."""
+    prepared = source.prepared(options)
+    if stack == "mirrored":
+        shared, prepared = half_of(prepared, source, options)
+    elif stack == "copies":
+        shared, prepared = without_copies(prepared)
+    else:
+        return prepared, None
+    return prepared, shared
+
+
+def _with_expected_resolution(
+    of_stages: Options, options: UnwrapOptions, components: Sequence[Component], exponent: int
+) -> Options:
+    """Return options with about the resolution that a texel density needs; exponent: see `CheckedMesh`."""
+    if options.texel_density is None:
+        return of_stages
+    with np.errstate(over="ignore"):  # a model that is too large for any texture
+        areas = np.ldexp(_double_areas_of(components) / 2, -2 * exponent)
+    expected = expected_resolution(options.texel_density, areas, options.padding, options.tiles)
+    return replace(of_stages, resolution=expected)
+
+
+def _with_least_resolution(
+    of_stages: Options, options: UnwrapOptions, prepared: Prepared, layouts: Sequence[Layout]
+) -> Options:
+    """Return options with the resolution that a texel density needs with given layouts."""
+    if options.texel_density is None:
+        return of_stages
+    with stage("pack"):
+        scale_at = packed_scale(prepared, layouts, of_stages)
+        start = of_stages.resolution
+        resolution = least_resolution(options.texel_density, options.padding, start, scale_at)
+    return replace(of_stages, resolution=resolution)
+
+
+def _double_areas_of(components: Sequence[Component]) -> FloatArray:
+    """Return (c,) twice the area of each component."""
+    return np.array([double_areas(component.lengths).sum() for component in components])
+
+
+def _cut_models(
+    components: Sequence[Component], copies: Sequence[Copy | None], options: UnwrapOptions
+) -> Models:
+    """Return the models of components that are no copies."""
+    steps = Steps(find_metric=quick_metric, separates=options.charts != "one", untangles=False)
+    bound = EnergyBound(options.bound, by_area=options.area is not None)
+    return {i: CutModel(components[i], bound, steps) for i, copy in enumerate(copies) if copy is None}
 
 
 def quick_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> FlatMetric:
@@ -192,59 +183,100 @@ def quick_metric(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> 
         return find_metric(surface, solution, replace(spec, method="linear"))
 
 
-def _groups(chosen: Sequence[int], sizes: FloatArray) -> Iterator[list[int]]:
-    """Yield groups of at least two components with not many triangles."""
-    components = np.array(chosen, dtype=np.int64)
-    total = np.cumsum(sizes[components]) // MANY_TRIANGLES
-    for group in np.split(components, np.flatnonzero(np.diff(total)) + 1):
+def _search(
+    models: Models, flat: Mapping[int, Layout], components: Sequence[Component]
+) -> dict[int, Candidate]:
+    """Return the best candidate of each component.
+
+    Flat components need no search. Minor ones are searched together, the others, and those of them without a candidate
+    within the bound, one by one.
+    """
+    sizes = np.array([len(component.faces) for component in components])
+    work = SEARCHING * sizes / sizes.sum()
+    candidates = {
+        i: Candidate(layout, ISOMETRIC, 0.0, 0.0, is_separated=True, keeps_points=True)
+        for i, layout in flat.items()
+    }
+    areas = _double_areas_of(components)
+    is_minor = areas < MINOR_SHARE * areas.sum()
+    minor = [
+        i for i, model in models.items() if is_minor[i] and i not in flat and is_searchable_together(model)
+    ]
+    for group in _groups(np.array(minor, dtype=np.int64), sizes):
+        with component_at_work("", float(work[group].sum())), stage("search"):
+            together = cuts_together([models[i] for i in group])
+        candidates |= {
+            i: replace(candidate, keeps_points=True)
+            for i, candidate in zip(group, together, strict=True)
+            if candidate is not None
+        }
+    alone = [i for i in models if i not in candidates]
+    for number, i in enumerate(alone):
+        place = f"component {number + 1:,} of {len(alone):,}" if len(alone) > 1 else ""
+        with component_at_work(place, float(work[i])), stage("search"):
+            candidates[i] = best_cut(models[i])
+    return candidates
+
+
+def _groups(minor: IntArray, sizes: IntArray) -> Iterator[list[int]]:
+    """Yield groups of at least two minor components, with not many triangles.
+
+    Args:
+        minor: (k,) indices of components.
+        sizes: (c,) numbers of triangles of all components.
+    """
+    total = np.cumsum(sizes[minor]) // MANY_TRIANGLES
+    for group in np.split(minor, np.flatnonzero(np.diff(total)) + 1):
         if len(group) > 1:
             yield group.tolist()
 
 
-def along_sharp_edges(components: Sequence[Component]) -> list[Component]:
-    """Return components that prefer seams along sharp edges, as far as these are what bends their surfaces."""
-    starts = np.cumsum([0, *(len(component.vertices) for component in components)])
-    mesh, count = joined_meshes([component.mesh for component in components], starts), len(components)
-    angles, lengths = (
-        np.abs(dihedral_angles(mesh)),
-        np.concatenate([component.lengths.ravel() for component in components]),
+def _cut_to_pack(
+    models: Models, candidates: Mapping[int, Candidate], options: UnwrapOptions, of_stages: Options
+) -> dict[int, Candidate]:
+    """Return candidates with charts cut further, into a number of them or for a tighter packing.
+
+    The bound is met again afterwards: tips of seams move, and small charts are joined to others.
+    """
+    order = list(models)
+    costs: Callable[[int], FloatArray] = lambda k: models[order[k]].costs  # noqa: E731
+    layouts = [candidates[i].layout for i in order]
+    if isinstance(options.charts, int):
+        layouts = cut_into(layouts, costs, options.charts)
+    elif options.charts == "atlas" and options.up is None and np.isfinite(options.bound):
+        layouts = cut_for_packing(layouts, costs, options.padding / of_stages.resolution)
+    finished = {}
+    for i, layout in zip(order, layouts, strict=True):
+        candidate, model = candidates[i], models[i]
+        if candidate.keeps_points:
+            # Flat disks are isometric; small components would each need a relaxation of their own.
+            candidate = replace(candidate, layout=layout)
+        else:
+            candidate = cut_further(model, candidate, layout)
+        if options.charts == "atlas" and candidate.layout.chart.any():
+            candidate = join_small_charts(model, candidate)
+        finished[i] = candidate
+    return finished
+
+
+def _measured_layouts(
+    candidates: Mapping[int, Candidate],
+    flat: Mapping[int, Layout],
+    components: Sequence[Component],
+    copies: Sequence[Copy | None],
+) -> list[Layout]:
+    """Return the layouts of all components with the scales and curvatures that they have."""
+    layouts = {
+        i: candidate.layout if candidate.layout is flat.get(i) else measured(candidate.layout)
+        for i, candidate in candidates.items()
+    }
+    return with_copies(layouts, components, copies)
+
+
+def _count_forbidden(components: Sequence[Component], layouts: Sequence[Layout]) -> int:
+    """Return the number of forbidden edges that are cut."""
+    return sum(
+        int(component.seams.is_forbidden[seam_edges(layout)].sum())
+        for component, layout in zip(components, layouts, strict=True)
+        if len(layout.seams)
     )
-    bending = angles * lengths[mesh.edge_halfedges[:, 0]]
-    of = np.arange(count).repeat(np.diff(starts))[mesh.edges[:, 0]]
-    sharp = np.bincount(of, np.where(angles > SHARP, bending, 0.0), count)
-    shares = sharp / np.maximum(np.bincount(of, bending, count), 1e-300)
-    creases = [
-        max(CREASES * share, component.seams.creases)
-        for share, component in zip(shares.tolist(), components, strict=True)
-    ]
-    return [
-        component
-        if strength == component.seams.creases
-        else replace(component, seams=replace(component.seams, creases=strength))
-        for strength, component in zip(creases, components, strict=True)
-    ]
-
-
-def _notes(o: UnwrapOptions, energies: Sequence[float], cut: int, measured: Distortion) -> Iterator[str]:
-    """Yield notes on energies above the bound, the number of forbidden edges that are cut, and that of charts."""
-    if cut:
-        yield f"{plural(cut, 'forbidden edge')} had to be cut to separate overlaps."
-    above, charts = [energy for energy in energies if energy > o.bound], measured.charts
-    if above:
-        name, most, reached = "energy", o.bound, max(above)
-        if o.area is not None:
-            name, most, reached = "area distortion", o.area, ((reached - ISOMETRIC) / ENERGY_PER_AREA) ** 0.5
-        yield (
-            f"The {name} of {plural(len(above), 'component')} is up to {reached:.6g}, above the {most:.6g} allowed: "
-            "refine the mesh, or allow more."
-        )
-    elif o.area is None and measured.energy > (1 + TYPED_TOLERANCE) * o.bound:
-        yield (
-            f"The energy is {measured.energy:.6g}, above the {o.bound:.6g} allowed, because of triangles that have "
-            "nearly no area: remesh there."
-        )
-    if isinstance(o.charts, int) and charts != o.charts:
-        why = (
-            "no further cut divides one" if charts < o.charts else "components, seams and overlaps need them"
-        )
-        yield f"The texture has {plural(charts, 'chart')} instead of {o.charts:,}: {why}."

@@ -23,8 +23,8 @@ RANDOM = np.random.default_rng(0)
 
 def areas(indices, uvs):
     corners = uvs[indices].astype(np.float64)
-    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    return (one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) / 2
+    first_side, second_side = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return (first_side[:, 0] * second_side[:, 1] - first_side[:, 1] * second_side[:, 0]) / 2
 
 
 SOUPS = {
@@ -46,8 +46,8 @@ def test_every_face_has_uvs_in_its_own_orientation(soup):
     assert (mapping.dtype, indices.dtype, uvs.dtype) == (np.uint32, np.uint32, np.float32)
     assert uvs.shape == (len(mapping), 2)
     np.testing.assert_array_equal(mapping[indices], faces)
-    one, two, three = np.asarray(faces).T
-    proper = (one != two) & (two != three) & (three != one)
+    a, b, c = np.asarray(faces).T
+    proper = (a != b) & (b != c) & (c != a)
     assert (areas(indices, uvs)[proper] > 0).all()
     assert 0 <= uvs.min() <= uvs.max() <= 1
 
@@ -102,12 +102,12 @@ def test_an_atlas_of_several_meshes():
 def test_a_doubled_surface_has_the_charts_of_two_sheets(sheet, turned):
     vertices, faces = sheet
     second = faces[:, ::-1] if turned else faces
-    own, both = np.concatenate([faces, len(vertices) + second]), np.concatenate([faces, second])
+    separate, shared = np.concatenate([faces, len(vertices) + second]), np.concatenate([faces, second])
     counts = []
     for points, triangles in (
-        (np.concatenate([vertices, vertices + np.array([8, 0, 0])]), own),
-        (np.concatenate([vertices, vertices]), own),
-        (vertices, both),
+        (np.concatenate([vertices, vertices + np.array([8, 0, 0])]), separate),
+        (np.concatenate([vertices, vertices]), separate),
+        (vertices, shared),
     ):
         atlas = ours.Atlas()
         atlas.add_mesh(points, triangles)
@@ -176,12 +176,12 @@ def test_the_size_of_a_texture_without_faces_is_checked():
 
 
 def test_an_atlas_is_equal_to_itself_alone():
-    one, two = ours.Atlas(), ours.Atlas()
-    for atlas in (one, two):
+    first, second = ours.Atlas(), ours.Atlas()
+    for atlas in (first, second):
         atlas.add_mesh(SQUARE, FACES)
-    assert one == one
-    assert one != two
-    assert len({one, two, one}) == 2
+    assert first == first
+    assert first != second
+    assert len({first, second, first}) == 2
 
 
 def test_the_interface_is_imported_without_the_rest():
@@ -284,10 +284,12 @@ def test_export(tmp_path):
 
 def test_the_types_of_xatlas():
     theirs = pytest.importorskip("xatlas")
-    vertices, faces = (np.asarray(each) for each in shapes.sphere(2))
-    for one, two in zip(theirs.parametrize(vertices, faces), ours.parametrize(vertices, faces), strict=True):
-        assert one.dtype == two.dtype
-        assert one.ndim == two.ndim
+    vertices, faces = (np.asarray(array) for array in shapes.sphere(2))
+    for expected, mapped in zip(
+        theirs.parametrize(vertices, faces), ours.parametrize(vertices, faces), strict=True
+    ):
+        assert expected.dtype == mapped.dtype
+        assert expected.ndim == mapped.ndim
     for name in ("ChartOptions", "PackOptions"):
         fields = {key for key in dir(getattr(theirs, name)()) if not key.startswith("_")}
         assert fields <= set(dir(getattr(ours, name)()))

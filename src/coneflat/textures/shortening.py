@@ -1,0 +1,100 @@
+"""Seams of a candidate with their tips moved to where the energy is about the largest allowed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..base import IntArray, has_any, mask_of
+from ..mesh import nearby
+from ..stages import Layout
+from .candidates import TOLERANCE, Candidate, CutModel
+from .free_seams import recut, seam_edges
+from .tips import RINGS, find_tips, moved_tips, moves_for
+
+# Number of times that tips are moved to meet the bound, half as often if it is met already.
+MAX_TRIES = 4
+# Tips of larger meshes are moved on their coarse meshes only: a try takes seconds.
+MANY_TRIANGLES = 60_000
+
+
+def shortened(model: CutModel, start: Candidate) -> Candidate:
+    """Return a candidate with the tips of its seams moved to where its energy is about the largest allowed.
+
+    Args:
+        model: the model of its component.
+        start: the candidate; it is returned itself if no moves improve it.
+    """
+    start = model.separated(start)
+    if model.bound.largest < start.energy <= model.settled_bound:
+        start = model.settled(start)
+    return _best_of_moved(model, start)
+
+
+def cut_further(model: CutModel, candidate: Candidate, layout: Layout) -> Candidate:
+    """Return a candidate whose layout was cut further, with its points relaxed and the tips of its seams moved."""
+    candidate = model.separated(candidate)
+    candidate = replace(candidate, layout=layout, cost=model.cost_of(layout))
+    is_large = len(model.component.faces) > MANY_TRIANGLES
+    if not is_large or model.bound.largest < candidate.energy <= model.settled_bound:
+        candidate = model.settled(candidate)
+    return _best_of_moved(model, candidate)
+
+
+def _best_of_moved(model: CutModel, start: Candidate) -> Candidate:
+    """Return the candidate with moved tips whose seams cost least, or the start if none is better."""
+    bound = model.bound
+    slack, is_large = bound.largest - start.energy, len(model.component.faces) > MANY_TRIANGLES
+    # With the cones of a coarse mesh, tips are moved there; here, only if much slack is left.
+    if is_large or (start.is_from_coarse and 0 <= slack <= 5 * (model.settled_bound - bound.largest)):
+        return start
+    candidates = [model.separated(candidate) for candidate in _with_moved_tips(model, start)]
+    for candidate in sorted(candidates, key=lambda candidate: candidate.cost):
+        settled = candidate if model.is_within(candidate) else model.settled(candidate)
+        is_better = settled.cost < start.cost or not model.is_within(start)
+        if model.is_within(settled) and is_better:
+            return settled
+    return start
+
+
+def _with_moved_tips(model: CutModel, start: Candidate) -> list[Candidate]:
+    """Return candidates with the tips of the seams moved, so that the energy is about the largest allowed."""
+    seams, bound, candidates = seam_edges(start.layout), model.bound, list[Candidate]()
+    tips = find_tips(start.layout, seams, model.costs)
+    if not (bound.is_finite and (tips.rates > 0).any()):
+        return candidates
+    slack, cuts = bound.largest - start.energy, [seams]
+    for _ in range(MAX_TRIES // 2 if slack > 0 else MAX_TRIES):
+        moved, cones = moved_tips(start.layout, seams, tips, moves_for(start.layout, tips, slack))
+        if any(np.array_equal(moved, cut) for cut in cuts):
+            # The tips move by whole edges.
+            slack += np.sign(slack) * bound.allowed / 4
+            continue
+        if not (len(moved) or model.component.mesh.is_boundary_edge.any()):
+            break  # not a disk
+        cuts.append(moved)
+        candidate = _recut(model, start, seams, moved, cones)
+        excess = candidate.energy - bound.largest
+        if candidate.energy <= model.settled_bound:
+            candidates.append(candidate)
+        # A start beyond the bound only has to get within it: the tips move again after the cuts for packing.
+        if excess <= 0 and (excess >= -2 * TOLERANCE * bound.allowed or not model.is_within(start)):
+            break
+        slack = slack - excess if (slack - excess) * slack > 0 else slack / 2
+    return candidates
+
+
+def _recut(model: CutModel, start: Candidate, seams: IntArray, moved: IntArray, cones: IntArray) -> Candidate:
+    """Return a candidate with other seams: only the points near those that differ move.
+
+    Args:
+        model, start: the model, and the candidate.
+        seams, moved: (k,), (j,) its seams, and the others.
+        cones: (s,) vertices at which the others may end.
+    """
+    mesh, layout = start.layout.mesh, replace(recut(start.layout, moved), cones=cones)
+    is_changed = mask_of(len(mesh.vertices), mesh.edges[np.setxor1d(seams, moved)])
+    # Most of what moves is near: more rings change the seams by less than 1%.
+    is_free = nearby(layout.corners, has_any(is_changed, mesh.faces), 4 * RINGS)
+    return model.candidate(layout, start.distortion, is_free)
