@@ -16,6 +16,10 @@ from .quad_mesh import QuadMesh, opposite_sides
 
 # Vertices are on a boundary if they are nearer than this fraction of the longest edge.
 TOUCHING = 1e-9
+# Boundaries of up to so many edges are compared with each point.
+MAX_EDGES_TO_COMPARE = 64
+# Rounds of spreading points along a boundary, and the least gap at which it ends, relative to the mean gap.
+MAX_SPREADING, MIN_GAP = 60, 0.3
 
 
 def with_borders(quads: QuadMesh) -> QuadMesh:
@@ -122,29 +126,55 @@ def _places_along(
         Positions that increase, at least one at each corner; None if the points do not run once around. Distances.
     """
     lengths = np.sqrt(dots(steps, steps))
+    at, distances = _nearest_positions(points, edge, starts, steps, lengths)
+    total = lengths.sum()
+    gaps = (np.roll(at, -1) - at + total / 2) % total - total / 2
+    if abs(gaps.sum() - total) > total / 2:
+        return None, distances
+    at = _spread(_increasing(at[0] + np.cumsum(gaps) - gaps, total), total)
+    return _moved_to_corners(at, steps, lengths) % total, distances
+
+
+def _nearest_positions(
+    points: FloatArray, edge: IntArray, starts: FloatArray, steps: FloatArray, lengths: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return (k,) the positions along a polyline nearest to points, and their distances; see `_places_along`."""
     # Along a boundary of few edges, the nearest one need not be next to the nearest vertex.
-    nearby = np.stack([edge, edge - 1]) if len(steps) > 64 else np.arange(len(steps))[:, None] + 0 * edge
+    is_long = len(steps) > MAX_EDGES_TO_COMPARE
+    nearby = np.stack([edge, edge - 1]) if is_long else np.arange(len(steps))[:, None] + 0 * edge
     share = np.clip(
         dots(points - starts[nearby], steps[nearby]) / np.maximum(lengths[nearby] ** 2, 1e-300), 0, 1
     )
     off = np.linalg.norm(starts[nearby] + share[..., None] * steps[nearby] - points, axis=2)
-    ends, total = np.cumsum(lengths), lengths.sum()
+    ends = np.cumsum(lengths)
     at = (ends[nearby] - lengths[nearby] * (1 - share))[off.argmin(axis=0), np.arange(len(points))]
-    gaps = (np.roll(at, -1) - at + total / 2) % total - total / 2
-    if abs(gaps.sum() - total) > total / 2:
-        return None, off.min(axis=0)
-    at = at[0] + np.cumsum(gaps) - gaps
+    return at, off.min(axis=0)
+
+
+def _increasing(at: FloatArray, total: float) -> FloatArray:
+    """Return positions that do not decrease along a closed line of a total length: means of bounds from both sides."""
     several = np.concatenate([at - total, at, at + total])
     falling = np.minimum.accumulate(several[::-1])[::-1]
-    at = (np.maximum.accumulate(several) + falling)[len(at) : 2 * len(at)] / 2
-    for _ in range(60):  # smoothed until no gap is very small
+    return (np.maximum.accumulate(several) + falling)[len(at) : 2 * len(at)] / 2
+
+
+def _spread(at: FloatArray, total: float) -> FloatArray:
+    """Return positions along a closed line, smoothed until no gap is very small."""
+    for _ in range(MAX_SPREADING):
         before, after = np.append(at[-1] - total, at[:-1]), np.append(at[1:], at[0] + total)
-        if (after - at).min() >= 0.3 * total / len(at):
+        if (after - at).min() >= MIN_GAP * total / len(at):
             break
         at = at / 2 + (before + after) / 4
+    return at
+
+
+def _moved_to_corners(at: FloatArray, steps: FloatArray, lengths: FloatArray) -> FloatArray:
+    """Return positions along a closed polyline, the nearest one to each of its corners moved there."""
+    ends, total = np.cumsum(lengths), lengths.sum()
     cosines = dots(steps, np.roll(steps, 1, axis=0)) / np.maximum(lengths * np.roll(lengths, 1), 1e-300)
     bends = np.flatnonzero(cosines < np.cos(SHARP_ANGLE))
     for corner in (ends - lengths)[bends[np.argsort(-cosines[bends], kind="stable")]]:  # the sharpest last
         away = (corner - at + total / 2) % total - total / 2
-        at[np.argmin(np.abs(away))] += away[np.argmin(np.abs(away))]
-    return at % total, off.min(axis=0)
+        nearest = np.argmin(np.abs(away))
+        at[nearest] += away[nearest]
+    return at
