@@ -16,8 +16,8 @@ A case is a kind and a seed: `--case mesh:17` runs one case in this process and 
   is in the written file, or a note names it;
 - offset: files of models far from the origin: the triangles of the written file are those that were read, or a note.
 
-Each runs in a worker with limits of time and memory. Of every result all promises are measured anew, by plain code of
-this benchmark's own (`trials/promises.py`): finite points in the texture, no flipped triangle, no overlaps in an atlas,
+Each runs in a worker with limits of time and memory. All guarantees of every result are measured again, by plain code
+of this benchmark (`trials/promises.py`): finite points in the texture, no flipped triangle, no overlaps in an atlas,
 angles around inner vertices and cones, equal sides of seams, prescribed boundaries, rotations by quanta, and a report
 that says what was measured. What is not kept and not named by a note is a breach; so are errors that are not the
 package's own, messages of several lines, crashes, hangs, and too much memory. The exit code is 1 if there is any.

@@ -56,7 +56,7 @@ if __name__ == "__main__":
         print(json.dumps([taken, sum(each.user + each.system for each in all_times), memory / 1e6]))
 """
 
-MANY = """
+COMPONENTS_SCRIPT = """
 import sys, time
 import numpy as np
 import coneflat
@@ -139,7 +139,10 @@ def print_components(count: int, file: Path) -> None:
         vertices = np.concatenate([np.add(part, (4.0 * i, 0, 0)) for i, (part, _) in enumerate(pieces)])
         np.savez(file, vertices=vertices, faces=np.concatenate(faces), some=np.concatenate(faces[:5]))
         printed = subprocess.run(
-            [sys.executable, "-c", MANY, str(file)], check=True, stdout=subprocess.PIPE, text=True
+            [sys.executable, "-c", COMPONENTS_SCRIPT, str(file)],
+            check=True,
+            stdout=subprocess.PIPE,
+            text=True,
         )
         milliseconds = 1000 * float(printed.stdout) / count
         print(f"| {count:,} {kind} | {len(faces[0])} | {milliseconds:.1f} |")

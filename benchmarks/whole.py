@@ -1,7 +1,7 @@
 """Time and memory of a whole flattening: `python benchmarks/whole.py` prints Markdown tables.
 
 Flattening to one chart in memory (check, cones, exact metric, cut, layout, measures), by stage, against one bare
-analysis and factorization of the same mesh's Laplacian by the same solver, and against what else can be installed with
+analysis and factorization of the same mesh's Laplacian by the same solver, and against what can be installed with
 pip: the LSCM of libigl on our cut mesh, xatlas, uvunwrap. Each mesh has a process of its own, which compiles and loads
 everything before the clock starts; its peak memory is that of the process with our flattening alone. Models of
 `../shared/meshes`, where they are, and a bumpy sphere, split in four over and over up to --largest triangles.

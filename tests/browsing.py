@@ -84,7 +84,7 @@ class Visit:
 
     def __init__(self, browser, path, **options):
         self.troubles, self.requests = [], []
-        # Moves that the page makes by itself are jumps, so that there is nothing to wait for.
+        # Movements that the page makes automatically are jumps, so that there is nothing to wait for.
         usual = {"viewport": SMALL, "color_scheme": "light", "reduced_motion": "reduce"}
         self.context = browser.new_context(**{**usual, **options})
         self.page = self.context.new_page()

@@ -202,7 +202,7 @@ class TestNotes:
         assert "lengths were changed by up to" in closed.notes[0]
         assert not flatten_by("bff", *shapes.hill(), cones="none").notes
 
-    def test_layouts_are_never_upside_down(self):
+    def test_charts_are_never_mirrored(self):
         """These cones are too sharp for a linear scale: triangles flip, but not most of them."""
         cones = {0: 1.99 * np.pi, 50: 1.99 * np.pi, 51: 0.02 * np.pi}
         result = flatten_by("bff", *shapes.sphere(3), cones=cones)

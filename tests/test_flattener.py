@@ -106,7 +106,7 @@ def test_other_seams_clear_the_cache():
         flattener.flatten(seams=edges[10 * k : 10 * k + 2])
         assert first not in flattener._surfaces.values()
         assert len(flattener._surfaces) == 1
-    assert all("search" not in surface.memo for surface in flattener._surfaces.values())
+    assert all(surface._search is None for surface in flattener._surfaces.values())
 
 
 class Enough(Exception):

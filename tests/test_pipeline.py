@@ -238,7 +238,7 @@ def test_extreme_metrics_are_refused_in_one_line():
 
 def test_surfaces_with_very_many_handles_come_through(monkeypatch):
     monkeypatch.setattr("coneflat.cones.sparse.limits.MAX_SEARCHED", 8)
-    monkeypatch.setattr("coneflat.cones.find.MAX_SEARCHED", 8)
+    monkeypatch.setattr("coneflat.cones.strategies.auto.MAX_SEARCHED", 8)
     result = flatten(*shapes.genus(5))
     assert len(result.cones) > 8
     assert result.distortion.flipped == 0

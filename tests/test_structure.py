@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+import coneflat
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tools"))
 from structure import (
     STAGES,
@@ -37,10 +39,10 @@ def is_core(name: str) -> bool:
 
 def test_packages_do_not_import_each_other_in_circles():
     try:
-        found = levels(read_modules())
+        package_levels = levels(read_modules())
     except CycleError as error:
         pytest.fail(f"packages import each other in a circle: {' -> '.join(error.args[1])}")
-    assert max(level for name, level in found.items() if is_core(name)) <= LEVELS
+    assert max(level for name, level in package_levels.items() if is_core(name)) <= LEVELS
 
 
 def test_files_do_not_import_each_other_in_circles():
@@ -68,23 +70,23 @@ def test_applications_import_what_packages_export(name: str):
     module = read_modules()[name]
     imported = module.imports | module.late_imports
     assert {
-        other
-        for other in imported
-        if is_core(other) and other.count(".") > 0 and not other.startswith(SHARED)
+        module_name
+        for module_name in imported
+        if is_core(module_name) and module_name.count(".") > 0 and not module_name.startswith(SHARED)
     } == set()
     if not name.startswith("apps.view"):
-        assert {other for other in imported if other.startswith("apps.view.")} == set()
+        assert {module_name for module_name in imported if module_name.startswith("apps.view.")} == set()
 
 
 def test_applications_do_not_import_what_is_inside_others():
-    found = {
-        (name, other)
+    violations = {
+        (name, imported)
         for name, module in read_modules().items()
         if name.startswith("apps.") and not name.startswith(FRONT)
-        for other in module.imports | module.late_imports
-        if other.count(".") > 1 and not is_core(other) and package_of(other) != package_of(name)
+        for imported in module.imports | module.late_imports
+        if imported.count(".") > 1 and not is_core(imported) and package_of(imported) != package_of(name)
     }
-    assert found == set()
+    assert violations == set()
 
 
 @pytest.mark.parametrize("name", sorted(filter(is_core, NAMES)))
@@ -92,25 +94,31 @@ def test_the_core_imports_no_application(name: str):
     module = read_modules()[name]
     allowed = name in ("", "__main__", "quadmesh.quad_mesh")
     imported = set() if allowed else module.imports | module.late_imports
-    assert [other for other in imported if not is_core(other)] == []
+    assert [module_name for module_name in imported if not is_core(module_name)] == []
+
+
+def test_no_module_has_the_name_of_a_public_function():
+    """But the application `studio`, which `coneflat.studio` opens."""
+    functions = {name for name in coneflat.__all__ if callable(getattr(coneflat, name))}
+    assert {name for name in NAMES if name.split(".")[-1] in functions} == {"apps.studio"}
 
 
 def test_tests_mirror_the_packages():
     tests = Path(__file__).parent
-    known = {package_of(name).replace(".", "/") for name in NAMES}
+    packages = {package_of(name).replace(".", "/") for name in NAMES}
     folders = {
         path.parent.relative_to(tests).as_posix() for path in tests.rglob("test_*.py") if path.parent != tests
     }
-    assert folders <= known
+    assert folders <= packages
 
 
-def test_the_check_sees_what_it_should(tmp_path):
+def test_late_imports_and_circles_are_found(tmp_path):
     (tmp_path / "mesh.py").write_text("def late():\n    from .files import read\n")
     (tmp_path / "files.py").write_text("from . import mesh\n")
-    found = read_modules(tmp_path)
-    assert found["mesh"] == Module("mesh", tmp_path / "mesh.py", frozenset(), frozenset({"files"}))
-    assert found["files"].imports == {"mesh"}
+    modules = read_modules(tmp_path)
+    assert modules["mesh"] == Module("mesh", tmp_path / "mesh.py", frozenset(), frozenset({"files"}))
+    assert modules["files"].imports == {"mesh"}
     with pytest.raises(CycleError):
-        levels(found)
-    assert file_circles(found) == [["files", "mesh"]]
+        levels(modules)
+    assert file_circles(modules) == [["files", "mesh"]]
     assert ast.parse((tmp_path / "mesh.py").read_text())

@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 
 IMAGES = Path(__file__).resolve().parents[1] / "docs" / "images"
-MOST = 250_000  # Largest size of an image of the documentation in bytes.
+MAX_BYTES = 250_000  # Largest size of an image of the documentation in bytes.
 COLORS = (128, 192, 255)
 #: Of 255: fewer colours are taken if by the root mean square they are off by no more than this beyond the most colours.
 UNSEEN = 1.2
@@ -37,7 +37,7 @@ def save_small(picture: Image.Image, name: str, *, dither: bool = True) -> None:
             break
     few.save(path, optimize=True)
     for colors in (128, 64, 32):
-        if path.stat().st_size > MOST:
+        if path.stat().st_size > MAX_BYTES:
             _with_palette(full, colors, dither).save(path, optimize=True)
     print(f"{path.name}: {picture.width} x {picture.height}, {path.stat().st_size / 1000:.0f} KB", flush=True)
 

@@ -154,7 +154,7 @@ def curvature_figure(measured: Measured) -> Any:
 
 
 def quarters_figure(measured: Measured) -> Any:
-    """Return a figure of a model with a checkerboard: with any cones, and with cones of whole quarter turns."""
+    """Return a figure of a model with a checkerboard: with any cone angles, and with multiples of pi/2."""
     free = measured.flattening("bunny")
     quarters = coneflat.flatten(measured.path("bunny"), quantise=np.pi / 2, correct_handles=True)
     assert quarters.rotations is not None

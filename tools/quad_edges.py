@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coneflat.apps.view import DOT_REACH, DOTS_PER_INCH, Eye, mark_scale, show_mesh
+from coneflat.apps.view import DOT_REACH, Eye, mark_scale, show_mesh
+from coneflat.base import DOTS_PER_INCH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -20,11 +20,16 @@ MODELS = ROOT.parent / "shared" / "meshes"
 
 
 def remake_options(_: argparse.Namespace | None = None) -> Iterator[tuple[Path, str]]:
-    """Yield the pages with tables of options."""
+    """Yield the pages with tables of options and the list of measures."""
+    from measure_list import measure_list
     from option_table import flag_tables, keyword_tables, quad_flag_table, quad_keyword_table
 
     tables = {
-        "reference/command-line.md": {"options": flag_tables, "quad options": quad_flag_table},
+        "reference/command-line.md": {
+            "options": flag_tables,
+            "quad options": quad_flag_table,
+            "measures": measure_list,
+        },
         "reference/python.md": {"keywords": keyword_tables, "quad keywords": quad_keyword_table},
     }
     for page, by_name in tables.items():

@@ -70,8 +70,8 @@ class Size:
     files: int
     lines: int
 
-    def __add__(self, other: Size) -> Size:
-        return Size(self.files + other.files, self.lines + other.lines)
+    def __add__(self, size: Size) -> Size:
+        return Size(self.files + size.files, self.lines + size.lines)
 
 
 def size_of(path: Path) -> Size:
@@ -114,25 +114,25 @@ def package_of(name: str) -> str:
 
 def sizes(package: Path = PACKAGE) -> dict[str, Size]:
     """Return the sizes of the packages."""
-    found: dict[str, Size] = {}
+    package_sizes: dict[str, Size] = {}
     for name, module in read_modules(package).items():
         key = package_of(name)
-        found[key] = found.get(key, Size(0, 0)) + size_of(module.path)
-    return found
+        package_sizes[key] = package_sizes.get(key, Size(0, 0)) + size_of(module.path)
+    return package_sizes
 
 
 def imported_packages(modules: dict[str, Module]) -> dict[str, frozenset[str]]:
     """Return the packages that each package imports, also late; the exceptions of the rules left out."""
-    found: dict[str, set[str]] = {}
+    imports_of: dict[str, set[str]] = {}
     for name, module in modules.items():
-        own = package_of(name)
-        others = {package_of(other) for other in module.imports | module.late_imports}
-        if own == "":
-            others = set()
+        importer = package_of(name)
+        imported = {package_of(imported_name) for imported_name in module.imports | module.late_imports}
+        if importer == "":
+            imported = set()
         if name == "quadmesh.quad_mesh":  # its `save` and `view`
-            others = {package_of(other) for other in module.imports}
-        found.setdefault(own, set()).update(others - {own, ""})
-    return {name: frozenset(others) for name, others in found.items()}
+            imported = {package_of(imported_name) for imported_name in module.imports}
+        imports_of.setdefault(importer, set()).update(imported - {importer, ""})
+    return {name: frozenset(imported) for name, imported in imports_of.items()}
 
 
 def file_circles(modules: dict[str, Module]) -> list[list[str]]:
@@ -142,7 +142,9 @@ def file_circles(modules: dict[str, Module]) -> list[list[str]]:
     do names of modules in text: public names of a package's `__init__`, and `EntryPoint`.
     """
     reached = {name: _reached(name, modules) for name in modules}
-    circles = {tuple(sorted(other for other in reached[name] if name in reached[other])) for name in modules}
+    circles = {
+        tuple(sorted(member for member in reached[name] if name in reached[member])) for name in modules
+    }
     return [list(circle) for circle in sorted(circles) if circle]
 
 
@@ -164,10 +166,10 @@ def levels(modules: dict[str, Module]) -> dict[str, int]:
         graphlib.CycleError: packages import each other in a circle.
     """
     graph = imported_packages(modules)
-    found: dict[str, int] = {}
+    package_levels: dict[str, int] = {}
     for name in TopologicalSorter(graph).static_order():
-        found[name] = 1 + max((found[other] for other in graph.get(name, ())), default=0)
-    return found
+        package_levels[name] = 1 + max((package_levels[lower] for lower in graph.get(name, ())), default=0)
+    return package_levels
 
 
 @dataclass(frozen=True)
@@ -259,8 +261,15 @@ def packages_by_level(package: Path = PACKAGE) -> list[list[Package]]:
     imported, sized = imported_packages(read_modules(package)), sizes(package)
 
     def describe(name: str) -> Package:
-        below = {_merged(other) for each in imported if _merged(each) == name for other in imported[each]}
-        size = sum((size for each, size in sized.items() if _merged(each) == name), Size(0, 0))
+        below = {
+            _merged(lower)
+            for package_name in imported
+            if _merged(package_name) == name
+            for lower in imported[package_name]
+        }
+        size = sum(
+            (size for package_name, size in sized.items() if _merged(package_name) == name), Size(0, 0)
+        )
         return Package(name, HOLDS.get(name, name), size, frozenset(below - {name}))
 
     return [[describe(name) for name in row] for row in names_by_level(package)]
@@ -268,9 +277,14 @@ def packages_by_level(package: Path = PACKAGE) -> list[list[Package]]:
 
 def names_by_level(package: Path = PACKAGE) -> list[list[str]]:
     """Return the names of the packages of each level, from the lowest one up; the applications count as one."""
-    found = levels(read_modules(package))
-    names = sorted({_merged(name) for name in found if name})
-    own_level = {name: max(found[each] for each in found if _merged(each) == name) for name in names}
+    package_levels = levels(read_modules(package))
+    names = sorted({_merged(name) for name in package_levels if name})
+    own_level = {
+        name: max(
+            package_levels[package_name] for package_name in package_levels if _merged(package_name) == name
+        )
+        for name in names
+    }
     own_level |= {name: max(own_level.values()) for name in ("apps",) if name in own_level}
     heights = sorted(set(own_level.values()))
     return [[name for name in names if own_level[name] == height] for height in heights]
@@ -292,16 +306,17 @@ def draw_structure(package: Path = PACKAGE) -> str:
     A package that is reached through another one has no arrow of its own.
     """
     heights = packages_by_level(package)
-    packages = {one.name: one for row in heights for one in row}
+    packages = {drawn.name: drawn for row in heights for drawn in row}
     places: dict[str, tuple[float, float, float]] = {}  # middle, top and width
     for level, row in enumerate(reversed(heights)):
         widths = [
-            max(LETTER * len(_title(one)), SMALL * max(len(one.holds), len(_size(one)))) + 20 for one in row
+            max(LETTER * len(_title(drawn)), SMALL * max(len(drawn.holds), len(_size(drawn)))) + 20
+            for drawn in row
         ]
         gap = (WIDTH - sum(widths)) / (len(row) + 1)
         left = gap
-        for one, width in zip(row, widths, strict=True):
-            places[one.name] = (left + width / 2, 10 + level * (ROW + GAP), width)
+        for drawn, width in zip(row, widths, strict=True):
+            places[drawn.name] = (left + width / 2, 10 + level * (ROW + GAP), width)
             left += width + gap
     height = 20 + len(heights) * (ROW + GAP) - GAP
     lines = [
@@ -310,11 +325,11 @@ def draw_structure(package: Path = PACKAGE) -> str:
         'orient="auto"><path d="M0 0 8 4 0 8z" fill="#7d8f9e"/></marker></defs>',
         f'<rect width="{WIDTH:g}" height="{height:g}" fill="#ffffff"/>',
     ]
-    for name, one in packages.items():
-        lines += [_arrow(places[name], places[other]) for other in sorted(_direct(one, packages))]
+    for name, drawn in packages.items():
+        lines += [_arrow(places[name], places[lower]) for lower in sorted(_direct(drawn, packages))]
     for number, row in enumerate(heights):
-        for one in row:
-            lines.append(_box(one, number, *places[one.name]))
+        for drawn in row:
+            lines.append(_box(drawn, number, *places[drawn.name]))
     return "\n".join([*lines, "</svg>", ""])
 
 
@@ -326,25 +341,25 @@ def packages_drawn(drawing: str) -> list[list[str]]:
     return [heights[number] for number in sorted(heights)]
 
 
-def _title(one: Package) -> str:
-    return one.name or "coneflat"
+def _title(described: Package) -> str:
+    return described.name or "coneflat"
 
 
-def _size(one: Package) -> str:
-    return f"{one.size.files} file{'s'[: one.size.files > 1]}, {one.size.lines:,} lines of code"
+def _size(described: Package) -> str:
+    return f"{described.size.files} file{'s'[: described.size.files > 1]}, {described.size.lines:,} lines of code"
 
 
-def _direct(one: Package, packages: dict[str, Package]) -> set[str]:
+def _direct(importer: Package, packages: dict[str, Package]) -> set[str]:
     """Return the imported packages that are not reached through another imported package."""
     reached: set[str] = set()
-    for other in one.below:
-        waiting = set(packages[other].below)
+    for imported in importer.below:
+        waiting = set(packages[imported].below)
         while waiting:
             name = waiting.pop()
             if name not in reached:
                 reached.add(name)
                 waiting |= packages[name].below
-    return {other for other in one.below - reached if other}
+    return {imported for imported in importer.below - reached if imported}
 
 
 def _arrow(start: tuple[float, float, float], end: tuple[float, float, float]) -> str:
@@ -358,7 +373,7 @@ def _arrow(start: tuple[float, float, float], end: tuple[float, float, float]) -
     return f'<path d="{line}" fill="none" stroke="#7d8f9e" stroke-width="1.2" marker-end="url(#tip)"/>'
 
 
-def _box(one: Package, row: int, x: float, top: float, width: float) -> str:
+def _box(described: Package, row: int, x: float, top: float, width: float) -> str:
     def text(below: float, size: int, colour: str, words: str, weight: str = "normal") -> str:
         return (
             f'<text x="{x:.0f}" y="{top + below:.0f}" font-size="{size}" font-weight="{weight}" fill="{colour}" '
@@ -366,20 +381,20 @@ def _box(one: Package, row: int, x: float, top: float, width: float) -> str:
         )
 
     return (
-        f'<g id="package-{one.name}" data-level="{row}"><rect x="{x - width / 2:.0f}" y="{top:.0f}" '
+        f'<g id="package-{described.name}" data-level="{row}"><rect x="{x - width / 2:.0f}" y="{top:.0f}" '
         f'width="{width:.0f}" height="{ROW:g}" rx="4" fill="#e9eff4" stroke="#40566a"/>'
-        + text(20, 14, "#1d2b36", _title(one), "bold")
-        + text(36, 11, "#1d2b36", one.holds)
-        + text(51, 10, "#5c6f7e", _size(one))
+        + text(20, 14, "#1d2b36", _title(described), "bold")
+        + text(36, 11, "#1d2b36", described.holds)
+        + text(51, 10, "#5c6f7e", _size(described))
         + "</g>"
     )
 
 
 def main() -> None:
     """Print the sizes of the packages and their levels."""
-    found, heights = sizes(), levels(read_modules())
+    package_sizes, heights = sizes(), levels(read_modules())
     print(f"{'package':16}{'level':>6}{'files':>7}{'lines':>8}")
-    for name, size in [*found.items(), ("all", sum(found.values(), Size(0, 0)))]:
+    for name, size in [*package_sizes.items(), ("all", sum(package_sizes.values(), Size(0, 0)))]:
         print(f"{name:16}{heights.get(name, '') if name else '':>6}{size.files:>7}{size.lines:>8}")
 
 

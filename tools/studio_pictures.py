@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from chromium import ARGUMENTS, browser_path
-from palette import IMAGES, MOST, save_small
+from palette import IMAGES, MAX_BYTES, save_small
 from PIL import Image
 from playwright.sync_api import sync_playwright
 from screenshots import NARROW
@@ -195,7 +195,7 @@ def _save_moving(frames: list[tuple[Image.Image, int]], name: str) -> None:
         pictures[0].save(
             path, save_all=True, append_images=pictures[1:], duration=times, loop=0, quality=quality, method=6
         )
-        if path.stat().st_size <= MOST:
+        if path.stat().st_size <= MAX_BYTES:
             break
     width, height = pictures[0].size
     print(

@@ -293,7 +293,7 @@ def target_angles(mesh: TriangleMesh, angles: FloatArray, curvature: FloatArray)
         worst = wide[0]
         raise CurvatureError(
             f"{plural(len(wide), 'cone')} with angles too large for the triangles around: {count[worst]} of them "
-            f"cannot hold an angle of {vertex_targets[worst] / np.pi:.4g} pi; choose others, or remesh"
+            f"cannot have an angle of {vertex_targets[worst] / np.pi:.4g} pi; choose others, or remesh"
         )
     scaled: FloatArray = angles.ravel() * (vertex_targets / total)[at]
     too_wide = np.zeros(len(count), dtype=bool)

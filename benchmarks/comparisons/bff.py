@@ -25,8 +25,8 @@ def boundary_first(mesh: TriangleMesh, lengths: FloatArray, solution: ConeSoluti
     Args:
         mesh: a connected mesh.
         lengths: (m, 3) side lengths, model units.
-        solution: cones and the linear log scale, which solves the discrete Cherrier problem of the paper: L u is target
-            minus curvature at inner vertices, u = 0 on the boundary.
+        solution: cones and the linear log conformal factor, which solves the discrete Cherrier problem of the paper:
+            L u is target minus curvature at inner vertices, u = 0 on the boundary.
 
     Raises:
         MetricError: scales differ so much that lengths overflow.
@@ -95,7 +95,7 @@ class HarmonicExtension:
         return fixed + self._inverse.solve(source - self._laplacian @ fixed)
 
     def boundary_curvature(self, log_scale: FloatArray) -> FloatArray:
-        """Return (n,) the boundary curvature for given scale factors on the boundary and flat inner vertices.
+        """Return (n,) the boundary curvature for given log conformal factors on the boundary and flat inner vertices.
 
         This is k + L u with L u = -K at inner vertices: the Dirichlet-to-Neumann map of the paper (Poincare-Steklov
         operator), for the discrete Cherrier formula.

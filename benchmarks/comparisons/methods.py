@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from coneflat import Flattening, TriangleMesh
 from coneflat.base import FloatArray
+from coneflat.base.progress import stage
 from coneflat.flattener import flatten_source
 from coneflat.io import as_input
 from coneflat.metric import find_metric
@@ -76,6 +77,7 @@ def flatten_by(name: str, mesh: Any, faces: ArrayLike | None = None, **options: 
     """
     settings = read_options({"charts": "one", **options, "method": name}, ComparedOptions)
 
+    @stage("metric")
     def find(surface: Surface, solution: ConeSolution, spec: MetricSpec) -> FlatMetric:
         if name not in CONE_BASELINES:
             return find_metric(surface, solution, spec)

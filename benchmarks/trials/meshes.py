@@ -54,14 +54,14 @@ def make_tiny(rng: Random) -> tuple[np.ndarray, np.ndarray, str]:
 
 
 #: Powers of ten of the numbers of components of a mesh of many.
-MANY = 2.0, 2.8
+LOG_COUNTS = 2.0, 2.8
 #: Their largest coordinates: others would leave only one component to see.
 LARGEST_PLACE = 1e4
 
 
 def make_many(rng: Random) -> tuple[np.ndarray, np.ndarray, str]:
     """Return vertices, faces and a description of a mesh of many tiny components, some repeated, some without area."""
-    count = int(10 ** rng.uniform(*MANY))
+    count = int(10 ** rng.uniform(*LOG_COUNTS))
     sizes, spacing = rng.choice([0.0, 1.0, 4.0]), float(rng.choice([0.0, 1.0, 3.0, 1e4]))
     pieces: list[tuple[np.ndarray, np.ndarray]] = []
     for number in range(count):

@@ -55,7 +55,7 @@ _HOMES = {
     "unwrap": "textures.unwrapping",
     "QuadMesh": "quadmesh.quad_mesh",
     "measure_quads": "quadmesh.quality",
-    "integer_grid": "quadmesh.grid_search",
+    "integer_grid": "quadmesh.quad_meshing",
     "IntegerGrid": "quadmesh.integer_map",
     "make_figure": "apps.view",
     "save_figure": "apps.view",
@@ -133,10 +133,9 @@ if TYPE_CHECKING:
     from .mesh.check import check_mesh
     from .mesh.connectivity import TriangleMesh
     from .options import PAPER
-    from .quadmesh.grid_search import integer_grid
     from .quadmesh.integer_map import IntegerGrid
     from .quadmesh.quad_mesh import QuadMesh
-    from .quadmesh.quad_meshing import quads
+    from .quadmesh.quad_meshing import integer_grid, quads
     from .quadmesh.quality import measure_quads
     from .result import Flattening
     from .sample import sample_path

@@ -12,14 +12,14 @@ from .base.arrays import FloatArray, IntArray
 from .base.notes import warns
 from .base.progress import Stopwatch
 from .base.threads import limit_threads
-from .cones import coneless_solution, open_search, unmet_requests
+from .cones import ConeSurface, coneless_solution, unmet_requests
 from .errors import OptionError
 from .geometry import double_areas
 from .geometry.operators import area_distortion, weighted_areas
 from .io.packages import as_input
 from .options import CurveOptions, FindOptions, Options, read_options, takes
 from .source import Component, Source
-from .stages import ConeSolution, Surface
+from .stages import ConeSolution
 
 if TYPE_CHECKING:
     from .cones.sparse import ConeSearch
@@ -244,13 +244,13 @@ def _curve(part: Component, max_count: int, stages: Stopwatch) -> tuple[ConeCurv
 
 def _open(part: Component, stages: Stopwatch) -> ConeSearch | FoundCones:
     """Return a cone search on a component, or the only possible set of cones if there is nothing to search."""
-    surface = Surface.of(part.mesh, part.lengths)
+    surface = ConeSurface.of(part.mesh, part.lengths)
     coneless = coneless_solution(surface, part.cones)
     if coneless is not None:
         share = weighted_areas(surface.areas, part.cones.weights)
         return _found_cones(coneless, area_distortion(coneless.log_scale, share), part)
     with stages("cones", 0.3):
-        return open_search(surface, part.cones)
+        return surface.search(part.cones)
 
 
 def _found_cones(solution: ConeSolution, distortion: float, part: Component) -> FoundCones:

@@ -14,7 +14,7 @@ from .base.arrays import FloatArray, IntArray, rows_of
 from .base.notes import counted_notes
 from .base.progress import stage, stage_seconds
 from .geometry.overlap import Overlaps
-from .measures.distortion import curvature_errors, measure
+from .measures.distortion import Distortion, curvature_errors, measure
 from .measures.guarantees import unmet_guarantees
 from .measures.seam_data import Rotations, measure_rotations
 from .mesh.connectivity import TriangleMesh
@@ -36,24 +36,26 @@ class _Numbering:
         positions: (r, 3).
         vertex_origin: (r,) the input vertex of each.
         of_checked: (n,) the index in the result of each vertex of the checked mesh.
-        of_parts: the index in the result of each vertex, for each component.
+        of_components: the index in the result of each vertex, for each component.
     """
 
     positions: FloatArray
     vertex_origin: IntArray
     of_checked: IntArray
-    of_parts: list[IntArray]
+    of_components: list[IntArray]
 
     def spread(self, values: Sequence[FloatArray]) -> FloatArray:
         """Return (r,) the values of all components at the vertices of the result, NaN at unused vertices."""
-        every = np.full(len(self.positions), np.nan)
-        for ids, value in zip(self.of_parts, values, strict=True):
-            every[ids] = value
-        return every
+        spread = np.full(len(self.positions), np.nan)
+        for vertices, component_values in zip(self.of_components, values, strict=True):
+            spread[vertices] = component_values
+        return spread
 
     def renumber(self, vertices: Sequence[IntArray]) -> IntArray:
         """Return the indices in the result of vertices of the components, concatenated by component."""
-        return np.concatenate([ids[own] for ids, own in zip(self.of_parts, vertices, strict=True)])
+        return np.concatenate(
+            [numbers[indices] for numbers, indices in zip(self.of_components, vertices, strict=True)]
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,14 +65,14 @@ class _Packed:
     Attributes:
         uv: (u, 2) points.
         corners: (m, 3) the point of each triangle corner, in the order of the result.
-        own: (m, 3) the same, concatenated by component.
+        component_corners: (m, 3) the same, concatenated by component.
         scale: UV units per unit of length of the checked mesh.
         efficiency: covered fraction of the square.
     """
 
     uv: FloatArray
     corners: IntArray
-    own: IntArray
+    component_corners: IntArray
     scale: float
     efficiency: float
 
@@ -89,73 +91,109 @@ def evaluate(
         options: the options; the result records them.
         overlaps: overlapping pairs of the result's triangles; None to compute them.
     """
-    checked = prepared.checked
+    checked, input_mesh = prepared.checked, prepared.input_mesh
     with stage("pack"):
         numbering, order, mesh = _result_mesh(prepared)
-        layout = _pack(layouts, order, mesh, options)
+        packed = _pack(layouts, order, mesh, options)
     with stage("measure"):
-        source, face_corners = prepared.input_mesh.source, prepared.input_mesh.face_corners
-        if face_corners is not None and source is not None:
+        curvatures = _Curvatures.of(prepared, layouts, numbering)
+        cones = numbering.renumber([layout.cones for layout in layouts])
+        packed, distortion = _measured(prepared, mesh, cones, curvatures, packed, options, overlaps)
+        rotations = _rotations(layouts, packed.uv[packed.component_corners], options)
+        weights = [layout.area if len(layouts) > 1 else 1.0 for layout in layouts]
+        statistics = SolveStatistics.of_all([layout.statistics for layout in layouts], weights)
+        face_corners = input_mesh.face_corners
+        if face_corners is not None and input_mesh.source is not None:
             face_corners = reorder_corners(checked, face_corners)
-        target = numbering.spread([one.target for one in layouts])
-        residual = target - numbering.spread([one.curvature for one in layouts])
-        prescribed = numbering.spread([one.prescribed for one in layouts])
-        # A vertex on a marked seam has several copies in the plane.
-        prescribed[numbering.of_checked[prepared.seams]] = np.nan
-        cones = numbering.renumber([one.cones for one in layouts])
-        measured = partial(
-            measure,
-            mesh,
-            curvature_error=curvature_errors(residual[np.isfinite(residual)]),
-            cones=cones,
-            prescribed=prescribed,
-            lengths=prepared.user_lengths,
-        )
-        distortion = measured(rows_of(layout.uv, layout.corners), overlaps=overlaps)
-        # In an atlas, triangles that overlap by rounding alone are separated.
-        if options.charts == "atlas" and distortion.overlapping_pairs:
-            separated, left = separate_touching(layout.uv, layout.corners)
-            if len(left.pairs) < distortion.overlapping_pairs:
-                layout = replace(layout, uv=separated)
-                distortion = measured(separated[layout.corners], overlaps=left)
-        rotations = _rotations(layouts, layout.uv[layout.own], options)
-        combined = SolveStatistics.of_all(
-            [one.statistics for one in layouts], [one.area if len(layouts) > 1 else 1.0 for one in layouts]
-        )
+    faces = np.concatenate([component.faces for component in prepared.components])
+    lengths = prepared.user_lengths
     result = Flattening(
         vertices=numbering.positions,
         faces=mesh.faces,
-        uv=layout.uv,
-        uv_faces=layout.corners,
-        uv_scale=float(np.ldexp(layout.scale, checked.exponent)),
-        packing_efficiency=layout.efficiency,
+        uv=packed.uv,
+        uv_faces=packed.corners,
+        uv_scale=float(np.ldexp(packed.scale, checked.exponent)),
+        packing_efficiency=packed.efficiency,
         cones=cones,
-        curvatures=target[cones],
-        log_scale=numbering.spread([one.log_scale for one in layouts]),
-        prescribed=prescribed,
-        curvature_residual=residual,
+        curvatures=curvatures.target[cones],
+        log_scale=numbering.spread([layout.log_scale for layout in layouts]),
+        prescribed=curvatures.prescribed,
+        curvature_residual=curvatures.residual,
         seams=np.concatenate(
-            [numbering.of_checked[prepared.seams], numbering.renumber([one.seams for one in layouts])]
+            [numbering.of_checked[prepared.seams], numbering.renumber([layout.seams for layout in layouts])]
         ),
         distortion=distortion.rescaled(checked.exponent * np.log(2)),
         seconds=stage_seconds(),
-        notes=(
-            *checked.notes,
-            *prepared.notes,
-            *counted_notes([one.notes for one in layouts]),
-        ),
+        notes=(*checked.notes, *prepared.notes, *counted_notes([layout.notes for layout in layouts])),
         settings=settings(options),
-        solve=combined,
+        solve=statistics,
         rotations=rotations,
         vertex_origin=numbering.vertex_origin,
-        face_origin=checked.face_origin[
-            np.sort(np.concatenate([component.faces for component in prepared.components]))
-        ],
+        face_origin=checked.face_origin[np.sort(faces)],
         face_corners=face_corners,
-        source=source,
-        lengths=None if prepared.user_lengths is None else np.ldexp(prepared.user_lengths, -checked.exponent),
+        source=input_mesh.source,
+        lengths=None if lengths is None else np.ldexp(lengths, -checked.exponent),
     )
     return replace(result, notes=(*result.notes, *unmet_guarantees(result)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Curvatures:
+    """Curvatures at the r vertices of the result, radians, NaN at unused vertices.
+
+    Attributes:
+        target: (r,) target curvature.
+        residual: (r,) target minus curvature of the flat metric.
+        prescribed: (r,) prescribed curvature in the plane, NaN where none is prescribed.
+    """
+
+    target: FloatArray
+    residual: FloatArray
+    prescribed: FloatArray
+
+    @classmethod
+    def of(cls, prepared: Prepared, layouts: Sequence[Layout], numbering: _Numbering) -> _Curvatures:
+        """Return the curvatures of the layouts of all components."""
+        target = numbering.spread([layout.target for layout in layouts])
+        residual = target - numbering.spread([layout.curvature for layout in layouts])
+        prescribed = numbering.spread([layout.prescribed for layout in layouts])
+        # A vertex on a marked seam has several copies in the plane.
+        prescribed[numbering.of_checked[prepared.seams]] = np.nan
+        return cls(target, residual, prescribed)
+
+
+def _measured(
+    prepared: Prepared,
+    mesh: TriangleMesh,
+    cones: IntArray,
+    curvatures: _Curvatures,
+    packed: _Packed,
+    options: Options,
+    overlaps: Overlaps | None,
+) -> tuple[_Packed, Distortion]:
+    """Return the charts and their measures; in an atlas, triangles that overlap by rounding alone are separated.
+
+    Args:
+        prepared, mesh, cones, curvatures: the input, and the mesh of the result with its cones and curvatures.
+        packed: the charts.
+        options, overlaps: as of `evaluate`.
+    """
+    residual = curvatures.residual
+    measure_places = partial(
+        measure,
+        mesh,
+        curvature_error=curvature_errors(residual[np.isfinite(residual)]),
+        cones=cones,
+        prescribed=curvatures.prescribed,
+        lengths=prepared.user_lengths,
+    )
+    distortion = measure_places(rows_of(packed.uv, packed.corners), overlaps=overlaps)
+    if options.charts == "atlas" and distortion.overlapping_pairs:
+        separated, remaining = separate_touching(packed.uv, packed.corners)
+        if len(remaining.pairs) < distortion.overlapping_pairs:
+            packed = replace(packed, uv=separated)
+            distortion = measure_places(separated[packed.corners], overlaps=remaining)
+    return packed, distortion
 
 
 def packed_scale(prepared: Prepared, layouts: Sequence[Layout], options: Options) -> Callable[[int], float]:
@@ -182,21 +220,21 @@ def _result_mesh(prepared: Prepared) -> tuple[_Numbering, IntArray, TriangleMesh
     order = np.argsort(origin, kind="stable")
     faces = rows_of(numbering.renumber([component.mesh.faces for component in prepared.components]), order)
     points = np.ldexp(numbering.positions, checked.exponent)
-    return numbering, order, _known_or_new(checked.mesh, points, faces)
+    return numbering, order, _with_connectivity(checked.mesh, points, faces)
 
 
 def _number_vertices(prepared: Prepared) -> _Numbering:
     """Return the numbering of the result's vertices."""
     points = np.asarray(prepared.input_mesh.vertices, dtype=np.float64)
     number, vertex_origin = result_numbering(prepared.checked, len(points))
-    of_parts = [number[component.vertices] for component in prepared.components]
-    return _Numbering(points[vertex_origin], vertex_origin, number, of_parts)
+    of_components = [number[component.vertices] for component in prepared.components]
+    return _Numbering(points[vertex_origin], vertex_origin, number, of_components)
 
 
 def _pack(layouts: Sequence[Layout], order: IntArray, mesh: TriangleMesh, options: Options) -> _Packed:
     """Return the packed charts of all components."""
-    points, own, chart, component = _all_charts(layouts)
-    corners = rows_of(own, order)
+    points, component_corners, chart, component = _all_charts(layouts)
+    corners = rows_of(component_corners, order)
     heights = None if options.up is None else mesh.vertices[mesh.faces] @ options.up
     packed = arrange_charts(
         rows_of(points, corners),
@@ -212,7 +250,7 @@ def _pack(layouts: Sequence[Layout], order: IntArray, mesh: TriangleMesh, option
     uv = np.empty_like(points)
     # Assigning both coordinates as one complex number is several times as fast in NumPy.
     uv.view(np.complex128)[:, 0][corners] = packed.corner_uv.view(np.complex128)[..., 0]
-    return _Packed(uv, corners, own, packed.scale, packed.efficiency)
+    return _Packed(uv, corners, component_corners, packed.scale, packed.efficiency)
 
 
 def _rotations(layouts: Sequence[Layout], corner_uv: FloatArray, options: Options) -> Rotations | None:
@@ -222,26 +260,28 @@ def _rotations(layouts: Sequence[Layout], corner_uv: FloatArray, options: Option
     """
     if options.quantise is None:
         return None
-    flat = np.split(corner_uv, np.cumsum([len(one.corners) for one in layouts])[:-1])
+    places_of_components = np.split(corner_uv, np.cumsum([len(layout.corners) for layout in layouts])[:-1])
     return Rotations.of_all(
-        [measure_rotations(one.mesh, own, options.quantise) for one, own in zip(layouts, flat, strict=True)]
+        [
+            measure_rotations(layout.mesh, places, options.quantise)
+            for layout, places in zip(layouts, places_of_components, strict=True)
+        ]
     )
 
 
-def _known_or_new(known: TriangleMesh, positions: FloatArray, faces: IntArray) -> TriangleMesh:
-    """Return a mesh of positions and faces; reuse the connectivity of a known mesh if the faces are equal."""
-    is_known = len(known.vertices) == len(positions) and np.array_equal(known.faces, faces)
-    return known.moved_to(positions) if is_known else TriangleMesh(positions, faces)
+def _with_connectivity(checked: TriangleMesh, positions: FloatArray, faces: IntArray) -> TriangleMesh:
+    """Return a mesh of positions and faces; reuse the connectivity of the checked mesh if the faces are equal."""
+    is_equal = len(checked.vertices) == len(positions) and np.array_equal(checked.faces, faces)
+    return checked.moved_to(positions) if is_equal else TriangleMesh(positions, faces)
 
 
 def _all_charts(layouts: Sequence[Layout]) -> tuple[FloatArray, IntArray, IntArray, IntArray]:
     """Return the points, corners and charts of all components, concatenated, and (k,) the component of each chart."""
-    corners, charts, component, points, count = [], [], [], 0, 0
-    for i, one in enumerate(layouts):
-        found = int(one.chart.max()) + 1
-        corners.append(one.corners + points)
-        charts.append(one.chart + count)
-        component += [i] * found
-        points, count = points + len(one.points), count + found
-    every = np.concatenate([one.points for one in layouts])
-    return every, np.concatenate(corners), np.concatenate(charts), np.array(component, dtype=np.int64)
+    chart_counts = [int(layout.chart.max()) + 1 for layout in layouts]
+    first_charts = np.cumsum([0, *chart_counts])
+    first_points = np.cumsum([0, *(len(layout.points) for layout in layouts)])
+    points = np.concatenate([layout.points for layout in layouts])
+    corners = [layout.corners + first for layout, first in zip(layouts, first_points, strict=False)]
+    charts = [layout.chart + first for layout, first in zip(layouts, first_charts, strict=False)]
+    components = np.arange(len(layouts)).repeat(chart_counts)
+    return points, np.concatenate(corners), np.concatenate(charts), components

@@ -14,7 +14,7 @@ from .base.notes import warns
 from .base.progress import stage, timing
 from .base.threads import limit_threads
 from .bounds import bound_notes
-from .cones import close_search
+from .cones import ConeSurface
 from .evaluate import evaluate
 from .flattening import FindMetric, Steps, SurfaceOf
 from .geometry.overlap import UNKNOWN_OVERLAPS
@@ -27,7 +27,7 @@ from .result import Flattening
 from .retries import cut_along_sharp_edges, finish_within_bound, lay_out_components
 from .source import Component, Prepared, Source
 from .source.copies import find_copies
-from .stages import Layout, RelaxSpec, Surface
+from .stages import Layout, RelaxSpec
 
 #: Receives the first layout, before triangles are relaxed and overlaps are separated.
 Preview: TypeAlias = Callable[[Flattening], object]
@@ -74,7 +74,7 @@ def flatten(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatte
 def flatten_source(
     source: Source,
     options: Options,
-    surface_of: SurfaceOf = Surface.of,
+    surface_of: SurfaceOf = ConeSurface.of,
     find_metric: FindMetric = conformal_metric,
     on_preview: Preview | None = None,
 ) -> Flattening:
@@ -170,7 +170,7 @@ class Flattener:
 
     def __init__(self, mesh: Any, faces: ArrayLike | None = None) -> None:
         self._source = Source(as_input(mesh, faces))
-        self._surfaces: dict[tuple[int, bool], Surface] = {}
+        self._surfaces: dict[tuple[int, bool], ConeSurface] = {}
         self._threads: int | None = None
 
     @warns()
@@ -203,12 +203,19 @@ class Flattener:
         try:
             return flatten_source(self._source, options, self._surface, on_preview=on_preview)
         finally:
-            for surface in self._surfaces.values():
-                close_search(surface)
+            self._close_searches()
 
-    def _surface(self, mesh: TriangleMesh, lengths: FloatArray, flips: bool) -> Surface:
+    def _surface(self, mesh: TriangleMesh, lengths: FloatArray, flips: bool) -> ConeSurface:
+        self._close_searches()
         key = id(mesh), flips
         if key not in self._surfaces:
-            self._surfaces[key] = Surface.of(mesh, lengths, flips)
+            self._surfaces[key] = ConeSurface.of(mesh, lengths, flips)
             self._surfaces[key].is_reused = True
+        if self._surfaces[key].lengths is not lengths:  # a retry has opened thin triangles
+            return ConeSurface.of(mesh, lengths, flips)
         return self._surfaces[key]
+
+    def _close_searches(self) -> None:
+        """Delete the searches for cones: the sets that they found must not affect later results."""
+        for surface in self._surfaces.values():
+            surface.close_search()

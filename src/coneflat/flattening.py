@@ -8,7 +8,7 @@ calls them again where a layout can be improved.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -17,7 +17,7 @@ from .atlas import separate_overlaps
 from .base.arrays import FloatArray, IntArray
 from .base.notes import Unmet
 from .base.text import list_some, plural
-from .cones import find_cones
+from .cones import ConeSurface, find_cones
 from .geometry.operators import weighted_areas
 from .layout import lay_out
 from .mesh.connectivity import TriangleMesh
@@ -28,7 +28,7 @@ from .source.components import Component
 from .stages import ConeSolution, FlatMetric, Layout, MetricSpec, RelaxSpec, Surface
 
 #: Returns a connected mesh with the operators of its (m, 3) lengths; the flag allows edge flips.
-SurfaceOf: TypeAlias = Callable[[TriangleMesh, FloatArray, bool], Surface]
+SurfaceOf: TypeAlias = Callable[[TriangleMesh, FloatArray, bool], ConeSurface]
 #: Returns the flat metric of a connected mesh for its cones.
 FindMetric: TypeAlias = Callable[[Surface, ConeSolution, MetricSpec], FlatMetric]
 
@@ -50,7 +50,7 @@ class Steps:
         names_components: errors name the component.
     """
 
-    surface_of: SurfaceOf = Surface.of
+    surface_of: SurfaceOf = ConeSurface.of
     find_metric: FindMetric = find_metric
     relax: RelaxSpec = field(default_factory=lambda: RelaxSpec("off", 0.0))
     separates: bool = False
@@ -58,12 +58,12 @@ class Steps:
     untangles: bool = True
     names_components: bool = False
 
-    def surface(self, component: Component) -> Surface:
+    def surface(self, component: Component) -> ConeSurface:
         """Return a component with the operators of its metric."""
         return self.surface_of(component.mesh, component.lengths, component.is_exact)
 
 
-def lay_out_component(surface: Surface, component: Component, steps: Steps) -> Layout:
+def lay_out_component(surface: ConeSurface, component: Component, steps: Steps) -> Layout:
     """Return the layout of a component in one chart (Section 4 of the paper).
 
     Cones concentrate the curvature that a flat metric cannot have elsewhere. The lengths l_ij of the surface are scaled
@@ -80,8 +80,8 @@ def lay_out_component(surface: Surface, component: Component, steps: Steps) -> L
         MetricError: the computation found no finite metric or layout.
         SeamError: every set of seams needs forbidden edges.
     """
-    holonomy = loop_rotations(surface, component.metric) if component.cones.quantum else None
-    cones = find_cones(surface, component.cones, holonomy)  # Sections 3.1 and 3.2
+    rotations = loop_rotations(surface, component.metric) if component.cones.quantum else None
+    cones = find_cones(surface, replace(component.cones, rotations=rotations))  # Sections 3.1 and 3.2
     metric = steps.find_metric(surface, cones, component.metric)  # 2.3
     costs = seam_costs(component.mesh, component.lengths, component.seams, cones.is_polyhedral)
     disk = cut_to_disk(component.mesh, cones.cones, costs, component.seams)  # 4.2

@@ -10,7 +10,7 @@ import numpy as np
 
 from .base.progress import stage
 from .bounds import TOLERATED_EXCESS, borders_and_distortion, excess, is_too_distorted, rank
-from .cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, close_search, uses_sparse_search, with_corners
+from .cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, uses_sparse_search, with_corners
 from .errors import ConvergenceError, CurvatureError, MetricError, OptionError, SeamError
 from .flattening import (
     Steps,
@@ -83,7 +83,6 @@ def lay_out_with_feasible_cones(component: Component, steps: Steps) -> Layout:
         if not (may_repeat and len(infeasible)):
             break
         component = replace(component, cones=component.cones.without(infeasible))
-    close_search(surface)
     return min(layouts, key=lambda layout: (len(layout.notes), len(infeasible_cones(layout))))
 
 
@@ -181,9 +180,9 @@ def search_more_cones(
             # About that many times as many cones are needed; a search without enough of them takes longest.
             if factor > TOLERATED_EXCESS and factor * len(latest[i].cones) <= MAX_SEARCHED:
                 tightened[i] = attempt.with_distortion(TOLERATED_EXCESS / factor)
-        better = retried(tightened, beyond, latest, steps)
-        improved |= better
-        attempts = {i: tightened[i] for i in better}
+        improvements = retried(tightened, beyond, latest, steps)
+        improved |= improvements
+        attempts = {i: tightened[i] for i in improvements}
     return improved
 
 
@@ -201,13 +200,13 @@ def retried(
         finished: their layouts.
         steps: the functions of the stages.
     """
-    better = dict[int, Layout]()
+    improvements = dict[int, Layout]()
     for group in groups_of_small(attempts, steps.relax):
         members = {i: attempts[i] for i in group}
         with suppress(*FAILURES):
             candidates = finish_components(members, lay_out_components(members, steps), steps)
-            better |= better_layouts(candidates, finished, components)
-    return better
+            improvements |= better_layouts(candidates, finished, components)
+    return improvements
 
 
 def better_layouts(

@@ -31,8 +31,8 @@ def test_no_exchange_of_quanta_is_better():
     """Brute force over transfers of a quantum between two cones."""
     search = search_on(*shapes.sphere(3))
     quantised = quantise_cones(search, np.pi / 2, distortion=0.1)
-    places = search.exact.insert(search.operator.unknowns_of(quantised.solution.cones))
-    model = search.exact
+    places = search.fine.insert(search.operator.unknowns_of(quantised.solution.cones))
+    model = search.fine
     gram, slope = model.gram[np.ix_(places, places)], model.slope[places]
 
     def energy(indices):

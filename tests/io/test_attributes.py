@@ -11,7 +11,7 @@ from scenes import SceneMaker, opened, rich_scene
 from trials.attributes import glb_rows, read_ply
 
 import coneflat
-from coneflat.io import KEPT, Attribute, read_mesh, read_mesh_from
+from coneflat.io import OUTPUT_FORMATS, Attribute, read_mesh, read_mesh_from
 
 PLY = """ply
 format ascii 1.0
@@ -188,7 +188,7 @@ def test_other_formats_name_what_they_do_not_keep(name, text, lost, tmp_path):
             f"solid left arm\nfacet normal 0 0 1\nouter loop\n{corners}endloop\nendfacet\nendsolid left arm\n"
         )
     result = coneflat.flatten(read_mesh_from(text.encode(), name))
-    for ending in KEPT:
+    for ending in OUTPUT_FORMATS:
         assert lost_in(result, ending) == ("" if name.endswith(ending) else lost)
 
 
@@ -287,8 +287,10 @@ def test_textures_of_the_old_uvs_of_an_obj_are_named(line, has_uv, tmp_path):
     (tmp_path / "a.obj").write_text("\n".join(lines))
     result = coneflat.flatten(tmp_path / "a.obj")
     note = "The textures of the file are kept, but were made for the old UVs"
-    found = [any(each.startswith(note) for each in result.as_written(ending).notes) for ending in KEPT]
-    assert found == [has_uv and line.startswith("map") and ending == ".obj" for ending in KEPT]
+    found = [
+        any(each.startswith(note) for each in result.as_written(ending).notes) for ending in OUTPUT_FORMATS
+    ]
+    assert found == [has_uv and line.startswith("map") and ending == ".obj" for ending in OUTPUT_FORMATS]
 
 
 def test_a_report_has_the_note(painted, tmp_path):

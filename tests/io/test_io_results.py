@@ -12,7 +12,7 @@ from bars import cut_bar, read_bar
 
 import coneflat
 from coneflat.errors import ConeflatError, MeshFileError, UnknownFormatError
-from coneflat.io import atomic_write, check_output, write_flattening
+from coneflat.io import atomic_write, check_output, write, write_flattening
 from coneflat.io.texture import read_picture
 from coneflat.io.write import OUTPUT_FORMATS
 
@@ -83,6 +83,11 @@ class TestReadingResults:
 @pytest.fixture
 def bar(tmp_path):
     return read_bar(tmp_path)
+
+
+def test_every_declared_format_is_written():
+    """The declared endings, which commands list, are those of the writers."""
+    assert set(OUTPUT_FORMATS) == set(write._FORMATS)
 
 
 class TestTargets:

@@ -222,7 +222,7 @@ class TestSplitFormats:
         result = cut_bar(bar)
         (tmp_path / "text.png").write_text("no image")
         for path, texture, kind, message in (
-            ("out.obj", "checker", OptionError, "only .glb files carry a texture"),
+            ("out.obj", "checker", OptionError, "only .glb files contain a texture"),
             ("out.glb", tmp_path / "none.png", MeshFileError, "there is no such file"),
             ("out.glb", tmp_path / "text.png", MeshFileError, "text.png is not a readable image"),
         ):

@@ -1,11 +1,15 @@
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 import shapes
+from measure_list import measure_list
 
 from coneflat import TriangleMesh, errors, measure
 from coneflat.geometry import edge_lengths
+from coneflat.measures.report import MEASURES
 
 VERTICES, FACES = shapes.grid(6, 4)
 MESH = TriangleMesh(VERTICES, FACES)
@@ -80,3 +84,8 @@ def test_a_metric_given_by_its_lengths(points):
         assert getattr(measured, name) == pytest.approx(getattr(expected, name), rel=1e-12, abs=1e-12)
     with pytest.raises(errors.LengthError, match="not positive: 2"):
         measure(MESH, uv, lengths=np.where(np.arange(len(FACES))[:, None] == 2, -1, lengths))
+
+
+def test_every_measure_is_documented():
+    listed = re.findall(r"`(\w+)`[,:]", measure_list())
+    assert sorted(listed) == sorted(MEASURES)

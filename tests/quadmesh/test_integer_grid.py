@@ -13,11 +13,13 @@ import coneflat
 from coneflat import errors, flatten, integer_grid
 from coneflat.geometry import edge_lengths
 from coneflat.mesh.connectivity import TriangleMesh
-from coneflat.quadmesh.grid_search import GridSearch
-from coneflat.quadmesh.layout import aligned
-from coneflat.quadmesh.lines import with_sides
-from coneflat.quadmesh.round_layout import split_between_nodes
+from coneflat.quadmesh import policies
+from coneflat.quadmesh.alignment import aligned
+from coneflat.quadmesh.grid_layout import with_sides
+from coneflat.quadmesh.no_grid import NoGrid
+from coneflat.quadmesh.request import GridRequest
 from coneflat.quadmesh.rounding import find_rounding
+from coneflat.quadmesh.splitting import split_between_nodes
 from coneflat.quadmesh.transitions import find_transitions
 
 TURNS = np.array([1, 1j, -1, -1j])
@@ -184,10 +186,8 @@ def test_a_grid_that_is_too_coarse_is_made_finer():
 
 
 def test_a_note_says_what_cones_are_not_chosen_for(monkeypatch):
-    def failing(*_):
-        raise errors.GridError("no place for them")
-
-    monkeypatch.setattr(GridSearch, "_of_aligned_cones", failing)
+    reason = NoGrid(errors.GridError("no place for them"))
+    monkeypatch.setattr(policies, "aligned_map", lambda *_: reason)
     note = "Cones are not chosen for the boundary, sharp edges or curvature, because no grid with such cones was found"
     assert f"{note}: no place for them." in integer_grid(*shapes.sphere(3), quads=300).notes
 
@@ -240,7 +240,7 @@ def test_charts_stay_joined_where_edges_between_them_are_split(every, height):
     """The first chain between two charts is another one then."""
     options = {**QUARTER, "charts": "atlas", "correct_handles": True, "distortion": 0.1}
     result = flatten(*spiked(every, height), **options)
-    layout = aligned(result, GridSearch.of(result, None, {"quads": 1000}, {}).size)
+    layout = aligned(result, GridRequest.of(result, None, {"quads": 1000}, {}).size)
     split = split_between_nodes(layout)
     assert result.distortion.charts > 1
     assert len(split.mesh.faces) > len(layout.mesh.faces)

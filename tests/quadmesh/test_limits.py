@@ -152,8 +152,8 @@ def test_points_in_triangles_without_area_have_weights():
 def test_quads_without_places_are_an_error(monkeypatch):
     grid = integer_grid(*SQUARE, quads=16)
 
-    def lost(*arguments, **options):
-        extracted = extract_quads(*arguments, **options)
+    def lost(grid):
+        extracted = extract_quads(grid)
         extracted.vertices[3] = np.nan
         return extracted
 

@@ -27,12 +27,13 @@ from shapes import grid as rectangle
 import coneflat
 from coneflat.errors import DegenerateFaceError, GridError
 from coneflat.geometry.nearest import surface_distances
-from coneflat.quadmesh import grid_search
-from coneflat.quadmesh.extract import extract_quads
-from coneflat.quadmesh.grid_search import GridSearch
-from coneflat.quadmesh.layout import aligned
-from coneflat.quadmesh.quad_mesh import CoarseGridError, degenerate_quads, least_jacobians
+from coneflat.quadmesh import policies
+from coneflat.quadmesh.alignment import aligned
+from coneflat.quadmesh.extract import DegenerateQuads, extract_quads, find_quads
+from coneflat.quadmesh.no_grid import NoGrid
+from coneflat.quadmesh.quad_mesh import degenerate_quads, least_jacobians
 from coneflat.quadmesh.quality import measure_quads
+from coneflat.quadmesh.request import GridRequest
 
 
 def oriented_sides(quads):
@@ -250,7 +251,7 @@ def test_quads_that_meet_themselves_are_made_smaller():
     grid = coneflat.integer_grid(*shapes.genus(3), **options)
     with pytest.raises(GridError, match="degenerate quads? of .*: use more quads"):
         extract_quads(grid)
-    assert all("Left out" in note for note in extract_quads(grid, leave_out=True).notes)
+    assert all("Left out" in note for note in find_quads(grid, leave_out=True).notes)
     mesh = coneflat.quads(*shapes.genus(3), **options)
     assert mesh.euler_characteristic == mesh.surface_euler == -4
     assert any("More quads than requested" in note for note in mesh.notes)
@@ -260,16 +261,16 @@ def test_quads_that_meet_themselves_are_made_smaller():
 @pytest.mark.slow
 def test_bad_quads_are_left_out_where_no_finer_grid_is_found(monkeypatch):
     options = {"quads": 10, "cones": "sparse", "distortion": 0.2}
-    search, searches = GridSearch._as_given, []
+    grid_of_size, searches = policies.grid_of_size, []
 
-    def fail_if_finer(self):
-        searches.append(self.size)
-        if self.size < requested:
-            raise GridError("none")
-        return search(self)
+    def fail_if_finer(request, flattening_of):
+        searches.append(request.size)
+        if request.size < requested:
+            return NoGrid(GridError("none"))
+        return grid_of_size(request, flattening_of)
 
-    monkeypatch.setattr(GridSearch, "_as_given", fail_if_finer)
-    requested = GridSearch.of(*shapes.genus(3), {"quads": 10}, {}).size
+    monkeypatch.setattr(policies, "grid_of_size", fail_if_finer)
+    requested = GridRequest.of(*shapes.genus(3), {"quads": 10}, {}).size
     mesh = coneflat.quads(*shapes.genus(3), **options)
     assert any("Left out" in note for note in mesh.notes)
     assert not any("More quads than requested" in note for note in mesh.notes)
@@ -279,7 +280,7 @@ def test_bad_quads_are_left_out_where_no_finer_grid_is_found(monkeypatch):
 
 @pytest.mark.slow
 def test_cones_are_chosen_once_for_all_sizes_of_one_price(monkeypatch):
-    chosen, sizes, choose, extract = [], [], grid_search.aligned_flattening, extract_quads
+    chosen, sizes, choose = [], [], policies.aligned_flattening
 
     def count(*arguments, **options):
         chosen.append(arguments)
@@ -288,18 +289,18 @@ def test_cones_are_chosen_once_for_all_sizes_of_one_price(monkeypatch):
     def fail_twice(grid):
         sizes.append(grid.size)
         if len(sizes) < 3:
-            raise CoarseGridError("none", grid)
-        return extract(grid)
+            return DegenerateQuads("none")
+        return find_quads(grid)
 
-    monkeypatch.setattr(grid_search, "aligned_flattening", count)
-    monkeypatch.setattr(grid_search, "extract_quads", fail_twice)
-    monkeypatch.setattr(grid_search, "QUADS_AT_UNIT_PRICE", 1)
-    monkeypatch.setattr(grid_search, "COARSE", 0)
+    monkeypatch.setattr(policies, "aligned_flattening", count)
+    monkeypatch.setattr(policies, "find_quads", fail_twice)
+    monkeypatch.setattr(policies, "QUADS_AT_UNIT_PRICE", 1)
+    monkeypatch.setattr(policies, "MAX_SPLIT_TRIANGLES", 0)
     mesh = coneflat.quads(*shapes.sphere(3), quads=200)
     assert len(chosen) == 1
     # The second grid is that of the fewest cones.
     assert sizes[0] == sizes[1] > sizes[2] == mesh.grid.size
-    monkeypatch.setattr(grid_search, "QUADS_AT_UNIT_PRICE", 1e6)
+    monkeypatch.setattr(policies, "QUADS_AT_UNIT_PRICE", 1e6)
     sizes.clear()
     coneflat.quads(*shapes.sphere(3), quads=200)
     assert len(chosen) == 3
@@ -314,22 +315,20 @@ def test_components_of_equal_price_have_grids_of_their_own():
 
 @pytest.mark.slow
 def test_a_large_grid_that_is_much_finer_than_requested_is_not_refined(monkeypatch):
-    grids, extract = [], extract_quads
+    grids = []
 
     def fail_at_first(grid):
         grids.append(grid.squares)
         if len(grids) < 3:
-            raise CoarseGridError("too coarse", grid)
-        return extract(grid)
+            return DegenerateQuads("too coarse")
+        return find_quads(grid)
 
-    monkeypatch.setattr("coneflat.quadmesh.grid_search.extract_quads", fail_at_first)
+    monkeypatch.setattr(policies, "find_quads", fail_at_first)
     options = {"cones": "sparse", "quads": 2000}
     assert coneflat.quads(*shapes.sphere(3), **options).left_out == 0
     assert len(grids) == 3
     grids.clear()
-    monkeypatch.setattr(
-        "coneflat.quadmesh.grid_search.aligned", lambda it, size, angle: aligned(it, size / 3, angle)
-    )
+    monkeypatch.setattr(policies, "aligned", lambda result, size, angle: aligned(result, size / 3, angle))
     coneflat.quads(*shapes.sphere(3), **options)
     assert len(grids) == 1
 
@@ -338,15 +337,12 @@ def test_a_large_grid_that_is_much_finer_than_requested_is_not_refined(monkeypat
 def test_grids_whose_bad_quads_are_left_out_keep_all_notes(monkeypatch):
     """The first grid, of aligned cones, is taken, not that of the fewest cones."""
 
-    def fail(grid):
-        raise CoarseGridError("too coarse", grid)
-
-    monkeypatch.setattr("coneflat.quadmesh.grid_search.extract_quads", fail)
+    monkeypatch.setattr(policies, "find_quads", lambda grid: DegenerateQuads("too coarse"))
     sizes = np.linspace(1, 2, len(shapes.sphere(3)[0]))
-    aligned_ones, graded = (coneflat.quads(*shapes.sphere(3), quads=200, size=size) for size in (None, sizes))
-    assert not any("Cones are not chosen" in note for note in aligned_ones.notes)
+    even, graded = (coneflat.quads(*shapes.sphere(3), quads=200, size=size) for size in (None, sizes))
+    assert not any("Cones are not chosen" in note for note in even.notes)
     assert any("Sizes of quads have a correlation" in note for note in graded.notes)
-    monkeypatch.setattr(GridSearch, "_of_aligned_cones", lambda *_: (_ for _ in ()).throw(GridError("none")))
+    monkeypatch.setattr(policies, "aligned_map", lambda *_: NoGrid(GridError("none")))
     assert any("Cones are not chosen" in note for note in coneflat.quads(*shapes.sphere(3), quads=200).notes)
 
 
@@ -357,10 +353,10 @@ def test_a_thin_component_does_not_make_the_others_finer(monkeypatch):
     def fail_for_few(grid):
         sizes.append(grid.squares)
         if grid.squares < 60:
-            raise CoarseGridError("as thin as a square", grid)
-        return extract_quads(grid)
+            return DegenerateQuads("as thin as a square")
+        return find_quads(grid)
 
-    monkeypatch.setattr("coneflat.quadmesh.grid_search.extract_quads", fail_for_few)
+    monkeypatch.setattr(policies, "find_quads", fail_for_few)
     small, triangles = shapes.sphere(2)
     mesh = coneflat.quads(*shapes.join(shapes.sphere(3), (small / 3 + 3, triangles)), quads=500)
     assert max(sizes) == pytest.approx(450, rel=0.1)

@@ -17,11 +17,12 @@ from coneflat.geometry.planar import signed_double_areas
 from coneflat.geometry.triangles import double_areas, edge_lengths
 from coneflat.mesh.connectivity import TriangleMesh
 from coneflat.optimise.seam_chains import find_chains
+from coneflat.quadmesh.alignment import aligned
 from coneflat.quadmesh.extract import extract_quads
-from coneflat.quadmesh.layout import aligned, split_edges
 from coneflat.quadmesh.quad_mesh import least_jacobians
 from coneflat.quadmesh.quality import measure_quads
 from coneflat.quadmesh.smooth import MovingQuads, smooth_quads
+from coneflat.quadmesh.splitting import with_split_edges
 
 
 def test_smoothing_makes_quads_squarer_and_stays_on_the_surface():
@@ -147,7 +148,7 @@ def test_splitting_keeps_the_surface_and_its_seams(share, boundary):
     sharpest = {"min_cone_angle": np.pi / 2} if boundary == "straight" else {}
     layout = aligned(flatten(*shape, **{**OPTIONS, **sharpest}, boundary=boundary), 0.2)
     is_split = np.random.default_rng(3).random(len(layout.mesh.edges)) < share
-    split = split_edges(layout, is_split)
+    split = with_split_edges(layout, is_split)
     before, mesh = layout.mesh, split.mesh
     assert len(mesh.vertices) == len(before.vertices) + is_split.sum()
     inner = 2 - before.is_boundary_edge.astype(int)

@@ -11,17 +11,19 @@ from scipy.sparse.csgraph import connected_components
 import coneflat
 from coneflat import TriangleMesh, check_mesh
 from coneflat.errors import GridError
-from coneflat.quadmesh import simpler_mesh as module
+from coneflat.quadmesh import policies, remesh
 from coneflat.quadmesh.cross_field import SHARP_ANGLE, sharp_ends
-from coneflat.quadmesh.grid_search import GridSearch
+from coneflat.quadmesh.no_grid import NoGrid
+from coneflat.quadmesh.policies import on_coarse_mesh
 from coneflat.quadmesh.quad_mesh import QuadMesh
-from coneflat.quadmesh.simpler_mesh import simplified
+from coneflat.quadmesh.request import GridRequest
+from coneflat.quadmesh.simpler_mesh import SimplerMesh
 
 
 @pytest.fixture
 def coarser(monkeypatch):
     """Meshes of more than 2,000 triangles are made coarse."""
-    monkeypatch.setattr(module, "COARSE", 1000)
+    monkeypatch.setattr(policies, "COARSE_TRIANGLES", 1000)
 
 
 MODELS = {
@@ -84,7 +86,7 @@ def test_vertices_slide_along_the_surface():
     )
     is_filling = np.zeros(len(surface.faces), dtype=bool)
     np.testing.assert_array_equal(coarse.vertices[[0, 1, 2]], surface.vertices[[0, 1, 2]])
-    moved = module.SimplerMesh(surface, np.array([0, 1, 2]), coarse, is_filling, 0.1).moved(quads)
+    moved = SimplerMesh(surface, np.array([0, 1, 2]), coarse, is_filling, 0.1).moved(quads)
     np.testing.assert_allclose(moved.vertices, quads.vertices, atol=1e-12)
 
 
@@ -112,17 +114,17 @@ def test_options_for_which_the_given_mesh_is_used(coarser, options):
         "quads": 300,
         **{name: options.pop(name) for name in ("quads", "sharp_angle") if name in options},
     }
-    assert simplified(GridSearch.of(vertices, faces, {"quads": 300}, {}))[1] is not None
-    search = GridSearch.of(vertices, faces, quad_options, options)
-    assert simplified(search) == (search, None)
+    assert on_coarse_mesh(GridRequest.of(vertices, faces, {"quads": 300}, {}))[1] is not None
+    request = GridRequest.of(vertices, faces, quad_options, options)
+    assert on_coarse_mesh(request) == (request, None)
 
 
 def test_sizes_are_those_of_the_given_mesh(coarser):
     vertices, faces = MODELS["ball"]()
     sizes = np.linspace(1, 2, len(vertices))
-    search, small = simplified(GridSearch.of(vertices, faces, {"quads": 300, "size": sizes}, {}))
-    np.testing.assert_allclose(search.sizes, sizes[small.vertex_origin])
-    np.testing.assert_array_equal(small.mesh.vertices, vertices[small.vertex_origin])
+    request, simpler = on_coarse_mesh(GridRequest.of(vertices, faces, {"quads": 300, "size": sizes}, {}))
+    np.testing.assert_allclose(request.sizes, sizes[simpler.vertex_origin])
+    np.testing.assert_array_equal(simpler.mesh.vertices, vertices[simpler.vertex_origin])
 
 
 def components_of(mesh):
@@ -133,7 +135,7 @@ def components_of(mesh):
 
 @pytest.mark.slow
 def test_small_components_are_divided(monkeypatch):
-    monkeypatch.setattr(module, "MAX_COMPONENTS", 2)
+    monkeypatch.setattr(remesh, "MAX_COMPONENTS", 2)
     cube, (ball, faces) = shapes.box(1, (1.0, 1.0, 1.0)), shapes.sphere(3)
     parts = [(4.0 * k + size * cube[0], cube[1]) for k, size in enumerate((3, 1, 2, 0.1))]
     mesh = coneflat.quads(*shapes.join(*parts, (ball - 9, faces)), quads=300)
@@ -168,7 +170,7 @@ def test_holes_smaller_than_quads_are_filled():
 
 
 def test_quads_over_filled_holes_are_left_out(monkeypatch):
-    monkeypatch.setattr(module, "MAX_HOLES", 1)
+    monkeypatch.setattr(remesh, "MAX_HOLES", 1)
     mesh = coneflat.quads(*with_holes(20, ((3, 3), (15, 3), (3, 15), (15, 15))), quads=1600)
     assert any(note.startswith("Filled 3 holes") for note in mesh.notes)
     assert mesh.euler_characteristic == mesh.surface_euler == -3
@@ -179,7 +181,7 @@ def test_quads_over_filled_holes_are_left_out(monkeypatch):
 
 @pytest.mark.slow
 def test_round_holes_that_are_filled_give_no_flipped_quads(monkeypatch):
-    monkeypatch.setattr(module, "MAX_HOLES", 1)
+    monkeypatch.setattr(remesh, "MAX_HOLES", 1)
     vertices, faces = shapes.grid(60, 60)
     middle = vertices[faces].mean(axis=1)[:, :2]
     centres = np.array([[0.2, 0.25], [0.7, 0.3], [0.35, 0.7], [0.75, 0.75]])
@@ -190,7 +192,8 @@ def test_round_holes_that_are_filled_give_no_flipped_quads(monkeypatch):
 
 
 def test_a_boundary_with_very_many_corners_is_free(monkeypatch):
-    monkeypatch.setattr(module, "MAX_CORNERS", 3)
+    for module in (remesh, policies):
+        monkeypatch.setattr(module, "MAX_CORNERS", 3)
     mesh = coneflat.quads(*shapes.grid(8, 8), quads=50)
     assert "The boundary cuts squares, because it has more than 3 corners." in mesh.notes
     assert mesh.euler_characteristic == 1
@@ -203,21 +206,21 @@ def test_a_boundary_with_very_many_corners_is_free(monkeypatch):
 @pytest.mark.parametrize("name", ["as given", "coarse", "filled", "few"])
 def test_components_for_which_no_grid_is_found_are_divided(monkeypatch, name):
     """Each triangle of the cube becomes three quads, and the surface is the given one."""
-    search = GridSearch.of_any_size
+    find_grid = policies.find_grid
 
-    def fail_for_cubes(self):
-        mesh = self.checked.mesh
+    def fail_for_cubes(request):
+        mesh = request.mesh
         if mesh.components[0] == 1 and not mesh.is_boundary_edge.any() and len(mesh.faces) <= 12:
-            raise GridError("none")
-        return search(self)
+            return NoGrid(GridError("none"))
+        return find_grid(request)
 
-    monkeypatch.setattr(GridSearch, "of_any_size", fail_for_cubes)
+    monkeypatch.setattr(policies, "find_grid", fail_for_cubes)
     (sheet, faces), cube = with_holes(40, ((20, 20),)), shapes.box(1, (1.0, 1.0, 1.0))
     parts = [(20 * sheet, faces), (cube[0] + 30, cube[1])]
     if name == "coarse":
-        monkeypatch.setattr(module, "COARSE", 1000)
+        monkeypatch.setattr(policies, "COARSE_TRIANGLES", 1000)
     if name == "few":
-        monkeypatch.setattr(module, "MAX_COMPONENTS", 4)
+        monkeypatch.setattr(remesh, "MAX_COMPONENTS", 4)
         parts += [(0.1 * cube[0] - 5 * k, cube[1]) for k in range(1, 4)]
     vertices, triangles = shapes.join(*parts)
     quad_mesh = coneflat.quads(vertices, triangles, quads=2000 if name == "as given" else 200)
@@ -236,7 +239,7 @@ def test_components_for_which_no_grid_is_found_are_divided(monkeypatch, name):
 
 def test_two_sided_triangles_are_divided(monkeypatch):
     """Splitting edges of two triangles with the same vertices would join two vertices twice."""
-    monkeypatch.setattr(module, "MAX_COMPONENTS", 1)
+    monkeypatch.setattr(remesh, "MAX_COMPONENTS", 1)
     pillow = np.array([[5.0, 0, 0], [6, 0, 0], [5, 1, 0]]), np.array([[0, 1, 2], [0, 2, 1]])
     mesh = coneflat.quads(*shapes.join(shapes.sphere(3), pillow), quads=2000)
     assert components_of(mesh) == (2, 2)
@@ -299,13 +302,13 @@ def test_meshes_of_thin_triangles_are_remeshed():
     fans = [[low, after, above], [low, above, high], [high, above, 0 * low + 2 * count]]
     faces = np.concatenate([np.stack(fan, axis=1) for fan in fans])
     checked = check_mesh(vertices, faces).mesh
-    assert module._is_thin(checked).all()
-    remeshed, vertices_of, of = module._retriangulated(checked, 4000)
+    assert remesh.is_thin(checked).all()
+    remeshed, vertices_of, of = remesh.remeshed(checked, 4000)
     common = vertices_of[vertices_of < len(vertices)]
     assert (np.diff(vertices_of) >= 0).all()
     np.testing.assert_array_equal(remeshed.vertices[: len(common)], checked.vertices[common])
     assert (remeshed.euler_characteristic, len(remeshed.faces)) == (1, len(of))
-    assert module._is_thin(remeshed).mean() < 0.2
+    assert remesh.is_thin(remeshed).mean() < 0.2
     mesh = coneflat.quads(vertices, faces, quads=600)
     np.testing.assert_array_equal(mesh.surface.vertices, vertices)
     assert (mesh.left_out, mesh.euler_characteristic) == (0, 1)
@@ -317,7 +320,7 @@ def test_meshes_of_thin_triangles_are_remeshed():
 def test_meshes_whose_triangles_stay_thin_are_taken_as_given():
     vertices, faces = shapes.grid(40, 2)
     mesh = check_mesh(vertices * [0.2, 8, 1], faces).mesh
-    remeshed, vertices_of, of = module._retriangulated(mesh, 400)
+    remeshed, vertices_of, of = remesh.remeshed(mesh, 400)
     np.testing.assert_array_equal(remeshed.faces, mesh.faces)
     assert (vertices_of.tolist(), of.tolist()) == (
         list(range(len(mesh.vertices))),
@@ -328,13 +331,13 @@ def test_meshes_whose_triangles_stay_thin_are_taken_as_given():
 @pytest.mark.slow
 def test_triangles_that_stay_thin_are_not_split_without_bound(monkeypatch):
     """The triangles of a cylinder of many sides are thin at their tips, however often they are split."""
-    counts, coarse = [], module.coarse_mesh
+    counts, coarse = [], remesh.coarse_mesh
 
     def watched(mesh, count):
         counts.append(len(mesh.faces) / count)
         return coarse(mesh, count)
 
-    monkeypatch.setattr(module, "coarse_mesh", watched)
+    monkeypatch.setattr(remesh, "coarse_mesh", watched)
     vertices, faces = shapes.cylinder(300, 1, 9.0, caps=True)
     quad_mesh = coneflat.quads(vertices, faces, quads=1000, repair=True)
     assert 1 < counts[0] < 12

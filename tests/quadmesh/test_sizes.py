@@ -11,9 +11,10 @@ import coneflat
 from coneflat.apps.cli.quads_command import quads as command
 from coneflat.errors import GridError, MeshFileError, OptionError
 from coneflat.mesh.connectivity import TriangleMesh
+from coneflat.quadmesh import policies
+from coneflat.quadmesh.alignment import has_area
 from coneflat.quadmesh.features import split_around
-from coneflat.quadmesh.grid_search import GridSearch
-from coneflat.quadmesh.layout import has_area
+from coneflat.quadmesh.no_grid import NoGrid
 from coneflat.quadmesh.sizes import extended
 
 
@@ -152,14 +153,14 @@ def test_sizes_hold_between_components(two_balls):
 
 @pytest.mark.slow
 def test_a_coarse_mesh_without_a_grid_is_refined(monkeypatch):
-    search = GridSearch._of_aligned_cones
+    aligned_map = policies.aligned_map
 
-    def fail_at_first(self, price_factor):
+    def fail_at_first(request, price_factor, flattening_of):
         if price_factor == 1:
-            raise GridError("none")
-        return search(self, price_factor)
+            return NoGrid(GridError("none"))
+        return aligned_map(request, price_factor, flattening_of)
 
-    monkeypatch.setattr(GridSearch, "_of_aligned_cones", fail_at_first)
+    monkeypatch.setattr(policies, "aligned_map", fail_at_first)
     vertices, faces = shapes.torus()
     grid = coneflat.integer_grid(vertices, faces, quads=500)
     assert len(grid.faces) >= 4 * len(faces)

@@ -162,12 +162,10 @@ def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:
     )
     all_uv = mapped.corner_uv[has_uv]
     cover = _cover_of_textures(np.ldexp(all_uv, -exponent), texture[has_uv])
-    points, corners = uv_points(checked.mesh, unit)
-    tiles = sum(len(chart_tiles(points, corners[owner == number], exponent)) for number in textures)
     with np.errstate(over="ignore"):  # A value that is not finite is reported as unknown.
         covered = float(np.ldexp(cover.area, 2 * exponent))
     # A chart may extend over several squares.
-    tiles = max(tiles, round(min(covered, MAX_TILES)))
+    tiles = max(_count_tiles(checked.mesh, unit, exponent, owner), round(min(covered, MAX_TILES)))
     counts = {
         "vertices": len(np.unique(mapped.faces)),
         "polygons": mapped.polygons,
@@ -194,6 +192,21 @@ def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:
     if distortion.degenerate_input or len(checked.mesh.faces) < len(all_uv):
         notes += rounding_notes(mapped.vertices, mapped.faces[has_uv])
     return replace(measures, notes=tuple(notes))
+
+
+def _count_tiles(mesh: TriangleMesh, unit_uv: FloatArray, exponent: int, texture: IntArray) -> int:
+    """Return the number of unit squares of all textures that contain charts.
+
+    Args:
+        mesh: m triangles.
+        unit_uv: (m, 3, 2) their UVs times 2^-exponent.
+        exponent: as above.
+        texture: (m,) number of the texture of each.
+    """
+    points, corners = uv_points(mesh, unit_uv)
+    return sum(
+        len(chart_tiles(points, corners[texture == number], exponent)) for number in np.unique(texture)
+    )
 
 
 def surface_of(mapped: UVMesh, *, strict: bool = False) -> tuple[CheckedMesh, FloatArray]:

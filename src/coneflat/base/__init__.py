@@ -8,7 +8,16 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .defaults import DISTORTION, MAX_CONE_ANGLE, MAX_CONES, MIN_CONE_ANGLE, TYPED_TOLERANCE
+from .defaults import (
+    BAKED_RESOLUTION,
+    CHECKER_CELLS,
+    DISTORTION,
+    DOTS_PER_INCH,
+    MAX_CONE_ANGLE,
+    MAX_CONES,
+    MIN_CONE_ANGLE,
+    TYPED_TOLERANCE,
+)
 from .entry_points import EntryPoint
 from .notes import Unmet, inner_calls, warn_of, warns
 from .progress import Progress, Stopwatch, cancel_with, check_cancelled, report_detail, stage, timing
@@ -32,11 +41,12 @@ if TYPE_CHECKING:
     from .kernel_cache import cache_folder, compilation
 
 __all__ = [
-    "BoolArray", "ComplexArray", "DISTORTION", "EntryPoint", "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE",
-    "MAX_LISTED", "MIN_CONE_ANGLE", "Progress", "Stopwatch", "THREADS", "TYPED_TOLERANCE", "Unmet", "as_floats",
-    "as_indices", "cache_folder", "cancel_with", "check_cancelled", "compilation", "compiled", "dots", "exit_text",
-    "has_any", "inner_calls", "limit_threads", "list_some", "mask_of", "plural", "printable", "report_detail",
-    "short_repr", "stage", "timing", "unit_exponent", "warn_of", "warns",
+    "BAKED_RESOLUTION", "BoolArray", "CHECKER_CELLS", "ComplexArray", "DISTORTION", "DOTS_PER_INCH", "EntryPoint",
+    "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE", "MAX_LISTED", "MIN_CONE_ANGLE", "Progress", "Stopwatch",
+    "THREADS", "TYPED_TOLERANCE", "Unmet", "as_floats", "as_indices", "cache_folder", "cancel_with",
+    "check_cancelled", "compilation", "compiled", "dots", "exit_text", "has_any", "inner_calls", "limit_threads",
+    "list_some", "mask_of", "plural", "printable", "report_detail", "short_repr", "stage", "timing", "unit_exponent",
+    "warn_of", "warns",
 ]  # fmt: skip
 
 

@@ -14,6 +14,12 @@ MAX_CONES = 30
 #: Texels along a side of a texture, and texels between charts.
 RESOLUTION = 1024
 PADDING = 2.0
+#: Texels along a side of a baked texture.
+BAKED_RESOLUTION = 2048
+#: Checkerboard cells along the square root of the area: about 20 across a ball.
+CHECKER_CELLS = 36
+#: Resolution of figures.
+DOTS_PER_INCH = 300.0
 # A preference of 1 makes seams at hidden places ten times cheaper. With a factor above 1e10, the lengths of seams
 # would be smaller than the rounding errors of their costs.
 MAX_PREFERENCE = 10.0

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.sparse import csc_matrix
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..base.progress import report_detail
 from ..errors import OptionError
 from ..mesh.ties import argmax_tied
 from ..stages import ConeSolution
@@ -29,7 +29,6 @@ def greedy_cones(
     epsilon: float = EPSILON,
     max_cones: int | None = None,
     tie_key: FloatArray | None = None,
-    progress: Callable[[str], None] | None = None,
 ) -> ConeSolution:
     """Return cones of a connected mesh by the greedy search of the paper (Section 3.2).
 
@@ -45,7 +44,6 @@ def greedy_cones(
         epsilon: stop when max(phi) - min(phi) is at most this.
         max_cones: stop at this number of cones; None for no limit.
         tie_key: (n,) decides between vertices whose values are equal up to rounding, as on symmetric meshes.
-        progress: called with a text on the progress before each step.
 
     Raises:
         OptionError: epsilon is not positive, or max_cones is negative.
@@ -60,8 +58,7 @@ def greedy_cones(
         return cones_at(laplacian, curvature, is_boundary, euler_characteristic, none)
     search = _Search(laplacian, curvature, is_boundary, euler_characteristic, max_cones, tie_key)
     while True:
-        if progress is not None:
-            progress(f"{len(search.cones)} so far, spread {np.ptp(search.phi):.3g}")
+        report_detail(f"{len(search.cones)} so far, spread {np.ptp(search.phi):.3g}")
         chosen = search.next_pair(epsilon)
         if not chosen:
             break

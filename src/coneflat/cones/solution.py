@@ -12,6 +12,7 @@ from ..base.text import plural
 from ..errors import CurvatureError
 from ..linalg import Factor, factorize
 from ..mesh.connectivity import TriangleMesh
+from ..stages import ConeSolution, ConeSpec
 
 # Values with at most this relative difference, or difference in radians, are equal. Symmetric surfaces have many values
 # that differ by rounding only; the first in the order of vertices is then chosen.
@@ -53,6 +54,21 @@ def target_from_log_scale(
         is_singular: (n,) mask of the cones, and of the boundary.
     """
     return np.where(is_singular, curvature + laplacian @ log_scale, 0.0)
+
+
+def check_solution(solution: ConeSolution, mesh: TriangleMesh, spec: ConeSpec, advice: str) -> None:
+    """Raise CurvatureError if no metric of a mesh has the cones of a solution.
+
+    Args:
+        solution: the cones.
+        mesh: connected mesh.
+        spec: what is required of the cones.
+        advice: the end of the message: what the user can do.
+    """
+    if spec.scale_at_cones:
+        check_enough(len(solution.cones), mesh)
+    else:
+        check_feasible(solution.cones, solution.curvatures, spec.names, advice)
 
 
 def check_feasible(cones: IntArray, curvatures: FloatArray, names: IntArray, advice: str) -> None:

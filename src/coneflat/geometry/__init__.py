@@ -12,6 +12,7 @@ from .overlap import Overlaps, find_overlaps
 from .planar import (
     as_complex,
     as_pairs,
+    complex_sums,
     layout_curvature,
     map_factors,
     mean_energy,
@@ -21,6 +22,7 @@ from .planar import (
     triangle_energies,
     vertex_log_scale,
 )
+from .quarter_turns import TURNS, UNITS, quarters_around, rotated, turn
 from .straight import FlatTriangles, flat_triangles
 from .triangles import (
     CREASE_COSINE,
@@ -38,10 +40,11 @@ from .triangles import (
 from .visibility import fill_nearest, visible_share
 
 __all__ = [
-    "CREASE_COSINE", "FlatTriangles", "MAX_CELLS", "Overlaps", "angle_defect", "as_complex", "as_pairs", "coarse_mesh",
-    "corner_angles", "corner_normals", "cotangent_laplacian", "cotangents", "dihedral_angles", "double_areas",
-    "edge_lengths", "face_normals", "fill_nearest", "fill_orientations", "find_overlaps", "flat_triangles",
-    "handle_loops", "halfedge_twins", "is_broken", "approximate_overlap_areas", "layout_curvature",
-    "map_factors", "mean_energy", "mollify", "orientation", "sides_between", "signed_angles", "signed_double_areas",
-    "triangle_energies", "unit_vectors", "vertex_log_scale", "vertex_normals", "visible_share",
+    "CREASE_COSINE", "FlatTriangles", "MAX_CELLS", "Overlaps", "TURNS", "UNITS", "angle_defect", "as_complex",
+    "as_pairs", "coarse_mesh", "complex_sums", "corner_angles", "corner_normals", "cotangent_laplacian", "cotangents",
+    "dihedral_angles", "double_areas", "edge_lengths", "face_normals", "fill_nearest", "fill_orientations",
+    "find_overlaps", "flat_triangles", "handle_loops", "halfedge_twins", "is_broken", "approximate_overlap_areas",
+    "layout_curvature", "map_factors", "mean_energy", "mollify", "orientation", "quarters_around", "rotated",
+    "sides_between", "signed_angles", "signed_double_areas", "triangle_energies", "turn", "unit_vectors",
+    "vertex_log_scale", "vertex_normals", "visible_share",
 ]  # fmt: skip

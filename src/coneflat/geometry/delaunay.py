@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base.arrays import FloatArray, IntArray, Numbers
 from ..base.jit import compiled
-from ..linalg.shortest_paths import drop_first, push
+from ..linalg.heap import drop_first, push
 from ..mesh.connectivity import TriangleMesh
 from .intrinsic import IntrinsicTriangulation, intrinsic_triangulation
 

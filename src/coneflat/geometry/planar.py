@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import BoolArray, ComplexArray, FloatArray, has_any
+from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh
 from .triangles import cotangents, double_areas
 
@@ -147,3 +147,8 @@ def dirichlet_energies(lengths: FloatArray, places: FloatArray) -> tuple[FloatAr
     # Flipped triangles count as compressed to nearly nothing.
     ratio = np.maximum(signed_double_areas(places) / (2 * areas), 1e-100)
     return dirichlet, dirichlet * ratio**-2
+
+
+def complex_sums(labels: IntArray, values: ComplexArray, count: int) -> ComplexArray:
+    """Return (count,) the sum of the values (k,) that have each label (k,)."""
+    return np.bincount(labels, values.real, count) + 1j * np.bincount(labels, values.imag, count)

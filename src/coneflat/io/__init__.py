@@ -2,6 +2,7 @@
 
 from .attributes import ALPHA, GROUPS, MATERIALS, OBJECTS, VERTEX_COLOURS, Attribute, losses, texture_files
 from .brains import VALUES, nibabel, read_label, read_structure, read_vertex_values
+from .colours import as_bytes, linear_colours, to_linear, to_srgb
 from .files import (
     PIPE,
     as_path,
@@ -37,9 +38,8 @@ from .obj import lines_of, relocated
 from .packages import as_input
 from .ply import write_parts
 from .read import INPUT_FORMATS, find_meshes, read_joined, read_mesh, read_mesh_from
-from .split import shading_normals, split_at_seams
+from .split import SplitMesh, shading_normals, split_at_seams
 from .texture import (
-    CELLS,
     DARK_CELL,
     LIGHT_CELL,
     Texture,
@@ -48,13 +48,12 @@ from .texture import (
     decode_image,
     encode_png,
     read_picture,
-    to_linear,
-    to_srgb,
 )
 from .write import (
-    KEPT,
+    OUTPUT_FORMATS,
     as_written,
     check_output,
+    kept_attributes,
     stored_in_glb,
     write_flattening,
     write_measured,
@@ -62,15 +61,15 @@ from .write import (
 )
 
 __all__ = [
-    "ALPHA", "as_input", "as_path", "as_uv_mesh", "as_written", "atomic_write", "Attribute", "bounds", "cell_side",
-    "CELLS", "check_cells", "check_output", "check_target", "checked_target", "CheckedArrays", "DARK_CELL",
-    "decode_image", "encode_png", "find_meshes", "FOR_INDICES", "FOR_VERTICES", "Glb", "GROUPS", "has_uv",
-    "imported", "INPUT_FORMATS", "Joined", "KEPT", "known_ending", "LIGHT_CELL", "lines_of", "local_positions",
-    "losses", "make_folder", "MATERIAL", "MATERIALS", "nibabel", "number", "OBJECTS", "PIPE", "read_archive",
-    "read_bytes", "read_flattening", "read_joined", "read_label", "read_mesh", "read_mesh_from", "read_picture",
-    "read_structure", "read_vertex_values", "relocated", "remove_unfinished", "shading_normals", "split_at_seams",
-    "stored_in_glb", "Texture", "texture_files", "uv_mesh_of", "UVMesh", "VALUES", "VERTEX_COLOURS", "write_flattening",
+    "ALPHA", "as_bytes", "as_input", "as_path", "as_uv_mesh", "as_written", "atomic_write", "Attribute", "bounds",
+    "cell_side", "check_cells", "check_output", "check_target", "checked_target", "CheckedArrays", "CLAMP",
+    "DARK_CELL", "decode_image", "encode_png", "find_meshes", "FOR_INDICES", "FOR_VERTICES", "Glb", "GROUPS",
+    "has_uv", "ImageTexture", "imported", "INPUT_FORMATS", "Joined", "kept_attributes", "keys_of", "known_ending",
+    "LIGHT_CELL", "linear_colours", "lines_of", "local_positions", "losses", "make_folder", "MATERIAL", "MATERIALS",
+    "Materials", "MIRRORED", "nibabel", "number", "OBJECTS", "OUTPUT_FORMATS", "PIPE", "read_archive", "read_bytes",
+    "read_flattening", "read_joined", "read_label", "read_materials", "read_mesh", "read_mesh_from", "read_picture",
+    "read_structure", "read_vertex_values", "readable", "relocated", "remove_unfinished", "REPEAT", "shading_normals",
+    "slot_of", "SLOTS", "SPECULAR", "split_at_seams", "SplitMesh", "stored_in_glb", "Texture", "texture_files",
+    "to_linear", "to_srgb", "TRANSFORM", "uv_mesh_of", "UVMesh", "VALUES", "VERTEX_COLOURS", "write_flattening",
     "write_measured", "write_parts", "write_stream",
-    "CLAMP", "ImageTexture", "keys_of", "Materials", "MIRRORED", "read_materials", "readable", "REPEAT", "slot_of",
-    "SLOTS", "SPECULAR", "to_linear", "to_srgb", "TRANSFORM",
 ]  # fmt: skip

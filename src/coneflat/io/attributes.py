@@ -9,9 +9,6 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
-from ..base.arrays import FloatArray
 from ..base.text import printable
 
 if TYPE_CHECKING:
@@ -19,10 +16,6 @@ if TYPE_CHECKING:
 
 # Characters of a name that a note shows, and names of a kind.
 MAX_NAME, MAX_NAMES = 40, 20
-# Largest value of a colour in bytes.
-BYTE = 255
-
-
 #: The kind of attributes that are names of images.
 TEXTURE_FILES = "texture files"
 
@@ -87,14 +80,3 @@ def list_names(names: Sequence[str]) -> str:
     """Return names as text, with the number of those that are not shown."""
     text = ", ".join(printable(name)[:MAX_NAME] for name in names[:MAX_NAMES])
     return f"{text} and {len(names) - MAX_NAMES:,} more" if len(names) > MAX_NAMES else text
-
-
-def colour_shades(values: FloatArray) -> FloatArray:
-    """Return the parts of colours as 0 to 1: numbers above 1 mean that they are bytes."""
-    numbers = np.asarray(values, np.float64)
-    return numbers / BYTE if np.nanmax(numbers, initial=0.0) > 1 else numbers
-
-
-def as_bytes(shades: FloatArray) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
-    """Return numbers from 0 to 1 as bytes; NaN becomes 0."""
-    return np.round(BYTE * np.clip(np.nan_to_num(shades), 0, 1)).astype(np.uint8)

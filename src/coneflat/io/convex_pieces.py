@@ -24,7 +24,7 @@ from ..result import Flattening
 CONVEX_HEIGHT = 1e-12
 
 # Factor by which the triangles of a fan may be thicker in the plane than on the model, as of `measure.NEEDLE_QC`, and
-# the thickness of triangles on the model that is put down to rounding.
+# the thickness of triangles on the model that is attributed to rounding.
 MAX_THICKENING, ROUNDED_HEIGHT = 1e3, 1e-12
 
 Node: TypeAlias = tuple[int, int]

@@ -160,7 +160,7 @@ def inner_path(folder: Path, name: str) -> Path:
 
 
 def moved_path(name: bytes, source: str, target: str) -> bytes:
-    """Return a path relative to folder `here` rewritten relative to folder `there`, separated by slashes."""
+    """Return a path relative to the folder `source` rewritten relative to the folder `target`, separated by slashes."""
     if os.path.isabs(name):
         return name
     full = os.path.join(os.fsencode(source), name)

@@ -13,13 +13,13 @@ from ..base.arrays import IntArray
 from ..base.text import list_some, plural
 from ..errors import ConeflatError, MeshFileError
 from .attributes import texture_files
+from .colours import to_linear
 from .files import read_bytes, readable
 from .gltf.data import GltfData, Item
 from .gltf.read import GltfScene
 from .mesh_file import MeshFile
 from .mtl import MtlMaterial, libraries_of, materials_of_polygons, parse_mtl, path_of_image
 from .obj import ObjText
-from .texture import to_linear
 
 #: Wrap modes of glTF, and its filter without interpolation.
 REPEAT, MIRRORED, CLAMP = 10497, 33648, 33071

@@ -80,31 +80,26 @@ def read_flattening(path: PathName) -> Flattening:
 
 
 def _flattening(reading: CheckedArrays) -> Flattening:
-    path, arrays, floats, indices = reading.path, reading.arrays, reading.floats, reading.indices
+    """Return the result in an archive.
+
+    Raises:
+        MeshFileError, ValueError: the archive is not one of a result, or is damaged.
+    """
+    arrays, floats, indices = reading.arrays, reading.floats, reading.indices
     reading.need(_NAMES, "result of coneflat with UVs")
-    report = reading.report()
-    arrays.setdefault("prescribed", np.full(len(arrays["vertices"]), np.nan))
-    for name in ("seconds", "settings"):
-        if not isinstance(report[name], dict):
-            raise ValueError(f"{name!r} of its report is a {type(report[name]).__name__}")
-    notes, efficiency = reading.notes(report), number(report["packing_efficiency"])
-    for value in report["seconds"].values():
-        number(value)
+    report = _checked_report(reading)
+    notes = reading.notes(report)
     vertices, uv = reading.finite("vertices", (None, 3)), reading.finite("uv", (None, 2))
     n, u = len(vertices), len(uv)
     faces = indices("faces", (None, 3), n)
     m = len(faces)
     uv_faces, cones = indices("uv_faces", (m, 3), u), indices("cones", (None,), n)
     if not m:
-        raise MeshFileError(f"{path} is not a result of coneflat: it has no faces")
+        raise MeshFileError(f"{reading.path} is not a result of coneflat: it has no faces")
     uv_scale = float(reading.finite("uv_scale", ()))
     if not uv_scale > 0:
-        raise MeshFileError(f"{path} is not a result of coneflat: its UV scale is {uv_scale:g}")
-    measures: dict[str, Any] = {name: number(report.get(name)) for name in MEASURES}
-    settings, rotations = report["settings"], None
-    if report["rotation_deviation"] is not None:
-        quantum = settings.get("quantise", settings.get("quantum"))  # the old name
-        rotations = Rotations(quantum, report["rotation_deviation"], tuple(report["handle_deviations"]))
+        raise MeshFileError(f"{reading.path} is not a result of coneflat: its UV scale is {uv_scale:g}")
+    has_prescribed = "prescribed" in arrays  # Not so in files of old versions.
     return Flattening(
         vertices=vertices,
         faces=faces,
@@ -114,24 +109,49 @@ def _flattening(reading: CheckedArrays) -> Flattening:
         cones=cones,
         curvatures=floats("curvatures", (len(cones),)),
         log_scale=floats("log_scale", (n,)),
-        prescribed=floats("prescribed", (n,)),
+        prescribed=floats("prescribed", (n,)) if has_prescribed else np.full(n, np.nan),
         curvature_residual=floats("curvature_residual", (n,)),
         seams=indices("seams", (None, 2), n),
-        packing_efficiency=efficiency,
-        distortion=Distortion(
-            qc=floats("qc", (m,)), log_area_scale=floats("log_area_scale", (m,)), **measures
-        ),
+        packing_efficiency=number(report["packing_efficiency"]),
+        distortion=_distortion(reading, report, m),
         seconds=report["seconds"],
         notes=notes,
-        settings=settings,
+        settings=report["settings"],
         solve=SolveStatistics(
             **{field.name: number(report.get(field.name, field.default)) for field in fields(SolveStatistics)}
         ),
-        rotations=rotations,
+        rotations=_rotations(report),
         vertex_origin=indices("vertex_origin", (n,), None),
         face_origin=indices("face_origin", (m,), None),
         lengths=floats("lengths", (m, 3)) if "lengths" in arrays else None,
     )
+
+
+def _checked_report(reading: CheckedArrays) -> dict[str, Any]:
+    """Return the report of an archive, whose times and settings are objects, and whose times are numbers."""
+    report = reading.report()
+    for name in ("seconds", "settings"):
+        if not isinstance(report[name], dict):
+            raise ValueError(f"{name!r} of its report is a {type(report[name]).__name__}")
+    for value in report["seconds"].values():
+        number(value)
+    return report
+
+
+def _distortion(reading: CheckedArrays, report: dict[str, Any], triangles: int) -> Distortion:
+    """Return the measures of an archive: those of its triangles, and those in its report."""
+    measures: dict[str, Any] = {name: number(report.get(name)) for name in MEASURES}
+    qc, log_area_scale = (reading.floats(name, (triangles,)) for name in ("qc", "log_area_scale"))
+    return Distortion(qc=qc, log_area_scale=log_area_scale, **measures)
+
+
+def _rotations(report: dict[str, Any]) -> Rotations | None:
+    """Return the rotations across seams in a report, if it has them."""
+    if report["rotation_deviation"] is None:
+        return None
+    settings = report["settings"]
+    quantum = settings.get("quantise", settings.get("quantum"))  # the old name
+    return Rotations(quantum, report["rotation_deviation"], tuple(report["handle_deviations"]))
 
 
 Built = TypeVar("Built")
@@ -153,7 +173,7 @@ class CheckedArrays:
         self.path, self.arrays = path, arrays
 
     def need(self, names: Iterable[str], content: str) -> None:
-        """Raise MeshFileError if arrays are missing; `what` is the expected content of the file."""
+        """Raise MeshFileError if arrays are missing; `content` is what the file should contain."""
         for name in names:
             if name not in self.arrays:
                 raise MeshFileError(f"{self.path} holds no {content}: {name!r} is missing")

@@ -22,12 +22,15 @@ from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..errors import ConeflatError, FaceIndexError, MeshFileError
 from ..mesh.polygons import COLOURS, first_bad_corner
 from ..result import Flattening
-from .attributes import GROUPS, MATERIALS, OBJECTS, VERTEX_COLOURS, Attribute, colour_shades
+from .attributes import GROUPS, MATERIALS, OBJECTS, VERTEX_COLOURS, Attribute
+from .colours import colour_shades
 from .convex_pieces import find_pieces
 from .files import inner_path, moved_path, read_bytes
 from .mesh_file import MeshFile, check_filled, offsets_of
 from .text import Growing, TextBlock, newline_of, text_blocks
 
+#: Indices of corners without a UV point, from 0, and without a normal, from 1.
+_NO_UV, _NO_NORMAL = -1, 0
 _OTHER, _VERTEX, _FACE, _TEXTURE, _NORMAL, _ELEMENT, _COMMENTED_FACE = range(7)
 #: The kind of a line by its first two characters as a 16-bit number.
 _KINDS = np.full(1 << 16, _OTHER, np.uint8)
@@ -82,66 +85,100 @@ def parse_obj(path: Path, content: bytes) -> MeshFile:
         FaceIndexError: a face refers to vertex 0, or to a vertex or UV point that does not exist.
     """
     newline = newline_of(content)
-    vertices, colours, directions = (Growing(np.float64, 3) for _ in range(3))
-    corners, textures, normals, sizes = (Growing(np.int64) for _ in range(4))
-    uv = Growing(np.float64, 2)
-    gaps: defaultdict[int, bytearray] = defaultdict(bytearray)
-    lengths: set[int] = set()
+    elements = _Elements(newline)
     for block in text_blocks(path, content, continued=True):
+        elements.add(block)
+    check_filled(path, len(elements.vertices), len(elements.sizes))
+    mesh = elements.mesh(path)
+    _check_corners(path, content, mesh)
+    return mesh
+
+
+class _Elements:
+    """The elements of an OBJ file, which are added block after block of its text.
+
+    Attributes:
+        vertices, colours: (n, 3) positions, and the colours after them.
+        uv, directions: (u, 2), (k, 3) UV points and normals.
+        sizes: (p,) number of corners of each face.
+        corners, textures, normals: (c,) index of the vertex, from 0, of the UV point, from 0 and -1 for none, and of
+            the normal, from 1 and 0 for none, at each corner; the latter two end at the last face that has them.
+        gaps: as in `ObjText`.
+        lengths: the numbers of words of `v` lines.
+    """
+
+    def __init__(self, newline: bytes) -> None:
+        self.vertices, self.colours, self.directions = (Growing(np.float64, 3) for _ in range(3))
+        self.corners, self.textures, self.normals, self.sizes = (Growing(np.int64) for _ in range(4))
+        self.uv = Growing(np.float64, 2)
+        self.gaps: defaultdict[int, bytearray] = defaultdict(bytearray)
+        self.lengths: set[int] = set()
+        self._newline = newline
+
+    def add(self, block: TextBlock) -> None:
+        """Add the elements of a block of text."""
         kinds = _KINDS[block.heads()]
         points = block.words(np.flatnonzero(kinds == _VERTEX), first=1).points()
+        for polygon, text in _texts(block, kinds, self._newline):
+            self.gaps[len(self.sizes) + polygon] += text
+        self._add_faces(block, kinds)
+        self.vertices.add(points[:, :3])
+        # Many programs write a colour after the position.
+        if points.shape[1] in (6, 7):
+            self.colours.add(points[:, 3:6])
+        self.lengths.update(np.unique(block.counts[kinds == _VERTEX] - 1).tolist())
+        self.uv.add(_uv_points(block, np.flatnonzero(kinds == _TEXTURE)))
+        self.directions.add(_directions(block, np.flatnonzero(kinds == _NORMAL)))
+
+    def _add_faces(self, block: TextBlock, kinds: NDArray[np.uint8]) -> None:
+        """Add the faces of a block; a negative index counts back from the last element above the face."""
         rows = np.flatnonzero(kinds == _FACE)
         words = block.words(rows, first=1)
         counts = words.counts
         position, texture, normal = words.corners()
-        del words  # free its text before the next block is read
-        above = len(vertices) + np.cumsum(kinds == _VERTEX)[rows]
-        for polygon, text in _texts(block, kinds, newline):
-            gaps[len(sizes) + polygon] += text
-        vertices.add(points[:, :3])
-        # Many programs write a colour after the position.
-        if points.shape[1] in (6, 7):
-            colours.add(points[:, 3:6])
-        lengths.update(np.unique(block.counts[kinds == _VERTEX] - 1).tolist())
-        sizes.add(counts)
+
+        def above(elements: Growing, kind: int) -> IntArray:
+            return np.repeat(len(elements) + np.cumsum(kinds == kind)[rows], counts)
+
         if texture is not None:
-            beyond = len(uv) + np.cumsum(kinds == _TEXTURE)[rows]
-            counted = np.repeat(beyond, counts) + texture
+            counted = above(self.uv, _TEXTURE) + texture
             # -1 means that there is no UV point; an index that counts back too far becomes -2, which is an error.
             texture = np.where(texture < 0, np.where(counted < 0, -2, counted), texture - 1)
-        uv.add(_uv_points(block, np.flatnonzero(kinds == _TEXTURE)))
+            self._add_at_corners(self.textures, texture, _NO_UV)
         if normal is not None:
-            beyond = len(directions) + np.cumsum(kinds == _NORMAL)[rows]
-            normal = np.where(normal < 0, np.repeat(beyond, counts) + normal + 1, normal)
-        directions.add(_directions(block, np.flatnonzero(kinds == _NORMAL)))
-        for indices, block_indices, none in ((textures, texture, -1), (normals, normal, 0)):
-            if block_indices is not None:
-                indices.add(np.full(len(corners) - len(indices), none))
-                indices.add(block_indices)
-        # A negative index counts back from the last vertex above the face.
-        corners.add(np.where(position < 0, np.repeat(above, counts) + position, position - 1))
-    check_filled(path, len(vertices), len(sizes))
-    for indices, none in ((textures, -1), (normals, 0)):
-        if len(indices):
-            indices.add(np.full(len(corners) - len(indices), none))
-    has_colours = len(colours) == len(vertices)
-    obj_text = ObjText({polygon: bytes(gaps.pop(polygon)) for polygon in list(gaps)}, newline)
-    mesh = MeshFile(
-        path,
-        vertices=vertices.done(),
-        corners=corners.done(),
-        offsets=offsets_of(sizes.done()),
-        obj=obj_text,
-        properties=dict(zip(COLOURS, colour_shades(colours.done()).T, strict=True)) if has_colours else {},
-        attributes=_attributes(obj_text, lengths),
-        texture=textures.done() if len(textures) else None,
-        # Some programs write indices of UV points, but not the points.
-        uv=uv.done() if len(textures) and len(uv) else None,
-        normals=directions.done(),
-        normal=normals.done() - 1 if len(normals) else None,
-    )
-    _check_corners(path, content, mesh)
-    return mesh
+            normal = np.where(normal < 0, above(self.directions, _NORMAL) + normal + 1, normal)
+            self._add_at_corners(self.normals, normal, _NO_NORMAL)
+        self.sizes.add(counts)
+        self.corners.add(np.where(position < 0, above(self.vertices, _VERTEX) + position, position - 1))
+
+    def _add_at_corners(self, indices: Growing, added: IntArray, missing: int) -> None:
+        """Add indices of the corners of a block, after corners before it that have none."""
+        indices.add(np.full(len(self.corners) - len(indices), missing))
+        indices.add(added)
+
+    def mesh(self, path: Path) -> MeshFile:
+        """Return the mesh of all elements."""
+        for indices, missing in ((self.textures, _NO_UV), (self.normals, _NO_NORMAL)):
+            if len(indices):
+                indices.add(np.full(len(self.corners) - len(indices), missing))
+        properties = {}
+        if len(self.colours) == len(self.vertices):
+            properties = dict(zip(COLOURS, colour_shades(self.colours.done()).T, strict=True))
+        text = ObjText({polygon: bytes(self.gaps.pop(polygon)) for polygon in list(self.gaps)}, self._newline)
+        return MeshFile(
+            path,
+            vertices=self.vertices.done(),
+            corners=self.corners.done(),
+            offsets=offsets_of(self.sizes.done()),
+            obj=text,
+            properties=properties,
+            attributes=_attributes(text, self.lengths),
+            texture=self.textures.done() if len(self.textures) else None,
+            # Some programs write indices of UV points, but not the points.
+            uv=self.uv.done() if len(self.textures) and len(self.uv) else None,
+            normals=self.directions.done(),
+            normal=self.normals.done() - 1 if len(self.normals) else None,
+        )
 
 
 def _attributes(text: ObjText, lengths: set[int]) -> tuple[Attribute, ...]:

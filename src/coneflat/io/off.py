@@ -6,19 +6,48 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from ..base.arrays import FloatArray, IntArray
 from ..errors import MeshFileError
 from ..mesh.polygons import COLOURS
-from .attributes import ALPHA, VERTEX_COLOURS, Attribute, colour_shades
+from .attributes import ALPHA, VERTEX_COLOURS, Attribute
+from .colours import colour_shades
 from .mesh_file import MeshFile, offsets_of
 from .text import Growing, TextBlock, text_blocks
 
 # Colours and texture coordinates follow the position and normal; "4" and "n" change the dimension of the position.
 _HEADER = re.compile(rb"(ST)?(C)?(N)?(4)?(n)?OFF\b", re.IGNORECASE)
 _LINE = re.compile(rb"([^\r\n]*)(?:\r\n|[\r\n]|\Z)")
+
+
+class _Header(NamedTuple):
+    """The header of an OFF file.
+
+    Attributes:
+        vertices, faces: their numbers.
+        end: the position after it.
+        letters: those before "OFF", in capitals: what lines of vertices have after the position.
+    """
+
+    vertices: int
+    faces: int
+    end: int
+    letters: bytes
+
+    @property
+    def has_normals(self) -> bool:
+        return b"N" in self.letters
+
+    @property
+    def has_colours(self) -> bool:
+        return b"C" in self.letters
+
+    @property
+    def has_uv(self) -> bool:
+        return b"S" in self.letters
 
 
 def is_off(content: bytes) -> bool:
@@ -32,59 +61,95 @@ def parse_off(path: Path, content: bytes) -> MeshFile:
     Raises:
         MeshFileError: the file is not OFF, has fewer elements than its header declares, or has text for a number.
     """
-    vertex_count, face_count, begin, keyword = _header(path, content)
-    has_normals = b"N" in keyword
-    vertices, normals, colours = Growing(np.float64, 3), Growing(np.float64, 3), Growing(np.float64, 4)
-    sizes, corners = Growing(np.int64), Growing(np.int64)
-    lines, attributes = 0, dict[Attribute, None]()
-    for block in text_blocks(path, content, begin):
+    header = _header(path, content)
+    elements = _Elements(header)
+    for block in text_blocks(path, content, header.end):
+        elements.add(block)
+    return elements.mesh(path)
+
+
+class _Elements:
+    """The elements of an OFF file, which are added block after block of its text."""
+
+    def __init__(self, header: _Header) -> None:
+        self._header = header
+        self._vertices, self._normals, self._colours = (Growing(np.float64, k) for k in (3, 3, 4))
+        self._sizes, self._corners = Growing(np.int64), Growing(np.int64)
+        self._lines = 0
+        self._attributes = dict[Attribute, None]()
+
+    def add(self, block: TextBlock) -> None:
+        """Add the elements of a block of text."""
         rows = np.flatnonzero(block.counts)
-        ends = np.array([vertex_count, vertex_count + face_count]) - lines
+        ends = np.array([self._header.vertices, self._header.vertices + self._header.faces]) - self._lines
         of_vertices, of_faces = np.clip(ends, 0, len(rows))
-        points = block.words(rows[:of_vertices]).points()
-        vertices.add(points[:, :3])
-        if has_normals and points.shape[1] >= 6:
-            normals.add(points[:, 3:6])
-        shades = _shades(points[:, 3 + 3 * has_normals :], keyword)
+        self._add_vertices(block, rows[:of_vertices])
+        self._add_faces(block, rows[of_vertices:of_faces])
+        self._lines += len(rows)
+
+    def _add_vertices(self, block: TextBlock, rows: IntArray) -> None:
+        """Add the vertices in some lines of a block, with their normals and colours."""
+        header, points = self._header, block.words(rows).points()
+        self._vertices.add(points[:, :3])
+        if header.has_normals and points.shape[1] >= 6:
+            self._normals.add(points[:, 3:6])
+        shades = _shades(points[:, 3 + 3 * header.has_normals :], header)
         if shades is not None:
-            colours.add(shades)
-        columns_before_colours = 3 + 3 * has_normals + 2 * (b"S" in keyword)
-        if (block.counts[rows[:of_vertices]] > columns_before_colours).any():
-            attributes[VERTEX_COLOURS] = None
-        counts, named = _polygons(block, rows[of_vertices:of_faces])
-        if (block.counts[rows[of_vertices:of_faces]] > 1 + counts).any():
-            attributes[Attribute("face colours")] = None
-        sizes.add(counts)
-        corners.add(named)
-        lines += len(rows)
-    if lines < vertex_count:
-        raise MeshFileError(f"{path} ends after {lines} of the {vertex_count} vertices in its header")
-    if (read_faces := lines - vertex_count) < face_count:
-        raise MeshFileError(f"{path} ends after {read_faces} of the {face_count} faces in its header")
-    properties: dict[str, FloatArray] = {}
-    if len(colours) == vertex_count > 0:
-        shades = colours.done()
-        is_whole = ~np.isnan(shades[:, 3])
-        shades = colour_shades(shades if is_whole.all() else shades[:, :3])
-        properties = dict(zip((*COLOURS, ALPHA.name), shades.T, strict=False))
-        attributes |= {ALPHA: None} if ALPHA.name in properties else {}
-    mesh = MeshFile(
-        path,
-        vertices.done(),
-        corners.done(),
-        offsets_of(sizes.done()),
-        properties=properties,
-        attributes=tuple(attributes),
-    )
-    if len(normals) < vertex_count or not vertex_count:
-        return mesh
-    return replace(mesh, normals=normals.done(), normal=mesh.corners)
+            self._colours.add(shades)
+        columns_before_colours = 3 + 3 * header.has_normals + 2 * header.has_uv
+        if (block.counts[rows] > columns_before_colours).any():
+            self._attributes[VERTEX_COLOURS] = None
+
+    def _add_faces(self, block: TextBlock, rows: IntArray) -> None:
+        """Add the faces in some lines of a block."""
+        sizes, corners = _polygons(block, rows)
+        if (block.counts[rows] > 1 + sizes).any():
+            self._attributes[Attribute("face colours")] = None
+        self._sizes.add(sizes)
+        self._corners.add(corners)
+
+    def mesh(self, path: Path) -> MeshFile:
+        """Return the mesh of all elements.
+
+        Raises:
+            MeshFileError: there are fewer than the header declares.
+        """
+        vertex_count, face_count = self._header.vertices, self._header.faces
+        read_faces = self._lines - vertex_count
+        if read_faces < 0:
+            raise MeshFileError(
+                f"{path} ends after {self._lines} of the {vertex_count} vertices in its header"
+            )
+        if read_faces < face_count:
+            raise MeshFileError(f"{path} ends after {read_faces} of the {face_count} faces in its header")
+        properties: dict[str, FloatArray] = {}
+        if len(self._colours) == vertex_count > 0:
+            properties = _colours_by_name(self._colours.done())
+        alpha = {ALPHA: None} if ALPHA.name in properties else {}
+        mesh = MeshFile(
+            path,
+            self._vertices.done(),
+            self._corners.done(),
+            offsets_of(self._sizes.done()),
+            properties=properties,
+            attributes=tuple(self._attributes | alpha),
+        )
+        if len(self._normals) < vertex_count or not vertex_count:
+            return mesh
+        return replace(mesh, normals=self._normals.done(), normal=mesh.corners)
 
 
-def _shades(columns: FloatArray, keyword: bytes) -> FloatArray | None:
+def _colours_by_name(shades: FloatArray) -> dict[str, FloatArray]:
+    """Return (n, 4) colours as vertex properties from 0 to 1; without alpha if a vertex has none, which is NaN."""
+    has_alpha = not np.isnan(shades[:, 3]).any()
+    shades = colour_shades(shades if has_alpha else shades[:, :3])
+    return dict(zip((*COLOURS, ALPHA.name), shades.T, strict=False))
+
+
+def _shades(columns: FloatArray, header: _Header) -> FloatArray | None:
     """Return (r, 4) the colours in the columns after positions and normals, alpha NaN without one; None if none."""
-    count = columns.shape[1] - 2 * (b"S" in keyword)
-    if b"C" not in keyword or count not in (3, 4):
+    count = columns.shape[1] - 2 * header.has_uv
+    if not header.has_colours or count not in (3, 4):
         return None
     return np.pad(columns[:, :count], ((0, 0), (0, 4 - count)), constant_values=np.nan)
 
@@ -104,8 +169,12 @@ def _polygons(block: TextBlock, rows: IntArray) -> tuple[IntArray, IntArray]:
     return sizes, corners
 
 
-def _header(path: Path, content: bytes) -> tuple[int, int, int, bytes]:
-    """Return the numbers of vertices and faces, the position after the header, and the keyword in capitals."""
+def _header(path: Path, content: bytes) -> _Header:
+    """Return the header of a file.
+
+    Raises:
+        MeshFileError: it is not one of an OFF file in text with points in three dimensions.
+    """
     lines = _filled_lines(content)
     number, first, end = next(lines, (0, b"", 0))
     if not first:
@@ -128,8 +197,8 @@ def _header(path: Path, content: bytes) -> tuple[int, int, int, bytes]:
         ) from None
     if vertex_count < 0 or face_count < 0:
         raise MeshFileError(f"{path}, line {number}: the number of vertices or faces is negative")
-    # The letters before "OFF" tell what lines of vertices have.
-    return vertex_count, face_count, end, b"" if keyword is None else keyword[0].upper().removesuffix(b"OFF")
+    letters = b"" if keyword is None else keyword[0].upper().removesuffix(b"OFF")
+    return _Header(vertex_count, face_count, end, letters)
 
 
 def _filled_lines(content: bytes) -> Iterator[tuple[int, bytes, int]]:

@@ -26,10 +26,9 @@ from .attributes import (
     TEXTURE_FILES,
     VERTEX_COLOURS,
     Attribute,
-    as_bytes,
-    colour_shades,
     texture_files,
 )
+from .colours import colour_shades, in_type, stored_shades
 from .files import moved_path
 from .mesh_file import MeshFile, check_filled, offsets_of
 from .split import input_vertices, source_normals, split_at_seams
@@ -150,7 +149,12 @@ def _vertices(
         element, columns = elements["vertex"], columns_of["vertex"]
         declared = [element.properties[i] for i in _mesh_properties(path, element)]
         vertices = np.stack([np.asarray(c, np.float64) for c in columns[:3]], axis=1)
-        properties = {p.name: _shade(p, c) for p, c in zip(declared[3:], columns[3:], strict=True)}
+        properties = {
+            p.name: colour_shades(column, _TYPES[p.word])
+            if p.name in COLOURS
+            else np.asarray(column, np.float64)
+            for p, column in zip(declared[3:], columns[3:], strict=True)
+        }
     return MeshFile(path, vertices, np.empty(0, np.int64), np.zeros(1, np.int64), properties=properties)
 
 
@@ -161,7 +165,7 @@ def _with_faces(path: Path, mesh: MeshFile, element: _Element, columns: list[Col
     lists = sum(p.count is not None for p in chosen_properties)
     texture, uv = _corner_uv(path, sizes, *columns[2:4]) if lists == 2 else (None, None)
     properties = {
-        p.name: _in_type(np.asarray(c), p.word)
+        p.name: in_type(np.asarray(c), _TYPES[p.word])
         for p, c in zip(chosen_properties[lists:], columns[2 * lists :], strict=True)
     }
     has_uv = uv is not None and len(uv) > 0
@@ -173,15 +177,6 @@ def _with_faces(path: Path, mesh: MeshFile, element: _Element, columns: list[Col
         texture=texture if has_uv else None,
         uv=uv if has_uv else None,
     )
-
-
-def _in_type(values: NDArray[Any], word: str) -> NDArray[Any]:
-    """Return numbers in a type of PLY; those that an integer type does not have are clipped, and NaN becomes 0."""
-    kind = np.dtype(_TYPES[word])
-    if kind.kind in "iu" and values.dtype.kind == "f":
-        limits = np.iinfo(kind)
-        values = np.clip(np.rint(np.nan_to_num(values)), limits.min, limits.max)
-    return values.astype(kind)
 
 
 def _attributes(
@@ -311,21 +306,12 @@ def _corners_of(element: _Element) -> str | None:
     return next(iter(named or alone), None)
 
 
-def _shade(declared: _Property, values: Column) -> FloatArray:
-    """Return a property as doubles; colours, which are integers in most files, are scaled to 0 to 1."""
-    numbers = np.asarray(values, np.float64)
-    if declared.name not in COLOURS:
-        return numbers
-    kind = np.dtype(_TYPES[declared.word])
-    return numbers / np.iinfo(kind).max if kind.kind in "iu" else colour_shades(numbers)
-
-
 class _EndOfFile(Exception):
     """Signals that the file is shorter than its header declares."""
 
 
 def _decode(content: bytes, start: int, element: _Element, chosen: list[int]) -> tuple[list[Column], int]:
-    """Return the wanted columns of an element, a list as two columns (lengths, items), and its end position."""
+    """Return the chosen columns of an element, a list as two columns (lengths, items), and its end position."""
     lists = [i for i, p in enumerate(element.properties) if p.count]
     first = _row(content, start, element)[1] if element.length else [0] * len(lists)
     lengths = dict(zip(lists, first, strict=True))
@@ -542,15 +528,10 @@ def _vertex_columns(source: MeshFile, numbers: IntArray) -> Iterator[tuple[str, 
     kinds = {} if source.ply is None else source.ply.kinds
     for name in _kept_properties(source):
         values = source.properties[name][numbers]
-        is_shade = name in COLOURS
-        word = kinds.get(name, "uchar" if is_shade or name == ALPHA.name else "double")
-        kind = np.dtype(_TYPES[word])
-        if name not in kinds and word == "uchar":
-            yield name, word, as_bytes(values)
-        elif is_shade and kind.kind in "iu":
-            yield name, word, _in_type(values * np.iinfo(kind).max, word)
-        else:
-            yield name, word, _in_type(values, word)
+        # The alpha of a PLY file is in the type of the file, that of other formats is 0 to 1.
+        is_colour = name in COLOURS or (name == ALPHA.name and name not in kinds)
+        word = kinds.get(name, "uchar" if is_colour else "double")
+        yield name, word, (stored_shades if is_colour else in_type)(values, _TYPES[word])
 
 
 def _face_columns(result: Flattening) -> dict[str, NDArray[Any]]:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from ..errors import EmptyMeshError, MeshFileError, OptionError, UnknownFormatEr
 from ..mesh.check import weld as weld_vertices
 from .brains import FREESURFER, is_freesurfer, is_gifti, parse_freesurfer, parse_gifti
 from .files import PIPE, PathName, as_path, known_ending, read_bytes, read_input, readable
-from .gltf.read import parse_gltf
+from .gltf.read import is_glb, is_gltf, parse_gltf
 from .join import Joined, join_borders
 from .mesh_file import MeshFile, check_corners, differing_properties, without_short_faces
 from .obj import parse_obj
@@ -25,23 +26,37 @@ from .ply import parse_ply
 from .split import usable_normals
 from .stl import is_stl, parse_stl
 
-_READERS: dict[str, Callable[[Path, bytes], MeshFile]] = {
-    ".obj": parse_obj,
-    ".ply": parse_ply,
-    ".stl": parse_stl,
-    ".off": parse_off,
-    ".gltf": parse_gltf,
-    ".glb": parse_gltf,
-    ".gii": parse_gifti,
-    **dict.fromkeys(FREESURFER, parse_freesurfer),
-}
-#: Formats that are read as text, or have a header of text.
-_TEXT = (".obj", ".ply", ".off", ".gltf")
-#: STL has no shared vertices; glTF repeats a vertex wherever a normal or a UV differs.
-_WELDED_BY_DEFAULT = {".stl", ".gltf", ".glb"}
 
+class InputFormat(NamedTuple):
+    """How files of a format are read.
+
+    Attributes:
+        parse: returns the mesh for a path and a content.
+        is_content: returns whether a content is of the format.
+        is_text: the files are text, or begin with text.
+        shares_vertices: faces share vertices. STL repeats every vertex for each triangle, glTF wherever a normal or a
+            UV differs; these are merged by default.
+    """
+
+    parse: Callable[[Path, bytes], MeshFile]
+    is_content: Callable[[bytes], bool]
+    is_text: bool = False
+    shares_vertices: bool = True
+
+
+#: The formats by ending, in the order in which a content is compared with them; any other content is taken for OBJ.
+_FORMATS = {
+    ".obj": InputFormat(parse_obj, lambda content: False, is_text=True),
+    ".ply": InputFormat(parse_ply, lambda content: content.startswith(b"ply"), is_text=True),
+    ".stl": InputFormat(parse_stl, is_stl, shares_vertices=False),
+    ".off": InputFormat(parse_off, is_off, is_text=True),
+    ".gltf": InputFormat(parse_gltf, is_gltf, is_text=True, shares_vertices=False),
+    ".glb": InputFormat(parse_gltf, is_glb, shares_vertices=False),
+    ".gii": InputFormat(parse_gifti, is_gifti),
+    **dict.fromkeys(FREESURFER, InputFormat(parse_freesurfer, is_freesurfer)),
+}
 #: Endings of the files that `read_mesh` reads.
-INPUT_FORMATS = tuple(_READERS)
+INPUT_FORMATS = tuple(_FORMATS)
 
 
 def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
@@ -119,36 +134,28 @@ def read_mesh_from(
     if not content or content.isspace():
         raise EmptyMeshError(f"{path} is empty")
     ending = format_of(content) if ending is None else ending.lower()
-    if ending in _TEXT and is_utf16(content):
-        raise MeshFileError(f"{path}, line 1: this is text in UTF-16: save the file as UTF-8 or ASCII")
-    if ending not in _READERS:
+    if ending not in _FORMATS:
         raise UnknownFormatError(
             f"{ending!r} is not a format that meshes are read from: {', '.join(INPUT_FORMATS)}"
         )
+    form = _FORMATS[ending]
+    if form.is_text and is_utf16(content):
+        raise MeshFileError(f"{path}, line 1: this is text in UTF-16: save the file as UTF-8 or ASCII")
     with readable(path, f"{ending[1:].upper()} file"):
         with np.errstate(invalid="ignore"):  # NaN coordinates are not rejected here
-            mesh = without_short_faces(_READERS[ending](path, content))
+            mesh = without_short_faces(form.parse(path, content))
         check_corners(path, mesh)
     normal = None
     if mesh.normals is not None and mesh.normal is not None:
         normal = usable_normals(mesh.normals, mesh.normal)
     mesh = replace(mesh, normals=None if normal is None else mesh.normals, normal=normal)
-    return _welded(mesh) if (ending in _WELDED_BY_DEFAULT if weld is None else weld) else mesh
+    is_welded = not form.shares_vertices if weld is None else weld
+    return _welded(mesh) if is_welded else mesh
 
 
 def format_of(content: bytes) -> str:
     """Return the ending in `INPUT_FORMATS` for the format of a content; .obj if it is none of the others."""
-    head = content[:512].removeprefix(b"\xef\xbb\xbf").lstrip()
-    formats = (
-        (".glb", content.startswith(b"glTF")),
-        (FREESURFER[0], is_freesurfer(content)),
-        (".gii", is_gifti(content)),
-        (".gltf", head.startswith(b"{")),
-        (".ply", content.startswith(b"ply")),
-        (".stl", is_stl(content)),
-        (".off", is_off(content)),
-    )
-    return next((ending for ending, is_found in formats if is_found), ".obj")
+    return next((ending for ending, form in _FORMATS.items() if form.is_content(content)), ".obj")
 
 
 def is_utf16(content: bytes) -> bool:

@@ -178,7 +178,7 @@ class Words:
         """Return all words as integers.
 
         Raises:
-            MeshFileError: a word is not an integer; the message says that it is not `what`.
+            MeshFileError: a word is not an integer; the message says that it is not `noun`.
         """
         numbers = _numbers(self._text, int(self.counts.sum()), np.int64)
         return self._reject(_INTEGER, noun) if numbers is None else numbers

@@ -9,23 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import FloatArray, IntArray
+from ..base.defaults import CHECKER_CELLS
 from ..errors import MeshFileError, OptionError
 from ..geometry.planar import signed_double_areas
 from ..result import Flattening
+from .colours import BYTE, as_bytes
 from .files import PathName, as_path, imported, read_bytes, readable
 
 #: A light, slightly cool grey.
 LIGHT_CELL = (0.86, 0.87, 0.89)
 #: Blue, so that red and black marks stand out.
 DARK_CELL = (0.34, 0.46, 0.62)
-#: Number of cells along the square root of the area: about 20 across a ball.
-CELLS = 36
 #: The image formats of glTF, and their names there.
 EMBEDDED = {"PNG": "image/png", "JPEG": "image/jpeg"}
 #: Maximum size of a picture in a page; larger ones are slow to open.
 MAX_BYTES = 32 * 2**20
-#: End of the linear part of sRGB.
-LINEAR_SRGB = 0.04045
 #: Largest values of grey images of integers and of floating-point numbers; the first that is large enough is white.
 INTEGER_RANGES = (2**16 - 1, 2**31 - 1)
 FLOAT_RANGES = (1.0, 2**8 - 1, 2**16 - 1)
@@ -45,7 +43,7 @@ class Texture(NamedTuple):
     kind: str
 
 
-def cell_side(uv: FloatArray, uv_faces: IntArray, cells: float = CELLS) -> float:
+def cell_side(uv: FloatArray, uv_faces: IntArray, cells: float = CHECKER_CELLS) -> float:
     """Return the side, in UV units, of square cells such that `cells` squared of them have the layout's area.
 
     Args:
@@ -114,18 +112,8 @@ def _as_rgba(image: Any) -> NDArray[np.uint8]:
     # Some versions of Pillow open 16-bit files as 32-bit integers.
     ranges = FLOAT_RANGES if image.mode == "F" else INTEGER_RANGES
     largest = next((limit for limit in ranges if grey.max(initial=0.0) <= limit), ranges[-1])
-    shade = np.round(255 * np.clip(grey / largest, 0, 1)).astype(np.uint8)
-    return np.stack([shade, shade, shade, np.full_like(shade, 255)], axis=-1)
-
-
-def to_linear(values: NDArray[Any]) -> FloatArray:
-    """Return linear values of sRGB ones, both from 0 to 1."""
-    return np.where(values <= LINEAR_SRGB, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
-
-
-def to_srgb(values: FloatArray) -> FloatArray:
-    """Return sRGB values of linear ones, both from 0 to 1."""
-    return np.where(values <= LINEAR_SRGB / 12.92, values * 12.92, 1.055 * values ** (1 / 2.4) - 0.055)
+    shade = as_bytes(grey / largest)
+    return np.stack([shade, shade, shade, np.full_like(shade, BYTE)], axis=-1)
 
 
 def encode_png(pixels: NDArray[np.uint8]) -> Texture:
@@ -134,7 +122,7 @@ def encode_png(pixels: NDArray[np.uint8]) -> Texture:
     Raises:
         OptionError: Pillow is not installed.
     """
-    shown = pixels if pixels[..., 3].min() < 255 else np.ascontiguousarray(pixels[..., :3])
+    shown = pixels if pixels[..., 3].min() < BYTE else np.ascontiguousarray(pixels[..., :3])
     return Texture(_png(_pillow().fromarray(shown)), EMBEDDED["PNG"])
 
 
@@ -174,7 +162,7 @@ def _checkerboard(result: Flattening, image: Any) -> Texture:
     # The first row is the upper one, where v is largest.
     dark = (along[None, :] + along[::-1, None]) % 2
     board = image.fromarray(dark.astype(np.uint8))
-    board.putpalette([round(255 * value) for value in (*LIGHT_CELL, *DARK_CELL)])
+    board.putpalette(as_bytes(np.array([*LIGHT_CELL, *DARK_CELL])).tolist())
     return Texture(_png(board), EMBEDDED["PNG"])
 
 

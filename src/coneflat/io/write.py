@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import IO
+from typing import IO, NamedTuple
 
 import numpy as np
 
 from ..atlas import round_safely
-from ..base.arrays import FloatArray, IntArray
+from ..base.arrays import FloatArray
 from ..base.notes import Unmet
 from ..base.text import plural, short_repr
 from ..errors import OptionError
@@ -27,21 +27,32 @@ from .mesh_file import MeshFile
 from .npz import write_npz
 from .obj import kept_in_obj, obj_has_textures, write_obj
 from .ply import kept_in_ply, ply_has_textures, write_ply
-from .texture import find_texture
+from .texture import Texture, find_texture
 
-#: Endings of the files that `write_flattening` writes.
+#: Endings of the files that `write_flattening` writes, each in `_FORMATS`.
 OUTPUT_FORMATS = tuple(f".{name}" for name in FORMATS)
-#: The attributes of a source file that each format keeps.
-KEPT: dict[str, Callable[[MeshFile], set[Attribute]]] = {
-    ".obj": kept_in_obj,
-    ".ply": kept_in_ply,
-    ".glb": kept_in_glb,
-    ".npz": lambda _: set(),
-}
 
 
-#: Whether a file of a format keeps textures of the old UVs of a source file, beside those of glTF scenes.
-HAS_TEXTURES: dict[str, Callable[[MeshFile], bool]] = {".obj": obj_has_textures, ".ply": ply_has_textures}
+class OutputFormat(NamedTuple):
+    """How files of a format are written.
+
+    Attributes:
+        write: writes a result to a stream; further arguments are the folder of the file, and a texture or None.
+        kept_attributes: returns those of a source file that the format keeps.
+        stored: returns a result with the numbers and the triangles of the file, measured again.
+        is_rounded: the numbers of `stored` are rounded, and are those that `write` gets instead of the result's.
+        takes_texture: a texture can be embedded.
+        keeps_old_textures: returns whether textures of the old UVs of a source file are kept, scenes not counted.
+        changes: returns notes on further changes of the data of the source, for a result and whether it has a texture.
+    """
+
+    write: Callable[[Flattening, IO[bytes], Path, Texture | None], None]
+    kept_attributes: Callable[[MeshFile], set[Attribute]]
+    stored: Callable[[Flattening], Flattening] = lambda result: result
+    is_rounded: bool = False
+    takes_texture: bool = False
+    keeps_old_textures: Callable[[MeshFile], bool] = lambda source: False
+    changes: Callable[[Flattening, bool], tuple[str, ...]] = lambda result, has_texture: ()
 
 
 def check_output(path: PathName, texture: PathName | None = None) -> Path:
@@ -124,21 +135,16 @@ def write_stream(
     ending, folder = ending.lower(), Path() if folder is None else folder
     _check_texture(f"a {ending}", ending, texture)
     image = None if texture is None else find_texture(texture, result)
-    # A .glb has fewer digits; triangles must also be positively oriented and disjoint after rounding.
-    stored = as_written(result, ending, has_texture=texture is not None) if ending == ".glb" else result
-    writers: dict[str, Callable[[], None]] = {
-        ".obj": lambda: write_obj(stored, stream, folder),
-        ".ply": lambda: write_ply(stored, stream, folder),
-        ".glb": lambda: write_glb(stored, stream, image, folder),
-        ".npz": lambda: write_npz(stored, stream),
-    }
-    writers[ending]()
+    form = _FORMATS[ending]
+    # Rounded triangles must also be positively oriented and disjoint.
+    stored = as_written(result, ending, has_texture=texture is not None) if form.is_rounded else result
+    form.write(stored, stream, folder, image)
     return stored
 
 
 def _check_texture(name: object, ending: str, texture: PathName | None) -> None:
-    if texture is not None and ending != ".glb":
-        raise OptionError(f"only .glb files carry a texture, and {name} is not one")
+    if texture is not None and not _FORMATS[ending].takes_texture:
+        raise OptionError(f"only .glb files contain a texture, and {name} is not one")
 
 
 def as_written(result: Flattening, ending: str, *, has_texture: bool = False) -> Flattening:
@@ -158,13 +164,9 @@ def as_written(result: Flattening, ending: str, *, has_texture: bool = False) ->
     """
     if not isinstance(ending, str):
         raise OptionError(f"ending must be text such as .glb, got {short_repr(ending)}")
-    stored, lost = result, left_out(result, ending, has_texture)
-    if ending == ".glb":
-        stored = _in_single_precision(result)
-        lost = (*lost, *scene_losses(stored, has_texture))
-    elif ending == ".obj" and result.source is not None and result.face_corners is not None:
-        stored = _in_fans(result, result.source.offsets, result.face_corners)
-    lost = tuple(note for note in lost if note not in stored.notes)
+    form = _FORMATS.get(ending)
+    stored = result if form is None else form.stored(result)
+    lost = tuple(note for note in left_out(stored, ending, has_texture) if note not in stored.notes)
     return replace(stored, notes=(*stored.notes, *lost)) if lost else stored
 
 
@@ -205,10 +207,12 @@ def stored_in_glb(uv: FloatArray) -> FloatArray:
     return np.stack([u, np.round(uv[:, 1] / step) * step], axis=1)
 
 
-def _in_fans(result: Flattening, offsets: IntArray, face_corners: IntArray) -> Flattening:
-    """Return the result with polygons split into fans, as most programs read them."""
-    if np.all(np.diff(offsets) == 3):
+def _in_fans(result: Flattening) -> Flattening:
+    """Return the result with the polygons of its file split into fans, as most programs read them."""
+    source, face_corners = result.source, result.face_corners
+    if source is None or face_corners is None or np.all(np.diff(source.offsets) == 3):
         return result
+    offsets = source.offsets
     pieces = find_pieces(result, offsets, face_corners)
     corners, uv_faces = pieces.fans()
     vertex = np.full(int(offsets[-1]), -1, dtype=np.int64)
@@ -236,16 +240,47 @@ def _in_fans(result: Flattening, offsets: IntArray, face_corners: IntArray) -> F
 
 def left_out(result: Flattening, ending: str, has_texture: bool = False) -> tuple[str, ...]:
     """Return notes on data of the source file that a file of another format does not keep, one sentence each."""
-    source = result.source
-    if source is None or result.face_corners is None or ending not in KEPT:
+    source, form = result.source, _FORMATS.get(ending)
+    if source is None or result.face_corners is None or form is None:
         return ()
     # A texture would be multiplied by colours of vertices.
     hidden = {VERTEX_COLOURS, ALPHA} if has_texture and source.scene is None else set()
-    kept_attributes = KEPT[ending](source) - hidden
-    lost_attributes = set(source.attributes) - kept_attributes
-    complete_endings = (
-        name for name, attributes_of in KEPT.items() if lost_attributes <= attributes_of(source)
+    preserved = form.kept_attributes(source) - hidden
+    lost = set(source.attributes) - preserved
+    complete = (name for name, other_form in _FORMATS.items() if lost <= other_form.kept_attributes(source))
+    return (
+        *losses(source, ending, preserved, next(complete, "")),
+        *([old_textures("the file")] if form.keeps_old_textures(source) else []),
+        *form.changes(result, has_texture),
     )
-    notes = losses(source, ending, kept_attributes, next(complete_endings, ""))
-    has_textures = ending in HAS_TEXTURES and HAS_TEXTURES[ending](source)
-    return (*notes, old_textures("the file")) if has_textures else notes
+
+
+def kept_attributes(source: MeshFile, ending: str) -> set[Attribute]:
+    """Return the attributes of a source file that a file of a format in `OUTPUT_FORMATS` keeps."""
+    return _FORMATS[ending].kept_attributes(source)
+
+
+_FORMATS = {
+    ".obj": OutputFormat(
+        write=lambda result, stream, folder, _: write_obj(result, stream, folder),
+        kept_attributes=kept_in_obj,
+        stored=_in_fans,
+        keeps_old_textures=obj_has_textures,
+    ),
+    ".ply": OutputFormat(
+        write=lambda result, stream, folder, _: write_ply(result, stream, folder),
+        kept_attributes=kept_in_ply,
+        keeps_old_textures=ply_has_textures,
+    ),
+    ".glb": OutputFormat(
+        write=lambda result, stream, folder, texture: write_glb(result, stream, texture, folder),
+        kept_attributes=kept_in_glb,
+        stored=_in_single_precision,
+        is_rounded=True,
+        takes_texture=True,
+        changes=scene_losses,
+    ),
+    ".npz": OutputFormat(
+        write=lambda result, stream, *_: write_npz(result, stream), kept_attributes=lambda source: set()
+    ),
+}

@@ -2,11 +2,22 @@
 
 from .distortion import angle_sum_errors, measure, measure_map, quantile, sum_angles
 from .guarantees import undefined_measures, unmet_guarantees
-from .report import MAP_MEASURES, Row, as_rows, map_rows, number_text, packing_row, path_text
+from .report import (
+    FIRST_ROWS,
+    MAP_MEASURES,
+    SUMMARY_MEASURES,
+    Row,
+    as_rows,
+    map_rows,
+    number_text,
+    packing_row,
+    path_text,
+)
 from .requirements import REPORTED, Requirement, breaches, parse_requirements
 
 __all__ = [
-    "as_rows", "angle_sum_errors", "MAP_MEASURES", "REPORTED", "Requirement", "Row", "breaches", "unmet_guarantees",
-    "map_rows", "measure", "measure_map", "number_text", "packing_row", "parse_requirements", "path_text", "quantile",
-    "sum_angles", "undefined_measures",
+    "FIRST_ROWS", "MAP_MEASURES", "REPORTED", "Requirement", "Row", "SUMMARY_MEASURES", "angle_sum_errors", "as_rows",
+    "breaches", "map_rows", "measure", "measure_map", "number_text", "packing_row", "parse_requirements", "path_text",
+    "quantile",
+    "sum_angles", "undefined_measures", "unmet_guarantees",
 ]  # fmt: skip

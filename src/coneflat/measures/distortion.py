@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,28 +32,28 @@ class Distortion:
     Attributes:
         qc: (m,) QC of each triangle; NaN where the triangle is degenerate on the model or in the plane.
         log_area_scale: (m,) log of sqrt(UV area / area on the model); NaN for the same triangles.
-        qc_mean, qc_p95, qc_max: of `qc`.
-        area_std: standard deviation of `log_area_scale`.
+        qc_mean, qc_p95, qc_max: mean, 95th percentile and maximum of the quasi-conformal distortion, the ratio of
+            the singular values of a triangle's map.
+        area_std: standard deviation of log sqrt(UV area / area on the model).
         energy: symmetric Dirichlet energy, the sum of the squares of both singular values and of their inverses,
             averaged by area, at the scale where it is least; 4 for an isometry. Orientation does not count.
         flipped: number of triangles whose orientation is opposite to that of their chart.
-        degenerate: number of triangles without area in the plane that have area on the model.
-        degenerate_input: number of triangles without area on the model.
-        charts: number of charts of the layout.
-        mirrored_charts: number of charts whose orientation is reversed.
+        degenerate, degenerate_input: number of triangles without area in the plane that have area on the model; number
+            of triangles without area on the model.
+        charts, mirrored_charts: number of charts of the layout; number of those whose orientation is reversed.
         seam_length: length on the model of all seams, each counted once, divided by the square root of the area.
-        seam_mismatch: relative difference of the two UV lengths of a seam edge: mean, weighted by length.
-        seam_mismatch_max: the largest such difference.
+        seam_mismatch, seam_mismatch_max: relative difference of the two UV lengths of a seam edge: mean, weighted by
+            length; maximum.
         seam_motion_mismatch: deviation of the two sides of a seam from being related by one rigid motion: largest
             change of the rotation between them from one seam edge to the next, radians. Vertices where seams branch or
             end, and cones, are not compared.
-        density_spread: 95% quantile of the texel density (texels per length on the model) divided by its 5% quantile.
-        overlap: fraction of the covered area that is covered more than once.
-        overlapping_pairs: number of pairs of triangles with common interior points, computed exactly.
+        density_spread: 95th percentile of the texel density (texels per length on the model) divided by the 5th.
+        overlap, overlapping_pairs: fraction of the covered area that is covered more than once; number of pairs of
+            triangles with common interior points, computed exactly.
+        curvature_error, curvature_error_max: ||target - K||_2 / n of the metric (Table 1 of the paper), and the largest
+            |target - K|, in units of pi.
         angle_sum_error: largest difference, radians, between the angle sum at a vertex in the plane and its target,
             2 pi (pi on the boundary) minus the prescribed curvature; NaN if unknown.
-        curvature_error: ||target - K||_2 / n of the metric, in units of pi (Table 1 of the paper).
-        curvature_error_max: largest |target - K|, in units of pi.
 
     Examples:
         >>> vertices = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
@@ -83,9 +84,9 @@ class Distortion:
     density_spread: float
     overlap: float
     overlapping_pairs: int
-    angle_sum_error: float = float("nan")
     curvature_error: float = float("nan")
     curvature_error_max: float = float("nan")
+    angle_sum_error: float = float("nan")
 
     def rescaled(self, log_factor: float) -> Distortion:
         """Return the measures of the layout scaled by exp(log_factor).
@@ -214,45 +215,18 @@ def measure_map(
     corner_uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
     shapes = (mesh.vertices, mesh.faces) if lengths is None else _place_separately(lengths)
     area, has_area, uv_area, has_uv_area, qc = measure_triangles(*shapes, corner_uv)
-    valid = has_area & has_uv_area
-    # In most meshes all triangles are valid; a slice then avoids copies.
-    chosen = slice(None) if valid.all() else valid
-    weights = area[chosen]
-    scales = np.log(np.abs(uv_area[chosen]) / weights) / 2
-    log_scale = np.full(len(area), np.nan)
-    log_scale[chosen] = scales
-    mean_scale = _mean(scales, weights)
-    low, high = (quantile(scales, weights, fraction) for fraction in (0.05, 0.95))
-
     joined = joined_edges(mesh, corner_uv)
     if texture is not None:
         joined &= texture[mesh.edge_faces[:, 0]] == texture[mesh.edge_faces[:, 1]]
     seams = np.flatnonzero(~joined & ~mesh.is_boundary_edge)
-    charts, chart = label_charts(mesh, joined)
-    sign = np.where(has_uv_area, np.sign(uv_area), 0)
-    majority = np.sign(np.bincount(chart, weights=np.abs(uv_area) * sign, minlength=charts))
-    against = sign * majority[chart] < 0
-    seam_lengths, mismatches = _seam_mismatch(mesh, corner_uv, seams)
-    if lengths is not None:
-        seam_lengths = lengths.ravel()[mesh.edge_halfedges[seams, 0]]
     return Distortion(
         qc=qc,
-        log_area_scale=log_scale,
-        qc_mean=_mean(qc[chosen], weights),
-        qc_p95=quantile(qc[chosen], weights, 0.95),
-        qc_max=float(qc[chosen].max()) if len(weights) else float("nan"),
-        area_std=float(np.sqrt(_mean((scales - mean_scale) ** 2, weights))),
-        energy=_symmetric_dirichlet(qc[chosen], scales, weights),
-        flipped=int(against.sum()),
+        **_scale_measures(qc, area, uv_area, has_area & has_uv_area),
         degenerate=int((has_area & ~has_uv_area).sum()),
         degenerate_input=int((~has_area).sum()),
-        charts=charts,
-        mirrored_charts=int((majority < 0).sum()),
-        seam_length=float(seam_lengths.sum() / np.sqrt(area.sum() / 2)) if area.sum() > 0 else 0.0,
-        seam_mismatch=_mean(mismatches, seam_lengths) if len(seams) else 0.0,
-        seam_mismatch_max=float(mismatches.max()) if len(seams) else 0.0,
+        **_orientation_measures(mesh, joined, np.where(has_uv_area, uv_area, 0)),
+        **_seam_measures(mesh, corner_uv, seams, lengths, float(area.sum() / 2)),
         seam_motion_mismatch=_seam_motion_mismatch(mesh, corner_uv, seams, cones),
-        density_spread=float(np.exp(high - low)),
         overlap=float("nan"),
         overlapping_pairs=0,
         curvature_error=curvature_error[0],
@@ -260,8 +234,72 @@ def measure_map(
     )
 
 
+def _scale_measures(
+    qc: FloatArray, area: FloatArray, uv_area: FloatArray, is_valid: BoolArray
+) -> dict[str, Any]:
+    """Return the measures of the singular values of the triangles that have area on the model and in the plane.
+
+    Args:
+        qc: (m,) QC of each triangle.
+        area, uv_area: (m,) twice the areas on the model, and twice the signed areas in the plane.
+        is_valid: (m,) whether both are nonzero.
+    """
+    # In most meshes all triangles are valid; a slice then avoids copies.
+    chosen = slice(None) if is_valid.all() else is_valid
+    weights, ratios = area[chosen], qc[chosen]
+    scales = np.log(np.abs(uv_area[chosen]) / weights) / 2
+    log_area_scale = np.full(len(area), np.nan)
+    log_area_scale[chosen] = scales
+    low, high = (quantile(scales, weights, fraction) for fraction in (0.05, 0.95))
+    return {
+        "log_area_scale": log_area_scale,
+        "qc_mean": _mean(ratios, weights),
+        "qc_p95": quantile(ratios, weights, 0.95),
+        "qc_max": float(ratios.max()) if len(weights) else float("nan"),
+        "area_std": float(np.sqrt(_mean((scales - _mean(scales, weights)) ** 2, weights))),
+        "energy": _symmetric_dirichlet(ratios, scales, weights),
+        "density_spread": float(np.exp(high - low)),
+    }
+
+
+def _orientation_measures(mesh: TriangleMesh, joined: BoolArray, uv_area: FloatArray) -> dict[str, Any]:
+    """Return the numbers of charts, of mirrored charts and of flipped triangles.
+
+    Args:
+        mesh: the mesh.
+        joined: (e,) whether the layout is connected at an edge.
+        uv_area: (m,) twice the signed area of each triangle in the plane; 0 if it has none.
+    """
+    charts, chart = label_charts(mesh, joined)
+    majority = np.sign(np.bincount(chart, weights=uv_area, minlength=charts))
+    against = np.sign(uv_area) * majority[chart] < 0
+    return {"flipped": int(against.sum()), "charts": charts, "mirrored_charts": int((majority < 0).sum())}
+
+
+def _seam_measures(
+    mesh: TriangleMesh, corner_uv: FloatArray, seams: IntArray, lengths: FloatArray | None, area: float
+) -> dict[str, Any]:
+    """Return the length of the seams, and how much the lengths of their two sides differ.
+
+    Args:
+        mesh: the mesh.
+        corner_uv: (m, 3, 2) the UV point of every triangle corner.
+        seams: numbers of the seam edges.
+        lengths: (m, 3) side lengths of the metric that is mapped; None for the distances between the vertices.
+        area: area of the model.
+    """
+    seam_lengths, mismatches = _seam_mismatch(mesh, corner_uv, seams)
+    if lengths is not None:
+        seam_lengths = lengths.ravel()[mesh.edge_halfedges[seams, 0]]
+    return {
+        "seam_length": float(seam_lengths.sum() / np.sqrt(area)) if area > 0 else 0.0,
+        "seam_mismatch": _mean(mismatches, seam_lengths) if len(seams) else 0.0,
+        "seam_mismatch_max": float(mismatches.max()) if len(seams) else 0.0,
+    }
+
+
 def _symmetric_dirichlet(qc: FloatArray, log_scale: FloatArray, weights: FloatArray) -> float:
-    """Return the mean symmetric Dirichlet energy at the best scale, from QC distortions and log scales."""
+    """Return the mean symmetric Dirichlet energy at the best scale, from QC distortions and log conformal factors."""
     ratio = qc + 1 / qc
     squares, inverses = (_mean(ratio * np.exp(sign * 2 * log_scale), weights) for sign in (1, -1))
     return 2 * float(np.sqrt(squares * inverses))

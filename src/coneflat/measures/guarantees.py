@@ -1,4 +1,4 @@
-"""Checks of the guarantees of a flattening; a note reports each one that is not met."""
+"""Checks of the guarantees of a flattening; a note reports each unmet guarantee."""
 
 from __future__ import annotations
 

@@ -1,32 +1,45 @@
-"""Reports of the measures of a flattening: as plain values for programs, and as table rows for people."""
+"""Reports of the measures of a flattening: as plain values for programs, and as table rows for people.
+
+`Distortion` declares the measures of a map. What is printed about them is declared here: `map_rows` has a row for each
+of them, `FIRST_ROWS` names those that are always printed, `SUMMARY_MEASURES` the columns of summaries of many meshes.
+Reports, requirements, archives, `coneflat measure` and the documentation follow from these.
+"""
 
 from __future__ import annotations
 
 import math
 import os
-from dataclasses import asdict
+from dataclasses import MISSING, asdict, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from ..base.text import plural
+from .distortion import Distortion
 
 if TYPE_CHECKING:
     from ..result import Flattening
-    from .distortion import Distortion
 
 #: The name of a measure, its value, and its meaning.
 Row: TypeAlias = tuple[str, str, str]
 
+# Arrays with a value for each triangle, which reports do not contain.
+_PER_TRIANGLE = ("qc", "log_area_scale")
+_MEASURES = [field for field in fields(Distortion) if field.name not in _PER_TRIANGLE]
 #: Measures of any map of a mesh to the plane.
-MAP_MEASURES = (
-    "qc_mean", "qc_p95", "qc_max", "area_std", "energy", "flipped", "degenerate", "degenerate_input", "charts",
-    "mirrored_charts", "seam_length", "seam_mismatch", "seam_mismatch_max", "seam_motion_mismatch", "density_spread",
-    "overlap", "overlapping_pairs",
+MAP_MEASURES = tuple(field.name for field in _MEASURES if field.default is MISSING)
+#: Measures of a flattening: those that need to know its metric, which are unknown for other maps, and those of the map.
+MEASURES = (*(field.name for field in _MEASURES if field.default is not MISSING), *MAP_MEASURES)
+#: Numbers of the report that summaries of many meshes contain, as columns.
+SUMMARY_MEASURES = (
+    "vertices", "triangles", "cones", "curvature_error_max", "qc_mean", "qc_max", "area_std", "area_distortion",
+    "flipped", "charts", "seam_length", "seam_mismatch_max", "rotation_deviation", "uv_scale",
 )  # fmt: skip
-#: Measures of a flattening.
-MEASURES = ("curvature_error", "curvature_error_max", "angle_sum_error", *MAP_MEASURES)
+#: The rows that commands always print, in this order; the others are printed if verbose.
+FIRST_ROWS = (
+    "charts", "overlap", "flipped", "texture", "texel density", "seam length", "QC distortion", "energy", "cones"
+)  # fmt: skip
 
 
 def as_dict(result: Flattening) -> dict[str, Any]:
@@ -96,56 +109,69 @@ def number_text(value: float, form: str) -> str:
 
 def as_rows(result: Flattening) -> list[Row]:
     """Return rows (measure, value, meaning) of the table that the commands print."""
-    d = result.distortion
-    curvatures = result.curvatures / np.pi
-    solve = result.solve
+    # Rows that do not describe the map itself, by the row of the map that they follow.
+    further = {
+        "energy": [_metric_row(result)],
+        "charts": [packing_row(result.packing_efficiency), *_texture_rows(result)],
+    }
+    rows = [_mesh_row(result), _cone_row(result), _curvature_row(result.distortion)]
+    for name, row in _solved_map_rows(result).items():
+        rows += [row, *further.get(name, [])]
+    return [*rows, *_rotation_rows(result)]
+
+
+def _mesh_row(result: Flattening) -> Row:
     vertex_count = np.count_nonzero(np.bincount(result.faces.ravel()))
-    cones = f"{len(result.cones)}"
-    if len(result.cones):
-        cones += f"  ({curvatures.min():+.3f} to {curvatures.max():+.3f} pi)"
-    of_map = map_rows(d)
+    return "triangles", f"{len(result.faces):,}", f"{vertex_count:,} vertices"
+
+
+def _cone_row(result: Flattening) -> Row:
+    count, curvatures = f"{len(result.cones)}", result.curvatures / np.pi
+    if len(curvatures):
+        count += f"  ({curvatures.min():+.3f} to {curvatures.max():+.3f} pi)"
+    return "cones", count, "singular vertices and their curvatures"
+
+
+def _curvature_row(d: Distortion) -> Row:
+    error, largest = (
+        f"{number_text(value, '.2e')} pi" for value in (d.curvature_error, d.curvature_error_max)
+    )
+    return "curvature error", error, f"||target - K|| / n; worst {largest}"
+
+
+def _metric_row(result: Flattening) -> Row:
+    solve = result.solve
+    linear = number_text(solve.area_distortion_linear, ".4f")
+    meaning = f"area distortion of the metric; {linear} in the linear model: {_target_text(result)}"
+    return "of the metric", number_text(solve.area_distortion, ".4f"), meaning
+
+
+def _solved_map_rows(result: Flattening) -> dict[str, Row]:
+    """Return the rows of the measures of the map, with what untangling and relaxing have changed."""
+    rows, solve = map_rows(result.distortion), result.solve
     if solve.untangled_vertices:
         untangled = (
             f"flipped triangles; {solve.untangled_triangles:,} before "
             f"{plural(solve.untangled_vertices, 'vertex', 'vertices')} were moved by at most "
             f"{solve.untangled_move:.2g} edge lengths"
         )
-        of_map["flipped"] = (*of_map["flipped"][:2], untangled)
+        rows["flipped"] = (*rows["flipped"][:2], untangled)
     if solve.relaxed_vertices:
         moved = f"{plural(solve.relaxed_vertices, 'vertex', 'vertices')} moved"
         relaxed = f"; {moved} to reduce it"
         if np.isfinite(solve.qc_mean_unrelaxed):
-            before = number_text(solve.qc_mean_unrelaxed, ".4f"), number_text(solve.qc_max_unrelaxed, ".4g")
-            relaxed = f"; before {moved} {before[0]}, worst {before[1]}"
-        name, value, meaning = of_map["QC distortion"]
-        of_map["QC distortion"] = (name, value, meaning + relaxed)
-    return [
-        ("triangles", f"{len(result.faces):,}", f"{vertex_count:,} vertices"),
-        ("cones", cones, "singular vertices and their curvatures"),
-        (
-            "curvature error",
-            f"{number_text(d.curvature_error, '.2e')} pi",
-            f"||target - K|| / n; worst {number_text(d.curvature_error_max, '.2e')} pi",
-        ),
-        of_map["QC distortion"],
-        of_map["area distortion"],
-        of_map["energy"],
-        (
-            "of the metric",
-            number_text(solve.area_distortion, ".4f"),
-            f"area distortion of the metric; {number_text(solve.area_distortion_linear, '.4f')} in the linear model: "
-            f"{_target_text(result)}",
-        ),
-        *(of_map[name] for name in ("flipped", "degenerate", "overlap", "charts")),
-        packing_row(result.packing_efficiency),
-        *_texture_rows(result),
-        *(of_map[name] for name in ("texel density", "seam length", "seam mismatch")),
-        *_rotation_rows(result),
-    ]
+            mean, largest = (
+                number_text(solve.qc_mean_unrelaxed, ".4f"),
+                number_text(solve.qc_max_unrelaxed, ".4g"),
+            )
+            relaxed = f"; before {moved} {mean}, worst {largest}"
+        name, value, meaning = rows["QC distortion"]
+        rows["QC distortion"] = (name, value, meaning + relaxed)
+    return rows
 
 
 def map_rows(d: Distortion) -> dict[str, Row]:
-    """Return the rows of the measures of a map, by name."""
+    """Return the rows of the measures of a map by name, in the order of tables."""
     rows = (
         (
             "QC distortion",
@@ -155,7 +181,7 @@ def map_rows(d: Distortion) -> dict[str, Row]:
         (
             "area distortion",
             number_text(d.area_std, ".4f"),
-            "standard deviation of the log scale, weighted by area",
+            "standard deviation of the log conformal factor, weighted by area",
         ),
         (
             "energy",

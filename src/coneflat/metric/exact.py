@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from copy import deepcopy
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -112,84 +113,184 @@ def exact_metric(
             a component without fixed vertices do not sum to 2 pi times its Euler characteristic.
 
     Notes:
-        Springborn, Schroeder, Pinkall, "Conformal equivalence of triangle meshes", 2008, with the flips of
-        Springborn, "Ideal hyperbolic polyhedra and discrete uniformization", 2019, and of Gillespie,
-        Springborn, Crane, "Discrete conformal equivalence of polyhedral surfaces", 2021. With flips, a metric exists
-        for every target that passes the checks. On surfaces with a boundary, the theorem requires that boundary edges
-        can be flipped, too. If the solution has triangles that break the triangle inequality there, the surface is
-        glued to its mirror image and solved again.
+        The curvature K(phi) minus the target is the gradient of a convex energy (Springborn, Schroeder, Pinkall 2008,
+        Eq. 7), whose Hessian is the cotangent Laplacian of the scaled metric. Newton's method starts from the linear
+        solution, which is its first step on a Delaunay mesh: L phi = target - K.
+
+        After each step the triangulation is flipped to Delaunay in the scaled metric; Ptolemy flips do not change the
+        conformal class (Springborn 2019; Gillespie, Springborn, Crane 2021). With flips, a metric exists for every
+        target that passes the checks. On surfaces with a boundary, the theorem requires that boundary edges can be
+        flipped, too. If the solution has triangles that break the triangle inequality there, the surface is glued to
+        its mirror image and solved again.
+
+    References:
+        B. Springborn, P. Schroeder, U. Pinkall, "Conformal equivalence of triangle meshes", 2008.
+        B. Springborn, "Ideal hyperbolic polyhedra and discrete uniformization", 2019.
+        M. Gillespie, B. Springborn, K. Crane, "Discrete conformal equivalence of polyhedral surfaces", 2021.
+
+    See Also:
+        find_metric: the metric of a component for its cones, with boundary conditions.
+        linear_flat_metric: the paper's metric, the first step of this method.
+        unfold: lays out the triangles of `ExactMetric.straight`.
     """
-    lengths, n = check_lengths(mesh, lengths), len(mesh.vertices)
-    fixed = np.zeros(n, dtype=bool) if fixed is None else _per_vertex("fixed", fixed, n).astype(bool)
-    target, pinned = checked_target(mesh, _per_vertex("target", target, n), fixed)
-    log_scale = np.zeros(n) if start is None else _per_vertex("start", start, n).copy()
-    log_scale[fixed] = _per_vertex("fixed_log_scale", fixed_log_scale, n)[fixed]
-    bad = np.flatnonzero(fixed & ~np.isfinite(log_scale))
-    if len(bad):
-        raise NonFiniteError(f"fixed_log_scale is NaN or infinite at {_at(bad)}")
-
-    plain = np.where(fixed, log_scale, 0.0)
-    log_scale = log_scale if np.ptp(log_scale) <= MAX_RANGE else plain
-    flat_angle = np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi)
-    copies = np.where(mesh.is_boundary_vertex, 2.0, 1.0)
-
-    def solved_from(first: FloatArray) -> tuple[ConformalProblem, State, IntArray, int]:
-        """Return the problem, its best state, the mesh vertex of each of its vertices, and the number of steps.
-
-        first: (n,) initial phi.
-        """
-        original, delaunay_flips = np.arange(n), flipped if delaunay and not doubled else None
-        triangulation = (
-            intrinsic_triangulation(mesh, lengths) if delaunay_flips is None else deepcopy(delaunay_flips[0])
-        )
-        if doubled:
-            triangulation, original = double(triangulation)
-            problem = ConformalProblem(
-                triangulation,
-                np.full(len(original), 2 * np.pi),
-                (copies * target)[original],
-                fixed[original],
-                np.concatenate([pinned, np.zeros(len(original) - n, dtype=bool)]),
-            )
-        else:
-            problem = ConformalProblem(triangulation, flat_angle, target, fixed, pinned, preconditioner)
-        if delaunay:
-            problem.records.append(
-                make_delaunay(triangulation) if delaunay_flips is None else delaunay_flips[1]
-            )
-        state, steps = find_scale(problem, first[original], tolerance, max_steps)
-        return problem, state, original, steps
-
-    problem, state, original, steps = solved_from(log_scale)
-    if not _is_solved(problem, state, tolerance) and mesh.is_boundary_vertex.any() and not doubled:
-        doubled = True
-        problem, state, original, further_steps = solved_from(log_scale)
-        steps += further_steps
-    if not _is_solved(problem, state, tolerance) and (log_scale != plain).any():
+    conditions, initial = _checked_conditions(mesh, lengths, target, fixed, fixed_log_scale, start)
+    settings = _Settings(tolerance, max_steps, delaunay, flipped, preconditioner)
+    attempt = _attempted(conditions, initial, settings, doubled)
+    steps = attempt.steps
+    if not attempt.is_solved and mesh.is_boundary_vertex.any() and not doubled:
+        attempt = _attempted(conditions, initial, settings, doubled=True)
+        steps += attempt.steps
+    zero = np.where(conditions.fixed, initial, 0.0)
+    if not attempt.is_solved and (initial != zero).any():
         # An initial phi may be so far off, for example on a surface of many spikes, that triangles there vanish. With
         # phi = 0 they are those of the input.
-        again = solved_from(plain)
-        steps += again[-1]
-        if again[1].largest < state.largest:
-            problem, state, original, _ = again
+        from_zero = _attempted(conditions, zero, settings, attempt.doubled)
+        steps += from_zero.steps
+        attempt = from_zero if from_zero.state.largest < attempt.state.largest else attempt
+    return _resulting_metric(conditions, attempt, steps)
+
+
+@dataclass(frozen=True, eq=False)
+class _Conditions:
+    """What a metric of a mesh with n vertices and m faces must satisfy.
+
+    Attributes:
+        mesh: the mesh.
+        lengths: (m, 3) side lengths that it is discretely conformal to.
+        target: (n,) curvature, radians; not used at fixed vertices.
+        fixed: (n,) vertices whose phi is prescribed.
+        pinned: (n,) one vertex of each component without fixed ones.
+    """
+
+    mesh: TriangleMesh
+    lengths: FloatArray
+    target: FloatArray
+    fixed: BoolArray
+    pinned: BoolArray
+
+    @property
+    def copies(self) -> FloatArray:
+        """(n,) the number of angle sums of a vertex that add up in the double of the surface: 2 on the boundary."""
+        return np.where(self.mesh.is_boundary_vertex, 2.0, 1.0)
+
+    def problem(
+        self, triangulation: IntrinsicTriangulation, preconditioner: LaplacianInverse | None
+    ) -> ConformalProblem:
+        """Return the problem on a triangulation of the surface."""
+        flat_angle = np.where(self.mesh.is_boundary_vertex, np.pi, 2 * np.pi)
+        return ConformalProblem(
+            triangulation, flat_angle, self.target, self.fixed, self.pinned, preconditioner
+        )
+
+    def doubled_problem(self, triangulation: IntrinsicTriangulation, original: IntArray) -> ConformalProblem:
+        """Return the problem on the double of the surface, whose vertices are copies of the `original` ones."""
+        pinned = np.concatenate([self.pinned, np.zeros(len(original) - len(self.pinned), dtype=bool)])
+        flat_angle, target = np.full(len(original), 2 * np.pi), (self.copies * self.target)[original]
+        return ConformalProblem(triangulation, flat_angle, target, self.fixed[original], pinned)
+
+
+class _Settings(NamedTuple):
+    """How a metric is solved for; see `exact_metric`."""
+
+    tolerance: float
+    max_steps: int
+    delaunay: bool
+    flipped: tuple[IntrinsicTriangulation, IntArray] | None
+    preconditioner: LaplacianInverse | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Attempt:
+    """The result of one solve, on the surface or on its double.
+
+    Attributes:
+        problem: the problem with the triangulation of the state.
+        state: the state with the smallest residual.
+        original: the vertex of the mesh that each vertex of the problem is a copy of.
+        steps: number of Newton steps.
+        tolerance: curvature error that counts as converged, radians.
+        delaunay: whether the first flips of the problem made the input Delaunay.
+        doubled: whether the surface was glued to its mirror image.
+    """
+
+    problem: ConformalProblem
+    state: State
+    original: IntArray
+    steps: int
+    tolerance: float
+    delaunay: bool
+    doubled: bool
+
+    @property
+    def is_solved(self) -> bool:
+        """Whether the residual is within the tolerance, or within the rounding errors at needles."""
+        state = self.state
+        return not state.broken and state.largest <= max(self.tolerance, self.problem.rounding_error(state))
+
+
+def _attempted(conditions: _Conditions, initial: FloatArray, settings: _Settings, doubled: bool) -> _Attempt:
+    """Return the solve that starts from an initial phi (n,)."""
+    original = np.arange(len(initial))
+    flipped = settings.flipped if settings.delaunay and not doubled else None
+    if flipped is None:
+        triangulation = intrinsic_triangulation(conditions.mesh, conditions.lengths)
+    else:
+        triangulation = deepcopy(flipped[0])
     if doubled:
-        state.curvature[:n] /= copies
-    if pinned.any():
-        state.variables = _keep_area(mesh, lengths, problem, state.variables, original)
+        triangulation, original = double(triangulation)
+        problem = conditions.doubled_problem(triangulation, original)
+    else:
+        problem = conditions.problem(triangulation, settings.preconditioner)
+    if settings.delaunay:
+        problem.records.append(make_delaunay(triangulation) if flipped is None else flipped[1])
+    state, steps = find_scale(problem, initial[original], settings.tolerance, settings.max_steps)
+    return _Attempt(problem, state, original, steps, settings.tolerance, settings.delaunay, doubled)
+
+
+def _resulting_metric(conditions: _Conditions, attempt: _Attempt, steps: int) -> ExactMetric:
+    """Return the metric of an attempt, with the area of the input where phi is unique up to a constant."""
+    problem, state, n = attempt.problem, attempt.state, len(conditions.fixed)
+    log_scale, curvature = state.variables, state.curvature[:n]
+    if attempt.doubled:
+        curvature = curvature / conditions.copies
+    if conditions.pinned.any():
+        log_scale = _keep_area(conditions.mesh, conditions.lengths, problem, log_scale, attempt.original)
     triangulation, records = problem.triangulation, problem.records
-    triangulation.length = problem.flat_lengths(state.variables)
+    triangulation.length = problem.flat_lengths(log_scale)
     return ExactMetric(
-        log_scale=state.variables[:n],
-        curvature=state.curvature[:n],
+        log_scale=log_scale[:n],
+        curvature=curvature,
         triangulation=triangulation,
         flips=np.concatenate(records) if records else np.empty(0, dtype=np.int64),
-        euclidean_flips=len(records[0]) if delaunay else 0,
+        euclidean_flips=len(records[0]) if attempt.delaunay else 0,
         steps=steps,
         residual=state.largest,
         worst_vertex=int(np.abs(state.residual[:n]).argmax()),
-        converged=_is_solved(problem, state, tolerance),
-        doubled=doubled,
+        converged=attempt.is_solved,
+        doubled=attempt.doubled,
     )
+
+
+def _checked_conditions(
+    mesh: TriangleMesh,
+    lengths: ArrayLike,
+    target: ArrayLike,
+    fixed: ArrayLike | None,
+    fixed_log_scale: ArrayLike,
+    start: ArrayLike | None,
+) -> tuple[_Conditions, FloatArray]:
+    """Return validated arguments of `exact_metric`, and (n,) the initial phi."""
+    lengths, n = check_lengths(mesh, lengths), len(mesh.vertices)
+    is_fixed = np.zeros(n, dtype=bool) if fixed is None else _per_vertex("fixed", fixed, n).astype(bool)
+    corrected, pinned = checked_target(mesh, _per_vertex("target", target, n), is_fixed)
+    initial = np.zeros(n) if start is None else _per_vertex("start", start, n).copy()
+    initial[is_fixed] = _per_vertex("fixed_log_scale", fixed_log_scale, n)[is_fixed]
+    bad = np.flatnonzero(is_fixed & ~np.isfinite(initial))
+    if len(bad):
+        raise NonFiniteError(f"fixed_log_scale is NaN or infinite at {_at(bad)}")
+    if not np.ptp(initial) <= MAX_RANGE:
+        initial = np.where(is_fixed, initial, 0.0)
+    return _Conditions(mesh, lengths, corrected, is_fixed, pinned), initial
 
 
 def _per_vertex(name: str, values: ArrayLike, count: int) -> FloatArray:
@@ -204,11 +305,6 @@ def _per_vertex(name: str, values: ArrayLike, count: int) -> FloatArray:
 
 def _at(vertices: IntArray) -> str:
     return f"{plural(len(vertices), 'vertex', 'vertices')}: {list_some(vertices)}"
-
-
-def _is_solved(problem: ConformalProblem, state: State, tolerance: float) -> bool:
-    """Return whether the residual is within the tolerance, or what the rounding at needles leaves of it."""
-    return not state.broken and state.largest <= max(tolerance, problem.rounding_error(state))
 
 
 def _keep_area(

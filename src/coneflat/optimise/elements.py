@@ -20,8 +20,6 @@ from ..mesh.connectivity import label_components, sort_by_counting, sort_keys
 from .energies import Energy
 from .motions import Motions
 
-# Maximum step, as a fraction of the step at which a triangle would have no area (Smith and Schaefer 2015).
-MAX_STEP_SHARE = 0.9
 # Fraction of diagonal entries that is added to them: parts without constraints are free to rotate and translate.
 RELATIVE_RIDGE = 1e-10
 
@@ -64,6 +62,7 @@ class Elements:
     Attributes:
         faces: (f,) the triangles.
         count: the number of unknowns k.
+        unknowns: (k,) their indices among those of the motions.
         parts: number of parts, which are connected components of unknowns that share triangles.
         part, unknown_part: (f,), (k,) the part of each triangle and of each unknown.
         weight: (f,) weight of each triangle's energy.
@@ -85,6 +84,7 @@ class Elements:
         moves = np.diff(matrix.indptr) > 0
         self.faces = np.flatnonzero(has_any(moves, corners))
         self.count, self.weight = motions.count, weight[self.faces]
+        self.unknowns = np.arange(self.count)
         corners = corners[self.faces]
         self._corners = corners
         self._a_of, self._b_of = map_factors(unit * rest_sides[self.faces])
@@ -103,8 +103,8 @@ class Elements:
         self._beta = self._b_of.ravel()[entry] * matrix.data[at]
         self._find_pattern()
 
-    def of_parts(self, chosen: BoolArray) -> tuple[Elements, IntArray]:
-        """Return the elements of chosen parts (parts,), renumbered, and (k',) the indices here of their unknowns."""
+    def of_parts(self, chosen: BoolArray) -> Elements:
+        """Return the elements of chosen parts (parts,), with renumbered parts and unknowns."""
         is_chosen, is_chosen_unknown = chosen[self.part], chosen[self.unknown_part]
         unknowns = np.flatnonzero(is_chosen_unknown)
         number = np.append(np.cumsum(is_chosen_unknown) - 1, len(unknowns))
@@ -123,8 +123,9 @@ class Elements:
         restricted._start = np.concatenate([[0], np.cumsum(sizes[is_chosen])])
         restricted._unknown = number[self._unknown[entries]]
         restricted._alpha, restricted._beta = self._alpha[entries], self._beta[entries]
+        restricted.unknowns = self.unknowns[unknowns]
         restricted._find_pattern()
-        return restricted, unknowns
+        return restricted
 
     def _find_pattern(self) -> None:
         k, sizes = self.count, np.diff(self._start)
@@ -166,6 +167,14 @@ class Elements:
         values = np.full(len(s1), np.inf)
         values[is_positive] = energy.values(s1[is_positive], s2[is_positive]) * self.weight[is_positive]
         return values
+
+    def part_energies(self, energy: Energy, maps: Maps) -> FloatArray:
+        """Return (parts,) the energy of each part."""
+        return self.sums(self.energies(energy, maps))
+
+    def sums(self, values: FloatArray) -> FloatArray:
+        """Return (parts,) the sum of the values (f,) of the triangles of each part."""
+        return np.bincount(self.part, values, self.parts).astype(np.float64)
 
     def newton_system(
         self, energy: Energy, maps: Maps, offset: float

@@ -8,11 +8,10 @@ from scipy.sparse import csr_matrix
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
 from ..errors import MetricError
 from ..geometry.straight import FlatTriangles
-from ..linalg import SuperLUFactor
-from ..linalg.newton import ARMIJO, HALVINGS
-from .elements import RELATIVE_RIDGE, Elements, Maps
+from .elements import Elements
 from .energies import UntanglingEnergy
 from .motions import Motions
+from .newton import descend
 
 # Ratio of height to longest side up to which a triangle is degenerate: coordinates in the plane are accurate to
 # about 1e-12 of an edge, and a triangle must stay positively oriented when they are rounded.
@@ -22,10 +21,10 @@ TARGET_AREA_SHARE = 0.1
 # Regularisation of the determinant: its floor, and its size relative to the worst determinant of the patch
 # (Garanzha et al. 2021, Section 4).
 MIN_REGULARISATION, RELATIVE_REGULARISATION = 1e-3, 0.2
-# A patch is abandoned, and tried again with more surrounding triangles, after MAX_ROUNDS rounds of STEPS_PER_ROUND
-# Newton steps, or if the distance to the goal has not shrunk by this factor in a round. Patches that succeed take 4
-# steps at the median.
-MAX_ROUNDS, STEPS_PER_ROUND, MIN_SHRINKING = 15, 4, 0.9
+# A patch is abandoned, and tried again with more surrounding triangles, after MAX_STEPS steps of Newton's method, or if
+# the distance to the goal has not shrunk by this factor in TRIAL_STEPS steps. Patches that succeed take 4 steps at the
+# median.
+MAX_STEPS, TRIAL_STEPS, MIN_SHRINKING = 60, 4, 0.9
 
 
 class Patches:
@@ -73,85 +72,54 @@ class Patches:
         unknown = 2 * self.corners[is_loose].repeat(2) + np.tile([0, 1], int(is_loose.sum()))
         coefficient = np.stack([self.shift[is_loose], 1j * self.shift[is_loose]], axis=1).ravel()
         shape = self.corners.size, 2 * len(self.vertices) + 1
-        motions = Motions(csr_matrix((coefficient, unknown, start), shape=shape))
+        self._motions = Motions(csr_matrix((coefficient, unknown, start), shape=shape))
         corners = np.arange(self.corners.size).reshape(-1, 3)
-        self.elements = Elements(motions, corners, target_shapes, 1.0, np.ones(len(target_shapes)))
+        self.elements = Elements(self._motions, corners, target_shapes, 1.0, np.ones(len(target_shapes)))
         self.count, self.patch = self.elements.parts, self.elements.unknown_part[::2]
         self.face_patch = self.elements.part
 
     def solve(self) -> ComplexArray:
         """Return (k,) shifts that make the determinants positive, where this succeeds.
 
-        Newton's method with the Hessian of each triangle projected to a positive semidefinite one. The steps of all
-        patches are solved for in one system, but every patch has its own regularisation and step length, and stops as
-        soon as it is finished or stuck. `linalg.newton` is not used because it has one of each for the whole system.
+        Every patch ends as soon as it is finished or stuck.
+
+        Notes:
+            V. Garanzha et al., "Foldover-free maps in 50 lines of code", 2021, Section 4: one step of Newton's method
+            for each regularisation, which decreases with the worst determinant of the patch.
         """
-        shifts = np.zeros(self.elements.count)
-        gap = TARGET_AREA_SHARE - _worst(self.elements, self._maps_at(self.elements, shifts))
-        active = gap > 0
-        for _ in range(MAX_ROUNDS):
-            if not active.any():
+        elements, points, shifts = self.elements, self._points, np.zeros(self.elements.count + 1)
+        missing, missing_before = self._missing(elements, points), np.full(elements.parts, np.inf)
+        for step in range(MAX_STEPS):
+            goes_on = missing > 0
+            if step % TRIAL_STEPS == 0:
+                goes_on &= missing <= MIN_SHRINKING * missing_before
+                missing_before = missing
+            if not goes_on.any():
                 break
-            active_elements, unknowns = self.elements.of_parts(active)
-            chosen, active_shifts, goes_on = (
-                np.flatnonzero(active),
-                shifts[unknowns],
-                np.ones(active_elements.parts, dtype=bool),
-            )
-            for _ in range(STEPS_PER_ROUND):
-                goes_on &= self._step(active_elements, active_shifts, goes_on)
-            shifts[unknowns], before = active_shifts, gap[chosen]
-            gap[chosen] = TARGET_AREA_SHARE - _worst(
-                active_elements, self._maps_at(active_elements, active_shifts)
-            )
-            active[chosen] = goes_on & (gap[chosen] <= MIN_SHRINKING * before)
-        return shifts[0::2] + 1j * shifts[1::2]
-
-    def _step(self, elements: Elements, shifts: FloatArray, active: BoolArray) -> BoolArray:
-        """Add a step to the unknowns of active parts, in place; return the parts that improved and may continue."""
-        maps = self._maps_at(elements, shifts)
-        worst = _worst(elements, maps)
-        epsilon = np.hypot(MIN_REGULARISATION, RELATIVE_REGULARISATION * np.minimum(worst, 0.0))
-        energy = UntanglingEnergy(epsilon[elements.part])
-        gradient, _, matrix = elements.newton_system(energy, maps, 0.0)
-        matrix.setdiag(matrix.diagonal() + RELATIVE_RIDGE * matrix.diagonal().max())
-        try:
-            step = SuperLUFactor(matrix).solve(-gradient)
-        except MetricError:
-            step = np.full(len(gradient), np.nan)
-        if not np.isfinite(step).all():
-            return np.zeros(elements.parts, dtype=bool)  # all are stuck
-        slopes = np.bincount(elements.unknown_part, gradient * step, elements.parts)
-        change = elements.change(np.append(step, 0.0))
-        before = np.bincount(elements.part, elements.energies(energy, maps), elements.parts)
-        length = np.ones(elements.parts)
-        for _ in range(HALVINGS):
-            trial = maps.plus(length[elements.part], change)
-            after = np.bincount(elements.part, elements.energies(energy, trial), elements.parts)
-            gained = ~active | (after <= before + ARMIJO * length * slopes)
-            if gained.all():
+            if not goes_on.all():
+                elements = elements.of_parts(goes_on)
+                missing, missing_before = missing[goes_on], missing_before[goes_on]
+            negative = np.minimum(TARGET_AREA_SHARE - missing, 0.0)
+            epsilon = np.hypot(MIN_REGULARISATION, RELATIVE_REGULARISATION * negative)
+            energy = UntanglingEnergy(epsilon[elements.part])
+            try:
+                descent = descend(points, self._motions, elements, energy, tolerance=0.0, steps=1)
+            except MetricError:  # a singular Hessian
                 break
-            length[~gained] /= 2
-        gained &= active & (worst < TARGET_AREA_SHARE)
-        shifts += np.where(gained, length, 0.0)[elements.unknown_part] * step
-        return gained
+            points, shifts = descent.points, shifts + descent.step
+            missing = self._missing(elements, points)
+        return shifts[0:-1:2] + 1j * shifts[1:-1:2]
 
-    def _maps_at(self, elements: Elements, shifts: FloatArray) -> Maps:
-        """Return the maps of some of the triangles for given shifts of their vertices, as real unknowns."""
-        change = elements.change(np.append(shifts, 0.0))
-        return elements.maps(self._points).plus(np.ones(len(elements.faces)), change)
+    def _missing(self, elements: Elements, points: ComplexArray) -> FloatArray:
+        """Return (parts,) how much the smallest determinant of each part is below its goal."""
+        maps, worst = elements.maps(points), np.full(elements.parts, np.inf)
+        np.minimum.at(worst, elements.part, np.abs(maps.a) ** 2 - np.abs(maps.b) ** 2)
+        return TARGET_AREA_SHARE - worst
 
     def moved(self, shifts: ComplexArray) -> ComplexArray:
         """Return (f, 3) the sides of the triangles after their vertices are shifted."""
         moved = np.where(self.corners >= 0, self.shift * shifts[self.corners], 0)
         return self.sides + moved[:, [2, 0, 1]] - moved[:, [1, 2, 0]]
-
-
-def _worst(elements: Elements, maps: Maps) -> FloatArray:
-    """Return (parts,) the smallest determinant of each part."""
-    worst = np.full(elements.parts, np.inf)
-    np.minimum.at(worst, elements.part, np.abs(maps.a) ** 2 - np.abs(maps.b) ** 2)
-    return worst
 
 
 def _corner_frames(flat: FlatTriangles, faces: IntArray, rows: IntArray, movable: BoolArray) -> ComplexArray:

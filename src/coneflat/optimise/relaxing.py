@@ -26,10 +26,10 @@ from ..geometry.planar import as_complex, as_pairs, heights, sides_between, sign
 from ..geometry.straight import place_triangles
 from ..mesh.connectivity import TriangleMesh
 from .constraints import PointConstraints, check_constraints
-from .descent import RELATIVE_ROUNDING, descend
 from .elements import Elements
 from .energies import Energy, StretchEnergy
 from .motions import close_seams, find_motions, find_restrictions
+from .newton import RELATIVE_ROUNDING, descend
 
 # The last step is the first one whose predicted decrease is at most this fraction of the energy minus its lower bound;
 # and the maximum number of steps.

@@ -113,12 +113,12 @@ COUNT = Number(0, is_integer=True, optional=True)
 
 
 def strength(maximum: float) -> Number:
-    """Return the kind of a strength from 0 to `most`."""
+    """Return the kind of a strength from 0 to `maximum`."""
     return Number(0, maximum, is_strength=True)
 
 
 def integer(maximum: float = math.inf) -> Number:
-    """Return the kind of an integer from 1 to `most`."""
+    """Return the kind of an integer from 1 to `maximum`."""
     return Number(1, maximum, is_integer=True)
 
 

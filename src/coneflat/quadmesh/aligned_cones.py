@@ -23,10 +23,10 @@ from ..mesh import CheckedMesh
 from ..mesh.connectivity import TriangleMesh
 from ..options import read_options
 from ..result import Flattening
+from .alignment import has_area
 from .cross_field import SHARP_ANGLE, directions_and_indices, sharp_ends
 from .features import split_around, split_chords, vertex_graph
-from .layout import has_area
-from .limits import NO_LIMIT, SquareLimit
+from .limits import COARSE_TRIANGLES, NO_LIMIT, SquareLimit
 from .map_model import SAMPLES, MapModel
 from .options import FLATTENING_OPTIONS, GRID_TOLERANCE, QuadOptions, flattening_defaults
 from .sizes import extended
@@ -36,14 +36,14 @@ from .sizes import extended
 COST_OF_AREAS, COST_OF_DIRECTIONS, TIMES_REQUIRED, COST_OF_MISSING = 15.0, 200.0, 5.0, 1e9
 # Radii within which cones move, relative to the distance between the centres of regions, and tried places in each.
 RADII, PLACES_NEAR = (1.0, 0.6, 0.35, 0.2), 10
-# Number of triangles of a coarse mesh, on which the cones of larger meshes are searched.
-COARSE = 25_000
 # Largest number of pairs of places that a search compares, half a second of work or more: for each vertex, and of small
 # meshes. Real models need up to 2,500 for each vertex, or 3 million. Surfaces with hundreds of spikes, nearly all of
 # whose vertices are cones, would need a hundred times as many.
 PAIRS_PER_VERTEX, MAX_PAIRS_OF_FEW = 6_000, 10_000_000
 # Least decrease of the cost by a step of a descent, which thus ends.
 MIN_GAIN = 1e-3
+# Quarter turns: largest difference of the angle defect at a corner of the surface from the curvature of its cone.
+MAX_CORNER_ERROR = 0.25
 # Bounds of the area distortion. Below, areas would cost more than missing cones; above, nothing.
 MIN_DISTORTION, MAX_DISTORTION = 1e-3, 1e3
 # How often the cost of areas is doubled to meet the bound, and the bound for a distortion of 1: the log of the ratio of
@@ -145,8 +145,8 @@ def aligned_cones(
     distortion = min(max(distortion, MIN_DISTORTION), MAX_DISTORTION)
     angle, origin = SHARP_ANGLE if sharp_angle is None else sharp_angle, np.arange(len(mesh.vertices))
     degrees = np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
-    if len(mesh.faces) > 2 * COARSE:
-        mesh, origin, _ = coarse_mesh(mesh, COARSE)
+    if len(mesh.faces) > 2 * COARSE_TRIANGLES:
+        mesh, origin, _ = coarse_mesh(mesh, COARSE_TRIANGLES)
     directions, start = directions_and_indices(mesh, angle)
     scale = None if log_scale is None else log_scale[origin]
     model = MapModel(mesh, directions.combined, min_quarters, max_quarters, degrees[origin], scale)
@@ -207,7 +207,7 @@ class _Search:
         edges_at = np.bincount(sharp_ends(mesh, sharp_angle).ravel(), minlength=len(mesh.vertices))[
             model.places
         ]
-        is_corner = (inside != 0) & (edges_at > 2) & (np.abs(model.curvature - inside) < 0.25)
+        is_corner = (inside != 0) & (edges_at > 2) & (np.abs(model.curvature - inside) < MAX_CORNER_ERROR)
         fixed = np.flatnonzero(is_corner)
         model.min_quarters[fixed] = model.max_quarters[fixed] = inside[fixed]
         is_border = mesh.is_boundary_vertex[model.places[fixed]]

@@ -14,6 +14,7 @@ from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags
 from ..base import ComplexArray, FloatArray, IntArray
 from ..geometry import (
     angle_defect,
+    complex_sums,
     corner_angles,
     cotangent_laplacian,
     cotangents,
@@ -65,11 +66,6 @@ def halfedge_angles(angles: FloatArray) -> FloatArray:
     """Return (3m,) the direction of each half-edge in the frame of its triangle, for corner angles (m, 3)."""
     zero = np.zeros(len(angles))
     return np.stack([zero, np.pi - angles[:, 2], np.pi + angles[:, 1]], axis=1).ravel()
-
-
-def complex_sums(labels: IntArray, values: ComplexArray, count: int) -> ComplexArray:
-    """Return (count,) the sum of the values (k,) that have each label (k,)."""
-    return np.bincount(labels, values.real, count) + 1j * np.bincount(labels, values.imag, count)
 
 
 def preferred_directions(mesh: TriangleMesh, angle: float = SHARP_ANGLE) -> Directions:

@@ -1,46 +1,73 @@
-"""Extraction of a quad mesh from an integer-grid map, and a layer of quads where the boundary cuts squares.
-
-H.-C. Ebke, D. Bommes, M. Campen, L. Kobbelt, "QEx: robust quad mesh extraction", 2013.
-"""
+"""Extraction of a quad mesh from an integer-grid map."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse.csgraph import dijkstra
 
 from ..base import FloatArray, IntArray, Unmet, dots, list_some, plural
 from ..errors import GridError
 from ..geometry import signed_double_areas
-from ..mesh import NEXT, PREVIOUS, label_components
-from .cross_field import SHARP_ANGLE
-from .features import vertex_graph
+from ..mesh import label_components
 from .grid_coordinates import ExactGrid, exact_grid
 from .grid_points import LOST, GridPoints, Ports, find_points, find_ports, join_ports
 from .integer_map import IntegerGrid
 from .limits import check_extraction
-from .quad_mesh import CoarseGridError, QuadMesh, corner_fans, degenerate_quads, opposite_sides
+from .quad_mesh import QuadMesh, corner_fans, degenerate_quads
+
+# Squares: difference of the area of a grid and the number of its quads that rounding explains.
+AREA_TOLERANCE = 1e-3
 
 
-def extract_quads(grid: IntegerGrid, leave_out: bool = False) -> QuadMesh:
+@dataclass(frozen=True)
+class DegenerateQuads:
+    """Why quads are not a mesh: some have a vertex twice, or a side with the vertices of another edge.
+
+    Attributes:
+        reason: how many, and which.
+    """
+
+    reason: str
+
+
+def extract_quads(grid: IntegerGrid) -> QuadMesh:
     """Return the quad mesh whose edges are the grid lines of an integer-grid map.
 
-    The vertices are the grid points on the surface. From each, grid lines leave in as many directions as its angle has
-    quarter turns. They are traced for one unit, across triangles and seams, to the next grid points. A path that turns
-    left at each point closes after four sides, which bound a quad. All decisions use exact predicates.
+    Raises:
+        GridError: the map is not an integer-grid map, is so coarse that a quad is degenerate, or has too many squares
+            or crossings.
+        TooLargeError: there is not enough memory.
 
-    Squares that the boundary cuts are left out and counted. The result is manifold: quads that touch in a single point
-    get separate vertices there.
+    See Also:
+        find_quads: the method; it returns a reason for degenerate quads.
+    """
+    quads = find_quads(grid)
+    if isinstance(quads, DegenerateQuads):
+        raise GridError(quads.reason)
+    return quads
+
+
+def find_quads(grid: IntegerGrid, leave_out: bool = False) -> QuadMesh | DegenerateQuads:
+    """Return the quad mesh whose edges are the grid lines of an integer-grid map, or why these quads are not a mesh.
 
     Args:
         grid: the map.
-        leave_out: leave out degenerate quads, instead of raising an error.
+        leave_out: leave out degenerate quads, unless all are.
 
     Raises:
-        GridError: the map is not an integer-grid map, is so coarse that a quad is degenerate, or
-            has too many squares or crossings.
+        GridError: the map is not an integer-grid map, or has too many squares or crossings.
         TooLargeError: there is not enough memory.
+
+    Notes:
+        The vertices are the grid points on the surface. From each, grid lines leave in as many directions as its angle
+        has quarter turns. They are traced for one unit, across triangles and seams, to the next grid points. A path
+        that turns left at each point closes after four sides, which bound a quad. All decisions use exact predicates.
+        Squares that the boundary cuts are left out and counted. The result is manifold: quads that touch in a single
+        point get separate vertices there.
+
+    References:
+        H.-C. Ebke, D. Bommes, M. Campen, L. Kobbelt, "QEx: robust quad mesh extraction", 2013.
     """
     check_extraction(grid.corner_grid)
     exact = exact_grid(grid)
@@ -48,37 +75,48 @@ def extract_quads(grid: IntegerGrid, leave_out: bool = False) -> QuadMesh:
     ports = find_ports(exact, points)
     mates = join_ports(exact, points, ports)
     _require_pairs(mates, ports)
-    following = _turn_left(mates, ports)
-    darts, left_out = _close(following, ports)
+    darts, left_out = _close(_turn_left(mates, ports), ports)
     area = float(signed_double_areas(exact.corners).sum()) / 2
-    # The tolerance covers rounding of the sum over all triangles.
-    if not exact.mesh.is_boundary_edge.any() and (left_out or abs(area - len(darts)) > 1e-3):
-        raise GridError(f"{len(darts):,} quads cover a grid of {area:.3f} squares: some are missing")
-    if not len(darts):
-        raise GridError(
-            f"no complete square of the grid lies on the surface, of {area:.1f} squares: use more quads, or a smaller "
-            "size"
-        )
+    _require_all_squares(exact, area, len(darts), left_out)
     origin, quads, edges = _split_fans(darts, mates, ports.points)
     notes: tuple[str, ...] = ()
     while (bad := degenerate_quads(quads, edges)).any():
         text = f"{plural(int(bad.sum()), 'degenerate quad')} of {len(quads):,}"
         if not leave_out or bad.all():
-            raise CoarseGridError(f"{text} ({list_some(np.flatnonzero(bad))}): use more quads", grid)
+            return DegenerateQuads(f"{text} ({list_some(np.flatnonzero(bad))}): use more quads")
         darts, notes = darts[~bad], (*notes, Unmet(f"Left out {text}: the surface is too thin there."))
         origin, quads, edges = _split_fans(darts, mates, ports.points)
     barycentric = _barycentric(exact, points, origin)
     corners = exact.mesh.vertices[exact.mesh.faces[points.faces[origin]]]
     return QuadMesh(
-        np.einsum("qi,qix->qx", barycentric, corners),
-        quads,
-        points.faces[origin],
-        barycentric,
-        left_out,
-        area - len(darts),
-        exact.mesh,
-        notes,
+        vertices=np.einsum("qi,qix->qx", barycentric, corners),
+        quads=quads,
+        faces=points.faces[origin],
+        barycentric=barycentric,
+        left_out=left_out,
+        area_left_out=area - len(darts),
+        surface=exact.mesh,
+        notes=notes,
     )
+
+
+def _require_all_squares(exact: ExactGrid, area: float, count: int, left_out: int) -> None:
+    """Raise GridError if there are no quads, or if some are missing on a surface without boundary.
+
+    Args:
+        exact: the map.
+        area: its area in squares.
+        count: number of quads.
+        left_out: number of squares that do not close.
+    """
+    is_closed = not exact.mesh.is_boundary_edge.any()
+    if is_closed and (left_out or abs(area - count) > AREA_TOLERANCE):
+        raise GridError(f"{count:,} quads cover a grid of {area:.3f} squares: some are missing")
+    if not count:
+        raise GridError(
+            f"no complete square of the grid lies on the surface, of {area:.1f} squares: use more quads, or a smaller "
+            "size"
+        )
 
 
 def _require_pairs(mates: IntArray, ports: Ports) -> None:
@@ -167,107 +205,3 @@ def _along_longest_side(corners: FloatArray) -> FloatArray:
     weights = np.zeros((len(corners), 3))
     weights[row, (longest + 1) % 3], weights[row, (longest + 2) % 3] = 1 - share, share
     return weights
-
-
-def with_borders(quads: QuadMesh) -> QuadMesh:
-    """Return a quad mesh with a further layer of quads between each of its boundaries and that of the surface.
-
-    Each vertex on a boundary of the quads is joined to the nearest point of the boundary of the surface. These points
-    are smoothed along the boundary, and its corners are among them. There is no layer where two boundaries do not
-    correspond, because quads are missing at thin parts or cover a hole.
-    """
-    mesh, count = quads.surface, len(quads.vertices)
-    loops = mesh.boundary_walks()
-    loop_of, place = np.full((2, len(mesh.vertices)), -1)
-    for number, loop in enumerate(loops):
-        loop_of[mesh.tails[loop]], place[mesh.tails[loop]] = number, np.arange(len(loop))
-    graph, border = vertex_graph(mesh), np.flatnonzero(mesh.is_boundary_vertex)
-    away, _, source = dijkstra(graph, indices=border, return_predecessors=True, min_only=True)
-    tails, heads = quads.quads.ravel(), np.roll(quads.quads, -1, axis=1).ravel()
-    alone = opposite_sides(quads.quads) < 0
-    layers, faces, weights, taken, missing = [quads.quads], [quads.faces], [quads.barycentric], [-1], 0
-    for walk in _walks(tails[alone], heads[alone]):
-        points, corners = quads.vertices[walk], mesh.faces[quads.faces[walk]]
-        ways = np.linalg.norm(mesh.vertices[corners] - points[:, None], axis=2) + away[corners]
-        nearest = source[corners[np.arange(len(walk)), np.argmin(ways, axis=1)]]
-        loop = loops[number := int(np.bincount(loop_of[nearest]).argmax())]
-        starts = mesh.vertices[mesh.tails[loop]]
-        steps = mesh.vertices[mesh.heads[loop]] - starts
-        at, off = _places_along(points, np.minimum(place[nearest], len(loop) - 1), starts, steps)
-        is_there = off.max() <= 1e-9 * graph.max()
-        if at is None or is_there or number in taken:
-            missing += not is_there
-            continue
-        taken.append(number)
-        ends = np.cumsum(np.sqrt(dots(steps, steps)))
-        edge = np.minimum(np.searchsorted(ends, at, side="right"), len(loop) - 1)
-        share = np.clip(1 - (ends[edge] - at) / np.sqrt(dots(steps, steps))[edge], 0, 1)[:, None]
-        side = loop[edge] % 3
-        outer, count = count + np.arange(len(walk)), count + len(walk)
-        layers.append(np.stack([np.roll(walk, -1), walk, outer, np.roll(outer, -1)], axis=1))
-        faces.append(loop[edge] // 3)
-        weights.append(
-            (1 - share) * np.eye(3)[np.take(NEXT, side)] + share * np.eye(3)[np.take(PREVIOUS, side)]
-        )
-    on, barycentric = np.concatenate(faces), np.concatenate(weights)
-    points = np.einsum("qi,qix->qx", barycentric, mesh.vertices[mesh.faces[on]])
-    bordered = replace(
-        quads, vertices=points, quads=np.concatenate(layers), faces=on, barycentric=barycentric
-    )
-    if missing:
-        return bordered
-    note = f"A layer of quads along the boundary replaces {plural(quads.left_out, 'square')} that it cuts."
-    return replace(bordered, left_out=0, area_left_out=0.0, notes=(*quads.notes, note))
-
-
-def _walks(tails: IntArray, heads: IntArray) -> list[IntArray]:
-    """Return the closed walks along directed edges, of which one leaves each vertex, as their vertices."""
-    following, walks = dict(zip(tails.tolist(), heads.tolist(), strict=True)), []
-    while following:
-        walk = [next(iter(following))]
-        while (vertex := following.pop(walk[-1], None)) is not None:
-            walk.append(vertex)
-        walks.append(np.array(walk[:-1], dtype=np.int64))
-    return walks
-
-
-def _places_along(
-    points: FloatArray, edge: IntArray, starts: FloatArray, steps: FloatArray
-) -> tuple[FloatArray | None, FloatArray]:
-    """Return (k,) positions along a closed polyline, and the distances of points (k, 3) from it.
-
-    Args:
-        points: the points, around the polyline.
-        edge: (k,) the edge of the polyline at whose start it is nearest to each point.
-        starts, steps: (b, 3) starts and vectors of the edges.
-
-    Returns:
-        Positions that increase, at least one at each corner; None if the points do not run once around. Distances.
-    """
-    lengths = np.sqrt(dots(steps, steps))
-    # Along a boundary of few edges, the nearest one need not be next to the nearest vertex.
-    nearby = np.stack([edge, edge - 1]) if len(steps) > 64 else np.arange(len(steps))[:, None] + 0 * edge
-    share = np.clip(
-        dots(points - starts[nearby], steps[nearby]) / np.maximum(lengths[nearby] ** 2, 1e-300), 0, 1
-    )
-    off = np.linalg.norm(starts[nearby] + share[..., None] * steps[nearby] - points, axis=2)
-    ends, total = np.cumsum(lengths), lengths.sum()
-    at = (ends[nearby] - lengths[nearby] * (1 - share))[off.argmin(axis=0), np.arange(len(points))]
-    gaps = (np.roll(at, -1) - at + total / 2) % total - total / 2
-    if abs(gaps.sum() - total) > total / 2:
-        return None, off.min(axis=0)
-    at = at[0] + np.cumsum(gaps) - gaps
-    several = np.concatenate([at - total, at, at + total])
-    falling = np.minimum.accumulate(several[::-1])[::-1]
-    at = (np.maximum.accumulate(several) + falling)[len(at) : 2 * len(at)] / 2
-    for _ in range(60):  # smoothed until no gap is very small
-        before, after = np.append(at[-1] - total, at[:-1]), np.append(at[1:], at[0] + total)
-        if (after - at).min() >= 0.3 * total / len(at):
-            break
-        at = at / 2 + (before + after) / 4
-    cosines = dots(steps, np.roll(steps, 1, axis=0)) / np.maximum(lengths * np.roll(lengths, 1), 1e-300)
-    bends = np.flatnonzero(cosines < np.cos(SHARP_ANGLE))
-    for corner in (ends - lengths)[bends[np.argsort(-cosines[bends], kind="stable")]]:  # the sharpest last
-        away = (corner - at + total / 2) % total - total / 2
-        at[np.argmin(np.abs(away))] += away[np.argmin(np.abs(away))]
-    return at % total, off.min(axis=0)

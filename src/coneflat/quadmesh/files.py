@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base import FloatArray, IntArray
 from ..errors import MeshError, MeshFileError
-from ..geometry import sides_between, vertex_normals
+from ..geometry import quarters_around, sides_between, vertex_normals
 from ..geometry.nearest import TriangleTree
 from ..io import (
     FOR_INDICES,
@@ -46,7 +46,6 @@ from ..io.mesh_file import MeshFile
 from ..mesh.check import check_mesh
 from ..mesh.connectivity import TriangleMesh
 from .integer_map import IntegerGrid, grid_of_corners, on_lines
-from .layout import quarters_around
 from .quad_mesh import QuadMesh, least_jacobians
 
 #: Names of the formats that meshio writes, by their extensions.

@@ -12,13 +12,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base import BoolArray, FloatArray, IntArray, compiled, list_some, mask_of, plural
+from ..base import BoolArray, FloatArray, IntArray, list_some, mask_of, plural
 from ..errors import GridError
-from ..geometry import fill_orientations, halfedge_twins, sides_between
+from ..geometry import fill_orientations, halfedge_twins, quarters_around, rotated, sides_between
 from ..mesh.connectivity import TriangleMesh
-from .layout import quarters_around
 from .options import GRID_TOLERANCE
-from .transitions import rotated
 
 if TYPE_CHECKING:
     from .integer_map import IntegerGrid
@@ -114,18 +112,6 @@ def _transport(exact: ExactGrid, start: FloatArray) -> tuple[FloatArray, BoolArr
         current[vertex] = rotated(exact.turns[out], current[vertex]) + exact.shifts[out]
     is_off = (current != start).any(axis=1) & ~exact.mesh.is_boundary_vertex
     return corners.reshape(-1, 3, 2), is_off
-
-
-@compiled
-def turn(quarters: int, x: float, y: float) -> tuple[float, float]:
-    """Return a point rotated counterclockwise by 0 to 3 quarter turns, without rounding."""
-    if quarters == 0:
-        return x, y
-    if quarters == 1:
-        return -y, x
-    if quarters == 2:
-        return -x, -y
-    return y, -x
 
 
 def orientations(corners: FloatArray) -> IntArray:

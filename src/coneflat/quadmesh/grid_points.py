@@ -15,9 +15,8 @@ from typing import TypeAlias
 import numpy as np
 
 from ..base import BoolArray, FloatArray, IntArray, compiled, dots, mask_of
-from ..geometry import orientation
-from .grid_coordinates import ExactGrid, orientations, turn
-from .transitions import rotated
+from ..geometry import orientation, rotated, turn
+from .grid_coordinates import ExactGrid, orientations
 
 #: Values for a port without a mate: its line ends at the boundary, or the map is invalid.
 BOUNDARY, LOST = -1, -2

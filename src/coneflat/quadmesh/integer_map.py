@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..base import BoolArray, FloatArray, IntArray, list_some, plural
 from ..errors import GridError
-from ..geometry import double_areas, edge_lengths, sides_between, signed_double_areas
+from ..geometry import UNITS, double_areas, edge_lengths, quarters_around, sides_between, signed_double_areas
 from ..mesh import NEXT, PREVIOUS
 from ..mesh.connectivity import TriangleMesh
-from .layout import quarters_around
 from .options import GRID_TOLERANCE
-from .transitions import UNITS
-
-if TYPE_CHECKING:
-    from .quad_mesh import QuadMesh
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +41,6 @@ class IntegerGrid:
         corner_quarters: (k,) their angles in quarter turns.
         features: (f, 2) vertices of sharp edges that lie on grid lines.
         seconds: wall time of each stage; not stored in files.
-        quad_mesh: its quads, if they were extracted; not stored in files.
 
     Examples:
         >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
@@ -70,7 +64,6 @@ class IntegerGrid:
     corner_quarters: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     features: IntArray = field(default_factory=lambda: np.empty((0, 2), dtype=np.int64))
     seconds: dict[str, float] = field(default_factory=dict)
-    quad_mesh: QuadMesh | None = field(default=None, repr=False)
 
     @property
     def squares(self) -> float:
@@ -184,6 +177,11 @@ def grid_of_corners(
     }
     arrays = (vertices, faces, corner_grid, turns, shifts, cones, quarters[cones])
     return IntegerGrid(*arrays, corners=corners, **attributes)  # type: ignore[arg-type]
+
+
+def with_note(grid: IntegerGrid, note: str) -> IntegerGrid:
+    """Return a grid with one more note, unless it has this one, or the note is empty."""
+    return grid if note in ("", *grid.notes) else replace(grid, notes=(*grid.notes, note))
 
 
 def joined_grids(grids: Sequence[IntegerGrid], notes: Sequence[str]) -> IntegerGrid:

@@ -12,6 +12,8 @@ from ..errors import GridError
 from ..geometry import signed_double_areas
 from ..linalg import require_memory
 
+#: Number of triangles of a coarse mesh, on which the cones, or the grid, of larger meshes are searched.
+COARSE_TRIANGLES = 25_000
 #: Largest number of squares of a grid, relative to the number requested.
 MAX_TIMES = 16
 #: Largest number of squares requested of any mesh, of one of few triangles, and for each triangle of larger meshes.

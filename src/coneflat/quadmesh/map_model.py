@@ -10,6 +10,7 @@ from ..base import ComplexArray, FloatArray, IntArray
 from ..cones import CONE_ANGLE_PER_TRIANGLE
 from ..geometry import (
     angle_defect,
+    complex_sums,
     corner_angles,
     cotangent_laplacian,
     cotangents,
@@ -21,7 +22,7 @@ from ..geometry import (
 from ..linalg import MultiGraph, factorize
 from ..mesh import tie_key
 from ..mesh.connectivity import TriangleMesh
-from .cross_field import complex_sums, edge_rotations, halfedge_angles
+from .cross_field import edge_rotations, halfedge_angles
 from .features import vertex_graph
 
 # Numbers of regions over which the log scale and the directions are summed.

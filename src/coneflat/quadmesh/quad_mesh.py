@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base import BoolArray, FloatArray, IntArray, dots, mask_of, plural
-from ..errors import GridError
 from ..mesh import label_components, sort_pairs
 from ..mesh.connectivity import TriangleMesh
 
@@ -167,14 +166,6 @@ class QuadMesh:
         from .files import read_quads
 
         return read_quads(path)
-
-
-class CoarseGridError(GridError):
-    """A grid is so coarse that its quads are not a mesh; `grid` is this grid, with all notes."""
-
-    def __init__(self, text: str, grid: IntegerGrid) -> None:
-        super().__init__(text)
-        self.grid = grid
 
 
 def opposite_sides(quads: IntArray) -> IntArray:

@@ -1,4 +1,9 @@
-"""Quad meshing of surfaces."""
+"""Integer grids and quad meshes of surfaces: the pipeline from a mesh to quads.
+
+Cones are chosen, the surface is flattened to a seamless map, which is rounded to an integer grid; quads are extracted
+from it and smoothed. Each step is a function of the previous result, and returns its result or a reason;
+`policies.py` says which other grids are tried then.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +17,21 @@ from numpy.typing import ArrayLike
 from ..base import Stopwatch, Unmet, plural, warns
 from ..errors import GridError, OptionError
 from ..options import read_options
+from .borders import with_borders
 from .cross_field import sharp_ends
-from .extract import extract_quads, with_borders
-from .grid_search import GridSearch
+from .extract import DegenerateQuads, extract_quads, find_quads
 from .integer_map import IntegerGrid
 from .limits import NO_LIMIT, SquareLimit
+from .no_grid import NoGrid
 from .options import QuadOptions
-from .quad_mesh import CoarseGridError, QuadMesh, least_jacobians
-from .simpler_mesh import SimplerMesh, simplified
+from .policies import GridWithQuads, Outcome, find_grid, on_coarse_mesh
+from .quad_mesh import QuadMesh, least_jacobians
+from .request import GridRequest
+from .simpler_mesh import SimplerMesh
 from .smooth import smooth_quads
+
+# Least scaled Jacobian without a note: an angle of 180 degrees has 0, up to rounding.
+MIN_SOUND_JACOBIAN = 1e-9
 
 
 @warns()
@@ -67,72 +78,180 @@ def quads(
         >>> mesh.quads.shape, mesh.vertices.shape
         ((9, 4), (16, 3))
     """
-    own = {"quads": quads, "size": size, "stretch": stretch, "sharp_angle": sharp_angle, "smooth": smooth}
-    small, search, source = None, None, None
+    quad_options = {
+        "quads": quads,
+        "size": size,
+        "stretch": stretch,
+        "sharp_angle": sharp_angle,
+        "smooth": smooth,
+    }
     if isinstance(mesh, IntegerGrid):
-        if any(one is not None for one in (faces, quads, size, sharp_angle)) or options.keys() - {"progress"}:
+        if any(value is not None for value in (faces, quads, size, sharp_angle)) or options.keys() - {
+            "progress"
+        }:
             raise OptionError("a grid already has faces, size and options: no others can be given")
-        read_options(own, QuadOptions)
-        grid, stages = mesh, Stopwatch(options.get("progress"))
-    else:
-        search = replace(GridSearch.of(mesh, faces, own, options), for_quads=True)
-        stages = search.stages
-        source = search.result.source if search.result else search.source.input_mesh.source
-        with stages("coarsen"):
-            search, small = simplified(search)
-        try:
-            grid = search.grid()
-        except CoarseGridError as error:
-            grid = replace(error.grid, seconds=dict(stages.seconds))
+        read_options(quad_options, QuadOptions)
+        return _quads_of_grid(mesh, smooth, Stopwatch(options.get("progress")))
+    return _quads_of_request(
+        replace(GridRequest.of(mesh, faces, quad_options, options), for_quads=True), smooth
+    )
+
+
+def _quads_of_grid(grid: IntegerGrid, rounds: int, stages: Stopwatch) -> QuadMesh:
+    """Return the smoothed quads of a given grid."""
     stages.done = 1.0
     with stages("extract"):
-        found = (search and grid.quad_mesh) or extract_quads(grid, leave_out=search is not None)
-        grid = replace(grid, quad_mesh=None)
-    found = with_borders(found) if found.left_out else found
-    features = grid.features
-    if small is None and search and not search.result:
-        has_all = found.surface.components[0] == search.checked.mesh.components[0]
-        small = None if has_all else SimplerMesh.of(search)
+        quad_mesh = extract_quads(grid)
+    quad_mesh = with_borders(quad_mesh) if quad_mesh.left_out else quad_mesh
     with stages("smooth"):
-        if small is not None:
-            found, features = small.moved(found), sharp_ends(small.surface)
-        found = smooth_quads(found, smooth, features)
-        found = found if small is None else small.completed(found)
-    _require_sound(found, search.limit if search else NO_LIMIT)
+        quad_mesh = smooth_quads(quad_mesh, rounds, grid.features)
+    _require_sound(quad_mesh, NO_LIMIT)
+    notes = (*grid.notes, *quad_mesh.notes, *map(Unmet, _notes(quad_mesh, fills_holes=False)))
+    return replace(quad_mesh, notes=notes, seconds={**grid.seconds, **stages.seconds}, grid=grid)
+
+
+def _quads_of_request(request: GridRequest, rounds: int) -> QuadMesh:
+    """Return the smoothed quads that are asked for: of a simpler mesh if this is needed, moved to the given one."""
+    stages = request.stages
+    source = request.flattening.source if request.flattening else request.source.input_mesh.source
+    with stages("coarsen"):
+        request, simpler = on_coarse_mesh(request)
+    stages.done = 0.0
+    gridded = _with_coarse_grid(find_grid(request))
+    grid = replace(gridded.grid, seconds=dict(stages.seconds))
+    stages.done = 1.0
+    with stages("extract"):
+        quad_mesh = gridded.quad_mesh or _without_degenerate_quads(grid)
+    quad_mesh = with_borders(quad_mesh) if quad_mesh.left_out else quad_mesh
+    if simpler is None and _lacks_components(quad_mesh, request):
+        simpler = SimplerMesh.of(request.checked, request.size, request.limit)
+    with stages("smooth"):
+        if simpler is None:
+            quad_mesh = smooth_quads(quad_mesh, rounds, grid.features)
+        else:
+            moved = simpler.moved(quad_mesh)
+            quad_mesh = simpler.completed(smooth_quads(moved, rounds, sharp_ends(simpler.surface)))
+    _require_sound(quad_mesh, request.limit)
     notes = (
-        *(() if small is None else small.notes),
+        *(() if simpler is None else simpler.notes),
         *grid.notes,
-        *found.notes,
-        *map(Unmet, _notes(found, small)),
+        *quad_mesh.notes,
+        *map(Unmet, _notes(quad_mesh, fills_holes=simpler is not None and bool(simpler.is_filling.any()))),
     )
-    return replace(found, notes=notes, seconds={**grid.seconds, **stages.seconds}, grid=grid, source=source)
+    return replace(
+        quad_mesh, notes=notes, seconds={**grid.seconds, **stages.seconds}, grid=grid, source=source
+    )
 
 
-def _require_sound(found: QuadMesh, limit: SquareLimit) -> None:
+def _with_coarse_grid(outcome: Outcome) -> GridWithQuads:
+    """Return a grid, or the coarse one of a reason, or raise the error of a reason without any."""
+    if isinstance(outcome, GridWithQuads):
+        return outcome
+    if outcome.coarse_grid is None:
+        raise outcome.error
+    return GridWithQuads(outcome.coarse_grid)
+
+
+def _without_degenerate_quads(grid: IntegerGrid) -> QuadMesh:
+    """Return the quads of a grid, without degenerate ones, or raise GridError if all are."""
+    quad_mesh = find_quads(grid, leave_out=True)
+    if isinstance(quad_mesh, DegenerateQuads):
+        raise GridError(quad_mesh.reason)
+    return quad_mesh
+
+
+def _lacks_components(quad_mesh: QuadMesh, request: GridRequest) -> bool:
+    """Return whether there is no grid, so no quads, for some components of a mesh."""
+    return request.flattening is None and quad_mesh.surface.components[0] != request.mesh.components[0]
+
+
+@warns("grid.notes")
+def integer_grid(
+    mesh: Any,
+    faces: ArrayLike | None = None,
+    *,
+    quads: int | None = None,
+    size: ArrayLike | None = None,
+    stretch: float = QuadOptions.stretch,
+    sharp_angle: float | str | None = None,
+    **options: Any,
+) -> IntegerGrid:
+    """Return a seamless map of a surface to the integer grid: unit squares become quads that match across seams.
+
+    Args:
+        mesh, faces: as for `coneflat.flatten`; or a `Flattening` with cones quantised to quarter turns.
+        quads: approximate number of unit squares that cover the surface; None: 10,000, unless `size` is given.
+        size: edge length of a square in model units, which replaces `quads`; or relative sizes of squares: (n,)
+            numbers, the name of a vertex property of the file, or "curvature", for squares up to four times smaller
+            where the surface is more curved.
+        stretch: trade-off between angles (0) and areas (1); see `StretchEnergy`.
+        sharp_angle: radians; edges with a larger dihedral angle, and the boundary, are put on grid lines; None for
+            none.
+        options: those of `coneflat.flatten`; by default cones have three, five or six quads. Given cones need
+            curvatures, multiples of pi/2; on surfaces with handles or several boundaries, a grid rarely exists for
+            them. boundary may also be "auto", the default: "straight" if such a grid is found and cones are not given,
+            else "free".
+
+    Returns:
+        The map, with its cones and measures.
+
+    Raises:
+        GridError: no grid of this size without flipped triangles was found; or there would be more than 16 times as
+            many squares, or more than the triangles of the mesh can carry.
+        TooLargeError: the grid does not fit into the free memory.
+        MeshError, CurvatureError, OptionError, SeamError, MetricError: as for `coneflat.flatten`.
+
+    Warns:
+        GuaranteeWarning: a guarantee, or a request, is not met; notes of the result say which.
+
+    Notes:
+        A smooth layout with quantised cones (Kaelberer, Nieser, Polthier, "QuadCover", 2007) is scaled. Translations of
+        seams and positions of cones are rounded together, to the nearest lattice point in the metric of the least
+        energy that a displacement needs. The layout is then relaxed to these constraints (integer-grid maps: Bommes,
+        Campen, Ebke, Alliez, Kobbelt 2013), from the smooth one by steps that flip no triangle. Edges between cones are
+        split before.
+
+    Examples:
+        >>> square = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]
+        >>> grid = coneflat.integer_grid(*square, quads=16)
+        >>> round(grid.size, 6)  # sides of the squares, in model units
+        0.25
+        >>> grid.corners, grid.corner_quarters
+        (array([0, 1, 2, 3]), array([1, 1, 1, 1]))
+    """
+    quad_options = {"quads": quads, "size": size, "stretch": stretch, "sharp_angle": sharp_angle}
+    request = GridRequest.of(mesh, faces, quad_options, options)
+    request.stages.done = 0.0
+    outcome = find_grid(request)
+    if isinstance(outcome, NoGrid):
+        raise outcome.error
+    return replace(outcome.grid, seconds=dict(request.stages.seconds))
+
+
+def _require_sound(quad_mesh: QuadMesh, limit: SquareLimit) -> None:
     """Raise GridError for more quads than a limit, or coordinates that are not finite."""
-    if text := limit.excess(len(found.quads)):
+    if text := limit.excess(len(quad_mesh.quads)):
         raise GridError(text)
-    if bad := int((~np.isfinite(found.vertices).all(axis=1)).sum()):
+    if bad := int((~np.isfinite(quad_mesh.vertices).all(axis=1)).sum()):
         raise GridError(f"{plural(bad, 'vertex', 'vertices')} of quads without a place: use fewer quads")
 
 
-def _notes(found: QuadMesh, small: SimplerMesh | None) -> Iterator[str]:
-    """Yield a note for each problem of a quad mesh."""
-    if found.left_out:
-        share = 100 * found.area_left_out / (found.area_left_out + len(found.quads))
+def _notes(quad_mesh: QuadMesh, fills_holes: bool) -> Iterator[str]:
+    """Yield a note for each problem of a quad mesh; `fills_holes` if it may cover filled holes."""
+    if quad_mesh.left_out:
+        share = 100 * quad_mesh.area_left_out / (quad_mesh.area_left_out + len(quad_mesh.quads))
         yield (
-            f"Left out {plural(found.left_out, 'square')} that the boundary cuts, {share:.1f} % of the area of the "
+            f"Left out {plural(quad_mesh.left_out, 'square')} that the boundary cuts, {share:.1f} % of the area of the "
             "grid."
         )
-    covered = found.euler_characteristic - found.surface_euler
-    if covered > 0 and small is not None and small.is_filling.any():
+    covered = quad_mesh.euler_characteristic - quad_mesh.surface_euler
+    if covered > 0 and fills_holes:
         yield f"Quads cover {plural(covered, 'hole')}."
     elif covered:
         yield (
-            f"The Euler characteristic of the quads is {found.euler_characteristic}, that of the "
-            f"surface {found.surface_euler}: leaving out squares has opened or split the mesh."
+            f"The Euler characteristic of the quads is {quad_mesh.euler_characteristic}, that of the "
+            f"surface {quad_mesh.surface_euler}: leaving out squares has opened or split the mesh."
         )
-    # An angle of 180 degrees is known up to rounding.
-    flipped = int((least_jacobians(found.vertices, found.quads) <= 1e-9).sum())
+    flipped = int((least_jacobians(quad_mesh.vertices, quad_mesh.quads) <= MIN_SOUND_JACOBIAN).sum())
     if flipped:
         yield f"{plural(flipped, 'quad')} with an angle of 180 degrees or more: use more quads."

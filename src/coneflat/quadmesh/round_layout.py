@@ -1,183 +1,230 @@
-"""The integer grid near a smooth layout: seams and cones are rounded to the lattice, and the rest is relaxed."""
+"""The integer grid near a smooth layout: its seams, cones and lines are rounded to the lattice, the rest is relaxed.
+
+If there is no grid with all sharp edges or sides on grid lines, some are left out; if there is none of the requested
+size, there are more squares.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import count
 
 import numpy as np
 
-from ..base import ComplexArray, IntArray, Unmet, mask_of
-from ..errors import ConvergenceError, GridError, OptionError
-from ..geometry import as_complex, as_pairs, double_areas
-from ..optimise import Lines, PointConstraints, Relaxed, StretchEnergy, relax
-from .integer_map import IntegerGrid, grid_of_corners
-from .layout import GridLayout, split_edges
-from .rounding import Rounding
-from .transitions import Transitions
+from ..base import FloatArray, IntArray, Unmet, plural
+from ..errors import GridError
+from .cross_field import sharp_ends
+from .features import edge_indices, lengths_along, sharp_edges
+from .grid_layout import GridLayout, with_sides
+from .integer_map import IntegerGrid, with_note
+from .lines import LinedLayout, deviations, long_chains, with_lines
+from .no_grid import NoGrid
+from .relaxing import GridGoal, relaxed_grid
+from .rounding import Rounding, find_rounding
+from .splitting import split_between_nodes
 
 # Relative deviation from the requested number of squares above which a note is added.
 NOTED_SHARE = 0.1
-# Largest fraction of the distance to the constraints per step of relaxing from the smooth layout.
-LINE_STRIDE = 0.1
+# How often the size is corrected for the number of squares.
+MAX_CORRECTIONS = 4
+# How often the number of squares is doubled to find a grid: with cones that may be replaced by others, and otherwise.
+DOUBLINGS_BEFORE_OTHER_CONES, MAX_DOUBLINGS = 1, 4
+# Preferred edges are put on a line if their direction differs from an axis by less, radians.
+MAX_TURN = np.deg2rad(20.0)
+# Largest cost of a preferred chain: the energy of the triangles near it, over its length and the root of the area.
+MAX_COST = 5e-4
+# Attempts to find a grid with preferred edges on lines, and attempts of `SEPARATIONS` in each: one cone at a time takes
+# long.
+LINE_ATTEMPTS, LINE_SEPARATIONS = 6, 2
+# Largest number of squares of a grid with lines, relative to that of the layout.
+MAX_GROWTH = 2.0
 
 
-def split_between_nodes(layout: GridLayout, lines: IntArray | None = None) -> GridLayout:
-    """Return a layout with the edges between vertices on grid points split.
+@dataclass(frozen=True, eq=False)
+class RoundingRules:
+    """What lies on grid lines, and what the grid is like.
 
-    Otherwise triangles may have grid points at all corners, which degenerate if they are collinear. Vertices of edges
-    (k,) that may get on grid lines may become such points.
+    Attributes:
+        goal: what the grid minimises, and its largest number of squares.
+        has_sides: the boundary consists of straight sides.
+        requires_sides: all these sides must be on grid lines.
+        sharp_angle: dihedral angle above which edges are sharp, radians; None ignores sharp edges.
+        requires_lines: put as many sharp edges as possible on grid lines; else only those that deform the grid little.
+        doublings: how often the number of squares is doubled to find a grid.
     """
-    mesh = layout.mesh
-    is_node = mask_of(len(mesh.vertices), layout.nodes)
-    may_be = is_node if lines is None else is_node | mask_of(len(is_node), mesh.edges[lines])
-    tails, heads = mesh.edges.T
-    is_split = (is_node[tails] & may_be[heads]) | (may_be[tails] & is_node[heads])
-    return split_edges(layout, is_split) if is_split.any() else layout
+
+    goal: GridGoal
+    has_sides: bool = False
+    requires_sides: bool = False
+    sharp_angle: float | None = None
+    requires_lines: bool = False
+    doublings: int = MAX_DOUBLINGS
 
 
-def grid_about(rounding: Rounding, energy: StretchEnergy, most: int) -> IntegerGrid:
+def rounded_grid(layout: GridLayout, rules: RoundingRules) -> IntegerGrid | NoGrid:
+    """Return the integer grid near a smooth layout, or the reason why there is none.
+
+    Raises:
+        SeamError: the sides of a seam are not congruent.
+        GridError: the sides of a seam are not related by quarter turns, or the equations between them overflow.
+
+    Notes:
+        The integers are the translations t of seams, z_right = i^q z_left + t, and the positions of cones. The nearest
+        ones, in the least Dirichlet energy of the displacement that they need, are searched in the lattice of the
+        solutions of the equations around vertices. The layout is then relaxed to them.
+
+    See Also:
+        find_rounding: the lattice and its metric.
+        relaxed_grid: the grid with given integers.
+    """
+    sided = with_sides(layout) if rules.has_sides else layout
+    grid: IntegerGrid | NoGrid | None = None
+    note = ""
+    if rules.sharp_angle is not None:
+        lines = edge_indices(sided.mesh, sharp_ends(sided.mesh, rules.sharp_angle))
+        grid, note = _grid_with_lines(
+            split_between_nodes(sided, lines), rules.sharp_angle, rules.requires_lines, rules.goal
+        )
+    if grid is None:
+        grid = _grid_with_sides(layout, sided, rules)
+    return with_note(grid, note) if isinstance(grid, IntegerGrid) else grid
+
+
+def _grid_with_sides(layout: GridLayout, sided: GridLayout, rules: RoundingRules) -> IntegerGrid | NoGrid:
+    """Return a grid with the sides of a layout on grid lines, or without some if these are not required."""
+    are_required = rules.requires_sides or len(sided.sides.points) == len(layout.sides.points)
+    try:
+        grid = grid_about(find_rounding(split_between_nodes(sided)), rules.goal, rules.doublings)
+    except GridError:
+        if are_required:
+            raise
+    else:
+        if are_required or isinstance(grid, IntegerGrid):
+            return grid
+    note = Unmet(
+        "Straight sides of different loops are not parallel up to quarter turns, so not all on grid lines."
+    )
+    grid = grid_about(find_rounding(split_between_nodes(layout)), rules.goal, rules.doublings)
+    return with_note(grid, note) if isinstance(grid, IntegerGrid) else grid
+
+
+def grid_about(rounding: Rounding, goal: GridGoal, doublings: int) -> IntegerGrid | NoGrid:
     """Return the grid of a smooth layout in which no edge between cones needs to be split.
 
     If rounding changes the number of squares much, the size is corrected. If there is no grid of this size, a finer one
-    is returned; `most` is how often the number of squares is doubled.
-
-    Raises:
-        GridError: no grid was found.
+    is returned; `doublings` is how often the number of squares is doubled.
     """
-    wanted, found, why = rounding.layout.area, None, ""
-    for finer in (2.0**k for k in range(most + 1)):
-        found, why = _grid_near(rounding.scaled(finer), energy)
-        if found is not None:
-            break
-    if found is None:
-        more = f", or of up to {2**most} times as many," if most else ""
-        raise GridError(f"no grid of about {wanted:,.0f} quads{more} was found: {why}")
-    factor, last = 1.0, found.squares
-    for _ in range(4):
-        if finer > 1 or abs(found.squares - wanted) <= NOTED_SHARE * wanted:
+    requested, reason = rounding.layout.area, ""
+    for doubling in range(doublings + 1):
+        grid = _nearest_grid(rounding.scaled(2.0**doubling), goal)
+        if isinstance(grid, IntegerGrid):
+            return _with_note_on_size(_corrected(rounding, grid, goal) if doubling == 0 else grid, requested)
+        reason = grid.reason
+    finer = f", or of up to {2**doublings} times as many," if doublings else ""
+    return NoGrid(GridError(f"no grid of about {requested:,.0f} quads{finer} was found: {reason}"))
+
+
+def _with_note_on_size(grid: IntegerGrid, requested: float) -> IntegerGrid:
+    """Return a grid with a note if its number of squares is not about the requested one."""
+    if abs(grid.squares - requested) <= NOTED_SHARE * requested:
+        return grid
+    return with_note(
+        grid, Unmet(f"The grid has an area of {grid.squares:,.0f} squares, not {requested:,.0f}.")
+    )
+
+
+def _corrected(rounding: Rounding, grid: IntegerGrid, goal: GridGoal) -> IntegerGrid:
+    """Return a grid whose number of squares is nearer to that of the layout, if there is one of a similar size."""
+    requested = rounding.layout.area
+    factor, last = 1.0, grid.squares
+    for _ in range(MAX_CORRECTIONS):
+        if abs(grid.squares - requested) <= NOTED_SHARE * requested:
             break
         # Later corrections are halved, because the number of squares changes by entire rows.
-        factor *= (wanted / last) if factor == 1.0 else math.sqrt(wanted / last)
-        other, _ = _grid_near(rounding.scaled(factor), energy)
-        if other is None:
+        factor *= (requested / last) if factor == 1.0 else math.sqrt(requested / last)
+        resized = _nearest_grid(rounding.scaled(factor), goal)
+        if isinstance(resized, NoGrid):
             break
-        last = other.squares
-        if abs(np.log(last / wanted)) < abs(np.log(found.squares / wanted)):
-            found = replace(other, size=rounding.layout.size)
-    if abs(found.squares - wanted) > NOTED_SHARE * wanted:
-        note = Unmet(f"The grid has an area of {found.squares:,.0f} squares, not {wanted:,.0f}.")
-        found = with_note(found, note)
-    return found
+        last = resized.squares
+        if abs(np.log(last / requested)) < abs(np.log(grid.squares / requested)):
+            grid = replace(resized, size=rounding.layout.size)
+    return grid
 
 
-def with_note(grid: IntegerGrid, note: str) -> IntegerGrid:
-    """Return a grid with one more note, unless it has this one, or the note is empty."""
-    return grid if note in ("", *grid.notes) else replace(grid, notes=(*grid.notes, note))
+def _nearest_grid(rounding: Rounding, goal: GridGoal) -> IntegerGrid | NoGrid:
+    """Return the grid with the nearest integers."""
+    values = rounding.nearest()
+    if values is None:
+        return NoGrid(GridError("near cones cannot be separated: use more quads"))
+    return relaxed_grid(rounding.layout, rounding.transitions, values, rounding.displaced(values), goal)
 
 
-def _grid_near(rounding: Rounding, energy: StretchEnergy) -> tuple[IntegerGrid | None, str]:
-    """Return a grid for the nearest lattice point, or None and the reason why there is none.
+def _grid_with_lines(
+    layout: GridLayout, angle: float, is_required: bool, goal: GridGoal
+) -> tuple[IntegerGrid | None, str]:
+    """Return a grid with sharp edges on grid lines, or None if none are, and a note on those that are not, or "".
 
-    Relaxing starts from the displacement of least energy to the lattice point. If this makes a triangle too small, or
-    does not succeed, it starts from the smooth layout itself, at last with smaller steps.
-    """
-    layout, transitions = rounding.layout, rounding.transitions
-    try:
-        values = rounding.nearest()
-    except GridError as error:
-        return None, str(error)
-    moved = rounding.displaced(values)
-    has_area = replace(layout, points=moved).double_areas() > 0.01 * layout.double_areas()
-    for stride in (1.0,) * bool(has_area.all()) + (LINE_STRIDE, LINE_STRIDE / 3):
-        try:
-            start = moved if stride == 1 else layout.points
-            found = _relaxed(rounding, values, start, energy, stride)
-        except (ConvergenceError, OptionError) as error:
-            why = str(error)
-            if start is moved:
-                continue
-            break
-        points = _snapped(found, transitions, values)
-        if why := layout.limit.excess(replace(layout, points=points).area):
-            break
-        if _folds_sides(layout, transitions, points):
-            why = "sides of triangles on grid lines change their direction"
-        elif (replace(layout, points=points).double_areas() > 0).all():
-            mesh, places, corners = layout.mesh, as_pairs(points)[layout.corners], layout.sides.corners
-            return grid_of_corners(
-                mesh.vertices, mesh.faces, places, layout.cones, corners, size=layout.size
-            ), ""
-        else:
-            why = "rounding flipped a very small triangle"
-    return None, why
-
-
-def _folds_sides(layout: GridLayout, transitions: Transitions, points: ComplexArray) -> bool:
-    """Return whether an edge on a side turns by more than a right angle if points move, which flips no triangle."""
-    on = mask_of(len(points), layout.sides.points)
-    sides = np.concatenate([layout.border, transitions.chains.halfedges.ravel()])
-    starts, ends = (points_of[sides] for points_of in layout.ends)
-    turned = (points[ends] - points[starts]) * np.conj(layout.points[ends] - layout.points[starts])
-    return bool((turned.real <= 0)[on[starts] & on[ends]].any())
-
-
-def _relaxed(
-    rounding: Rounding, values: IntArray, start: ComplexArray, energy: StretchEnergy, stride: float
-) -> Relaxed:
-    """Return the relaxed layout with integer translations of seams and cones on grid points.
+    Chains that deform the grid most for their length are left out until there is a grid.
 
     Args:
-        rounding: the smooth layout.
-        values: (v,) the integers.
-        start: (u,) the points from which relaxing starts.
-        energy: what it minimises.
-        stride: largest fraction of the distance to the constraints per step.
-
-    Raises:
-        ConvergenceError: these constraints were not reached without flipping a triangle.
+        layout: a layout in which no edge joins two vertices on grid points.
+        angle: dihedral angle above which edges are sharp, radians.
+        is_required: put as many edges as possible on lines; else only those that deform the grid little.
+        goal: what the grid minimises.
     """
-    layout, transitions = rounding.layout, rounding.transitions
-    chains, count = transitions.chains, 2 * len(transitions.quarters)
-    places = transitions.places(start, values.astype(np.float64))
-    pinned = np.flatnonzero(transitions.fixed.all(axis=1))
-    _, edge_of_chain = np.unique(chains.chain, return_index=True)
-    # The signed offset of a line is measured to the left of its direction, so that of a vertical line is -x.
-    sides, lines = layout.sides, None
-    if len(sides.axis):
-        loose = ~np.isin(sides.points, pinned)
-        offsets = np.where(sides.axis == 0, -1.0, 1.0) * values[len(values) - len(sides.axis) :]
-        lines = Lines(sides.points[loose], sides.side[loose], sides.directions, offsets)
-    constraints = PointConstraints(
-        pinned=pinned,
-        places=as_pairs(places[pinned]),
-        lines=lines,
-        tied=chains.halfedges[edge_of_chain, 1],
-        translations=values[:count].reshape(-1, 2),
-        stride=stride,
-    )
-    # A thousand times the energy of an isometry occurs if cones merge. Of 60 cases of benchmarks/grids.py the slowest
-    # takes 1.7 times as long without this limit.
-    area = float(double_areas(layout.lengths).sum()) / 2
-    energy_limit = 1e3 * float(energy.values(np.ones(1), np.ones(1))[0]) * area
-    return relax(
-        layout.mesh,
-        as_pairs(start),
-        layout.corners,
-        energy,
-        constraints,
-        lengths=layout.lengths,
-        steps=200,
-        progress=lambda _, total: total > energy_limit,
-    )
+    mesh, off = layout.mesh, deviations(layout)
+    sharp = sharp_edges(mesh, angle) if is_required else edge_indices(mesh, sharp_ends(mesh, angle))
+    edges = long_chains(layout, sharp if is_required else sharp[np.abs(off[sharp]) < MAX_TURN])
+    grid, reason = None, "too short for quads of this size"
+    for attempt in count() if is_required else range(LINE_ATTEMPTS):
+        lined = with_lines(layout, edges, off)
+        if not len(lined.edges):
+            break
+        separations = None if is_required else LINE_SEPARATIONS
+        rounding = replace(find_rounding(lined.layout), attempts=separations)
+        costs, is_folded = lined.costs(layout, rounding.displaced(rounding.basis @ rounding.start))
+        max_cost = np.inf if is_required else MAX_COST * np.sqrt(layout.area)
+        is_costly = costs.max() > max_cost
+        if not is_costly and (not is_folded or (is_required and attempt == 0)):
+            nearest = grid_about(rounding, goal, 0)
+            if isinstance(nearest, NoGrid):
+                reason = nearest.reason
+            elif nearest.squares > MAX_GROWTH * layout.area:
+                reason = f"squares would be {nearest.squares:,.0f}, not {layout.area:,.0f}"
+            else:
+                grid = replace(nearest, features=mesh.edges[lined.edges])
+                break
+        edges = _cheaper_chains(layout, lined, costs, max_cost, attempt)
+    off_lines = np.setdiff1d(sharp, lined.edges) if grid else sharp
+    return grid, _note_on_lines(layout, sharp, off_lines, reason) if is_required else ""
 
 
-def _snapped(relaxed: Relaxed, transitions: Transitions, values: IntArray) -> ComplexArray:
-    """Return the points rounded so that motions across seams are exact, and cones are exactly on grid points.
+def _cheaper_chains(
+    layout: GridLayout, lined: LinedLayout, costs: FloatArray, max_cost: float, attempt: int
+) -> IntArray:
+    """Return the edges of the chains that remain after an attempt: each leaves out the costliest ones.
 
-    Coordinates become multiples of a power of two for which sums with integers are exact.
+    Of preferred edges these are half of the chains, or those above a bound that decreases so that the attempts end; of
+    required ones fewer.
     """
-    largest = float(np.abs(relaxed.points).max(initial=1.0)) + float(np.abs(values).max(initial=0))
-    bits = min(40, 50 - int(np.ceil(np.log2(largest))))
-    rounded = np.ldexp(np.rint(np.ldexp(relaxed.points, bits)), -bits)
-    return transitions.places(as_complex(rounded), values.astype(np.float64))
+    if costs.max() > max_cost:
+        bound = 0.7**attempt * max_cost
+    elif np.isinf(max_cost):
+        bound = 0.5 ** (1 + attempt / 4) * costs.max()
+    else:
+        bound = np.median(costs)
+    return long_chains(layout, lined.edges[costs[lined.chain] < bound])
+
+
+def _note_on_lines(layout: GridLayout, sharp: IntArray, off_lines: IntArray, reason: str) -> str:
+    """Return a note on required sharp edges that are not on grid lines; "" if all are."""
+    if not len(sharp):
+        return "There are no sharp edges."
+    if not len(off_lines):
+        return ""
+    share = 100 * lengths_along(layout.mesh, off_lines).sum() / lengths_along(layout.mesh, sharp).sum()
+    return Unmet(
+        f"{plural(len(off_lines), 'sharp edge')} of {len(sharp):,}, {share:.1f} % of their length, not on grid lines: "
+        f"{reason}."
+    )

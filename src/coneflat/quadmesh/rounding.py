@@ -11,14 +11,12 @@ from scipy.sparse import bmat, coo_matrix, csc_matrix, csr_matrix, diags, kron, 
 from scipy.sparse.csgraph import dijkstra
 
 from ..base import BoolArray, ComplexArray, FloatArray, IntArray, mask_of
-from ..errors import GridError
-from ..geometry import as_complex, as_pairs, cotangent_laplacian, cotangents
+from ..geometry import TURNS, UNITS, as_complex, as_pairs, complex_sums, cotangent_laplacian, cotangents
 from ..linalg import factorize
-from .cross_field import complex_sums
 from .features import edge_indices
+from .grid_layout import GridLayout
 from .lattice import Lattice, ReducedLattice, integer_solutions
-from .layout import GridLayout
-from .transitions import TURNS, UNITS, Transitions, find_transitions
+from .transitions import Transitions, find_transitions
 
 
 class Stiffness:
@@ -148,18 +146,17 @@ class Rounding:
         """Pairs of cones that must not merge."""
         return _near_pairs(self.layout, self.transitions, self.basis, self.start)
 
-    def nearest(self) -> IntArray:
+    def nearest(self) -> IntArray | None:
         """Return integer values (v,) of the variables nearest to the smooth ones that merge no two cones.
 
-        Raises:
-            GridError: cones cannot be separated.
+        None if cones cannot be separated.
         """
         units = np.eye(len(self.start), dtype=np.int64)
         lattice = Lattice(np.zeros_like(self.start, dtype=np.int64), units, self.metric).reduced()
         for attempt in SEPARATIONS[: self.attempts]:
             if (coordinates := self._separated(lattice, *attempt)) is not None:
                 return np.asarray(self.basis @ coordinates)
-        raise GridError("near cones cannot be separated: use more quads")
+        return None
 
     def displaced(self, values: FloatArray | IntArray) -> ComplexArray:
         """Return (u,) the points moved by the displacement of least energy to some values (v,)."""

@@ -9,29 +9,16 @@ from __future__ import annotations
 
 from collections import defaultdict, deque
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
 from ..base import BoolArray, ComplexArray, FloatArray, IntArray, mask_of
 from ..errors import GridError
-from ..geometry import as_pairs
+from ..geometry import TURNS, UNITS, as_pairs, complex_sums
 from ..optimise import SeamChains
-from .cross_field import complex_sums
-from .layout import GridLayout, charts_of, first_points, joining_chains
+from .grid_layout import GridLayout, charts_of, first_points, joining_chains
 from .options import GRID_TOLERANCE
-
-Vectors = TypeVar("Vectors", FloatArray, IntArray)
-
-UNITS = np.array([1, 1j, -1, -1j])
-# The same rotations, counterclockwise quarter turns, as integer matrices.
-TURNS = np.array([[[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[0, 1], [-1, 0]]])
-
-
-def rotated(turns: IntArray, vectors: Vectors) -> Vectors:
-    """Return (k, 2) vectors rotated counterclockwise by quarter turns (k,), without rounding."""
-    return np.einsum("kxy,ky->kx", TURNS[turns], vectors)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from scipy.sparse import csc_matrix
@@ -15,11 +16,14 @@ from ..geometry.delaunay import intrinsic_delaunay
 from ..geometry.intrinsic import IntrinsicTriangulation
 from ..geometry.operators import vertex_areas
 from ..mesh.connectivity import TriangleMesh
+from .outputs import ConeSolution
 
 # A mesh counts as stretched if its Delaunay triangulation needs more than STRETCHED_FLIPS flips per edge: scans need
 # less than 0.2, models stretched thirty to one 1.0 to 1.5, noise alone up to 0.85. Flips are tried only if more than
 # MIN_SHARE_TO_FLIP of the edges are not Delaunay.
 STRETCHED_FLIPS, MIN_SHARE_TO_FLIP = 0.95, 0.15
+
+SurfaceT = TypeVar("SurfaceT", bound="Surface")
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +71,8 @@ class ConeSpec:
         searches_corners: corners of a straight boundary are searched with the cones.
         scale_at_cones: phi = 0 is prescribed at the cones instead of their curvature.
         names: (n,) the index of each vertex in the user's input.
+        rotations: returns (2 genus,) the rotations of loops along the handles in the metric of a solution, radians;
+            quantised cones are moved to align them. None: they are not moved.
     """
 
     strategy: str
@@ -87,6 +93,7 @@ class ConeSpec:
     searches_corners: bool
     scale_at_cones: bool
     names: IntArray
+    rotations: Callable[[ConeSolution], FloatArray] | None = None
 
     def without(self, vertices: IntArray) -> ConeSpec:
         """Return a specification that forbids cones at further vertices."""
@@ -183,7 +190,6 @@ class Surface:
         areas: (n,) vertex areas.
         widest: (n,) largest corner angle at each vertex, divided by the angle sum there.
         is_reused: the surface is cached, and further searches for cones will follow.
-        memo: values cached by stages; a value is read only by the stage that stored it.
         known_delaunay: the intrinsic Delaunay triangulation, or None before it is computed.
     """
 
@@ -194,11 +200,10 @@ class Surface:
     areas: FloatArray
     widest: FloatArray
     is_reused: bool = False
-    memo: dict[str, Any] = field(default_factory=dict)
     known_delaunay: tuple[IntrinsicTriangulation, IntArray] | None = None
 
     @classmethod
-    def of(cls, mesh: TriangleMesh, lengths: FloatArray, flips: bool = True) -> Surface:
+    def of(cls: type[SurfaceT], mesh: TriangleMesh, lengths: FloatArray, flips: bool = True) -> SurfaceT:
         """Return a mesh with the operators of its lengths.
 
         On stretched meshes many cotangent weights are negative. Laplacian and areas are then those of the intrinsic

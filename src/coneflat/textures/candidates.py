@@ -8,12 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from ..base import BoolArray, FloatArray, mask_of
+from ..cones import ConeSurface
 from ..flattening import Steps, lay_out_component
 from ..geometry import find_overlaps
 from ..mesh import nearby
 from ..seams import seam_costs
 from ..source import Component
-from ..stages import ConeSpec, Layout, Surface
+from ..stages import ConeSpec, Layout
 from .energy import EnergyBound
 from .free_seams import freed, seam_edges, separate_charts, side_by_side
 from .tips import RINGS
@@ -65,9 +66,9 @@ class CutModel:
     steps: Steps
 
     @cached_property
-    def surface(self) -> Surface:
+    def surface(self) -> ConeSurface:
         """The component with its operators, which searches for cones share."""
-        surface = Surface.of(self.component.mesh, self.component.lengths, self.component.is_exact)
+        surface = ConeSurface.of(self.component.mesh, self.component.lengths, self.component.is_exact)
         surface.is_reused = True
         return surface
 

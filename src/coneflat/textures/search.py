@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..base import mask_of
-from ..cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, close_search, with_corners
+from ..cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, with_corners
 from ..seams import without_loose_ends
 from ..source import Component
 from ..stages import VertexCurvatures
@@ -54,7 +54,7 @@ def best_cut(model: CutModel) -> Candidate:
     if not model.is_within(candidate):
         # The bound is too low, or the surface too noisy, for the cones of a coarse mesh.
         return _best_of_searched(model, [replace(candidate, is_from_coarse=False)])
-    close_search(model.surface)
+    model.surface.close_search()
     return replace(model.separated(candidate), is_from_coarse=True)
 
 
@@ -67,7 +67,7 @@ def _with_fewest_seams(model: CutModel) -> Candidate:
     """Return a candidate cut between the fewest cones, and only along closed curves where there are handles."""
     mesh = model.component.mesh
     layout = model.laid_out(replace(model.component.cones, distortion=ANY_DISTORTION))
-    close_search(model.surface)
+    model.surface.close_search()
     if len(layout.cones) and mesh.euler_characteristic < 2 and not mesh.is_boundary_edge.any():
         is_cut = mask_of(len(mesh.edges), seam_edges(layout))
         layout = replace(layout, points=0 * layout.points, cones=np.empty(0, dtype=np.int64))
@@ -105,7 +105,7 @@ def _best_of_searched(model: CutModel, earlier: Sequence[Candidate] = ()) -> Can
     promising.sort(key=model.expected_cost)
     if promising and not model.is_within(promising[0]):
         promising.append(shortened(model, promising[0]))
-    close_search(model.surface)
+    model.surface.close_search()
     within = [candidate for candidate in promising if model.is_within(candidate)]
     lowest = min([*promising, *candidates], key=lambda candidate: candidate.energy)
     return model.separated(min(within, key=model.expected_cost, default=lowest))

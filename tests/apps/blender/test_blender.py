@@ -94,7 +94,7 @@ def test_the_extension_imports_only_what_blender_has(archive):
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_every_option_of_a_command_is_shown_or_hidden_for_a_reason(name, extension):
-    records = extension.environment.KNOWN["commands"][name]
+    records = extension.environment.OPTIONS_FILE["commands"][name]
     shown = [record["name"] for record in records]
     hidden = {option.removeprefix(f"{name} ") for names in HIDDEN.values() for option in names}
     params = {option.name for option in cli.commands[name].params}
@@ -110,7 +110,7 @@ def test_no_option_is_hidden_that_no_command_has():
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_the_groups_are_those_of_the_command(name, extension):
-    records = extension.environment.KNOWN["commands"][name]
+    records = extension.environment.OPTIONS_FILE["commands"][name]
     groups = {option.name: getattr(option, "group", "") for option in cli.commands[name].params}
     assert all(groups[record["name"]].startswith(record["group"]) for record in records)
     order = [title for title, _ in itertools.groupby(record["group"] for record in records)]
@@ -119,7 +119,7 @@ def test_the_groups_are_those_of_the_command(name, extension):
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_every_option_becomes_a_flag(name, extension):
-    records = extension.environment.KNOWN["commands"][name]
+    records = extension.environment.OPTIONS_FILE["commands"][name]
     flags = {flag for option in cli.commands[name].params for flag in option.opts}
     defaults = {record["name"]: record["default"] for record in records}
     assert extension.exchange.arguments(records, defaults) == []
@@ -136,7 +136,9 @@ def test_every_option_becomes_a_flag(name, extension):
 )
 def test_a_size_is_a_number_a_word_or_a_vertex_group(value, argument, extension):
     (record,) = (
-        option for option in extension.environment.KNOWN["commands"]["quads"] if option["name"] == "size"
+        option
+        for option in extension.environment.OPTIONS_FILE["commands"]["quads"]
+        if option["name"] == "size"
     )
     arguments = extension.exchange.arguments([record], {"size": value})
     assert arguments == ([] if argument is None else [f"--size={argument}"])
@@ -144,7 +146,7 @@ def test_a_size_is_a_number_a_word_or_a_vertex_group(value, argument, extension)
 
 
 def test_numbers_of_single_precision_are_written_as_they_were_typed(extension):
-    records = extension.environment.KNOWN["commands"]["flatten"]
+    records = extension.environment.OPTIONS_FILE["commands"]["flatten"]
     values = {record["name"]: record["default"] for record in records}
     values |= {"distortion": float(np.float32(0.1)), "quantise": float(np.float32(np.pi / 2)), "up": "-x"}
     arguments = extension.exchange.arguments(records, values)

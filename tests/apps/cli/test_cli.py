@@ -21,7 +21,6 @@ from command import command as run
 import coneflat
 from coneflat import errors, flatten, read_mesh
 from coneflat.apps.cli.main import main
-from coneflat.options.texts import parse_curvature
 
 #: A line of progress, which comes by the clock.
 PROGRESS = re.compile(r" *\d+\.\d s +\d+%  .*")
@@ -75,7 +74,7 @@ def test_paper_is_the_published_method(model, tmp_path):
         (["model.obj", "-o", "x.fbx"], "'.fbx'"),
         (["model.obj", "-o", "missing/x.obj"], "missing"),
         (["model.obj", "--report", "missing/x.json"], "missing"),
-        (["model.obj", "--texture", "checker"], "only .glb files carry a texture"),
+        (["model.obj", "--texture", "checker"], "only .glb files contain a texture"),
         (["model.obj", "-o", "x.glb", "--texture", "none.png"], "none.png: there is no such file"),
         (["."], "coneflat batch"),
         (["model.obj", "-o", "x.glb", "--texture", "text.ply"], "text.ply is not a readable image"),
@@ -129,21 +128,6 @@ def test_cones_from_a_file(model, tmp_path):
         done = flatten(text)
         assert done.returncode == 2
         assert message in done.stderr
-
-
-@pytest.mark.parametrize(
-    ("text", "value"),
-    [("1.5", 1.5), ("pi", np.pi), ("-pi/2", -np.pi / 2), ("0.5pi", np.pi / 2), ("3pi/2", 1.5 * np.pi),
-     ("90deg", np.pi / 2), ("1e-1", 0.1), ("π", np.pi), ("-.25 pi", -np.pi / 4), ("2 * pi", 2 * np.pi)],
-)  # fmt: skip
-def test_forms_of_curvatures(text, value):
-    assert parse_curvature(text, "here") == pytest.approx(value)
-
-
-@pytest.mark.parametrize("text", ["", "x", "pi/0", "1..2", "pipi", "-", "deg", "nan", "1 2"])
-def test_invalid_curvatures_are_refused(text):
-    with pytest.raises(errors.OptionError, match="here"):
-        parse_curvature(text, "here")
 
 
 @pytest.mark.skipif(os.name == "nt", reason="sh closes the streams")

@@ -30,7 +30,7 @@ ASKED = (
     ("POST", "/export/obj"),
     ("POST", "/mesh"),
 )
-MOST = 200_000
+MAX_UPLOAD = 200_000
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def session(tmp_path):
 
 @pytest.fixture
 def stranger(session, monkeypatch):
-    monkeypatch.setattr("coneflat.apps.studio.server.MAX_UPLOAD_BYTES", MOST)
+    monkeypatch.setattr("coneflat.apps.studio.server.MAX_UPLOAD_BYTES", MAX_UPLOAD)
     return TestClient(studio_app(session, TOKEN, PORT), base_url=BASE)
 
 
@@ -145,9 +145,9 @@ class TestPage:
 
 class TestUploads:
     def test_too_large_a_mesh_is_refused_and_leaves_nothing(self, page, tmp_path):
-        answer = page.post("/mesh?name=big.obj", content=b"#" * (MOST + 1))
+        answer = page.post("/mesh?name=big.obj", content=b"#" * (MAX_UPLOAD + 1))
         assert answer.status_code == 413
-        assert f"{MOST:,}" in answer.text
+        assert f"{MAX_UPLOAD:,}" in answer.text
         assert list(tmp_path.iterdir()) == []
 
     def test_its_size_is_counted_whatever_is_said(self, page, tmp_path):

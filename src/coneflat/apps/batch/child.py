@@ -10,14 +10,13 @@ import time
 from typing import IO, Any
 
 from ...base import inner_calls
-from .jobs import COLUMNS
 
 
 def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
     """Flatten a mesh file, write the result, and return its row of the summary; errors give a row, too."""
     from ... import ConeflatError, flatten, unwrap
     from ...io import read_joined, write_measured
-    from ...measures import REPORTED, breaches, parse_requirements
+    from ...measures import REPORTED, SUMMARY_MEASURES, breaches, parse_requirements
 
     start = time.perf_counter()
     row: dict[str, Any] = {"mesh": job["mesh"], "output": job["output"]}
@@ -30,7 +29,7 @@ def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
         row |= {
             "status": "failed" if unmet else "done",
             "error": f"requirement failed: {'; '.join(unmet)}" if unmet else "",
-        } | {name: report[name] for name in COLUMNS}
+        } | {name: report[name] for name in SUMMARY_MEASURES}
         row["notes"] = " ".join(source.all_notes(report["notes"]))
     except ConeflatError as error:
         row |= {"status": "failed", "error": str(error)}

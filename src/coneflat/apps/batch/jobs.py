@@ -14,12 +14,6 @@ from typing import Any
 from ...errors import OptionError
 from ...io import find_meshes
 
-# Keys of the report that the summary contains.
-COLUMNS = (
-    "vertices", "triangles", "cones", "curvature_error_max", "qc_mean", "qc_max", "area_std", "area_distortion",
-    "flipped", "charts", "seam_length", "seam_mismatch_max", "rotation_deviation", "uv_scale",
-)  # fmt: skip
-
 
 @dataclass(frozen=True)
 class Job:

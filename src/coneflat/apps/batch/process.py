@@ -100,7 +100,7 @@ class Child:
             process.stdin.flush()
             answer = _answer(process, limit)
             while "message" in answer:
-                # The compilation of a kernel begins, which happens once for all meshes: the time starts anew.
+                # The compilation of a kernel begins, which happens once for all meshes: the time starts again.
                 start = time.perf_counter()
                 log_once(answer["level"], answer["message"])
                 answer = _answer(process, limit)

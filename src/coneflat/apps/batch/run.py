@@ -14,7 +14,8 @@ from typing import Any
 from ...base import plural, printable
 from ...errors import MeshFileError, OptionError
 from ...io import atomic_write, check_target, checked_target, make_folder
-from .jobs import COLUMNS, Job
+from ...measures import SUMMARY_MEASURES
+from .jobs import Job
 
 #: Function that is called with the row of each completed mesh, the number completed so far, and the total number.
 Listener = Callable[[dict[str, Any], int, int], None]
@@ -108,7 +109,7 @@ def _rows(
     return rows_of_processes(jobs, min(processes or cores, max(len(jobs), 1)), limit)
 
 
-HEADINGS = ("mesh", "status", "error", "output", "seconds", *COLUMNS, "notes")
+HEADINGS = ("mesh", "status", "error", "output", "seconds", *SUMMARY_MEASURES, "notes")
 # Keys that every row must have.
 NEEDED = ("mesh", "output", "status")
 

@@ -6,13 +6,13 @@ import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ...base import plural, printable
 from ...options import FORMATS, Options, declarations, read_options
-from ...textures.options import MAX_ENERGY, TextureOptions, UnwrapOptions
+from ...textures import MAX_ENERGY, TextureOptions, UnwrapOptions
 from .flags import (
     GroupedCommand,
     check_combinations,
@@ -27,6 +27,9 @@ from .flags import (
     require_option,
     verbosity_options,
 )
+
+if TYPE_CHECKING:
+    from ..batch import BatchSummary
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,15 +95,12 @@ def batch(
     flags = pop_flags(params, BatchFlags)
     if flags.jobs is not None and flags.dask is not None:
         raise click.UsageError("--jobs has no effect with --dask: leave out --jobs", context)
-    textures = {name: params[name] for name in declarations(TextureOptions) if params[name] is not None}
-    options = keywords(params) | ({"max_energy": MAX_ENERGY, **textures} if textures else {})
-    _refuse_vertices(context, options)
+    options = _options(context, params)
     parse_requirements(required, REPORTED)
-    # Options are checked before the work starts.
-    read_options(options, UnwrapOptions if textures else Options)
     todo = find_jobs(patterns, flags.out.absolute(), f".{flags.format}", options, weld, required)
     make_folder(flags.out)
-    rows = []
+    table = flags.summary or flags.out / "summary.csv"
+    rows: list[dict[str, Any]] = []
     with Console(verbosity) as console:
 
         def report(row: dict[str, Any], done: int, count: int) -> None:
@@ -123,16 +123,30 @@ def batch(
             summary=flags.summary,
             listener=report,
         )
-        before = f", {outcome.skipped:,} of them before" if outcome.skipped else ""
-        failed = f"; {outcome.failed:,} failed" if outcome.failed else ""
-        console.say(f"note: {note}" for note in outcome.notes)
-        console.say([f"{len(todo) - outcome.failed:,} of {len(todo):,} meshes are flattened{before}{failed}"])
+        console.say(_outcome_lines(outcome, len(todo)))
         console.say(_slowest(rows, console.elapsed))
-        console.finish([table := flags.summary or flags.out / "summary.csv"])
+        console.finish([table])
     if outcome.failed:
         sys.exit(
             f"coneflat: error: {outcome.failed:,} of {len(todo):,} meshes failed, see {printable(table)}"
         )
+
+
+def _options(context: click.Context, params: dict[str, Any]) -> dict[str, Any]:
+    """Return the options of each mesh, checked; with options for textures, those of `coneflat.unwrap`."""
+    textures = {name: params[name] for name in declarations(TextureOptions) if params[name] is not None}
+    options = keywords(params) | ({"max_energy": MAX_ENERGY, **textures} if textures else {})
+    _refuse_vertices(context, options)
+    read_options(options, UnwrapOptions if textures else Options)
+    return options
+
+
+def _outcome_lines(outcome: BatchSummary, count: int) -> Iterator[str]:
+    """Yield the notes on a batch of meshes, and how many of them are flattened."""
+    yield from (f"note: {note}" for note in outcome.notes)
+    before = f", {outcome.skipped:,} of them before" if outcome.skipped else ""
+    failed = f"; {outcome.failed:,} failed" if outcome.failed else ""
+    yield f"{count - outcome.failed:,} of {count:,} meshes are flattened{before}{failed}"
 
 
 def _lines(row: dict[str, Any], verbose: bool) -> Iterator[str]:

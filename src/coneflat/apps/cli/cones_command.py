@@ -64,7 +64,7 @@ def cones(
       coneflat cones horse.ply --curve
     """
     from ... import cone_curve, find_cones
-    from ...io import atomic_write, check_target, read_joined
+    from ...io import check_target, read_joined
     from ..view import check_figure, make_figure, new_figure, save_figure
     from .run import Console
 
@@ -101,10 +101,17 @@ def cones(
             with console.stage("draw"):
                 save_figure(make_figure(curve, "curve", distortion=distortion, title=mesh.name), picture)
         if flags.output is not None:
-            with atomic_write(flags.output, "w") as file:
-                for vertex, curvature in zip(found_cones.vertices, found_cones.curvatures, strict=True):
-                    file.write(f"{vertex} {float(curvature)!r}\n")
+            _write_cones(found_cones, flags.output)
         console.finish([path for path in (picture, flags.output) if path is not None])
+
+
+def _write_cones(cones: FoundCones, path: Path) -> None:
+    """Write a line VERTEX CURVATURE for each cone."""
+    from ...io import atomic_write
+
+    with atomic_write(path, "w") as file:
+        for vertex, curvature in zip(cones.vertices, cones.curvatures, strict=True):
+            file.write(f"{vertex} {float(curvature)!r}\n")
 
 
 def _curve_lines(curve: ConeCurve, distortion: float) -> Iterator[str]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from ...base import CHECKER_CELLS, DOTS_PER_INCH, MAX_CONES
 from .flags import (
     again_option,
     color_option,
@@ -23,6 +24,11 @@ from .flags import (
     up_option,
     verbosity_options,
 )
+
+if TYPE_CHECKING:
+    from ... import ConeCurve
+    from .run import Console
+
 
 KINDS = ("layout", "checker", "quality", "cones", "curvature", "color", "curve")
 
@@ -64,11 +70,11 @@ class FigureFlags:
     output: Path | None = path_flag()
     eye: tuple[Any, ...] = flag((), type=parse_eye, metavar="EYE", multiple=True)
     size: tuple[float, float] | None = flag(type=float, nargs=2, metavar="WIDTH HEIGHT")
-    dpi: float = flag(300.0, type=float)
+    dpi: float = flag(DOTS_PER_INCH, type=float)
     colors: str | None = flag(metavar="NAME")
-    cells: float = flag(36.0, type=float)
+    cells: float = flag(float(CHECKER_CELLS), type=float)
     color_charts: bool = flag(False, is_flag=True)
-    most: int = flag(30, type=int)
+    most: int = flag(MAX_CONES, type=int)
     title: str = flag("")
 
 
@@ -104,7 +110,6 @@ def figure(
       coneflat figure scan.ply --color quality
       coneflat flatten horse.ply -o horse.npz --distortion 0.1 && coneflat figure horse.npz --kind quality
     """
-    from ... import cone_curve
     from ..view import Look, check_figure, make_figure, new_figure, own_quantity, save_figure
     from .run import Console, archive_path, open_result
 
@@ -124,12 +129,7 @@ def figure(
     with Console(verbosity) as console:
         shown: Any
         if kind == "curve":
-            with console.stage("read", 0.0):
-                surface, notes = _surface(mesh, weld)
-            console.say(f"note: {note}" for note in notes)
-            with console.stage("cones", console.READ):
-                part = console.part()
-                shown = cone_curve(surface, most=flags.most, progress=part, **repair_keywords(repair))
+            shown = _curve(mesh, console, flags.most, weld, repair)
         else:
             shown = open_result(mesh, console, again=again, repair=repair, weld=weld)
             if color is not None:
@@ -138,6 +138,17 @@ def figure(
         with console.stage("draw"):
             save_figure(make_figure(shown, kind, **look), output)
         console.finish([output])
+
+
+def _curve(mesh: Path, console: Console, max_cones: int, weld: bool | None, repair: bool) -> ConeCurve:
+    """Return the cone curve of a mesh file or a result, up to a number of cones, and print the notes on reading it."""
+    from ... import cone_curve
+
+    with console.stage("read", 0.0):
+        surface, notes = _surface(mesh, weld)
+    console.say(f"note: {note}" for note in notes)
+    with console.stage("cones", console.READ):
+        return cone_curve(surface, most=max_cones, progress=console.part(), **repair_keywords(repair))
 
 
 def _surface(file: Path, weld: bool | None) -> tuple[Any, tuple[str, ...]]:

@@ -74,8 +74,7 @@ def measure(
 
 def rows_of_measures(measured: UVMeasures, flat: FlatMeasures | None = None) -> list[Row]:
     """Return the rows (name, value, meaning) of the table of measures of UVs, or of a flat map of a brain."""
-    from ...measures import map_rows, number_text, packing_row
-    from .run import FIRST_ROWS
+    from ...measures import FIRST_ROWS, map_rows, number_text, packing_row
 
     counts, of_map = measured.counts, map_rows(measured.distortion)
     missing = ""

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -21,6 +21,9 @@ from .flags import (
     refuse,
     verbosity_options,
 )
+
+if TYPE_CHECKING:
+    from ... import IntegerGrid, QuadMesh
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,9 +70,8 @@ def quads(
     """
     from ... import integer_grid, measure_quads
     from ... import quads as find_quads
-    from ...io import check_target, read_joined
-    from ...quadmesh.files import check_grid_output, check_quads_output, quads_left_out, read_grid
-    from ..view import check_page, page_of_quads, write_page
+    from ...io import read_joined
+    from ...quadmesh.files import quads_left_out, read_grid
     from .run import Console, require_distinct, write_report
 
     _check_combinations(context, mesh)
@@ -77,15 +79,9 @@ def quads(
     read_options(options, QuadOptions)
     if "quads" in options and isinstance(options.get("size"), float):
         raise click.UsageError("--quads (--faces) and a length as --size exclude each other: leave out one")
-    output, grid, view = flags.output, flags.grid, flags.view
-    if output is None and grid is None and view is None:
-        output = Path(f"{mesh.stem}_quads.obj")
-    # Errors that writing would raise are reported before the work starts.
-    files = {"output": output, "grid": grid, "view": view, "report": flags.report}
-    checks = (check_quads_output, check_grid_output, check_page, check_target)
-    for path, check in zip(files.values(), checks, strict=True):
-        if path is not None:
-            check(path)
+    if flags.output is None and flags.grid is None and flags.view is None:
+        flags = replace(flags, output=Path(f"{mesh.stem}_quads.obj"))
+    files = _checked_files(flags)
     require_distinct({"input": mesh, **files})
     rounds = {"smooth": options.pop("smooth")} if "smooth" in options else {}
     with Console(verbosity) as console:
@@ -94,7 +90,7 @@ def quads(
             source: Any = read_grid(mesh) if joined is None else joined.mesh
         options = {**({} if joined is None else joined.map_options(options)), "progress": console.part()}
         quad_mesh = measures = None
-        if output is None and view is None:
+        if flags.output is None and flags.view is None:
             done = grid_map = source if joined is None else integer_grid(source, **options)
         else:
             done = quad_mesh = find_quads(source, **options, **rounds)
@@ -103,14 +99,9 @@ def quads(
                 measures = measure_quads(quad_mesh)
         console.seconds.update(done.seconds)
         with console.stage("write"):
-            if grid is not None:
-                grid_map.save(grid)
-            if quad_mesh is not None and output is not None:
-                quad_mesh.save(output)
-            if quad_mesh is not None and view is not None:
-                write_page(page_of_quads(quad_mesh, name=mesh.name), view)
+            _write(flags, grid_map, quad_mesh, mesh.name)
         notes = list(done.notes if joined is None else joined.all_notes(done.notes))
-        endings = [path.suffix.lower() for path in (output, grid) if path is not None]
+        endings = [path.suffix.lower() for path in (flags.output, flags.grid) if path is not None]
         for ending in dict.fromkeys(endings):
             notes += quads_left_out(None if joined is None else joined.mesh, ending)
         if flags.report is not None:
@@ -121,6 +112,32 @@ def quads(
         console.finish([path for path in files.values() if path is not None])
         square = "square", f"{grid_map.size:.4g}", "side of a grid square in model units"
         console.table([square, *(() if measures is None else measures.rows())])
+
+
+def _checked_files(flags: QuadFlags) -> dict[str, Path | None]:
+    """Return the files to write by role; errors that writing would raise are reported before the work starts."""
+    from ...io import check_target
+    from ...quadmesh.files import check_grid_output, check_quads_output
+    from ..view import check_page
+
+    files = {"output": flags.output, "grid": flags.grid, "view": flags.view, "report": flags.report}
+    checks = (check_quads_output, check_grid_output, check_page, check_target)
+    for path, check in zip(files.values(), checks, strict=True):
+        if path is not None:
+            check(path)
+    return files
+
+
+def _write(flags: QuadFlags, grid_map: IntegerGrid, quad_mesh: QuadMesh | None, name: str) -> None:
+    """Write the grid, the quads and their page, of a mesh with a name, as far as they are requested."""
+    from ..view import page_of_quads, write_page
+
+    if flags.grid is not None:
+        grid_map.save(flags.grid)
+    if quad_mesh is not None and flags.output is not None:
+        quad_mesh.save(flags.output)
+    if quad_mesh is not None and flags.view is not None:
+        write_page(page_of_quads(quad_mesh, name=name), flags.view)
 
 
 def _check_combinations(context: click.Context, mesh: Path) -> None:

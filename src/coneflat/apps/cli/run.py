@@ -32,11 +32,6 @@ if TYPE_CHECKING:
 LOG = logging.getLogger("coneflat")
 AGAIN = "--again flattens the mesh again"
 
-#: The rows that are always printed, in this order; the others are printed if verbose.
-FIRST_ROWS = (
-    "charts", "overlap", "flipped", "texture", "texel density", "seam length", "QC distortion", "energy", "cones"
-)  # fmt: skip
-
 
 class Console:
     """Output of a command: progress while it runs and a summary when it is done; nothing if quiet.
@@ -160,6 +155,7 @@ class Console:
 
     def _result_rows(self, result: Flattening) -> list[tuple[str, str, str]]:
         """Return the main measures; if verbose, all measures and the statistics of the solvers."""
+        from ...measures import FIRST_ROWS
         from ..view import shown_rows
 
         rows = {row[0]: row for row in shown_rows(result)}

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ...base import BAKED_RESOLUTION
 from .flags import verbosity_options
 
 if TYPE_CHECKING:
@@ -21,7 +22,9 @@ _PATH = click.Path(path_type=Path)
 @click.option(
     "-o", "--output", type=_PATH, help="File to write: .glb or .png.  [default: NEW's name with _baked]"
 )
-@click.option("--resolution", type=int, default=2048, show_default=True, help="Texels along a side.")
+@click.option(
+    "--resolution", type=int, default=BAKED_RESOLUTION, show_default=True, help="Texels along a side."
+)
 @click.option("--texture", type=_PATH, help="Image of the UVs of OLD, instead of its materials.")
 @verbosity_options
 def transfer(
@@ -64,7 +67,7 @@ def _not_baked(baked: Baked, output: Path) -> tuple[str, ...]:
     from ... import io
 
     source, ending = baked.uv_mesh.source, output.suffix.lower()
-    if source is None or ending not in io.KEPT:
+    if source is None or ending not in io.OUTPUT_FORMATS:
         return ()
     # Baked textures replace them.
     replaced = {
@@ -73,4 +76,6 @@ def _not_baked(baked: Baked, output: Path) -> tuple[str, ...]:
         io.VERTEX_COLOURS,
         io.Attribute("vertex attributes", "COLOR_0"),
     }
-    return io.losses(source, ending, io.KEPT[ending](source) | replaced | set(io.texture_files(source)))
+    return io.losses(
+        source, ending, io.kept_attributes(source, ending) | replaced | set(io.texture_files(source))
+    )

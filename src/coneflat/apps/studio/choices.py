@@ -17,11 +17,11 @@ import numpy as np
 from ...base import MAX_CONE_ANGLE, short_repr
 from ...errors import OptionError, StudioError
 from ...options import Flag, Options, as_integer, as_number, declarations, read_options
-from ...textures.options import UnwrapOptions
+from ...textures import UnwrapOptions
 from .paint import Paint, Region
 
 #: Options whose controls are made from their declarations, with the labels of these.
-MORE = {
+FURTHER_OPTIONS = {
     "area": "Area distortion at most", "stack": "Stack halves", "tiles": "Tiles (UDIM)", "up": "Up in the texture",
     "quantise": "Multiples of angle, °", "max_cones": "Cones at most", "min_cone_angle": "Smallest cone angle, °",
     "max_cone_angle": "Largest cone angle, °", "relax": "Relax",
@@ -29,7 +29,7 @@ MORE = {
 #: Options that the studio sets directly; cones and seams are edited individually.
 PLAIN_OPTIONS = (
     "distortion", "cone_count", "boundary", "stretch", "charts", "seams", "sharp_angle", "hide_seams",
-    "resolution", "padding", "repair", "max_energy", "texel_density", *MORE,
+    "resolution", "padding", "repair", "max_energy", "texel_density", *FURTHER_OPTIONS,
 )  # fmt: skip
 #: Declarations of all options, by name; those of both kinds of maps take further values for textures.
 DECLARED = declarations(Options) | declarations(UnwrapOptions)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...base import MAX_CONE_ANGLE, MAX_LISTED, MIN_CONE_ANGLE, list_some, plural
 from ...mesh import REPAIR_ADVICE
-from .choices import MORE, Choices
+from .choices import FURTHER_OPTIONS, Choices
 from .paint import Region
 
 if TYPE_CHECKING:
@@ -25,7 +25,8 @@ CONTROLS = {
     "weights": "Important", "seams": "Seams", "no_seams": "No seams", "sharp_angle": "Cut edges sharper than",
     "hide_seams": "Hide seams", "boundary": "Boundary", "stretch": "From angles to areas", "charts": "Charts",
     "resolution": "Texels per side", "padding": "Texels between charts",
-    "texel_density": "Texels per unit of length", "max_energy": "Energy at most", "repair": "Repair the mesh", **MORE,
+    "texel_density": "Texels per unit of length", "max_energy": "Energy at most", "repair": "Repair the mesh",
+    **FURTHER_OPTIONS,
 }  # fmt: skip
 #: A flag, or the name of an option. Names that are ordinary words count at the beginning of a message, with or without
 #: a value, and as the second of two options.

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from .transfer import ENDINGS, Baked, transfer
+from .baking import ENDINGS, Baked, transfer
 
 __all__ = ["ENDINGS", "Baked", "transfer"]

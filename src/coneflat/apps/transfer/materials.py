@@ -18,12 +18,12 @@ from ...io import (
     Materials,
     as_input,
     decode_image,
+    linear_colours,
     read_bytes,
     read_materials,
     read_mesh,
     readable,
     slot_of,
-    to_linear,
 )
 from ...mesh import polygon_of
 from .sampling import Sampler
@@ -129,13 +129,8 @@ class Painted:
         """(m, 3, 4) linear vertex colours, if any."""
         if self._uses_scene:
             return self._attribute("COLOR_0", 4, 1.0) if self._has_attribute("COLOR_0") else None
-        if not self.mesh.has_colours or self._has_picture:
-            return None
-        values = self.mesh.properties
-        rgb = to_linear(np.stack([values[name] for name in ("red", "green", "blue")], axis=1))
-        alpha = values.get("alpha", np.ones(len(rgb)))
-        # PLY files have bytes.
-        return np.column_stack([rgb, alpha / 255 if alpha.max(initial=0.0) > 1 else alpha])[self.faces]
+        colours = None if self._has_picture else linear_colours(self.mesh)
+        return None if colours is None else colours[self.faces]
 
     @property
     def alpha_mode(self) -> str:

@@ -6,7 +6,7 @@ from .figures.camera import Eye, eye_direction, view_aspect
 from .figures.compose import Panel, Row, check_figure, compose, new_figure, save_figure, write_figure
 from .figures.cone_marks import DOT_REACH, mark_handles, mark_scale
 from .figures.kinds import Look, demo_figure, make_figure
-from .figures.model import DOTS_PER_INCH, draw_checker, draw_cones, draw_quantity, show_mesh
+from .figures.model import draw_checker, draw_cones, draw_quantity, show_mesh
 from .figures.render import Barycentrics
 from .figures.uv_layout import draw_layout, fill_layout, layout_aspect
 from .from_uv import own_flattening, shown_rows, uv_flattening
@@ -25,7 +25,7 @@ from .quad_page import page_of_quads
 from .quantity import Quantity, conformal_distortion, own_quantity
 
 __all__ = [
-    "Barycentrics", "DOTS_PER_INCH", "DOT_REACH", "Eye", "Look", "Model", "PageText", "Panel", "Quantity", "Row",
+    "Barycentrics", "DOT_REACH", "Eye", "Look", "Model", "PageText", "Panel", "Quantity", "Row",
     "check_figure", "check_page", "compose", "conformal_distortion", "content_of", "demo_figure", "draw_checker",
     "draw_cones", "draw_layout", "draw_quantity", "eye_direction", "fill_layout", "head_and_block", "layout_aspect",
     "make_figure", "mark_handles", "mark_scale", "new_figure", "notebook_html", "open_address", "open_page",

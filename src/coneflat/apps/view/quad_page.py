@@ -9,11 +9,11 @@ import numpy as np
 
 from ... import Flattening
 from ...base import BoolArray, IntArray, mask_of, plural
+from ...geometry import TURNS, rotated
 from ...io import UVMesh
 from ...mesh import label_components
 from ...quadmesh.quad_mesh import QuadMesh, opposite_sides
 from ...quadmesh.quality import measure_quads
-from ...quadmesh.transitions import TURNS, rotated
 from . import PageText, page_html, uv_flattening
 
 # The corners of a square, counterclockwise, and the directions of its sides.

@@ -17,6 +17,8 @@ from ..sparse.dense_model import argmin_tied
 
 # Largest number of quanta that are transferred at once; a cone cannot hold more quarter turns.
 MAX_QUANTA = 3
+# Kinds of moves: quanta added to a cone, quanta transferred between cones, a cone moved to another candidate.
+NO_MOVE, ADD, TRANSFER, MOVE = 0, 1, 2, 3
 
 
 class Quanta(NamedTuple):
@@ -105,39 +107,20 @@ def descend(
         quanta: the quantum and the bounds of the indices.
         usable: (m,) mask of the candidates.
     """
-    size, count, quantum = len(members), len(slope), quanta.quantum
+    quantum = quanta.quantum
     energy = energy_of(gram, slope, constant, members, indices, quantum)
     free = without_members(usable, members)
-    for _ in range(100 + 20 * size):  # converges after a few moves per cone
+    for _ in range(100 + 20 * len(members)):  # converges after a few moves per cone
         gradient = slopes(gram, slope, members, quantum, indices)
-        best, kind, cone, target, amount = -TIE_TOLERANCE * abs(energy), 0, -1, -1, 0
-        for i in range(size):
-            s = members[i]
-            if not quanta.has_sum:
-                for d in range(-MAX_QUANTA, MAX_QUANTA + 1):
-                    k = quantum * d
-                    change = (2 * gradient[s] + k * gram[s, s]) * k
-                    if change < best - TIE_TOLERANCE * abs(best) and is_within(indices[i] + d, quanta):
-                        best, kind, cone, amount = change, 1, i, d
-            for j in range(size):
-                for d in range(1, MAX_QUANTA + 1 if i != j else 0):
-                    change = transfer(gram, gradient, s, members[j], quantum * d)
-                    if (
-                        change < best - TIE_TOLERANCE * abs(best)
-                        and is_within(indices[i] - d, quanta)
-                        and is_within(indices[j] + d, quanta)
-                    ):
-                        best, kind, cone, target, amount = change, 2, i, j, d
-            for t in range(count if i >= fixed else 0):
-                if free[t]:
-                    change = transfer(gram, gradient, s, t, quantum * indices[i])
-                    if change < best - TIE_TOLERANCE * abs(best):
-                        best, kind, cone, target = change, 3, i, t
-        if kind == 0:
+        threshold = -TIE_TOLERANCE * abs(energy)
+        kind, cone, target, amount = best_move(
+            gram, gradient, members, indices, fixed, quanta, free, threshold
+        )
+        if kind == NO_MOVE:
             break
-        if kind == 1:
+        if kind == ADD:
             indices[cone] += amount
-        elif kind == 2:
+        elif kind == TRANSFER:
             indices[cone] -= amount
             indices[target] += amount
         else:
@@ -146,6 +129,54 @@ def descend(
             free[target] = False
         energy = energy_of(gram, slope, constant, members, indices, quantum)
     return energy
+
+
+@compiled
+def best_move(
+    gram: FloatArray,
+    gradient: FloatArray,
+    members: IntArray,
+    indices: IntArray,
+    fixed: int,
+    quanta: Quanta,
+    free: BoolArray,
+    threshold: float,
+) -> tuple[int, int, int, int]:
+    """Return the move that changes E^2 least: its kind, the cone, the target, and the quanta.
+
+    The target is a position among the cones for a transfer of quanta, and a candidate for a move of the cone.
+
+    Args:
+        gram, gradient: see `transfer`.
+        members, indices, fixed, quanta: see `descend`.
+        free: (m,) candidates that are usable and not cones.
+        threshold: change of E^2 that a move must be below.
+    """
+    quantum = quanta.quantum
+    best, kind, cone, target, amount = threshold, NO_MOVE, -1, -1, 0
+    for i in range(len(members)):
+        s = members[i]
+        if not quanta.has_sum:
+            for d in range(-MAX_QUANTA, MAX_QUANTA + 1):
+                k = quantum * d
+                change = (2 * gradient[s] + k * gram[s, s]) * k
+                if change < best - TIE_TOLERANCE * abs(best) and is_within(indices[i] + d, quanta):
+                    best, kind, cone, amount = change, ADD, i, d
+        for j in range(len(members)):
+            for d in range(1, MAX_QUANTA + 1 if i != j else 0):
+                change = transfer(gram, gradient, s, members[j], quantum * d)
+                if (
+                    change < best - TIE_TOLERANCE * abs(best)
+                    and is_within(indices[i] - d, quanta)
+                    and is_within(indices[j] + d, quanta)
+                ):
+                    best, kind, cone, target, amount = change, TRANSFER, i, j, d
+        for t in range(len(gradient) if i >= fixed else 0):
+            if free[t]:
+                change = transfer(gram, gradient, s, t, quantum * indices[i])
+                if change < best - TIE_TOLERANCE * abs(best):
+                    best, kind, cone, target = change, MOVE, i, t
+    return kind, cone, target, amount
 
 
 @compiled

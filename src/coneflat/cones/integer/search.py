@@ -7,30 +7,19 @@ together, by moves that preserve the sum.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arrays import FloatArray, IntArray
+from ...base.arrays import IntArray
 from ...base.defaults import DISTORTION, TYPED_TOLERANCE
 from ...errors import CurvatureError
-from ...geometry.handles import difference_from_multiple
 from ...stages import ConeSolution
 from ..sparse.dense_model import MIN_RELATIVE_GAIN
 from ..sparse.fine_model import MAX_ROUNDS, MIN_PROMISED_GAIN
 from ..sparse.search import COARSE_MODEL_ERROR, ConeSearch
 from .lattice import IndexedCones, Lattice
 from .moves import Quanta
-
-# Number of vertices around each cone to which it may move, fewer where there are many cones, since pairs of moves are
-# compared; and largest number of moves of one or two cones.
-MAX_NEIGHBOURS, MAX_COMPARED, MAX_MOVES = 60, 2_000, 30
-# Largest number of comparisons of the linear model with the exact metric.
-MAX_COMPARISONS = 4
-# Error of the rotations, radians, at which moving cones stops.
-MIN_GAIN = 1e-4
-
 
 # Curvature, radians, that represents "no bound"; larger than that of any useful cone.
 UNBOUNDED = 2000 * math.pi
@@ -39,108 +28,6 @@ UNBOUNDED = 2000 * math.pi
 SIZES_PAST_GOAL, SIZES_PAST_STALL = 2, 5
 # Sets with fewer cones are not searched for from sets whose E^2 exceeds the goal by more than this factor.
 MAX_ENERGY_RATIO = 4.0
-
-
-def align_handles(
-    search: ConeSearch,
-    quantised: QuantisedCones,
-    by_scale: FloatArray,
-    holonomy: Callable[[ConeSolution], FloatArray],
-    bound: float,
-) -> QuantisedCones:
-    """Return quantised cones that are moved so that the holonomy of loops is close to multiples of the quantum.
-
-    Args:
-        search: the search that found the cones.
-        quantised: the cones.
-        by_scale: (2 genus, n) derivative of the rotation along loops by the log conformal factor.
-        holonomy: function that returns (2 genus,) the rotations along loops in the metric with given cones, radians.
-        bound: the allowed E.
-    """
-    operator = search.operator
-    by_curvature = operator.solve(np.ascontiguousarray(by_scale[:, operator.vertices].T))
-    best, best_off = quantised, difference_from_multiple(holonomy(quantised.solution), quantised.quantum)
-    trial, off = best, best_off
-    for _ in range(MAX_COMPARISONS):
-        if np.abs(best_off).max() <= MIN_GAIN:
-            break
-        moved = moved_cones(search, trial, by_curvature, off, bound)
-        if np.array_equal(moved.solution.cones, trial.solution.cones):
-            break
-        trial, off = moved, difference_from_multiple(holonomy(moved.solution), quantised.quantum)
-        if (off**2).sum() < (best_off**2).sum():
-            best, best_off = trial, off
-    return best
-
-
-def moved_cones(
-    search: ConeSearch, quantised: QuantisedCones, by_curvature: FloatArray, off: FloatArray, bound: float
-) -> QuantisedCones:
-    """Return cones moved one or two at a time while the error of the holonomy decreases in the linear model.
-
-    Args:
-        search: the search that found the cones.
-        quantised: the cones.
-        by_curvature: (f, 2 genus) derivative of the rotation along loops by curvature.
-        off: (2 genus,) current difference of the rotations from multiples of the quantum, radians.
-        bound: the allowed E.
-    """
-    operator = search.operator
-    places = operator.unknowns_of(quantised.solution.cones)
-    curvatures = quantised.quantum * quantised.indices.astype(np.float64)
-    before, penalty = (places, off), 1.0
-    for _ in range(MAX_MOVES):
-        log_scale = search.solution_of(places, curvatures).log_scale[operator.vertices]
-        slack = bound * bound - float(log_scale @ operator.weighted(log_scale))
-        if slack < 0 and places is not before[0]:
-            # The coarse model underestimated E: undo the move and increase its penalty.
-            (places, off), penalty = before, 2 * penalty
-            continue
-        score = operator.solve(operator.weighted(log_scale))
-        cones, targets = _moves(search, places)
-        if not len(cones):
-            break
-        moved_curvatures, origins = curvatures[cones], places[cones]
-        distances = np.concatenate(
-            [search.exact.squared_distances(places[c], targets[cones == c]) for c in np.unique(cones)]
-        )
-        costlier = (
-            2 * moved_curvatures * (score[targets] - score[origins])
-            + penalty * moved_curvatures**2 * distances
-        )
-        # Moves that are too costly even together with another one are removed. The last entry represents no move.
-        may = np.flatnonzero(costlier + min(costlier.min(), 0.0) <= max(slack, 0.0))
-        turns = np.vstack(
-            [(moved_curvatures[:, None] * (by_curvature[targets] - by_curvature[origins]))[may], 0 * off]
-        )
-        cones, targets, costlier = np.append(cones[may], -1), targets[may], np.append(costlier[may], 0.0)
-        squared_errors = ((off + turns) ** 2).sum(axis=1)
-        pairs = squared_errors[:, None] + squared_errors - (off**2).sum() + 2 * turns @ turns.T
-        pairs[(costlier[:, None] + costlier > max(slack, 0.0)) | (cones[:, None] == cones)] = np.inf
-        first, second = np.unravel_index(np.argmin(pairs), pairs.shape)
-        if not pairs[first, second] < 0.9 * (off**2).sum():
-            break
-        before, places = (places, off), places.copy()
-        for move in (first, second):
-            if cones[move] >= 0:
-                places[cones[move]] = targets[move]
-        off = off + turns[first] + turns[second]
-    solution = search.solution_of(places, curvatures)
-    inner = solution.log_scale[operator.vertices]
-    energy = float(np.sqrt(inner @ operator.weighted(inner)))
-    return replace(quantised, solution=solution, distortion=energy)
-
-
-def _moves(search: ConeSearch, places: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the cone and the target of all moves to usable vertices nearby; required cones are not moved."""
-    cones, targets = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
-    for i in range(len(search.coarse.fixed), len(places)):
-        neighbours = search.exact.neighbours(
-            int(places[i]), min(MAX_NEIGHBOURS, 1 + MAX_COMPARED // len(places))
-        )
-        targets.append(neighbours[~np.isin(neighbours, places)])
-        cones.append(np.full(len(targets[-1]), i))
-    return np.concatenate(cones), np.concatenate(targets)
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,9 +69,9 @@ def quantise_cones(
     """
     lattice = make_lattice(search, quantum)
     goal = 0.0 if count is not None else distortion * distortion
-    max_count = min(limit for limit in (count, max_count, search.most_cones) if limit is not None)
+    max_count = min(limit for limit in (count, max_count, search.max_cones) if limit is not None)
     search_coarse(search, lattice, goal, max_count)
-    exact = Lattice(search.exact, lattice.quanta, lattice.total)
+    fine = Lattice(search.fine, lattice.quanta, lattice.total)
     sizes = [size for size in lattice.best.sizes if size <= max_count]
     if not sizes:
         raise CurvatureError(
@@ -196,15 +83,15 @@ def quantise_cones(
         (size for size in sizes if lattice.best.energy(size) <= goal), min(sizes, key=lattice.best.energy)
     )
     for size in sizes[sizes.index(first) :]:
-        if refine(search, lattice, exact, size) <= goal:
+        if refine(search, lattice, fine, size) <= goal:
             break
     for size in reversed(sizes[: sizes.index(first)]):
         is_near = lattice.best.energy(size) <= goal * COARSE_MODEL_ERROR
-        if not is_near or not refine(search, lattice, exact, size) <= goal:
+        if not is_near or not refine(search, lattice, fine, size) <= goal:
             break
-    best = exact.best.fewest(goal)
+    best = fine.best.fewest(goal)
     order = _order_to_round_in(search, best.members)
-    places = search.exact.unknowns[best.members[order]]
+    places = search.fine.unknowns[best.members[order]]
     solution = search.solution_of(places, lattice.curvatures(best)[order])
     return QuantisedCones(solution, best.indices[order], lattice.quanta.quantum, math.sqrt(best.energy))
 
@@ -248,8 +135,8 @@ def _order_to_round_in(search: ConeSearch, members: IntArray) -> IntArray:
     the sample and a scan had grids of about the requested size. If slopes are equal up to rounding, the order is that
     of the vertices of the search.
     """
-    order, required = search.exact.in_order(members), len(search.exact.fixed)
-    slope = search.exact.slope[members[order[required:]]]
+    order, required = search.fine.in_order(members), len(search.fine.fixed)
+    slope = search.fine.slope[members[order[required:]]]
     steps = np.round(slope / max(MIN_RELATIVE_GAIN * np.abs(slope).max(initial=0.0), np.finfo(float).tiny))
     return np.append(order[:required], order[required:][np.argsort(-steps, kind="stable")])
 
@@ -258,7 +145,7 @@ def search_coarse(search: ConeSearch, lattice: Lattice, goal: float, max_count: 
     """Find good sets of cones on the coarse model, of all sizes up to slightly more than needed."""
     model, best = search.coarse, lattice.best
     fewest = max(lattice.fewest, len(model.fixed))
-    max_count = min(max_count + 1, search.most_cones)
+    max_count = min(max_count + 1, search.max_cones)
     model.climb(goal / COARSE_MODEL_ERROR, max_count)
     for cones in model.best:
         # Of many sizes, fewer are rounded: growing finds the others.
@@ -294,20 +181,20 @@ def _offer(lattice: Lattice, cones: IndexedCones | None, max_count: float = math
         lattice.best.offer(lattice.exchanged(cones))
 
 
-def refine(search: ConeSearch, lattice: Lattice, exact: Lattice, size: int) -> float:
+def refine(search: ConeSearch, lattice: Lattice, fine: Lattice, size: int) -> float:
     """Move the cones of the best coarse set of a size over the mesh until E converges; return E^2."""
-    model, start = search.exact, lattice.best[size]
+    model, start = search.fine, lattice.best[size]
     members = model.insert(search.places[start.members])
-    cones = exact.exchanged(exact.descended(members, start.indices))
+    cones = fine.exchanged(fine.descended(members, start.indices))
     for _ in range(MAX_ROUNDS):
         known_count = len(model.unknowns)
-        model.insert(model.targets(cones.members, exact.curvatures(cones), cones.energy))
+        model.insert(model.targets(cones.members, fine.curvatures(cones), cones.energy))
         if len(model.unknowns) == known_count:
             break
-        moved = exact.exchanged(exact.descended(cones.members, cones.indices))
+        moved = fine.exchanged(fine.descended(cones.members, cones.indices))
         stalled = not moved.energy < cones.energy * (1 - MIN_PROMISED_GAIN)
         cones = moved
         if stalled:
             break
-    exact.best.offer(cones)
+    fine.best.offer(cones)
     return cones.energy

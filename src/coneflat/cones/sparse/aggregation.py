@@ -128,9 +128,8 @@ def aggregate(
     vertices join the aggregate of their most strongly coupled neighbour. Couplings below the fraction `min_coupling` of
     the geometric mean of the diagonals do not count.
     """
-    count = len(diagonal)
-    labels, joined = np.empty(count, np.int64), np.empty(count, np.int64)
-    for vertex in range(count):
+    labels = np.empty(len(diagonal), np.int64)
+    for vertex in range(len(diagonal)):
         labels[vertex] = -1
     number = 0
     for vertex in order:
@@ -166,6 +165,18 @@ def aggregate(
             labels[strongest] = number
             space -= 1
         number += 1
+    return join_remaining(indptr, indices, weights, order, labels, number)
+
+
+@compiled
+def join_remaining(
+    indptr: IntArray, indices: IntArray, weights: FloatArray, order: IntArray, labels: IntArray, number: int
+) -> tuple[IntArray, int]:
+    """Return (n,) the aggregate of each vertex, and the number of aggregates.
+
+    Vertices without an aggregate, whose label is -1, join that of their most strongly coupled neighbour, or form one.
+    """
+    joined = np.empty(len(labels), np.int64)
     for vertex in order:
         joined[vertex] = labels[vertex]
         if labels[vertex] >= 0:

@@ -1,6 +1,9 @@
-"""Exact energies of cones at the vertices tried so far, and proposals of better vertices on the mesh."""
+"""Energies of cones on the mesh, at the vertices that were evaluated so far, and proposals of better vertices."""
 
 from __future__ import annotations
+
+import math
+from copy import copy
 
 import numpy as np
 
@@ -16,48 +19,66 @@ MIN_PROMISED_GAIN = 1e-3
 MAX_ROUNDS = 12
 
 
-class ExactModel(DenseModel):
-    """A dense model on a growing set of vertices, with exact entries.
+class FineModel(DenseModel):
+    """The dense model of a growing set of vertices of the mesh, in contrast to the coarse model.
+
+    Its candidates are the vertices whose Green's functions have been computed.
 
     Attributes:
         unknowns: (m,) the vertex of each candidate, in the numbering of the Green operator.
+        lower_bounds: (f,) lower bound of the curvature at each unknown, radians.
     """
 
     def __init__(
-        self,
-        linear: LinearModel,
-        required: IntArray,
-        limits: Limits,
-        lower: FloatArray,
+        self, linear: LinearModel, required: IntArray, limits: Limits, lower_bounds: FloatArray
     ) -> None:
-        none, coarse, operator, log_scale = np.empty(0), linear.coarse, linear.operator, linear.log_scale
-        fixed = np.arange(len(required))
-        super().__init__(np.empty((0, 0)), none, coarse.constant, none.astype(bool), fixed, limits, none)
-        self._operator, self._coarse, self._log_scale = operator, coarse, log_scale
-        self._usable = np.ones(len(log_scale), dtype=bool)
-        self._indptr = operator.laplacian.indptr.astype(np.int64)
-        self._indices = operator.laplacian.indices.astype(np.int64)
-        self._is_reached, self._reached = (
-            np.zeros(len(log_scale), dtype=bool),
-            np.empty(len(log_scale), np.int64),
+        """Return the model whose candidates are the required cones, unknowns (s,); all unknowns are usable."""
+        empty, fixed = np.empty(0), np.arange(len(required))
+        super().__init__(
+            np.empty((0, 0)), empty, linear.coarse.constant, empty.astype(bool), fixed, limits, empty
         )
-        self._linear, self._lower = linear, lower
-        # The Green's functions of the unknowns and their means, in blocks in the order in which they were added.
+        self._linear, self._coarse, self._operator = linear, linear.coarse, linear.operator
+        self.unknowns: IntArray = np.empty(0, dtype=np.int64)
+        self.lower_bounds = lower_bounds
+        self._usable = np.ones(len(lower_bounds), dtype=bool)
+        self._indptr = self._operator.laplacian.indptr.astype(np.int64)
+        self._indices = self._operator.laplacian.indices.astype(np.int64)
+        # Buffers of `fill_ball`.
+        self._is_reached = np.zeros(len(lower_bounds), dtype=bool)
+        self._reached = np.empty(len(lower_bounds), np.int64)
+        # The Green's functions of the candidates and their means, in blocks in the order in which they were added.
         self._responses: list[FloatArray] = []
         self._means: list[FloatArray] = []
-        self.unknowns: IntArray = np.empty(0, dtype=np.int64)
         if len(required):
-            self._add(required, operator.responses(required))
+            self._add(required, self._operator.responses(required))
 
-    def restrict(self, usable: BoolArray) -> None:
-        """Restrict cones to the usable unknowns (f,) and delete the sets found; energies stay cached."""
-        self._usable = usable
-        self.usable = usable[self.unknowns]
-        self.best = BestSets()
+    def restricted(self, usable: BoolArray) -> FineModel:
+        """Return the model with further cones at the usable unknowns (f,) only, and without sets of cones.
+
+        Green's functions and energies are shared.
+        """
+        model = copy(self)
+        model._usable = usable.copy()
+        model._usable[self.unknowns[self.fixed]] = False
+        model.usable = model._usable[self.unknowns]
+        model.best = BestSets()
+        model._responses, model._means = [*self._responses], [*self._means]
+        return model
+
+    @property
+    def fitness(self) -> FloatArray:
+        """(f,) preference of unknowns as candidates of the coarse model; 0 for those that must not be further cones.
+
+        There a neighbourhood is represented by a vertex that can have a wide cone angle.
+        """
+        excess = np.maximum(-self.lower_bounds, 0.0)
+        is_bounded = 0 < excess.max(initial=0.0) < math.inf
+        fitness: FloatArray = self._usable * (0.5 + 0.5 * excess / excess.max() if is_bounded else 1.0)
+        return fitness
 
     def insert(self, unknowns: IntArray) -> IntArray:
         """Add those vertices that are not candidates yet; return the candidate number of each."""
-        is_new = mask_of(len(self._log_scale), unknowns)
+        is_new = mask_of(len(self._usable), unknowns)
         is_new[self.unknowns] = False
         added = np.flatnonzero(is_new)
         for batch in self._operator.batches(added):
@@ -92,7 +113,7 @@ class ExactModel(DenseModel):
         self.slope = self._linear.score[self.unknowns]
         self.usable = self._usable[self.unknowns]
         self.usable[self.fixed] = False
-        self.lower = self._lower[self.unknowns]
+        self.lower = self.lower_bounds[self.unknowns]
 
     def refine(self, members: IntArray) -> float:
         """Move cones over the mesh until E converges; return E^2 of the best set of this number of cones."""
@@ -148,7 +169,7 @@ class ExactModel(DenseModel):
 
     def _score(self, members: IntArray, curvatures: FloatArray) -> FloatArray:
         """Return (f,) half the derivative of E^2 by the curvature of a cone at each vertex."""
-        log_scale = self._log_scale.copy()
+        log_scale = self._linear.log_scale.copy()
         first = 0
         for block in self._responses:
             is_member = (members >= first) & (members < first + len(block))
@@ -167,7 +188,7 @@ class ExactModel(DenseModel):
         return self._reached[:count].copy()
 
     def squared_distances(self, unknown: int, targets: IntArray) -> FloatArray:
-        """Return (p,) approximate squared norms of the differences of one Green's function and each of the others."""
+        """Return (p,) approximate squared distances of the Green's function of an unknown from those of targets."""
         return self._coarse.squared_distances(unknown, targets)
 
 

@@ -7,13 +7,35 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arrays import BoolArray, IntArray
+from ...base.arrays import BoolArray, FloatArray, IntArray
 from ...base.text import plural
 from ...errors import CurvatureError, OptionError
+from ...mesh.connectivity import TriangleMesh
 from ..solution import TIE_TOLERANCE
 
 # Largest number of cones searched for, in addition to the required ones: seams through more cones are useless.
 MAX_SEARCHED = 200
+# Cone angle per triangle around a cone, radians, up to which the triangles can realise it with straight sides. It is
+# less than pi, since the angle cannot be distributed evenly over the triangles.
+CONE_ANGLE_PER_TRIANGLE = 0.6 * np.pi
+# On meshes with this number of vertices, a neighbouring vertex is as good for a cone. The corners at a cone, all
+# widened by the same factor, must then not exceed this angle. Otherwise a triangle with straight sides may be unable to
+# realise its corner, and the search has to be repeated, which takes 14% of the time on a horse of 97,000 triangles.
+FINE_VERTICES, MAX_CORNER = 30_000, 0.95 * np.pi
+
+
+def largest_cone_angles(mesh: TriangleMesh, widest: FloatArray) -> FloatArray:
+    """Return (n,) the largest cone angle that the triangles at each vertex can realise, radians.
+
+    Args:
+        mesh: connected mesh.
+        widest: (n,) largest corner angle at each vertex, divided by the angle sum there.
+    """
+    triangles = np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
+    angles = CONE_ANGLE_PER_TRIANGLE * triangles + np.pi * mesh.is_boundary_vertex
+    if len(angles) >= FINE_VERTICES:
+        angles = np.minimum(angles, MAX_CORNER / widest)
+    return angles.astype(np.float64)
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,16 @@ of E^2 is largest.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ...base.arrays import BoolArray, FloatArray, IntArray
 from ...base.defaults import DISTORTION, MAX_CONE_ANGLE, MIN_CONE_ANGLE
+from ...base.progress import report_detail
 from ...base.text import list_some, plural
 from ...base.threads import concurrently
 from ...errors import CurvatureError, OptionError
@@ -32,7 +34,7 @@ from ...stages import ConeSolution
 from ..solution import TIE_TOLERANCE
 from .coarse_model import candidates
 from .dense_model import STALL_FACTOR, ConeSet, DenseModel
-from .fine_model import ExactModel
+from .fine_model import FineModel
 from .limits import MAX_SEARCHED, Limits
 from .linear_model import LinearModel
 
@@ -57,31 +59,64 @@ class ConeSearch:
     """A search for cones on a connected mesh; the Laplacian is factorized once for any number of queries.
 
     It is made by `from_mesh`. The distortion E is the area-weighted standard deviation of the linear log conformal
-    factor. A boundary has phi = 0 and absorbs the remaining curvature.
+    factor. A boundary has phi = 0 and absorbs the remaining curvature. The best sets of each size are cached, so that
+    later queries start from them.
 
         search = ConeSearch.from_mesh(mesh)
         search.fewest(0.2).solution.cones
 
-    Args:
-        linear: the linear model of the mesh.
-        euler_characteristic: chi of the mesh.
-        min_cone_angle, max_cone_angle: bounds of the cone angles 2 pi - k, radians.
-        positive_only: no cones of negative curvature (angles above 2 pi).
-        required: vertices that are always cones.
-        allowed: (n,) mask of the other vertices that may be cones; None: all.
-        max_angles: (n,) largest cone angle at each vertex, radians, in addition to `max_cone_angle`; None: no further
-            bound.
-
     Attributes:
-        progress: function that is called with a text on the progress.
+        fine: the model with the energies of sets on the mesh; its required cones are always cones.
+        coarse: the model in which sets are searched first, at one vertex for each function of the coarse basis.
+        places: (c,) unknown of each candidate of the coarse model, required cones first.
+        limits: bounds and sum of the curvatures.
+        operator: the Laplacian of the vertices that can be cones.
 
-    Raises:
-        OptionError: an option is not valid.
-        CurvatureError: no curvatures within the bounds have the sum that the surface needs.
+    Notes:
+        Sets of each size are found on the coarse model, by adding cones one at a time and exchanging members
+        (`DenseModel`), and are then moved over the mesh (`FineModel.refine`). Matching pursuit adds the candidate
+        that lowers E^2 most if all curvatures are fitted again; moves follow the gradient of E^2. References are in
+        the docstring of the module.
+
+    See Also:
+        coneflat.cones.integer.search.quantise_cones: curvatures that are multiples of a quantum.
+        coneflat.cones.greedy_cones: the search of the paper.
     """
 
-    def __init__(
-        self,
+    def __init__(self, linear: LinearModel, fine: FineModel, usable: BoolArray) -> None:
+        """Set up a search for cones at vertices.
+
+        Args:
+            linear: the linear model of the mesh.
+            fine: the model of the sets on the mesh, with the required cones.
+            usable: (n,) mask of the other vertices that may be cones.
+
+        Raises:
+            CurvatureError: cones at these vertices cannot absorb the curvature.
+        """
+        self.operator, self.limits = linear.operator, fine.limits
+        self._linear, self._usable = linear, usable
+        required = fine.unknowns[fine.fixed]
+        self.limits.check_available(usable, self.operator.vertices[required])
+        self.fine = fine.restricted(usable[self.operator.vertices])
+        self.places = np.concatenate([required, candidates(linear.coarse, self.fine.fitness)])
+        kernel, slope = linear.coarse.at(self.places)
+        self.coarse = DenseModel(
+            np.ascontiguousarray(kernel),
+            slope,
+            linear.coarse.constant,
+            np.arange(len(self.places)) >= len(required),
+            fine.fixed,
+            self.limits,
+            fine.lower_bounds[self.places],
+        )
+        # What the last refinement of each size started from, and the sizes that more cones hardly improve.
+        self._refined = dict[int, tuple[float, ...]]()
+        self._stalled = set[int]()
+
+    @classmethod
+    def of(
+        cls,
         linear: LinearModel,
         euler_characteristic: float,
         *,
@@ -91,27 +126,38 @@ class ConeSearch:
         required: Iterable[int] = (),
         allowed: BoolArray | None = None,
         max_angles: FloatArray | None = None,
-    ) -> None:
-        is_boundary = self.is_boundary = linear.is_boundary
+    ) -> ConeSearch:
+        """Return a search on a linear model.
+
+        Args:
+            linear: the linear model of the mesh.
+            euler_characteristic: chi of the mesh.
+            min_cone_angle, max_cone_angle: bounds of the cone angles 2 pi - k, radians.
+            positive_only: no cones of negative curvature (angles above 2 pi).
+            required: vertices that are always cones.
+            allowed: (n,) mask of the other vertices that may be cones; None: all.
+            max_angles: (n,) largest cone angle at each vertex, radians, in addition to `max_cone_angle`; None: no
+                further bound.
+
+        Raises:
+            OptionError: an option is not valid.
+            CurvatureError: no curvatures within the bounds have the sum that the surface needs.
+        """
+        is_boundary, operator = linear.is_boundary, linear.operator
         chi = None if is_boundary.any() else euler_characteristic
-        limits = self.limits = Limits.of_angles(chi, min_cone_angle, max_cone_angle, positive_only)
+        limits = Limits.of_angles(chi, min_cone_angle, max_cone_angle, positive_only)
         if allowed is not None and allowed.shape != is_boundary.shape:
             raise OptionError(f"allowed must be {len(is_boundary):,} flags, got the shape {allowed.shape}")
         cones = required_vertices(required, is_boundary)
         usable = ~is_boundary if allowed is None else ~is_boundary & allowed
         limits.check_available(usable, cones)
-        self.progress: Callable[[str], None] = lambda _: None
-        self._linear, self.operator, self._coarse_model = linear, linear.operator, linear.coarse
-        vertices = self.operator.vertices
-        self._lower = np.full(len(vertices), limits.lower)
+        lower = np.full(len(operator.vertices), limits.lower)
         if max_angles is not None:
-            self._lower = np.maximum(self._lower, np.minimum(math.tau - max_angles[vertices], 0.0))
-        self._required = self.operator.unknowns_of(cones)
-        self.exact = ExactModel(linear, self._required, limits, self._lower)
-        self._usable = np.empty(0, dtype=bool)
-        # The exact model will need the score; it is computed while the coarse model is set up.
-        with concurrently(lambda: linear.score, 2 * len(vertices)):
-            self.restrict(usable)
+            lower = np.maximum(lower, np.minimum(math.tau - max_angles[operator.vertices], 0.0))
+        fine = FineModel(linear, operator.unknowns_of(cones), limits, lower)
+        # The fine model will need the score; it is computed while the coarse model is set up.
+        with concurrently(lambda: linear.score, 2 * len(operator.vertices)):
+            return cls(linear, fine, usable)
 
     @classmethod
     def from_mesh(
@@ -138,42 +184,23 @@ class ConeSearch:
             is_boundary,
             tie_key(mesh.vertices),
         )
-        return cls(linear, mesh.euler_characteristic, **options)
+        return cls.of(linear, mesh.euler_characteristic, **options)
 
-    def restrict(self, usable: BoolArray) -> None:
-        """Restrict the search to the usable vertices (n,); if they are the same as before, sets found stay known.
+    def restricted(self, allowed: BoolArray) -> ConeSearch:
+        """Return the search for cones at allowed vertices (n,); Green's functions are shared.
+
+        If these are the vertices of this search, it is returned itself, with the sets that it has found.
 
         Raises:
             CurvatureError: cones at these vertices cannot absorb the curvature.
         """
-        required, operator = self._required, self.operator
-        if np.array_equal(usable, self._usable):
-            return
-        self.limits.check_available(usable, operator.vertices[required])
-        is_usable = usable[operator.vertices]
-        is_usable[required] = False
-        # On the coarse model, a neighbourhood is represented by a vertex that can have a wide cone angle.
-        excess = np.maximum(-self._lower, 0.0)
-        fitness = 0.5 + 0.5 * excess / excess.max() if 0 < excess.max(initial=0.0) < math.inf else 1.0
-        self.places = np.concatenate([required, candidates(self._coarse_model, is_usable * fitness)])
-        kernel, slope = self._coarse_model.at(self.places)
-        mask = np.arange(len(self.places)) >= len(required)
-        self.coarse = DenseModel(
-            np.ascontiguousarray(kernel),
-            slope,
-            self._coarse_model.constant,
-            mask,
-            np.arange(len(required)),
-            self.limits,
-            self._lower[self.places],
-        )
-        self.exact.restrict(is_usable)
-        self._usable, self._refined, self._stalled = usable.copy(), dict[int, tuple[float, ...]](), set[int]()
+        usable = ~self._linear.is_boundary & allowed
+        return self if np.array_equal(usable, self._usable) else ConeSearch(self._linear, self.fine, usable)
 
-    @property
-    def most_cones(self) -> int:
+    @cached_property
+    def max_cones(self) -> int:
         """The largest number of cones searched for."""
-        largest = min(MAX_SEARCHED + len(self._required), len(self.places))
+        largest = min(MAX_SEARCHED + len(self.fine.fixed), len(self.places))
         return largest if self.limits.largest is None else min(largest, self.limits.largest)
 
     def fewest(self, distortion: float = DISTORTION, max_count: int | None = None) -> SparseCones:
@@ -190,16 +217,16 @@ class ConeSearch:
         if not 0 < distortion < math.inf:
             raise OptionError(f"the distortion allowed must be a positive number, got {distortion:g}")
         if max_count is not None:
-            self.limits.check_count(max_count, len(self._required))
-        max_count = self.most_cones if max_count is None else min(max_count, self.most_cones)
+            self.limits.check_count(max_count, len(self.fine.fixed))
+        max_count = self.max_cones if max_count is None else min(max_count, self.max_cones)
         goal = distortion * distortion
         count = self._find_sufficient(self._search_coarse(goal, max_count), goal, max_count)
-        while count > max(self.limits.fewest, len(self._required)) and self._refine(count - 1) <= goal:
+        while count > max(self.limits.fewest, len(self.fine.fixed)) and self._refine(count - 1) <= goal:
             count -= 1
         # If it is not reached: the fewest cones that are nearly as good as the best set.
-        smallest_energy = self.exact.best.fewest(goal, max_count).energy
+        smallest_energy = self.fine.best.fewest(goal, max_count).energy
         return self._cones(
-            self.exact.best.fewest(
+            self.fine.best.fewest(
                 goal if smallest_energy <= goal else smallest_energy / STALL_FACTOR, max_count
             )
         )
@@ -214,15 +241,15 @@ class ConeSearch:
             OptionError: `count` is not valid.
             CurvatureError: `count` cones cannot absorb the curvature.
         """
-        self.limits.check_count(count, len(self._required))
-        count = min(count, self.most_cones)
+        self.limits.check_count(count, len(self.fine.fixed))
+        count = min(count, self.max_cones)
         self._climb(0.0, count + 1, count)
         self.coarse.descend(count - 2, count + 1)
         self._refine(max(size for size in self.coarse.best.sizes if size <= count))
         fewer = 2 * count // 3
         if self._refine(fewer) < math.inf:
-            self.exact.refine(self.exact.extended(self.exact.best[fewer].members, 0.0, count))
-        return self._cones(self.exact.best.fewest(-1.0, count))
+            self.fine.refine(self.fine.extended(self.fine.best[fewer].members, 0.0, count))
+        return self._cones(self.fine.best.fewest(-1.0, count))
 
     def curve(self, max_count: int) -> list[SparseCones]:
         """Return the best cones found for each number up to `max_count`, if their E is below that of fewer cones.
@@ -230,15 +257,15 @@ class ConeSearch:
         Args:
             max_count: largest number of cones.
         """
-        max_count = min(max_count, self.most_cones)
+        max_count = min(max_count, self.max_cones)
         self.coarse.climb(0.0, max_count)
         self.coarse.descend(1, max_count)
         # First upwards, then downwards: the best set may be the next larger set without one of its cones.
         for count in (*range(max_count + 1), *range(max_count, -1, -1)):
             self._refine(count)
         curve: list[SparseCones] = []
-        for count in self.exact.best.sizes:
-            cones = self._cones(self.exact.best[count])
+        for count in self.fine.best.sizes:
+            cones = self._cones(self.fine.best[count])
             if count <= max_count and (not curve or cones.distortion < curve[-1].distortion - TIE_TOLERANCE):
                 curve.append(cones)
         return curve
@@ -252,14 +279,14 @@ class ConeSearch:
 
     def _find_sufficient(self, count: int, goal: float, max_count: int) -> int:
         """Return how many cones reach E^2 <= goal on the mesh, or stall; the search starts with `count`."""
-        exact, best = self.exact, self.exact.best
+        fine, best = self.fine, self.fine.best
         self._refine(count)
         while best.fewest(goal, max_count).energy > goal:
             start = max(size for size in best.sizes if size <= max_count)
             if start in {max_count, *self._stalled}:
                 break
-            added = exact.extended(best[start].members, goal, max_count)
-            if not exact.refine(added) < STALL_FACTOR * best.energy(start):
+            added = fine.extended(best[start].members, goal, max_count)
+            if not fine.refine(added) < STALL_FACTOR * best.energy(start):
                 self._stalled |= {start, len(added)}
         return len(best.fewest(goal, max_count))
 
@@ -282,28 +309,28 @@ class ConeSearch:
         It starts from the best of the set of the coarse model, the next larger set without one cone, and the next
         smaller set with one more.
         """
-        self.progress(plural(count, "cone"))
-        exact, starts = self.exact, []
-        state = (self.coarse.best.energy(count), exact.best.energy(count + 1), exact.best.energy(count - 1))
+        report_detail(plural(count, "cone"))
+        fine, starts = self.fine, []
+        state = (self.coarse.best.energy(count), fine.best.energy(count + 1), fine.best.energy(count - 1))
         if self._refined.get(count) == state:
-            return exact.best.energy(count)
+            return fine.best.energy(count)
         self._refined[count] = state
         if count in self.coarse.best:
-            starts.append(exact.insert(self.places[self.coarse.best[count].members]))
-        if count + 1 in exact.best:
-            shrunk = exact.shrunk(exact.best[count + 1].members)
+            starts.append(fine.insert(self.places[self.coarse.best[count].members]))
+        if count + 1 in fine.best:
+            shrunk = fine.shrunk(fine.best[count + 1].members)
             starts += [] if shrunk is None else [shrunk]
-        if count - 1 in exact.best:
-            starts.append(exact.extended(exact.best[count - 1].members, 0.0, count))
+        if count - 1 in fine.best:
+            starts.append(fine.extended(fine.best[count - 1].members, 0.0, count))
         if starts:
-            exact.refine(min(starts, key=exact.energy))
-        return exact.best.energy(count)
+            fine.refine(min(starts, key=fine.energy))
+        return fine.best.energy(count)
 
     def _cones(self, best: ConeSet) -> SparseCones:
         """Return the cones of a set on the mesh; cones of zero curvature are removed unless they are required."""
-        unknowns, required = self.exact.unknowns, len(self._required)
-        members = best.members[self.exact.in_order(best.members)]
-        curvatures = self.exact.fit(members).curvatures
+        unknowns, required = self.fine.unknowns, len(self.fine.fixed)
+        members = best.members[self.fine.in_order(best.members)]
+        curvatures = self.fine.fit(members).curvatures
         is_kept = np.abs(curvatures) > TIE_TOLERANCE
         is_kept[:required] = True
         kept_curvatures = curvatures[is_kept]

@@ -70,6 +70,16 @@ class GltfScene:
     blocks: tuple[int, ...]
 
 
+def is_glb(content: bytes) -> bool:
+    """Return True if a file begins as GLB files do."""
+    return content.startswith(b"glTF")
+
+
+def is_gltf(content: bytes) -> bool:
+    """Return True if a file begins as an object of JSON."""
+    return content[:512].removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{")
+
+
 def parse_gltf(path: Path, content: bytes) -> MeshFile:
     """Return all triangle meshes of the scene as one, in scene coordinates.
 

@@ -24,13 +24,13 @@ from ...base.arrays import FloatArray, IntArray
 from ...base.text import list_some, plural, printable
 from ...errors import ConeflatError, MeshFileError
 from ...geometry.triangles import vertex_normals
-from ...mesh.polygons import COLOURS
 from ...result import Flattening
-from ..attributes import ALPHA, MAX_NAME, VERTEX_COLOURS, Attribute, colour_shades, old_textures
+from ..attributes import ALPHA, MAX_NAME, VERTEX_COLOURS, Attribute, old_textures
+from ..colours import linear_colours, stored_shades
 from ..files import moved_path, read_bytes
 from ..mesh_file import MeshFile
 from ..split import distinct_pairs, input_vertices, shading_normals, source_normals, split_at_seams
-from ..texture import Texture, image_kind, to_linear
+from ..texture import Texture, image_kind
 from .data import COMPRESSED, GltfData, Item
 from .positions import local_positions
 from .read import DRACO, GltfScene, Mode, ScenePart
@@ -194,7 +194,7 @@ def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
         normals = shading_normals(vertex_normals(result.vertices, result.faces))[split.vertex]
     places, colours = local_positions(split.vertices), None
     if texture is None and result.source is not None and result.face_corners is not None:
-        colours = linear_colours(result.source, input_vertices(result)[split.vertex])
+        colours = linear_colours(result.source)
     primitive: Item = {"attributes": {}, "indices": 0, "material": 0}
     glb = Glb(
         {
@@ -217,9 +217,10 @@ def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
         form = {"componentType": 5126, "type": kind} | (bounds(stored) if name == "POSITION" else {})
         primitive["attributes"][name] = glb.add_array(stored, form)
     if colours is not None:
+        # 16 bits keep all of the 256 steps of sRGB.
+        stored = stored_shades(colours[input_vertices(result)[split.vertex]], "<u2")
         form = {"componentType": 5123, "type": "VEC4", "normalized": True}
-        primitive["attributes"][COLOUR] = glb.add_array(colours, form, FOR_VERTICES)
-    if colours is not None:
+        primitive["attributes"][COLOUR] = glb.add_array(stored, form, FOR_VERTICES)
         # The material multiplies the colours.
         plain = MATERIAL["pbrMetallicRoughness"] | {"baseColorFactor": [1.0] * 4}
         glb.add("materials", MATERIAL | {"pbrMetallicRoughness": plain})
@@ -228,20 +229,6 @@ def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
     else:
         glb.add_material(texture)
     return glb
-
-
-def linear_colours(source: MeshFile, vertices: IntArray) -> NDArray[np.uint16] | None:
-    """Return (k, 4) the linear colours and alphas of vertices of a file, 0 to 65535; None if it has none.
-
-    Colours of files are sRGB; 16 bits keep all of their 256 steps.
-    """
-    if not source.has_colours:
-        return None
-    shades = np.stack([source.properties[name][vertices] for name in COLOURS], axis=1)
-    linear = to_linear(np.clip(np.nan_to_num(shades), 0, 1))
-    alpha = colour_shades(source.properties.get(ALPHA.name, np.ones(len(source.vertices))))[vertices]
-    rows = np.column_stack([linear, np.clip(np.nan_to_num(alpha), 0, 1)])
-    return np.rint(np.iinfo(np.uint16).max * rows).astype("<u2")
 
 
 def kept_in_glb(source: MeshFile) -> set[Attribute]:
@@ -305,9 +292,8 @@ def scene_losses(result: Flattening, has_texture: bool = False) -> tuple[str, ..
     source = result.source
     if source is None or source.scene is None or result.face_corners is None:
         return ()
-    notes = []
     data, parts = source.scene.data, source.scene.parts
-    tree = data.tree
+    notes = []
     dropped = sum(len(part.corners) for part in parts) // 3 - len(result.faces)
     if dropped:
         notes.append(f"Triangles that the repair dropped are not in the file: {dropped:,}.")
@@ -317,7 +303,7 @@ def scene_losses(result: Flattening, has_texture: bool = False) -> tuple[str, ..
         notes.append(
             f"Meshes of several nodes were copied, to have UVs for each node: {plural(copies, 'copy', 'copies')}."
         )
-    primitives = [tree["meshes"][part.mesh]["primitives"][part.primitive] for part in parts]
+    primitives = [data.tree["meshes"][part.mesh]["primitives"][part.primitive] for part in parts]
     bare = sum("material" not in primitive for primitive in primitives)
     if bare and not has_texture:
         notes.append(
@@ -326,23 +312,32 @@ def scene_losses(result: Flattening, has_texture: bool = False) -> tuple[str, ..
         )
     if any("TANGENT" in item["attributes"] and "TANGENT" in _replaced(data, item) for item in primitives):
         notes.append("Tangents of the old UVs are not in the file: viewers compute them from the new ones.")
+    notes += _image_notes(data)
+    painted = _painted_materials(data.tree, primitives)
+    if painted and not has_texture:
+        notes.append(old_textures(plural(painted, "material")))
+    return tuple(notes)
+
+
+def _image_notes(data: GltfData) -> list[str]:
+    """Return a note on image files of a scene that cannot be embedded, if there are any."""
     unread_images = [
         printable(image["uri"])[:MAX_NAME]
-        for image in image_files(tree)
+        for image in image_files(data.tree)
         if not _content_of(data, image["uri"])
     ]
-    if unread_images:
-        notes.append(
-            f"{plural(len(unread_images), 'image file is', 'image files are')} not embedded, because nothing can be "
-            f"read there, or because it is outside the folder of the scene: {list_some(unread_images)}."
-        )
-    shown_materials = {item["material"] for item in primitives if "material" in item}
-    painted = [
-        i for i in shown_materials if any(name.endswith("Texture") for name in keys_of(tree["materials"][i]))
+    if not unread_images:
+        return []
+    return [
+        f"{plural(len(unread_images), 'image file is', 'image files are')} not embedded, because nothing can be "
+        f"read there, or because it is outside the folder of the scene: {list_some(unread_images)}."
     ]
-    if painted and not has_texture:
-        notes.append(old_textures(plural(len(painted), "material")))
-    return tuple(notes)
+
+
+def _painted_materials(tree: Item, primitives: list[Item]) -> int:
+    """Return the number of materials of primitives that have textures."""
+    materials = {primitive["material"] for primitive in primitives if "material" in primitive}
+    return sum(any(name.endswith("Texture") for name in keys_of(tree["materials"][i])) for i in materials)
 
 
 def _own_primitives(tree: Item, scene: GltfScene) -> list[Item]:

@@ -18,7 +18,7 @@ from pathlib import Path
 from .job import HINT, Failure, popen_options
 
 #: The version of the extension, and the options of the commands.
-KNOWN = json.loads(Path(__file__).with_name("options.json").read_text(encoding="utf-8"))
+OPTIONS_FILE = json.loads(Path(__file__).with_name("options.json").read_text(encoding="utf-8"))
 #: Seconds to wait for a program that only prints its version.
 _PATIENCE = 60.0
 #: Prints whether a Python can make environments that coneflat supports.
@@ -84,8 +84,8 @@ def _checked(command: Sequence[str]) -> Environment:
     if code != 0 or match is None:
         last = ([line.strip() for line in text.splitlines() if line.strip()] or [f"code {code}"])[-1]
         raise Failure(f"{command[0]} does not run coneflat: {last}")
-    if _numbers(match[1]) < _numbers(KNOWN["version"]):
-        needed = KNOWN["version"]
+    if _numbers(match[1]) < _numbers(OPTIONS_FILE["version"]):
+        needed = OPTIONS_FILE["version"]
         raise Failure(f"coneflat {match[1]} of {command[0]} is older than the extension, {needed}: {HINT}")
     return Environment(tuple(command), match[1])
 
@@ -128,7 +128,7 @@ def install_commands(
     source = ["--no-index", "--find-links", wheels] if wheels else ["--retries", "1"]
     quiet = ["--disable-pip-version-check", "--no-input", "--progress-bar", "off"]
     python = str(python_in(folder))
-    needed = requirement.strip() or f"coneflat>={KNOWN['version']}"
+    needed = requirement.strip() or f"coneflat>={OPTIONS_FILE['version']}"
     return [
         ("make environment", [_base_python(), "-m", "venv", "--clear", str(folder)]),
         ("install coneflat", [python, "-m", "pip", "install", *quiet, *source, needed]),

@@ -8,10 +8,10 @@ from typing import Any, ClassVar
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
-from .environment import KNOWN, Environment
+from .environment import OPTIONS_FILE, Environment
 
 #: The options of each command, as records.
-COMMANDS: dict[str, list[dict[str, Any]]] = KNOWN["commands"]
+COMMANDS: dict[str, list[dict[str, Any]]] = OPTIONS_FILE["commands"]
 
 
 def _property(record: dict[str, Any]) -> Any:
@@ -61,7 +61,7 @@ _ATLAS = "Put all selected objects into one atlas, at one texel density; otherwi
 _MAP = "UV map to write, which is added if it does not exist. Empty: the active one"
 _MARK = "Mark the cut edges as seams, instead of those that coneflat has marked before"
 _APPLY = "Make quads of the mesh with its modifiers and shape keys, in object mode"
-_OWN = {
+_MAP_SETTINGS = {
     "marks": EnumProperty(name="Marked seams", description="Marked seams that are cut", items=_MARKS),
     "sharp": BoolProperty(name="Cut sharp edges", description="Also cut edges that are marked as sharp"),
     "together": BoolProperty(name="One atlas", description=_ATLAS, default=True),
@@ -72,7 +72,7 @@ _OWN = {
 }
 _POINTERS = {command: PointerProperty(type=group) for command, group in GROUPS.items()}
 #: All settings, which are stored with each scene.
-Settings = _group("settings", {**_OWN, **_POINTERS})
+Settings = _group("settings", {**_MAP_SETTINGS, **_POINTERS})
 
 
 _PYTHON = "Python or environment that has coneflat. Empty: the extension's own, or one on the PATH"

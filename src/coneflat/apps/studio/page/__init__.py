@@ -9,7 +9,7 @@ from importlib.resources import files
 
 from ...controls import control_of
 from ...view import page_around
-from ..choices import DECLARED, MORE, PLAIN_OPTIONS
+from ..choices import DECLARED, FURTHER_OPTIONS, PLAIN_OPTIONS
 
 #: Content security policy: only connections to the server of the page are allowed.
 POLICY = (
@@ -29,9 +29,9 @@ def studio_page(formats: Sequence[str]) -> str:
     uses = {"Texture": "for-texture", "Cones": "for-angles", "Metric": "for-angles"}
     further = [
         {**control_of(DECLARED[name]), "label": label, "use": uses.get(DECLARED[name].group, "")}
-        for name, label in MORE.items()
+        for name, label in FURTHER_OPTIONS.items()
     ]
-    constants = f"const DEFAULTS = {json.dumps(defaults)}, MORE = {json.dumps(further)};"
+    constants = f"const DEFAULTS = {json.dumps(defaults)}, FURTHER_OPTIONS = {json.dumps(further)};"
     scripts = [constants, *(_read(f"{name}.js") for name in _SCRIPTS)]
     return page_around(
         POLICY,

@@ -25,7 +25,7 @@ class Panel {
       button("Picture", "Save the layout as a picture, .png", () => this.studio.save("png"), {id: "save-png"}),
       button("Report", "Save the report, .json", () => this.studio.save("json"), {id: "save-json"}),
     );
-    this.part("more").append(...MORE.map((control) => this.further(control)));
+    this.part("more").append(...FURTHER_OPTIONS.map((control) => this.further(control)));
     for (const id of ["unit", "shown-in"]) this.part(id).replaceChildren(...UNITS.map(([key, name]) => new Option(key || id === "unit" ? name : "unit of the file", key)));
   }
 
@@ -145,7 +145,7 @@ class Panel {
     this.part("hide-value").textContent = options.hide_seams;
     this.part("own-seams").checked = options.seams === "input";
     this.part("no-more").checked = options.seams === "none";
-    for (const {name, kind} of MORE) this.value(`more-${name}`, furtherText(kind, options[name]));
+    for (const {name, kind} of FURTHER_OPTIONS) this.value(`more-${name}`, furtherText(kind, options[name]));
     this.value("boundary", options.boundary);
     this.part("boundary").closest("label").hidden = this.part("tool-corner").hidden = forTexture || !this.studio.hasBoundary();
     this.value("resolution", options.resolution);

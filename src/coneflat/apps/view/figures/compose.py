@@ -14,6 +14,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
+from ....base import DOTS_PER_INCH
 from ....errors import OptionError
 from ....io import atomic_write, checked_target, imported
 from ..quantity import Quantity
@@ -97,7 +98,7 @@ def compose(
     title: str = "",
     marks: Sequence[Any] = (),
     size: tuple[float, float] | None = None,
-    dpi: float = 300.0,
+    dpi: float = DOTS_PER_INCH,
     width: float = Inches.WIDTH,
 ) -> Figure:
     """Return a figure of rows of panels.
@@ -116,16 +117,11 @@ def compose(
     above = [Inches.LABEL * any(panel.label for panel in row.panels) for row in rows]
     fixed = sum(above) + Inches.GAP * (len(rows) - 1) + 2 * Inches.MARGIN
     fixed += Inches.TITLE * bool(title) + Inches.LEGEND * bool(marks)
-    minima = [max(Inches.CARD_HEIGHT * len(row.quantities), 0.3) for row in rows]
     if size is None:
-        natural = [min(_panel_space(row, width) / _aspect(row), row.tallest) for row in rows]
-        spare = min(_panel_space(row, width) - h * _aspect(row) for row, h in zip(rows, natural, strict=True))
-        width = max(width - spare, _legend_width(marks))
-        heights = np.maximum(natural, minima).tolist()
-        size = width, sum(heights) + fixed
+        size, heights = _fitted_size(rows, width, fixed, _legend_width(marks))
     else:
         heights = [(size[1] - fixed) / len(rows)] * len(rows)
-        if heights[0] < max(minima) or min(_panel_space(row, size[0]) for row in rows) < 0.3:
+        if heights[0] < max(_smallest_heights(rows)) or min(_panel_space(row, size[0]) for row in rows) < 0.3:
             raise OptionError(f"{size[0]:g} by {size[1]:g} inches are too small for the pictures")
     check_pixels(size, dpi)
     figure = new_figure(*size, dpi=dpi)
@@ -246,6 +242,28 @@ def _write(figure: Figure, x: float, y: float, text: str, space: float | None = 
 def text_width(text: str, size: float = Points.LABEL) -> float:
     """Return the approximate width of a text in inches; size: font size in points."""
     return len(text) * 0.6 * size / 72.0
+
+
+def _smallest_heights(rows: Sequence[Row]) -> list[float]:
+    """Return the smallest height in inches of each row."""
+    return [max(Inches.CARD_HEIGHT * len(row.quantities), 0.3) for row in rows]
+
+
+def _fitted_size(
+    rows: Sequence[Row], width: float, fixed: float, legend_width: float
+) -> tuple[tuple[float, float], list[float]]:
+    """Return width and height of a figure that fit its panels, and the height of each row, all in inches.
+
+    Args:
+        rows: rows from top to bottom.
+        width: largest width of the rows.
+        fixed: height of everything but the rows.
+        legend_width: width that the legend needs.
+    """
+    natural = [min(_panel_space(row, width) / _aspect(row), row.tallest) for row in rows]
+    spare = min(_panel_space(row, width) - h * _aspect(row) for row, h in zip(rows, natural, strict=True))
+    heights = np.maximum(natural, _smallest_heights(rows)).tolist()
+    return (max(width - spare, legend_width), sum(heights) + fixed), heights
 
 
 def _legend_width(marks: Sequence[Any]) -> float:

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from .... import ConeCurve
-from ....base import DISTORTION, IntArray, plural, short_repr
+from ....base import CHECKER_CELLS, DISTORTION, DOTS_PER_INCH, IntArray, plural, short_repr
 from ....errors import OptionError
-from ....io import CELLS, check_cells
+from ....io import check_cells
 from ..from_uv import is_from_file
 from ..quantity import Quantity, check_color_map, conformal_distortion, curvature, stretch
 from .camera import Eye, eye_direction, view_aspect
 from .compose import Panel, Row, check_pixels, compose
 from .cone_marks import mark_handles
-from .model import DOTS_PER_INCH, draw_checker, draw_cone_curve, draw_cones, draw_curvature, draw_quantity
+from .model import draw_checker, draw_cone_curve, draw_cones, draw_curvature, draw_quantity
 from .uv_layout import draw_layout, fill_layout, layout_aspect
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class Look:
     eyes: Sequence[Eye] = ("front-right",)
     up: str = "y"
     colors: str | None = None
-    cells: float = CELLS
+    cells: float = CHECKER_CELLS
     color_charts: bool = False
     own: Quantity | None = None
     distortion: float = DISTORTION

@@ -6,8 +6,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from .... import ConeCurve
-from ....base import DISTORTION, FloatArray, IntArray
-from ....io import CELLS, cell_side
+from ....base import CHECKER_CELLS, DISTORTION, DOTS_PER_INCH, FloatArray, IntArray
+from ....io import cell_side
 from ..quantity import Quantity, curvature
 from .camera import Eye
 from .cone_marks import draw_cones_on_model, draw_seams_on_model, pixels_of
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from .... import Flattening
 
-DOTS_PER_INCH = 300.0
 """Resolution of pictures for print."""
 
 
@@ -28,7 +27,7 @@ def draw_checker(
     *,
     eye: Eye = "front-right",
     up: str = "y",
-    cells: float = CELLS,
+    cells: float = CHECKER_CELLS,
     seams: bool = True,
     cones: bool = False,
     dpi: float = DOTS_PER_INCH,

@@ -11,21 +11,21 @@ from .... import TriangleMesh
 from ....base import BoolArray, FloatArray, IntArray, mask_of
 from ....errors import ArrayShapeError, MeshError, OptionError
 from ....geometry import signed_double_areas
-from ....io import cell_side, split_at_seams
+from ....io import SplitMesh, cell_side, split_at_seams
 from ....mesh import end_corners, label_faces, point_seams
 from ..quantity import ColorScale, Quantity, angle_defects, conformal_distortion, stretch
 
 if TYPE_CHECKING:
     from .... import Flattening
 
-CELLS = 4095
+GRID_CELLS = 4095
 """Largest number of cells along an axis, so that the five indices of a cell fit into 60 bits."""
 
 
 def simplify(
     places: FloatArray, uv: FloatArray, faces: IntArray, fixed: BoolArray, max_triangles: int
 ) -> tuple[IntArray, IntArray]:
-    """Return a simplified mesh of at most `most` triangles: the (k,) faces that remain, and their (k, 3) new corners.
+    """Return the (k,) faces of a mesh that remain if it is simplified for display, and (k, 3) their corners.
 
     Points in the same cell of a grid, in space and in the plane, are merged into the one nearest to their mean. The
     points on outlines are not merged. Such a map of the points of a chart, the identity on its outline, covers the
@@ -52,7 +52,7 @@ def simplify(
     for _ in range(60):
         unmerged = fixed
         while True:
-            corners = _representatives(coordinates, unmerged, max(size, extent / CELLS))[faces]
+            corners = _representatives(coordinates, unmerged, max(size, extent / GRID_CELLS))[faces]
             remain = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
             folded = np.flatnonzero(remain)
             folded = folded[signed_double_areas(uv[corners[folded]]) * areas[folded] <= 0]
@@ -86,7 +86,7 @@ def _representatives(coordinates: FloatArray, fixed: BoolArray, size: float) -> 
     cells = np.floor(coordinates[free] / size).astype(np.int64)
     key = np.zeros(len(free), dtype=np.int64)
     for column in cells.T:
-        key = key * (CELLS + 1) + column
+        key = key * (GRID_CELLS + 1) + column
     _, cell = np.unique(key, return_inverse=True)
     cell = cell.reshape(-1)
     members = np.bincount(cell)
@@ -208,8 +208,8 @@ def content_of(
 
     Raises:
         ArrayShapeError: the result has no UVs, or no triangles.
-        MeshError: it cannot be reduced to `most` triangles.
-        OptionError: `most` is not positive.
+        MeshError: it cannot be reduced to `max_triangles`.
+        OptionError: `max_triangles` is not positive.
     """
     if max_triangles < 1:
         raise OptionError(f"most_triangles must be 1 or more, got {max_triangles}")
@@ -219,57 +219,99 @@ def content_of(
             f"{len(result.uv_faces):,} UV triangles"
         )
     split, model = split_at_seams(result), Model.of(result) if model is None else model
-    mesh_vertices, places = model.vertices, model.places
-    vertex = np.searchsorted(mesh_vertices, split.vertex)
+    vertex = np.searchsorted(model.vertices, split.vertex)
+    cone = np.searchsorted(model.vertices, result.cones)
     outline, seams = outline_halfedges(model.mesh, split.faces)
+    drawn = _drawn(split, model.places[vertex], vertex, cone, outline, max_triangles)
     chart = _charts(split.faces, split.uv)
     qc, scale = conformal_distortion(result), stretch(result)
-    flat_curvature = angle_defects(result, True, model.mesh)[mesh_vertices] / np.pi
-    cone = np.searchsorted(mesh_vertices, result.cones)
-
-    # Without simplification, every point and every vertex has a triangle.
-    shown, faces = np.arange(len(split.faces)), split.faces
-    points, vertices, point_vertex = np.arange(len(split.uv)), np.arange(len(mesh_vertices)), vertex
-    if len(shown) > max_triangles:
-        fixed = np.zeros(len(split.uv), dtype=bool)
-        for end in end_corners(outline):
-            fixed[split.faces.reshape(-1)[end]] = True
-        fixed |= np.isin(vertex, cone)
-        shown, corners = simplify(places[vertex], split.uv, split.faces, fixed, max_triangles)
-        # All triangles at outlines remain, because their third corner is not merged with the other two.
-        outline = 3 * np.searchsorted(shown, outline // 3) + outline % 3
-        points, faces = np.unique(corners, return_inverse=True)
-        vertices, point_vertex = np.unique(vertex[points], return_inverse=True)
+    flat_curvature = angle_defects(result, True, model.mesh)[model.vertices] / np.pi
     numbers = np.arange(len(result.vertices)) if result.vertex_origin is None else result.vertex_origin
     scales = _scales(qc, scale, model.curvature)
     if quantity is not None:
         colors = "diverging" if quantity.scale.low < 0 < quantity.scale.high else "sequential"
         scales = {"own": replace(quantity.scale, colors=colors), **scales}
-        quantity = replace(
-            quantity, values=quantity.values[shown if quantity.corners is None else mesh_vertices[vertices]]
-        )
+        rows = drawn.triangles if quantity.corners is None else model.vertices[drawn.vertices]
+        quantity = replace(quantity, values=quantity.values[rows])
     return Content(
         model=model,
-        places=places[vertices],
-        point_vertex=point_vertex.reshape(-1),
-        uv=split.uv[points],
+        places=model.places[drawn.vertices],
+        point_vertex=drawn.point_vertex,
+        uv=split.uv[drawn.points],
         uv_side=cell_side(split.uv, split.faces, 1.0),
-        faces=faces.reshape(-1, 3),
-        outline=outline,
+        faces=drawn.faces,
+        outline=drawn.outline,
         seams=seams,
-        chart=chart[shown],
-        qc=qc.values[shown],
-        area=scale.values[shown],
-        curvature=model.curvature[vertices],
-        flat=flat_curvature[vertices],
-        cones=np.searchsorted(vertices, cone),
+        chart=chart[drawn.triangles],
+        qc=qc.values[drawn.triangles],
+        area=scale.values[drawn.triangles],
+        curvature=model.curvature[drawn.vertices],
+        flat=flat_curvature[drawn.vertices],
+        cones=np.searchsorted(drawn.vertices, cone),
         cone_curvatures=result.curvatures,
-        vertex_numbers=numbers[mesh_vertices[vertices]],
-        face_numbers=shown,
-        left_out=len(split.faces) - len(shown),
+        vertex_numbers=numbers[model.vertices[drawn.vertices]],
+        face_numbers=drawn.triangles,
+        left_out=len(split.faces) - len(drawn.triangles),
         scales=scales,
         quantity=quantity,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """What a page draws of a cut mesh: everything, or a simplified mesh.
+
+    Attributes:
+        triangles: (m,) the triangles of the mesh that remain.
+        points, vertices: (u,), (v,) the points of the layout and the vertices of the model that remain.
+        point_vertex: (u,) index into `vertices` of each point.
+        faces: (m, 3) index into `points` of every corner.
+        outline: half-edges on the outlines of charts, as in `Content`.
+    """
+
+    triangles: IntArray
+    points: IntArray
+    vertices: IntArray
+    point_vertex: IntArray
+    faces: IntArray
+    outline: IntArray
+
+
+def _drawn(
+    split: SplitMesh,
+    places: FloatArray,
+    vertex: IntArray,
+    cones: IntArray,
+    outline: IntArray,
+    max_triangles: int,
+) -> _Drawn:
+    """Return what a page draws of a cut mesh.
+
+    Args:
+        split: the mesh.
+        places: (u, 3) positions of its vertices in the unit ball.
+        vertex: (u,) the vertex of the model of each.
+        cones: vertices of the model that must remain.
+        outline: half-edges on the outlines of charts.
+        max_triangles: largest number of triangles.
+
+    Raises:
+        MeshError: it cannot be reduced to `max_triangles`.
+    """
+    if len(split.faces) <= max_triangles:
+        # Every point and every vertex of the model has a triangle.
+        points, vertices = np.arange(len(split.uv)), np.arange(int(vertex.max()) + 1)
+        return _Drawn(np.arange(len(split.faces)), points, vertices, vertex, split.faces, outline)
+    fixed = np.zeros(len(split.uv), dtype=bool)
+    for end in end_corners(outline):
+        fixed[split.faces.reshape(-1)[end]] = True
+    fixed |= np.isin(vertex, cones)
+    triangles, corners = simplify(places, split.uv, split.faces, fixed, max_triangles)
+    # All triangles at outlines remain, because their third corner is not merged with the other two.
+    outline = 3 * np.searchsorted(triangles, outline // 3) + outline % 3
+    points, faces = np.unique(corners, return_inverse=True)
+    vertices, point_vertex = np.unique(vertex[points], return_inverse=True)
+    return _Drawn(triangles, points, vertices, point_vertex.reshape(-1), faces.reshape(-1, 3), outline)
 
 
 def _scales(qc: Quantity, area: Quantity, curvature: FloatArray) -> dict[str, ColorScale]:

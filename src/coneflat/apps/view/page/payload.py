@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ....base import CHECKER_CELLS
 from ....geometry import CREASE_COSINE, double_areas, edge_lengths
-from ....io import CELLS, Texture
+from ....io import Texture
 from ....mesh import end_corners
 from ..figures.camera import fit_camera
 from ..figures.kinds import title
@@ -61,7 +62,7 @@ class PageText:
 
     title: str
     rows: Sequence[tuple[str, str, str]]
-    squares: float = CELLS
+    squares: float = CHECKER_CELLS
 
 
 def as_payload(head: dict[str, Any], block: bytes) -> tuple[str, str]:
@@ -95,6 +96,7 @@ def head_and_block(
     quantity, arrays = content.quantity, _arrays(content)
     if picture is not None:
         arrays["picture"] = np.frombuffer(picture.content, dtype=np.uint8)
+    titles = TITLES if quantity is None else {**TITLES, "own": quantity.label}
     listed, block = pack(arrays)
     head = {
         "name": name,
@@ -114,10 +116,7 @@ def head_and_block(
         "sizes": _sizes(result, content),
         "squares": text.squares,
         "crease_cosine": CREASE_COSINE,
-        "scales": {
-            key: _plain_scale(TITLES[key] if quantity is None or key != "own" else quantity.label, scale)
-            for key, scale in content.scales.items()
-        },
+        "scales": {key: _plain_scale(titles[key], scale) for key, scale in content.scales.items()},
         "own": None if quantity is None else "faces" if quantity.corners is None else "vertices",
         "picture": None if picture is None else picture.kind,
         "show": show,

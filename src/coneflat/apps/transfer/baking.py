@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from ... import MeshFile, io
-from ...base import FloatArray, IntArray, Unmet, check_cancelled, unit_exponent, warns
+from ...base import BAKED_RESOLUTION, FloatArray, IntArray, Unmet, check_cancelled, unit_exponent, warns
 from ...errors import NonFiniteError, OptionError
 from ...geometry import fill_nearest, signed_double_areas, unit_vectors
 from ...geometry.nearest import TriangleTree
-from ...io import UVMesh, as_path, to_srgb
+from ...io import UVMesh, as_bytes, as_path, to_srgb
 from ...options import Number
 from ..view import Barycentrics, uv_flattening
 from .materials import BASE, NORMAL, UNLIT, Channel, Painted
@@ -86,7 +86,7 @@ def transfer(
     old: str | PathLike[str],
     new: str | PathLike[str],
     *,
-    resolution: int = 2048,
+    resolution: int = BAKED_RESOLUTION,
     texture: str | PathLike[str] | None = None,
 ) -> Baked:
     """Bake the colours of a model into the UVs of another model of the same shape.
@@ -197,7 +197,7 @@ def _bake(
                 values[:, :2] = 0.5 + np.einsum("qab,qb->qa", turns, values[:, :2] - 0.5)
             if channel.is_colour:
                 values[:, :3] = to_srgb(np.clip(values[:, :3], 0, 1))
-            image.reshape(-1, 4)[place] = np.round(255 * np.clip(values, 0, 1))
+            image.reshape(-1, 4)[place] = as_bytes(values)
     return images, farthest
 
 

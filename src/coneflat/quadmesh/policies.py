@@ -1,0 +1,408 @@
+"""Which grids are tried, and in which order, until one has quads that are a mesh.
+
+1. `on_coarse_mesh`: the grid of a simpler mesh, if the surface has very many triangles, holes or components.
+2. `finer_grid`: more squares, if some quads are degenerate.
+3. `components_apart`: a grid for each component.
+4. `other_cones`: costlier cones, then the fewest cones.
+5. `boundary_free`: a boundary that cuts squares, if it cannot lie on grid lines.
+
+Each returns a grid, or the reason why there is none. A single attempt is `grid_of_map`: from a seamless map by rounding
+(which may leave out lines, or double the number of squares, see `round_layout`) and extraction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from numbers import Real
+from typing import TypeAlias
+
+import numpy as np
+
+from ..base import THREADS, Unmet, limit_threads, plural
+from ..errors import ConvergenceError, GridError, OptionError
+from ..flattener import flatten_source
+from ..geometry import coarse_mesh, double_areas, edge_lengths
+from ..io import as_input
+from ..measures import unmet_guarantees
+from ..mesh.connectivity import TriangleMesh
+from ..options import declarations, read_options
+from ..result import Flattening
+from ..source import Source
+from .aligned_cones import aligned_flattening
+from .alignment import aligned
+from .extract import DegenerateQuads, find_quads
+from .features import without_pillows
+from .integer_map import IntegerGrid, joined_grids, with_note
+from .limits import COARSE_TRIANGLES
+from .no_grid import NoGrid, or_reason
+from .options import QUADS, QuadOptions, flattening_defaults
+from .quad_mesh import QuadMesh
+from .relaxing import GridGoal
+from .remesh import MAX_CORNERS, MAX_HOLES, area_of, filled_mesh, is_thin, manageable_parts, part_of, remeshed
+from .request import GridRequest
+from .round_layout import DOUBLINGS_BEFORE_OTHER_CONES, MAX_DOUBLINGS, RoundingRules, rounded_grid
+from .simpler_mesh import SimplerMesh
+from .sizes import extended, note_on_sizes
+
+# A surface is remeshed if more than this share of its triangles is thin, as in files of CAD programs: few grids are
+# found for such meshes.
+MAX_THIN_SHARE = 0.1
+# Largest number of new triangles for each thin one, in meshes of more than COARSE_TRIANGLES: the plane parts of a
+# surface are not better the finer they are.
+MAX_REFINEMENT = 100
+# How many sizes are tried, each with this factor more squares than the last; and the least useful factor.
+MAX_SIZES, GROWTH, MIN_GROWTH = 3, 1.6, 1.2
+# A grid of more squares whose squares would need sides smaller than this fraction of the requested ones is not refined,
+# since each attempt repeats the search.
+FINE_SQUARES, MIN_SIDE = 1000, 0.4
+# With fewer quads, a cone costs more than 1, in proportion.
+QUADS_AT_UNIT_PRICE = 2_000
+# Factors of the price of cones that are tried, the latter on meshes of few triangles, which are split for it.
+PRICE_FACTORS, MAX_SPLIT_TRIANGLES = (1.0, 4.0), COARSE_TRIANGLES // 6
+# With a lower Euler characteristic, so many holes and handles, costlier cones hardly ever help.
+MIN_EULER_FOR_OTHER_CONES = -24
+
+
+@dataclass(frozen=True, eq=False)
+class GridWithQuads:
+    """An integer grid, and its quads if they are asked for and the mesh is connected."""
+
+    grid: IntegerGrid
+    quad_mesh: QuadMesh | None = None
+
+    def with_note(self, note: str) -> GridWithQuads:
+        """Return the grid with one more note."""
+        return replace(self, grid=with_note(self.grid, note))
+
+
+@dataclass(frozen=True, eq=False)
+class SeamlessMap:
+    """A flattening with cones quantised to quarter turns, to be made into a grid.
+
+    Attributes:
+        flattening: the flattening.
+        requires_sides: all straight sides must be on grid lines.
+        is_aligned: its cones are chosen for its directions: sharp edges that are nearly along the axes are put on grid
+            lines, if possible.
+        note: a note on the choice of cones or of the boundary, or "".
+    """
+
+    flattening: Flattening
+    requires_sides: bool = False
+    is_aligned: bool = False
+    note: str = ""
+
+
+Outcome: TypeAlias = GridWithQuads | NoGrid
+#: Returns a flattening with aligned cones for a price of cones, and whether the mesh is split for them.
+AlignedFlattenings: TypeAlias = Callable[[float, bool], Flattening]
+
+
+def find_grid(request: GridRequest) -> Outcome:
+    """Return the grid that is asked for, with its quads, or the reason why there is none."""
+
+    @cache
+    def flattening_of(price: float, is_split: bool) -> Flattening:
+        return aligned_flattening(
+            request.checked, price, is_split, request.options, request.stages, request.sharp_angle,
+            request.scales, request.limit,
+        )  # fmt: skip
+
+    # Sizes with the same price of cones share a flattening.
+    return finer_grid(request, flattening_of)
+
+
+# -- 1. a coarse mesh
+
+
+def on_coarse_mesh(request: GridRequest) -> tuple[GridRequest, SimplerMesh | None]:
+    """Return the request for the grid of a simpler mesh, and this mesh.
+
+    The request is the given one if its options name vertices, or if the mesh has few triangles, holes and components.
+
+    Raises:
+        MeshError: the mesh cannot be flattened.
+        OptionError: sizes are not positive numbers.
+    """
+    if _names_vertices(request) or request.sharp_angle is not None or request.flattening:
+        return request, None
+    checked, mesh = request.checked, request.mesh
+    side = float(np.ldexp(request.size, checked.exponent))
+    is_manageable, walks, is_jagged = manageable_parts(mesh, side)
+    walks, is_jagged = (walks, is_jagged) if request.boundary == "auto" else ([], False)
+    part, part_vertices = part_of(mesh, is_manageable)
+    loops = [np.searchsorted(part_vertices, mesh.tails[walk]) for walk in walks]
+    filled, notes = filled_mesh(part, loops), list(checked.notes)
+    simple, vertex_origin, face_origin = _with_few_triangles(filled, side)
+    if simple is filled and is_manageable.all() and not (loops or is_jagged):
+        return request, None
+    if is_jagged:
+        request = replace(request, boundary="free")
+        notes.append(Unmet(f"The boundary cuts squares, because it has more than {MAX_CORNERS} corners."))
+    if loops:
+        notes.append(
+            f"Filled {plural(len(loops), 'hole')}: small ones, and those beyond the {MAX_HOLES} longest."
+        )
+    shared = part_vertices[vertex_origin[vertex_origin < len(part_vertices)]]
+    sizes = None if request.scales is None else np.exp(extended(-request.scales[shared], simple))
+    simple = simple.moved_to(np.ldexp(simple.vertices, -checked.exponent))
+    simpler = replace(
+        SimplerMesh.of(checked, request.size, request.limit),
+        mesh=simple,
+        vertex_origin=shared,
+        is_filling=face_origin >= len(part.faces),
+        notes=tuple(notes),
+    )
+    return replace(request, source=Source(as_input(simple)), sizes=sizes), simpler
+
+
+def _names_vertices(request: GridRequest) -> bool:
+    """Return whether options may name vertices: weights, and those that are not simple values."""
+    options = {**request.options, "boundary": request.boundary}
+    is_simple = all(
+        value is None or isinstance(value, (str, Real)) or callable(value) for value in options.values()
+    )
+    return not (is_simple and options.keys() <= declarations(QuadOptions).keys() - {"weights"})
+
+
+def _with_few_triangles(mesh: TriangleMesh, side: float) -> tuple[TriangleMesh, np.ndarray, np.ndarray]:
+    """Return a mesh of few triangles, not too thin, for quads with a length of their sides.
+
+    And the vertices and triangles of the given mesh that its own are; it is the given mesh if this is simple already.
+    """
+    quads = area_of(mesh) / side**2
+    count = COARSE_TRIANGLES * max(1.0, quads / QUADS)
+    simple, vertex_origin, face_origin = mesh, np.arange(len(mesh.vertices)), np.arange(len(mesh.faces))
+    if is_thin(mesh).mean() > MAX_THIN_SHARE and len(without_pillows(mesh).faces) == len(mesh.faces):
+        finest = min(count, max(COARSE_TRIANGLES, MAX_REFINEMENT * len(mesh.faces)))
+        simple, vertex_origin, face_origin = remeshed(
+            mesh, int(np.clip(4 * quads, COARSE_TRIANGLES // 6, finest))
+        )
+    if len(simple.faces) > 2 * count:
+        simple, vertex_origin, face_origin = coarse_mesh(mesh, int(count))
+    return simple, vertex_origin, face_origin
+
+
+# -- 2. a finer grid
+
+
+def finer_grid(request: GridRequest, flattening_of: AlignedFlattenings) -> Outcome:
+    """Return a grid, with more squares if some quads of one of the requested size are degenerate.
+
+    This is so where the surface is as thin as a square. If no finer grid is found, the coarse one is the reason.
+    """
+    coarsest = None
+    for _ in range(MAX_SIZES):
+        outcome = grid_of_size(request, flattening_of)
+        if isinstance(outcome, GridWithQuads):
+            if coarsest is None:
+                return outcome
+            return outcome.with_note(Unmet("More quads than requested: with fewer, some are degenerate."))
+        coarsest = coarsest or outcome
+        finer = None if outcome.coarse_grid is None else _with_more_squares(request, outcome.coarse_grid)
+        if finer is None:
+            break
+        request = finer
+    assert coarsest is not None
+    return coarsest
+
+
+def _with_more_squares(request: GridRequest, grid: IntegerGrid) -> GridRequest | None:
+    """Return the request for more squares than those of a grid; None if these would be too many or hardly more."""
+    squares = grid.squares
+    more_squares = min(max(GROWTH * squares, 32.0), request.limit.squares)
+    size = request.extent / float(np.sqrt(more_squares))
+    is_fine = squares > FINE_SQUARES and size < MIN_SIDE * request.size
+    return None if more_squares < MIN_GROWTH * squares or is_fine else replace(request, size=size)
+
+
+def grid_of_size(request: GridRequest, flattening_of: AlignedFlattenings) -> Outcome:
+    """Return a grid of the requested size: that of a given flattening, of components, or of cones to be chosen."""
+    if request.flattening:
+        return grid_of_map(request, SeamlessMap(request.flattening))
+    if not request.leaves_cones_open:
+        if request.sizes is not None:
+            raise OptionError("sizes cannot be combined with options of cones, boundaries or weights")
+        return boundary_free(request)
+    if request.mesh.components[0] > 1:
+        return components_apart(request)
+    return other_cones(request, flattening_of)
+
+
+# -- 3. components apart
+
+
+def components_apart(request: GridRequest) -> Outcome:
+    """Return the grid of the components, each with a search of its own.
+
+    One that needs a finer grid, or that has none, thus does not change those of the others. On human.obj, five
+    components, 3,000 quads become 3,099 in half the time; 12,040 if all are rounded together.
+    """
+    checked, grids, reasons = request.checked, list[IntegerGrid](), list[str]()
+    mesh, grow = checked.mesh, np.exp2(-checked.exponent)
+    scales = np.zeros(len(mesh.vertices)) if request.scales is None else request.scales
+    areas = double_areas(edge_lengths(mesh.vertices, mesh.faces))
+    of_face = scales[mesh.faces].mean(axis=1)
+    for part, vertices, faces in mesh.split_components():
+        if not areas[faces].any():  # nothing of a component without area can be seen
+            continue
+        # The mean of the log scale on the component, relative to that on all components.
+        mean = np.average(of_face[faces], weights=areas[faces]) - np.average(of_face, weights=areas)
+        outcome = find_grid(
+            replace(
+                request,
+                source=Source(as_input(part.moved_to(grow * part.vertices))),
+                size=request.size * float(np.exp(-mean)),
+                sizes=None if request.sizes is None else np.exp(-scales[vertices]),
+            )
+        )
+        if isinstance(outcome, GridWithQuads):
+            grids.append(outcome.grid)
+        elif outcome.coarse_grid is not None:  # its degenerate quads are left out
+            grids.append(outcome.coarse_grid)
+        else:
+            count = plural(len(part.faces), "triangle")
+            reasons.append(Unmet(f"No grid for a component of {count}: {outcome.reason}."))
+        if excess := request.limit.excess(sum(grid.squares for grid in grids)):
+            return NoGrid(GridError(excess))
+    if not grids:
+        reason = reasons[0] if reasons else "they have no area."
+        return NoGrid(GridError(f"no grid was found for any of {mesh.components[0]} components: {reason}"))
+    return GridWithQuads(joined_grids(grids, (*checked.notes, *reasons)))
+
+
+# -- 4. other cones
+
+
+def other_cones(request: GridRequest, flattening_of: AlignedFlattenings) -> Outcome:
+    """Return a grid of a connected mesh whose cones are aligned; if there is none, one with other cones.
+
+    On a coarse mesh that is split, costlier cones are different ones, for which there may be a grid. Where rotations
+    are not reached, other cones hardly ever help, and each metric takes long.
+    """
+    failures = list[NoGrid]()
+    has_many_loops = request.mesh.euler_characteristic < MIN_EULER_FOR_OTHER_CONES
+    is_small = len(request.mesh.faces) <= MAX_SPLIT_TRIANGLES
+    for price_factor in PRICE_FACTORS if is_small and not has_many_loops else PRICE_FACTORS[:1]:
+        outcome = grid_of_map(request, aligned_map(request, price_factor, flattening_of))
+        if isinstance(outcome, GridWithQuads):
+            return outcome
+        is_far = isinstance(outcome.error, ConvergenceError)
+        if (outcome.coarse_grid is not None and request.sizes is not None) or (is_far and has_many_loops):
+            return outcome
+        failures.append(outcome)
+        if is_far:
+            break
+    directions = "the boundary, sharp edges or curvature" + ", nor for requested sizes" * (
+        request.sizes is not None
+    )
+    note = Unmet(
+        f"Cones are not chosen for {directions}, because no grid with such cones was found: {failures[-1].reason}."
+    )
+    outcome = grid_of_map(request, flattened_map(request, note=note))
+    if isinstance(outcome, GridWithQuads):
+        return outcome
+    return next((failure for failure in failures if failure.coarse_grid is not None), outcome)
+
+
+# -- 5. a free boundary
+
+
+def boundary_free(request: GridRequest) -> Outcome:
+    """Return a grid with the fewest cones, or given ones, whose boundary lies on grid lines if possible."""
+    may_be_straight = request.boundary == "auto" and isinstance(request.options.get("cones", "auto"), str)
+    if not (may_be_straight and request.mesh.is_boundary_edge.any()):
+        return grid_of_map(request, flattened_map(request))
+    outcome = grid_of_map(request, flattened_map(request, "straight", requires_sides=True))
+    if isinstance(outcome, GridWithQuads) or outcome.coarse_grid is not None:
+        return outcome
+    note = Unmet(
+        f"The boundary cuts squares, because no grid with the boundary on grid lines was found: {outcome.reason}."
+    )
+    return grid_of_map(request, flattened_map(request, note=note))
+
+
+# -- one attempt: cones, seamless map, rounding, extraction
+
+
+@or_reason
+def aligned_map(request: GridRequest, price_factor: float, flattening_of: AlignedFlattenings) -> SeamlessMap:
+    """Return the map of a connected mesh whose cones are chosen for even sizes and its directions.
+
+    price_factor: factor of the price of cones.
+    """
+    price = price_factor * max(1.0, QUADS_AT_UNIT_PRICE * (request.size / request.extent) ** 2)
+    # With costlier cones the mesh is split, for more places for them.
+    return SeamlessMap(flattening_of(price, price_factor > 1), requires_sides=True, is_aligned=True)
+
+
+@or_reason
+def flattened_map(
+    request: GridRequest, boundary: str = "", requires_sides: bool = False, note: str = ""
+) -> SeamlessMap:
+    """Return the map with the fewest cones, or given ones.
+
+    Args:
+        request: the grid that is asked for.
+        boundary: the boundary; "" for that of the options, by default free.
+        requires_sides: all straight sides must be on grid lines.
+        note: a further note, or "".
+    """
+    requested = "free" if request.boundary == "auto" else request.boundary
+    options = {**request.options, "boundary": boundary or requested}
+    request.stages.done = 0.0
+    with request.stages("flatten"):
+        flattening = flatten_source(request.source, read_options({**flattening_defaults(options), **options}))
+    return SeamlessMap(flattening, requires_sides, note=note)
+
+
+def grid_of_map(request: GridRequest, seamless: SeamlessMap | NoGrid) -> Outcome:
+    """Return the grid of a seamless map, with its quads if they are asked for."""
+    grid = seamless if isinstance(seamless, NoGrid) else rounded_map(request, seamless)
+    if isinstance(grid, NoGrid):
+        return grid
+    return extracted(request, grid) if request.for_quads else GridWithQuads(grid)
+
+
+@or_reason
+def rounded_map(request: GridRequest, seamless: SeamlessMap) -> IntegerGrid | NoGrid:
+    """Return the grid of a seamless map, with all notes."""
+    flattening = seamless.flattening
+    request.stages.done = 1.0
+    with request.stages("grid"), limit_threads(flattening.settings.get("threads", THREADS)):
+        layout = aligned(flattening, request.size, request.angle)
+        request.limit.check_cones(layout.node_quarters)
+        follows_lines = seamless.is_aligned or request.sharp_angle is not None
+        # Rather than many more squares than requested, a grid with other cones is searched.
+        may_change_cones = seamless.is_aligned and request.sharp_angle is None
+        rules = RoundingRules(
+            goal=GridGoal(request.energy, request.limit),
+            has_sides=flattening.settings.get("boundary") == "straight",
+            requires_sides=seamless.requires_sides,
+            sharp_angle=request.angle if follows_lines else None,
+            requires_lines=request.sharp_angle is not None,
+            doublings=DOUBLINGS_BEFORE_OTHER_CONES if may_change_cones else MAX_DOUBLINGS,
+        )
+        grid = rounded_grid(layout, rules)
+    if isinstance(grid, NoGrid):
+        return grid
+    if flattening is not request.flattening:
+        # Unmet guarantees of the map do not apply to the grid.
+        unmet = unmet_guarantees(flattening)
+        notes = (note for note in flattening.notes if note not in unmet)
+        grid = with_note(replace(grid, notes=(*notes, *grid.notes)), seamless.note)
+    if seamless.is_aligned and request.scales is not None:
+        grid = with_note(grid, note_on_sizes(grid, request.scales))
+    return grid
+
+
+@or_reason
+def extracted(request: GridRequest, grid: IntegerGrid) -> Outcome:
+    """Return a grid with its quads; if these are degenerate, it is the coarse grid of the reason."""
+    with request.stages("extract"):
+        quads = find_quads(grid)
+    if isinstance(quads, DegenerateQuads):
+        return NoGrid(GridError(quads.reason), coarse_grid=grid)
+    return GridWithQuads(grid, quads)
