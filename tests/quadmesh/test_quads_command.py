@@ -76,7 +76,7 @@ def test_the_mesh_is_read_and_checked_once(tmp_path, monkeypatch, ball, options)
     for module, name in (
         ("io.packages", "triangulate"),
         ("io.packages", "read_mesh"),
-        ("source.components", "check_mesh"),
+        ("source.preparation", "check_mesh"),
     ):
         module = import_module(f"coneflat.{module}")
         monkeypatch.setattr(module, name, counted(name, getattr(module, name)))

@@ -16,7 +16,7 @@ from ... import __version__
 from ...io import atomic_write, checked_target
 from ...options import Options
 from ...quadmesh import QUADS, QuadOptions
-from ...textures.options import UnwrapOptions
+from ...textures import UnwrapOptions
 from ..controls import controls_of
 
 #: The options of each command.

@@ -12,7 +12,7 @@ import click
 
 from ...base import plural, printable
 from ...options import FORMATS, Options, declarations, read_options
-from ...textures.options import MAX_ENERGY, TextureOptions, UnwrapOptions
+from ...textures import MAX_ENERGY, TextureOptions, UnwrapOptions
 from .flags import (
     GroupedCommand,
     check_combinations,
