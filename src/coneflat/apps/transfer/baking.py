@@ -29,7 +29,7 @@ TEXELS_AT_ONCE = 2**18
 #: Largest side of a texture: that of most graphics cards.
 MAX_RESOLUTION = 16384
 #: Distance of the models, as a fraction of the diagonal, from which on a note reports it: above the error of 32 bits.
-FAR = 0.01
+NOTED_DISTANCE = 0.01
 ENDINGS = (".glb", ".png")
 #: Attributes and extensions of primitives that the material replaces: vertex colours are in the image; tangents may be
 #: those of other UVs, and viewers compute them; compressed copies contain both.
@@ -134,7 +134,7 @@ def transfer(
         notes.append(
             Unmet(f"UVs overlap: {twice:,} texels are in several triangles, and show the first of them.")
         )
-    if farthest > FAR:
+    if farthest > NOTED_DISTANCE:
         notes.append(
             Unmet(f"The models differ: points are up to {farthest:.1%} of the size from the old surface.")
         )
