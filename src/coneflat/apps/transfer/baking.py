@@ -17,8 +17,7 @@ from scipy.ndimage import distance_transform_edt
 from ... import MeshFile, io
 from ...base import BAKED_RESOLUTION, FloatArray, IntArray, Unmet, check_cancelled, unit_exponent, warns
 from ...errors import NonFiniteError, OptionError
-from ...geometry import fill_nearest, signed_double_areas, unit_vectors
-from ...geometry.nearest import TriangleTree
+from ...geometry import TriangleTree, fill_nearest, signed_double_areas, unit_vectors
 from ...io import UVMesh, as_bytes, as_path, to_srgb
 from ...options import Number
 from ..view import Barycentrics, uv_flattening
