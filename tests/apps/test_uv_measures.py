@@ -7,10 +7,10 @@ import math
 
 import numpy as np
 import pytest
-import reference
+import reference_measures
 import shapes
 from click.testing import CliRunner
-from scenes import SceneMaker
+from gltf_scenes import SceneMaker
 
 import coneflat
 from coneflat import MeshFile, errors, measure_uv
@@ -30,7 +30,7 @@ def written(folder, text, name="a.obj"):
 
 def agree(path):
     """Compare the report with measures by their definitions, and return it."""
-    ours, theirs = measure_uv(path).report(), reference.measures(*reference.read_obj(path))
+    ours, theirs = measure_uv(path).report(), reference_measures.measures(*reference_measures.read_obj(path))
     for name, value in theirs.items():
         # Overlap by definition counts pixels.
         tolerance = {"abs": 0.01} if name == "overlap" else {"rel": 1e-9, "abs": 1e-12}

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 from command import command
-from scenes import SceneMaker, opened, rich_scene
+from gltf_scenes import SceneMaker, opened, rich_scene
 from trials.attributes import glb_rows, read_ply
 
 import coneflat

@@ -7,7 +7,7 @@ import struct
 import numpy as np
 import pytest
 import shapes
-from scenes import SceneMaker, opened, rich_scene
+from gltf_scenes import SceneMaker, opened, rich_scene
 from trials.offsets import READERS
 
 import coneflat

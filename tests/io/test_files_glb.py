@@ -7,7 +7,7 @@ import struct
 
 import numpy as np
 import pytest
-from scenes import PNG, SceneMaker, corners_of, opened, rich_scene
+from gltf_scenes import PNG, SceneMaker, corners_of, opened, rich_scene
 from shapes import sphere
 
 import coneflat

@@ -13,7 +13,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 import shapes
-from scenes import SceneMaker, opened, rich_scene
+from gltf_scenes import SceneMaker, opened, rich_scene
 
 import coneflat
 from coneflat.errors import ConeflatError, MeshFileError

@@ -8,7 +8,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 import shapes
-from bars import cut_bar, read_bar
+from full_obj import cut_bar, read_bar
 
 import coneflat
 from coneflat.errors import ConeflatError, MeshFileError, UnknownFormatError

@@ -9,8 +9,8 @@ from io import BytesIO
 import numpy as np
 import pytest
 import shapes
-from bars import OBJ, POINTS, cut_bar, flattening, read_bar
-from scenes import opened
+from full_obj import OBJ, POINTS, cut_bar, flattening, read_bar
+from gltf_scenes import opened
 
 import coneflat
 from coneflat.errors import MeshFileError, OptionError

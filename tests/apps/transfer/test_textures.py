@@ -7,7 +7,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 from command import command
-from scenes import SceneMaker
+from gltf_scenes import SceneMaker
 
 import coneflat
 from coneflat import errors

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapes
 from command import command
-from drawing import groups, pixels
+from figure_contents import groups, pixels
 
 import coneflat
 from coneflat.errors import OptionError

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapes
-from drawing import BLACK, RED, SVG, axes_of, count_dots, enclosed, groups, polygons, shown_at
+from figure_contents import BLACK, RED, SVG, axes_of, count_dots, enclosed, groups, polygons, shown_at
 
 import coneflat
 
