@@ -28,7 +28,7 @@ from structure import (
 NAMES = module_paths()
 #: Applications that set up the others, and packages whose modules applications may import.
 FRONT = ("apps.warm_up", "apps.blender", "apps.cli", "apps.studio")
-SHARED = ("textures", "geometry.nearest")
+SHARED = ("textures",)
 #: The most levels of the packages of the core.
 LEVELS = 10
 
