@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,9 @@ from .cross_field import SHARP_ANGLE
 from .features import vertex_graph
 from .quad_mesh import QuadMesh, opposite_sides
 
+# Vertices are on a boundary if they are nearer than this fraction of the longest edge.
+TOUCHING = 1e-9
+
 
 def with_borders(quads: QuadMesh) -> QuadMesh:
     """Return a quad mesh with a further layer of quads between each of its boundaries and that of the surface.
@@ -22,38 +26,27 @@ def with_borders(quads: QuadMesh) -> QuadMesh:
     correspond, because quads are missing at thin parts or cover a hole.
     """
     mesh, count = quads.surface, len(quads.vertices)
-    loops = mesh.boundary_walks()
-    loop_of, place = np.full((2, len(mesh.vertices)), -1)
-    for number, loop in enumerate(loops):
-        loop_of[mesh.tails[loop]], place[mesh.tails[loop]] = number, np.arange(len(loop))
-    graph, border = vertex_graph(mesh), np.flatnonzero(mesh.is_boundary_vertex)
-    away, _, source = dijkstra(graph, indices=border, return_predecessors=True, min_only=True)
+    nearest_loop, longest_edge = _loop_finder(quads), vertex_graph(mesh).max()
+    layers, faces, weights, joined_loops, missing = (
+        [quads.quads], [quads.faces], [quads.barycentric], set[int](), 0,
+    )  # fmt: skip
     tails, heads = quads.quads.ravel(), np.roll(quads.quads, -1, axis=1).ravel()
-    alone = opposite_sides(quads.quads) < 0
-    layers, faces, weights, taken, missing = [quads.quads], [quads.faces], [quads.barycentric], [-1], 0
-    for walk in _walks(tails[alone], heads[alone]):
-        points, corners = quads.vertices[walk], mesh.faces[quads.faces[walk]]
-        ways = np.linalg.norm(mesh.vertices[corners] - points[:, None], axis=2) + away[corners]
-        nearest = source[corners[np.arange(len(walk)), np.argmin(ways, axis=1)]]
-        loop = loops[number := int(np.bincount(loop_of[nearest]).argmax())]
+    is_alone = opposite_sides(quads.quads) < 0
+    for walk in _walks(tails[is_alone], heads[is_alone]):
+        number, loop, edge = nearest_loop(walk)
         starts = mesh.vertices[mesh.tails[loop]]
         steps = mesh.vertices[mesh.heads[loop]] - starts
-        at, off = _places_along(points, np.minimum(place[nearest], len(loop) - 1), starts, steps)
-        is_there = off.max() <= 1e-9 * graph.max()
-        if at is None or is_there or number in taken:
+        at, distances = _places_along(quads.vertices[walk], edge, starts, steps)
+        is_there = distances.max() <= TOUCHING * longest_edge
+        if at is None or is_there or number in joined_loops:
             missing += not is_there
             continue
-        taken.append(number)
-        ends = np.cumsum(np.sqrt(dots(steps, steps)))
-        edge = np.minimum(np.searchsorted(ends, at, side="right"), len(loop) - 1)
-        share = np.clip(1 - (ends[edge] - at) / np.sqrt(dots(steps, steps))[edge], 0, 1)[:, None]
-        side = loop[edge] % 3
+        joined_loops.add(number)
+        faces_on, weights_on = _on_loop(loop, at, steps)
         outer, count = count + np.arange(len(walk)), count + len(walk)
         layers.append(np.stack([np.roll(walk, -1), walk, outer, np.roll(outer, -1)], axis=1))
-        faces.append(loop[edge] // 3)
-        weights.append(
-            (1 - share) * np.eye(3)[np.take(NEXT, side)] + share * np.eye(3)[np.take(PREVIOUS, side)]
-        )
+        faces.append(faces_on)
+        weights.append(weights_on)
     on, barycentric = np.concatenate(faces), np.concatenate(weights)
     points = np.einsum("qi,qix->qx", barycentric, mesh.vertices[mesh.faces[on]])
     bordered = replace(
@@ -63,6 +56,45 @@ def with_borders(quads: QuadMesh) -> QuadMesh:
         return bordered
     note = f"A layer of quads along the boundary replaces {plural(quads.left_out, 'square')} that it cuts."
     return replace(bordered, left_out=0, area_left_out=0.0, notes=(*quads.notes, note))
+
+
+def _loop_finder(quads: QuadMesh) -> Callable[[IntArray], tuple[int, IntArray, IntArray]]:
+    """Return a function that finds the boundary of the surface nearest to a walk along one of the quads.
+
+    It returns the number of the boundary, its half-edges, and the index among these of the nearest to each vertex.
+    """
+    mesh, loops = quads.surface, quads.surface.boundary_walks()
+    loop_of, place = np.full((2, len(mesh.vertices)), -1)
+    for number, loop in enumerate(loops):
+        loop_of[mesh.tails[loop]], place[mesh.tails[loop]] = number, np.arange(len(loop))
+    border = np.flatnonzero(mesh.is_boundary_vertex)
+    away, _, source = dijkstra(vertex_graph(mesh), indices=border, return_predecessors=True, min_only=True)
+
+    def nearest_loop(walk: IntArray) -> tuple[int, IntArray, IntArray]:
+        corners = mesh.faces[quads.faces[walk]]
+        ways = np.linalg.norm(mesh.vertices[corners] - quads.vertices[walk][:, None], axis=2) + away[corners]
+        nearest = source[corners[np.arange(len(walk)), np.argmin(ways, axis=1)]]
+        number = int(np.bincount(loop_of[nearest]).argmax())
+        return number, loops[number], np.minimum(place[nearest], len(loops[number]) - 1)
+
+    return nearest_loop
+
+
+def _on_loop(loop: IntArray, at: FloatArray, steps: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return (k,) the triangles and (k, 3) the barycentric coordinates of positions along a boundary.
+
+    Args:
+        loop: (b,) its half-edges.
+        at: (k,) positions, in units of length.
+        steps: (b, 3) the vectors of the edges.
+    """
+    lengths = np.sqrt(dots(steps, steps))
+    ends = np.cumsum(lengths)
+    edge = np.minimum(np.searchsorted(ends, at, side="right"), len(loop) - 1)
+    share = np.clip(1 - (ends[edge] - at) / lengths[edge], 0, 1)[:, None]
+    side = loop[edge] % 3
+    weights = (1 - share) * np.eye(3)[np.take(NEXT, side)] + share * np.eye(3)[np.take(PREVIOUS, side)]
+    return loop[edge] // 3, weights
 
 
 def _walks(tails: IntArray, heads: IntArray) -> list[IntArray]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...options import ConeBounds, ConeNumber, declarations, read_options
-from ...quadmesh.options import QuadOptions
+from ...quadmesh import QuadOptions
 from .flags import (
     GroupedCommand,
     input_options,
@@ -71,7 +71,7 @@ def quads(
     from ... import integer_grid, measure_quads
     from ... import quads as find_quads
     from ...io import read_joined
-    from ...quadmesh.files import quads_left_out, read_grid
+    from ...quadmesh import quads_left_out, read_grid
     from .run import Console, require_distinct, write_report
 
     _check_combinations(context, mesh)
@@ -117,7 +117,7 @@ def quads(
 def _checked_files(flags: QuadFlags) -> dict[str, Path | None]:
     """Return the files to write by role; errors that writing would raise are reported before the work starts."""
     from ...io import check_target
-    from ...quadmesh.files import check_grid_output, check_quads_output
+    from ...quadmesh import check_grid_output, check_quads_output
     from ..view import check_page
 
     files = {"output": flags.output, "grid": flags.grid, "view": flags.view, "report": flags.report}

@@ -83,7 +83,7 @@ def quads_file(source: Joined, choices: Choices, count: int, ending: str, report
         report: called like `progress` of `coneflat.flatten`.
     """
     from ... import quads
-    from ...quadmesh.files import write_quads_stream
+    from ...quadmesh import write_quads_stream
 
     words = choices.with_search().keywords()
     options = {name: words[name] for name in QUAD_OPTIONS if name in words}
