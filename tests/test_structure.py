@@ -26,9 +26,8 @@ from structure import (
 )
 
 NAMES = module_paths()
-#: Applications that set up the others, and packages whose modules applications may import.
+#: Applications that set up the others.
 FRONT = ("apps.warm_up", "apps.blender", "apps.cli", "apps.studio")
-SHARED = ("textures",)
 #: The most levels of the packages of the core.
 LEVELS = 10
 
@@ -59,6 +58,12 @@ def test_entry_points_are_functions_of_the_package():
         assert callable(getattr(import_module(f"coneflat.{module}"), name)), target
 
 
+def test_no_module_has_the_name_of_a_public_function():
+    """Importing such a module would replace the function as attribute of the package."""
+    modules = {name.split(".")[0] for name in NAMES}
+    assert modules & {*coneflat.__all__} == {"errors"}
+
+
 @pytest.mark.parametrize("stage", STAGES)
 def test_stages_stand_side_by_side(stage: str):
     assert imported_packages(read_modules())[stage] & {*STAGES, "options", "flattening"} == set()
@@ -69,9 +74,7 @@ def test_applications_import_what_packages_export(name: str):
     module = read_modules()[name]
     imported = module.imports | module.late_imports
     assert {
-        module_name
-        for module_name in imported
-        if is_core(module_name) and module_name.count(".") > 0 and not module_name.startswith(SHARED)
+        module_name for module_name in imported if is_core(module_name) and module_name.count(".") > 0
     } == set()
     if not name.startswith("apps.view"):
         assert {module_name for module_name in imported if module_name.startswith("apps.view.")} == set()
