@@ -40,7 +40,7 @@ def unwrap_mesh(
     """Unwrap a mesh with random options, beside fixed ones."""
     import coneflat
     from coneflat.options import declarations
-    from coneflat.textures.options import UnwrapOptions
+    from coneflat.textures import UnwrapOptions
 
     drawn = make_options(rng, vertices, faces)
     options = {name: value for name, value in drawn.items() if name in declarations(UnwrapOptions)} | fixed

@@ -18,7 +18,7 @@ from .geometry import double_areas
 from .geometry.operators import area_distortion, weighted_areas
 from .io.packages import as_input
 from .options import CurveOptions, FindOptions, Options, read_options, takes
-from .source.components import Component, Source
+from .source import Component, Source
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,7 +25,7 @@ from .metric import find_metric as conformal_metric
 from .options import Options, read_options, takes
 from .result import Flattening
 from .retries import cut_along_sharp_edges, finish_within_bound, lay_out_components
-from .source.components import Component, Prepared, Source
+from .source import Component, Prepared, Source
 from .source.copies import find_copies
 from .stages import Layout, RelaxSpec
 

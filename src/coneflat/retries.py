@@ -25,7 +25,7 @@ from .groups import ComponentProgress, groups_of_small
 from .mesh.connectivity import TriangleMesh
 from .optimise import mean_qc
 from .options import Options
-from .source.components import Component, Prepared, Source
+from .source import Component, Prepared, Source
 from .stages import Layout
 
 # Largest number of cone searches per component.

@@ -1,9 +1,10 @@
 """Preparation of the input: connected parts, each with the specification of its cones, metric and seams."""
 
-from .components import Component, Prepared, Source
+from .components import Component, Prepared
 from .constraints import vertex_numbers
 from .copies import find_copies
 from .input_mesh import at_unit_size, result_numbering
+from .preparation import Source
 from .rounding import rounding_notes
 
 __all__ = [

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from ..atlas import Packed, pack_charts, round_safely
-from ..base import FloatArray, IntArray, Unmet, plural
+from ..atlas import pack_charts, round_safely
+from ..base import BoolArray, FloatArray, IntArray, Unmet, plural
 from ..errors import ConeflatError, OptionError
 from ..geometry import as_pairs, edge_lengths, signed_double_areas
 from ..io import stored_in_glb
 from ..mesh import EdgeGroups, end_corners, glue_layers, label_faces, split_vertices, weld
 from ..optimise import rest_sides
 from ..options import read_options
+from ..result import Flattening
 from .options import MAX_RESOLUTION, UnwrapOptions
 from .unwrapping import unwrap
 
@@ -54,51 +56,74 @@ def unwrap_soup(vertices: FloatArray, faces: IntArray, **options: Any) -> Unwrap
     Raises:
         OptionError: an option is invalid, or the padding leaves no space for charts.
     """
-    o = read_options(options, UnwrapOptions)
-    corner_uv, chart = np.zeros((len(faces), 3, 2)), np.full(len(faces), -1)
+    parsed = read_options(options, UnwrapOptions)
     first, place = weld(vertices)
-    a, b, c = place[faces].T
-    is_face = (a != b) & (b != c) & (c != a) & np.isfinite(vertices[faces]).all(axis=(1, 2))
-    chosen = np.flatnonzero(is_face)
-    left_out, notes = len(faces) - len(chosen), list[str]()
-    if left_out:
-        notes.append(Unmet(f"{plural(left_out, 'face')} without area: the UVs of each are one point."))
+    has_area = _has_three_places(place[faces]) & np.isfinite(vertices[faces]).all(axis=(1, 2))
+    chosen = np.flatnonzero(has_area)
+    dropped = len(faces) - len(chosen)
+    notes = (
+        [Unmet(f"{plural(dropped, 'face')} without area: the UVs of each are one point.")] if dropped else []
+    )
     if not len(chosen):
-        return UnwrappedSoup(corner_uv, chart, 0.0, 0.0, o.resolution, tuple(notes))
-    origin, corner = _oriented(vertices[first], place[faces[chosen]])
+        empty = UnwrappedSoup(np.zeros((0, 3, 2)), chosen, 0.0, 0.0, parsed.resolution, ())
+        return _among(empty, chosen, len(faces), notes)
+    origin, corners = _oriented(vertices[first], place[faces[chosen]])
     points = vertices[first[origin]]
     try:
-        result = unwrap(points, corner, repair=True, **options)
+        result = unwrap(points, corners, repair=True, **options)
     except OptionError:
         raise
     except ConeflatError as error:
         notes.append(Unmet(f"Each face is a chart of its own: {error}."))
-        packed, resolution = _packed_separately(points, corner, o)
-        corner_uv[chosen], chart[chosen] = packed.corner_uv, np.arange(len(chosen))
-        return UnwrappedSoup(corner_uv, chart, packed.efficiency, packed.scale, resolution, tuple(notes))
+        return _among(_packed_separately(points, corners, parsed), chosen, len(faces), notes)
     assert result.face_origin is not None
-    unwrapped = chosen[result.face_origin]
-    # Where charts touch themselves, rounding to single precision may make overlaps.
+    return _among(_rounded(result), chosen[result.face_origin], len(faces), notes)
+
+
+def _has_three_places(places: IntArray) -> BoolArray:
+    """Return (m,) whether the three corners of faces are at different places."""
+    a, b, c = places.T
+    return (a != b) & (b != c) & (c != a)
+
+
+def _among(soup: UnwrappedSoup, faces: IntArray, count: int, notes: Sequence[str]) -> UnwrappedSoup:
+    """Return the UVs of `count` faces from those of some of them, (k,) `faces`; the others get a point.
+
+    notes: those of the whole, before those of the soup.
+    """
+    corner_uv, chart = np.zeros((count, 3, 2)), np.full(count, -1)
+    corner_uv[faces], chart[faces] = soup.corner_uv, soup.chart
+    return replace(soup, corner_uv=corner_uv, chart=chart, notes=(*notes, *soup.notes))
+
+
+def _rounded(result: Flattening) -> UnwrappedSoup:
+    """Return the UVs of a result, rounded to single precision.
+
+    Where charts touch themselves, this may make overlaps, which notes report.
+    """
     uv, overlaps = round_safely(result.uv, result.uv_faces, stored_in_glb)
-    notes.extend(result.notes)
+    notes = list(result.notes)
     if len(overlaps.pairs) > result.distortion.overlapping_pairs:
         count = plural(len(overlaps.pairs), "pair")
         notes.append(Unmet(f"{count} of triangles overlap in single precision."))
     flipped = int(np.count_nonzero(signed_double_areas(uv[result.uv_faces]) < 0))
     if flipped > result.distortion.flipped:
         notes.append(Unmet(f"{plural(flipped, 'triangle is', 'triangles are')} flipped in single precision."))
-    corner_uv[unwrapped], chart[unwrapped] = uv[result.uv_faces], label_faces(result.uv_faces, len(uv))[1]
-    resolution = result.settings["resolution"]
     return UnwrappedSoup(
-        corner_uv, chart, result.packing_efficiency, result.uv_scale, resolution, tuple(notes)
+        uv[result.uv_faces],
+        label_faces(result.uv_faces, len(uv))[1],
+        result.packing_efficiency,
+        result.uv_scale,
+        result.settings["resolution"],
+        tuple(notes),
     )
 
 
-def _packed_separately(points: FloatArray, corner: IntArray, options: UnwrapOptions) -> tuple[Packed, int]:
-    """Return the packing of faces (m, 3), each as a chart, and its resolution."""
-    sides = rest_sides(edge_lengths(points, corner))
+def _packed_separately(points: FloatArray, corners: IntArray, options: UnwrapOptions) -> UnwrappedSoup:
+    """Return the UVs of faces (m, 3), each as a chart."""
+    sides = rest_sides(edge_lengths(points, corners))
     flat = np.stack([np.zeros(len(sides)), sides[:, 2], -sides[:, 1]], axis=1)
-    charts = as_pairs(flat.ravel()).reshape(-1, 3, 2), np.arange(len(corner))
+    charts = as_pairs(flat.ravel()).reshape(-1, 3, 2), np.arange(len(corners))
     resolution, density = options.resolution, options.texel_density
     packed = pack_charts(*charts, resolution=resolution, padding=options.padding)
     while density is not None and resolution * packed.scale < density:
@@ -109,7 +134,7 @@ def _packed_separately(points: FloatArray, corner: IntArray, options: UnwrapOpti
                 f"texel_density is too large: {density:g} texels per unit need {resolution:,} texels per side"
             )
         packed = pack_charts(*charts, resolution=resolution, padding=options.padding)
-    return packed, resolution
+    return UnwrappedSoup(packed.corner_uv, charts[1], packed.efficiency, packed.scale, resolution, ())
 
 
 def _oriented(vertices: FloatArray, faces: IntArray) -> tuple[IntArray, IntArray]:

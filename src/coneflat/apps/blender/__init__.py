@@ -15,8 +15,8 @@ from typing import Any
 from ... import __version__
 from ...io import atomic_write, checked_target
 from ...options import Options
-from ...quadmesh.options import QUADS, QuadOptions
-from ...textures.options import UnwrapOptions
+from ...quadmesh import QUADS, QuadOptions
+from ...textures import UnwrapOptions
 from ..controls import controls_of
 
 #: The options of each command.

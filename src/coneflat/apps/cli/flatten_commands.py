@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...options import FORMATS, Options, declarations
-from ...textures.options import UnwrapOptions
+from ...textures import UnwrapOptions
 from .flags import (
     GroupedCommand,
     check_combinations,

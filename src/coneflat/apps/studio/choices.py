@@ -17,7 +17,7 @@ import numpy as np
 from ...base import MAX_CONE_ANGLE, short_repr
 from ...errors import OptionError, StudioError
 from ...options import Flag, Options, as_integer, as_number, declarations, read_options
-from ...textures.options import UnwrapOptions
+from ...textures import UnwrapOptions
 from .paint import Paint, Region
 
 #: Options whose controls are made from their declarations, with the labels of these.

@@ -16,7 +16,7 @@ from ...base import FloatArray, IntArray, as_floats, as_indices
 from ...errors import ArrayShapeError, FaceIndexError, NonFiniteError, OptionError
 from ...geometry import fill_nearest
 from ...io import atomic_write
-from ...textures.soup import UnwrappedSoup, unwrap_soup
+from ...textures import UnwrappedSoup, unwrap_soup
 
 if TYPE_CHECKING:
     from .interface import PackOptions
