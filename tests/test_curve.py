@@ -77,12 +77,12 @@ def test_the_command_draws_the_curve(model, tmp_path, monkeypatch):
 
 
 class TestWhole:
-    """The curve of all parts of a mesh together."""
+    """The curve of all components of a mesh together."""
 
     def test_one_component_has_the_curve_of_the_component(self):
         mesh = shapes.sphere(2)
         mesh_curve, component_curve = whole_curve(mesh, Options(), 6), coneflat.cone_curve(*mesh, most=6)
-        assert mesh_curve.parts == 1
+        assert mesh_curve.components == 1
         np.testing.assert_array_equal(mesh_curve.counts, component_curve.counts)
         np.testing.assert_allclose(mesh_curve.distortions, component_curve.distortions, rtol=1e-12)
         assert mesh_curve.knee == component_curve.knee
@@ -92,7 +92,7 @@ class TestWhole:
         ball, hill = shapes.sphere(3), shapes.hill(10, 8)
         vertices, faces = shapes.join((3 * ball[0] * [1, 1, 1.4], ball[1]), (hill[0] + 20, hill[1]))
         mesh_curve = whole_curve((vertices, faces), Options(), 9)
-        assert mesh_curve.parts == 2
+        assert mesh_curve.components == 2
         assert (np.diff(mesh_curve.distortions) < 0).all()
         alone = [
             coneflat.cone_curve(*component, most=9)
@@ -117,5 +117,5 @@ class TestWhole:
         below = np.isin(np.arange(len(vertices)), faces[low[faces].any(axis=1)]) & ~low
         seams = rim[below[rim].all(axis=1)]
         mesh_curve = whole_curve((vertices, faces), Options(seams=seams), 6)
-        assert mesh_curve.parts == 2
+        assert mesh_curve.components == 2
         assert mesh_curve.counts[0] == 0

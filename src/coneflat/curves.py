@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .base.arrays import FloatArray, IntArray
 from .base.notes import warns
-from .base.progress import Stopwatch
+from .base.progress import component_at_work, stage, timing
 from .base.threads import limit_threads
-from .cones import ConeSurface, coneless_solution, unmet_requests
+from .cones import ConeSearch, ConeSurface, SparseCones, coneless_solution, unmet_requests
 from .errors import OptionError
 from .geometry import double_areas
 from .geometry.operators import area_distortion, weighted_areas
 from .io.packages import as_input
 from .options import CurveOptions, FindOptions, Options, read_options, takes
 from .source import Component, Source
-from .stages import ConeSolution
-
-if TYPE_CHECKING:
-    from .cones.sparse import ConeSearch
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,17 +75,17 @@ class ConeCurve:
 
 @dataclass(frozen=True, eq=False)
 class WholeCurve:
-    """The area distortion of a whole mesh against the largest number of cones in each of its parts.
+    """The area distortion of a whole mesh against the largest number of cones in each of its components.
 
     Attributes:
-        counts: (k,) largest number of cones in each part, as the option `cone_count` sets it.
-        distortions: (k,) area distortion E of the linear model of all parts, decreasing.
-        parts: number of parts: components, and the pieces into which marked seams divide them.
+        counts: (k,) largest number of cones in each component, as the option `cone_count` sets it.
+        distortions: (k,) area distortion E of the linear model of all components, decreasing.
+        components: number of components, which marked seams also separate.
     """
 
     counts: IntArray
     distortions: FloatArray
-    parts: int
+    components: int
 
     @property
     def knee(self) -> int:
@@ -134,18 +130,18 @@ def find_cones(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Fou
     """
     parsed = read_options(options, FindOptions)
     chosen = Options(**vars(parsed))
-    stages = Stopwatch(chosen.progress)
-    with limit_threads():
-        part = _largest(mesh, faces, chosen, stages)
-        search = _open(part, stages)
-        if isinstance(search, FoundCones):
-            notes = unmet_requests(part.mesh, np.empty(0, np.int64), search.distortion, part.cones)
-            return replace(search, notes=notes)
-        with stages("cones"):
-            count = chosen.cone_count
-            search_result = search.fewest(chosen.distortion) if count is None else search.best_of(count)
-    notes = unmet_requests(part.mesh, search_result.solution.cones, search_result.distortion, part.cones)
-    return replace(_found_cones(search_result.solution, search_result.distortion, part), notes=notes)
+    with timing(chosen.progress), limit_threads():
+        component = _largest_component(mesh, faces, chosen)
+        with component_at_work("", 1.0), stage("cones"):
+            search = _open_search(component)
+            if isinstance(search, SparseCones):
+                cones = search
+            elif chosen.cone_count is None:
+                cones = search.fewest(chosen.distortion)
+            else:
+                cones = search.best_of(chosen.cone_count)
+    notes = unmet_requests(component.mesh, cones.solution.cones, cones.distortion, component.cones)
+    return replace(_in_numbering_of_input(cones, component), notes=notes)
 
 
 @takes(CurveOptions)
@@ -179,18 +175,19 @@ def cone_curve(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Con
     """
     parsed = read_options(options, CurveOptions)
     chosen = Options(**{name: value for name, value in vars(parsed).items() if name != "most"})
-    stages = Stopwatch(chosen.progress)
-    with limit_threads():
-        return _curve(_largest(mesh, faces, chosen, stages), parsed.most, stages)[0]
+    with timing(chosen.progress), limit_threads():
+        component = _largest_component(mesh, faces, chosen)
+        with component_at_work("", 1.0):
+            return _curve(component, parsed.most)
 
 
 def whole_curve(mesh: Any, options: Options, max_count: int) -> WholeCurve:
-    """Search for the best set of cones of each size, on all parts of a mesh.
+    """Search for the best set of cones of each size, on all components of a mesh.
 
     Args:
         mesh: as for `coneflat.flatten`.
         options: parsed options of `coneflat.flatten`; `cone_count` is ignored.
-        max_count: largest number of cones in each part.
+        max_count: largest number of cones in each component.
 
     Returns:
         The area distortion of the whole mesh against the number of cones.
@@ -198,60 +195,53 @@ def whole_curve(mesh: Any, options: Options, max_count: int) -> WholeCurve:
     Raises:
         ConeflatError: as for `coneflat.flatten`.
     """
-    stages = Stopwatch(options.progress)
-    with limit_threads(options.threads):
-        with stages("check"):
-            parts = Source(as_input(mesh)).prepared(options).components
-        total, curves = sum(len(part.faces) for part in parts), []
-        for part in parts:
-            stages.share = len(part.faces) / total
-            curves.append(_curve(part, max_count, stages))
-            stages.end_component()
-    smallest_count = max(curve.counts[0] for curve, _ in curves)
-    counts = np.unique(np.concatenate([[smallest_count], *(curve.counts for curve, _ in curves)]))
+    with timing(options.progress), limit_threads(options.threads):
+        with stage("check"):
+            components = Source(as_input(mesh)).prepared(options).components
+        triangles = sum(len(component.faces) for component in components)
+        curves = []
+        for component in components:
+            with component_at_work("", len(component.faces) / triangles):
+                curves.append(_curve(component, max_count))
+    smallest_count = max(curve.counts[0] for curve in curves)
+    counts = np.unique(np.concatenate([[smallest_count], *(curve.counts for curve in curves)]))
     counts = counts[counts >= smallest_count]
-    # If up to c cones are allowed, a part uses its best set of at most c cones.
-    per_part = [
-        curve.distortions[np.searchsorted(curve.counts, counts, side="right") - 1] for curve, _ in curves
+    # If up to c cones are allowed, a component uses its best set of at most c cones.
+    distortions = [
+        curve.distortions[np.searchsorted(curve.counts, counts, side="right") - 1] for curve in curves
     ]
-    areas = [area for _, area in curves]
-    distortions = np.sqrt(np.average(np.square(per_part), axis=0, weights=areas))
-    return WholeCurve(counts, distortions, len(parts))
+    areas = [double_areas(component.lengths).sum() for component in components]
+    combined = np.sqrt(np.average(np.square(distortions), axis=0, weights=areas))
+    return WholeCurve(counts, combined, len(components))
 
 
-def _largest(mesh: Any, faces: ArrayLike | None, options: Options, stages: Stopwatch) -> Component:
-    """Return the largest component of a mesh; progress counts this component alone."""
-    with stages("check"):
-        part = max(
-            Source(as_input(mesh, faces)).prepared(options).components,
-            key=lambda component: len(component.faces),
-        )
-    stages.share = 1.0
-    return part
+def _largest_component(mesh: Any, faces: ArrayLike | None, options: Options) -> Component:
+    """Return the largest component of a mesh."""
+    with stage("check"):
+        components = Source(as_input(mesh, faces)).prepared(options).components
+    return max(components, key=lambda component: len(component.faces))
 
 
-def _curve(part: Component, max_count: int, stages: Stopwatch) -> tuple[ConeCurve, float]:
-    """Return the curve of a component and twice its area."""
-    area, search = float(double_areas(part.lengths).sum()), _open(part, stages)
-    if isinstance(search, FoundCones):
-        return ConeCurve((search,)), area
-    with stages("cones"):
-        curve = search.curve(max_count)
-    if not curve:
+def _curve(component: Component, max_count: int) -> ConeCurve:
+    """Return the curve of a component."""
+    with stage("cones"):
+        search = _open_search(component)
+        sets = [search] if isinstance(search, SparseCones) else search.curve(max_count)
+    if not sets:
         raise OptionError(f"no set of up to {max_count} cones absorbs this surface's curvature; allow more")
-    return ConeCurve(tuple(_found_cones(cones.solution, cones.distortion, part) for cones in curve)), area
+    return ConeCurve(tuple(_in_numbering_of_input(cones, component) for cones in sets))
 
 
-def _open(part: Component, stages: Stopwatch) -> ConeSearch | FoundCones:
-    """Return a cone search on a component, or the only possible set of cones if there is nothing to search."""
-    surface = ConeSurface.of(part.mesh, part.lengths)
-    coneless = coneless_solution(surface, part.cones)
-    if coneless is not None:
-        share = weighted_areas(surface.areas, part.cones.weights)
-        return _found_cones(coneless, area_distortion(coneless.log_scale, share), part)
-    with stages("cones", 0.3):
-        return surface.search(part.cones)
+def _open_search(component: Component) -> ConeSearch | SparseCones:
+    """Return a cone search on a component, or the solution without cones if no vertex may be one."""
+    surface = ConeSurface.of(component.mesh, component.lengths)
+    coneless = coneless_solution(surface, component.cones)
+    if coneless is None:
+        return surface.search(component.cones)
+    share = weighted_areas(surface.areas, component.cones.weights)
+    return SparseCones(coneless, area_distortion(coneless.log_scale, share))
 
 
-def _found_cones(solution: ConeSolution, distortion: float, part: Component) -> FoundCones:
-    return FoundCones(part.cones.names[solution.cones], solution.curvatures, distortion)
+def _in_numbering_of_input(cones: SparseCones, component: Component) -> FoundCones:
+    vertices = component.cones.names[cones.solution.cones]
+    return FoundCones(vertices, cones.solution.curvatures, cones.distortion)

@@ -12,7 +12,7 @@ from coneflat import check_mesh, errors, flatten
 from coneflat.geometry import corner_angles, edge_lengths
 from coneflat.geometry.handles import difference_from_multiple, handle_loops, loop_holonomy
 from coneflat.measures.seam_data import measure_rotations
-from coneflat.metric import exact_metric, find
+from coneflat.metric import corrected, exact_metric
 
 QUARTER = np.pi / 2
 
@@ -91,7 +91,7 @@ def test_corrections_end_at_rounding(monkeypatch):
     """Along many loops, rounding is larger than the tolerance."""
     noise = cycle([5e-11, -5e-11])
     monkeypatch.setattr(
-        "coneflat.metric.find.difference_from_multiple",
+        "coneflat.metric.corrected.difference_from_multiple",
         lambda angles, quantum: difference_from_multiple(angles, quantum) + next(noise),
     )
     exact = flatten(*shapes.genus(2), quantise=QUARTER, correct_handles=True)
@@ -100,7 +100,7 @@ def test_corrections_end_at_rounding(monkeypatch):
 
 def test_corrections_that_need_more_steps_than_are_left_end_at_once(monkeypatch):
     solved, solve = [], exact_metric
-    monkeypatch.setattr(find, "MAX_CHANGE", 1e-4)
+    monkeypatch.setattr(corrected, "MAX_CHANGE", 1e-4)
     monkeypatch.setattr(
         "coneflat.metric.solve.exact_metric",
         lambda *arguments, **options: solved.append(0) or solve(*arguments, **options),

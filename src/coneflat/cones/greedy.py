@@ -48,6 +48,17 @@ def greedy_cones(
     Raises:
         OptionError: epsilon is not positive, or max_cones is negative.
         CurvatureError: `max_cones` is 0 for a closed surface that is not a torus.
+
+    Notes:
+        phi solves the Dirichlet problem L phi = -K with phi = 0 at the cones S, and the target curvature of S is
+        K + L phi (Eq. 1-5 of the paper, see `target_from_log_scale`). Starting from the vertex of largest curvature
+        (of most negative, if chi < 0), the vertices of largest and smallest phi become cones until their difference is
+        at most epsilon. The Laplacian is factorized once: a cone s adds one solve for its Green's function g_s, which
+        is made to vanish at the earlier cones, and phi -= g_s phi_s / g_s(s).
+
+    See Also:
+        ConeSearch: fewer cones for a bound on the area distortion.
+        cones_at: the same problem for given cones.
     """
     if not epsilon > 0:
         raise OptionError(f"epsilon must be positive, got {epsilon:g}")

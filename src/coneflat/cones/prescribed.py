@@ -134,6 +134,14 @@ def fitted_cones(
 
     Raises:
         CurvatureError: all curvatures are given, and on a closed mesh they do not sum to 2 pi chi.
+
+    Notes:
+        With the area weights a and A = diag(a) - a a^T, E^2 = (phi_0 + G k)^T A (phi_0 + G k), where the columns of G
+        are the g_i. The Gram matrix is G^T A G and the linear term G^T A phi_0.
+
+    See Also:
+        fit_curvatures: the quadratic program.
+        ConeSearch: also searches for the vertices.
     """
     operator, is_free = linear.operator, np.isnan(curvatures)
     euler = euler_characteristic if operator.is_closed else None

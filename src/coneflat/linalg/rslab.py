@@ -32,8 +32,8 @@ class RslabFactor(Factor):
     def _set_pattern(self, matrix: csc_matrix) -> None:
         from rslab import analyze
 
-        self._triangle = part = Triangle(matrix)
-        lower = csc_matrix((part.values(matrix), part.rows, part.starts), shape=matrix.shape)
+        self._triangle = triangle = Triangle(matrix)
+        lower = csc_matrix((triangle.values(matrix), triangle.rows, triangle.starts), shape=matrix.shape)
         self._symbolic: Any = analyze(lower, path="ldlt", ordering=ORDERING, threads=1)
 
     def _fill(self, matrix: csc_matrix) -> None:

@@ -29,6 +29,15 @@ def linear_flat_metric(
 
     Raises:
         MetricError: the range of the scale is so large that lengths overflow or underflow.
+
+    Notes:
+        phi solves L phi = target - K (Eq. 1). A side from i to j is multiplied by the integral of exp(phi) along it,
+        (e^phi_j - e^phi_i) / (phi_j - phi_i). The metric is flat to first order only, and some triangles may break
+        the triangle inequality, so that the layout is a least squares problem.
+
+    See Also:
+        exact_metric: the metric whose curvature is exactly the target.
+        least_squares_layout: lays out this metric.
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         scaled = scaled_lengths(lengths, mesh.faces, solution.log_scale, rule)

@@ -45,6 +45,22 @@ def find_seams(
     Raises:
         SeamError: every set of seams needs forbidden edges.
         OptionError: costs are not positive numbers.
+
+    Notes:
+        Cones and boundary loops are connected by an approximate Steiner tree (Section 4.2 of the paper): the shortest
+        paths from all of them divide the vertices into regions, and a minimum spanning tree is chosen of the cheapest
+        paths between regions; it costs at most twice as much as the cheapest tree. On a surface of genus g, 2 g loops
+        from a tree-cotree decomposition are added, each the shortest through its edge.
+
+    References:
+        A. Sheffer, J. Hart, "Seamster: inconspicuous low-distortion texture seam layout", 2002.
+        K. Mehlhorn, "A faster approximation algorithm for the Steiner problem in graphs", 1988.
+        D. Eppstein, "Dynamic generators of topologically embedded graphs", 2003.
+        J. Erickson, K. Whittlesey, "Greedy optimal homotopy and homology generators", 2005.
+
+    See Also:
+        edge_costs: costs that prefer creases and hidden places.
+        cut_open: the mesh cut along seams.
     """
     is_forbidden = mask_of(len(mesh.edges), forbidden)
     key = mesh_tie_key(mesh)
@@ -101,9 +117,8 @@ def _checked(costs: FloatArray, count: int) -> FloatArray:
 def _tree(mesh: TriangleMesh, costs: FloatArray, is_cut: BoolArray, is_end: BoolArray) -> BoolArray:
     """Return (e,) the edges of a tree that connects the ends (n,), at most twice as costly as the cheapest.
 
-    K. Mehlhorn, "A faster approximation algorithm for the Steiner problem in graphs", 1988: one search from all
-    ends simultaneously, then a minimum spanning tree over the cheapest bridges between their regions. Edges that are
-    already cut (e,) cost nothing.
+    This is the algorithm of Mehlhorn 1988: one search from all ends simultaneously, then a minimum spanning tree over
+    the cheapest bridges between their regions. Edges that are already cut (e,) cost nothing.
     """
     paths = MultiGraph(len(mesh.vertices), mesh.edges, costs, mesh.incident_edges).shortest_paths(
         np.flatnonzero(is_end)

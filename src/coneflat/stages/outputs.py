@@ -117,11 +117,11 @@ class SolveStatistics:
     area_distortion: float = 0.0
 
     @classmethod
-    def of_all(cls, parts: Sequence[SolveStatistics], areas: Sequence[float]) -> SolveStatistics:
+    def of_all(cls, components: Sequence[SolveStatistics], areas: Sequence[float]) -> SolveStatistics:
         """Return the combined statistics of components: sums of counts, maxima, and means weighted by area."""
         values = {}
         for statistic in fields(cls):
-            numbers = np.array([getattr(part, statistic.name) for part in parts])
+            numbers = np.array([getattr(component, statistic.name) for component in components])
             if statistic.name in ("newton_steps", "residual", "untangled_move", "qc_max_unrelaxed"):
                 values[statistic.name] = numbers.max().item()
             elif statistic.name == "qc_mean_unrelaxed":

@@ -110,7 +110,7 @@ def curve_data(source: Joined, choices: Choices, report: Progress) -> dict[str, 
         source.mesh, read_options({**source.map_options(words), "cone_count": n, "progress": report}), n
     )
     curve = {"counts": cone_curve.counts.tolist(), "distortions": cone_curve.distortions.tolist()}
-    return {**curve, "knee": cone_curve.knee, "parts": cone_curve.parts}
+    return {**curve, "knee": cone_curve.knee, "parts": cone_curve.components}
 
 
 def curve_options(choices: Choices) -> dict[str, Any]:

@@ -56,17 +56,17 @@ def coarse_basis(
         steps = max(1, round(np.log(ratio) / np.log(MAX_AGGREGATE)))
         max_count = size if steps == 1 else None
         for min_coupling in (MIN_COUPLING, 0.0):  # 0 if all couplings are weak, as on slivers
-            part = _smoothed_aggregates(level, order, ratio ** (1 / steps), max_count, min_coupling)
-            if part.shape[1] <= MAX_LEVEL_SHARE * level.shape[0]:
+            prolongation = _smoothed_aggregates(level, order, ratio ** (1 / steps), max_count, min_coupling)
+            if prolongation.shape[1] <= MAX_LEVEL_SHARE * level.shape[0]:
                 break
         else:
             # Hardly any unknowns are coupled, as on a strip between two boundaries: aggregate consecutive unknowns.
-            part = _indicators(np.argsort(order, kind="stable") * size // len(order), size)
-        transposed = csr_matrix(part.T)
-        level = csr_matrix(transposed @ (level @ part))
-        mass = csr_matrix(transposed @ (mass @ part))
-        functions = csr_matrix(functions @ part)
-        order = _order_of_aggregates(part, order)
+            prolongation = _indicators(np.argsort(order, kind="stable") * size // len(order), size)
+        transposed = csr_matrix(prolongation.T)
+        level = csr_matrix(transposed @ (level @ prolongation))
+        mass = csr_matrix(transposed @ (mass @ prolongation))
+        functions = csr_matrix(functions @ prolongation)
+        order = _order_of_aggregates(prolongation, order)
     return functions, level, mass
 
 
@@ -194,10 +194,10 @@ def join_remaining(
     return joined, number
 
 
-def _order_of_aggregates(part: csr_matrix, order: IntArray) -> IntArray:
+def _order_of_aggregates(prolongation: csr_matrix, order: IntArray) -> IntArray:
     """Return the order of aggregates by their first members."""
     place = np.argsort(order)
-    columns = part.tocsc()
+    columns = prolongation.tocsc()
     first = np.minimum.reduceat(place[columns.indices], columns.indptr[:-1])
     return np.argsort(first, kind="stable")
 

@@ -42,6 +42,15 @@ def fit_curvatures(
     Returns:
         (s,) the curvatures, the multiplier of the sum, and whether the bounds allow the sum. If they do not, the
         bounds are ignored.
+
+    Notes:
+        The optimum satisfies gram k + slope + multiplier = 0 at free variables; at the lower bound the left side is
+        not negative, at the upper not positive (Karush, Kuhn, Tucker). `change_at_once` is a semismooth Newton method:
+        a step solves for the free variables, and the signs decide which are free in the next. There is no function to
+        decrease along a step, so that `linalg.newton`, whose line search needs one, does not apply.
+
+    See Also:
+        DenseModel.fit: calls this for sets of candidates.
     """
     has_sum = not math.isnan(total)
     if not len(slope):
