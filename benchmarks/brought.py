@@ -27,73 +27,91 @@ TOLD = re.compile(
 )
 
 
-def commands(folder: Path) -> Iterator[tuple[str, list[str]]]:
-    """Yield the name of each case, and its command line; written files go to a folder."""
-    coneflat = [sys.executable, "-m", "coneflat"]
+class Commands:
+    """The command lines of the cases, by name; written files go to a folder."""
 
-    def command(name: str, *options: object, ending: str = ".obj") -> list[str]:
+    COMMAND = (sys.executable, "-m", "coneflat")
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def __iter__(self) -> Iterator[tuple[str, list[str]]]:
+        """Yield the name of each case, and its command line."""
+        yield from self._sheets()
+        yield from self._plates()
+        yield from self._files()
+        yield from self._transfers()
+        yield from self._hostile_quads()
+        yield from self._further_cases()
+
+    def _command(self, name: str, *options: object, ending: str = ".obj") -> list[str]:
         kind, *flags = map(str, options)
-        return [*coneflat, kind, str(CASES / name), "-o", str(folder / f"out{ending}"), *flags]
+        return [*self.COMMAND, kind, str(CASES / name), "-o", str(self._folder / f"out{ending}"), *flags]
 
-    def script(name: str, *arguments: object) -> list[str]:
+    def _script(self, name: str, *arguments: object) -> list[str]:
         return [sys.executable, str(CASES / name), *map(str, arguments)]
 
-    for name in ("grid5", "sheet_hole", "plate3"):
-        for kind in ("flatten", "unwrap"):
-            yield f"{kind} {name}.obj", command(f"brought/{name}.obj", kind)
-    for name in ("twosided.gltf", "twosided.obj"):
-        ending = ".glb" if name.endswith("gltf") else ".obj"
-        yield f"unwrap {name}", command(f"brought/{name}", "unwrap", ending=ending)
-        yield (
-            f"unwrap {name} --stack copies",
-            command(f"brought/{name}", "unwrap", "--stack", "copies", ending=ending),
-        )
-    for name in ("plate_holes", "round_hole"):
-        for sharp in ("", "40deg"):
-            further = ["--sharp-angle", sharp] if sharp else []
-            text = " ".join(["quads", f"{name}.obj", "--quads 3000", *further])
-            yield text, command(f"brought/{name}.obj", "quads", "--quads", 3000, *further)
-    for name in ("brought/utm.obj", "hostile/far.obj"):
-        yield f"unwrap {Path(name).name} -o o.glb", command(name, "unwrap", ending=".glb")
-    cards = folder / "cards.obj"
-    with cards.open("w") as stream:
-        subprocess.run(script("brought/cards.py", 10_000), stdout=stream, check=True)
-    yield "flatten cards.py 10000", [*coneflat, "flatten", str(cards), "-o", str(folder / "cards_uv.obj")]
-    for name in ("attributes.ply", "attributes.gltf", "groups.obj"):
-        for ending in (".obj", ".ply", ".glb", ".npz"):
-            yield f"flatten {name} -o o{ending}", command(f"brought/{name}", "flatten", ending=ending)
-    for name in ("mirrored_repeat.gltf", "specgloss.gltf", "texture.ply", "two_textures.obj", "unlit.gltf"):
-        source, target = CASES / "brought" / name, folder / f"unwrapped-{Path(name).stem}.glb"
-        subprocess.run([*coneflat, "unwrap", str(source), "-o", str(target), "-q"], check=False)
-        yield (
-            f"transfer {name}",
-            [
-                *coneflat,
-                "transfer",
-                str(source),
-                str(target),
-                "-o",
-                str(folder / "baked.glb"),
-                "--resolution",
-                "64",
-            ],
-        )
-    yield "flatten two_corners.obj", command("brought/two_corners.obj", "flatten")
-    yield "flatmap.py", script("brought/flatmap.py", Path(sys.executable).parent / "coneflat")
-    yield "read_only.sh", ["bash", str(CASES / "hostile/read_only.sh"), sys.executable, str(SOURCE)]
-    yield "quads_needle_nan.py 4 1.6e4", script("hostile/quads_needle_nan.py", 4, "1.6e4")
-    needle = ("--quads", 10, "--sharp-angle", 0.7, "--stretch", 0, "--cones", "sparse")
-    yield "quads q4.obj", command("hostile/q4.obj", "quads", *needle)
-    yield "quads q52.obj --quads 1", command("hostile/q52.obj", "quads", "--quads", 1)
-    yield (
-        "quads q89.obj --quads 1000000",
-        command("hostile/q89.obj", "quads", "--quads", 1_000_000, "--stretch", 0),
-    )
-    for name in ("xatlas_padding.py", "density_padding.py", "area_raw.py"):
-        yield name, script(f"hostile/{name}")
-    for label in ("short", "long"):
-        options = ("brain", "--remove-label", f"{CASES}/hostile/{label}.annot:wall")
-        yield f"brain b.gii, {label}.annot:wall", command("hostile/b.gii", *options, ending=".gii")
+    def _sheets(self) -> Iterator[tuple[str, list[str]]]:
+        for name in ("grid5", "sheet_hole", "plate3"):
+            for kind in ("flatten", "unwrap"):
+                yield f"{kind} {name}.obj", self._command(f"brought/{name}.obj", kind)
+        for name in ("twosided.gltf", "twosided.obj"):
+            file, ending = f"brought/{name}", ".glb" if name.endswith("gltf") else ".obj"
+            copies = ("--stack", "copies")
+            yield f"unwrap {name}", self._command(file, "unwrap", ending=ending)
+            yield f"unwrap {name} --stack copies", self._command(file, "unwrap", *copies, ending=ending)
+
+    def _plates(self) -> Iterator[tuple[str, list[str]]]:
+        for name in ("plate_holes", "round_hole"):
+            for further in ([], ["--sharp-angle", "40deg"]):
+                text = " ".join(["quads", f"{name}.obj", "--quads 3000", *further])
+                yield text, self._command(f"brought/{name}.obj", "quads", "--quads", 3000, *further)
+
+    def _files(self) -> Iterator[tuple[str, list[str]]]:
+        for name in ("brought/utm.obj", "hostile/far.obj"):
+            yield f"unwrap {Path(name).name} -o o.glb", self._command(name, "unwrap", ending=".glb")
+        cards, output = self._folder / "cards.obj", str(self._folder / "cards_uv.obj")
+        with cards.open("w") as stream:
+            subprocess.run(self._script("brought/cards.py", 10_000), stdout=stream, check=True)
+        yield "flatten cards.py 10000", [*self.COMMAND, "flatten", str(cards), "-o", output]
+        for name in ("attributes.ply", "attributes.gltf", "groups.obj"):
+            for ending in (".obj", ".ply", ".glb", ".npz"):
+                yield (
+                    f"flatten {name} -o o{ending}",
+                    self._command(f"brought/{name}", "flatten", ending=ending),
+                )
+
+    def _transfers(self) -> Iterator[tuple[str, list[str]]]:
+        baked = str(self._folder / "baked.glb")
+        for name in (
+            "mirrored_repeat.gltf",
+            "specgloss.gltf",
+            "texture.ply",
+            "two_textures.obj",
+            "unlit.gltf",
+        ):
+            source, target = CASES / "brought" / name, self._folder / f"unwrapped-{Path(name).stem}.glb"
+            subprocess.run([*self.COMMAND, "unwrap", str(source), "-o", str(target), "-q"], check=False)
+            words = ["transfer", str(source), str(target), "-o", baked, "--resolution", "64"]
+            yield f"transfer {name}", [*self.COMMAND, *words]
+
+    def _hostile_quads(self) -> Iterator[tuple[str, list[str]]]:
+        yield "quads_needle_nan.py 4 1.6e4", self._script("hostile/quads_needle_nan.py", 4, "1.6e4")
+        needle = ("--quads", 10, "--sharp-angle", 0.7, "--stretch", 0, "--cones", "sparse")
+        yield "quads q4.obj", self._command("hostile/q4.obj", "quads", *needle)
+        yield "quads q52.obj --quads 1", self._command("hostile/q52.obj", "quads", "--quads", 1)
+        dense = ("--quads", 1_000_000, "--stretch", 0)
+        yield "quads q89.obj --quads 1000000", self._command("hostile/q89.obj", "quads", *dense)
+
+    def _further_cases(self) -> Iterator[tuple[str, list[str]]]:
+        yield "flatten two_corners.obj", self._command("brought/two_corners.obj", "flatten")
+        yield "flatmap.py", self._script("brought/flatmap.py", Path(sys.executable).parent / "coneflat")
+        yield "read_only.sh", ["bash", str(CASES / "hostile/read_only.sh"), sys.executable, str(SOURCE)]
+        for name in ("xatlas_padding.py", "density_padding.py", "area_raw.py"):
+            yield name, self._script(f"hostile/{name}")
+        for label in ("short", "long"):
+            options = ("brain", "--remove-label", f"{CASES}/hostile/{label}.annot:wall")
+            yield f"brain b.gii, {label}.annot:wall", self._command("hostile/b.gii", *options, ending=".gii")
 
 
 def run(command: list[str], folder: Path) -> tuple[float, int, str]:
@@ -121,7 +139,7 @@ def main() -> None:
     print("| case | exit code | s | gives |\n| --- | --- | --- | --- |")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        for case, command in commands(folder):
+        for case, command in Commands(folder):
             if chosen in case:
                 seconds, code, text = run(command, folder)
                 print(f"| {case} | {code} | {seconds:.1f} | {summary(text)} |", flush=True)

@@ -16,14 +16,14 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 import chromium  # noqa: E402, F401 - for benchmarks that open a page
 import shapes  # noqa: E402
-import stored  # noqa: E402
+import stored_meshes  # noqa: E402
 
 from coneflat import ConeflatError, Flattening, check_mesh, flatten, read_mesh  # noqa: E402
 from coneflat.mesh.connectivity import TriangleMesh  # noqa: E402
 from coneflat.options import Options, declarations, parse_angle  # noqa: E402
 
 #: The folder of models: `../shared/meshes`, or those of `tests/data`.
-MODELS = stored.model_folder()
+MODELS = stored_meshes.model_folder()
 
 
 def models(repair: bool = False) -> Iterator[tuple[str, TriangleMesh]]:

@@ -27,13 +27,13 @@ from typing import Any
 
 import mechanical
 import numpy as np
-from common import models, shapes, stored
+from common import models, shapes, stored_meshes
 
 from coneflat import check_mesh, quads
 from coneflat.errors import ConeflatError
 from coneflat.mesh.connectivity import TriangleMesh
 
-TOOL = stored.SHARED.parent / "tools" / "quads_aligned.py"
+TOOL = stored_meshes.SHARED.parent / "tools" / "quads_aligned.py"
 #: Models above this number of triangles are measured decimated, too.
 DECIMATED = 20_000
 #: Columns: the name, the key in the output of the tool, and the format.

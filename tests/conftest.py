@@ -6,7 +6,7 @@ import sys
 
 import pytest
 from browsing import browser, open_visit, viewed, viewed_page, visit  # noqa: F401
-from stored import find_model
+from stored_meshes import find_model
 
 # As in an installation: otherwise each process compiles the bytecode again, which takes a second.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)

@@ -126,7 +126,7 @@ def test_a_cone_without_room_is_refused():
             flatten_by(method, *shapes.sphere(3), cones=cones)
 
 
-def test_what_did_not_converge_is_refused(monkeypatch):
+def test_a_failure_to_converge_is_an_error(monkeypatch):
     monkeypatch.setattr("comparisons.abf.STEPS", 1)
     with pytest.raises(errors.ConvergenceError, match=r"off by .* after 1 step; method 'exact'"):
         flatten_by("abf++", *shapes.sphere(2))

@@ -41,7 +41,7 @@ class TestEnergy:
         assert np.abs(equations @ ((2 - 1j) * z + 3)).max() < 1e-13
         assert np.abs(equations @ np.conj(z)).max() > 0.1
 
-    def test_the_map_has_the_least(self):
+    def test_the_map_minimises_the_energy(self):
         disk = TriangleMesh(*shapes.hill())
         lengths = lengths_of(disk)
         pins = far_pins(disk, lengths)
@@ -87,7 +87,7 @@ class TestInvariance:
 
 class TestPipeline:
     @pytest.mark.parametrize(("method", "name"), [("lscm", "LSCM")])
-    def test_says_that_it_cut(self, method, name):
+    def test_a_note_names_the_cut_of_closed_surfaces(self, method, name):
         closed = flatten_by(method, *shapes.sphere(2))
         note = closed.notes[-1]
         assert "cut open first" in note
@@ -98,7 +98,7 @@ class TestPipeline:
         assert notes_of_two == (note.replace("match.", "match (and similarly 1 component more)."),)
 
     @pytest.mark.parametrize("method", ["lscm", "bff"])
-    def test_nothing_to_cut_through(self, method):
+    def test_closed_surfaces_need_cones_and_tori_do_not(self, method):
         with pytest.raises(errors.CurvatureError, match="closed surface .* needs cones"):
             flatten_by(method, *shapes.sphere(1), cones="none")
         assert flatten_by(method, *shapes.torus(20, 10), cones="none").distortion.flipped == 0
@@ -197,7 +197,7 @@ class TestPromises:
 
 
 class TestNotes:
-    def test_says_how_far_the_curve_was_from_closed(self):
+    def test_a_note_gives_the_change_of_boundary_lengths(self):
         closed = flatten_by("bff", *shapes.sphere(3))
         assert "lengths were changed by up to" in closed.notes[0]
         assert not flatten_by("bff", *shapes.hill(), cones="none").notes

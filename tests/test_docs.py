@@ -115,7 +115,7 @@ def test_modules_exist(page):
 
 #: Private words that were replaced by the field's terms, as regular expressions.
 REPLACED_WORDS = [
-    r"(?<!matching )\bpursuit\b",
+    r"(?<![Mm]atching )\bpursuit\b",
     r"\bun-?held\b",
     r"\bevened out\b",
     r"\bpolish",

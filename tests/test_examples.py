@@ -41,7 +41,7 @@ def test_results_show_themselves(executed):
     assert {path.name for path in folder.iterdir()} == {"sample.html", "sample.glb"}
 
 
-def test_it_is_kept_without_output():
+def test_the_notebook_is_stored_without_output():
     nbformat = pytest.importorskip("nbformat")
     cells = nbformat.read(NOTEBOOK, as_version=4).cells
     assert not any(cell.get("outputs") for cell in cells)

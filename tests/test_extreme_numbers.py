@@ -83,7 +83,11 @@ def test_extreme_numbers_for_a_cortex(tmp_path):
     from coneflat.apps.cli.brain_command import BrainOptions
 
     nibabel.freesurfer.write_geometry(tmp_path / "lh.pial", *shapes.sphere(2))
-    names = [name for name, one in declarations(BrainOptions).items() if isinstance(one.kind, Number)]
+    names = [
+        name
+        for name, declaration in declarations(BrainOptions).items()
+        if isinstance(declaration.kind, Number)
+    ]
     for name in names:
         for value in EXTREMES:
             outcome(lambda **options: flatten_cortex(tmp_path / "lh.pial", **options).points, **{name: value})

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 import shapes
-from stored import at_hand
+from stored_meshes import at_hand
 
 import coneflat
 from coneflat import errors

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapes
-from stored import at_hand
+from stored_meshes import at_hand
 
 from coneflat import TriangleMesh, errors, flatten, read_mesh
 from coneflat.geometry.triangles import edge_lengths

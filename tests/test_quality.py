@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[1]
 @pytest.mark.parametrize(
     "arguments", [["ruff", "check", "."], ["ruff", "format", "--check", "."], ["mypy", "--num-workers", "2"]]
 )
-def test_passes(arguments):
+def test_lint_format_and_types_pass(arguments):
     pytest.importorskip(arguments[0])
     if arguments[0] == "mypy" and np.lib.NumpyVersion(np.__version__) < "2.4.0":
         pytest.skip(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from stored import REGRESSIONS, regression
+from stored_meshes import REGRESSIONS, regression
 from trials.outcome import Outcome
 from trials.promises import check
 from trials.textures import check_xatlas

@@ -49,7 +49,7 @@ def test_numbers_of_the_sample_are_those_of_today():
     assert any(match["what"].startswith("sample ") for match in NUMBER.finditer(readme))
 
 
-def test_what_stands_between_markers_is_filled():
+def test_text_between_markers_is_replaced():
     page = "a\n\n<!-- table x -->\n\nold\n\n<!-- /table -->\n\n<!-- table y -->\n<!-- /table -->\n"
     filled = fill(page, "table x", "new")
     assert filled == page.replace("old", "new")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapes
-from stored import regression
+from stored_meshes import regression
 
 import coneflat
 from coneflat import xatlas

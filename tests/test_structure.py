@@ -28,7 +28,7 @@ from structure import (
 NAMES = module_paths()
 #: Applications that set up the others, and packages whose modules applications may import.
 FRONT = ("apps.warm_up", "apps.blender", "apps.cli", "apps.studio")
-SHARED = ("quadmesh", "textures", "geometry.nearest")
+SHARED = ("textures",)
 #: The most levels of the packages of the core.
 LEVELS = 10
 
@@ -46,8 +46,7 @@ def test_packages_do_not_import_each_other_in_circles():
 
 
 def test_files_do_not_import_each_other_in_circles():
-    circles = file_circles(read_modules())
-    assert [circle for circle in circles if "quadmesh.files" not in circle] == []
+    assert file_circles(read_modules()) == []
 
 
 def test_entry_points_are_functions_of_the_package():
@@ -92,7 +91,7 @@ def test_applications_do_not_import_what_is_inside_others():
 @pytest.mark.parametrize("name", sorted(filter(is_core, NAMES)))
 def test_the_core_imports_no_application(name: str):
     module = read_modules()[name]
-    allowed = name in ("", "__main__", "quadmesh.quad_mesh")
+    allowed = name in ("", "__main__")
     imported = set() if allowed else module.imports | module.late_imports
     assert [module_name for module_name in imported if not is_core(module_name)] == []
 

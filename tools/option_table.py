@@ -16,7 +16,7 @@ from coneflat.options.declared import (
     RunOptions,
     SeamOptions,
 )
-from coneflat.quadmesh.options import QuadOptions
+from coneflat.quadmesh import QuadOptions
 
 #: As people think of them; each group's docstring is its title.
 GROUPS = (ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)

@@ -129,8 +129,6 @@ def imported_packages(modules: dict[str, Module]) -> dict[str, frozenset[str]]:
         imported = {package_of(imported_name) for imported_name in module.imports | module.late_imports}
         if importer == "":
             imported = set()
-        if name == "quadmesh.quad_mesh":  # its `save` and `view`
-            imported = {package_of(imported_name) for imported_name in module.imports}
         imports_of.setdefault(importer, set()).update(imported - {importer, ""})
     return {name: frozenset(imported) for name, imported in imports_of.items()}
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import gltf_scenes
 import numpy as np
-import scenes
 import shapes
 
 from .commands import run_command
@@ -158,74 +158,119 @@ def _colours(shades: np.ndarray, further: Mapping[str, Check]) -> Planted:
 
 
 def make_ply(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
-    n, m = len(vertices), len(faces)
-    shades, alpha = rng.integers(0, 256, (n, 3)), rng.integers(0, 256, n)
-    of_vertex = {
-        "quality": ("float", rng.normal(size=n).astype("f4")),
-        "label": ("int", rng.integers(-(2**31), 2**31, n)),
-        "weight": ("double", rng.normal(size=n)),
-        "small": ("uchar", rng.integers(0, 256, n)),
-    }
-    of_face = {
-        "texnumber": ("int", rng.integers(0, 4, m)),
-        "red": ("uchar", rng.integers(0, 256, m)),
-        "area": ("float", rng.random(m).astype("f4")),
-        "segment": ("short", rng.integers(-(2**15), 2**15, m)),
-    }
-    planted = chosen_attributes(
-        rng,
-        [
-            _colours(shades, {}),
-            *(
-                Planted(
-                    name, rf"vertex properties \([^)]*\b{name}\b", {".ply": _vertex_check(name, word, values)}
-                )
-                for name, (word, values) in of_vertex.items()
-            ),
-            *(
-                Planted(
-                    f"face {name}",
-                    rf"face properties \([^)]*\b{name}\b",
-                    {".ply": _face_check(name, values, faces)},
-                )
-                for name, (word, values) in of_face.items()
-            ),
+    properties = PlyProperties.random(rng, len(vertices), len(faces))
+    planted = chosen_attributes(rng, properties.attributes(faces))
+    names = {attribute.name for attribute in planted}
+    if "colours" in names and rng.random() < 0.5:
+        planted.append(properties.alpha_attribute())
+        names.add("alpha")
+    form = str(rng.choice(["ascii", "binary_little_endian", "binary_big_endian"]))
+    columns = properties.vertex_columns(vertices, names)
+    on_faces = [(word, name, x) for name, (word, x) in properties.of_face.items() if f"face {name}" in names]
+    head = ply_header(form, len(vertices), len(faces), columns, on_faces, names)
+    return head + ply_body(form, ply_rows(faces, columns, on_faces, names)), planted
+
+
+#: The type, the name and the values of a property.
+Column = tuple[str, str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class PlyProperties:
+    """Random properties of a PLY file.
+
+    Attributes:
+        shades: (n, 3) colours of the vertices.
+        alpha: (n,) their opacity.
+        of_vertex, of_face: type and values of further properties by name.
+    """
+
+    shades: np.ndarray
+    alpha: np.ndarray
+    of_vertex: Mapping[str, tuple[str, np.ndarray]]
+    of_face: Mapping[str, tuple[str, np.ndarray]]
+
+    @classmethod
+    def random(cls, rng: Random, n: int, m: int) -> PlyProperties:
+        """Return properties of n vertices and m faces."""
+        return cls(
+            rng.integers(0, 256, (n, 3)),
+            rng.integers(0, 256, n),
+            {
+                "quality": ("float", rng.normal(size=n).astype("f4")),
+                "label": ("int", rng.integers(-(2**31), 2**31, n)),
+                "weight": ("double", rng.normal(size=n)),
+                "small": ("uchar", rng.integers(0, 256, n)),
+            },
+            {
+                "texnumber": ("int", rng.integers(0, 4, m)),
+                "red": ("uchar", rng.integers(0, 256, m)),
+                "area": ("float", rng.random(m).astype("f4")),
+                "segment": ("short", rng.integers(-(2**15), 2**15, m)),
+            },
+        )
+
+    def attributes(self, faces: np.ndarray) -> list[Planted]:
+        """Return all data that a file may have in addition to the mesh."""
+        of_vertex = [
             Planted(
-                "textures",
-                r"texture files \([^)]*skin\.png",
-                {".ply": _has(rb"^comment TextureFile skin.png$")},
-            ),
+                name, rf"vertex properties \([^)]*\b{name}\b", {".ply": _vertex_check(name, word, values)}
+            )
+            for name, (word, values) in self.of_vertex.items()
+        ]
+        of_face = [
+            Planted(
+                f"face {name}",
+                rf"face properties \([^)]*\b{name}\b",
+                {".ply": _face_check(name, values, faces)},
+            )
+            for name, (_, values) in self.of_face.items()
+        ]
+        comment = {".ply": _has(rb"^comment TextureFile skin.png$")}
+        return [
+            _colours(self.shades, {}),
+            *of_vertex,
+            *of_face,
+            Planted("textures", r"texture files \([^)]*skin\.png", comment),
             Planted("edges", r"elements \([^)]*\bedge\b"),
             Planted("vertex lists", r"vertex properties \([^)]*\bnear\b"),
             Planted("face lists", r"face properties \([^)]*\bcurve\b"),
-        ],
-    )
-    names = {attribute.name for attribute in planted}
-    with_alpha = "colours" in names and rng.random() < 0.5
-    if with_alpha:
-        planted.append(
-            Planted(
-                "alpha",
-                r"vertex properties \([^)]*\balpha\b",
-                {".ply": _vertex_check("alpha", "uchar", alpha), ".glb": _alpha_in_glb(alpha)},
-            )
-        )
-    columns = [("double", axis, vertices[:, i]) for i, axis in enumerate("xyz")]
-    if "colours" in names:
-        columns += [("uchar", name, shades[:, i]) for i, name in enumerate(("red", "green", "blue"))]
-    columns += [("uchar", "alpha", alpha)] * with_alpha
-    columns += [(word, name, values) for name, (word, values) in of_vertex.items() if name in names]
-    on_faces = [(word, name, values) for name, (word, values) in of_face.items() if f"face {name}" in names]
-    form = str(rng.choice(["ascii", "binary_little_endian", "binary_big_endian"]))
-    head = ["ply", f"format {form} 1.0", *["comment TextureFile skin.png"] * ("textures" in names)]
-    head += [f"element vertex {n}", *(f"property {word} {name}" for word, name, _ in columns)]
-    head += ["property list uchar int near"] * ("vertex lists" in names)
-    head += [f"element face {m}", "property list uchar int vertex_indices"]
-    head += [f"property {word} {name}" for word, name, _ in on_faces]
-    head += ["property list uchar float curve"] * ("face lists" in names)
-    head += ["element edge 1", "property int vertex1", "property int vertex2"] if "edges" in names else []
-    rows = []
-    for i in range(n):
+        ]
+
+    def alpha_attribute(self) -> Planted:
+        """Return the opacity of the colours."""
+        checks = {".ply": _vertex_check("alpha", "uchar", self.alpha), ".glb": _alpha_in_glb(self.alpha)}
+        return Planted("alpha", r"vertex properties \([^)]*\balpha\b", checks)
+
+    def vertex_columns(self, vertices: np.ndarray, names: set[str]) -> list[Column]:
+        """Return the columns of the vertices: their positions and the chosen properties."""
+        columns: list[Column] = [("double", axis, vertices[:, i]) for i, axis in enumerate("xyz")]
+        if "colours" in names:
+            columns += [("uchar", name, self.shades[:, i]) for i, name in enumerate(("red", "green", "blue"))]
+        columns += [("uchar", "alpha", self.alpha)] * ("alpha" in names)
+        return columns + [(word, name, x) for name, (word, x) in self.of_vertex.items() if name in names]
+
+
+def ply_header(
+    form: str, n: int, m: int, columns: list[Column], on_faces: list[Column], names: set[str]
+) -> bytes:
+    """Return the header of a PLY file with the chosen data."""
+    lines = ["ply", f"format {form} 1.0", *["comment TextureFile skin.png"] * ("textures" in names)]
+    lines += [f"element vertex {n}", *(f"property {word} {name}" for word, name, _ in columns)]
+    lines += ["property list uchar int near"] * ("vertex lists" in names)
+    lines += [f"element face {m}", "property list uchar int vertex_indices"]
+    lines += [f"property {word} {name}" for word, name, _ in on_faces]
+    lines += ["property list uchar float curve"] * ("face lists" in names)
+    lines += ["element edge 1", "property int vertex1", "property int vertex2"] if "edges" in names else []
+    return ("\n".join([*lines, "end_header"]) + "\n").encode()
+
+
+def ply_rows(
+    faces: np.ndarray, columns: list[Column], on_faces: list[Column], names: set[str]
+) -> list[list[tuple[str, Any]]]:
+    """Return the rows of vertices, faces and edges: each value with its type."""
+    rows: list[list[tuple[str, Any]]] = []
+    for i in range(len(columns[0][2])):
         rows.append([(word, values[i]) for word, _, values in columns])
         rows[-1] += [("uchar", 2), ("int", 0), ("int", 1)] if "vertex lists" in names else []
     for i, face in enumerate(faces.tolist()):
@@ -233,19 +278,21 @@ def make_ply(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
             [("uchar", 3), *(("int", v) for v in face), *((word, values[i]) for word, _, values in on_faces)]
         )
         rows[-1] += [("uchar", 1), ("float", 0.5)] if "face lists" in names else []
-    rows += [[("int", 0), ("int", 1)]] if "edges" in names else []
-    text = "\n".join([*head, "end_header"]) + "\n"
+    return rows + [[("int", 0), ("int", 1)]] * ("edges" in names)
+
+
+def ply_body(form: str, rows: list[list[tuple[str, Any]]]) -> bytes:
+    """Return the rows of a PLY file as text, or in binary."""
     if form == "ascii":
-        body = "".join(
+        return "".join(
             " ".join(repr(value.item() if hasattr(value, "item") else value) for _, value in row) + "\n"
             for row in rows
-        )
-        return (text + body).encode(), planted
+        ).encode()
     order = "<" if "little" in form else ">"
-    return text.encode() + b"".join(
+    return b"".join(
         struct.pack(order + "".join(CODES[word] for word, _ in row), *(value for _, value in row))
         for row in rows
-    ), planted
+    )
 
 
 CODES = {"uchar": "B", "short": "h", "int": "i", "float": "f", "double": "d"}
@@ -301,7 +348,7 @@ def read_ply(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 def glb_rows(path: Path, name: str) -> np.ndarray:
     """Return the rows of an attribute of the first primitive of a GLB."""
-    tree, accessor, _ = scenes.opened(path.read_bytes())
+    tree, accessor, _ = gltf_scenes.opened(path.read_bytes())
     return np.asarray(accessor(tree["meshes"][0]["primitives"][0]["attributes"][name]))
 
 
@@ -337,41 +384,28 @@ def make_stl(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
     ]
 
 
+#: Data of a glTF file that are not arrays of vertices, and the words of a note that names them.
+GLTF_DATA = {
+    "materials": r"\bmaterials\b",
+    "cameras": r"\bcameras\b",
+    "extras": r"\bextras\b",
+    "morph targets": r"\bmorph targets\b",
+    "lines": r"\blines and points\b",
+    "nodes": r"\bnodes\b",
+    "extension": r"extensions \([^)]*KHR_lights_punctual",
+    "animations": r"\banimations\b",
+}
+
+
 def make_glb(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
-    make, n = scenes.SceneMaker(), len(vertices)
-    points = vertices.astype("<f4")
-    arrays: dict[str, tuple[np.ndarray, int, dict[str, Any]]] = {
-        "TEXCOORD_1": (rng.random((n, 2)), 5126, {}),
-        "COLOR_0": (rng.integers(0, 256, (n, 4)), 5121, {"normalized": True}),
-        "COLOR_1": (rng.random((n, 3)), 5126, {}),
-        "JOINTS_0": (np.zeros((n, 4)), 5121, {}),
-        "WEIGHTS_0": (np.tile([1.0, 0, 0, 0], (n, 1)), 5126, {}),
-        "_HEAT": (rng.random((n, 1)), 5126, {}),
-    }
-    entries = {
-        "materials": r"\bmaterials\b",
-        "cameras": r"\bcameras\b",
-        "extras": r"\bextras\b",
-        "morph targets": r"\bmorph targets\b",
-        "lines": r"\blines and points\b",
-        "nodes": r"\bnodes\b",
-        "extension": r"extensions \([^)]*KHR_lights_punctual",
-        "animations": r"\banimations\b",
-    }
-    planted = chosen_attributes(
-        rng,
-        [
-            *(
-                Planted(
-                    name,
-                    rf"vertex attributes \([^)]*\b{name}\b",
-                    {".glb": _glb_check(name, points, array[0])},
-                )
-                for name, array in arrays.items()
-            ),
-            *(Planted(name, words, {".glb": _TREE_CHECKS[name]}) for name, words in entries.items()),
-        ],
-    )
+    make, points = gltf_scenes.SceneMaker(), vertices.astype("<f4")
+    arrays = random_arrays(rng, len(vertices))
+    of_vertex = [
+        Planted(name, rf"vertex attributes \([^)]*\b{name}\b", {".glb": _glb_check(name, points, array[0])})
+        for name, array in arrays.items()
+    ]
+    of_file = [Planted(name, words, {".glb": _TREE_CHECKS[name]}) for name, words in GLTF_DATA.items()]
+    planted = chosen_attributes(rng, [*of_vertex, *of_file])
     names = {attribute.name for attribute in planted}
     primitive: dict[str, Any] = {
         "attributes": {"POSITION": make.accessor(points)},
@@ -380,23 +414,48 @@ def make_glb(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
     for name, (values, code, options) in arrays.items():
         if name in names:
             primitive["attributes"][name] = make.accessor(values, code, **options)
+    add_primitive_data(rng, make, primitive, names, len(vertices))
     primitives = [primitive]
-    nodes: list[dict[str, Any]] = [{"mesh": 0, "name": "thing"}]
-    if "materials" in names:
-        make.tree["materials"] = [
-            {"name": "paint", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}}
-        ]
-        primitive["material"] = 0
-    if "cameras" in names:
-        make.tree["cameras"] = [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.01}}]
-    if "extras" in names:
-        primitive["extras"] = {"part": 7}
-    if "morph targets" in names:
-        primitive["targets"] = [{"POSITION": make.accessor(rng.normal(size=(n, 3)))}]
     if "lines" in names:
         primitives.append(
             {"attributes": dict(primitive["attributes"]), "indices": make.accessor([0, 1], 5121), "mode": 1}
         )
+    add_scene_data(make, names)
+    make.tree["meshes"] = [{"primitives": primitives}]
+    return make.glb(), planted
+
+
+def random_arrays(rng: Random, n: int) -> dict[str, tuple[np.ndarray, int, dict[str, Any]]]:
+    """Return attributes of n vertices: values, the code of their type, and properties of the accessor."""
+    return {
+        "TEXCOORD_1": (rng.random((n, 2)), 5126, {}),
+        "COLOR_0": (rng.integers(0, 256, (n, 4)), 5121, {"normalized": True}),
+        "COLOR_1": (rng.random((n, 3)), 5126, {}),
+        "JOINTS_0": (np.zeros((n, 4)), 5121, {}),
+        "WEIGHTS_0": (np.tile([1.0, 0, 0, 0], (n, 1)), 5126, {}),
+        "_HEAT": (rng.random((n, 1)), 5126, {}),
+    }
+
+
+def add_primitive_data(
+    rng: Random, make: gltf_scenes.SceneMaker, primitive: dict[str, Any], names: set[str], n: int
+) -> None:
+    """Add those of `GLTF_DATA` that belong to a primitive of n vertices."""
+    if "materials" in names:
+        paint = {"name": "paint", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}}
+        make.tree["materials"] = [paint]
+        primitive["material"] = 0
+    if "extras" in names:
+        primitive["extras"] = {"part": 7}
+    if "morph targets" in names:
+        primitive["targets"] = [{"POSITION": make.accessor(rng.normal(size=(n, 3)))}]
+
+
+def add_scene_data(make: gltf_scenes.SceneMaker, names: set[str]) -> None:
+    """Add a scene, and those of `GLTF_DATA` that belong to it."""
+    nodes: list[dict[str, Any]] = [{"mesh": 0, "name": "thing"}]
+    if "cameras" in names:
+        make.tree["cameras"] = [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.01}}]
     if "nodes" in names:
         nodes = [{"name": "root", "children": [1]}, {**nodes[0], "translation": [1.0, 2, 3]}]
     if "extension" in names:
@@ -406,13 +465,7 @@ def make_glb(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
         times, turns = make.accessor([0.0, 1.0]), make.accessor([[0.0, 0, 0, 1], [0, 0, 1, 0]])
         channel = {"sampler": 0, "target": {"node": 0, "path": "rotation"}}
         make.tree["animations"] = [{"channels": [channel], "samplers": [{"input": times, "output": turns}]}]
-    make.tree |= {
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": nodes,
-        "meshes": [{"primitives": primitives}],
-    }
-    return make.glb(), planted
+    make.tree |= {"scene": 0, "scenes": [{"nodes": [0]}], "nodes": nodes}
 
 
 def make_gltf(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
@@ -435,7 +488,7 @@ def _glb_check(name: str, points: np.ndarray, values: np.ndarray) -> Check:
 
 
 def _tree(test: Callable[[dict[str, Any]], Any]) -> Check:
-    return lambda path: bool(test(scenes.opened(path.read_bytes())[0]))
+    return lambda path: bool(test(gltf_scenes.opened(path.read_bytes())[0]))
 
 
 def _has_paint(tree: dict[str, Any]) -> bool:

@@ -19,111 +19,120 @@ OF_SEARCH = (*SEARCH_OPTIONS, "correct_handles")
 INVALID = (None, -1, 0, 1e308, 1e-300, math.nan, math.inf, "abc", "", [], (), {}, [1], [[0, 1]], True, 2**70)
 
 
+#: Options that get a value of `INVALID`.
+MAY_BE_INVALID = (
+    "distortion", "quantise", "cones", "boundary", "seams", "weights", "up", "tiles", "charts", "method",
+)  # fmt: skip
+
+
 def make_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> dict[str, Any]:
     """Return keyword arguments for a mesh."""
-    size = len(vertices)
-    usable = len(faces) > 0 and faces.min() >= 0 and faces.max() < size
-    topology = Topology.of(faces if usable else np.zeros((1, 3), dtype=np.int64), max(size, 1))
-    inside = np.flatnonzero(topology.is_used & ~topology.is_border)
-    border = np.flatnonzero(topology.is_border)
-    options: dict[str, Any] = {}
-
-    def maybe(chance: float, name: str, *values: Any) -> None:
-        if rng.random() < chance:
-            options[name] = values[int(rng.integers(len(values)))]
-
-    def random_vertices(pool: np.ndarray, max_count: int) -> list[int]:
-        count = min(len(pool), int(rng.integers(1, max_count + 1)))
-        return rng.choice(pool, count, replace=False).tolist() if count else []
-
-    maybe(0.75, "charts", "atlas", "atlas", "one")
-    maybe(0.1, "method", "linear")
-    maybe(
-        0.25,
-        "cones",
-        "sparse",
-        "sparse",
-        "greedy",
-        "none",
-        "auto",
-        random_vertices(inside, 4),
-        random_vertices(inside, 4),
-    )
-    if rng.random() < 0.06:
-        options["cones"] = _given_curvatures(rng, inside, topology, faces if usable else faces[:0])
-    maybe(0.2, "distortion", 0.02, 0.1, 0.5, 2.0)
-    maybe(0.12, "cone_count", *range(0, 12))
-    maybe(0.08, "max_cones", 0, 1, 2, 5, 40)
-    maybe(0.06, "min_cone_angle", math.pi / 6, 1.0, 3.0, 5.0)
-    maybe(0.06, "max_cone_angle", None, 7.0, 9.0, 20.0)
-    maybe(0.06, "positive_only", True)
-    maybe(0.05, "weights", rng.random(size), 10 ** rng.uniform(-9, 9, size), np.eye(1, max(size, 1))[0])
-    maybe(0.05, "required_cones", random_vertices(inside, 3))
-    maybe(0.05, "forbidden_cones", random_vertices(np.arange(size), max(1, size // 2)))
-    maybe(
-        0.16,
-        "quantise",
-        math.pi / 2,
-        math.pi / 2,
-        math.pi / 3,
-        math.pi,
-        2 * math.pi,
-        0.1,
-        rng.uniform(1e-3, 6),
-    )
-    maybe(0.3 if "quantise" in options else 0, "correct_handles", True)
-    if len(border):
-        maybe(
-            0.3,
-            "boundary",
-            "lengths",
-            "lengths",
-            "disk",
-            "disk",
-            "straight",
-            "straight",
-            random_vertices(border, 6),
-        )
-        if rng.random() < 0.05:
-            corners = random_vertices(border, 6)
-            turns = rng.dirichlet(np.ones(len(corners))) * 2 * math.pi if corners else []
-            options["boundary"] = {v: float(k) for v, k in zip(corners, turns, strict=True)}
-    else:
-        maybe(0.03, "boundary", "lengths", "disk", "straight")
-    maybe(0.35, "repair", True)
-    maybe(0.04, "strict", True)
-    if len(topology.inner):
-        edges = topology.edges[topology.inner]
-        if rng.random() < 0.06:
-            options["seams"] = edges[rng.random(len(edges)) < rng.choice([0.03, 0.3, 1.0])]
-        if rng.random() < 0.06:
-            options["seams"] = _walk(rng, edges)
-        if rng.random() < 0.04:
-            barred = edges[rng.random(len(edges)) < rng.choice([0.03, 0.3, 0.9])]
-            options["no_seams"] = barred if rng.random() < 0.7 else np.unique(barred)
-    maybe(0.1, "sharp_angle", 0.3, 0.7, 1.2, 3.0)
-    maybe(0.04, "hide_seams", 1.0, 10.0)
-    maybe(0.05, "seam_weights", rng.random(size), 10 ** rng.uniform(-9, 9, size), np.ones(size) * 1e308)
-    maybe(0.08, "resolution", 1, 16, 64, 4096)
-    maybe(0.08, "padding", 0.0, 0.2, 8.0)
-    maybe(0.05, "tiles", 2, 3, 12)
-    maybe(0.12, "up", (0, 0, 1), (0, 1, 0), (1, 1e-9, -3), (0.0, -2.0, 0.0))
-    _drop_clashes(rng, options)
+    options = RandomOptions(rng, len(vertices), faces)
+    options.add_method()
+    options.add_cones()
+    options.add_boundary()
+    options.maybe(0.35, "repair", True)
+    options.maybe(0.04, "strict", True)
+    options.add_seams()
+    options.add_texture()
+    _drop_clashes(rng, options.chosen)
     if rng.random() < 0.03:
-        names = (
-            "distortion",
-            "quantise",
-            "cones",
-            "boundary",
-            "seams",
-            "weights",
-            "up",
-            "tiles",
-            "charts",
-            "method",
-        )
-        options[names[int(rng.integers(len(names)))]] = INVALID[int(rng.integers(len(INVALID)))]
-    return options
+        value = INVALID[int(rng.integers(len(INVALID)))]
+        options.chosen[MAY_BE_INVALID[int(rng.integers(len(MAY_BE_INVALID)))]] = value
+    return options.chosen
+
+
+class RandomOptions:
+    """Options that fit a mesh; cases are reproducible, so random numbers are drawn in a fixed order.
+
+    Attributes:
+        chosen: the options so far, by name.
+    """
+
+    def __init__(self, rng: Random, size: int, faces: np.ndarray) -> None:
+        """size: number of vertices; faces: (m, 3), possibly invalid, which only restricts the choice."""
+        self.chosen: dict[str, Any] = {}
+        self._rng, self._size = rng, size
+        is_valid = len(faces) > 0 and faces.min() >= 0 and faces.max() < size
+        self._faces = faces if is_valid else faces[:0]
+        self._topology = Topology.of(faces if is_valid else np.zeros((1, 3), dtype=np.int64), max(size, 1))
+        self._inside = np.flatnonzero(self._topology.is_used & ~self._topology.is_border)
+        self._border = np.flatnonzero(self._topology.is_border)
+
+    def maybe(self, chance: float, name: str, *values: Any) -> None:
+        """Set an option to one of some values, with a probability."""
+        if self._rng.random() < chance:
+            self.chosen[name] = values[int(self._rng.integers(len(values)))]
+
+    def _vertices(self, pool: np.ndarray, max_count: int) -> list[int]:
+        count = min(len(pool), int(self._rng.integers(1, max_count + 1)))
+        return self._rng.choice(pool, count, replace=False).tolist() if count else []
+
+    def _weights(self, constant: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return weights of vertices: moderate, of all magnitudes, and those given."""
+        rng, size = self._rng, self._size
+        return rng.random(size), 10 ** rng.uniform(-9, 9, size), constant
+
+    def add_method(self) -> None:
+        """Add the method and the kind of charts."""
+        self.maybe(0.75, "charts", "atlas", "atlas", "one")
+        self.maybe(0.1, "method", "linear")
+
+    def add_cones(self) -> None:
+        """Add cones and options of their search."""
+        rng, inside = self._rng, self._inside
+        words = ("sparse", "sparse", "greedy", "none", "auto")
+        self.maybe(0.25, "cones", *words, self._vertices(inside, 4), self._vertices(inside, 4))
+        if rng.random() < 0.06:
+            self.chosen["cones"] = _given_curvatures(rng, inside, self._topology, self._faces)
+        self.maybe(0.2, "distortion", 0.02, 0.1, 0.5, 2.0)
+        self.maybe(0.12, "cone_count", *range(0, 12))
+        self.maybe(0.08, "max_cones", 0, 1, 2, 5, 40)
+        self.maybe(0.06, "min_cone_angle", math.pi / 6, 1.0, 3.0, 5.0)
+        self.maybe(0.06, "max_cone_angle", None, 7.0, 9.0, 20.0)
+        self.maybe(0.06, "positive_only", True)
+        self.maybe(0.05, "weights", *self._weights(np.eye(1, max(self._size, 1))[0]))
+        self.maybe(0.05, "required_cones", self._vertices(inside, 3))
+        forbidden = self._vertices(np.arange(self._size), max(1, self._size // 2))
+        self.maybe(0.05, "forbidden_cones", forbidden)
+        quanta = (math.pi / 2, math.pi / 2, math.pi / 3, math.pi, 2 * math.pi, 0.1)
+        self.maybe(0.16, "quantise", *quanta, rng.uniform(1e-3, 6))
+        self.maybe(0.3 if "quantise" in self.chosen else 0, "correct_handles", True)
+
+    def add_boundary(self) -> None:
+        """Add a condition of the boundary."""
+        rng, border = self._rng, self._border
+        if not len(border):
+            self.maybe(0.03, "boundary", "lengths", "disk", "straight")
+            return
+        words = ("lengths", "lengths", "disk", "disk", "straight", "straight")
+        self.maybe(0.3, "boundary", *words, self._vertices(border, 6))
+        if rng.random() < 0.05:
+            corners = self._vertices(border, 6)
+            turns = rng.dirichlet(np.ones(len(corners))) * 2 * math.pi if corners else []
+            self.chosen["boundary"] = {v: float(k) for v, k in zip(corners, turns, strict=True)}
+
+    def add_seams(self) -> None:
+        """Add marked and avoided edges, and what seams cost."""
+        rng, edges = self._rng, self._topology.edges[self._topology.inner]
+        if len(edges):
+            if rng.random() < 0.06:
+                self.chosen["seams"] = edges[rng.random(len(edges)) < rng.choice([0.03, 0.3, 1.0])]
+            if rng.random() < 0.06:
+                self.chosen["seams"] = _walk(rng, edges)
+            if rng.random() < 0.04:
+                barred = edges[rng.random(len(edges)) < rng.choice([0.03, 0.3, 0.9])]
+                self.chosen["no_seams"] = barred if rng.random() < 0.7 else np.unique(barred)
+        self.maybe(0.1, "sharp_angle", 0.3, 0.7, 1.2, 3.0)
+        self.maybe(0.04, "hide_seams", 1.0, 10.0)
+        self.maybe(0.05, "seam_weights", *self._weights(np.ones(self._size) * 1e308))
+
+    def add_texture(self) -> None:
+        """Add the size of the texture, and how charts are placed in it."""
+        self.maybe(0.08, "resolution", 1, 16, 64, 4096)
+        self.maybe(0.08, "padding", 0.0, 0.2, 8.0)
+        self.maybe(0.05, "tiles", 2, 3, 12)
+        self.maybe(0.12, "up", (0, 0, 1), (0, 1, 0), (1, 1e-9, -3), (0.0, -2.0, 0.0))
 
 
 def cross_options(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> dict[str, Any]:

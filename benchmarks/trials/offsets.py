@@ -7,8 +7,8 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+import gltf_scenes
 import numpy as np
-import scenes
 import shapes
 
 from .attributes import read_ply
@@ -117,7 +117,7 @@ def _ply(kind: str, word: str) -> Callable[[Random, np.ndarray, np.ndarray], Mad
 
 def _glb(is_local: bool) -> Callable[[Random, np.ndarray, np.ndarray], Made]:
     def make(rng: Random, vertices: np.ndarray, faces: np.ndarray) -> Made:
-        scene = scenes.SceneMaker()
+        scene = gltf_scenes.SceneMaker()
         place = vertices.mean(axis=0) if is_local else np.zeros(3)
         points = (vertices - place).astype("f4")
         primitive = {
@@ -144,14 +144,14 @@ INPUTS = {
 
 def _read_glb(path: Path) -> np.ndarray:
     """Return the triangles of a GLB whose nodes have translations only."""
-    tree, accessor, _ = scenes.opened(path.read_bytes())
+    tree, accessor, _ = gltf_scenes.opened(path.read_bytes())
     triangles = []
     for node in tree["nodes"]:
         for primitive in tree["meshes"][node["mesh"]]["primitives"]:
             points = accessor(primitive["attributes"]["POSITION"]).astype(float) + node.get(
                 "translation", [0, 0, 0]
             )
-            triangles.append(points[scenes.corners_of(tree, accessor, primitive)])
+            triangles.append(points[gltf_scenes.corners_of(tree, accessor, primitive)])
     return np.concatenate(triangles).reshape(-1, 3, 3)
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scenes import SceneMaker, opened
+from gltf_scenes import SceneMaker, opened
 
 from .files import damaged_bytes, damaged_scene
 from .outcome import Outcome

@@ -28,11 +28,11 @@ def ball():
 
 
 def test_the_entry_point_leads_to_the_accessor(accessor):
-    found = [point for point in entry_points(group="pyvista.accessors") if point.name == "coneflat"]
-    if not found:
+    points = [point for point in entry_points(group="pyvista.accessors") if point.name == "coneflat"]
+    if not points:
         pytest.skip("an older version of the package is installed")
-    assert found[0].load() is accessor
-    assert "coneflat" in {each.name for each in pyvista.registered_accessors()}
+    assert points[0].load() is accessor
+    assert "coneflat" in {accessor_entry.name for accessor_entry in pyvista.registered_accessors()}
 
 
 def test_flatten_is_that_of_the_package(ball):
@@ -81,5 +81,5 @@ def test_data_of_points_and_cells_stay_where_they_are():
         # Each triangle is in the square around the middle.
         inside = np.abs(corners - np.asarray(result["middle"])[:, None]).max(axis=2)
         assert inside.max() == pytest.approx(0.5)
-        assert [str(one) for one in result["name"][:2]] == ["cell 2", "cell 2"]
+        assert [str(name) for name in result["name"][:2]] == ["cell 2", "cell 2"]
         assert np.linalg.norm(np.asarray(result["middle"]), axis=1) == pytest.approx(0.5)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from outlines import as_complex, letter_l, star
+from flat_charts import as_complex, letter_l, star
 from shapes import hill, rotation
 
 from coneflat import TriangleMesh

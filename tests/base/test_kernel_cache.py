@@ -82,8 +82,8 @@ def test_a_chosen_folder_gets_the_kernels_of_other_folders(folder, monkeypatch):
 def test_a_damaged_kernel_is_compiled_again(folder, damage, caplog):
     compiled(copy_of(product))(np.arange(4.0), 2.0)
     [file] = folder.iterdir()
-    whole = file.read_bytes()
-    file.write_bytes(damage(whole))
+    stored = file.read_bytes()
+    file.write_bytes(damage(stored))
     caplog.clear()
     assert compiled(copy_of(product))(np.arange(4.0), 2.0) == 12.0
     assert [record.getMessage() for record in caplog.records] == [
@@ -144,13 +144,13 @@ class TestDigest:
             '\n\ndef f(x: float):\n    """Text."""  # why\n    return x * a', a=2.0
         )
         digest = self.digest("def f(x):\n    return x * a", a=2.0)
-        others = [
+        changed = [
             self.digest("def f(x):\n    return x * a", a=3.0),
             self.digest("def f(x):\n    return x + a", a=2.0),
             self.digest("def f(x):\n    return x * a * 2", a=2.0),
             self.digest("def f(x):\n    return x * b", b=2.0),
         ]
-        assert len({digest, *others}) == 5
+        assert len({digest, *changed}) == 5
 
     def test_called_kernels(self):
         def caller(source):
@@ -186,14 +186,14 @@ class TestFolders:
     SCRIPT = "import json; from coneflat.base.kernel_cache import writable_folder as w; print(json.dumps(str(w())))"
 
     def folder(self, tmp_path, **environment):
-        kept = {
+        inherited = {
             name: value
             for name, value in os.environ.items()
             if name not in (CACHE_VARIABLE, "XDG_CACHE_HOME")
         }
         done = subprocess.run(
             [sys.executable, "-c", self.SCRIPT],
-            env={**kept, "TMPDIR": str(tmp_path), **environment},
+            env={**inherited, "TMPDIR": str(tmp_path), **environment},
             capture_output=True,
             text=True,
             check=True,

@@ -31,10 +31,10 @@ def outer(*notes):
 
 
 def caught(call, *args):
-    with warnings.catch_warnings(record=True) as found:
+    with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
         call(*args)
-    return found
+    return warned
 
 
 def test_information_does_not_warn():
@@ -43,37 +43,37 @@ def test_information_does_not_warn():
 
 
 def test_a_call_warns_once_and_inner_calls_do_not():
-    (found,) = caught(outer, Unmet("One is unmet."), "Dropped 2 faces.", Unmet("Two are unmet."))
-    assert found.category is GuaranteeWarning
-    assert str(found.message) == "One is unmet. Two are unmet. (see map.notes)"
-    assert found.message.notes == ("One is unmet.", "Two are unmet.")
-    assert {type(note) for note in found.message.notes} == {str}
+    (warning,) = caught(outer, Unmet("One is unmet."), "Dropped 2 faces.", Unmet("Two are unmet."))
+    assert warning.category is GuaranteeWarning
+    assert str(warning.message) == "One is unmet. Two are unmet. (see map.notes)"
+    assert warning.message.notes == ("One is unmet.", "Two are unmet.")
+    assert {type(note) for note in warning.message.notes} == {str}
     assert caught(outer, "Dropped 2 faces.") == []
 
 
 def test_further_notes_are_counted():
     notes = [Unmet(f"Note {i}.") for i in range(MAX_QUOTED + 2)]
-    (found,) = caught(inner, *notes)
+    (warning,) = caught(inner, *notes)
     quoted = " ".join(notes[:MAX_QUOTED])
-    assert str(found.message) == f"{quoted} (2 more unmet guarantees; all are in result.notes)"
-    (found,) = caught(inner, *notes[: MAX_QUOTED + 1])
-    assert str(found.message).endswith("(1 more unmet guarantee; all are in result.notes)")
+    assert str(warning.message) == f"{quoted} (2 more unmet guarantees; all are in result.notes)"
+    (warning,) = caught(inner, *notes[: MAX_QUOTED + 1])
+    assert str(warning.message).endswith("(1 more unmet guarantee; all are in result.notes)")
 
 
 def test_the_warning_is_at_the_callers_line():
     def explicit():
         warn_of([Unmet("One is unmet.")], "result.notes")
 
-    with warnings.catch_warnings(record=True) as found:
+    with warnings.catch_warnings(record=True) as warned:
         warnings.simplefilter("always")
         outer(Unmet("One is unmet."))
         explicit()
     lines = open(__file__, encoding="utf-8").read().splitlines()  # noqa: SIM115
-    assert [lines[each.lineno - 1].strip() for each in found] == [
+    assert [lines[warning.lineno - 1].strip() for warning in warned] == [
         'outer(Unmet("One is unmet."))',
         "explicit()",
     ]
-    assert {each.filename for each in found} == {__file__}
+    assert {warning.filename for warning in warned} == {__file__}
 
 
 def test_notes_that_an_argument_has_are_not_repeated():
@@ -83,8 +83,8 @@ def test_notes_that_an_argument_has_are_not_repeated():
     def extracted(grid):
         return result_with(*grid.notes, Unmet("Two are unmet."))
 
-    for found in (caught(extracted, grid), caught(lambda: extracted(grid=grid))):
-        assert [each.message.notes for each in found] == [("Two are unmet.",)]
+    for warned in (caught(extracted, grid), caught(lambda: extracted(grid=grid))):
+        assert [warning.message.notes for warning in warned] == [("Two are unmet.",)]
 
 
 def test_as_an_error_it_leaves_the_state_clean():

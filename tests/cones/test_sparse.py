@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapes
 from scipy.sparse import csr_matrix
-from stored import at_hand, noisy
+from stored_meshes import at_hand, noisy
 
 from coneflat import check_mesh, read_mesh
 from coneflat.cones.sparse import ConeSearch, fit_curvatures

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 from command import command
-from scenes import SceneMaker, opened, rich_scene
+from gltf_scenes import SceneMaker, opened, rich_scene
 from trials.attributes import glb_rows, read_ply
 
 import coneflat
@@ -133,10 +133,9 @@ def test_colours_of_vertices_are_those_of_a_glb(painted, tmp_path):
 
 def test_colours_that_a_texture_hides_are_named(painted, tmp_path):
     pytest.importorskip("PIL")
-    found = command("flatten", painted, "-o", tmp_path / "out.glb", "--texture", "checker")
+    done = command("flatten", painted, "-o", tmp_path / "out.glb", "--texture", "checker")
     assert (
-        "not kept in .glb: texture files (part0.png), vertex colours, vertex properties (alpha"
-        in found.stdout
+        "not kept in .glb: texture files (part0.png), vertex colours, vertex properties (alpha" in done.stdout
     )
 
 
@@ -215,9 +214,9 @@ def test_gifti_names_its_metadata():
     meta = nibabel.gifti.GiftiMetaData({"AnatomicalStructurePrimary": "CortexLeft"})
     points, faces = np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32)
     for values, intent in ((points, "POINTSET"), (faces, "TRIANGLE")):
-        more = {"meta": meta} if intent == "POINTSET" else {}
+        metadata = {"meta": meta} if intent == "POINTSET" else {}
         image.add_gifti_data_array(
-            nibabel.gifti.GiftiDataArray(values, intent=f"NIFTI_INTENT_{intent}", **more)
+            nibabel.gifti.GiftiDataArray(values, intent=f"NIFTI_INTENT_{intent}", **metadata)
         )
     mesh = read_mesh_from(image.to_bytes(), "lh.surf.gii")
     assert Attribute("metadata", "AnatomicalStructurePrimary") in mesh.attributes
@@ -228,8 +227,8 @@ def test_gifti_names_its_metadata():
 def test_every_command_that_writes_a_mesh_names_what_it_does_not_keep(painted, tmp_path):
     note = "note: These data of the input are not kept in .obj: texture files (part0.png), vertex colours"
     for verb in ("flatten", "unwrap", "quads"):
-        more = ["--quads", "8"] if verb == "quads" else []
-        assert note in command(verb, painted, "-o", tmp_path / "out.obj", *more).stdout
+        arguments = ["--quads", "8"] if verb == "quads" else []
+        assert note in command(verb, painted, "-o", tmp_path / "out.obj", *arguments).stdout
     command("batch", painted, "--out", tmp_path / "many", "--jobs", "1")
     assert note.removeprefix("note: ") in (tmp_path / "many" / "summary.csv").read_text()
     pytest.importorskip("PIL")
@@ -271,10 +270,10 @@ def test_properties_that_merged_vertices_do_not_share_are_named(weld, tmp_path):
     ]
     lines += ["end_header", "0 0 0 1 9", "1 0 0 2 9", "0 1 0 3 9", "1 0 0 2 9", "1 1 0 5 9", "0 1 0 4 9"]
     (tmp_path / "slit.ply").write_text("\n".join([*lines, "3 0 1 2", "3 3 4 5"]) + "\n")
-    found = command("flatten", tmp_path / "slit.ply", "-o", tmp_path / "out.ply", *weld).stdout
-    assert "note: Merged vertices differ in label: the values of the first of them are used" in found
-    found = command("flatten", tmp_path / "slit.ply", "-o", tmp_path / "out.ply", "--no-weld").stdout
-    assert "Merged" not in found
+    output = command("flatten", tmp_path / "slit.ply", "-o", tmp_path / "out.ply", *weld).stdout
+    assert "note: Merged vertices differ in label: the values of the first of them are used" in output
+    output = command("flatten", tmp_path / "slit.ply", "-o", tmp_path / "out.ply", "--no-weld").stdout
+    assert "Merged" not in output
 
 
 @pytest.mark.parametrize("has_uv", [True, False])
@@ -287,10 +286,10 @@ def test_textures_of_the_old_uvs_of_an_obj_are_named(line, has_uv, tmp_path):
     (tmp_path / "a.obj").write_text("\n".join(lines))
     result = coneflat.flatten(tmp_path / "a.obj")
     note = "The textures of the file are kept, but were made for the old UVs"
-    found = [
-        any(each.startswith(note) for each in result.as_written(ending).notes) for ending in OUTPUT_FORMATS
+    is_noted = [
+        any(text.startswith(note) for text in result.as_written(ending).notes) for ending in OUTPUT_FORMATS
     ]
-    assert found == [has_uv and line.startswith("map") and ending == ".obj" for ending in OUTPUT_FORMATS]
+    assert is_noted == [has_uv and line.startswith("map") and ending == ".obj" for ending in OUTPUT_FORMATS]
 
 
 def test_a_report_has_the_note(painted, tmp_path):

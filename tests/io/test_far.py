@@ -7,7 +7,7 @@ import struct
 import numpy as np
 import pytest
 import shapes
-from scenes import SceneMaker, opened, rich_scene
+from gltf_scenes import SceneMaker, opened, rich_scene
 from trials.offsets import READERS
 
 import coneflat
@@ -28,14 +28,14 @@ def test_a_model_of_size_one_far_away_keeps_its_triangles(tmp_path, offset, endi
     vertices, faces = shapes.hill(5, 4)
     vertices = vertices + offset
     result = coneflat.flatten(vertices, faces)
-    found = READERS[ending](result.save(tmp_path / f"out{ending}"))
+    corners = READERS[ending](result.save(tmp_path / f"out{ending}"))
     if ending == ".glb":  # vertices are in the order of the result
-        np.testing.assert_allclose(sides(found), sides(vertices[result.faces]), rtol=0, atol=4e-7)
-        np.testing.assert_allclose(found, vertices[result.faces], rtol=0, atol=3e-7)
+        np.testing.assert_allclose(sides(corners), sides(vertices[result.faces]), rtol=0, atol=4e-7)
+        np.testing.assert_allclose(corners, vertices[result.faces], rtol=0, atol=3e-7)
     else:
-        assert found.tobytes() == vertices[result.faces].tobytes()
+        assert corners.tobytes() == vertices[result.faces].tobytes()
     stored = result.as_written(ending)
-    assert np.array_equal(stored.vertices[stored.faces], found)
+    assert np.array_equal(stored.vertices[stored.faces], corners)
     assert not stored.distortion.degenerate_input
     assert np.isfinite(stored.distortion.qc_mean)
     assert stored.as_written(ending) is stored
@@ -95,12 +95,15 @@ def test_vertices_without_a_face_do_not_count(tmp_path):
 def test_a_scene_with_transforms_keeps_them(tmp_path):
     make = SceneMaker()
     vertices, faces = shapes.hill(3, 3)
-    one = {"attributes": {"POSITION": make.accessor(vertices)}, "indices": make.accessor(faces.ravel(), 5123)}
+    primitive = {
+        "attributes": {"POSITION": make.accessor(vertices)},
+        "indices": make.accessor(faces.ravel(), 5123),
+    }
     nodes = [
         {"children": [1], "translation": OFFSETS[0]},
         {"mesh": 0, "scale": [2, 2, 2], "rotation": [0, 0, 0.6, 0.8]},
     ]
-    make.tree |= {"meshes": [{"primitives": [one]}], "nodes": nodes, "scenes": [{"nodes": [0]}]}
+    make.tree |= {"meshes": [{"primitives": [primitive]}], "nodes": nodes, "scenes": [{"nodes": [0]}]}
     result = coneflat.flatten(read_mesh_from(make.glb(), "a.glb"))
     tree, accessor, _ = opened(result.save(tmp_path / "out.glb").read_bytes())
     assert tree["nodes"] == nodes
@@ -130,15 +133,15 @@ def test_quads_far_away_keep_their_shape(tmp_path, ending):
     out = mesh.save(tmp_path / f"out{ending}")
     if ending in (".obj", ".ply", ".glb"):
         scene = trimesh.load_scene(out, process=False)
-        meshes = [one for one in scene.dump() if isinstance(one, trimesh.Trimesh)]
-        found = meshes[0].vertices
+        meshes = [geometry for geometry in scene.dump() if isinstance(geometry, trimesh.Trimesh)]
+        points = meshes[0].vertices
     else:
-        found = meshio.read(out).points
+        points = meshio.read(out).points
     # The reader of triangles repeats vertices of an OBJ at other UVs.
     for axis in range(3):
-        errors = np.abs(np.unique(found[:, axis])[:, None] - mesh.vertices[:, axis]).min(axis=1)
+        errors = np.abs(np.unique(points[:, axis])[:, None] - mesh.vertices[:, axis]).min(axis=1)
         assert errors.max() < 1e-6
-    assert len(np.unique(found, axis=0)) == len(mesh.vertices)
+    assert len(np.unique(points, axis=0)) == len(mesh.vertices)
 
 
 def rounded_stl(vertices, faces):

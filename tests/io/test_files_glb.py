@@ -7,7 +7,7 @@ import struct
 
 import numpy as np
 import pytest
-from scenes import PNG, SceneMaker, corners_of, opened, rich_scene
+from gltf_scenes import PNG, SceneMaker, corners_of, opened, rich_scene
 from shapes import sphere
 
 import coneflat
@@ -32,29 +32,31 @@ def pair(rich, tmp_path):
 
 class TestScene:
     def test_all_but_the_triangles_stays_as_it_is(self, pair):
-        (old, _, old_view), (new, _, new_view), _ = pair
-        kept = "scene scenes materials samplers textures skins animations cameras asset extensions extras"
-        for name in (*kept.split(), "extensionsUsed"):
-            assert new[name][: len(old[name])] == old[name] if name == "materials" else new[name] == old[name]
-        for one, other in zip(old["nodes"], new["nodes"], strict=True):
-            assert {**one, "mesh": 0} == {**other, "mesh": 0}
-        assert [node.get("mesh") for node in new["nodes"]] == [None, 0, 1, None, 2]
-        assert [mesh["name"] for mesh in new["meshes"]] == ["body", "strip", "strip"]
-        assert new["meshes"][0]["weights"] == [0, 0]
-        assert new["meshes"][0]["extras"] == old["meshes"][0]["extras"]
-        (image,) = new["images"]
+        (old, _, old_view), (tree, _, new_view), _ = pair
+        names = "scene scenes materials samplers textures skins animations cameras asset extensions extras"
+        for name in (*names.split(), "extensionsUsed"):
+            assert (
+                tree[name][: len(old[name])] == old[name] if name == "materials" else tree[name] == old[name]
+            )
+        for old_node, tree_node in zip(old["nodes"], tree["nodes"], strict=True):
+            assert {**old_node, "mesh": 0} == {**tree_node, "mesh": 0}
+        assert [node.get("mesh") for node in tree["nodes"]] == [None, 0, 1, None, 2]
+        assert [mesh["name"] for mesh in tree["meshes"]] == ["body", "strip", "strip"]
+        assert tree["meshes"][0]["weights"] == [0, 0]
+        assert tree["meshes"][0]["extras"] == old["meshes"][0]["extras"]
+        (image,) = tree["images"]
         assert image["name"] == "skin"
         assert new_view(image["bufferView"]) == old_view(old["images"][0]["bufferView"]) == PNG
 
     def test_every_attribute_of_every_corner_is_the_same_bit_for_bit(self, pair):
-        (old, old_values, _), (new, new_values, _), _ = pair
+        (old, old_values, _), (written, written_values, _), _ = pair
         compared = 0
         for node in range(5):
             if "mesh" not in old["nodes"][node]:
                 continue
             primitives = zip(
                 old["meshes"][old["nodes"][node]["mesh"]]["primitives"],
-                new["meshes"][new["nodes"][node]["mesh"]]["primitives"],
+                written["meshes"][written["nodes"][node]["mesh"]]["primitives"],
                 strict=True,
             )
             for before, after in primitives:
@@ -63,50 +65,60 @@ class TestScene:
                 assert after.get("extras") == before.get("extras")
                 if before.get("mode") == 1:
                     assert after["mode"] == 1
-                    np.testing.assert_array_equal(old_values(before["indices"]), new_values(after["indices"]))
+                    np.testing.assert_array_equal(
+                        old_values(before["indices"]), written_values(after["indices"])
+                    )
                     continue
-                here, there = corners_of(old, old_values, before), corners_of(new, new_values, after)
-                kept = set(before["attributes"])
+                old_corners, written_corners = (
+                    corners_of(old, old_values, before),
+                    corners_of(written, written_values, after),
+                )
+                copied = set(before["attributes"])
                 # Tangents are those of the normal map's UVs, which are the second ones of the lower half.
-                kept -= {"TANGENT"} if before.get("material") == 0 else set()
-                assert set(after["attributes"]) == kept | {"TEXCOORD_0"}
+                copied -= {"TANGENT"} if before.get("material") == 0 else set()
+                assert set(after["attributes"]) == copied | {"TEXCOORD_0"}
                 pairs = [
                     (before["attributes"][name], after["attributes"][name])
-                    for name in kept
+                    for name in copied
                     if name != "TEXCOORD_0"
                 ]
-                for one, other in zip(before.get("targets", []), after.get("targets", []), strict=True):
-                    pairs += [(one[name], other[name]) for name in one]
-                for one, other in pairs:
+                for old_item, written_item in zip(
+                    before.get("targets", []), after.get("targets", []), strict=True
+                ):
+                    pairs += [(old_item[name], written_item[name]) for name in old_item]
+                for old_item, written_item in pairs:
                     forms = [
                         {k: tree["accessors"][i].get(k) for k in ("componentType", "type", "normalized")}
-                        for tree, i in ((old, one), (new, other))
+                        for tree, i in ((old, old_item), (written, written_item))
                     ]
                     assert forms[0] == forms[1]
-                    assert old_values(one)[here].tobytes() == new_values(other)[there].tobytes()
+                    assert (
+                        old_values(old_item)[old_corners].tobytes()
+                        == written_values(written_item)[written_corners].tobytes()
+                    )
                     compared += 1
         assert compared == 2 * (8 + 2) + 2 - 1
 
     def test_the_uvs_are_those_of_the_result(self, pair):
-        _, (new, values, _), result = pair
-        found = []
-        for node in new["nodes"]:
-            for one in new["meshes"][node["mesh"]]["primitives"] if "mesh" in node else []:
-                if "TEXCOORD_0" in one["attributes"]:
-                    corners = corners_of(new, values, one)
-                    found.append(values(one["attributes"]["TEXCOORD_0"])[corners].reshape(-1, 3, 2))
+        _, (tree, values, _), result = pair
+        uvs = []
+        for node in tree["nodes"]:
+            for primitive in tree["meshes"][node["mesh"]]["primitives"] if "mesh" in node else []:
+                if "TEXCOORD_0" in primitive["attributes"]:
+                    corners = corners_of(tree, values, primitive)
+                    uvs.append(values(primitive["attributes"]["TEXCOORD_0"])[corners].reshape(-1, 3, 2))
         # Nodes in depth-first order: the ball, the mirrored ribbon, whose corners run the other way, the other one.
-        found[2] = found[2][:, ::-1]
+        uvs[2] = uvs[2][:, ::-1]
         expected = result.as_written(".glb").corner_uv * [1, -1] + [0, 1]
-        np.testing.assert_array_equal(np.concatenate(found), expected)
+        np.testing.assert_array_equal(np.concatenate(uvs), expected)
 
     def test_nothing_of_the_old_arrays_stays_behind(self, rich, tmp_path):
         _, result = rich
         once = result.save(tmp_path / "once.glb")
         twice = coneflat.flatten(once, charts="atlas").save(tmp_path / "twice.glb")
-        one, other = opened(once.read_bytes())[0], opened(twice.read_bytes())[0]
-        assert len(other["accessors"]) == len(one["accessors"])
-        assert len(other["bufferViews"]) == len(one["bufferViews"])
+        first_tree, second_tree = opened(once.read_bytes())[0], opened(twice.read_bytes())[0]
+        assert len(second_tree["accessors"]) == len(first_tree["accessors"])
+        assert len(second_tree["bufferViews"]) == len(first_tree["bufferViews"])
         assert twice.stat().st_size < 1.2 * once.stat().st_size
 
 
@@ -115,15 +127,15 @@ def two_balls():
     make = SceneMaker()
     ball = sphere(1)
     top, bottom = ball[0][ball[0][:, 2].argmax()], ball[0][ball[0][:, 2].argmin()]
-    other = (ball[0] + top - bottom).astype("f4").astype(float)
+    second_ball = (ball[0] + top - bottom).astype("f4").astype(float)
     # In the numbers of the file, the point is the same.
-    other[ball[0][:, 2].argmin()] = top
-    for points in (ball[0], other):
-        one = {
+    second_ball[ball[0][:, 2].argmin()] = top
+    for points in (ball[0], second_ball):
+        primitive = {
             "attributes": {"POSITION": make.accessor(points)},
             "indices": make.accessor(ball[1].ravel(), 5125),
         }
-        make.tree.setdefault("meshes", []).append({"primitives": [one]})
+        make.tree.setdefault("meshes", []).append({"primitives": [primitive]})
     make.tree |= {"nodes": [{"mesh": i, "name": f"ball {i}"} for i in (0, 1)], "scenes": [{"nodes": [0, 1]}]}
     return make.glb()
 
@@ -148,9 +160,9 @@ class TestLosses:
         make = SceneMaker()
         points = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
         order = [0, 1, 2, 0, 2, 3, 1, 1, 2]
-        one = {"attributes": {"POSITION": make.accessor(points)}, "indices": make.accessor(order, 5121)}
-        lost = {"attributes": one["attributes"], "indices": make.accessor([3, 3, 0], 5121)}
-        make.tree |= {"meshes": [{"primitives": [one, lost]}, {"primitives": [lost]}]}
+        primitive = {"attributes": {"POSITION": make.accessor(points)}, "indices": make.accessor(order, 5121)}
+        lost = {"attributes": primitive["attributes"], "indices": make.accessor([3, 3, 0], 5121)}
+        make.tree |= {"meshes": [{"primitives": [primitive, lost]}, {"primitives": [lost]}]}
         make.tree |= {"nodes": [{"mesh": 0}, {"mesh": 1}], "scenes": [{"nodes": [0, 1]}]}
         result = coneflat.flatten(read_mesh_from(make.glb(), "a.glb"), repair=True)
         assert "Triangles that the repair dropped are not in the file: 3." in result.as_written(".glb").notes
@@ -185,26 +197,26 @@ class TestFilesBeside:
         tree["images"] = [{"uri": "skin.png"}, {"uri": "gone%20away.png"}]
         (folder / "rich.gltf").write_text(json.dumps(tree))
         result = coneflat.flatten(folder / "rich.gltf")
-        new, _, view = opened(result.save(tmp_path / "out.glb").read_bytes())
-        assert view(new["images"][0]["bufferView"]) == PNG
-        assert new["images"][1]["uri"] == "in/gone%20away.png"
-        assert "uri" not in new["buffers"][0]
+        written, _, view = opened(result.save(tmp_path / "out.glb").read_bytes())
+        assert view(written["images"][0]["bufferView"]) == PNG
+        assert written["images"][1]["uri"] == "in/gone%20away.png"
+        assert "uri" not in written["buffers"][0]
 
     def test_a_checkerboard_takes_the_place_of_the_materials(self, rich, tmp_path):
         _, result = rich
-        new, _, view = opened(result.save(tmp_path / "out.glb", texture="checker").read_bytes())
+        tree, _, view = opened(result.save(tmp_path / "out.glb", texture="checker").read_bytes())
         shown = {
-            one.get("material")
-            for mesh in new["meshes"]
-            for one in mesh["primitives"]
-            if one.get("mode") != 1
+            item.get("material")
+            for mesh in tree["meshes"]
+            for item in mesh["primitives"]
+            if item.get("mode") != 1
         }
         (number,) = shown
-        index = new["materials"][number]["pbrMetallicRoughness"]["baseColorTexture"]["index"]
-        image = new["images"][new["textures"][index]["source"]]
+        index = tree["materials"][number]["pbrMetallicRoughness"]["baseColorTexture"]["index"]
+        image = tree["images"][tree["textures"][index]["source"]]
         assert view(image["bufferView"]).startswith(b"\x89PNG")
         assert view(image["bufferView"]) != PNG
-        assert [one["name"] for one in new["materials"][:2]] == ["upper", "lower"]
+        assert [item["name"] for item in tree["materials"][:2]] == ["upper", "lower"]
 
     def test_primitives_without_a_material_get_a_plain_one(self, tmp_path):
         trimesh.creation.icosphere(2).export(tmp_path / "in.glb")

@@ -13,24 +13,24 @@ from io import BytesIO
 import numpy as np
 import pytest
 import shapes
-from scenes import SceneMaker, opened, rich_scene
+from gltf_scenes import SceneMaker, opened, rich_scene
 
 import coneflat
 from coneflat.errors import ConeflatError, MeshFileError
 from coneflat.geometry.triangulate import triangulate
 from coneflat.io import read_mesh, read_mesh_from
 
-MOST = 64 << 20
+MEMORY = 64 << 20
 """Bytes that refusing a file of a few kilobytes may take."""
 
 
-def refused(content, name, match, most=MOST):
+def refused(content, name, match, memory=MEMORY):
     """Require that content is refused, in one line, and with little memory."""
     tracemalloc.start()
     try:
         with pytest.raises(ConeflatError, match=match) as caught:
             read_mesh_from(content, name, ending=os.path.splitext(name)[1])
-        assert tracemalloc.get_traced_memory()[1] < most
+        assert tracemalloc.get_traced_memory()[1] < memory
     finally:
         tracemalloc.stop()
     assert "\n" not in str(caught.value)
@@ -41,8 +41,8 @@ def square():
     """Return the maker of a scene of two triangles."""
     make = SceneMaker()
     position = make.accessor([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-    one = {"attributes": {"POSITION": position}, "indices": make.accessor([0, 1, 2, 0, 2, 3], 5121)}
-    make.tree |= {"meshes": [{"primitives": [one]}], "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}]}
+    primitive = {"attributes": {"POSITION": position}, "indices": make.accessor([0, 1, 2, 0, 2, 3], 5121)}
+    make.tree |= {"meshes": [{"primitives": [primitive]}], "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}]}
     return make
 
 
@@ -77,10 +77,10 @@ class TestGltf:
         refused(make.glb(), "a.glb", "reached twice")
         make = square()
         corners = np.zeros(30_000)
-        one = make.tree["meshes"][0]["primitives"][0]
-        one["indices"] = make.accessor(corners, 5121)
-        make.tree["meshes"][0]["primitives"] = [one] * 400
-        refused(make.glb(), "a.glb", "so often that there are over 10,000,000 corners", most=MOST * 8)
+        primitive = make.tree["meshes"][0]["primitives"][0]
+        primitive["indices"] = make.accessor(corners, 5121)
+        make.tree["meshes"][0]["primitives"] = [primitive] * 400
+        refused(make.glb(), "a.glb", "so often that there are over 10,000,000 corners", memory=MEMORY * 8)
 
     def test_names_that_are_not_text_are_refused(self):
         make = square()
@@ -181,11 +181,11 @@ class TestGltf:
     def test_sparse_positions_replace_those_of_the_buffer(self):
         make = square()
         where = make.view(np.array([2], "<u2").tobytes())
-        new = make.view(np.array([5, 6, 7], "<f4").tobytes())
+        view = make.view(np.array([5, 6, 7], "<f4").tobytes())
         make.tree["accessors"][0]["sparse"] = {
             "count": 1,
             "indices": {"bufferView": where, "componentType": 5123},
-            "values": {"bufferView": new},
+            "values": {"bufferView": view},
         }
         mesh = read_mesh_from(make.glb(), "a.glb")
         assert mesh.vertices.tolist() == [[0, 0, 0], [1, 0, 0], [5, 6, 7], [0, 1, 0]]
@@ -200,12 +200,12 @@ class TestGltf:
         assert mesh.vertices[:, :2].tolist() == [[0, 0], [1, 0], [1, -1], [0, 64 / 127]]
 
     def test_a_changed_byte_leads_to_a_mesh_or_a_named_error(self, tmp_path):
-        whole = rich_scene()
-        length = struct.unpack_from("<I", whole, 12)[0]
+        content = rich_scene()
+        length = struct.unpack_from("<I", content, 12)[0]
         rng = np.random.default_rng(1)
         read = 0
         for place in rng.integers(20, 20 + length, 400).tolist():
-            broken = bytearray(whole)
+            broken = bytearray(content)
             broken[place] = rng.integers(32, 127)
             try:
                 mesh = read_mesh_from(bytes(broken), "a.glb")
@@ -222,9 +222,9 @@ def saved(tmp_path_factory):
 
 
 class TestNpz:
-    def written(self, saved, tmp_path, **new):
+    def written(self, saved, tmp_path, **arrays_by_name):
         with np.load(saved) as archive:
-            arrays = dict(archive) | new
+            arrays = dict(archive) | arrays_by_name
         np.savez(tmp_path / "b.npz", **arrays)
         return tmp_path / "b.npz"
 
@@ -253,7 +253,7 @@ class TestNpz:
         tracemalloc.start()
         with pytest.raises(MeshFileError, match="unpacks to more than 30 times its size"):
             coneflat.read_flattening(bomb)
-        assert tracemalloc.get_traced_memory()[1] < MOST
+        assert tracemalloc.get_traced_memory()[1] < MEMORY
         tracemalloc.stop()
 
 
@@ -325,9 +325,9 @@ def test_large_polygons_are_tiled(count):
     (ux, uy), (vx, vy) = (b - a).T, (c - a).T
     areas = (ux * vy - uy * vx) / 2
     x, y = points.T
-    whole = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2
-    assert (np.sign(whole) * areas).min() > 0
-    assert areas.sum() == pytest.approx(whole, rel=1e-9)
+    total = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2
+    assert (np.sign(total) * areas).min() > 0
+    assert areas.sum() == pytest.approx(total, rel=1e-9)
 
 
 def test_a_name_that_is_too_long():

@@ -50,11 +50,11 @@ def ngons():
     middles = vertices[faces].mean(axis=1)
     around = []
     for v in range(len(vertices)):
-        here = np.flatnonzero((faces == v).any(axis=1))
-        x = np.cross(vertices[v], middles[here[0]])
+        around_vertex = np.flatnonzero((faces == v).any(axis=1))
+        x = np.cross(vertices[v], middles[around_vertex[0]])
         y = np.cross(vertices[v], x)
-        angles = np.arctan2(middles[here] @ y, middles[here] @ x)
-        around.append(here[np.argsort(angles)].tolist())
+        angles = np.arctan2(middles[around_vertex] @ y, middles[around_vertex] @ x)
+        around.append(around_vertex[np.argsort(angles)].tolist())
     return Polygons(middles, around)
 
 
@@ -85,10 +85,10 @@ def concave():
 
 def twice(shape):
     """A shape and another component, smaller and aside."""
-    other = shape.vertices * 0.7 + [4, 0.5, -0.25]
+    second = shape.vertices * 0.7 + [4, 0.5, -0.25]
     count = len(shape.vertices)
     return Polygons(
-        np.concatenate([shape.vertices, other]),
+        np.concatenate([shape.vertices, second]),
         shape.faces + [[v + count for v in face] for face in shape.faces],
     )
 
@@ -172,8 +172,8 @@ INPUTS = {
 }  # fmt: skip
 CASES = [
     pytest.param(name, shape, id=f"{name}-{shape.__name__}")
-    for name, one in INPUTS.items()
-    for shape in one.only
+    for name, input_format in INPUTS.items()
+    for shape in input_format.only
 ]
 
 
@@ -247,12 +247,12 @@ READERS = {
 def rings(points, faces, single=False):
     """Return faces as what they are in space, wherever they begin, in an order that tells them apart."""
     points = points.astype("f4").astype(float) if single else points
-    found = []
+    turned = []
     for face in faces:
         ring = [tuple(row) for row in (points[face] + 0.0).tolist()]
-        least = ring.index(min(ring))
-        found.append(tuple(ring[least:] + ring[:least]))
-    return sorted(found)
+        smallest = ring.index(min(ring))
+        turned.append(tuple(ring[smallest:] + ring[:smallest]))
+    return sorted(turned)
 
 
 def measured(seen):
@@ -267,16 +267,16 @@ def measured(seen):
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "shape"), CASES)
 def test_other_readers_find_the_mesh_and_its_measures(tmp_path, name, shape):
-    given = twice(shape())
+    mesh = twice(shape())
     ending, write, weld, _ = INPUTS[name]
     (tmp_path / "some.mtl").write_text("newmtl paint0\nnewmtl paint1\n")
     path = tmp_path / f"in{ending}"
-    write(path, given)
+    write(path, mesh)
     source = read_mesh(path, weld)
-    assert len(source.vertices) == len(given.vertices)
+    assert len(source.vertices) == len(mesh.vertices)
     result = coneflat.flatten(source, charts="atlas")
     single = ending in (".stl", ".glb")
-    in_space = rings(given.vertices, fans(given.faces) if single else given.faces, single)
+    in_space = rings(mesh.vertices, fans(mesh.faces) if single else mesh.faces, single)
     assert rings(source.vertices, np.split(source.corners, source.offsets[1:-1])) == in_space
     for out, readers in READERS.items():
         file = result.save(tmp_path / f"out{out}")
@@ -284,7 +284,7 @@ def test_other_readers_find_the_mesh_and_its_measures(tmp_path, name, shape):
             points, faces, _ = by_eye(file)
             # Its own vertices stand in an OBJ, those that were merged, too.
             assert len(points) == (
-                len(doubled(given).vertices) if name.startswith("obj") and weld else len(given.vertices)
+                len(doubled(mesh).vertices) if name.startswith("obj") and weld else len(mesh.vertices)
             )
             assert sorted({v for face in faces for v in face}) == list(range(len(points)))
             if len(faces) == len(in_space):
@@ -298,22 +298,26 @@ def test_other_readers_find_the_mesh_and_its_measures(tmp_path, name, shape):
                 single = out == ".glb"
                 assert rings(seen.points, seen.faces) == rings(result.vertices, result.faces, single)
             expected = as_written(result, out).distortion
-            found = measured(seen)
-            for what in ("flipped", "degenerate", "overlapping_pairs", "charts", "mirrored_charts"):
-                assert getattr(found, what) == getattr(expected, what), (read.__name__, out, what)
-            for what in ("qc_mean", "qc_max", "area_std", "seam_length"):
-                least = SINGLE if out == ".glb" else ROUNDING
-                close = pytest.approx(getattr(expected, what), rel=least, abs=least)
-                assert getattr(found, what) == close, (read.__name__, out, what)
+            distortion = measured(seen)
+            for name in ("flipped", "degenerate", "overlapping_pairs", "charts", "mirrored_charts"):
+                assert getattr(distortion, name) == getattr(expected, name), (
+                    read.__name__,
+                    out,
+                    name,
+                )
+            for name in ("qc_mean", "qc_max", "area_std", "seam_length"):
+                tolerance = SINGLE if out == ".glb" else ROUNDING
+                close = pytest.approx(getattr(expected, name), rel=tolerance, abs=tolerance)
+                assert getattr(distortion, name) == close, (read.__name__, out, name)
 
 
 trimesh = pytest.importorskip("trimesh")
 
 
 def test_the_parts_of_a_welded_vertex_that_is_split_again_have_one_number_in_an_obj(tmp_path):
-    ball, other = sphere(1), sphere(1)
+    ball, second = sphere(1), sphere(1)
     top = ball[0][ball[0][:, 2].argmax()]
-    shifted = (other[0] + top - other[0][other[0][:, 2].argmin()], other[1])
+    shifted = (second[0] + top - second[0][second[0][:, 2].argmin()], second[1])
     vertices, faces = join(ball, shifted)
     trimesh.Trimesh(vertices, faces, process=False).export(tmp_path / "two.stl")
     result = coneflat.flatten(tmp_path / "two.stl", repair=True)

@@ -118,6 +118,8 @@ def test_unusable_normals_are_ignored(tmp_path):
     assert sorted(set(source.normal.tolist())) == [-1, 0, 2, 4]
     places, normals = seen_normals(coneflat.flatten(source).save(tmp_path / "flat.glb"))
     side = np.cross(places[:, 1] - places[:, 0], places[:, 2] - places[:, 0])
-    given = side.min(axis=1) < -0.5
-    np.testing.assert_allclose(normals[given], np.repeat(side[given][:, None], 3, axis=1), atol=1e-6)
+    has_normal = side.min(axis=1) < -0.5
+    np.testing.assert_allclose(
+        normals[has_normal], np.repeat(side[has_normal][:, None], 3, axis=1), atol=1e-6
+    )
     assert np.isfinite(normals).all()

@@ -36,10 +36,10 @@ def contents():
 def test_formats_are_recognized_by_content(contents):
     assert {ending.split()[0] for ending in contents} == set(INPUT_FORMATS) - {".gltf", ".gii", *FREESURFER}
     for ending, content in contents.items():
-        there = read_mesh_from(content, "-", weld=False)
-        here = read_mesh_from(content, "a", weld=False, ending=ending.split()[0])
-        assert there.vertices.tobytes() == here.vertices.tobytes(), ending
-        assert len(there.offsets) == 61, ending
+        recognized = read_mesh_from(content, "-", weld=False)
+        named = read_mesh_from(content, "a", weld=False, ending=ending.split()[0])
+        assert recognized.vertices.tobytes() == named.vertices.tobytes(), ending
+        assert len(recognized.offsets) == 61, ending
 
 
 def test_a_gltf_with_its_data_within_goes_through_a_pipe(contents):
@@ -69,8 +69,8 @@ def test_a_pipe_gets_the_bytes_of_the_file(contents, tmp_path, form):
         assert ran.stdout_bytes == (tmp_path / f"out.{form}").read_bytes()
     else:
         (tmp_path / "piped.npz").write_bytes(ran.stdout_bytes)
-        one, other = (coneflat.read_flattening(tmp_path / name) for name in ("piped.npz", "out.npz"))
-        np.testing.assert_array_equal(one.uv, other.uv)
+        from_pipe, saved = (coneflat.read_flattening(tmp_path / name) for name in ("piped.npz", "out.npz"))
+        np.testing.assert_array_equal(from_pipe.uv, saved.uv)
 
 
 def test_a_mesh_from_a_pipe_is_written_to_a_pipe(contents):

@@ -227,23 +227,23 @@ class TestBadFiles:
 
     @pytest.mark.parametrize("ending", [".off", ".ply", ".stl"])
     def test_text_cut_anywhere(self, tmp_path, ending):
-        whole = tetra_text(ending).rstrip()
+        text = tetra_text(ending).rstrip()
         # A cut inside the last number, or name of the solid, leaves a file nobody can tell from a whole one.
-        stop = len(whole) if ending != ".stl" else whole.index("endsolid")
+        stop = len(text) if ending != ".stl" else text.index("endsolid")
         for cut in range(1, stop - 1):
             with pytest.raises(ConeflatError):
-                read_mesh(written(tmp_path, "cut" + ending, whole[:cut]))
+                read_mesh(written(tmp_path, "cut" + ending, text[:cut]))
 
     @pytest.mark.parametrize("order", "<>")
     @pytest.mark.parametrize("faces", [TETRA_FACES, [[0, 1, 2], [3, 2, 1, 0], [0, 1, 3]]])
     def test_binary_ply_cut_anywhere(self, tmp_path, order, faces):
-        whole = ply_bytes(order, TETRA_POINTS, faces)
-        for cut in range(1, len(whole)):
+        content = ply_bytes(order, TETRA_POINTS, faces)
+        for cut in range(1, len(content)):
             with pytest.raises((MeshFileError, EmptyMeshError)):
-                read_mesh(written(tmp_path, "cut.ply", whole[:cut]))
+                read_mesh(written(tmp_path, "cut.ply", content[:cut]))
 
     @pytest.mark.parametrize(
-        ("name", "old", "new", "reason"),
+        ("name", "old", "replacement", "reason"),
         [
             ("x.off", "4 4 6", "4 5 6", "4 of the 5 faces"),
             ("x.off", "4 4 6", "9 4 6", "8 of the 9 vertices"),
@@ -259,11 +259,11 @@ class TestBadFiles:
             ("x.stl", "1e-07", "abc", "'abc'"),
         ],
     )
-    def test_reasons(self, tmp_path, name, old, new, reason):
+    def test_reasons(self, tmp_path, name, old, replacement, reason):
         text = tetra_text(name[1:])
         assert old in text
         with pytest.raises(MeshFileError, match=reason):
-            read_mesh(written(tmp_path, name, text.replace(old, new, 1)))
+            read_mesh(written(tmp_path, name, text.replace(old, replacement, 1)))
 
     @pytest.mark.parametrize("ending", [".off", ".ply"])
     def test_index_out_of_range(self, tmp_path, ending):

@@ -52,15 +52,15 @@ def small_blocks(request, monkeypatch):
 
 class TestBlocks:
     @pytest.fixture
-    def whole(self, tmp_path):
+    def meshes(self, tmp_path):
         """Read before any test makes the blocks small."""
         return {
             name: read_mesh(written(tmp_path, "whole" + name, content)) for name, content in TEXTS.items()
         }
 
     @pytest.mark.parametrize("ending", TEXTS)
-    def test_the_result_does_not_depend_on_the_block_size(self, tmp_path, whole, small_blocks, ending):
-        mesh, expected = read_mesh(tmp_path / ("whole" + ending)), whole[ending]
+    def test_the_result_does_not_depend_on_the_block_size(self, tmp_path, meshes, small_blocks, ending):
+        mesh, expected = read_mesh(tmp_path / ("whole" + ending)), meshes[ending]
         for name in ("vertices", "corners", "offsets"):
             assert getattr(mesh, name).tobytes() == getattr(expected, name).tobytes(), name
         assert mesh.welded == expected.welded
@@ -70,8 +70,8 @@ class TestBlocks:
             np.testing.assert_array_equal(mesh.normal, expected.normal)
             assert mesh.obj.newline == b"\r\n"
 
-    def test_obj_with_all_kinds_of_lines(self, whole):
-        mesh = whole[".obj"]
+    def test_obj_with_all_kinds_of_lines(self, meshes):
+        mesh = meshes[".obj"]
         np.testing.assert_array_equal(mesh.vertices, [[0, 0, 0], [1, 0.5, 1e-3], [1, 1, 0], [0.5, 2, np.nan]])
         assert mesh.corners.tolist() == [0, 1, 2, 0, 1, 2, 3, 2, 1, 0]
         assert mesh.normal.tolist() == [-1, -1, -1, 0, 0, -1, 0, -1, -1, -1]
@@ -80,7 +80,7 @@ class TestBlocks:
         assert b"vt" not in b"".join(mesh.obj.gaps.values())
 
     @pytest.mark.parametrize(
-        ("ending", "old", "new", "message"),
+        ("ending", "old", "replacement", "message"),
         [
             (".obj", b"f 4/1/1", b"f x/1/1", "line 19: 'x/1/1' is not a number"),
             (".obj", b"f 4/1/1", b"f 5/1/1", "line 19: a face refers to vertex 5"),
@@ -95,10 +95,12 @@ class TestBlocks:
             (".stl", b"vertex 2 2 2", b"vertex2 2 2 2", "2 facets but 5 vertices"),
         ],
     )
-    def test_bad_words_are_named_with_their_lines(self, tmp_path, small_blocks, ending, old, new, message):
+    def test_bad_words_are_named_with_their_lines(
+        self, tmp_path, small_blocks, ending, old, replacement, message
+    ):
         assert old in TEXTS[ending]
         with pytest.raises((MeshFileError, FaceIndexError)) as caught:
-            read_mesh(written(tmp_path, "bad" + ending, TEXTS[ending].replace(old, new)))
+            read_mesh(written(tmp_path, "bad" + ending, TEXTS[ending].replace(old, replacement)))
         assert message in str(caught.value)
 
 
@@ -180,11 +182,11 @@ def test_welding_agrees_with_sorting():
         rng.integers(-3, 4, (5000, 3)) * np.array([0.25, 1e-30, 1e30]) * rng.choice([-1.0, 1.0], (5000, 3))
     )
     points[::97, 1] = np.nan
-    kept, merged = weld(points)
+    representatives, merged = weld(points)
     distinct, first, number = np.unique(
         (points + 0.0).view(np.int64), axis=0, return_index=True, return_inverse=True
     )
-    assert len(kept) == len(distinct) < 400
-    np.testing.assert_array_equal(kept, np.sort(first))
-    np.testing.assert_array_equal(kept[merged], first[number.ravel()])
+    assert len(representatives) == len(distinct) < 400
+    np.testing.assert_array_equal(representatives, np.sort(first))
+    np.testing.assert_array_equal(representatives[merged], first[number.ravel()])
     assert all(len(part) == 0 for part in weld(np.empty((0, 3))))

@@ -8,7 +8,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 import shapes
-from bars import cut_bar, read_bar
+from full_obj import cut_bar, read_bar
 
 import coneflat
 from coneflat.errors import ConeflatError, MeshFileError, UnknownFormatError
@@ -26,9 +26,9 @@ class TestReadingResults:
     def test_a_result_comes_back(self, result, tmp_path):
         again = coneflat.read_flattening(result.save(tmp_path / "out.npz"))
         for field in fields(result):
-            one, other = getattr(result, field.name), getattr(again, field.name)
-            if isinstance(one, np.ndarray):
-                np.testing.assert_array_equal(one, other)
+            written_value, read_value = getattr(result, field.name), getattr(again, field.name)
+            if isinstance(written_value, np.ndarray):
+                np.testing.assert_array_equal(written_value, read_value)
         np.testing.assert_array_equal(again.distortion.qc, result.distortion.qc)
         assert again.report() == result.report()
 

@@ -29,8 +29,8 @@ def corner_uv(path):
 class TestObj:
     def test_numbers_that_count_back_from_the_face(self, tmp_path):
         text = SQUARE + "vt 9 9\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/-3 2/-2 3/-1\nvt 0 1\nf 1/-4 3/-2 4/-1\n"
-        found = corner_uv(written(tmp_path, "a.obj", text))
-        np.testing.assert_array_equal(found, PLACES[[0, 1, 2, 0, 2, 3]])
+        uv = corner_uv(written(tmp_path, "a.obj", text))
+        np.testing.assert_array_equal(uv, PLACES[[0, 1, 2, 0, 2, 3]])
 
     def test_corners_without_uv(self, tmp_path):
         text = SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nf 1 3 4\nf 1/1 2/2 3/3\nf 1//1 3 4/1\n"
@@ -49,8 +49,8 @@ class TestObj:
 
     def test_invalid_uv_numbers_become_nan(self, tmp_path):
         text = SQUARE + "vt nan 0\nvt 1 inf\nvt 1 1\nf 1/1 2/2 3/3\n"
-        found = corner_uv(written(tmp_path, "a.obj", text))
-        assert np.isfinite(found).tolist() == [[False, True], [True, False], [True, True]]
+        uv = corner_uv(written(tmp_path, "a.obj", text))
+        assert np.isfinite(uv).tolist() == [[False, True], [True, False], [True, True]]
 
     @pytest.mark.parametrize("number", ["4", "-4", "-5", "400"])
     def test_a_point_that_does_not_exist(self, tmp_path, number):

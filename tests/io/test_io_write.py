@@ -9,8 +9,8 @@ from io import BytesIO
 import numpy as np
 import pytest
 import shapes
-from bars import OBJ, POINTS, cut_bar, flattening, read_bar
-from scenes import opened
+from full_obj import OBJ, POINTS, cut_bar, flattening, read_bar
+from gltf_scenes import opened
 
 import coneflat
 from coneflat.errors import MeshFileError, OptionError
@@ -38,9 +38,11 @@ def corner_uv(path):
 class TestObj:
     def test_everything_else_stays_in_place(self, bar, tmp_path):
         out = write_flattening(cut_bar(bar), tmp_path / "in" / "out.obj")
-        old = [line for line in OBJ.splitlines() if not line.startswith((b"vt", b"f", b"l"))]
-        new = [line for line in lines_of(out) if not line.startswith((b"vt", b"f", b"l", b"# the triangle"))]
-        assert new == old
+        lines_before = [line for line in OBJ.splitlines() if not line.startswith((b"vt", b"f", b"l"))]
+        lines_after = [
+            line for line in lines_of(out) if not line.startswith((b"vt", b"f", b"l", b"# the triangle"))
+        ]
+        assert lines_after == lines_before
         lines = lines_of(out)
         assert [line for line in lines if line.startswith(b"f")] == [
             b"f 1/1/1 2/2/1 5/5/1 4/4/1",

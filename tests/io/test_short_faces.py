@@ -81,7 +81,7 @@ def test_triangle_strips_are_named():
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "message"),
+    ("old", "replacement", "message"),
     [
         ("3 1 3 2 9", "3 1 3 9", "line 17: the properties of this face need 5 numbers, but the line has 4"),
         (
@@ -100,10 +100,10 @@ def test_triangle_strips_are_named():
         ),
     ],
 )
-def test_a_bad_line_of_a_text_ply_is_named(old, new, message):
+def test_a_bad_line_of_a_text_ply_is_named(old, replacement, message):
     assert old in PLY
     with pytest.raises(MeshFileError, match=message):
-        read_mesh_from(PLY.replace(old, new).encode(), "a.ply")
+        read_mesh_from(PLY.replace(old, replacement).encode(), "a.ply")
 
 
 def test_rows_of_several_lines_are_read():

@@ -63,13 +63,13 @@ class TestTriangulate:
     def test_triangles_tile_the_polygon(self, shape):
         points = lifted(shape)
         count = len(points)
-        whole = area_vectors(points, [[0, i, i + 1] for i in range(1, count - 1)]).sum(0)
+        total = area_vectors(points, [[0, i, i + 1] for i in range(1, count - 1)]).sum(0)
         for start in range(count):
             for ring in (np.roll(np.arange(count), start), np.roll(np.arange(count)[::-1], start)):
                 faces, _, _ = triangulated(points, ring)
                 assert faces.shape == (count - 2, 3)
                 assert set(faces.ravel()) == set(range(count))
-                up = whole if ring[1] == (ring[0] + 1) % count else -whole
+                up = total if ring[1] == (ring[0] + 1) % count else -total
                 parts = area_vectors(points, faces) @ up / (up @ up)
                 # All turned the polygon's way, none empty, and together as large as it.
                 assert parts.min() > 1e-3

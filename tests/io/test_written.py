@@ -125,10 +125,10 @@ def test_marked_seams_of_an_obj_turn_freely_whatever_its_diagonals(tmp_path):
     ring = np.array(sorted((a, b) for a, b in sides if (b, a) not in sides))
     result = flatten(tmp_path / "in.obj", seams=ring, quantise=np.pi / 2, charts="atlas")
     written = result.as_written(".obj")
-    edges, others = (
-        set(map(tuple, TriangleMesh(vertices, one.faces).edges.tolist())) for one in (result, written)
+    edges, written_edges = (
+        set(map(tuple, TriangleMesh(vertices, mesh.faces).edges.tolist())) for mesh in (result, written)
     )
-    assert edges != others
+    assert edges != written_edges
     assert result.rotations.worst < 1e-9
     assert written.rotations.worst < 1e-9
     assert not any("multiples of" in note for note in written.notes)
@@ -196,7 +196,7 @@ def test_notes_name_what_another_format_does_not_keep(tmp_path):
         for ending in (".obj", ".ply", ".glb", ".npz"):
             keeps = name.endswith(ending) or (ending in (".ply", ".glb") and "coloured" in name)
             note = f"These data of the input are not kept in {ending}: {data}"
-            assert any(note in each for each in all_notes(tmp_path / name, ending)) != keeps
+            assert any(note in text for text in all_notes(tmp_path / name, ending)) != keeps
 
 
 def bent_quads_with_corners_on_sides(count):

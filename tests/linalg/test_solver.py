@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapes
 from scipy.sparse import csc_matrix, diags, tril
-from stored import at_hand
+from stored_meshes import at_hand
 
 from coneflat import errors, flatten, read_mesh
 from coneflat.base.threads import limit_threads

@@ -187,7 +187,7 @@ def test_vertices_without_a_face_have_no_scale():
     )
 
 
-def test_sides_that_are_missing():
+def test_seam_pairs_that_are_no_inner_edges_have_unknown_motion():
     """Pairs that are a border of the model, or no edge at all, as a damaged file may have them."""
     result = flattened("one chart")
     hill = coneflat.flatten(*shapes.hill())
@@ -208,7 +208,7 @@ def test_sides_that_are_missing():
 
 
 class TestArchives:
-    def test_it_is_written_and_comes_back(self, tmp_path):
+    def test_seam_data_is_written_and_read_back(self, tmp_path):
         result = flattened("quanta")
         path = result.save(tmp_path / "out.npz")
         again = coneflat.read_flattening(path).seam_data

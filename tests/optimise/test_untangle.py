@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapes
-from stored import stored_heights
+from stored_meshes import stored_heights
 
 import coneflat
 from coneflat import TriangleMesh

@@ -48,7 +48,7 @@ def assert_same(grid, other_grid):
         np.testing.assert_array_equal(getattr(grid, field.name), getattr(other_grid, field.name), field.name)
 
 
-def test_a_grid_comes_back(grid, tmp_path):
+def test_saved_grids_are_restored(grid, tmp_path):
     again = IntegerGrid.load(grid.save(tmp_path / "grid.npz"))
     assert_same(grid, again)
     quads, quads_again = extract_quads(grid), extract_quads(again)

@@ -106,7 +106,7 @@ def test_the_coarsest_grid_of_a_box_is_a_cube():
     assert "6 squares, not 1" in " ".join(grid.notes)
 
 
-def test_a_result_will_do():
+def test_a_flattening_is_accepted():
     shape = shapes.sphere(3)
     grid = integer_grid(flatten(*shape, **QUARTER), quads=200)
     assert (grid.corner_grid == integer_grid(*shape, quads=200, cones="sparse").corner_grid).all()

@@ -41,7 +41,7 @@ def test_solutions_are_all_solutions(seed):
     assert (solutions.basis @ np.rint(steps).astype(int) == solution - solutions.solution).all()
 
 
-def test_what_has_no_whole_solution():
+def test_equations_without_integer_solutions():
     assert integer_solutions(np.array([[2, 4]]), np.array([3])) is None
     assert integer_solutions(np.array([[1, 1], [2, 2]]), np.array([1, 3])) is None
     assert integer_solutions(np.zeros((1, 2), dtype=int), np.array([1])) is None

@@ -103,7 +103,7 @@ def test_torus(along, across, shear):
     assert mesh.euler_characteristic == 0
 
 
-def test_what_is_no_grid_map_is_refused():
+def test_maps_that_are_no_integer_grid_are_refused():
     grid = on_squares(*polycube(CUBE), 3)
     shifts = grid.shifts.copy()
     shifts[4] += 1

@@ -49,7 +49,7 @@ def test_a_ball(ball, quads_of_ball):
     assert measures.angle_mean < 10
 
 
-def test_a_grid_may_be_given():
+def test_quads_of_a_grid():
     grid = on_squares(*polycube(RING), 4)
     stored = IntegerGrid(**vars(grid), size=0.0, notes=("As given.",))
     mesh = coneflat.quads(stored, smooth=0)

@@ -111,7 +111,7 @@ class TestNpz:
     def saved(self, cube, tmp_path):
         return cube.save(tmp_path / "quads.npz")
 
-    def test_all_comes_back(self, cube, saved):
+    def test_saved_quads_are_restored(self, cube, saved):
         again = QuadMesh.load(saved)
         for field in fields(cube):
             stored, restored = getattr(cube, field.name), getattr(again, field.name)
@@ -136,7 +136,7 @@ class TestNpz:
             ("report", np.array("[]"), "not a readable NPZ file"),
         ],
     )
-    def test_what_is_none(self, saved, tmp_path, name, value, message):
+    def test_invalid_archives_are_refused(self, saved, tmp_path, name, value, message):
         with np.load(saved) as archive:
             arrays = dict(archive)
         if value is None:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from grid_maps import CUBE, L_SHAPE, RING, TRIPOD, TWO_RINGS, on_squares, polycube, torus_map
 
-from coneflat.apps.view.quad_page import as_flattening, find_domains, page_of_quads
+from coneflat.apps.view.quad_page import as_flattening, page_of_quads
+from coneflat.quadmesh import find_domains
 from coneflat.quadmesh.extract import extract_quads
 
 SOLIDS = {"cube": CUBE, "l": L_SHAPE, "tripod": TRIPOD, "ring": RING, "double torus": TWO_RINGS}

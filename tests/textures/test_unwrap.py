@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapes
 from command import command
-from stored import at_hand, noisy
+from stored_meshes import at_hand, noisy
 
 import coneflat
 from coneflat import errors, measure_uv, unwrap

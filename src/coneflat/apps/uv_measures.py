@@ -157,9 +157,8 @@ def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:
     texture = np.zeros(len(has_uv), np.int64) if mapped.texture is None else mapped.texture
     textures = np.unique(texture[has_uv])
     owner = texture[has_uv][checked.face_origin]
-    distortion = measure_map(scaled.mesh, unit, texture=owner).rescaled(
-        (scaled.exponent + exponent) * np.log(2)
-    )
+    log_scale = (scaled.exponent + exponent) * np.log(2)
+    distortion = measure_map(scaled.mesh, unit, texture=owner).rescaled(log_scale)
     all_uv = mapped.corner_uv[has_uv]
     cover = _cover_of_textures(np.ldexp(all_uv, -exponent), texture[has_uv])
     with np.errstate(over="ignore"):  # A value that is not finite is reported as unknown.

@@ -13,8 +13,7 @@ import numpy as np
 from .. import flatten, sample_path, unwrap
 from ..base import FloatArray, IntArray, inner_calls
 from ..geometry import visible_share
-from ..quadmesh.quad_meshing import quads
-from ..quadmesh.quality import measure_quads
+from ..quadmesh import measure_quads, quads
 
 
 def steps() -> Iterator[tuple[str, Callable[[], object]]]:

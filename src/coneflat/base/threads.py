@@ -1,4 +1,4 @@
-"""Threads: the number that libraries may use, and a second thread where two stages can run at the same time."""
+"""Threads: the number that libraries may use, and a second thread for parts of a stage that can run concurrently."""
 
 from __future__ import annotations
 

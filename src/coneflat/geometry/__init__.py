@@ -5,6 +5,7 @@ from .coverage import approximate_overlap_areas
 from .handles import handle_loops
 from .intrinsic import halfedge_twins
 from .layers import MAX_CELLS
+from .nearest import TriangleTree
 from .opening import mollify
 from .operators import angle_defect, cotangent_laplacian
 from .orientation import fill_orientations, orientation
@@ -40,11 +41,11 @@ from .triangles import (
 from .visibility import fill_nearest, visible_share
 
 __all__ = [
-    "CREASE_COSINE", "FlatTriangles", "MAX_CELLS", "Overlaps", "TURNS", "UNITS", "angle_defect", "as_complex",
-    "as_pairs", "coarse_mesh", "complex_sums", "corner_angles", "corner_normals", "cotangent_laplacian", "cotangents",
-    "dihedral_angles", "double_areas", "edge_lengths", "face_normals", "fill_nearest", "fill_orientations",
-    "find_overlaps", "flat_triangles", "handle_loops", "halfedge_twins", "is_broken", "approximate_overlap_areas",
-    "layout_curvature", "map_factors", "mean_energy", "mollify", "orientation", "quarters_around", "rotated",
-    "sides_between", "signed_angles", "signed_double_areas", "triangle_energies", "turn", "unit_vectors",
-    "vertex_log_scale", "vertex_normals", "visible_share",
+    "CREASE_COSINE", "FlatTriangles", "MAX_CELLS", "Overlaps", "TURNS", "TriangleTree", "UNITS", "angle_defect",
+    "as_complex", "as_pairs", "coarse_mesh", "complex_sums", "corner_angles", "corner_normals", "cotangent_laplacian",
+    "cotangents", "dihedral_angles", "double_areas", "edge_lengths", "face_normals", "fill_nearest",
+    "fill_orientations", "find_overlaps", "flat_triangles", "handle_loops", "halfedge_twins", "is_broken",
+    "approximate_overlap_areas", "layout_curvature", "map_factors", "mean_energy", "mollify", "orientation",
+    "quarters_around", "rotated", "sides_between", "signed_angles", "signed_double_areas", "triangle_energies",
+    "turn", "unit_vectors", "vertex_log_scale", "vertex_normals", "visible_share",
 ]  # fmt: skip

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..base import FloatArray, IntArray, compiled, dots
-from . import face_normals
+from .triangles import face_normals
 
 #: A triangle that faces away from the normal of a point counts as farther by this fraction of the model's diagonal,
 #: so that the two sides of a thin wall are not confused.

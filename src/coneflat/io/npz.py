@@ -117,9 +117,7 @@ def _flattening(reading: CheckedArrays) -> Flattening:
         seconds=report["seconds"],
         notes=notes,
         settings=report["settings"],
-        solve=SolveStatistics(
-            **{field.name: number(report.get(field.name, field.default)) for field in fields(SolveStatistics)}
-        ),
+        solve=_statistics(report),
         rotations=_rotations(report),
         vertex_origin=indices("vertex_origin", (n,), None),
         face_origin=indices("face_origin", (m,), None),
@@ -143,6 +141,13 @@ def _distortion(reading: CheckedArrays, report: dict[str, Any], triangles: int) 
     measures: dict[str, Any] = {name: number(report.get(name)) for name in MEASURES}
     qc, log_area_scale = (reading.floats(name, (triangles,)) for name in ("qc", "log_area_scale"))
     return Distortion(qc=qc, log_area_scale=log_area_scale, **measures)
+
+
+def _statistics(report: dict[str, Any]) -> SolveStatistics:
+    """Return the statistics of the solvers in a report."""
+    return SolveStatistics(
+        **{field.name: number(report.get(field.name, field.default)) for field in fields(SolveStatistics)}
+    )
 
 
 def _rotations(report: dict[str, Any]) -> Rotations | None:

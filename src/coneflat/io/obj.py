@@ -31,9 +31,9 @@ from .text import Growing, TextBlock, newline_of, text_blocks
 
 #: Indices of corners without a UV point, from 0, and without a normal, from 1.
 _NO_UV, _NO_NORMAL = -1, 0
-_OTHER, _VERTEX, _FACE, _TEXTURE, _NORMAL, _ELEMENT, _COMMENTED_FACE = range(7)
+_IGNORED, _VERTEX, _FACE, _TEXTURE, _NORMAL, _ELEMENT, _COMMENTED_FACE = range(7)
 #: The kind of a line by its first two characters as a 16-bit number.
-_KINDS = np.full(1 << 16, _OTHER, np.uint8)
+_KINDS = np.full(1 << 16, _IGNORED, np.uint8)
 _HEADS = {b"v ": _VERTEX, b"f ": _FACE, b"l ": _ELEMENT, b"p ": _ELEMENT, b"vt": _TEXTURE, b"vn": _NORMAL}
 _KINDS[[int.from_bytes(head, "big") for head in _HEADS]] = [*_HEADS.values()]
 _TEXTURE_INDICES = re.compile(rb"(#[^\r\n]*)|/[-+0-9]*")
@@ -237,7 +237,7 @@ def _directions(block: TextBlock, rows: IntArray) -> FloatArray:
 def _texts(block: TextBlock, kinds: NDArray[np.uint8], newline: bytes) -> Iterator[tuple[int, bytes]]:
     """Yield pieces of a block's text for `ObjText.gaps`, each with the number of polygons of the block before it."""
     polygons = np.cumsum(kinds == _FACE)
-    kinds = np.where((kinds == _VERTEX) | (kinds == _NORMAL), _OTHER, kinds)
+    kinds = np.where((kinds == _VERTEX) | (kinds == _NORMAL), _IGNORED, kinds)
     if b"#" in block.raw:
         marks = np.flatnonzero(np.frombuffer(block.raw, np.uint8) == ord("#"))
         rows = np.searchsorted(block.line_starts, marks, side="right") - 1

@@ -33,7 +33,28 @@ MIN_ACTIVE_SHARE = 0.6
 # 2,000 unknowns, PARDISO then takes 1 ms for each, and SuperLU 6.
 MAX_REPETITIONS = 24
 
-Progress = Callable[[int, float], bool | None]
+Report = Callable[[int, float], bool | None]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """The energy of moving triangles as a function of unknowns.
+
+    Attributes:
+        motions: the motions of the points as functions of the unknowns.
+        elements: the triangles that move, or those of some parts.
+        energy: the energy that is minimised.
+        damping: added to the diagonal of the Hessian, relative to its largest entry.
+    """
+
+    motions: Motions
+    elements: Elements
+    energy: Energy
+    damping: float = 0.0
+
+    def energies_along(self, maps: Maps, change: Maps, lengths: FloatArray) -> FloatArray:
+        """Return (f,) the energies of the triangles after steps of lengths (f,) or (1,)."""
+        return self.elements.energies(self.energy, maps.plus(lengths, change))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,22 +79,18 @@ class Descent:
 
 def descend(
     points: ComplexArray,
-    motions: Motions,
-    elements: Elements,
-    energy: Energy,
+    problem: Problem,
     tolerance: float,
     steps: int,
-    progress: Progress | None = None,
+    progress: Report | None = None,
     stride: float = 1.0,
 ) -> Descent:
     """Return points that satisfy the constraints and have a lower energy, found by Newton's method.
 
     Args:
-        points: (u,) start positions as complex numbers. No triangle of `elements` is flipped there, unless the energy
-            is regularised.
-        motions: the motions of the points as functions of the unknowns.
-        elements: the triangles that move, or those of some parts.
-        energy: the energy that is minimised.
+        points: (u,) start positions as complex numbers. No moving triangle is flipped there, unless the energy is
+            regularised.
+        problem: the motions, the triangles and the energy.
         tolerance: the last step of a part is the first one whose predicted decrease is at most this fraction of its
             energy minus the lower bound.
         steps: maximum number of steps.
@@ -86,17 +103,15 @@ def descend(
     See Also:
         coneflat.linalg.newton.minimise: for convex functions that are given by their gradients alone.
     """
-    report = progress or (lambda _, energy: None)
-    if not motions.has_offset:
-        return minimise(points, motions, elements, energy, tolerance, steps, report)
-    start = reach_constraints(points, motions, elements, energy, steps, report, stride)
-    if start.remaining or not elements.count:
+    report = progress or (lambda step, energy: None)
+    if not problem.motions.has_offset:
+        return minimise(points, problem, tolerance, steps, report)
+    start = reach_constraints(points, problem, steps, report, stride)
+    if start.remaining or not problem.elements.count:
         return start
     end = minimise(
         start.points,
-        motions,
-        elements,
-        energy,
+        problem,
         tolerance,
         steps - start.steps,
         lambda step, energy: report(start.steps + step, energy),
@@ -105,13 +120,7 @@ def descend(
 
 
 def reach_constraints(
-    points: ComplexArray,
-    motions: Motions,
-    elements: Elements,
-    energy: Energy,
-    steps: int,
-    report: Progress,
-    stride: float,
+    points: ComplexArray, problem: Problem, steps: int, report: Report, stride: float
 ) -> Descent:
     """Return points that satisfy the constraints, if Newton's method reaches them without flipping a triangle.
 
@@ -121,25 +130,19 @@ def reach_constraints(
         Each step goes towards the constraints and a lower energy, as far as the triangles permit. The energy may rise
         (an infeasible start: Boyd and Vandenberghe, "Convex Optimization", 2004, Section 10.3).
     """
-    total, places, taken, remaining = np.zeros(motions.count + 1), points, 0, 1.0
+    elements, energy = problem.elements, problem.energy
+    total, places, taken, remaining = np.zeros(problem.motions.count + 1), points, 0, 1.0
     maps = elements.maps(places)
     before = after = float(elements.energies(energy, maps).sum())
     factor: Factor | None = None
     while taken < steps and remaining:
         check_cancelled()
-        _, step, factor = newton_step(elements, energy, maps, remaining, 0.0, factor, _size(points, steps))
+        _, step, factor = newton_step(problem, maps, factor, _size(points, steps), remaining)
         taken += 1
         change = elements.change(step)
-        longest = MAX_STEP_SHARE * maps.largest_steps(change).min(initial=np.inf)
-
-        def energy_at(lengths: FloatArray, maps: Maps = maps, change: Maps = change) -> FloatArray:
-            moved = maps.plus(lengths.repeat(len(elements.faces)), change)
-            return elements.energies(energy, moved).sum(keepdims=True)
-
-        first = np.array([min(1.0, stride / remaining, longest)])
-        length = search_line(energy_at, first, lambda _, energies: np.isfinite(energies))[0][0]
+        length = feasible_length(problem, maps, change, min(1.0, stride / remaining))
         total += length * step
-        places = points + motions.shifts(total)
+        places = points + problem.motions.shifts(total)
         maps = elements.maps(places)
         after = float(elements.energies(energy, maps).sum())
         remaining = 1.0 - float(total[-1])
@@ -149,21 +152,27 @@ def reach_constraints(
     return Descent(places, total, before, after, taken, remaining)
 
 
-def minimise(
-    points: ComplexArray,
-    motions: Motions,
-    elements: Elements,
-    energy: Energy,
-    tolerance: float,
-    steps: int,
-    report: Progress,
-) -> Descent:
+def feasible_length(problem: Problem, maps: Maps, change: Maps, first: float) -> float:
+    """Return a step length of at most `first` at which no triangle is flipped, though the energy may rise."""
+    longest = MAX_STEP_SHARE * maps.largest_steps(change).min(initial=np.inf)
+
+    def energy_at(lengths: FloatArray) -> FloatArray:
+        return problem.energies_along(maps, change, lengths).sum(keepdims=True)
+
+    lengths, _ = search_line(
+        energy_at, np.array([min(first, longest)]), lambda _, energies: np.isfinite(energies)
+    )
+    return float(lengths[0])
+
+
+def minimise(points: ComplexArray, problem: Problem, tolerance: float, steps: int, report: Report) -> Descent:
     """Return points of lower energy; see `descend` for the arguments.
 
     Notes:
         Parts that no triangle connects have separate step lengths, and end separately.
     """
-    total, places, taken = np.zeros(motions.count + 1), points, 0
+    elements, energy = problem.elements, problem.energy
+    total, places, taken = np.zeros(problem.motions.count + 1), points, 0
     maps = elements.maps(places)
     energies = elements.part_energies(energy, maps)
     before, converged = float(energies.sum()), 0.0
@@ -173,22 +182,21 @@ def minimise(
         if active[elements.unknown_part].mean() < MIN_ACTIVE_SHARE:
             converged += float(energies[~active].sum())
             elements, energies = elements.of_parts(active), energies[active]
+            problem = replace(problem, elements=elements)
             maps, active, factor = elements.maps(places), np.ones(elements.parts, dtype=bool), None
         check_cancelled()
-        step, slope, factor = falling_step(
-            elements, energy, maps, np.where(active, energies, np.inf), factor, _size(points, steps)
-        )
-        excess = energies - energy.minimum * elements.sums(elements.weight)
-        is_last = -slope <= tolerance * excess
+        ceiling = np.where(active, RELATIVE_ROUNDING * energies, np.inf)
+        step, slope, factor = falling_step(problem, maps, factor, _size(points, steps), ceiling)
+        is_last = -slope <= tolerance * (energies - energy.minimum * elements.sums(elements.weight))
         active &= -slope > RELATIVE_ROUNDING * energies
         if not active.any():
             break
         step[:-1][~active[elements.unknown_part]] = 0.0
         taken += 1
-        lengths = step_lengths(elements, energy, maps, elements.change(step), energies, slope, active)
+        lengths = step_lengths(problem, maps, elements.change(step), energies, slope, active)
         active &= (lengths > 0) & ~is_last
         total[elements.unknowns] += lengths[elements.unknown_part] * step[:-1]
-        places = points + motions.shifts(total)
+        places = points + problem.motions.shifts(total)
         maps = elements.maps(places)
         energies = elements.part_energies(energy, maps)
         if report(taken, converged + float(energies.sum())):
@@ -202,89 +210,86 @@ def _size(points: ComplexArray, steps: int) -> int:
 
 
 def newton_step(
-    elements: Elements,
-    energy: Energy,
+    problem: Problem,
     maps: Maps,
-    remaining: float,
-    ridge: float,
     previous: Factor | None,
     size: int,
+    remaining: float = 0.0,
+    ridge: float = 0.0,
 ) -> tuple[FloatArray, FloatArray, Factor]:
     """Return the gradient (k,), Newton's step (k + 1,) with the offset as the last entry, and the factorized Hessian.
 
     Args:
-        elements, energy, maps: the triangles, their energy and current maps.
-        remaining: the step of the offset.
-        ridge: added to the diagonal of the Hessian, relative to it.
+        problem, maps: the triangles, their energy and their current maps.
         previous: the factor of the step before, or None.
         size: see `total_size` of `factorize`.
+        remaining: the step of the offset.
+        ridge: added to the diagonal of the Hessian, relative to it.
 
     Raises:
         MetricError: the Hessian is singular in double precision.
     """
-    gradient, pull, matrix = elements.newton_system(energy, maps, remaining)
+    gradient, pull, matrix = problem.elements.newton_system(problem.energy, maps, remaining)
+    if problem.damping:
+        matrix.setdiag(matrix.diagonal() + problem.damping * matrix.diagonal().max())
     if ridge:
         matrix.setdiag(matrix.diagonal() * (1 + ridge))
     factor = factorize(matrix, previous, size)
     step = np.append(factor.solve(-gradient - pull), remaining)
     if not np.isfinite(step).all():
-        raise MetricError(f"relaxation found no finite step of its {elements.count:,} unknowns")
+        raise MetricError(f"relaxation found no finite step of its {len(gradient):,} unknowns")
     return gradient, step, factor
 
 
 def falling_step(
-    elements: Elements,
-    energy: Energy,
-    maps: Maps,
-    energies: FloatArray,
-    factor: Factor | None,
-    size: int,
+    problem: Problem, maps: Maps, previous: Factor | None, size: int, ceiling: FloatArray
 ) -> tuple[FloatArray, FloatArray, Factor]:
-    """Return Newton's step (k + 1,), the slope (p,) of the energy of each part along it, and the factorized Hessian.
+    """Return Newton's step (k + 1,), the slope of the energy of each part along it, and the factorized Hessian.
 
-    See `newton_step` for the arguments.
-
-    energies: (p,) the energies of the parts, infinite for those whose energy may rise.
+    Args:
+        problem, maps, previous, size: see `newton_step`.
+        ceiling: (parts,) the largest slope that is accepted.
     """
+    elements, factor = problem.elements, previous
     for ridge in RIDGES:
-        gradient, step, factor = newton_step(elements, energy, maps, 0.0, ridge, factor, size)
+        gradient, step, factor = newton_step(problem, maps, factor, size, ridge=ridge)
         slope = np.bincount(elements.unknown_part, gradient * step[:-1], elements.parts).astype(np.float64)
-        if (slope <= RELATIVE_ROUNDING * energies).all():
+        if (slope <= ceiling).all():
             break
     assert factor is not None
     return step, slope, factor
 
 
 def step_lengths(
-    elements: Elements,
-    energy: Energy,
+    problem: Problem,
     maps: Maps,
     change: Maps,
     energies: FloatArray,
     slope: FloatArray,
     active: BoolArray,
 ) -> FloatArray:
-    """Return the step length (p,) of each part along a step, 0 where no length lowers the energy of an active part.
+    """Return the step length of each part along a step, 0 where no length lowers the energy of an active part.
 
     Args:
-        elements, energy, maps: the triangles, their energy and current maps.
+        problem, maps: the triangles, their energy and their current maps.
         change: the change of the maps along the step.
-        energies, slope: (p,) the energies of the parts and their derivatives along the step.
-        active: (p,) the parts whose energy must fall.
+        energies, slope: (parts,) the energies of the parts and their derivatives along the step.
+        active: (parts,) the parts whose energy must fall.
     """
+    elements = problem.elements
 
     def energies_at(lengths: FloatArray) -> FloatArray:
-        return elements.part_energies(energy, maps.plus(lengths[elements.part], change))
+        return elements.sums(problem.energies_along(maps, change, lengths[elements.part]))
 
     longest = np.full(elements.parts, np.inf)
-    if not energy.is_regularised:
+    if not problem.energy.is_regularised:
         np.minimum.at(longest, elements.part, MAX_STEP_SHARE * maps.largest_steps(change))
     lengths, reached = search_line(
         energies_at,
         np.minimum(1.0, longest),
         lambda lengths, reached: ~active | (reached <= energies + ARMIJO * lengths * slope),
     )
-    for _ in range(MAX_LENGTHENINGS):
+    for _ in range(0 if problem.energy.is_regularised else MAX_LENGTHENINGS):
         longer = np.minimum(LENGTHENING * lengths, longest)
         energies_longer = energies_at(longer)
         is_lower = (lengths > 0) & (energies_longer < reached)

@@ -11,7 +11,7 @@ from ..geometry.straight import FlatTriangles
 from .elements import Elements
 from .energies import UntanglingEnergy
 from .motions import Motions
-from .newton import descend
+from .newton import Problem, descend
 
 # Ratio of height to longest side up to which a triangle is degenerate: coordinates in the plane are accurate to
 # about 1e-12 of an edge, and a triangle must stay positively oriented when they are rounded.
@@ -21,6 +21,8 @@ TARGET_AREA_SHARE = 0.1
 # Regularisation of the determinant: its floor, and its size relative to the worst determinant of the patch
 # (Garanzha et al. 2021, Section 4).
 MIN_REGULARISATION, RELATIVE_REGULARISATION = 1e-3, 0.2
+# Added to the diagonal of the Hessian, relative to its largest entry.
+DAMPING = 1e-10
 # A patch is abandoned, and tried again with more surrounding triangles, after MAX_STEPS steps of Newton's method, or if
 # the distance to the goal has not shrunk by this factor in TRIAL_STEPS steps. Patches that succeed take 4 steps at the
 # median.
@@ -103,7 +105,9 @@ class Patches:
             epsilon = np.hypot(MIN_REGULARISATION, RELATIVE_REGULARISATION * negative)
             energy = UntanglingEnergy(epsilon[elements.part])
             try:
-                descent = descend(points, self._motions, elements, energy, tolerance=0.0, steps=1)
+                descent = descend(
+                    points, Problem(self._motions, elements, energy, DAMPING), tolerance=0.0, steps=1
+                )
             except MetricError:  # a singular Hessian
                 break
             points, shifts = descent.points, shifts + descent.step

@@ -12,9 +12,11 @@ from ..base.arrays import (
     BoolArray,
     ComplexArray,
     FloatArray,
+    IntArray,
     as_faces,
     as_floats,
     has_any,
+    mask_of,
     require_finite,
     rows_of,
 )
@@ -29,7 +31,7 @@ from .constraints import PointConstraints, check_constraints
 from .elements import Elements
 from .energies import Energy, StretchEnergy
 from .motions import close_seams, find_motions, find_restrictions
-from .newton import RELATIVE_ROUNDING, descend
+from .newton import RELATIVE_ROUNDING, Problem, descend
 
 # The last step is the first one whose predicted decrease is at most this fraction of the energy minus its lower bound;
 # and the maximum number of steps.
@@ -110,7 +112,40 @@ def relax(
         constraints but eliminated, so the system is symmetric positive definite, with one sparsity pattern for all
         steps.
     """
-    energy = StretchEnergy() if energy is None else energy
+    if not 0 <= tolerance < 1 or steps < 0:
+        raise OptionError(f"tolerance must be from 0 to 1 and steps from 0, got {tolerance!r} and {steps!r}")
+    constraints = PointConstraints() if constraints is None else constraints
+    places, corner = _checked_layout(mesh, points, corners)
+    sides = edge_lengths(mesh.vertices, mesh.faces) if lengths is None else check_lengths(mesh, lengths)
+    checked = check_constraints(constraints, places)
+    areas = double_areas(sides) / 2
+    share = areas * _weights(weights, len(mesh.faces))
+    shapes, is_free = _movable(mesh, places[corner], sides, areas, _flags(free, len(mesh.vertices)))
+    unmoved = Relaxed(places, 0.0, 0.0, 0, is_free)
+    if not is_free.any():
+        return unmoved
+    area = np.abs(signed_double_areas(rows_of(places, corner))).sum() / 2
+    unit = 1.0 if to_scale else float(np.sqrt(area / areas.sum()))
+    z = as_complex(places)
+    restrictions = find_restrictions(mesh, corner, z, is_free, checked)
+    motions = find_motions(z, restrictions)
+    elements = Elements(motions, corner, shapes, unit, share)
+    if not elements.count and not motions.has_offset:
+        return unmoved
+    problem = Problem(motions, elements, StretchEnergy() if energy is None else energy)
+    descent = descend(z, problem, tolerance, steps, progress, constraints.stride)
+    if descent.remaining:
+        raise ConvergenceError(
+            f"constraints are only {1 - descent.remaining:.1%} satisfied after {plural(descent.steps, 'step')}: "
+            "they cannot be met without flipping triangles"
+        )
+    total = float(elements.weight.sum())
+    moved = as_pairs(close_seams(descent.points, restrictions))
+    return Relaxed(moved, descent.before / total, descent.after / total, descent.steps, is_free)
+
+
+def _checked_layout(mesh: TriangleMesh, points: ArrayLike, corners: ArrayLike) -> tuple[FloatArray, IntArray]:
+    """Return validated points (u, 2) and corners (m, 3)."""
     places = as_floats("points", points)
     if places.ndim != 2 or places.shape[1] != 2:
         raise ArrayShapeError(f"points must have the shape (u, 2), got {places.shape}")
@@ -120,43 +155,29 @@ def relax(
             f"corners must have the shape {mesh.faces.shape} of the faces, got {corner.shape}"
         )
     require_finite(places, corner)
-    side_lengths = (
-        edge_lengths(mesh.vertices, mesh.faces) if lengths is None else check_lengths(mesh, lengths)
-    )
-    if not 0 <= tolerance < 1 or steps < 0:
-        raise OptionError(f"tolerance must be from 0 to 1 and steps from 0, got {tolerance!r} and {steps!r}")
-    checked = check_constraints(PointConstraints() if constraints is None else constraints, places)
-    is_free = _flags(free, len(mesh.vertices))
-    areas = double_areas(side_lengths) / 2
-    share = areas * _weights(weights, len(mesh.faces))
-    doubled = signed_double_areas(rows_of(places, corner))
-    # Only for triangles that may move, which are usually few.
+    return places, corner
+
+
+def _movable(
+    mesh: TriangleMesh, corners: FloatArray, lengths: FloatArray, areas: FloatArray, is_free: BoolArray
+) -> tuple[ComplexArray, BoolArray]:
+    """Return target shapes and (n,) the vertices that move: the free ones without flipped or degenerate triangles.
+
+    Args:
+        mesh: the mesh.
+        corners: (m, 3, 2) the corners of the triangles in the plane.
+        lengths, areas: (m, 3), (m,) their target side lengths and areas.
+        is_free: (n,) True for vertices that may move.
+
+    Returns:
+        (m, 3) sides of the triangles with free vertices, which are usually few, in their target shapes; and a mask.
+    """
     candidates = np.flatnonzero(has_any(is_free, mesh.faces))
-    target_shapes = np.empty(side_lengths.shape, dtype=np.complex128)
-    target_shapes[candidates] = candidate_shapes = rest_sides(side_lengths[candidates])
-    height = np.minimum(
-        heights(candidate_shapes), heights(sides_between(rows_of(places, corner[candidates])))
-    )
-    is_free[mesh.faces[candidates[(height <= RELATIVE_ROUNDING) | (areas[candidates] <= 0)]]] = False
-    if not is_free.any():
-        return Relaxed(places, 0.0, 0.0, 0, is_free)
-    unit = 1.0 if to_scale else float(np.sqrt(np.abs(doubled).sum() / (2 * areas.sum())))
-    z = as_complex(places)
-    restrictions = find_restrictions(mesh, corner, z, is_free, checked)
-    motions = find_motions(z, restrictions)
-    elements = Elements(motions, corner, target_shapes, unit, share)
-    if not elements.count and not motions.has_offset:
-        return Relaxed(places, 0.0, 0.0, 0, is_free)
-    stride = 1.0 if constraints is None else constraints.stride
-    descent = descend(z, motions, elements, energy, tolerance, steps, progress, stride)
-    if descent.remaining:
-        raise ConvergenceError(
-            f"constraints cannot be met without flipping triangles: {descent.remaining:.1%} of the way to them "
-            f"is left after {plural(descent.steps, 'step')}"
-        )
-    total = float(elements.weight.sum())
-    moved = as_pairs(close_seams(descent.points, restrictions))
-    return Relaxed(moved, descent.before / total, descent.after / total, descent.steps, is_free)
+    shapes = np.empty(lengths.shape, dtype=np.complex128)
+    shapes[candidates] = candidate_shapes = rest_sides(lengths[candidates])
+    height = np.minimum(heights(candidate_shapes), heights(sides_between(corners[candidates])))
+    is_degenerate = (height <= RELATIVE_ROUNDING) | (areas[candidates] <= 0)
+    return shapes, is_free & ~mask_of(len(is_free), mesh.faces[candidates[is_degenerate]])
 
 
 def rest_sides(lengths: FloatArray) -> ComplexArray:

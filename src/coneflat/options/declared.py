@@ -300,9 +300,9 @@ class RunOptions(InputOptions):
     """Input and computation.
 
     Attributes:
-        threads: Number of threads of PARDISO, which solves large linear systems. With more than one, two stages may
-            also run at the same time. The last digits of results depend on it, so the default is the same on every
-            machine.
+        threads: Number of threads of PARDISO, which solves large linear systems. With more than one, the
+            search for cones may also use a second one. The last digits of results depend on it, so the default is the
+            same on every machine.
     """
 
     threads: int = option(THREADS, integer(256))

@@ -1,1 +1,73 @@
 """Integer-grid maps and the quad meshes extracted from them."""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+#: Where names are defined; they are imported when they are first used, since commands need the options alone.
+_HOMES = {
+    "Domains": "domains",
+    "IntegerGrid": "integer_map",
+    "QUADS": "options",
+    "QuadMeasures": "quality",
+    "QuadMesh": "quad_mesh",
+    "QuadOptions": "options",
+    "Sizes": "options",
+    "check_grid_output": "files",
+    "check_quads_output": "files",
+    "extract_quads": "extract",
+    "find_domains": "domains",
+    "holds_quads": "files",
+    "integer_grid": "quad_meshing",
+    "measure_quads": "quality",
+    "quads": "quad_meshing",
+    "quads_left_out": "files",
+    "read_grid": "files",
+    "read_quads": "files",
+    "write_quads_stream": "files",
+}
+
+__all__ = [
+    "QUADS",
+    "Domains",
+    "IntegerGrid",
+    "QuadMeasures",
+    "QuadMesh",
+    "QuadOptions",
+    "Sizes",
+    "check_grid_output",
+    "check_quads_output",
+    "extract_quads",
+    "find_domains",
+    "holds_quads",
+    "integer_grid",
+    "measure_quads",
+    "quads",
+    "quads_left_out",
+    "read_grid",
+    "read_quads",
+    "write_quads_stream",
+]
+
+if TYPE_CHECKING:
+    from .domains import Domains, find_domains
+    from .extract import extract_quads
+    from .files import (
+        check_grid_output,
+        check_quads_output,
+        holds_quads,
+        quads_left_out,
+        read_grid,
+        read_quads,
+        write_quads_stream,
+    )
+    from .integer_map import IntegerGrid
+    from .options import QUADS, QuadOptions, Sizes
+    from .quad_mesh import QuadMesh
+    from .quad_meshing import integer_grid, quads
+    from .quality import QuadMeasures, measure_quads
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module("." + _HOMES[name], __name__), name)

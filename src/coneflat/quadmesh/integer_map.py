@@ -10,12 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from ..base import BoolArray, FloatArray, IntArray, list_some, plural
+from ..base import BoolArray, EntryPoint, FloatArray, IntArray, list_some, plural
 from ..errors import GridError
 from ..geometry import UNITS, double_areas, edge_lengths, quarters_around, sides_between, signed_double_areas
 from ..mesh import NEXT, PREVIOUS
 from ..mesh.connectivity import TriangleMesh
 from .options import GRID_TOLERANCE
+
+# Files are made of grids, so their module imports this one.
+_WRITE = EntryPoint[Path]("quadmesh.files:write_grid")
+_READ = EntryPoint["IntegerGrid"]("quadmesh.files:read_grid")
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,9 +81,7 @@ class IntegerGrid:
             UnknownFormatError: the extension is not .obj or .npz.
             MeshFileError: the file cannot be written.
         """
-        from .files import write_grid
-
-        return write_grid(path, self)
+        return _WRITE(path, self)
 
     @staticmethod
     def load(path: str | PathLike[str]) -> IntegerGrid:
@@ -91,9 +93,7 @@ class IntegerGrid:
                 triangle mesh.
             GridError: triangles are flipped, or sides of seams do not match.
         """
-        from .files import read_grid
-
-        return read_grid(path)
+        return _READ(path)
 
 
 def find_motions(mesh: TriangleMesh, corner_grid: FloatArray) -> tuple[IntArray, IntArray, float]:

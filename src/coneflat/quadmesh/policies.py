@@ -20,7 +20,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ..base import THREADS, Unmet, limit_threads, plural
+from ..base import THREADS, IntArray, Unmet, limit_threads, plural
 from ..errors import ConvergenceError, GridError, OptionError
 from ..flattener import flatten_source
 from ..geometry import coarse_mesh, double_areas, edge_lengths
@@ -52,9 +52,10 @@ MAX_THIN_SHARE = 0.1
 # Largest number of new triangles for each thin one, in meshes of more than COARSE_TRIANGLES: the plane parts of a
 # surface are not better the finer they are.
 MAX_REFINEMENT = 100
-# How many sizes are tried, each with this factor more squares than the last; and the least useful factor.
-MAX_SIZES, GROWTH, MIN_GROWTH = 3, 1.6, 1.2
-# A grid of more squares whose squares would need sides smaller than this fraction of the requested ones is not refined,
+# How many sizes are tried. Each has GROWTH times the squares of the last grid, and MIN_SQUARES at least; if the limit
+# leaves less than MIN_GROWTH times as many, none is tried.
+MAX_SIZES, GROWTH, MIN_GROWTH, MIN_SQUARES = 3, 1.6, 1.2, 32.0
+# A grid of more than FINE_SQUARES is not refined if sides would be shorter than MIN_SIDE times the requested ones,
 # since each attempt repeats the search.
 FINE_SQUARES, MIN_SIDE = 1000, 0.4
 # With fewer quads, a cone costs more than 1, in proportion.
@@ -167,7 +168,7 @@ def _names_vertices(request: GridRequest) -> bool:
     return not (is_simple and options.keys() <= declarations(QuadOptions).keys() - {"weights"})
 
 
-def _with_few_triangles(mesh: TriangleMesh, side: float) -> tuple[TriangleMesh, np.ndarray, np.ndarray]:
+def _with_few_triangles(mesh: TriangleMesh, side: float) -> tuple[TriangleMesh, IntArray, IntArray]:
     """Return a mesh of few triangles, not too thin, for quads with a length of their sides.
 
     And the vertices and triangles of the given mesh that its own are; it is the given mesh if this is simple already.
@@ -212,7 +213,7 @@ def finer_grid(request: GridRequest, flattening_of: AlignedFlattenings) -> Outco
 def _with_more_squares(request: GridRequest, grid: IntegerGrid) -> GridRequest | None:
     """Return the request for more squares than those of a grid; None if these would be too many or hardly more."""
     squares = grid.squares
-    more_squares = min(max(GROWTH * squares, 32.0), request.limit.squares)
+    more_squares = min(max(GROWTH * squares, MIN_SQUARES), request.limit.squares)
     size = request.extent / float(np.sqrt(more_squares))
     is_fine = squares > FINE_SQUARES and size < MIN_SIDE * request.size
     return None if more_squares < MIN_GROWTH * squares or is_fine else replace(request, size=size)

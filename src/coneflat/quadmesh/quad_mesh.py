@@ -10,13 +10,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base import BoolArray, FloatArray, IntArray, dots, mask_of, plural
+from ..base import BoolArray, EntryPoint, FloatArray, IntArray, dots, mask_of, plural
 from ..mesh import label_components, sort_pairs
 from ..mesh.connectivity import TriangleMesh
 
 if TYPE_CHECKING:
     from ..io.mesh_file import MeshFile
     from .integer_map import IntegerGrid
+
+# Files and UVs are made of quad meshes, so their modules import this one.
+_WRITE = EntryPoint[Path]("quadmesh.files:write_quads")
+_READ = EntryPoint["QuadMesh"]("quadmesh.files:read_quads")
+_UV = EntryPoint[FloatArray]("quadmesh.domains:quad_uv")
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,10 +109,7 @@ class QuadMesh:
     @cached_property
     def uv(self) -> FloatArray:
         """(p, 4, 2) UVs of the corners of quads: squares of one size in disjoint rectangles, in the unit square."""
-        from ..apps.view.quad_page import arranged, find_domains
-
-        places, side = arranged(find_domains(self))
-        return places / side
+        return _UV(self)
 
     def without(self, is_left_out: BoolArray) -> QuadMesh:
         """Return a mesh without some quads, (p,); those that then touch only in a point get separate vertices there."""
@@ -151,9 +153,7 @@ class QuadMesh:
             OptionError: meshio, which writes the last four, is not installed.
             MeshFileError: the file cannot be written.
         """
-        from .files import write_quads
-
-        return write_quads(path, self)
+        return _WRITE(path, self)
 
     @staticmethod
     def load(path: str | PathLike[str]) -> QuadMesh:
@@ -163,9 +163,7 @@ class QuadMesh:
             UnknownFormatError: the extension is not .npz.
             MeshFileError: the file does not exist, cannot be read, or does not contain a quad mesh.
         """
-        from .files import read_quads
-
-        return read_quads(path)
+        return _READ(path)
 
 
 def opposite_sides(quads: IntArray) -> IntArray:

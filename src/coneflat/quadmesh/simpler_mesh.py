@@ -92,19 +92,12 @@ class SimplerMesh:
         border = np.flatnonzero(mesh.is_boundary_edge), np.full(len(points), np.linalg.norm(apart))
         is_on = is_on_feature(quads, sharp_ends(simple)), quads.is_boundary_vertex
         for moves, (edges, reach) in zip(is_on, (sharp, border), strict=True):
-            if not (len(edges) and moves.any()):
-                continue
-            halfedges = mesh.edge_halfedges[edges, 0]
-            tails, heads = mesh.ends_of(halfedges)
-            # Each edge is a triangle without area.
-            tree = TriangleTree(places, np.stack([tails, heads, heads], axis=1))
-            on, (share, *_) = (rows.T for rows in tree.nearest(targets[moves]))
-            on_edges = places[heads[on]] + share[:, None] * (places[tails[on]] - places[heads[on]])
-            within = np.linalg.norm(on_edges - targets[moves], axis=1) <= reach[moves]
-            at, halfedge, share = np.flatnonzero(moves)[within], halfedges[on[within]], share[within]
-            faces[at], weights[at] = halfedge // 3, 0.0
-            weights[at, np.take(NEXT, halfedge % 3)] = share
-            weights[at, np.take(PREVIOUS, halfedge % 3)] = 1 - share
+            if len(edges) and moves.any():
+                on_edges, faces_there, weights_there = _nearest_on_edges(
+                    mesh, edges, places, targets[moves], reach[moves]
+                )
+                at = np.flatnonzero(moves)[on_edges]
+                faces[at], weights[at] = faces_there, weights_there
         places = stars.at(faces, weights)
         moved = replace(quads, vertices=places, faces=faces, barycentric=weights, surface=mesh)
         return moved.without(is_over & ~is_over.all()) if is_over.any() else moved
@@ -151,6 +144,32 @@ class SimplerMesh:
             barycentric=np.concatenate([quads.barycentric, weights]),
             notes=(*quads.notes, note),
         )
+
+
+def _nearest_on_edges(
+    mesh: TriangleMesh, edges: IntArray, places: FloatArray, targets: FloatArray, reach: FloatArray
+) -> tuple[BoolArray, IntArray, FloatArray]:
+    """Return (k,) which targets have a point on edges within reach, and for these the triangles and the coordinates.
+
+    Args:
+        mesh: the mesh.
+        edges: its edges.
+        places: (n, 3) where its vertices are taken to be.
+        targets: (k, 3) the targets.
+        reach: (k,) largest distances from them.
+    """
+    halfedges = mesh.edge_halfedges[edges, 0]
+    tails, heads = mesh.ends_of(halfedges)
+    # Each edge is a triangle without area.
+    tree = TriangleTree(places, np.stack([tails, heads, heads], axis=1))
+    on, (share, *_) = (columns.T for columns in tree.nearest(targets))
+    nearest = places[heads[on]] + share[:, None] * (places[tails[on]] - places[heads[on]])
+    is_near = np.linalg.norm(nearest - targets, axis=1) <= reach
+    halfedge, share = halfedges[on[is_near]], share[is_near]
+    weights, row = np.zeros((len(share), 3)), np.arange(len(share))
+    weights[row, np.take(NEXT, halfedge % 3)] = share
+    weights[row, np.take(PREVIOUS, halfedge % 3)] = 1 - share
+    return is_near, halfedge // 3, weights
 
 
 def _placed(

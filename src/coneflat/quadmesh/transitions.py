@@ -162,6 +162,19 @@ class _Builder:
             self._add_node(v, int(start[v]), sorted(relations.get(v, ())), of_cone.get(v))
 
     def _add_node(self, v: int, start: int, relations: list[tuple[int, int, int]], cone: int | None) -> None:
+        copies = self._copies_of_node(v, start, relations, cone)
+        for point, (turn, shift) in copies.items():
+            if cone is None:
+                self.base[point], self.turn[point] = start, turn
+            for side in self.sides_at.get(point, ()):  # the sides that contain the point
+                equation = shift[self.sides.axis[side]].copy()
+                equation[self.first_side + side] -= 1
+                self.equations.extend([equation] if equation.any() else [])
+            row, column = np.nonzero(shift)
+            self.entries.append((2 * point + row, column, shift[row, column]))
+
+    def _base_shift(self, start: int, cone: int | None) -> IntArray:
+        """Return (2, v) the coefficients of the base point of a node: variables of its cone, or of its side."""
         shift = np.zeros((2, self.size), dtype=np.int64)
         if cone is not None:
             at = 2 * (self.chain_count + cone)
@@ -171,7 +184,23 @@ class _Builder:
             axis = int(self.sides.axis[side])
             shift[axis, self.first_side + side] = 1
             self.fixed[start, axis] = True
-        copies = {start: (0, shift)}
+        return shift
+
+    def _copies_of_node(
+        self, v: int, start: int, relations: list[tuple[int, int, int]], cone: int | None
+    ) -> dict[int, tuple[int, IntArray]]:
+        """Return the quarter turns and the shift (2, v) of each copy of a node, and add the equations of its loop.
+
+        Args:
+            v: the node.
+            start: its base point.
+            relations: left point, right point and chain of each seam at the node.
+            cone: its number among the cones, or None.
+
+        Raises:
+            GridError: the loop is not closed, or the node must be a cone.
+        """
+        copies = {start: (0, self._base_shift(start, cone))}
         left_over, waiting = deque(relations), 0
         while left_over:
             left, right, chain = left_over.popleft()
@@ -192,19 +221,11 @@ class _Builder:
                 turn, shift = copies[right]
                 copies[left] = (turn - quarter) % 4, TURNS[-quarter % 4] @ (shift - across)
             else:
-                left_over.append((left, right, chain))  # until one of both is known
+                left_over.append((left, right, chain))  # until one of both is in `copies`
                 waiting += 1
                 if waiting > len(relations) ** 2:
                     raise GridError(f"the seams at vertex {v} do not connect all its copies")
-        for point, (turn, shift) in copies.items():
-            if cone is None:
-                self.base[point], self.turn[point] = start, turn
-            for side in self.sides_at.get(point, ()):  # the sides that contain the point
-                equation = shift[self.sides.axis[side]].copy()
-                equation[self.first_side + side] -= 1
-                self.equations.extend([equation] if equation.any() else [])
-            row, column = np.nonzero(shift)
-            self.entries.append((2 * point + row, column, shift[row, column]))
+        return copies
 
     def _fix_charts(self) -> None:
         """Fix the free motions of charts: some seams between them, and a cone or side of each component."""

@@ -238,8 +238,3 @@ class Surface:
         if self.known_delaunay is None:
             self.known_delaunay = intrinsic_delaunay(self.mesh, self.lengths)
         return self.known_delaunay
-
-    def prepare(self, method: str) -> None:
-        """Compute in advance what a metric by the given method needs, except on surfaces where memory is scarce."""
-        if method == "exact" and len(self.mesh.faces) <= MEMORY_BOUND_TRIANGLES:
-            _ = self.delaunay

@@ -38,7 +38,7 @@ def invoke(*arguments):
 
 
 @pytest.mark.slow
-def test_failures_stop_nothing(models, tmp_path):
+def test_a_mesh_that_fails_does_not_stop_the_batch(models, tmp_path):
     out = tmp_path / "out"
     result = invoke("batch", models, "--out", out, "--jobs", 2)
     assert result.exit_code == 1
@@ -70,7 +70,7 @@ def test_textures(models, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_further_run_does_what_is_left(models, tmp_path):
+def test_a_further_run_flattens_only_the_missing_meshes(models, tmp_path):
     out = tmp_path / "out"
     run = partial(invoke, "batch", models, "--out", out, "--jobs", 1)
     run()
@@ -206,7 +206,7 @@ def test_broken_lines_of_the_journal_are_left_out_and_named(models, tmp_path):
     assert "2 of them before" in run(models / "hill.obj").output
 
 
-def test_what_cannot_be_written_is_said_before_the_work(models, tmp_path):
+def test_paths_that_cannot_be_written_are_errors_before_the_work(models, tmp_path):
     jobs = find_jobs([str(models)], tmp_path, ".obj", {}, None)
     (tmp_path / "file").write_text("")
     (tmp_path / "journal" / "batch.jsonl").mkdir(parents=True)

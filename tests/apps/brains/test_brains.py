@@ -248,7 +248,7 @@ def test_a_patch_has_the_layout_of_freesurfer(flat, tmp_path):
 
 
 @pytest.mark.parametrize("ending", [".gii", ".3d"])
-def test_what_is_read_back_measures_the_same(folder, flat, tmp_path, ending):
+def test_maps_that_are_read_back_have_equal_measures(folder, flat, tmp_path, ending):
     path = flat.save(tmp_path / f"lh.flat{ending}")
     written, read_back = measure_flat(flat.uv_mesh(path)), measure_flat(read_flat(path, folder / "lh.pial"))
     assert written.report() | {"input": ""} == read_back.report() | {"input": ""}

@@ -132,7 +132,7 @@ def test_cones_from_a_file(model, tmp_path):
 
 @pytest.mark.skipif(os.name == "nt", reason="sh closes the streams")
 @pytest.mark.parametrize(
-    "closed", [*(pytest.param(one, marks=pytest.mark.slow) for one in (">&-", "2>&-")), "<&- >&- 2>&-"]
+    "closed", [*(pytest.param(closed, marks=pytest.mark.slow) for closed in (">&-", "2>&-")), "<&- >&- 2>&-"]
 )
 def test_closed_standard_streams_do_not_prevent_the_output(tmp_path, closed):
     shapes.write_obj(tmp_path / "in.obj", *shapes.sphere(2))
@@ -295,12 +295,12 @@ def test_no_seams_takes_vertices_and_pairs(tmp_path):
     seams = flatten(tmp_path / "ball.obj").seams
     (tmp_path / "pairs.txt").write_text("\n".join(f"{a} {b}" for a, b in seams[:4]) + "  # edges\n")
     (tmp_path / "some.txt").write_text("\n".join(str(v) for v in np.unique(seams[:4])))
-    for given in ("pairs.txt", "some.txt", ",".join(str(v) for v in np.unique(seams[:4]))):
-        done = run("flatten", "ball.obj", "-q", "-o", "out.npz", "--no-seams", given, cwd=tmp_path)
+    for values in ("pairs.txt", "some.txt", ",".join(str(v) for v in np.unique(seams[:4]))):
+        done = run("flatten", "ball.obj", "-q", "-o", "out.npz", "--no-seams", values, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
-        found = np.load(tmp_path / "out.npz")["seams"]
+        cut_edges = np.load(tmp_path / "out.npz")["seams"]
         assert not {tuple(sorted(edge)) for edge in seams[:4].tolist()} & {
-            tuple(sorted(edge)) for edge in found.tolist()
+            tuple(sorted(edge)) for edge in cut_edges.tolist()
         }
     done = run("flatten", "ball.obj", "--no-seams", "3", "--no-seams", "pairs.txt", cwd=tmp_path)
     assert "--no-seams takes vertices or pairs of them, not both" in done.stderr

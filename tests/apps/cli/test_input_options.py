@@ -113,21 +113,21 @@ class TestJoining:
         monkeypatch.chdir(tmp_path)
         vertices, faces = soup(*shapes.sphere(1))
         path = shapes.write_obj(tmp_path / "soup.obj", vertices, faces)
-        used = read_joined(path).representative
-        merged = np.flatnonzero(used != np.arange(len(used)))
+        representative = read_joined(path).representative
+        merged = np.flatnonzero(representative != np.arange(len(representative)))
         words = [word for v in merged[[5, 40, 80]] for word in ("--required-cones", v)]
         done = run("flatten", path, "-q", "-o", "a.obj", "--report", "a.json", *words)
         assert done.exit_code == 0, done.output
-        found = json.loads((tmp_path / "a.json").read_text())
-        assert set(used[merged[[5, 40, 80]]].tolist()) <= set(found["cone_vertices"])
-        one = int(merged[0])
-        done = run("flatten", path, "--cones", f"{one},{int(used[one])},7")
+        report = json.loads((tmp_path / "a.json").read_text())
+        assert set(representative[merged[[5, 40, 80]]].tolist()) <= set(report["cone_vertices"])
+        vertex = int(merged[0])
+        done = run("flatten", path, "--cones", f"{vertex},{int(representative[vertex])},7")
         assert "have the same position" in str(done.exception)
 
 
 class TestRepair:
     @pytest.mark.parametrize(
-        ("command", "more"),
+        ("command", "arguments"),
         [
             ("flatten", ["-o", "out.obj"]),
             ("cones", ["-o", "out.txt"]),
@@ -136,16 +136,18 @@ class TestRepair:
             ("figure", ["--kind", "curve", "-o", "out.png", "--dpi", "50", "--most", "6"]),
         ],
     )
-    def test_commands_repair_with_a_note_and_refuse_if_strict(self, tmp_path, monkeypatch, command, more):
+    def test_commands_repair_with_a_note_and_refuse_if_strict(
+        self, tmp_path, monkeypatch, command, arguments
+    ):
         if command == "figure":
             pytest.importorskip("matplotlib")
         monkeypatch.chdir(tmp_path)
         shapes.write_obj(tmp_path / "fin.obj", *fin())
-        done = run(command, "fin.obj", *more)
+        done = run(command, "fin.obj", *arguments)
         assert done.exit_code == 0, done.output
         if command in ("flatten", "view"):
             assert "note: Separated the faces at 1 edge with more than two." in done.stdout
-        done = run(command, "fin.obj", "--strict", *more)
+        done = run(command, "fin.obj", "--strict", *arguments)
         assert isinstance(done.exception, errors.NonManifoldError)
 
 
@@ -153,12 +155,14 @@ def test_every_command_that_reads_meshes_takes_the_same_options():
     declared = []
     for name in TAKE_MESHES:
         options = {
-            option: each for each in cli.commands[name].params for option in each.opts + each.secondary_opts
+            option: param
+            for param in cli.commands[name].params
+            for option in param.opts + param.secondary_opts
         }
-        found = [options.get(option) for option in ("--repair", "--strict", "--weld", "--no-weld")]
-        assert all(found), name
-        declared.append([each.help for each in found])
-    assert all(each == declared[0] for each in declared)
+        shared_options = [options.get(option) for option in ("--repair", "--strict", "--weld", "--no-weld")]
+        assert all(shared_options), name
+        declared.append([parameter.help for parameter in shared_options])
+    assert all(parameter == declared[0] for parameter in declared)
 
 
 class TestOwnUVs:

@@ -69,9 +69,9 @@ class TestMeeting:
         assert (breaches(parse_requirements([text], ["a"]), {"a": value}) == ()) == met
 
     def test_an_overlap_that_is_rounded_to_nothing_is_one(self):
-        wanted = parse_requirements(["overlap=0"], REPORTED)
-        assert breaches(wanted, {"overlap": 0.0, "overlapping_pairs": 0}) == ()
-        assert len(breaches(wanted, {"overlap": 0.0, "overlapping_pairs": 2})) == 1
+        requirements = parse_requirements(["overlap=0"], REPORTED)
+        assert breaches(requirements, {"overlap": 0.0, "overlapping_pairs": 0}) == ()
+        assert len(breaches(requirements, {"overlap": 0.0, "overlapping_pairs": 2})) == 1
 
 
 class TestFlatten:

@@ -50,7 +50,7 @@ def test_verbose_tells_each_step_and_where_the_time_went(folder, name):
     told = [re.fullmatch(LINE, line) for line in done.stderr.splitlines()]
     assert len(told) > (0 if name == "batch" else 2)
     assert all(told)
-    percents = [int(each[1]) for each in told]
+    percents = [int(match[1]) for match in told]
     assert percents == sorted(percents)
     assert re.search(r"^time +\d+\.\d+ s", done.stdout, re.MULTILINE)
     assert "wrote " in done.stdout

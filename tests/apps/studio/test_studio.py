@@ -27,18 +27,18 @@ def some_choices():
 
 
 class TestChoices:
-    def test_what_is_found_becomes_the_users(self):
+    def test_editing_a_searched_cone_places_all_cones_by_hand(self):
         chosen = Choices().placed([9, 4]).added(7).moved(4, 5).removed(9)
         assert chosen.by_hand
         assert chosen.cones == (Cone(5), Cone(7))
         assert chosen.keywords() == {"cones": {5: None, 7: None}}
 
-    def test_an_angle_is_what_is_left_of_a_turn(self):
+    def test_the_curvature_of_a_cone_is_a_full_turn_minus_its_angle(self):
         chosen = Choices().placed([4, 9]).with_angle(9, math.radians(270))
         assert chosen.keywords() == {"cones": {4: None, 9: pytest.approx(math.pi / 2)}}
         assert chosen.with_angle(9, None).keywords() == {"cones": {4: None, 9: None}}
 
-    def test_a_search_goes_around_what_is_locked(self):
+    def test_a_search_keeps_locked_cones(self):
         chosen = Choices().placed([4, 9, 12]).locked(9, True).with_option("cone_count", 8)
         assert chosen.keywords() == {"cone_count": 8, "required_cones": [9]}
         # One of the two numbers is asked for.
@@ -77,7 +77,7 @@ class TestChoices:
             (lambda c: c.with_option("boundary", [3]), OptionError, "unknown boundary"),
         ],
     )
-    def test_what_makes_no_sense_is_refused(self, change, kind, message):
+    def test_invalid_choices_are_refused(self, change, kind, message):
         with pytest.raises(kind, match=message):
             change(Choices().placed([4, 9]))
 
@@ -111,7 +111,7 @@ class TestHistory:
 
 
 class TestProject:
-    def test_it_comes_back(self, tmp_path, mesh):
+    def test_a_saved_project_is_read_back(self, tmp_path, mesh):
         (tmp_path / "sub").mkdir()
         project = Project(tmp_path / "ball.obj", file_hash(tmp_path / "ball.obj"), some_choices())
         project.save(tmp_path / "sub" / "p.json")
@@ -151,7 +151,7 @@ class TestProject:
             (lambda p: {**p, "choices": {**p["choices"], "cones": [{"vertex": "x"}]}}, "a number"),
         ],
     )
-    def test_what_is_none_is_named(self, tmp_path, mesh, change, message):
+    def test_invalid_projects_are_refused_with_the_reason(self, tmp_path, mesh, change, message):
         path = tmp_path / "p.json"
         Project(tmp_path / "ball.obj", "0" * 64, Choices()).save(path)
         content = change(json.loads(path.read_text()))

@@ -59,7 +59,7 @@ class TestFirstViews:
             session.state()["layout"],
         )
 
-    def test_they_are_shown_and_replaced(self, session):
+    def test_previews_are_shown_and_replaced(self, session):
         job = session._worker.jobs[-1]["job"]
         self.answer(session, "early", job, "first")
         assert self.shown(session) == ("first", True, True, 1)
@@ -67,7 +67,7 @@ class TestFirstViews:
         self.answer(session, "done", job, "last")
         assert self.shown(session) == ("last", False, False, 2)
 
-    def test_they_replace_nothing_newer(self, session):
+    def test_previews_of_older_jobs_are_dropped(self, session):
         old = session._worker.jobs[-1]["job"]
         session.act({"do": "set", "name": "stretch", "value": 0.5})
         newest = session._worker.jobs[-1]["job"]
@@ -137,7 +137,7 @@ class TestKnownArrays:
             )
         return arrays
 
-    def test_only_those_that_changed_are_told(self):
+    def test_only_arrays_that_changed_are_sent(self):
         sent = SentPictures()
         first = sent.numbered(self.picture(places=[1.0, 2.0], tints=np.uint8([1, 2, 3]), uv=[0.5]))
         second = sent.numbered(self.picture(places=[1.0, 2.0], tints=np.uint8([1, 2, 4]), uv=[0.5]))

@@ -6,7 +6,7 @@ from io import BytesIO
 
 import numpy as np
 import pytest
-from scenes import SceneMaker
+from gltf_scenes import SceneMaker
 from shapes import sphere
 
 import coneflat

@@ -50,7 +50,7 @@ def replayed(session, tmp_path):
 
 
 class TestRegion:
-    def test_it_is_a_set(self):
+    def test_regions_combine_like_sets(self):
         rng = random.Random(0)
         for _ in range(60):
             first, second = (
@@ -62,12 +62,12 @@ class TestRegion:
             assert a.vertices() == sorted(first)
             assert Region.of_text(a.text) == a
 
-    def test_it_is_short(self):
+    def test_the_text_of_a_region_lists_ranges(self):
         assert Region.of_text("7 3-5 6 9-9").text == "3-7 9"
         assert region(range(100_000)).text == "0-99999"
 
     @pytest.mark.parametrize("text", ["5-3", "a", "-1", "1--2", "1.5", "3,4", 7, None])
-    def test_no_region(self, text):
+    def test_invalid_texts_of_regions_are_refused(self, text):
         with pytest.raises(StudioError, match="a region must be a text such as 3-17 20"):
             Region.of_text(text)
 
@@ -102,11 +102,11 @@ class TestPaint:
             ("importance", None, "an importance must be a number"),
         ],
     )
-    def test_what_makes_no_sense(self, layer, weight, message):
+    def test_invalid_strokes_are_refused(self, layer, weight, message):
         with pytest.raises((StudioError, OptionError), match=message):
             Paint().with_stroke(layer, region([1]), weight)
 
-    def test_what_it_means(self):
+    def test_paint_becomes_options_of_flatten(self):
         chosen = Choices().painted("no_cone", region([1, 2])).painted("no_seam", region([5, 6]))
         chosen = chosen.painted("importance", region([8]), 10)
         words = chosen.keywords()

@@ -76,7 +76,7 @@ class TestStrangers:
         answer = stranger.request(method, f"{path}?token={TOKEN}")
         assert answer.status_code == (200 if path == "/" else 403)
 
-    def test_another_name_of_this_machine(self, page, method, path):
+    def test_requests_with_another_host_are_refused(self, page, method, path):
         for host in (
             "evil.example",
             f"evil.example:{PORT}",
@@ -87,14 +87,14 @@ class TestStrangers:
             answer = page.request(method, path, headers={"host": host})
             assert answer.status_code == 403, host
 
-    def test_another_page(self, page, method, path):
+    def test_requests_with_another_origin_are_refused(self, page, method, path):
         for origin in ("http://evil.example", "null", "http://127.0.0.1:1", f"https://127.0.0.1:{PORT}"):
             answer = page.request(method, path, headers={"origin": origin})
             assert answer.status_code == 403, origin
 
 
 class TestPage:
-    def test_it_is_the_viewers_with_more(self, stranger):
+    def test_the_page_extends_the_page_of_the_viewer(self, stranger):
         answer = stranger.get(f"/?token={TOKEN}")
         assert "class Renderer" in answer.text
         assert "class Studio" in answer.text
@@ -131,7 +131,7 @@ class TestPage:
         assert page.post("/export/obj").text.count("\nvt ") > 0
         assert (tmp_path / "ball_studio.json").exists()
 
-    def test_refusals_say_why(self, page, ball):
+    def test_refused_requests_are_answered_with_the_reason(self, page, ball):
         page.post("/mesh?name=ball.obj", content=ball.read_bytes())
         answer = page.post("/act", json={"do": "remove", "vertex": 10**9})
         assert answer.status_code == 400
@@ -150,7 +150,7 @@ class TestUploads:
         assert f"{MAX_UPLOAD:,}" in answer.text
         assert list(tmp_path.iterdir()) == []
 
-    def test_its_size_is_counted_whatever_is_said(self, page, tmp_path):
+    def test_an_upload_without_a_stated_size_is_refused_above_the_limit(self, page, tmp_path):
         def endless():
             for _ in range(1000):
                 yield b"#" * 1000
@@ -162,7 +162,7 @@ class TestUploads:
         "name",
         ["../up.obj", "%2e%2e%2fup.obj", "/etc/up.obj", "a/b.obj", ".x.obj", "", "x.exe", "x", "a%00.obj"],
     )
-    def test_names_lead_nowhere_else(self, page, tmp_path, name, ball):
+    def test_names_of_uploads_stay_in_the_folder(self, page, tmp_path, name, ball):
         before = set(tmp_path.parent.rglob("*"))
         assert page.post(f"/mesh?name={name}", content=ball.read_bytes()).status_code == 400
         assert set(tmp_path.parent.rglob("*")) == before
@@ -209,7 +209,7 @@ class TestFailedOpening:
     """What is shown stays, and no file is left, if a dropped file cannot be opened."""
 
     @pytest.mark.slow
-    def test_what_is_shown_stays_and_no_file_is_left(self, page, session, ball, tmp_path):
+    def test_invalid_uploads_change_no_state_and_leave_no_file(self, page, session, ball, tmp_path):
         assert page.post("/mesh?name=ball.obj", content=ball.read_bytes()).status_code == 200
         assert session.wait_until_idle(120)
         before, files_before = page.get("/state").json(), sorted(tmp_path.iterdir())

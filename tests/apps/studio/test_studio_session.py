@@ -44,7 +44,7 @@ def uv_of(content):
 
 class TestSession:
     @pytest.mark.slow
-    def test_it_flattens_what_is_chosen(self, session):
+    def test_the_layout_follows_the_choices(self, session):
         state = settled(session)
         assert state["trouble"] is None
         assert state["layout"] == 1
@@ -79,7 +79,7 @@ class TestSession:
         np.testing.assert_array_equal(coneflat.read_flattening(tmp_path / "again.npz").uv, saved)
 
     @pytest.mark.slow
-    def test_it_saves(self, session):
+    def test_every_mesh_format_can_be_exported(self, session):
         begins = {".obj": b"v ", ".ply": b"ply", ".glb": b"glTF", ".npz": b"PK", ".svg": b"<svg"}
         for ending, begin in begins.items():
             assert session.export(ending).startswith(begin), ending
@@ -139,7 +139,7 @@ class TestSession:
         assert state["choices"]["options"] == {"stretch": 0.5}
         assert worker_process() != first
 
-    def test_everything_is_kept_at_once(self, session, tmp_path):
+    def test_choices_are_stored_immediately(self, session, tmp_path):
         session.act({"do": "set", "name": "stretch", "value": 0.5})
         again = Session(tmp_path)  # as if the first had been killed
         try:

@@ -129,7 +129,7 @@ class TestChoices:
             lambda chosen: chosen.locked(7, True),
         ],
     )
-    def test_there_are_no_cones_to_edit(self, change):
+    def test_maps_for_textures_have_no_cones_to_edit(self, change):
         with pytest.raises(StudioError, match="a map for a texture has no cones to edit"):
             change(Choices().with_texture(True))
 
@@ -137,7 +137,7 @@ class TestChoices:
         assert not Choices().with_texture(True).with_option("cone_count", 8).for_texture
         assert set(curve_options(both_kinds().with_texture(True))) == set(curve_options(both_kinds()))
 
-    def test_they_come_back_from_json(self):
+    def test_choices_are_read_back_from_json(self):
         chosen = both_kinds().with_texture(True)
         assert Choices.from_plain(json.loads(json.dumps(chosen.as_plain()))) == chosen
         assert "for_texture" not in both_kinds().as_plain()
@@ -216,7 +216,7 @@ class TestSession:
         assert not read_project(session.project_file).choices.for_texture
 
     @pytest.mark.slow
-    def test_what_cannot_be_is_refused(self, session):
+    def test_actions_that_need_cones_and_invalid_values_are_refused(self, session):
         session.act({"do": "texture", "value": True})
         with pytest.raises(StudioError, match="has no cones to edit"):
             session.act({"do": "add", "vertex": 5})

@@ -27,7 +27,7 @@ def settled(session):
 
 
 class TestPlaces:
-    def test_one_and_several(self):
+    def test_misplaced_cones_are_counted_in_the_warning(self):
         painted = Choices().painted("no_cone", Region("3-9 20"))
         assert misplaced_warning(painted) == ()
         assert misplaced_warning(painted.added(10)) == ()
@@ -39,7 +39,7 @@ class TestPlaces:
         assert "2 cones set by hand or locked lie in regions painted as “No cones”: vertices 3, 20." in two
 
     @pytest.mark.slow
-    def test_they_are_told_at_once_and_noted(self, session):
+    def test_misplaced_cones_are_warned_of_at_once_and_noted(self, session):
         cones = settled(session)["found"]
         session.act({"do": "paint", "layer": "no_cone", "where": f"{cones[0]}"})
         state = settled(session)
@@ -56,7 +56,7 @@ class TestPlaces:
 
 
 class TestAngles:
-    def test_none_is_wider_than_a_search_may_have_them(self):
+    def test_typed_angles_are_positive_and_at_most_the_largest_of_a_search(self):
         chosen = Choices().placed([4, 9]).with_angle(9, math.radians(720))
         assert chosen.cones[1].angle == MAX_CONE_ANGLE
         for angle in (0.0, math.radians(721), math.radians(3000), math.inf, math.nan):
@@ -70,7 +70,7 @@ class TestAngles:
             Choices.from_plain(plain)
 
     @pytest.mark.slow
-    def test_what_typed_angles_leave_out_of_bounds_is_told(self, session):
+    def test_typed_angles_that_force_others_out_of_bounds_give_a_warning(self, session):
         """Of a ball's 720 degrees, three cones of 220 take 420; what is left leaves one more an angle below 90."""
         settled(session)
         session.act({"do": "set", "name": "cone_count", "value": 4})

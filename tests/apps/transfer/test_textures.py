@@ -7,7 +7,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 from command import command
-from scenes import SceneMaker
+from gltf_scenes import SceneMaker
 
 import coneflat
 from coneflat import errors
@@ -56,7 +56,7 @@ def two_squares(folder):
     return path
 
 
-def scene(folder, material, uv=SQUARE[:, :2], pixels=PIXELS, sampler=None, name="old.glb", **more):
+def scene(folder, material, uv=SQUARE[:, :2], pixels=PIXELS, sampler=None, name="old.glb", **entries):
     """Write a square with a material, and UVs with v downwards."""
     make = SceneMaker()
     attributes = {"POSITION": make.accessor(SQUARE), "TEXCOORD_0": make.accessor(np.array(uv, float))}
@@ -69,15 +69,15 @@ def scene(folder, material, uv=SQUARE[:, :2], pixels=PIXELS, sampler=None, name=
         "nodes": [{"mesh": 0}],
         "scenes": [{"nodes": [0]}],
         "meshes": [{"primitives": [{"attributes": attributes, "indices": indices, "material": 0}]}],
-        **more,
+        **entries,
     }
     path = folder / name
     path.write_bytes(make.glb())
     return path
 
 
-def base(**more):
-    return {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, **more}}
+def base(**properties):
+    return {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, **properties}}
 
 
 def colours(baked):
@@ -104,10 +104,10 @@ class TestWrapModes:
 
     def test_a_filter_without_interpolation_gives_pixels(self, tmp_path):
         old = scene(tmp_path, base(), uv=SQUARE[:, :2] * [1, -1] + [0, 1], sampler={"magFilter": NEAREST})
-        near = colours(transfer(old, new_square(tmp_path), resolution=8))
-        assert np.array_equal(near, np.kron(PIXELS, np.ones((4, 4, 1), np.uint8)))
+        pixel_colours = colours(transfer(old, new_square(tmp_path), resolution=8))
+        assert np.array_equal(pixel_colours, np.kron(PIXELS, np.ones((4, 4, 1), np.uint8)))
         old = scene(tmp_path, base(), uv=SQUARE[:, :2] * [1, -1] + [0, 1])
-        assert not np.array_equal(near, colours(transfer(old, new_square(tmp_path), resolution=8)))
+        assert not np.array_equal(pixel_colours, colours(transfer(old, new_square(tmp_path), resolution=8)))
 
     def test_wrapped_pixels(self):
         pixels = np.arange(-7, 8)
@@ -161,32 +161,35 @@ class TestScenes:
 
     def test_unlit_materials_stay_unlit(self, tmp_path):
         extensions = {"extensions": {"KHR_materials_unlit": {}}}
-        more = {"extensionsUsed": ["KHR_materials_unlit"], "extensionsRequired": ["KHR_materials_unlit"]}
-        old = scene(tmp_path, base() | extensions, **more)
+        declarations = {
+            "extensionsUsed": ["KHR_materials_unlit"],
+            "extensionsRequired": ["KHR_materials_unlit"],
+        }
+        old = scene(tmp_path, base() | extensions, **declarations)
         lit = scene(tmp_path, base(), name="lit.glb")
-        for source, target, used in (
+        for source, target, extensions_used in (
             (old, new_square(tmp_path), ["KHR_materials_unlit"]),
             (old, lit, ["KHR_materials_unlit"]),
             (lit, old, None),
         ):
             out = transfer(source, target, resolution=2).save(tmp_path / "out.glb")
             tree = coneflat.read_mesh(out).scene.data.tree
-            assert tree.get("extensionsUsed") == used
-            assert ("extensions" in tree["materials"][0]) == (used is not None)
-            assert set(tree.get("extensionsRequired", ())) <= set(used or ())
+            assert tree.get("extensionsUsed") == extensions_used
+            assert ("extensions" in tree["materials"][0]) == (extensions_used is not None)
+            assert set(tree.get("extensionsRequired", ())) <= set(extensions_used or ())
 
     def test_extensions_that_are_not_baked_are_named_and_not_left_declared(self, tmp_path):
         coat = {"extensions": {"KHR_materials_clearcoat": {"clearcoatFactor": 1}}}
-        used = {"extensionsUsed": ["KHR_materials_clearcoat", "KHR_mesh_quantization"]}
-        old = scene(tmp_path, base() | coat, **used)
+        declarations = {"extensionsUsed": ["KHR_materials_clearcoat", "KHR_mesh_quantization"]}
+        old = scene(tmp_path, base() | coat, **declarations)
         baked = transfer(old, old, resolution=2)
         assert any("KHR_materials_clearcoat" in note for note in baked.notes)
         tree = coneflat.read_mesh(baked.save(tmp_path / "out.glb")).scene.data.tree
         assert tree["extensionsUsed"] == ["KHR_mesh_quantization"]
 
     def test_variants_are_named(self, tmp_path):
-        more = {"extensions": {"KHR_materials_variants": {"variants": [{"name": "a"}]}}}
-        old = scene(tmp_path, base(), extensionsUsed=["KHR_materials_variants"], **more)
+        variants = {"extensions": {"KHR_materials_variants": {"variants": [{"name": "a"}]}}}
+        old = scene(tmp_path, base(), extensionsUsed=["KHR_materials_variants"], **variants)
         baked = transfer(old, old, resolution=2)
         assert any("Variants of materials" in note for note in baked.notes)
         tree = coneflat.read_mesh(baked.save(tmp_path / "out.glb")).scene.data.tree
@@ -221,11 +224,11 @@ class TestScenes:
             transfer(scene(tmp_path, material), new_square(tmp_path), resolution=2)
 
     def test_an_image_of_another_format_is_named(self, tmp_path):
-        more = {"textures": [{"extensions": {"KHR_texture_basisu": {"source": 0}}}]}
+        textures = {"textures": [{"extensions": {"KHR_texture_basisu": {"source": 0}}}]}
         with pytest.raises(
             errors.MeshFileError, match="no image of a format that is read .KHR_texture_basisu"
         ):
-            transfer(scene(tmp_path, base(), **more), new_square(tmp_path), resolution=2)
+            transfer(scene(tmp_path, base(), **textures), new_square(tmp_path), resolution=2)
 
     def test_a_png_names_the_other_images(self, tmp_path):
         old = scene(tmp_path, base() | {"occlusionTexture": {"index": 0}})
@@ -233,11 +236,11 @@ class TestScenes:
         assert "note: A .png has the base colour only, not occlusionTexture" in done.stdout
 
 
-def painted_obj(folder, library, used=("a", "b"), uv="vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n", colour=""):
+def painted_obj(folder, library, materials=("a", "b"), uv="vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n", colour=""):
     """Write two squares with a material each, both with the whole texture; and their library."""
     vertices = [(0, 0), (1, 0), (1, 1), (0, 1), (2, 0), (2, 1)]
     lines = ["mtllib old.mtl", *(f"v {x} {y} 0{colour}" for x, y in vertices)]
-    faces = [f"usemtl {used[0]}", "f 1/1 2/2 3/3 4/4", f"usemtl {used[1]}", "f 2/1 5/2 6/3 3/4", ""]
+    faces = [f"usemtl {materials[0]}", "f 1/1 2/2 3/3 4/4", f"usemtl {materials[1]}", "f 2/1 5/2 6/3 3/4", ""]
     (folder / "old.obj").write_text("\n".join([*lines, uv + faces[0], *faces[1:]]))
     if library is not None:
         (folder / "old.mtl").write_text(library)
@@ -307,28 +310,28 @@ class TestObj:
         assert not colours(baked).any()
 
     def test_missing_libraries_and_materials_are_named(self, tmp_path):
-        new = two_squares(tmp_path)
+        target = two_squares(tmp_path)
         with pytest.raises(errors.OptionError, match=r"got neither.*old\.mtl: there is no such file"):
-            transfer(painted_obj(tmp_path, None), new, resolution=4)
-        baked = transfer(painted_obj(tmp_path, None, colour=" 1 0 0"), new, resolution=4)
+            transfer(painted_obj(tmp_path, None), target, resolution=4)
+        baked = transfer(painted_obj(tmp_path, None, colour=" 1 0 0"), target, resolution=4)
         assert (colours(baked) == [255, 0, 0]).all()
         assert "there is no such file" in baked.notes[0]
-        baked = transfer(painted_obj(tmp_path, "newmtl a\nKd 1 0 0\n"), new, resolution=4)
+        baked = transfer(painted_obj(tmp_path, "newmtl a\nKd 1 0 0\n"), target, resolution=4)
         assert baked.notes == ("Materials that are in no library are white: b.",)
         assert (colours(baked)[:, 2:] == 255).all()
 
     def test_materials_of_the_target_are_not_read(self, tmp_path):
         """They are replaced, so it does not matter that their library is missing."""
         solid([255, 0, 0], tmp_path / "x.png")
-        new = two_squares(tmp_path)
+        target = two_squares(tmp_path)
         lines = (
-            new.read_text()
+            target.read_text()
             .replace("f 1/1", "mtllib none.mtl\nusemtl a\nf 1/1")
             .replace("f 2/2", "usemtl b\nf 2/2")
         )
-        new.write_text(lines)
+        target.write_text(lines)
         old = painted_obj(tmp_path, "newmtl a\nmap_Kd x.png\n", ("a", "a"))
-        assert transfer(old, new, resolution=4).notes == ()
+        assert transfer(old, target, resolution=4).notes == ()
 
     @pytest.mark.parametrize(
         ("library", "message"),
@@ -378,7 +381,7 @@ HEADER += "property list uchar float texcoord\n{number}end_header\n"
 CORNERS = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0]]
 FACES = [[0, 1, 2, 3], [1, 4, 5, 2]]
 SHADES = ("red", "green", "blue", "alpha")
-WHOLE = [0, 0, 1, 0, 1, 1, 0, 1]
+FULL_SQUARE = [0, 0, 1, 0, 1, 1, 0, 1]
 
 
 def painted_ply(folder, images, numbers=None, form="ascii", colour=None):
@@ -395,14 +398,17 @@ def painted_ply(folder, images, numbers=None, form="ascii", colour=None):
     numbers_of = [[]] * 2 if numbers is None else [[number] for number in numbers]
     if form == "ascii":
         rows = [[*corner, *shades] for corner in CORNERS]
-        rows += [[4, *face, 8, *WHOLE, *number] for face, number in zip(FACES, numbers_of, strict=True)]
+        rows += [[4, *face, 8, *FULL_SQUARE, *number] for face, number in zip(FACES, numbers_of, strict=True)]
         path.write_text(header + "\n".join(" ".join(map(str, row)) for row in rows) + "\n")
         return path
     order = ">" if "big" in form else "<"
     body = b"".join(np.array(corner, f"{order}f4").tobytes() + bytes(shades) for corner in CORNERS)
     for face, number in zip(FACES, numbers_of, strict=True):
         body += (
-            b"\4" + np.array(face, f"{order}i4").tobytes() + b"\x08" + np.array(WHOLE, f"{order}f4").tobytes()
+            b"\4"
+            + np.array(face, f"{order}i4").tobytes()
+            + b"\x08"
+            + np.array(FULL_SQUARE, f"{order}f4").tobytes()
         )
         body += np.array(number, f"{order}i4").tobytes()
     path.write_bytes(header.encode() + body)
@@ -461,7 +467,7 @@ class TestImages:
 
     @pytest.mark.parametrize("mode", ["1", "L", "LA", "P", "RGB", "RGBA", "CMYK", "I;16", "I", "F"])
     def test_white_is_white_and_black_black_in_every_mode(self, tmp_path, mode):
-        old, new = scene(tmp_path, base(), uv=SQUARE[:, :2] * [1, -1] + [0, 1]), new_square(tmp_path)
+        old, target = scene(tmp_path, base(), uv=SQUARE[:, :2] * [1, -1] + [0, 1]), new_square(tmp_path)
         whites = {"I;16": np.uint16(65535), "I": np.int32(65535), "F": np.float32(1)}
         for shade in (0, 255):
             if mode in whites:
@@ -470,7 +476,7 @@ class TestImages:
                 image = Image.new("L", (2, 2), shade).convert(mode)
             assert image.mode == mode
             image.save(tmp_path / "x.tif")
-            baked = transfer(old, new, resolution=2, texture=tmp_path / "x.tif")
+            baked = transfer(old, target, resolution=2, texture=tmp_path / "x.tif")
             assert (colours(baked) == shade).all()
 
 

@@ -7,7 +7,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 from command import command
-from scenes import SceneMaker
+from gltf_scenes import SceneMaker
 
 import coneflat
 from coneflat.apps.transfer import transfer
@@ -106,22 +106,22 @@ def mean_difference(path):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A folder with a textured torus, and the same with new UVs."""
-    here = tmp_path_factory.mktemp("torus")
-    (here / "old.glb").write_bytes(model(torus))
-    coneflat.flatten(str(here / "old.glb")).save(here / "new.glb")
-    return here
+    folder_path = tmp_path_factory.mktemp("torus")
+    (folder_path / "old.glb").write_bytes(model(torus))
+    coneflat.flatten(str(folder_path / "old.glb")).save(folder_path / "new.glb")
+    return folder_path
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 def test_colours_of_ten_models_arrive(name, tmp_path):
-    old, new, out = (tmp_path / f"{stem}.glb" for stem in ("old", "new", "out"))
+    old, target, out = (tmp_path / f"{stem}.glb" for stem in ("old", "new", "out"))
     old.write_bytes(model(MODELS[name]))
-    coneflat.flatten(str(old), repair=True).save(new)
-    transfer(old, new, resolution=512).save(out)
+    coneflat.flatten(str(old), repair=True).save(target)
+    transfer(old, target, resolution=512).save(out)
     # Rounding gives half a step of 8 bits; texels of the thin knot are read at their centre here.
     assert mean_difference(out) < 3.0
-    assert mean_difference(new) > 10.0
+    assert mean_difference(target) > 10.0
 
 
 @pytest.mark.slow
@@ -283,9 +283,9 @@ def test_nearest_triangles_are_those_of_all_pairs():
     vertices, faces = rng.normal(size=(60, 3)), rng.integers(0, 60, (200, 3))
     points = rng.normal(size=(50, 3))
     on, weights = TriangleTree(vertices, faces).nearest(points)
-    found = np.linalg.norm(np.einsum("qi,qix->qx", weights, vertices[faces[on]]) - points, axis=1)
-    each = [TriangleTree(vertices, face[None]).nearest(points)[1] @ vertices[face] for face in faces]
-    assert np.allclose(found, np.linalg.norm(np.array(each) - points, axis=2).min(axis=0), atol=1e-12)
+    distances = np.linalg.norm(np.einsum("qi,qix->qx", weights, vertices[faces[on]]) - points, axis=1)
+    nearest = [TriangleTree(vertices, face[None]).nearest(points)[1] @ vertices[face] for face in faces]
+    assert np.allclose(distances, np.linalg.norm(np.array(nearest) - points, axis=2).min(axis=0), atol=1e-12)
 
 
 @pytest.mark.slow

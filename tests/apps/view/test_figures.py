@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapes
 from command import command
-from drawing import groups, pixels
+from figure_contents import groups, pixels
 
 import coneflat
 from coneflat.errors import OptionError
@@ -61,11 +61,11 @@ class TestFigures:
             coneflat.save_figure(coneflat.make_figure(result, "cones", dpi=50), tmp_path / f"{name}.{ending}")
             for name in ("one", "two")
         ]
-        one, two = (path.read_bytes() for path in paths)
-        assert one == two
+        first, second = (path.read_bytes() for path in paths)
+        assert first == second
         start = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}[ending.lower()]
-        assert one.startswith(start)
-        assert b"/Type3" not in one
+        assert first.startswith(start)
+        assert b"/Type3" not in first
         assert sorted(path.name for path in tmp_path.iterdir()) == sorted(path.name for path in paths)
 
     @pytest.mark.parametrize(
@@ -114,8 +114,8 @@ class TestCommand:
     def test_figure_of_a_mesh(self, run, tmp_path, kind):
         vertices = coneflat.read_mesh(tmp_path / "ball.obj").vertices
         np.save(tmp_path / "x.npy", vertices[:, 0])
-        own = ["--color", "x.npy"] if kind == "color" else []
-        code, out, _ = run("ball.obj", "--kind", kind, "--dpi", "50", *own)
+        color = ["--color", "x.npy"] if kind == "color" else []
+        code, out, _ = run("ball.obj", "--kind", kind, "--dpi", "50", *color)
         assert code == 0
         assert re.fullmatch(rf"wrote ball_{kind}\.png\ntime .*, draw \S+, other \S+\n", out)
         assert (tmp_path / f"ball_{kind}.png").stat().st_size > 2000

@@ -38,22 +38,24 @@ def ball(tmp_path):
 class TestQuantity:
     def test_a_property_follows_its_vertices(self, ball):
         result = coneflat.flatten(ball)
-        own = own_quantity(result, "heat")
-        used = np.unique(result.faces)
-        np.testing.assert_array_equal(own.values[used], result.vertices[used, 2])
-        assert own.label == "heat"
-        assert own.scale.high < 2  # Vertices of no face do not count.
+        quantity = own_quantity(result, "heat")
+        vertices_of_faces = np.unique(result.faces)
+        np.testing.assert_array_equal(
+            quantity.values[vertices_of_faces], result.vertices[vertices_of_faces, 2]
+        )
+        assert quantity.label == "heat"
+        assert quantity.scale.high < 2  # Vertices of no face do not count.
         # Both signs: the middle of the scale is 0.
-        assert own.scale.low == -own.scale.high
+        assert quantity.scale.low == -quantity.scale.high
 
     def test_arrays_of_files(self, ball, tmp_path):
         result = coneflat.flatten(ball)
         middles = result.vertices[result.faces].mean(axis=1)
         np.save(tmp_path / "f.npy", middles[:, 0] ** 2)
         np.savez(tmp_path / "m.npz", one=np.arange(len(result.vertices)))
-        own = own_quantity(result, str(tmp_path / "f.npy"))
-        assert own.corners is None
-        assert own.scale.low >= 0
+        quantity = own_quantity(result, str(tmp_path / "f.npy"))
+        assert quantity.corners is None
+        assert quantity.scale.low >= 0
         by_vertex = own_quantity(result, f"{tmp_path / 'm.npz'}:one")
         assert by_vertex.label == "one"
         np.testing.assert_array_equal(by_vertex.values, np.arange(len(result.vertices)))

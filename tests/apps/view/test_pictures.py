@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapes
-from drawing import BLACK, RED, SVG, axes_of, count_dots, enclosed, groups, polygons, shown_at
+from figure_contents import BLACK, RED, SVG, axes_of, count_dots, enclosed, groups, polygons, shown_at
 
 import coneflat
 
@@ -26,23 +26,23 @@ class TestLayout:
     def test_charts_are_polygons_of_the_right_area(self, tmp_path, pieces):
         vertices, faces = shapes.annulus()
         if pieces == 2:
-            other, more = shapes.sphere(2)
-            vertices, faces = shapes.join((vertices, faces), (other + 5, more))
+            ball_vertices, ball_faces = shapes.sphere(2)
+            vertices, faces = shapes.join((vertices, faces), (ball_vertices + 5, ball_faces))
         result = coneflat.flatten(vertices, faces, charts="atlas")
         path = coneflat.save_figure(coneflat.make_figure(result, "layout"), tmp_path / "layout.svg")
-        found = groups(path)
-        charts = [found[name] for name in found if name and name.startswith("chart-")]
+        groups_by_name = groups(path)
+        charts = [groups_by_name[name] for name in groups_by_name if name and name.startswith("chart-")]
         assert len(charts) == result.distortion.charts >= pieces
-        one, two = (result.corner_uv[:, k] - result.corner_uv[:, 0] for k in (1, 2))
-        area = np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]).sum() / 2
+        first_side, second_side = (result.corner_uv[:, k] - result.corner_uv[:, 0] for k in (1, 2))
+        area = np.abs(first_side[:, 0] * second_side[:, 1] - first_side[:, 1] * second_side[:, 0]).sum() / 2
         drawn = sum(abs(sum(enclosed(curve) for curve in polygons(chart))) for chart in charts)
         # The frame around is the unit square, with 2 in 104 of the width on either side.
         side = (4.5 - 2 * 0.0) * 72 / 1.04
         assert drawn / side**2 == pytest.approx(area, rel=1e-4)
         mesh = coneflat.TriangleMesh(result.uv, result.uv_faces)
-        lines = "".join(part.get("d") for part in found["edges"].iter(f"{SVG}path"))
+        lines = "".join(part.get("d") for part in groups_by_name["edges"].iter(f"{SVG}path"))
         assert lines.count("M") == np.count_nonzero(~mesh.is_boundary_edge)
-        assert count_dots(found.get("cones")) == len(layout.layout_cones(result)[0])
+        assert count_dots(groups_by_name.get("cones")) == len(layout.layout_cones(result)[0])
 
     def test_cones_are_red_and_black_at_their_points(self):
         tube = shapes.tube()
@@ -63,8 +63,8 @@ class TestQuality:
         layout.fill_layout(axes, result, shown, dpi=100)
         share = np.clip((result.distortion.qc - 1) / (shown.scale.high - 1), 0, 1)
         expected = 255 * np.asarray(colormaps["viridis_r"](share))[:, :3]
-        found = shown_at(axes, result.corner_uv.mean(axis=1))
-        close = np.abs(found - expected).max(axis=1) < 12
+        shades = shown_at(axes, result.corner_uv.mean(axis=1))
+        close = np.abs(shades - expected).max(axis=1) < 12
         # The rest is beside outlines and other triangles.
         assert close.mean() > 0.9
         assert np.ptp(expected, axis=0).max() > 100
@@ -82,18 +82,24 @@ class TestConesAndCurvature:
         for eye, hidden in (((1, 0, 0.2), False), ((-1, 0, 0.05), True)):
             axes = axes_of()
             draw_cones(tube, axes, eye=eye, up="z", dpi=100)
-            dots = {each.get_gid(): each for each in axes.collections if "cones" in each.get_gid()}
+            dots = {
+                collection.get_gid(): collection
+                for collection in axes.collections
+                if "cones" in collection.get_gid()
+            }
             assert list(dots) == ["hidden-cones" if hidden else "cones"]
-            (found,) = dots.values()
-            positive, negative = shown_at(axes, found.get_offsets())
+            (marks,) = dots.values()
+            positive, negative = shown_at(axes, marks.get_offsets())
             assert np.abs(positive - RED).max() > 60 if hidden else positive.tolist() == list(RED)
             assert np.abs(negative - BLACK).max() > 100 if hidden else negative.tolist() == list(BLACK)
-            lines = {each.get_gid() for each in axes.collections if "seams" in each.get_gid()}
+            lines = {
+                collection.get_gid() for collection in axes.collections if "seams" in collection.get_gid()
+            }
             assert lines == {"hidden-seams", "seams"}
             seams = {
-                each.get_gid(): len(each.get_segments())
-                for each in axes.collections
-                if "seams" in each.get_gid()
+                collection.get_gid(): len(collection.get_segments())
+                for collection in axes.collections
+                if "seams" in collection.get_gid()
             }
             assert (seams["seams"] < seams["hidden-seams"]) == hidden
 

@@ -16,12 +16,12 @@ SQUARE = np.array([[0, 1, 2], [0, 2, 3]])
 
 
 def test_the_nearer_triangle_hides_the_farther_one_in_either_order():
-    near, far = [[2, 2, 1], [18, 2, 1], [2, 18, 1]], [[0, 0, 5], [30, 0, 5], [0, 30, 5]]
-    for order in ([near, far], [far, near]):
+    front, behind = [[2, 2, 1], [18, 2, 1], [2, 18, 1]], [[0, 0, 5], [30, 0, 5], [0, 30, 5]]
+    for order in ([front, behind], [behind, front]):
         coverage = rasterise(np.concatenate(order), [[0, 1, 2], [3, 4, 5]], 32, 32)
-        assert coverage.face[5, 5] == order.index(near)
+        assert coverage.face[5, 5] == order.index(front)
         assert coverage.depth[5, 5] == pytest.approx(1.0)
-        assert coverage.face[1, 20] == order.index(far)
+        assert coverage.face[1, 20] == order.index(behind)
         assert coverage.face[31, 31] == -1
         assert np.isinf(coverage.depth[31, 31])
 
@@ -63,8 +63,8 @@ def test_the_camera_fits_the_model_and_keeps_it_upright(up):
 def test_the_sides_of_a_model(up):
     sides = {name: eye_direction(name, up) for name in ("front", "back", "left", "right", "top", "bottom")}
     assert sides["top"].tolist() == np.eye(3)["xyz".index(up)].tolist()
-    for one, other in (("front", "back"), ("left", "right"), ("top", "bottom")):
-        np.testing.assert_array_equal(sides[one], -sides[other])
+    for side, opposite in (("front", "back"), ("left", "right"), ("top", "bottom")):
+        np.testing.assert_array_equal(sides[side], -sides[opposite])
     # Seen from the front, the right side is to the right in the picture.
     camera = fit_camera(np.eye(3), (9, 9), "front", up)
     np.testing.assert_allclose(camera.axes, [sides["right"], sides["top"], sides["front"]], atol=1e-12)

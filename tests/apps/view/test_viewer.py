@@ -39,8 +39,8 @@ def unpack(page):
     (text,) = re.findall(r'<script type="text/plain" id="arrays">(.*?)</script>', page, re.DOTALL)
     head, block = json.loads(head), zlib.decompress(base64.b64decode(text))
     arrays = {
-        one["name"]: np.frombuffer(block, TYPES[one["type"]], one["count"], one["offset"])
-        for one in head["arrays"]
+        array["name"]: np.frombuffer(block, TYPES[array["type"]], array["count"], array["offset"])
+        for array in head["arrays"]
     }
     return head, arrays
 
@@ -148,27 +148,27 @@ def fine():
 class TestThinning:
     @pytest.mark.slow
     def test_simplification_keeps_almost_the_requested_number_of_triangles(self, fine):
-        whole = content_of(fine, 10**6)
-        assert whole.left_out == 0
-        for most in (12_000, 6_000):
-            thinned = content_of(fine, most)
-            assert most / 2 < len(thinned.faces) <= most
+        complete = content_of(fine, 10**6)
+        assert complete.left_out == 0
+        for limit in (12_000, 6_000):
+            thinned = content_of(fine, limit)
+            assert limit / 2 < len(thinned.faces) <= limit
             assert len(thinned.faces) + thinned.left_out == len(fine.faces)
 
     def test_the_layout_stays_covered_and_the_outline_as_it_was(self, fine):
-        whole, thinned = content_of(fine, 10**6), content_of(fine, 4000)
+        complete, thinned = content_of(fine, 10**6), content_of(fine, 4000)
 
         def covered(content):
             flat = np.column_stack([900 * content.uv, np.zeros(len(content.uv))])
             return rasterise(flat, content.faces, 900, 900).covered
 
-        np.testing.assert_array_equal(covered(whole), covered(thinned))
+        np.testing.assert_array_equal(covered(complete), covered(thinned))
 
         def outline(content):
             return content.uv[content.faces.ravel()[np.stack(end_corners(content.outline), axis=1)]]
 
-        np.testing.assert_array_equal(outline(whole), outline(thinned))
-        assert whole.seams == thinned.seams
+        np.testing.assert_array_equal(outline(complete), outline(thinned))
+        assert complete.seams == thinned.seams
 
     def test_a_number_of_triangles_that_cannot_be_reached_is_an_error(self, fine):
         with pytest.raises(

@@ -70,13 +70,13 @@ def test_both_views_are_drawn_and_everything_fits(browser, viewed_page, size, sc
 def test_the_browser_has_the_numbers_of_the_result(visit, viewed):
     content = content_of(viewed, 10**6)
     for name, values in (("qc", content.qc), ("area", content.area), ("flat", content.flat)):
-        there = np.array(visit.run(f"Array.from(coneflat.model.arrays.{name})"), dtype=float)
-        np.testing.assert_allclose(there, values, rtol=1e-6, atol=1e-9)
+        shown = np.array(visit.run(f"Array.from(coneflat.model.arrays.{name})"), dtype=float)
+        np.testing.assert_allclose(shown, values, rtol=1e-6, atol=1e-9)
     values = {"qc": content.qc, "area": content.area, "curvature": content.curvature}
     for name, scale in content.scales.items():
-        there = np.array(visit.run(f"Array.from(coneflat.model.tones('{name}'))"))
+        shown = np.array(visit.run(f"Array.from(coneflat.model.tones('{name}'))"))
         expected = np.nan_to_num(scale.position(values.get(name, content.flat)), nan=-1)
-        np.testing.assert_allclose(there, expected, atol=1e-5)
+        np.testing.assert_allclose(shown, expected, atol=1e-5)
 
 
 def test_report_help_and_theme(visit, viewed):
@@ -84,8 +84,8 @@ def test_report_help_and_theme(visit, viewed):
     visit.page.click("#report")
     assert "seam mismatch" in visit.page.inner_text("#table")
     assert 0.1 < visit.drawn_share("layout") < 0.95  # it has made room
-    box, whole = visit.box("layout"), visit.picture()
-    gap = whole[
+    box, picture = visit.box("layout"), visit.picture()
+    gap = picture[
         round(box["y"]) + 5 : round(box["y"] + box["height"]) - 5, round(box["x"]) - 6 : round(box["x"]) - 2
     ]
     assert np.ptp(gap.reshape(-1, 3), axis=0).max() == 0  # nothing is left of what was there
@@ -108,7 +108,7 @@ def test_everything_that_can_be_shown_looks_different(visit):
         assert visit.page.is_visible("#scale") == has_scale
         assert visit.page.is_visible("#file-label") == (show == "picture")
         seen.append(visit.picture("layout"))
-        assert not any(np.array_equal(seen[-1], other) for other in seen[:-1])
+        assert not any(np.array_equal(seen[-1], picture) for picture in seen[:-1])
     visit.page.select_option("#show", "qc")
     assert visit.page.locator("#scale-ticks span").count() == 3
     visit.page.mouse.move(*visit.at("layout", thing("triangle", 200))[0])
@@ -130,7 +130,7 @@ def test_a_picture_lies_upright(browser, viewed, tmp_path):
     visit.close()
 
 
-def near(visit, pane, x, y, reach=16):
+def is_marked(visit, pane, x, y, reach=16):
     """Whether the accent colour of marks is seen near a place."""
     box = visit.box(pane)
     picture = visit.picture(pane)
@@ -149,7 +149,7 @@ def test_pointing_finds_a_triangle_on_both_sides(visit, viewed):
         for pane in ("model", "layout"):
             (x, y), box = visit.at(pane, thing("triangle", index))[0], visit.box(pane)
             if 0 < x - box["x"] < box["width"] and 0 < y - box["y"] < box["height"]:
-                assert near(visit, pane, x, y)
+                assert is_marked(visit, pane, x, y)
     visit.page.mouse.move(5, 5)
     assert visit.state("hovered") is None
 
@@ -163,7 +163,7 @@ def test_a_click_keeps_a_cone_and_turns_the_model_to_it(visit, viewed):
         (x, y), box = visit.at("model", thing("cone", index))[0], visit.box("model")
         assert 0 < x - box["x"] < box["width"]
         assert 0 < y - box["y"] < box["height"]
-        assert near(visit, "model", x, y)
+        assert is_marked(visit, "model", x, y)
         assert f"{abs(viewed.curvatures[index]) / np.pi:.3f} π" in visit.page.inner_text("#facts")
     visit.page.keyboard.press("Escape")
     assert visit.state("picked") is None

@@ -15,7 +15,7 @@ from typing import Any
 from ... import __version__
 from ...io import atomic_write, checked_target
 from ...options import Options
-from ...quadmesh.options import QUADS, QuadOptions
+from ...quadmesh import QUADS, QuadOptions
 from ...textures import UnwrapOptions
 from ..controls import controls_of
 

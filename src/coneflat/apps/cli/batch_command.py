@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,6 +30,7 @@ from .flags import (
 
 if TYPE_CHECKING:
     from ..batch import BatchSummary
+    from .run import Console
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,15 +103,6 @@ def batch(
     table = flags.summary or flags.out / "summary.csv"
     rows: list[dict[str, Any]] = []
     with Console(verbosity) as console:
-
-        def report(row: dict[str, Any], done: int, count: int) -> None:
-            rows.append(row)
-            first, *details = _lines(row, console.verbose)
-            console.say(
-                [f"{done:>{len(str(count))}}/{count}  {printable(Path(row['mesh']).name)}  {first}", *details]
-            )
-            console.progress(f"{done} of {plural(count, 'mesh', 'meshes')}", done / count)
-
         console.say([f"flattening {plural(len(todo), 'mesh', 'meshes')} into {printable(flags.out)}"])
         console.progress("flatten", 0.0)
         outcome = run_batch(
@@ -121,7 +113,7 @@ def batch(
             dask=flags.dask,
             redo=flags.redo,
             summary=flags.summary,
-            listener=report,
+            listener=_listener(console, rows),
         )
         console.say(_outcome_lines(outcome, len(todo)))
         console.say(_slowest(rows, console.elapsed))
@@ -130,6 +122,20 @@ def batch(
         sys.exit(
             f"coneflat: error: {outcome.failed:,} of {len(todo):,} meshes failed, see {printable(table)}"
         )
+
+
+def _listener(console: Console, rows: list[dict[str, Any]]) -> Callable[[dict[str, Any], int, int], None]:
+    """Return a function that prints the row of each mesh when it is done, and appends it to rows."""
+
+    def report(row: dict[str, Any], done: int, count: int) -> None:
+        rows.append(row)
+        first, *details = _lines(row, console.verbose)
+        console.say(
+            [f"{done:>{len(str(count))}}/{count}  {printable(Path(row['mesh']).name)}  {first}", *details]
+        )
+        console.progress(f"{done} of {plural(count, 'mesh', 'meshes')}", done / count)
+
+    return report
 
 
 def _options(context: click.Context, params: dict[str, Any]) -> dict[str, Any]:

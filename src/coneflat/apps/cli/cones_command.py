@@ -65,17 +65,11 @@ def cones(
     """
     from ... import cone_curve, find_cones
     from ...io import check_target, read_joined
-    from ..view import check_figure, make_figure, new_figure, save_figure
+    from ..view import make_figure, save_figure
     from .run import Console
 
     flags, options = pop_flags(params, ConeFlags), keywords(params, FindOptions)
-    picture = None
-    if flags.curve:
-        new_figure(1, 1)  # A missing package is reported before the work starts.
-        picture = check_figure(flags.picture or Path(f"{mesh.stem}_cones.png"))
-    for name in () if flags.curve else ("picture", "most"):
-        if is_given(context, name):
-            raise click.UsageError(f"--{name} has no effect without --curve: add --curve", context)
+    picture = _checked_picture(context, flags, mesh)
     if flags.output is not None:
         check_target(flags.output)
     with Console(verbosity) as console:
@@ -103,6 +97,19 @@ def cones(
         if flags.output is not None:
             _write_cones(found_cones, flags.output)
         console.finish([path for path in (picture, flags.output) if path is not None])
+
+
+def _checked_picture(context: click.Context, flags: ConeFlags, mesh: Path) -> Path | None:
+    """Return the file for the picture of the curve, if it is requested; errors are reported before the work starts."""
+    from ..view import check_figure, new_figure
+
+    if flags.curve:
+        new_figure(1, 1)
+        return check_figure(flags.picture or Path(f"{mesh.stem}_cones.png"))
+    for name in ("picture", "most"):
+        if is_given(context, name):
+            raise click.UsageError(f"--{name} has no effect without --curve: add --curve", context)
+    return None
 
 
 def _write_cones(cones: FoundCones, path: Path) -> None:

@@ -33,7 +33,7 @@ from ...options import (
     read_vertices_or_pairs,
     read_word_or_vertex_map,
 )
-from ...quadmesh.options import Sizes
+from ...quadmesh import Sizes
 
 if TYPE_CHECKING:
     from ...measures import Requirement

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...options import ConeBounds, ConeNumber, declarations, read_options
-from ...quadmesh.options import QuadOptions
+from ...quadmesh import QuadOptions
 from .flags import (
     GroupedCommand,
     input_options,
@@ -24,6 +24,7 @@ from .flags import (
 
 if TYPE_CHECKING:
     from ... import IntegerGrid, QuadMesh
+    from ...io import Joined
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,14 +72,11 @@ def quads(
     from ... import integer_grid, measure_quads
     from ... import quads as find_quads
     from ...io import read_joined
-    from ...quadmesh.files import quads_left_out, read_grid
+    from ...quadmesh import read_grid
     from .run import Console, require_distinct, write_report
 
     _check_combinations(context, mesh)
-    flags, options = pop_flags(params, QuadFlags), keywords(params, QuadOptions)
-    read_options(options, QuadOptions)
-    if "quads" in options and isinstance(options.get("size"), float):
-        raise click.UsageError("--quads (--faces) and a length as --size exclude each other: leave out one")
+    flags, options = pop_flags(params, QuadFlags), _options(params)
     if flags.output is None and flags.grid is None and flags.view is None:
         flags = replace(flags, output=Path(f"{mesh.stem}_quads.obj"))
     files = _checked_files(flags)
@@ -100,10 +98,7 @@ def quads(
         console.seconds.update(done.seconds)
         with console.stage("write"):
             _write(flags, grid_map, quad_mesh, mesh.name)
-        notes = list(done.notes if joined is None else joined.all_notes(done.notes))
-        endings = [path.suffix.lower() for path in (flags.output, flags.grid) if path is not None]
-        for ending in dict.fromkeys(endings):
-            notes += quads_left_out(None if joined is None else joined.mesh, ending)
+        notes = [*(done.notes if joined is None else joined.all_notes(done.notes)), *_left_out(flags, joined)]
         if flags.report is not None:
             measured = {} if measures is None else measures.report()
             run = {"grid": {"size": grid_map.size}, "seconds": dict(console.seconds), "notes": notes}
@@ -114,10 +109,19 @@ def quads(
         console.table([square, *(() if measures is None else measures.rows())])
 
 
+def _options(params: dict[str, Any]) -> dict[str, Any]:
+    """Return the checked options of the quads."""
+    options = keywords(params, QuadOptions)
+    read_options(options, QuadOptions)
+    if "quads" in options and isinstance(options.get("size"), float):
+        raise click.UsageError("--quads (--faces) and a length as --size exclude each other: leave out one")
+    return options
+
+
 def _checked_files(flags: QuadFlags) -> dict[str, Path | None]:
     """Return the files to write by role; errors that writing would raise are reported before the work starts."""
     from ...io import check_target
-    from ...quadmesh.files import check_grid_output, check_quads_output
+    from ...quadmesh import check_grid_output, check_quads_output
     from ..view import check_page
 
     files = {"output": flags.output, "grid": flags.grid, "view": flags.view, "report": flags.report}
@@ -138,6 +142,15 @@ def _write(flags: QuadFlags, grid_map: IntegerGrid, quad_mesh: QuadMesh | None, 
         quad_mesh.save(flags.output)
     if quad_mesh is not None and flags.view is not None:
         write_page(page_of_quads(quad_mesh, name=name), flags.view)
+
+
+def _left_out(flags: QuadFlags, joined: Joined | None) -> list[str]:
+    """Return the notes on data of a mesh file that the written files do not keep."""
+    from ...quadmesh import quads_left_out
+
+    endings = [path.suffix.lower() for path in (flags.output, flags.grid) if path is not None]
+    source = None if joined is None else joined.mesh
+    return [note for ending in dict.fromkeys(endings) for note in quads_left_out(source, ending)]
 
 
 def _check_combinations(context: click.Context, mesh: Path) -> None:

@@ -77,7 +77,7 @@ def view(
     """
     from ... import flatten, unwrap
     from ...io import read_picture
-    from ...quadmesh.files import holds_quads, read_quads
+    from ...quadmesh import holds_quads, read_quads
     from ..view import check_page, open_page, own_quantity, page_html, page_of_quads, write_page
     from .run import Console, archive_path, open_result
 

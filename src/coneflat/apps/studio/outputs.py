@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import lru_cache
 from io import BytesIO
 from types import SimpleNamespace
@@ -15,14 +16,12 @@ import numpy as np
 from ... import ConeflatError, Flattening, MeshFile, TriangleMesh, check_mesh
 from ...base import MAX_CONES, FloatArray
 from ...errors import MeshError, StudioError
-from ...io import Joined, Texture, as_input, encode_png
+from ...io import Joined, Texture, as_input, encode_png, write_stream
 from ...mesh import REPAIR_ADVICE, CheckedMesh, end_corners
 from ..transfer.materials import BASE, Painted
 from ..view import outline_halfedges
 from .choices import DECLARED, Choices
 
-#: File formats of results: .json is the report, .svg and .png are pictures of the layout.
-EXPORTS = (".obj", ".ply", ".glb", ".npz", ".svg", ".png", ".json")
 #: File formats of quads.
 QUADS = (".obj", ".ply", ".glb")
 MAX_QUADS = 1_000_000
@@ -36,27 +35,38 @@ Progress = Callable[[str, float], None]
 
 
 def result_file(result: Flattening | None, ending: str) -> bytes:
-    """Return the content of a file of a result; ending: one of `EXPORTS`.
+    """Return the content of a file of a result; ending: one of `RESULT_FILES`.
 
     Raises:
         StudioError: there is no result.
     """
     if result is None:
         raise StudioError("there is nothing to save: the last change could not be flattened")
-    if ending == ".json":
-        return (json.dumps(result.report(), indent=2) + "\n").encode("utf-8")
-    if ending == ".svg":
-        return layout_svg(result).encode("utf-8")
+    return RESULT_FILES[ending].content(result, ending)
+
+
+def _mesh_file(result: Flattening, ending: str) -> bytes:
+    """Return the content of a mesh file with the UVs."""
     stream = BytesIO()
-    if ending == ".png":
-        from ..view import make_figure, write_figure
-
-        write_figure(make_figure(result, "layout"), stream, ending)
-    else:
-        from ...io import write_stream
-
-        write_stream(result, stream, ending)
+    write_stream(result, stream, ending)
     return stream.getvalue()
+
+
+def _layout_picture(result: Flattening, ending: str) -> bytes:
+    """Return a picture of the layout."""
+    from ..view import make_figure, write_figure
+
+    stream = BytesIO()
+    write_figure(make_figure(result, "layout"), stream, ending)
+    return stream.getvalue()
+
+
+def _layout_svg(result: Flattening, _: str) -> bytes:
+    return layout_svg(result).encode("utf-8")
+
+
+def _report(result: Flattening, _: str) -> bytes:
+    return (json.dumps(result.report(), indent=2) + "\n").encode("utf-8")
 
 
 def quads_file(source: Joined, choices: Choices, count: int, ending: str, report: Progress) -> bytes:
@@ -73,7 +83,7 @@ def quads_file(source: Joined, choices: Choices, count: int, ending: str, report
         report: called like `progress` of `coneflat.flatten`.
     """
     from ... import quads
-    from ...quadmesh.files import write_quads_stream
+    from ...quadmesh import write_quads_stream
 
     words = choices.with_search().keywords()
     options = {name: words[name] for name in QUAD_OPTIONS if name in words}
@@ -138,6 +148,34 @@ def layout_svg(result: Flattening) -> str:
             "</svg>\n",
         )
     )
+
+
+@dataclass(frozen=True)
+class ResultFile:
+    """A file of the result that the user can save.
+
+    Attributes:
+        label, title: text of its button on the page, and the tooltip.
+        stem: added to the name of the mesh in the name of the file.
+        content: returns the content of the file of a result with an ending.
+    """
+
+    label: str
+    title: str
+    stem: str
+    content: Callable[[Flattening, str], bytes]
+
+
+#: The files of a result by their ending, in the order of their buttons.
+RESULT_FILES = {
+    **{
+        f".{e}": ResultFile(e.upper(), f"Save as .{e}", "uv", _mesh_file)
+        for e in ("obj", "ply", "glb", "npz")
+    },
+    ".svg": ResultFile("SVG", "Save as .svg", "uv", _layout_svg),
+    ".png": ResultFile("Picture", "Save the layout as a picture, .png", "layout", _layout_picture),
+    ".json": ResultFile("Report", "Save the report, .json", "report", _report),
+}
 
 
 @lru_cache(maxsize=1)

@@ -8,7 +8,7 @@ import mimetypes
 import secrets
 import socket
 import struct
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -94,22 +94,48 @@ def studio_app(session: Session, token: str, port: int, **access: bool) -> ASGIA
         port: port of the server; requests with another one are rejected.
         access: `framed` and `proxied`, as in `Guard`.
     """
-    notifier = Notifier()
-    session.listen(notifier.notify)
+    routes = Routes(session)
+    app = Starlette(
+        routes=[
+            Route("/", routes.page),
+            Route("/state", routes.state),
+            Route("/layout", routes.layout),
+            Route("/act", routes.act, methods=["POST"]),
+            Route("/export/{ending}", routes.export, methods=["POST"]),
+            Route("/quads/{ending}", routes.quads, methods=["POST"]),
+            Route("/curve", routes.curve, methods=["POST"]),
+            Route("/mesh", routes.upload, methods=["POST"]),
+            Route("/sample", routes.sample, methods=["POST"]),
+        ],
+        exception_handlers=dict.fromkeys(REFUSED, _refused),
+    )
+    return Guard(app, token, port, **access)
 
-    async def page(request: Request) -> Response:
+
+class Routes:
+    """The answers to the requests of a page, from a session; what takes long runs in a thread."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._notifier = Notifier()
+        session.listen(self._notifier.notify)
+
+    async def page(self, request: Request) -> Response:
+        """Answer with the page."""
         return HTMLResponse(studio_page(INPUT_FORMATS))
 
-    async def state(request: Request) -> Response:
+    async def state(self, request: Request) -> Response:
+        """Answer with the state of the session, as soon as it is newer than that of the page."""
         after = _number(request, "after")
         if isinstance(after, int):
-            await notifier.wait_for_change(session, after, 20.0)  # Seconds.
+            await self._notifier.wait_for_change(self._session, after, 20.0)  # Seconds.
         received = _number(request, "chosen")
-        return JSONResponse(await run_sync(session.state, received if isinstance(received, int) else 0))
+        return JSONResponse(await run_sync(self._session.state, received if isinstance(received, int) else 0))
 
-    async def layout(request: Request) -> Response:
+    async def layout(self, request: Request) -> Response:
+        """Answer with the page data of the layout: the length of the head, the head as JSON, and arrays."""
         received = _number(request, "known")
-        shown = await run_sync(session.picture, received if isinstance(received, int) else 0)
+        shown = await run_sync(self._session.picture, received if isinstance(received, int) else 0)
         if shown is None:
             raise StudioError("there is no layout yet")
         head = json.dumps(shown[0]).encode("ascii")
@@ -117,57 +143,59 @@ def studio_app(session: Session, token: str, port: int, **access: bool) -> ASGIA
         content = struct.pack("<I", len(head)) + head + shown[1]
         return Response(content, media_type=BYTES)
 
-    async def act(request: Request) -> Response:
+    async def act(self, request: Request) -> Response:
+        """Perform an action of the user."""
         action = json.loads(b"".join([part async for part in _parts(request, MAX_REQUEST_BYTES)]))
         if not isinstance(action, dict):
             raise StudioError("an action must be a JSON object")
-        await run_sync(session.act, action)
-        return JSONResponse({"version": session.version})
+        return await self._changed(self._session.act, action)
 
-    async def output(request: Request) -> Response:
-        ending = f".{request.path_params['ending']}"
-        if request.url.path.startswith("/quads"):
-            content = await run_sync(session.quads, ending, _number(request, "count"))
-        else:
-            content = await run_sync(session.export, ending)
-        return Response(content, media_type=mimetypes.MimeTypes(()).guess_type(f"it{ending}")[0] or BYTES)
+    async def export(self, request: Request) -> Response:
+        """Answer with a file of the result."""
+        ending = _ending(request)
+        return _file(await run_sync(self._session.export, ending), ending)
 
-    async def curve(request: Request) -> Response:
-        return JSONResponse(await run_sync(session.curve))
+    async def quads(self, request: Request) -> Response:
+        """Answer with a file of quads."""
+        ending = _ending(request)
+        return _file(await run_sync(self._session.quads, ending, _number(request, "count")), ending)
 
-    async def upload(request: Request) -> Response:
-        requested = file_within(request.query_params.get("name", ""), session.folder)
-        path = file_within(safe_name(requested.name), session.folder)
+    async def curve(self, request: Request) -> Response:
+        """Answer with the distortion for each number of cones."""
+        return JSONResponse(await run_sync(self._session.curve))
+
+    async def upload(self, request: Request) -> Response:
+        """Store the mesh or the project of a request, and open it."""
+        folder = self._session.folder
+        requested = file_within(request.query_params.get("name", ""), folder)
+        path = file_within(safe_name(requested.name), folder)
         if path.suffix.lower() not in (*INPUT_FORMATS, ".json"):
             raise StudioError(f"{path.name} is not in a format that can be read: {', '.join(INPUT_FORMATS)}")
-        before = set(session.folder.glob("*"))  # none if the folder is gone
+        before = set(folder.glob("*"))  # none if the folder is gone
         stored = await _store(request, path)
         try:
-            await run_sync(session.open_named, stored.name)
+            return await self._changed(self._session.open_named, stored.name)
         except ConeflatError:
             for uploaded in {stored} - before:
                 uploaded.unlink(missing_ok=True)
             raise
-        return JSONResponse({"version": session.version})
 
-    async def sample(request: Request) -> Response:
-        await run_sync(session.open, sample_path())
-        return JSONResponse({"version": session.version})
+    async def sample(self, request: Request) -> Response:
+        """Open the sample mesh."""
+        return await self._changed(self._session.open, sample_path())
 
-    app = Starlette(
-        routes=[
-            Route("/", page),
-            Route("/state", state),
-            Route("/layout", layout),
-            Route("/act", act, methods=["POST"]),
-            *(Route(f"/{kind}/{{ending}}", output, methods=["POST"]) for kind in ("export", "quads")),
-            Route("/curve", curve, methods=["POST"]),
-            Route("/mesh", upload, methods=["POST"]),
-            Route("/sample", sample, methods=["POST"]),
-        ],
-        exception_handlers=dict.fromkeys(REFUSED, _refused),
-    )
-    return Guard(app, token, port, **access)
+    async def _changed(self, change: Callable[..., None], argument: object) -> Response:
+        """Change the session, and answer with its version."""
+        await run_sync(change, argument)
+        return JSONResponse({"version": self._session.version})
+
+
+def _ending(request: Request) -> str:
+    return f".{request.path_params['ending']}"
+
+
+def _file(content: bytes, ending: str) -> Response:
+    return Response(content, media_type=mimetypes.MimeTypes(()).guess_type(f"it{ending}")[0] or BYTES)
 
 
 def _number(request: Request, name: str) -> int | str:

@@ -16,7 +16,7 @@ from ...io import read_joined
 from ...options import as_integer
 from .choices import Choices
 from .messages import command_line, misplaced_warning, python_lines
-from .outputs import EXPORTS, MAX_QUADS, QUADS, curve_options
+from .outputs import MAX_QUADS, QUADS, RESULT_FILES, curve_options
 from .project import Project, file_within, open_project
 from .steps import STEPS, History
 from .worker import Head, SentPictures, Worker
@@ -264,8 +264,8 @@ class Session:
         Raises:
             StudioError: there is no result, or the format is unknown.
         """
-        if ending not in EXPORTS:
-            raise StudioError(f"unknown format {short_repr(ending)}: choose from {', '.join(EXPORTS)}")
+        if ending not in RESULT_FILES:
+            raise StudioError(f"unknown format {short_repr(ending)}: choose from {', '.join(RESULT_FILES)}")
         return self._request({"do": "export", "ending": ending})[1]
 
     def quads(self, ending: str, count: object) -> bytes:

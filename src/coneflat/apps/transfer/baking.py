@@ -17,8 +17,7 @@ from scipy.ndimage import distance_transform_edt
 from ... import MeshFile, io
 from ...base import BAKED_RESOLUTION, FloatArray, IntArray, Unmet, check_cancelled, unit_exponent, warns
 from ...errors import NonFiniteError, OptionError
-from ...geometry import fill_nearest, signed_double_areas, unit_vectors
-from ...geometry.nearest import TriangleTree
+from ...geometry import TriangleTree, fill_nearest, signed_double_areas, unit_vectors
 from ...io import UVMesh, as_bytes, as_path, to_srgb
 from ...options import Number
 from ..view import Barycentrics, uv_flattening
@@ -29,7 +28,7 @@ TEXELS_AT_ONCE = 2**18
 #: Largest side of a texture: that of most graphics cards.
 MAX_RESOLUTION = 16384
 #: Distance of the models, as a fraction of the diagonal, from which on a note reports it: above the error of 32 bits.
-FAR = 0.01
+NOTED_DISTANCE = 0.01
 ENDINGS = (".glb", ".png")
 #: Attributes and extensions of primitives that the material replaces: vertex colours are in the image; tangents may be
 #: those of other UVs, and viewers compute them; compressed copies contain both.
@@ -134,7 +133,7 @@ def transfer(
         notes.append(
             Unmet(f"UVs overlap: {twice:,} texels are in several triangles, and show the first of them.")
         )
-    if farthest > FAR:
+    if farthest > NOTED_DISTANCE:
         notes.append(
             Unmet(f"The models differ: points are up to {farthest:.1%} of the size from the old surface.")
         )

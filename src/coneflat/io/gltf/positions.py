@@ -14,7 +14,7 @@ from ...errors import MeshFileError
 MIN_SIZE, MAX_SIZE = 1e-15, 1e18
 #: Distance from the origin, in sizes of the model, from which positions are relative to a node: 32-bit numbers have 24
 #: binary digits, of which at most two are lost below it.
-FAR = 4.0
+MAX_DISTANCE = 4.0
 #: Binary digits of 32-bit numbers.
 DIGITS = 24
 
@@ -58,7 +58,7 @@ def local_positions(vertices: FloatArray) -> LocalPositions:
             f"{MIN_SIZE:.0e} to {MAX_SIZE:.0e}: scale the mesh, or write .ply"
         )
     rounded = vertices.astype(np.float32)
-    if largest <= FAR * size or np.array_equal(rounded, vertices):
+    if largest <= MAX_DISTANCE * size or np.array_equal(rounded, vertices):
         return LocalPositions(rounded, np.zeros(3))
     exponent = np.frexp(np.maximum(high - low, MIN_SIZE))[1]
     translation = np.ldexp(np.rint(np.ldexp((low + high) / 2, -exponent)), exponent)

@@ -51,7 +51,7 @@ MATERIAL: Item = {
 DEFAULT_MATERIAL: Item = {"name": "default"}
 UV, COLOUR = "TEXCOORD_0", "COLOR_0"
 #: Keys of an accessor that are copied to the accessor of a subset of its elements.
-_KEPT = ("componentType", "type", "normalized", "name", "extras")
+_COPIED_FIELDS = ("componentType", "type", "normalized", "name", "extras")
 
 
 class Glb:
@@ -393,7 +393,7 @@ def _gathered(glb: Glb, data: GltfData, index: int, elements: IntArray, has_boun
     """Add an array with some elements of another one, and return its index."""
     old = data.item("accessors", index)
     rows = np.take(data.raw(index), elements, axis=0)
-    form: Item = {key: old[key] for key in _KEPT if key in old}
+    form: Item = {key: old[key] for key in _COPIED_FIELDS if key in old}
     if has_bounds:
         form |= bounds(rows.view(data.accessor(index).kind))
     return glb.add_array(rows, form, FOR_VERTICES)

@@ -10,6 +10,7 @@ from importlib.resources import files
 from ...controls import control_of
 from ...view import page_around
 from ..choices import DECLARED, FURTHER_OPTIONS, PLAIN_OPTIONS
+from ..outputs import RESULT_FILES
 
 #: Content security policy: only connections to the server of the page are allowed.
 POLICY = (
@@ -31,7 +32,14 @@ def studio_page(formats: Sequence[str]) -> str:
         {**control_of(DECLARED[name]), "label": label, "use": uses.get(DECLARED[name].group, "")}
         for name, label in FURTHER_OPTIONS.items()
     ]
-    constants = f"const DEFAULTS = {json.dumps(defaults)}, FURTHER_OPTIONS = {json.dumps(further)};"
+    files = [
+        {"ending": ending[1:], "label": file.label, "title": file.title, "stem": file.stem}
+        for ending, file in RESULT_FILES.items()
+    ]
+    constants = "".join(
+        f"const {name} = {json.dumps(value)};"
+        for name, value in (("DEFAULTS", defaults), ("FURTHER_OPTIONS", further), ("RESULT_FILES", files))
+    )
     scripts = [constants, *(_read(f"{name}.js") for name in _SCRIPTS)]
     return page_around(
         POLICY,

@@ -21,9 +21,7 @@ class Panel {
       ...BRUSHES.map(([key, name, letter]) => button(name, `${name} (${letter})`, () => this.studio.setTool(key), {className: `toggle brush ${key} ${useOf(key)}`, id: `tool-${key}`})),
     );
     this.part("exports").append(
-      ...["obj", "ply", "glb", "npz", "svg"].map((ending) => button(ending.toUpperCase(), `Save as .${ending}`, () => this.studio.save(ending), {id: `save-${ending}`})),
-      button("Picture", "Save the layout as a picture, .png", () => this.studio.save("png"), {id: "save-png"}),
-      button("Report", "Save the report, .json", () => this.studio.save("json"), {id: "save-json"}),
+      ...RESULT_FILES.map(({ending, label, title}) => button(label, title, () => this.studio.save(ending), {id: `save-${ending}`})),
     );
     this.part("more").append(...FURTHER_OPTIONS.map((control) => this.further(control)));
     for (const id of ["unit", "shown-in"]) this.part(id).replaceChildren(...UNITS.map(([key, name]) => new Option(key || id === "unit" ? name : "unit of the file", key)));

@@ -208,8 +208,8 @@ class Studio {
   }
 
   async save(ending) {
-    const name = {json: "report", png: "layout"}[ending] ?? "uv";
-    await this.server.save(`export/${ending}`, `${this.stem}_${name}.${ending}`).catch((error) => this.refuse(error));
+    const {stem} = RESULT_FILES.find((file) => file.ending === ending);
+    await this.server.save(`export/${ending}`, `${this.stem}_${stem}.${ending}`).catch((error) => this.refuse(error));
   }
 
   /** Compute quads of the mesh, approximately the chosen number, and download them. */
