@@ -17,7 +17,7 @@ from .charts import Outlines
 
 # Columns of the grid per square root of the number of charts, and the maximum number of cells of all tiles: at first,
 # and where gaps between the charts need more.
-COLUMNS_PER_CHART, MAX_CELLS, MOST_CELLS = 24.0, 4_000_000, 16_000_000
+COLUMNS_PER_CHART, MAX_CELLS, MAX_CELLS_WITH_GAPS = 24.0, 4_000_000, 16_000_000
 # The work after which the search ends, in comparisons of runs of cells: about a second.
 MAX_WORK = 40_000_000
 # Up to OFFSET_CHARTS charts, a chart may be forced to the right, which happens in this fraction of the tries. With more
@@ -203,6 +203,60 @@ class _Placed(NamedTuple):
     place: IntArray
 
 
+@dataclass(frozen=True, eq=False)
+class _Grid:
+    """Shapes of k charts on a grid, to be placed in tiles of a varying width.
+
+    Attributes:
+        masks: the shapes.
+        extent: (k, t) extents of the rotated charts, as complex numbers; infinite for angles that are not allowed.
+        group: (k,) group of each chart, see `place_all`.
+        gap: minimum distance between charts, relative to the width.
+        tiles: number of tiles.
+        columns: width to begin with.
+        widest: largest width.
+        narrowest: width that the longest chart needs.
+    """
+
+    masks: Masks
+    extent: NDArray[np.complex128]
+    group: IntArray
+    gap: float
+    tiles: int
+    columns: int
+    widest: int
+    narrowest: int
+
+    def place(self, plan: Plan, width: int, limit: int) -> _Placed:
+        """Return the charts placed by a plan in tiles of a width, with at most `limit` rows."""
+        reach = _reach(self.gap * width)
+        return _Placed(plan, *place_all(plan, self.group, self.masks, reach, self.tiles, width, limit))
+
+    def first_placed(self, plan: Plan) -> tuple[_Placed, int]:
+        """Return the charts placed by a plan in the narrowest square tiles that it fits, and their width.
+
+        Raises:
+            OptionError: it fits none.
+        """
+        width, failures = self.columns, 0
+        while (placed := self.place(plan, width, width)).height > width:
+            failures += 1
+            width += width // (12 if failures < MANY_FAILURES else 4) + 1
+            if width > self.widest:
+                raise _no_space(self.gap, len(plan.order))
+        return placed, width
+
+    def packing(self, placed: _Placed, width: int) -> Packing:
+        """Return placed charts as a packing; the tile is cropped to the charts, not to the cells."""
+        masks, chosen = self.masks, placed.chosen
+        tile, column, row = placed.place.T
+        shift = (column + 1j * row) * masks.cell - masks.low[chosen]
+        low, high = masks.low[chosen] + shift, masks.low[chosen] + self.extent.ravel()[chosen] + shift
+        corner = complex(low.real.min(), low.imag.min())
+        side = max(high.real.max() - corner.real, high.imag.max() - corner.imag)
+        return Packing(min(side, width * masks.cell), masks.angle[chosen], shift - corner, tile)
+
+
 def pack(
     outlines: Outlines,
     area: float,
@@ -234,49 +288,72 @@ def pack(
     Raises:
         OptionError: the gap is too wide for this number of charts.
     """
-    rng = np.random.default_rng(0)
-    columns = int(max(effort.columns, COLUMNS_PER_CHART * (len(outlines) / tiles) ** 0.5))
+    grid = _grid_of(outlines, area, angles, allowed, gap, tiles, effort.columns)
+    boxes = (grid.extent.real + grid.extent.imag).min(axis=1)
+    plan = Plan(np.argsort(-boxes, kind="stable"), allowed.ravel(), np.zeros(len(outlines)))
+    placed, width = grid.first_placed(plan)
+    return grid.packing(*_improved(grid, placed, width, effort))
+
+
+def _grid_of(
+    outlines: Outlines,
+    area: float,
+    angles: FloatArray,
+    allowed: BoolArray,
+    gap: float,
+    tiles: int,
+    min_columns: int,
+) -> _Grid:
+    """Return the shapes of charts on a grid; arguments as of `pack`, and the minimum number of columns.
+
+    Raises:
+        OptionError: the gap is too wide for this number of charts.
+    """
+    columns = int(max(min_columns, COLUMNS_PER_CHART * (len(outlines) / tiles) ** 0.5))
     columns = int(min(columns, (MAX_CELLS / tiles) ** 0.5))
     _, extent = rotated_boxes(outlines, angles)
     extent = np.where(allowed, extent, complex(np.inf, np.inf))
     longest = float(np.maximum(extent.real, extent.imag).min(axis=1).max())
     side = GRID_MARGIN * max((area / tiles) ** 0.5, longest) or 1.0
-    widest = min(4 * columns, int((1.5 * MOST_CELLS / tiles) ** 0.5))
+    widest = min(4 * columns, int((1.5 * MAX_CELLS_WITH_GAPS / tiles) ** 0.5))
+    group = np.arange(len(outlines))
     if len(outlines) > GROUPED_CHARTS:
         # Charts in rows, with gaps that are a fraction of the width: so many cells of the width are left to each.
         in_row = (len(outlines) / tiles) ** 0.5
-        cells = (MOST_CELLS / tiles) ** 0.5 * (1 / in_row - gap) - ROUNDED_CELLS
+        cells = (MAX_CELLS_WITH_GAPS / tiles) ** 0.5 * (1 / in_row - gap) - ROUNDED_CELLS
         size = float(np.sqrt(extent.real * extent.imag).min(axis=1).mean())
         columns = int(min(columns, max(cells, 0.0) * side / size if size > 0 else columns))
     if columns < 1:
         raise _no_space(gap, len(outlines))
+    if len(outlines) > GROUPED_CHARTS:
+        boxes = (extent.real + extent.imag).min(axis=1)
+        sizes = np.log(boxes + side / columns) // np.log(GROUP_RATIO)
+        group = np.unique(sizes, return_inverse=True)[1].ravel()
     masks = cover_charts(outlines, angles, side / columns)
-    box = (extent.real + extent.imag).min(axis=1)
-    order = np.argsort(-box, kind="stable")
-    group = np.arange(len(order))
-    if len(order) > GROUPED_CHARTS:
-        group = np.unique(np.log(box + side / columns) // np.log(GROUP_RATIO), return_inverse=True)[1].ravel()
-    start, width = Plan(order, allowed.ravel(), np.zeros(len(order))), columns
+    return _Grid(masks, extent, group, gap, tiles, columns, widest, int(longest / masks.cell) + 1)
 
-    def fill(plan: Plan, width: int, limit: int) -> _Placed:
-        return _Placed(plan, *place_all(plan, group, masks, _reach(gap * width), tiles, width, limit))
 
-    failures = 0
-    while (best := fill(start, width, width)).height > width:
-        failures += 1
-        width += width // (12 if failures < MANY_FAILURES else 4) + 1
-        if width > widest:
-            raise _no_space(gap, len(order))
-    last, min_width, step, work = best, int(longest / masks.cell) + 1, width // 16, 0
-    useful_width = int(min(effort.max_side / masks.cell, width)) + 1
+def _improved(grid: _Grid, placed: _Placed, width: int, effort: Effort) -> tuple[_Placed, int]:
+    """Return charts placed in narrower tiles by random changes of their plan, and the width of the tiles.
+
+    Args:
+        grid: the shapes of the charts.
+        placed, width: the charts as placed first, and the width of their tiles.
+        effort: what the search may cost.
+    """
+    rng, permitted = np.random.default_rng(0), placed.plan.allowed
+    best = last = placed
+    step, work = width // 16, 0
+    useful_width = int(min(effort.max_side / grid.masks.cell, width)) + 1
     for attempt in range(effort.tries):
-        goal = max(min(width - step, useful_width), min_width)
-        if goal >= width or work > MAX_WORK or (width > useful_width and attempt > effort.tries // 3):
+        goal = max(min(width - step, useful_width), grid.narrowest)
+        is_late = width > useful_width and attempt > effort.tries // 3
+        if goal >= width or work > MAX_WORK or is_late:
             break
         check_cancelled()
         limit = goal + goal // 4 if last is best else min(last.height, goal + goal // 4)
-        plan = best.plan if last is best else _changed(last.plan, start.allowed, rng)
-        candidate = fill(plan, goal, limit)
+        plan = best.plan if last is best else _changed(last.plan, permitted, rng)
+        candidate = grid.place(plan, goal, limit)
         work += candidate.work
         if candidate.height <= goal:
             best, last, width = candidate, candidate, goal
@@ -285,13 +362,7 @@ def pack(
             step //= 2
         elif last is best or candidate.height <= last.height:
             last = candidate
-    tile, column, row = best.place.T
-    shift = (column + 1j * row) * masks.cell - masks.low[best.chosen]
-    # The tile is cropped to the charts, not to the cells.
-    low, high = masks.low[best.chosen] + shift, masks.low[best.chosen] + extent.ravel()[best.chosen] + shift
-    corner = complex(low.real.min(), low.imag.min())
-    side = max(high.real.max() - corner.real, high.imag.max() - corner.imag)
-    return Packing(min(side, width * masks.cell), masks.angle[best.chosen], shift - corner, tile)
+    return best, width
 
 
 def _no_space(gap: float, count: int) -> OptionError:
