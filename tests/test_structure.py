@@ -26,9 +26,8 @@ from structure import (
 )
 
 NAMES = module_paths()
-#: Applications that set up the others, and packages whose modules applications may import.
+#: Applications that set up the others.
 FRONT = ("apps.warm_up", "apps.blender", "apps.cli", "apps.studio")
-SHARED = ("textures",)
 #: The most levels of the packages of the core.
 LEVELS = 10
 
@@ -69,9 +68,7 @@ def test_applications_import_what_packages_export(name: str):
     module = read_modules()[name]
     imported = module.imports | module.late_imports
     assert {
-        module_name
-        for module_name in imported
-        if is_core(module_name) and module_name.count(".") > 0 and not module_name.startswith(SHARED)
+        module_name for module_name in imported if is_core(module_name) and module_name.count(".") > 0
     } == set()
     if not name.startswith("apps.view"):
         assert {module_name for module_name in imported if module_name.startswith("apps.view.")} == set()
