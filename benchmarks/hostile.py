@@ -1,4 +1,4 @@
-"""Trial with hostile input: `python benchmarks/hostile.py --cases 10000 --jobs 2` runs 10,000 cases from seeds.
+"""Fuzzing with hostile input: `python benchmarks/hostile.py --cases 10000 --jobs 2` runs 10,000 cases from seeds.
 
 A case is a kind and a seed: `--case mesh:17` runs one case in this process and prints all details.
 

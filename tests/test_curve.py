@@ -41,10 +41,10 @@ def test_cones_are_those_of_flatten():
     assert cones.distortion <= 0.1
 
 
-@pytest.mark.parametrize("most", [0, 2.5, True, "5", np.arange(3), float("nan"), None])
-def test_invalid_numbers_are_errors(most):
+@pytest.mark.parametrize("limit", [0, 2.5, True, "5", np.arange(3), float("nan"), None])
+def test_invalid_numbers_are_errors(limit):
     with pytest.raises(OptionError, match="most must be an? (integer|number)"):
-        coneflat.cone_curve(*shapes.sphere(2), most=most)
+        coneflat.cone_curve(*shapes.sphere(2), most=limit)
 
 
 def test_too_few_cones_are_an_error():

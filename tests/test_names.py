@@ -27,17 +27,6 @@ PUBLIC = {
     "src/coneflat/apps/transfer/baking.py": {"new"},  # `coneflat.apps.transfer.transfer(new=)`
     "src/coneflat/apps/view/figures/kinds.py": {"own"},  # `coneflat.make_figure(own=)`
 }
-#: Files and folders that are not yet clean.
-NOT_YET = (
-    "benchmarks/atlas.py", "benchmarks/trials/textures.py", "benchmarks/unwrap.py",
-    "src/coneflat/atlas/", "src/coneflat/evaluate.py", "src/coneflat/mesh/",
-    "src/coneflat/quadmesh/",
-    "src/coneflat/retries.py", "src/coneflat/source/", "src/coneflat/textures/",
-
-    "tests/apps/xatlas/", "tests/atlas/", "tests/mesh/", "tests/source/",
-    "tests/test_copies.py", "tests/test_curve.py",
-    "tests/textures/",
-)  # fmt: skip
 
 
 def assigned_names(tree: ast.AST) -> Iterator[tuple[str, int]]:
@@ -80,7 +69,7 @@ def test_names_say_what_they_stand_for(folder):
     lines = [
         f"{module}:{line}: {name}"
         for module in modules()
-        if module.startswith(folder) and not module.startswith(NOT_YET)
+        if module.startswith(folder)
         for name, line in banned_names((ROOT / module).read_text(encoding="utf-8"))
         if name not in PUBLIC.get(module, ())
     ]
@@ -112,5 +101,5 @@ def test_nouns_with_a_banned_word_inside_are_allowed():
     assert banned_names("others_of_mine = one_sided = is_known = used_vertices = 1") == []
 
 
-def test_files_that_are_not_yet_clean_exist():
-    assert [path for path in (*NOT_YET, *PUBLIC) if not (Path(ROOT) / path).exists()] == []
+def test_files_with_public_names_exist():
+    assert [path for path in PUBLIC if not (Path(ROOT) / path).exists()] == []

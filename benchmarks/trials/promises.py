@@ -281,31 +281,36 @@ def _check_boundary_lengths(trial: Trial) -> None:
 
 def _check_boundary_turns(trial: Trial) -> None:
     """Check the curvature of the boundary: uniform on round loops, zero along straight sides."""
-    result, topology = trial.result, trial.topology
     curvature = np.pi - _angle_sums(trial)
     slack = ANGLE + _angle_rounding(trial)
     if trial.boundary == "straight":
-        quantum = trial.options.get("quantise")
+        _check_straight_boundary(trial, curvature, slack)
+    else:
+        _check_loops(trial, curvature, slack)
+
+
+def _check_straight_boundary(trial: Trial, curvature: np.ndarray, slack: np.ndarray) -> None:
+    """Check that sides are straight, or that corners turn by multiples of the quantum."""
+    is_border, quantum = trial.topology.is_border, trial.options.get("quantise")
+    if quantum is None:
         # Corners are found like cones, and there may be many; sides between them are straight.
-        off = topology.is_border & (np.abs(curvature - np.nan_to_num(result.prescribed)) > slack)
-        if off.any() and quantum is None:
+        off = is_border & (np.abs(curvature - np.nan_to_num(trial.result.prescribed)) > slack)
+        if off.any():
             trial.broken("angles", "boundary not straight", f"{off.sum()} vertices")
-        if quantum is not None:
-            off = plane.difference_from_multiple(curvature, quantum) - slack
-            if (off[topology.is_border] > 0).any():
-                trial.broken(
-                    "angles", "corners are no multiples", f"by {off[topology.is_border].max():.3g} rad"
-                )
         return
+    off = (plane.difference_from_multiple(curvature, quantum) - slack)[is_border]
+    if (off > 0).any():
+        trial.broken("angles", "corners are no multiples", f"by {off.max():.3g} rad")
+
+
+def _check_loops(trial: Trial, curvature: np.ndarray, slack: np.ndarray) -> None:
+    """Check round loops, and loops with named corners between straight sides."""
+    result, topology = trial.result, trial.topology
     named = dict.fromkeys(trial.boundary) if not isinstance(trial.boundary, (str, dict)) else trial.boundary
     # Another copy of a vertex may be inside.
     is_named = np.isin(result.vertex_origin, list(named) if isinstance(named, dict) else [])
     corner_at = np.flatnonzero(is_named & topology.is_border)
-    share = np.zeros(len(curvature))
-    edge_at = topology.edges[topology.count == 1]
-    length = np.empty(len(topology.edges))
-    length[trial.topology.edge_of_halfedges(trial.result.faces)] = trial.sides.ravel()
-    np.add.at(share, edge_at.ravel(), np.repeat(length[topology.count == 1] / 2, 2))
+    share = _border_lengths(trial)
     for loop in topology.border_loops():
         if (
             isinstance(named, dict)
@@ -329,6 +334,17 @@ def _check_boundary_turns(trial: Trial) -> None:
         off = np.abs(curvature[corner_at] - targets) - slack[corner_at] - 1e-6
         if off.max(initial=-1) > 0:
             trial.broken("angles", "corners not held", f"by {off.max():.3g} rad")
+
+
+def _border_lengths(trial: Trial) -> np.ndarray:
+    """Return (n,) half the length of the boundary edges at each vertex, in the plane."""
+    topology = trial.topology
+    length = np.empty(len(topology.edges))
+    length[topology.edge_of_halfedges(trial.result.faces)] = trial.sides.ravel()
+    share = np.zeros(len(trial.result.vertices))
+    is_border_edge = topology.count == 1
+    np.add.at(share, topology.edges[is_border_edge].ravel(), np.repeat(length[is_border_edge] / 2, 2))
+    return share
 
 
 def _check_rotations(trial: Trial) -> None:
@@ -370,29 +386,45 @@ def _must_turn_by_quanta(trial: Trial) -> bool:
 
 def _check_cones(trial: Trial) -> None:
     """Check that cones are the requested ones, and that their curvatures satisfy Gauss-Bonnet."""
-    result, options, topology = trial.result, trial.options, trial.topology
-    cones, curvatures = result.cones, result.curvatures
-    names = result.vertex_origin[cones].tolist()
+    cones = trial.result.cones
     if len(set(cones.tolist())) != len(cones):
         trial.outcome.breach("cones: one twice", cones)
+    _check_cone_sums(trial)
+    if isinstance(trial.options.get("cones", "auto"), str):
+        _check_searched_cones(trial)
+    else:
+        _check_given_cones(trial)
+
+
+def _check_cone_sums(trial: Trial) -> None:
+    """Check Gauss-Bonnet on each closed component."""
+    result, topology = trial.result, trial.topology
     for component in np.unique(topology.component[topology.is_used]).tolist():
         is_inside = topology.component == component
         if trial.method == "exact" and not trial.is_marked and not (is_inside & topology.is_border).any():
-            expected, total = (
-                TURN * topology.euler(result.faces, component),
-                curvatures[is_inside[cones]].sum(),
-            )
-            if abs(total - expected) > ANGLE * max(1, len(cones)):
+            expected = TURN * topology.euler(result.faces, component)
+            total = result.curvatures[is_inside[result.cones]].sum()
+            if abs(total - expected) > ANGLE * max(1, len(result.cones)):
                 trial.breach("cones: sum of curvatures", f"{total:.6g} instead of {expected:.6g}")
-    if not isinstance(options.get("cones", "auto"), str):
-        expected = options["cones"]
-        if set(names) != {int(v) for v in expected}:
-            trial.breach("cones: not those given", f"{names} instead of {list(expected)}")
-        elif isinstance(expected, dict):
-            off = max((abs(expected[v] - k) for v, k in zip(names, curvatures, strict=True)), default=0)
-            if off > ANGLE:
-                trial.breach("cones: not the curvatures given", f"off by {off:.3g}")
-        return
+
+
+def _check_given_cones(trial: Trial) -> None:
+    """Check that cones are those of the options, with their curvatures if these have any."""
+    result, expected = trial.result, trial.options["cones"]
+    names = result.vertex_origin[result.cones].tolist()
+    if set(names) != {int(v) for v in expected}:
+        trial.breach("cones: not those given", f"{names} instead of {list(expected)}")
+    elif isinstance(expected, dict):
+        off = max((abs(expected[v] - k) for v, k in zip(names, result.curvatures, strict=True)), default=0)
+        if off > ANGLE:
+            trial.breach("cones: not the curvatures given", f"off by {off:.3g}")
+
+
+def _check_searched_cones(trial: Trial) -> None:
+    """Check that a search has heeded its constraints."""
+    result, options, topology = trial.result, trial.options, trial.topology
+    cones, curvatures = result.cones, result.curvatures
+    names = result.vertex_origin[cones].tolist()
     missing = set(options.get("required_cones") or ()) - set(names)
     forbidden = set(options.get("forbidden_cones") or ()) & set(names)
     if missing or forbidden:

@@ -182,9 +182,10 @@ def _corners(square: int) -> list[tuple[int, int]]:
     return [(square, 0), (square + 1, 0), (square + 1, 1), (square, 1)]
 
 
-def _write_glb(rng: Random, row: Row, files: list[str]) -> Path:
-    make = SceneMaker()
-    primitives, textures, materials = [], [], []
+def _gltf_materials(rng: Random, row: Row) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """Return the materials and the textures of a row; some materials are of specular-glossiness."""
+    textures: list[dict[str, Any]] = []
+    materials: list[dict[str, Any]] = []
     for painted in row.materials:
         surface: dict[str, Any] = {"baseColorFactor": list(painted.colour)}
         if painted.image is not None:
@@ -205,6 +206,12 @@ def _write_glb(rng: Random, row: Row, files: list[str]) -> Path:
                 named["diffuseTexture"] = surface["baseColorTexture"]
             item = {"extensions": {"KHR_materials_pbrSpecularGlossiness": named}}
         materials.append(item)
+    return materials, textures
+
+
+def _write_glb(rng: Random, row: Row, files: list[str]) -> Path:
+    make, primitives = SceneMaker(), []
+    materials, textures = _gltf_materials(rng, row)
     for square, material in enumerate(row.squares):
         points = np.array([(*corner, 0) for corner in _corners(square)], float)
         uv = np.array([row.uv(square, x - square, y) for x, y in _corners(square)])

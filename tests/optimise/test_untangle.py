@@ -15,9 +15,9 @@ from coneflat import TriangleMesh
 from coneflat.geometry import edge_lengths
 from coneflat.geometry.planar import heights, signed_double_areas
 from coneflat.geometry.straight import FlatTriangles
+from coneflat.optimise import embedded_disks
 from coneflat.optimise.patches import DEGENERATE_HEIGHT, Patches
 from coneflat.optimise.relaxing import rest_sides
-from coneflat.optimise.seam_untangling import embedded_disks
 from coneflat.optimise.untangling import untangle
 
 

@@ -2,10 +2,11 @@
 
 from .constraints import Lines, PointConstraints
 from .energies import StretchEnergy
+from .free_seams import embedded_disks, relaxed_disks, untangled_disk
 from .relaxed_layouts import joined, mean_qc, relax_layouts
 from .relaxing import Relaxed, relax, rest_sides
 from .seam_chains import SeamChains, find_chains
-from .seam_untangling import embedded_disks, untangle_seams, untangled_disk
+from .seam_untangling import untangle_seams
 
 __all__ = [
     "Lines",
@@ -18,6 +19,7 @@ __all__ = [
     "joined",
     "mean_qc",
     "relax",
+    "relaxed_disks",
     "relax_layouts",
     "rest_sides",
     "untangle_seams",

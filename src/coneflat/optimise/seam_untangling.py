@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of
+from ..base.arrays import mask_of
 from ..base.notes import Unmet
 from ..base.progress import stage
 from ..base.text import list_some, plural
-from ..geometry.intrinsic import halfedge_twins
-from ..geometry.operators import cotangent_laplacian
-from ..geometry.planar import sides_between, signed_double_areas
-from ..geometry.straight import FlatTriangles
-from ..geometry.unfolding import unfold
-from ..linalg import factorize
+from ..geometry.planar import sides_between
 from ..mesh.connectivity import TriangleMesh
 from ..stages import ConeSpec, Layout
 from .energies import StretchEnergy
+from .free_seams import untangled_disk
 from .relaxed_layouts import LayoutGroup
-from .relaxing import relax, rest_sides
-from .untangling import MAX_RINGS, find_degenerate, untangle
+from .relaxing import relax
+from .untangling import find_degenerate
 
 
 @stage("relax")
@@ -41,10 +37,8 @@ def untangle_seams(layout: Layout, spec: ConeSpec, stretch: float, quantum: floa
     Returns:
         The layout, with a note if triangles were flipped.
 
-    Notes:
-        W. T. Tutte, "How to draw a graph", 1963: with every inner point at the mean of its neighbours and the border on
-        a convex curve no triangle is inverted. A layout relaxed from this embedding is much worse than one relaxed from
-        a layout of a flat metric.
+    See Also:
+        untangled_disk: which moves the points.
     """
     sides = sides_between(layout.points[layout.corners])
     was_bad = find_degenerate(sides)
@@ -80,64 +74,3 @@ def untangle_seams(layout: Layout, spec: ConeSpec, stretch: float, quantum: floa
         f"{where}: they are positively oriented, but {caveat}."
     )
     return untangled.with_notes(Unmet(note))
-
-
-def untangled_disk(
-    disk: TriangleMesh, points: FloatArray, lengths: FloatArray, fixed: BoolArray, may_wind: bool = False
-) -> tuple[FloatArray, BoolArray, bool]:
-    """Return points of a disk whose inverted triangles are positively oriented, except those that cannot be untangled.
-
-    Args:
-        disk: the disk; the angles at its border are free.
-        points: (c, 2) its points.
-        lengths: (m, 3) side lengths of its triangles on the surface.
-        fixed: (c,) points that do not move.
-        may_wind: whether triangles may wind around inner vertices several times where nothing else untangles them; the
-            disk is not embedded again then.
-
-    Returns:
-        (c, 2) points, (c,) those that moved, and whether the disk was embedded again.
-    """
-    # The angle at a vertex of a prescribed boundary is preserved if the adjacent seam edges do not move.
-    border = disk.edges[disk.is_boundary_edge]
-    is_near = fixed.copy()
-    is_near[border[fixed[border].any(axis=1)]] = True
-    sides, twins = sides_between(points[disk.faces]), halfedge_twins(disk)
-    flat = FlatTriangles(sides.ravel(), np.ones(sides.size, dtype=np.complex128), twins)
-    fixed_input = disk.is_boundary_vertex, (is_near, fixed), rest_sides(lengths)
-    angles = np.where(disk.is_boundary_vertex, np.nan, 2 * np.pi)
-    # More rings rarely help if triangles may wind, and take half of the time on small CAD parts.
-    rings = MAX_RINGS // 2 if may_wind else 2 * MAX_RINGS
-    untangled = untangle(flat, disk.faces, angles, *fixed_input, rings)
-    if may_wind:
-        untangled = untangle(untangled.flat, disk.faces, np.full_like(angles, np.nan), *fixed_input, rings)
-    places, moved = unfold(untangled.flat, disk.faces), mask_of(len(points), untangled.moved)
-    if len(untangled.left) and not (may_wind or fixed.any()) and disk.boundary_loops[0] == 1:
-        areas = np.abs(signed_double_areas(places[disk.faces])) / 2
-        embedded = embedded_disks(disk, np.zeros(len(areas), dtype=np.int64), areas)
-        if not find_degenerate(sides_between(embedded[disk.faces])).any():
-            return embedded, ~fixed, True
-    return places, moved, False
-
-
-def embedded_disks(disks: TriangleMesh, of_face: IntArray, areas: FloatArray) -> FloatArray:
-    """Return (c, 2) points of disks by Tutte's embedding: borders on circles, inner points at neighbour means.
-
-    Args:
-        disks: one or several disks as one mesh.
-        of_face: (m,) the disk of each triangle.
-        areas: (m,) areas of the triangles; each disk gets the area of its triangles.
-    """
-    count, of = len(disks.vertices), np.zeros(len(disks.vertices), dtype=np.int64)
-    of[disks.faces] = of_face[:, None]
-    points = np.zeros((count, 2))
-    for walk in disks.boundary_walks():
-        turn = 2 * np.pi * np.arange(len(walk)) / len(walk)
-        points[disks.tails[walk]] = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    inside = np.flatnonzero(~disks.is_boundary_vertex)
-    if len(inside):
-        rows = cotangent_laplacian(disks.faces, np.ones(disks.faces.shape), count)[inside]
-        points[inside] = factorize(rows[:, inside]).solve(-(rows @ points))
-    flat = np.bincount(of_face, np.abs(signed_double_areas(points[disks.faces])) / 2)
-    scale = np.sqrt(np.bincount(of_face, areas) / np.maximum(flat, np.finfo(float).tiny))
-    return np.asarray(scale[of, None] * points)

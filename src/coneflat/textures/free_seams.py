@@ -20,7 +20,7 @@ from ..geometry import (
 )
 from ..mesh import label_faces, open_along
 from ..mesh.connectivity import TriangleMesh
-from ..optimise import StretchEnergy, embedded_disks, relax, untangled_disk
+from ..optimise import relaxed_disks, untangled_disk
 from ..seams import find_seams
 from ..stages import Layout, SeamSpec, SolveStatistics
 
@@ -46,16 +46,11 @@ def freed(
     is_bad = ~(signed_double_areas(layout.points[layout.corners]) > 0)
     if 0 < is_bad.sum() < len(is_bad):
         layout = _untangled(layout, disk, spec)
-    points, disk = layout.points, layout.disk or disk
-    if not (signed_double_areas(points[layout.corners]) > 0).all():
-        points, free = embedded_disks(disk, layout.chart, areas), None
-    free = None if free is None or len(free) != len(points) else free
-    energy, sides = StretchEnergy(1.0), layout.lengths
-    relaxed = relax(
-        disk, points, layout.corners, energy, lengths=sides, free=free, tolerance=tolerance, to_scale=True
-    )
-    energies = triangle_energies(sides, relaxed.points[layout.corners])
-    return replace(layout, points=relaxed.points), float(energies.sum() / areas.sum())
+    disk = layout.disk or disk
+    free = None if free is None or len(free) != len(layout.points) else free
+    points = relaxed_disks(disk, layout.points, layout.lengths, layout.chart, free, tolerance)
+    energies = triangle_energies(layout.lengths, points[layout.corners])
+    return replace(layout, points=points), float(energies.sum() / areas.sum())
 
 
 def _untangled(layout: Layout, disk: TriangleMesh, spec: SeamSpec | None) -> Layout:

@@ -1,0 +1,112 @@
+"""Disks whose borders are free: the sides of seams move independently when triangles are untangled and relaxed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of
+from ..geometry import double_areas
+from ..geometry.intrinsic import halfedge_twins
+from ..geometry.operators import cotangent_laplacian
+from ..geometry.planar import sides_between, signed_double_areas
+from ..geometry.straight import FlatTriangles
+from ..geometry.unfolding import unfold
+from ..linalg import factorize
+from ..mesh.connectivity import TriangleMesh
+from .energies import StretchEnergy
+from .relaxing import relax, rest_sides
+from .untangling import MAX_RINGS, find_degenerate, untangle
+
+
+def relaxed_disks(
+    disks: TriangleMesh,
+    points: FloatArray,
+    lengths: FloatArray,
+    of_face: IntArray,
+    free: BoolArray | None = None,
+    tolerance: float = 1e-3,
+) -> FloatArray:
+    """Return (c, 2) points of disks with the least symmetric Dirichlet energy, without flipping triangles.
+
+    If triangles are flipped at the start, all points move, and the minimisation starts from an embedding.
+
+    Args:
+        disks: one or several disks as one mesh.
+        points: (c, 2) the points at the start.
+        lengths: (m, 3) side lengths of the triangles on the surface.
+        of_face: (m,) the disk of each triangle.
+        free: (c,) the points that move; None for all.
+        tolerance: see `relax`.
+    """
+    if not (signed_double_areas(points[disks.faces]) > 0).all():
+        points, free = embedded_disks(disks, of_face, double_areas(lengths) / 2), None
+    energy = StretchEnergy(1.0)
+    return relax(
+        disks, points, disks.faces, energy, lengths=lengths, free=free, tolerance=tolerance, to_scale=True
+    ).points
+
+
+def untangled_disk(
+    disk: TriangleMesh, points: FloatArray, lengths: FloatArray, fixed: BoolArray, may_wind: bool = False
+) -> tuple[FloatArray, BoolArray, bool]:
+    """Return points of a disk whose inverted triangles are positively oriented, except those that cannot be untangled.
+
+    Args:
+        disk: the disk; the angles at its border are free.
+        points: (c, 2) its points.
+        lengths: (m, 3) side lengths of its triangles on the surface.
+        fixed: (c,) points that do not move.
+        may_wind: whether triangles may wind around inner vertices several times where nothing else untangles them; the
+            disk is not embedded again then.
+
+    Returns:
+        (c, 2) points, (c,) those that moved, and whether the disk was embedded again.
+    """
+    # The angle at a vertex of a prescribed boundary is preserved if the adjacent seam edges do not move.
+    border = disk.edges[disk.is_boundary_edge]
+    is_near = fixed.copy()
+    is_near[border[fixed[border].any(axis=1)]] = True
+    sides, twins = sides_between(points[disk.faces]), halfedge_twins(disk)
+    flat = FlatTriangles(sides.ravel(), np.ones(sides.size, dtype=np.complex128), twins)
+    fixed_input = disk.is_boundary_vertex, (is_near, fixed), rest_sides(lengths)
+    angles = np.where(disk.is_boundary_vertex, np.nan, 2 * np.pi)
+    # More rings rarely help if triangles may wind, and take half of the time on small CAD parts.
+    rings = MAX_RINGS // 2 if may_wind else 2 * MAX_RINGS
+    untangled = untangle(flat, disk.faces, angles, *fixed_input, rings)
+    if may_wind:
+        untangled = untangle(untangled.flat, disk.faces, np.full_like(angles, np.nan), *fixed_input, rings)
+    places, moved = unfold(untangled.flat, disk.faces), mask_of(len(points), untangled.moved)
+    if len(untangled.left) and not (may_wind or fixed.any()) and disk.boundary_loops[0] == 1:
+        areas = np.abs(signed_double_areas(places[disk.faces])) / 2
+        embedded = embedded_disks(disk, np.zeros(len(areas), dtype=np.int64), areas)
+        if not find_degenerate(sides_between(embedded[disk.faces])).any():
+            return embedded, ~fixed, True
+    return places, moved, False
+
+
+def embedded_disks(disks: TriangleMesh, of_face: IntArray, areas: FloatArray) -> FloatArray:
+    """Return (c, 2) points of disks by Tutte's embedding: borders on circles, inner points at neighbour means.
+
+    Args:
+        disks: one or several disks as one mesh.
+        of_face: (m,) the disk of each triangle.
+        areas: (m,) areas of the triangles; each disk gets the area of its triangles.
+
+    Notes:
+        W. T. Tutte, "How to draw a graph", 1963: with every inner point at the mean of its neighbours and the border on
+        a convex curve no triangle is inverted. A layout relaxed from this embedding is much worse than one relaxed from
+        a layout of a flat metric.
+    """
+    count, of = len(disks.vertices), np.zeros(len(disks.vertices), dtype=np.int64)
+    of[disks.faces] = of_face[:, None]
+    points = np.zeros((count, 2))
+    for walk in disks.boundary_walks():
+        turn = 2 * np.pi * np.arange(len(walk)) / len(walk)
+        points[disks.tails[walk]] = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    inside = np.flatnonzero(~disks.is_boundary_vertex)
+    if len(inside):
+        rows = cotangent_laplacian(disks.faces, np.ones(disks.faces.shape), count)[inside]
+        points[inside] = factorize(rows[:, inside]).solve(-(rows @ points))
+    flat = np.bincount(of_face, np.abs(signed_double_areas(points[disks.faces])) / 2)
+    scale = np.sqrt(np.bincount(of_face, areas) / np.maximum(flat, np.finfo(float).tiny))
+    return np.asarray(scale[of, None] * points)
