@@ -44,7 +44,7 @@ def expected_resolution(density: float, areas: FloatArray, padding: float, tiles
 def least_resolution(density: float, padding: float, start: int, scale_at: Callable[[int], float]) -> int:
     """Return a resolution with a texel density: a multiple of 4 that suffices, while the next smaller one does not.
 
-    The density increases with the resolution almost linearly, but not monotonically, because charts are packed anew
+    The density increases with the resolution almost linearly, but not monotonically, because charts are packed again
     for each. So a smaller resolution that was not tried may suffice, too.
 
     Args:

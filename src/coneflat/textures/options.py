@@ -66,8 +66,8 @@ class TextureOptions:
     Attributes:
         max_energy: Largest symmetric Dirichlet energy of each component, averaged by area: the sum of the squares of
             the singular values and of their inverses, 4 if nothing is stretched. A smaller value needs longer seams.
-        area: Largest area distortion of each component instead of an energy: the standard deviation of the log scale,
-            weighted by area; from 1e-6 to 100.
+        area: Largest area distortion of each component instead of an energy: the standard deviation of the log
+            conformal factor, weighted by area; from 1e-6 to 100.
         texel_density: Texels per unit of length of the model, at least, instead of a resolution, which is then a
             multiple of 4 that suffices, while 4 texels less do not.
         stack: mirrored: the two halves of a model that is mirrored vertex by vertex share their texels. It is cut along
