@@ -58,6 +58,12 @@ def test_entry_points_are_functions_of_the_package():
         assert callable(getattr(import_module(f"coneflat.{module}"), name)), target
 
 
+def test_no_module_replaces_a_public_name():
+    """Importing such a module would replace the function as attribute of the package."""
+    modules = {name.split(".")[0] for name in NAMES}
+    assert modules & {*coneflat.__all__} == {"errors"}
+
+
 @pytest.mark.parametrize("stage", STAGES)
 def test_stages_stand_side_by_side(stage: str):
     assert imported_packages(read_modules())[stage] & {*STAGES, "options", "flattening"} == set()
