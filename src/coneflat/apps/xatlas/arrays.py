@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from os import PathLike
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,9 +17,7 @@ from ...errors import ArrayShapeError, FaceIndexError, NonFiniteError, OptionErr
 from ...geometry import fill_nearest
 from ...io import atomic_write
 from ...textures import UnwrappedSoup, unwrap_soup
-
-if TYPE_CHECKING:
-    from .interface import PackOptions
+from .options import PackOptions
 
 #: What xatlas returns for a mesh: (k,) the input vertex of each vertex, (m, 3) faces, and (k, 2) UVs.
 Mapped: TypeAlias = tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float32]]

@@ -1,6 +1,6 @@
 """`coneflat.unwrap` with the interface of the package xatlas; see `coneflat.xatlas`.
 
-What needs more than Python is in `xatlas_arrays.py`, so that `import coneflat.xatlas` is fast.
+What needs more than Python is in `arrays.py`, so that `import coneflat.xatlas` is fast.
 """
 
 from __future__ import annotations
@@ -11,52 +11,13 @@ from os import PathLike
 from typing import TYPE_CHECKING
 
 from ...base import inner_calls, warn_of, warns
+from .options import ChartOptions, PackOptions
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
     from .arrays import Mapped, MeshArrays
-
-
-@dataclass
-class ChartOptions:
-    """The options for charts of xatlas, which have no effect here."""
-
-    max_chart_area: float = 0.0
-    max_boundary_length: float = 0.0
-    normal_deviation_weight: float = 2.0
-    roundness_weight: float = 0.01
-    straightness_weight: float = 6.0
-    normal_seam_weight: float = 4.0
-    texture_seam_weight: float = 0.5
-    max_cost: float = 2.0
-    max_iterations: int = 1
-    use_input_mesh_uvs: bool = False
-    fix_winding: bool = False
-
-
-@dataclass
-class PackOptions:
-    """The options for packing of xatlas.
-
-    Attributes:
-        padding: texels between charts, and between charts and the border, at least; 0 for the default.
-        resolution: texels along a side of the texture; 0 for that of `texels_per_unit`, or else 1024.
-        texels_per_unit: texels per unit of length, at least, without a resolution; there is one texture.
-        create_image: make `Atlas.chart_image`. The other options have no effect.
-    """
-
-    max_chart_size: int = 0
-    padding: int = 0
-    texels_per_unit: float = 0.0
-    resolution: int = 0
-    bilinear: bool = True
-    blockAlign: bool = False
-    bruteForce: bool = False
-    create_image: bool = False
-    rotate_charts_to_axis: bool = True
-    rotate_charts: bool = True
 
 
 class Utilization(float):
