@@ -117,14 +117,16 @@ def flatten_components(
 ) -> list[Layout]:
     """Return the layouts of components; of those that are copies of each other, the layout of the first is copied.
 
-    on_layouts: called with the first layouts of all components, as of `flatten_source`.
+    on_layouts: called with the first layouts of all components, see `on_preview` of `flatten_source`.
     """
     # A map of another kind need not be an isometry of flat components.
     with stage("layout"):
         flat = lay_out_flat_components(components) if steps.find_metric is conformal_metric else {}
     with stage("check"):
         copies = find_copies(components, flat)
-    originals = {i: part for i, part in enumerate(components) if copies[i] is None and i not in flat}
+    originals = {
+        i: component for i, component in enumerate(components) if copies[i] is None and i not in flat
+    }
     layouts = lay_out_components(originals, steps)
     if on_layouts is not None:
         on_layouts(with_copies(flat | layouts, components, copies))

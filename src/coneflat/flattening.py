@@ -27,12 +27,14 @@ from .seams import cut_to_disk, seam_costs
 from .source.components import Component
 from .stages import ConeSolution, FlatMetric, Layout, MetricSpec, RelaxSpec, Surface
 
-#: Returns a connected mesh with the operators of its (m, 3) lengths; the flag allows edge flips.
+#: Returns a connected mesh with the operators of its (m, 3) lengths; the flag allows intrinsic edge flips, as the exact
+#: metric does.
 SurfaceOf: TypeAlias = Callable[[TriangleMesh, FloatArray, bool], ConeSurface]
 #: Returns the flat metric of a connected mesh for its cones.
 FindMetric: TypeAlias = Callable[[Surface, ConeSolution, MetricSpec], FlatMetric]
 
-# Curvature error of an infeasible cone, radians: ideally a full turn; rounding and untangled neighbours reduce it.
+# Curvature error of an infeasible cone, radians. Triangles that wind around a vertex once too little miss a full turn,
+# of which untangled neighbours may take a part; rounding errors are far below.
 INFEASIBLE_ERROR = 1.0
 
 
@@ -46,7 +48,7 @@ class Steps:
         relax: which triangles are relaxed.
         separates: overlaps are separated into charts.
         quantum: rotations across seams are multiples of it, radians; None for any rotation.
-        untangles: triangles of a first layout that are inverted are flipped.
+        untangles: inverted triangles of a first layout are turned back.
         names_components: errors name the component.
     """
 
@@ -77,9 +79,10 @@ def lay_out_component(surface: ConeSurface, component: Component, steps: Steps) 
 
     Raises:
         CurvatureError: no metric has the curvatures.
-        MetricError: the computation found no finite metric or layout.
+        MetricError: the computation found no finite metric or layout; `ConvergenceError` if Newton's method fails.
         SeamError: every set of seams needs forbidden edges.
     """
+    # Rotations along handles can be measured only in the metric of a set of cones, so this is a function.
     rotations = loop_rotations(surface, component.metric) if component.cones.quantum else None
     cones = find_cones(surface, replace(component.cones, rotations=rotations))  # Sections 3.1 and 3.2
     metric = steps.find_metric(surface, cones, component.metric)  # 2.3
@@ -93,13 +96,17 @@ def lay_out_component(surface: ConeSurface, component: Component, steps: Steps) 
 def relax_components(
     components: Sequence[Component], layouts: Sequence[Layout], steps: Steps
 ) -> Sequence[Layout]:
-    """Return layouts, relaxed together: distorted triangles near cones by default, or all."""
+    """Return layouts, relaxed together by `Steps.relax`: no triangle, the most distorted ones near cones, or all."""
     weights = [component.cones.weights for component in components]
     return relax_layouts(layouts, weights, steps.relax)
 
 
 def finish_component(component: Component, relaxed: Layout, steps: Steps) -> Layout:
-    """Return a relaxed layout without inverted triangles, and without overlaps if these are separated into charts."""
+    """Return a relaxed layout whose inverted triangles are turned back, and whose overlaps are separated into charts.
+
+    Triangles are turned back if the metric is exact and seam rotations are not multiples of a quantum; overlaps are
+    separated if `Steps.separates`. What remains is measured later, and noted.
+    """
     layout = relaxed
     if component.is_exact:
         layout = untangle_seams(layout, component.cones, steps.relax.stretch, steps.quantum)

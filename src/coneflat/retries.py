@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -28,15 +27,17 @@ from .options import Options
 from .source import Component, Prepared, Source
 from .stages import Layout
 
-# Largest number of cone searches per component.
+# Largest number of cone searches for a layout.
 MAX_SEARCHES = 4
-# A component beyond the allowed area distortion is relaxed with this stretch, then flattened with tighter bounds of the
-# search: at most so often, and by at most this factor each time.
-MAX_CORRECTIONS, MAX_TIGHTENING, CORRECTING_STRETCH = 2, 2.0, 0.1
-# Dihedral angle, radians, above which edges are cut where a solid is too distorted otherwise. The edges between half of
-# it and itself then bend the surface by at most this share of what sharper ones do: 0 to 0.07 of it on plates, gears
-# and rings, 0.15 and more on noise.
-SHARP_ANGLE, MAX_BETWEEN = np.radians(40), 0.1
+# Weight of areas with which a component beyond the allowed area distortion is relaxed.
+CORRECTING_STRETCH = 0.1
+# How often such a component is flattened with a tighter bound of the search, and the largest factor of one tightening.
+MAX_CORRECTIONS, MAX_TIGHTENING = 2, 2.0
+# Dihedral angle, radians, above which edges are cut in a solid that is too distorted otherwise.
+SHARP_ANGLE = np.radians(40)
+# Edges with dihedral angles from SHARP_ANGLE / 2 to SHARP_ANGLE bend a solid by at most this share of what sharper
+# edges do: 0 to 0.07 on plates, gears and rings, 0.15 and more on noise.
+MAX_BETWEEN = 0.1
 # Fraction of the work that computes the layouts; the rest relaxes and separates them.
 LAYING_OUT = 0.8
 #: Errors of a component that a retry may solve, and after which its earlier layout remains.
@@ -78,8 +79,13 @@ def lay_out_with_feasible_cones(component: Component, steps: Steps) -> Layout:
     may_repeat = component.is_exact and uses_sparse_search(component.mesh, component.cones)
     layouts = list[Layout]()
     for _ in range(MAX_SEARCHES):
-        layouts.append(lay_out_component(surface, component, steps))
-        infeasible = infeasible_cones(layouts[-1])
+        try:
+            layouts.append(lay_out_component(surface, component, steps))
+        except FAILURES:
+            if not layouts:
+                raise
+            break
+        infeasible = np.setdiff1d(infeasible_cones(layouts[-1]), component.cones.required)
         if not (may_repeat and len(infeasible)):
             break
         component = replace(component, cones=component.cones.without(infeasible))
@@ -156,7 +162,11 @@ def relax_areas(
     relaxed = with_relaxed_areas(steps)
     if not beyond or relaxed is steps:
         return {}
-    return better_layouts(finish_components(beyond, layouts, relaxed), finished, beyond)
+
+    def relax(members: Mapping[int, Component]) -> dict[int, Layout]:
+        return finish_components(members, layouts, relaxed)
+
+    return better_layouts(without_failures(relax, beyond), finished, beyond)
 
 
 def with_relaxed_areas(steps: Steps) -> Steps:
@@ -195,18 +205,34 @@ def retried(
     """Return the layouts of components with other cones that are better than the finished ones.
 
     Args:
-        attempts: the components with other cones; one that fails is left out.
+        attempts: the components with other cones; those that fail are left out.
         components: the components with the cones that the options require.
         finished: their layouts.
         steps: the functions of the stages.
     """
-    improvements = dict[int, Layout]()
+
+    def flatten(members: Mapping[int, Component]) -> dict[int, Layout]:
+        return finish_components(members, lay_out_components(members, steps), steps)
+
+    candidates = dict[int, Layout]()
     for group in groups_of_small(attempts, steps.relax):
-        members = {i: attempts[i] for i in group}
-        with suppress(*FAILURES):
-            candidates = finish_components(members, lay_out_components(members, steps), steps)
-            improvements |= better_layouts(candidates, finished, components)
-    return improvements
+        candidates |= without_failures(flatten, {i: attempts[i] for i in group})
+    return better_layouts(candidates, finished, components)
+
+
+def without_failures(
+    flatten: Callable[[Mapping[int, Component]], dict[int, Layout]], components: Mapping[int, Component]
+) -> dict[int, Layout]:
+    """Return the layouts of components by a function of several; after a failure, of each component that succeeds."""
+    try:
+        return flatten(components)
+    except FAILURES:
+        if len(components) == 1:
+            return {}
+    layouts = dict[int, Layout]()
+    for i, component in components.items():
+        layouts |= without_failures(flatten, {i: component})
+    return layouts
 
 
 def better_layouts(
@@ -234,38 +260,41 @@ def cut_along_sharp_edges(
         layouts: the layouts of the components.
         flatten_pieces: returns the finished layouts of components.
     """
+    uncut = prepared, list(layouts)
     if options.charts != "atlas" or options.sharp_angle is not None:
-        return prepared, list(layouts)
+        return uncut
     distorted = [
         i
         for i, (component, layout) in enumerate(zip(prepared.components, layouts, strict=True))
         if is_machined(component.mesh) and is_too_distorted(component, layout)
     ]
     if not distorted:
-        return prepared, list(layouts)
+        return uncut
     try:
         sharp = source.prepared(replace(options, sharp_angle=SHARP_ANGLE))
-    except (OptionError, SeamError):  # options name vertices or edges that such seams exclude
-        return prepared, list(layouts)
-    pieces_of = sharp.pieces_of(prepared, distorted)
-    try:
+        pieces_of = sharp.pieces_of(prepared, distorted)
         layouts_of_pieces = iter(flatten_pieces([piece for i in distorted for piece in pieces_of[i]]))
-    except FAILURES:
-        return prepared, list(layouts)
-    replaced = {}
-    for i in distorted:
-        component, pieces = prepared.components[i], pieces_of[i]
-        cut = [next(layouts_of_pieces) for _ in pieces]
-        if is_worth_its_seams(pieces, cut, component, layouts[i]):
-            note = (
-                f"Edges above {np.degrees(SHARP_ANGLE):g} degrees are seams {component.location}: without them its "
-                f"mean QC distortion is {mean_qc(layouts[i]):.3g}."
-            )
-            replaced[i] = [cut[0].with_notes(note), *cut[1:]]
-    if not replaced:
-        return prepared, list(layouts)
-    prepared = prepared.with_pieces(sharp, {i: pieces_of[i] for i in replaced})
-    return prepared, [layout for i, uncut in enumerate(layouts) for layout in replaced.get(i, [uncut])]
+    except (OptionError, *FAILURES):  # options may name vertices or edges that such seams exclude
+        return uncut
+    layouts_of = {i: [next(layouts_of_pieces) for _ in pieces_of[i]] for i in distorted}
+    cut = {
+        i: with_note_on_seams(layouts_of[i], prepared.components[i], layouts[i])
+        for i in distorted
+        if is_worth_its_seams(pieces_of[i], layouts_of[i], prepared.components[i], layouts[i])
+    }
+    if not cut:
+        return uncut
+    prepared = prepared.with_pieces(sharp, {i: pieces_of[i] for i in cut})
+    return prepared, [piece for i, layout in enumerate(layouts) for piece in cut.get(i, [layout])]
+
+
+def with_note_on_seams(cut: Sequence[Layout], component: Component, uncut: Layout) -> list[Layout]:
+    """Return the layouts of the pieces of a component with a note on why its sharp edges are seams."""
+    note = (
+        f"Edges above {np.degrees(SHARP_ANGLE):g} degrees are seams {component.location}: without them its "
+        f"mean QC distortion is {mean_qc(uncut):.3g}."
+    )
+    return [cut[0].with_notes(note), *cut[1:]]
 
 
 def is_worth_its_seams(

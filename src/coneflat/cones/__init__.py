@@ -1,14 +1,14 @@
 """Cone placement and target curvatures, one file per strategy."""
 
 from .corners import MAX_POLYHEDRON_CORNERS, with_corners
-from .find import find_cones
+from .find import find_cones, leaves_flat_disks
 from .greedy import greedy_cones
 from .prescribed import cones_at, cones_with_curvature
 from .solution import GroundedLaplacian
 from .sparse import ConeSearch, SparseCones
 from .sparse.limits import CONE_ANGLE_PER_TRIANGLE, MAX_SEARCHED
 from .strategies.auto import uses_sparse_search
-from .strategies.none import coneless_solution, leaves_flat_disks
+from .strategies.none import coneless_solution
 from .strategies.sparse import unmet_requests
 from .surface import ConeSurface
 

@@ -33,7 +33,8 @@ class ConeSurface(Surface):
     def linear_model(self, spec: ConeSpec) -> LinearModel:
         """Return the linear model of cones at vertices that do not absorb curvature, with the weights of `spec` in E.
 
-        The latest model is cached, unless the mesh is huge: its factorization is valid for other weights, too.
+        The latest model is cached, since its factorization is valid for other weights, too; not on a huge mesh that is
+        used once.
         """
         share, absorbs = weighted_areas(self.areas, spec.weights), spec.absorbs_curvature
         linear = self._linear

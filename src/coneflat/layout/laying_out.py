@@ -24,13 +24,13 @@ from .least_squares import least_squares_layout
 def lay_out(metric: FlatMetric, cut: Cut, untangles: bool = True) -> Layout:
     """Return the layout of a flat metric on a mesh that is cut open (Section 4.3 of the paper).
 
-    An exact metric with straight triangles is unfolded, by default after inverted triangles are flipped. Lengths of an
-    approximately flat metric are laid out by least squares. Other methods provide a map of the cut mesh.
+    An exact metric with straight triangles is unfolded, by default after inverted triangles are turned back. Lengths of
+    an approximately flat metric are laid out by least squares. Other methods provide a map of the cut mesh.
 
     Args:
         metric: the flat metric.
         cut: the seams and the mesh cut open along them.
-        untangles: flip inverted triangles.
+        untangles: turn inverted triangles back.
 
     Raises:
         MetricError: the layout has no area.

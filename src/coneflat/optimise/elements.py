@@ -246,7 +246,7 @@ def _polar(
     """Return (f,) the directions of complex numbers of a given size, and the derivatives by it divided by it.
 
     By symmetry the derivative `slope` vanishes with the size, so the limit of the quotient is the second derivative
-    `bend`. Sizes that are tiny in comparison with `other` count as 0.
+    `bend`. Sizes that are tiny in comparison with `reference` count as 0.
     """
     is_zero = size <= 1e-9 * reference
     divisor = np.where(is_zero, 1.0, size)

@@ -36,20 +36,18 @@ class Motions:
     Attributes:
         matrix: (u, k + 1) the complex shift of each point per unit of each unknown. Unknown k, the offset, is not
             solved for: with the value 1 it moves the points to where the constraints hold.
-        count: the number of unknowns k.
-        has_offset: whether constraints do not hold at the current points.
     """
 
     matrix: csr_matrix
 
     @property
     def count(self) -> int:
-        """Return the number of unknowns, without the offset."""
+        """The number k of unknowns, without the offset."""
         return int(self.matrix.shape[1]) - 1
 
     @property
     def has_offset(self) -> bool:
-        """Return whether the offset moves a point."""
+        """Whether the offset moves a point: constraints do not hold at the current points."""
         return bool(np.any(self.matrix.data[self.matrix.indices == self.count] != 0))
 
     def shifts(self, step: FloatArray) -> ComplexArray:

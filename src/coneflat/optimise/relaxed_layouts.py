@@ -31,7 +31,8 @@ TOLERANCE = 1e-2
 # Fraction of the mean area that is added to the weight of every triangle. Without it, slivers are distorted without
 # bound, 60 to 1 on a decimated face instead of 11; with it, means rise by 0.0005.
 MEAN_AREA_SHARE = 0.1
-# Patches whose mean distortion or worst triangle would get worse are relaxed again with this sharpness.
+# Patches whose mean distortion would grow, or with a triangle worse than the worst of the layout before, are relaxed
+# again with this sharpness.
 RETRY_SHARPNESS = 2.0
 # Relative changes below this value are not a deterioration: the patch may not have moved, or moved rigidly.
 RELATIVE_TOLERANCE = 1e-9
@@ -45,8 +46,8 @@ def relax_layouts(
 ) -> list[Layout]:
     """Return layouts with less distortion, the same cones and the same seams, relaxed as one mesh.
 
-    A boundary with prescribed lengths or shape does not move. A layout that cannot be relaxed is returned unchanged,
-    with a note if the relaxation of all triangles was requested.
+    A boundary with prescribed lengths or shape does not move. A layout whose seams do not have sides of equal lengths,
+    so that these cannot be held, is returned unchanged, with a note if the relaxation of all triangles was requested.
 
     Args:
         layouts: layouts of connected meshes.

@@ -1,4 +1,4 @@
-"""Untangling: the few inverted triangles of a flat metric are flipped by moving vertices on the flat surface."""
+"""Untangling: the few inverted triangles of a flat metric are turned back by moving vertices on the flat surface."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class _Untangling:
     """The state of untangling the triangles of a surface.
 
     Attributes:
-        flat, faces, angles, on_boundary, rest: see `untangle`; the target shapes are not thin.
+        flat, faces, angles, on_boundary, target_shapes: see `untangle`; the target shapes are not thin.
         sides: (m, 3) current sides of the triangles.
         is_bad: (m,) True for triangles that are inverted or degenerate.
         moves: (n,) distance by which each vertex was moved, relative to the mean length of the edges around it.
@@ -139,13 +139,13 @@ class _Untangling:
         before = self.sides[rows]
         after = before.copy()
         after[np.searchsorted(rows, patches.faces)] = trial
-        now, then = (
+        wrong_before, wrong_after = (
             winding_vertices(sides, self.faces[rows], self.angles, is_free) for sides in (before, after)
         )
         # Vertices far from the patches are in both sets.
-        is_new = is_adjacent
-        is_new[now] = False
-        return then[is_new[then]]
+        was_right = is_adjacent.copy()
+        was_right[wrong_before] = False
+        return wrong_after[was_right[wrong_after]]
 
 
 def winding_vertices(

@@ -6,8 +6,11 @@
 4. `other_cones`: costlier cones, then the fewest cones.
 5. `boundary_free`: a boundary that cuts squares, if it cannot lie on grid lines.
 
-Each returns a grid, or the reason why there is none. A single attempt is `grid_of_map`: from a seamless map by rounding
-(which may leave out lines, or double the number of squares, see `round_layout`) and extraction.
+`find_grid` calls the others: around each attempt `finer_grid`; for several components `components_apart`; for one,
+`other_cones` if the options leave the cones open, else `boundary_free`. Each returns a grid, or the reason why there is
+none, except `on_coarse_mesh`, which returns the request for a simpler mesh. A single attempt is `grid_of_map`: from a
+seamless map by rounding (which may leave out lines, or double the number of squares, see `round_layout`), then
+extraction.
 """
 
 from __future__ import annotations
@@ -296,9 +299,9 @@ def other_cones(request: GridRequest, flattening_of: AlignedFlattenings) -> Outc
         failures.append(outcome)
         if is_far:
             break
-    directions = "the boundary, sharp edges or curvature" + ", nor for requested sizes" * (
-        request.sizes is not None
-    )
+    directions = "the boundary, sharp edges or curvature"
+    if request.sizes is not None:
+        directions += ", nor for requested sizes"
     note = Unmet(
         f"Cones are not chosen for {directions}, because no grid with such cones was found: {failures[-1].reason}."
     )

@@ -86,10 +86,9 @@ def quads(
         "smooth": smooth,
     }
     if isinstance(mesh, IntegerGrid):
-        if any(value is not None for value in (faces, quads, size, sharp_angle)) or options.keys() - {
-            "progress"
-        }:
-            raise OptionError("a grid already has faces, size and options: no others can be given")
+        has_options = any(value is not None for value in (faces, quads, size, sharp_angle))
+        if has_options or stretch != QuadOptions.stretch or options.keys() - {"progress"}:
+            raise OptionError("a grid already has faces, size, stretch and options: no others can be given")
         read_options(quad_options, QuadOptions)
         return _quads_of_grid(mesh, smooth, Stopwatch(options.get("progress")))
     return _quads_of_request(

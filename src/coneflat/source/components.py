@@ -37,7 +37,7 @@ class Component:
 
     @property
     def is_exact(self) -> bool:
-        """Whether the metric may flip edges."""
+        """Whether the metric is exact: its computation flips edges of an intrinsic triangulation."""
         return self.metric.method == "exact"
 
     @property

@@ -25,8 +25,10 @@ from .free_seams import recut, seam_edges
 from .options import ISOMETRIC
 from .shortening import shortened
 
-# The area distortion of the first candidate, one that the fewest cones reach, and the maximum number of candidates.
-FIRST_DISTORTION, ANY_DISTORTION, MAX_CANDIDATES = 0.25, 1e3, 5
+# The area distortion of the first candidate, and one so large that the fewest cones reach it.
+FIRST_DISTORTION, ANY_DISTORTION = 0.25, 1e3
+# Number of searches after which a candidate within the bound is enough; twice as many are the maximum.
+ENOUGH_SEARCHES = 5
 # The search ends where the costs within and beyond the bound differ by less than this factor, or the numbers of cones
 # by one. A surface of 50 handles needs about 160 cones, and each search for them more than a second.
 SIMILAR_COSTS = 1.06
@@ -114,7 +116,7 @@ def _best_of_searched(model: CutModel, earlier: Sequence[Candidate] = ()) -> Can
 def _by_distortion(model: CutModel, earlier: Sequence[Candidate]) -> list[Candidate]:
     """Return candidates for different area distortions, with energies around the bound among them."""
     candidates = list(earlier)
-    for tries in range(2 * MAX_CANDIDATES):
+    for tries in range(2 * ENOUGH_SEARCHES):
         distortion = _next_distortion(model.bound, candidates, tries)
         if distortion is None:
             break
@@ -146,7 +148,7 @@ def _next_distortion(bound: EnergyBound, candidates: Sequence[Candidate], tries:
     within = [candidate for candidate in rising if candidate.energy <= bound.largest]
     beyond = [candidate for candidate in rising if candidate.energy > bound.largest]
     # At least one search is made, also after candidates from a coarse mesh.
-    if within and tries and (tries >= MAX_CANDIDATES or not len(within[-1].layout.seams)):
+    if within and tries and (tries >= ENOUGH_SEARCHES or not len(within[-1].layout.seams)):
         return None
     if within and beyond and tries:
         low, high = within[-1], beyond[0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeAlias
 
@@ -98,11 +98,11 @@ def unwrap_source(source: Source, options: UnwrapOptions) -> Flattening:
     seams is within the bound of the energy. Charts are cut further for packing (`pack_cuts.py`), and the ends of seams
     are moved again to meet the bound.
     """
-    of_stages = options_of_stages(options)
+    stage_options = options_of_stages(options)
     with stage("check"):
-        prepared, shared = _without_shared(source, of_stages, options.stack)
+        prepared, shared = _without_shared(source, stage_options, options.stack)
     components = along_sharp_edges(prepared.components)
-    of_stages = _with_expected_resolution(of_stages, options, components, prepared.checked.exponent)
+    stage_options = _with_expected_resolution(stage_options, options, components, prepared.checked.exponent)
     is_parallel = max(len(component.faces) for component in components) > PARALLEL
     with limit_threads(options.threads if is_parallel else 1):
         with stage("layout"):
@@ -114,11 +114,11 @@ def unwrap_source(source: Source, options: UnwrapOptions) -> Flattening:
         models = _cut_models(components, copies, options)
         candidates = _search(models, flat, components)
         with stage("pack"):
-            candidates = _cut_to_pack(models, candidates, options, of_stages)
+            candidates = _cut_to_pack(models, candidates, options, stage_options)
         with stage("measure"):
             layouts = _measured_layouts(candidates, flat, components, copies)
-    of_stages = _with_least_resolution(of_stages, options, prepared, layouts)
-    result = evaluate(prepared, layouts, replace(of_stages, method=FREE))
+    stage_options = _with_least_resolution(stage_options, options, prepared, layouts)
+    result = evaluate(prepared, layouts, replace(stage_options, method=FREE))
     energies = [candidate.energy for candidate in candidates.values()]
     result = with_notes(result, options, energies, _count_forbidden(components, layouts))
     return result if shared is None else with_shared_texels(result, shared, prepared)
@@ -137,28 +137,28 @@ def _without_shared(source: Source, options: Options, stack: str) -> tuple[Prepa
 
 
 def _with_expected_resolution(
-    of_stages: Options, options: UnwrapOptions, components: Sequence[Component], exponent: int
+    stage_options: Options, options: UnwrapOptions, components: Sequence[Component], exponent: int
 ) -> Options:
     """Return options with about the resolution that a texel density needs; exponent: see `CheckedMesh`."""
     if options.texel_density is None:
-        return of_stages
+        return stage_options
     with np.errstate(over="ignore"):  # a model that is too large for any texture
         areas = np.ldexp(_double_areas_of(components) / 2, -2 * exponent)
     expected = expected_resolution(options.texel_density, areas, options.padding, options.tiles)
-    return replace(of_stages, resolution=expected)
+    return replace(stage_options, resolution=expected)
 
 
 def _with_least_resolution(
-    of_stages: Options, options: UnwrapOptions, prepared: Prepared, layouts: Sequence[Layout]
+    stage_options: Options, options: UnwrapOptions, prepared: Prepared, layouts: Sequence[Layout]
 ) -> Options:
     """Return options with the resolution that a texel density needs with given layouts."""
     if options.texel_density is None:
-        return of_stages
+        return stage_options
     with stage("pack"):
-        scale_at = packed_scale(prepared, layouts, of_stages)
-        start = of_stages.resolution
+        scale_at = packed_scale(prepared, layouts, stage_options)
+        start = stage_options.resolution
         resolution = least_resolution(options.texel_density, options.padding, start, scale_at)
-    return replace(of_stages, resolution=resolution)
+    return replace(stage_options, resolution=resolution)
 
 
 def _double_areas_of(components: Sequence[Component]) -> FloatArray:
@@ -232,19 +232,22 @@ def _groups(minor: IntArray, sizes: IntArray) -> Iterator[list[int]]:
 
 
 def _cut_to_pack(
-    models: Models, candidates: Mapping[int, Candidate], options: UnwrapOptions, of_stages: Options
+    models: Models, candidates: Mapping[int, Candidate], options: UnwrapOptions, stage_options: Options
 ) -> dict[int, Candidate]:
     """Return candidates with charts cut further, into a number of them or for a tighter packing.
 
     The bound is met again afterwards: tips of seams move, and small charts are joined to others.
     """
     order = list(models)
-    costs: Callable[[int], FloatArray] = lambda k: models[order[k]].costs  # noqa: E731
+
+    def costs(k: int) -> FloatArray:
+        return models[order[k]].costs
+
     layouts = [candidates[i].layout for i in order]
     if isinstance(options.charts, int):
         layouts = cut_into(layouts, costs, options.charts)
     elif options.charts == "atlas" and options.up is None and np.isfinite(options.bound):
-        layouts = cut_for_packing(layouts, costs, options.padding / of_stages.resolution)
+        layouts = cut_for_packing(layouts, costs, options.padding / stage_options.resolution)
     finished = {}
     for i, layout in zip(order, layouts, strict=True):
         candidate, model = candidates[i], models[i]

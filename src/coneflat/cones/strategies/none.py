@@ -34,10 +34,3 @@ def coneless_solution(surface: Surface, spec: ConeSpec) -> ConeSolution | None:
     if is_searched or not (absorbs.any() or chi == 0):
         return None
     return cones_at(surface.laplacian, surface.curvature, absorbs, chi, NO_CONES)
-
-
-def leaves_flat_disks(spec: ConeSpec) -> bool:
-    """Return whether a flat disk gets no cones by any search: none are requested, and its boundary is free."""
-    is_free = not (spec.prescribes_boundary or spec.searches_corners or spec.strategy == "greedy")
-    has_vertices = len(spec.prescribed) or len(spec.required)
-    return is_free and not has_vertices and spec.count is None and spec.quantum is None
