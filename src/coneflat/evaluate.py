@@ -82,6 +82,7 @@ def evaluate(
     layouts: Sequence[Layout],
     options: Options,
     overlaps: Overlaps | None = None,
+    notes: Sequence[str] = (),
 ) -> Flattening:
     """Return the result of a flattening: packed, in the input's numbering, measured, with notes on unmet guarantees.
 
@@ -90,6 +91,7 @@ def evaluate(
         layouts: the layouts of its components.
         options: the options; the result records them.
         overlaps: overlapping pairs of the result's triangles; None to compute them.
+        notes: further notes.
     """
     checked, input_mesh = prepared.checked, prepared.input_mesh
     with stage("pack"):
@@ -98,7 +100,9 @@ def evaluate(
     with stage("measure"):
         curvatures = _Curvatures.of(prepared, layouts, numbering)
         cones = numbering.renumber([layout.cones for layout in layouts])
-        packed, distortion = _measured(prepared, mesh, cones, curvatures, packed, options, overlaps)
+        packed, distortion = _separated_and_measured(
+            prepared, mesh, cones, curvatures, packed, options, overlaps
+        )
         rotations = _rotations(layouts, packed.uv[packed.component_corners], options)
         weights = [layout.area if len(layouts) > 1 else 1.0 for layout in layouts]
         statistics = SolveStatistics.of_all([layout.statistics for layout in layouts], weights)
@@ -124,7 +128,7 @@ def evaluate(
         ),
         distortion=distortion.rescaled(checked.exponent * np.log(2)),
         seconds=stage_seconds(),
-        notes=(*checked.notes, *prepared.notes, *counted_notes([layout.notes for layout in layouts])),
+        notes=(*checked.notes, *prepared.notes, *counted_notes([layout.notes for layout in layouts]), *notes),
         settings=settings(options),
         solve=statistics,
         rotations=rotations,
@@ -162,7 +166,7 @@ class _Curvatures:
         return cls(target, residual, prescribed)
 
 
-def _measured(
+def _separated_and_measured(
     prepared: Prepared,
     mesh: TriangleMesh,
     cones: IntArray,

@@ -108,8 +108,8 @@ def flatten_source(
             prepared, layouts = cut_along_sharp_edges(
                 source, prepared, layouts, options, partial(flatten_components, steps=steps)
             )
-        layouts[0] = layouts[0].with_notes(*bound_notes(prepared.components, layouts, options))
-        return evaluate(prepared, layouts, options)
+        notes = tuple(bound_notes(prepared.components, layouts, options))
+        return evaluate(prepared, layouts, options, notes=notes)
 
 
 def flatten_components(

@@ -88,10 +88,14 @@ def test_more_quads_than_fit_into_memory_are_refused_before_any_work(monkeypatch
 def test_the_limit_is_that_of_the_number_requested_or_of_the_triangles(requested, triangles, limit):
     square_limit = SquareLimit.of(requested, triangles, 1.0)
     assert square_limit.squares == limit
-    assert square_limit.excess(limit) == ""
-    assert square_limit.excess(math.nan) == square_limit.excess(math.inf) == "the nearest grid is not finite"
+    assert square_limit.violation(limit) == ""
+    assert (
+        square_limit.violation(math.nan)
+        == square_limit.violation(math.inf)
+        == "the nearest grid is not finite"
+    )
     advice = "use fewer quads" if limit == 2e5 else f"use at least {math.ceil((limit + 1) / 16)} quads"
-    assert advice in square_limit.excess(limit + 1)
+    assert advice in square_limit.violation(limit + 1)
 
 
 def test_a_grid_with_cones_at_the_corners_of_a_surface_is_not_smaller_than_they_need():

@@ -92,7 +92,7 @@ def relax(
             its lower bound.
         steps: maximum number of Newton steps.
         progress: called after each step with its number and the energy; if it returns True, the iteration ends with
-            the current result.
+            the current result, or with an error if constraints do not hold yet.
 
     Returns:
         The relaxed layout.

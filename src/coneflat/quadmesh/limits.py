@@ -74,7 +74,7 @@ class SquareLimit:
         """The limit itself."""
         return min(MAX_TIMES * self.requested, 2 * most_squares(self.triangles))
 
-    def excess(self, squares: float) -> str:
+    def violation(self, squares: float) -> str:
         """Return what is wrong with a number of squares above the limit; "" if nothing.
 
         The number is NaN or infinite where a map is not finite.
@@ -103,7 +103,7 @@ class SquareLimit:
 
         quarters: (k,) the angles in quarter turns.
         """
-        if text := self.excess(float(quarters.sum()) / 4):
+        if text := self.violation(float(quarters.sum()) / 4):
             raise GridError(f"{plural(len(quarters), 'cone')} of the surface: {text}")
 
 

@@ -269,7 +269,7 @@ def components_apart(request: GridRequest) -> Outcome:
         else:
             count = plural(len(part.faces), "triangle")
             reasons.append(Unmet(f"No grid for a component of {count}: {outcome.reason}."))
-        if excess := request.limit.excess(sum(grid.squares for grid in grids)):
+        if excess := request.limit.violation(sum(grid.squares for grid in grids)):
             return NoGrid(GridError(excess))
     if not grids:
         reason = reasons[0] if reasons else "they have no area."

@@ -229,7 +229,7 @@ def integer_grid(
 
 def _require_sound(quad_mesh: QuadMesh, limit: SquareLimit) -> None:
     """Raise GridError for more quads than a limit, or coordinates that are not finite."""
-    if text := limit.excess(len(quad_mesh.quads)):
+    if text := limit.violation(len(quad_mesh.quads)):
         raise GridError(text)
     if bad := int((~np.isfinite(quad_mesh.vertices).all(axis=1)).sum()):
         raise GridError(f"{plural(bad, 'vertex', 'vertices')} of quads without a place: use fewer quads")

@@ -67,7 +67,7 @@ def relaxed_grid(
                 continue
             break
         snapped = replace(layout, points=_snapped(relaxed, transitions, values))
-        if reason := goal.limit.excess(snapped.area):
+        if reason := goal.limit.violation(snapped.area):
             break
         if _folds_sides(layout, transitions, snapped.points):
             reason = "sides of triangles on grid lines change their direction"

@@ -23,7 +23,7 @@ from ..view import outline_halfedges
 from .choices import DECLARED, Choices
 
 #: File formats of quads.
-QUADS = (".obj", ".ply", ".glb")
+QUAD_FORMATS = (".obj", ".ply", ".glb")
 MAX_QUADS = 1_000_000
 #: Options that apply to curves, and those that apply to quads.
 CURVE_OPTIONS = (
@@ -79,7 +79,7 @@ def quads_file(source: Joined, choices: Choices, count: int, ending: str, report
         source: the mesh.
         choices: the choices of the user.
         count: approximate number of quads.
-        ending: one of `QUADS`.
+        ending: one of `QUAD_FORMATS`.
         report: called like `progress` of `coneflat.flatten`.
     """
     from ... import quads

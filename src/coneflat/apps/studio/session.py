@@ -16,7 +16,7 @@ from ...io import read_joined
 from ...options import as_integer
 from .choices import Choices
 from .messages import command_line, misplaced_warning, python_lines
-from .outputs import MAX_QUADS, QUADS, RESULT_FILES, curve_options
+from .outputs import MAX_QUADS, QUAD_FORMATS, RESULT_FILES, curve_options
 from .project import Project, file_within, open_project
 from .steps import STEPS, History
 from .worker import Head, SentPictures, Worker
@@ -275,8 +275,10 @@ class Session:
             StudioError: no mesh is open, the format is unknown, or the choices were changed.
             OptionError: the number is not an integer.
         """
-        if ending not in QUADS:
-            raise StudioError(f"unknown format {short_repr(ending)} of quads: choose from {', '.join(QUADS)}")
+        if ending not in QUAD_FORMATS:
+            raise StudioError(
+                f"unknown format {short_repr(ending)} of quads: choose from {', '.join(QUAD_FORMATS)}"
+            )
         number = as_integer("the number of quads", count)
         if not 1 <= number <= MAX_QUADS:
             raise StudioError(f"the number of quads must be from 1 to {MAX_QUADS:,}, got {number:,}")
