@@ -170,7 +170,7 @@ def test_scales_of_a_plane_that_is_stretched_in_half():
 
 @pytest.mark.parametrize("exponent", [-300, 300])
 def test_measured_scales_follow_the_metric(exponent):
-    """Of a fine mesh they are the log scale, but for the size of the layout."""
+    """Of a fine mesh they are the log conformal factor, but for the size of the layout."""
     vertices, faces = shapes.hill(60, 50)
     result = coneflat.flatten(np.ldexp(vertices, exponent), faces, distortion=0.1)
     scale = result.seam_data.vertex_log_scale - np.log(result.uv_scale)

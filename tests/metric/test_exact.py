@@ -177,7 +177,7 @@ class TestTwoRoutes:
 
 class TestInvariance:
     def test_scale_and_gauge(self):
-        """The log scale does not see the unit of length, and the total area stays."""
+        """The log conformal factor does not see the unit of length, and the total area stays."""
         mesh = TriangleMesh(*shapes.sphere(3))
         target = cones_on(mesh, [np.pi, 2.5 * np.pi - np.pi, 1.5 * np.pi])
         metric = exact_metric(mesh, lengths_of(mesh), target)

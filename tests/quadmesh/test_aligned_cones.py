@@ -70,7 +70,7 @@ def test_short_sharp_edges_are_noise():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["box", "torus", "genus 2", "hill"])
 def test_the_linear_model_agrees_with_an_exact_map(name):
-    """Between two sets of cones that differ a little, log scale and rotation change by nearly the same."""
+    """Between two sets of cones that differ a little, log conformal factor and rotation change by nearly the same."""
     mesh = mesh_of(name)
     preferred = preferred_directions(mesh).combined
     start = field_indices(mesh, smoothest_cross_field(mesh, preferred_directions(mesh)))

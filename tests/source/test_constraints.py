@@ -26,7 +26,7 @@ def painted_ply(path, vertices, faces, red):
 
 
 def spread(result, where):
-    """Return the standard deviation of the log scale over some vertices."""
+    """Return the standard deviation of the log conformal factor over some vertices."""
     return np.std(result.log_scale[where])
 
 

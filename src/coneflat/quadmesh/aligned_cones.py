@@ -1,8 +1,8 @@
 """Cones of a quad mesh: few, for even sizes, and for grid lines along preferred directions.
 
 The search starts from the singular vertices of the smoothest cross field. In the linear model of conformal maps, the
-log scale and the rotation of each triangle are linear functions of the cones' curvatures. The search adds a quarter
-turn at one vertex and subtracts one at another as long as the cost decreases. This moves cones, and adds or removes
+log conformal factor and the rotation of each triangle are linear functions of the cones' curvatures. The search adds a
+quarter turn at one vertex and subtracts one at another as long as the cost decreases. This moves cones, and adds or removes
 pairs of them.
 """
 
@@ -70,7 +70,7 @@ def aligned_flattening(
         options: those of `integer_grid`.
         stages: the stopwatch.
         sharp_angle: dihedral angle of edges that are required on grid lines, or None.
-        log_scale: (n,) the target log scale at the vertices, or None for equal sizes.
+        log_scale: (n,) the target log conformal factor at the vertices, or None for equal sizes.
         limit: largest number of squares of a grid.
 
     Raises:
@@ -130,12 +130,12 @@ def aligned_cones(
 
     Args:
         mesh: connected mesh.
-        distortion: area distortion that should not be exceeded: the standard deviation of the log scale.
+        distortion: area distortion that should not be exceeded: the standard deviation of the log conformal factor.
         min_quarters, max_quarters: bounds of the curvature of cones.
         price: cost of a cone, 1 by default.
         sharp_angle: dihedral angle of edges that grid lines must follow, radians; None: that from which on they prefer
             to, and other directions count as much.
-        log_scale: (n,) the log scale from which the distortion deviates, up to a constant; None for equal sizes.
+        log_scale: (n,) the log conformal factor from which the distortion is measured, up to a constant; None for 0.
         limit: largest number of squares of a grid.
 
     Raises:

@@ -1,4 +1,4 @@
-"""The linear model of conformal maps: log scale and rotation of triangles as functions of the curvatures of cones."""
+"""The linear model of conformal maps: log conformal factor and rotation of triangles by the curvatures of cones."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from ..mesh.connectivity import TriangleMesh
 from .cross_field import edge_rotations, halfedge_angles
 from .features import vertex_graph
 
-# Numbers of regions over which the log scale and the directions are summed.
+# Numbers of regions over which the log conformal factor and the directions are summed.
 REGIONS, SAMPLES = 500, 250
 
 
@@ -41,8 +41,8 @@ class MapModel:
         curvature: (p,) the angle defects of the surface there, in quarter turns.
         centres: indices of places that are the centres of regions; each is far from the previous ones.
         spacing: mean distance of the centres.
-        scales: (r, p + 1) change of the mean log scale of each region by a quarter turn, times the root of the region's
-            share of the area.
+        scales: (r, p + 1) change of the mean log conformal factor of each region by a quarter turn, times the root of
+            the region's share of the area.
         turns: (s, p + 1) four times the rotation of samples by a quarter turn.
         loops: (l, p + 1) the same for the rotations along handles.
         min_quarters, max_quarters: (p + 1,) bounds of the curvatures.
@@ -65,7 +65,7 @@ class MapModel:
             preferred: (m,) preferred crosses of triangles, weighted.
             min_quarters, max_quarters: bounds of the curvature of cones, in quarter turns.
             triangles: (n,) the number of triangles at each vertex in the mesh that gets the cones.
-            log_scale: (n,) the target log scale, up to a constant; None for 0.
+            log_scale: (n,) the target log conformal factor, up to a constant; None for 0.
         """
         lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces), mesh)
         angles, count = corner_angles(lengths), len(mesh.vertices)
@@ -128,7 +128,7 @@ class MapModel:
         return float(2 * (high - low))
 
     def state(self, indices: IntArray) -> tuple[FloatArray, ComplexArray, ComplexArray]:
-        """Return how far log scales of regions (r,) are off, crosses of samples (s,), and rotations of loops (l,)."""
+        """Return the errors of log conformal factors of regions (r,), crosses of samples (s,) and rotations of loops (l,)."""
         step = indices - self._at
         changed = np.flatnonzero(step)
         turned, looped = (matrix[:, changed] @ step[changed] for matrix in (self.turns, self.loops))
@@ -179,7 +179,7 @@ class _Poisson:
         return solution - self.share @ solution
 
     def functional(self, rows: csr_matrix, places: IntArray) -> FloatArray:
-        """Return (k, p) the values of linear functionals (k, n) of the log scale for a quarter turn at each place."""
+        """Return (k, p) the values of linear functionals (k, n) of the log conformal factor for a quarter turn at places."""
         values = np.empty((rows.shape[0], len(places)))
         for start in range(0, rows.shape[0], 64):  # not all at once, which would take much memory
             block = slice(start, start + 64)
@@ -214,11 +214,11 @@ class _Rotations:
         edges = np.searchsorted(self.inner, mesh.halfedge_edges[crossed])
         signs = np.where(first[edges] == crossed, 1.0, -1.0)
         self._around = csr_matrix((signs, (of_loop, edges)), shape=(len(loops) - 1, len(first)))
-        # The matrix (l, n) from the log scale to the rotations of loops.
+        # The matrix (l, n) from the log conformal factor to the rotations of loops.
         self.loops = csr_matrix(self._around @ self.change)
 
     def of_frames(self, log_scale: FloatArray) -> FloatArray:
-        """Return (m,) the rotations of first half-edges in the plane for a log scale (n,)."""
+        """Return (m,) the rotations of first half-edges in the plane for a log conformal factor (n,)."""
         steps = np.pi - self.by_edge + self.change @ log_scale
         total, before = np.where(self.edge < 0, 0.0, self.sign * steps[self.edge]), self.before
         while (before != self.root).any():
@@ -227,7 +227,7 @@ class _Rotations:
         return total
 
     def to_frames(self, faces: IntArray) -> csr_matrix:
-        """Return (k, n) the matrix from the log scale to the rotation of the first half-edges of triangles."""
+        """Return (k, n) the matrix from the log conformal factor to rotations of the first half-edges of triangles."""
         row, face, path = np.arange(len(faces)), faces, list[tuple[IntArray, IntArray]]()
         while len(face):
             is_below_root = face != self.root
@@ -239,12 +239,12 @@ class _Rotations:
         return csr_matrix(csr_matrix(parts, shape=(len(faces), len(self.inner))) @ self.change)
 
     def around_loops(self, log_scale: FloatArray) -> FloatArray:
-        """Return (l,) the rotations around loops for a log scale (n,), up to half turns."""
+        """Return (l,) the rotations around loops for a log conformal factor (n,), up to half turns."""
         return np.asarray(self._around @ (np.pi - self.by_edge + self.change @ log_scale))
 
 
 def _angle_changes(mesh: TriangleMesh, angles: FloatArray) -> csr_matrix:
-    """Return (3m, n) the matrix from the log scale to the change of the directions of half-edges in their triangles.
+    """Return (3m, n) the matrix from the log conformal factor to the directions of half-edges in their triangles.
 
     A corner i changes by (cot k (u_j - u_i) + cot j (u_k - u_i)) / 2.
     """

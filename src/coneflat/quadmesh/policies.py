@@ -252,7 +252,7 @@ def components_apart(request: GridRequest) -> Outcome:
     for part, vertices, faces in mesh.split_components():
         if not areas[faces].any():  # nothing of a component without area can be seen
             continue
-        # The mean of the log scale on the component, relative to that on all components.
+        # The mean of the log conformal factor on the component, relative to that on all components.
         mean = np.average(of_face[faces], weights=areas[faces]) - np.average(of_face, weights=areas)
         outcome = find_grid(
             replace(

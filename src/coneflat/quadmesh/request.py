@@ -140,7 +140,7 @@ class GridRequest:
 
     @cached_property
     def scales(self) -> FloatArray | None:
-        """(n,) the target log scale at the vertices of the checked mesh, if relative sizes are given."""
+        """(n,) the target log conformal factor at the vertices of the checked mesh, if relative sizes are given."""
         return None if self.sizes is None else target_scales(self.source, self.checked, self.sizes)
 
     @property

@@ -20,7 +20,7 @@ from .integer_map import IntegerGrid
 
 
 def target_scales(source: Source, checked: CheckedMesh, sizes: Any) -> FloatArray:
-    """Return (n,) the target log scale of a flattening at the vertices of a checked mesh: minus the log of the sizes.
+    """Return (n,) the target log conformal factor of a flattening at the vertices of a mesh: minus the log of the sizes.
 
     Args:
         source: the input.
@@ -40,7 +40,7 @@ def target_scales(source: Source, checked: CheckedMesh, sizes: Any) -> FloatArra
 
 
 def _scales_of_curvature(mesh: TriangleMesh, ratio: float = 4.0) -> FloatArray:
-    """Return (n,) log scales at which quads of the same size deviate equally from the surface.
+    """Return (n,) log conformal factors at which quads of the same size deviate equally from the surface.
 
     An edge of length h deviates by h^2 / 8 times the curvature, so that sizes are inverse to its root. The curvature is
     the root of the sum of the squared principal curvatures, averaged over the same radius as their directions. Values
@@ -79,7 +79,7 @@ def extended(values: FloatArray, mesh: TriangleMesh) -> FloatArray:
 def note_on_sizes(grid: IntegerGrid, target_scale: FloatArray) -> str:
     """Return a note on how well the sizes of the squares of a grid agree with the target sizes, up to a common factor.
 
-    target_scale: (k,) the log scale at the first vertices of the grid.
+    target_scale: (k,) the log conformal factor at the first vertices of the grid.
     """
     mesh = TriangleMesh(grid.vertices, grid.faces)
     number = signed_double_areas(grid.corner_grid)
