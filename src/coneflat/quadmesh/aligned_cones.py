@@ -2,8 +2,8 @@
 
 The search starts from the singular vertices of the smoothest cross field. In the linear model of conformal maps, the
 log conformal factor and the rotation of each triangle are linear functions of the cones' curvatures. The search adds a
-quarter turn at one vertex and subtracts one at another as long as the cost decreases. This moves cones, and adds or removes
-pairs of them.
+quarter turn at one vertex and subtracts one at another as long as the cost decreases. This moves cones, and adds or
+removes pairs of them.
 """
 
 from __future__ import annotations

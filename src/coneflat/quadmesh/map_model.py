@@ -128,7 +128,7 @@ class MapModel:
         return float(2 * (high - low))
 
     def state(self, indices: IntArray) -> tuple[FloatArray, ComplexArray, ComplexArray]:
-        """Return the errors of log conformal factors of regions (r,), crosses of samples (s,) and rotations of loops (l,)."""
+        """Return the errors of log conformal factors of regions (r,), of crosses of samples (s,), of loops (l,)."""
         step = indices - self._at
         changed = np.flatnonzero(step)
         turned, looped = (matrix[:, changed] @ step[changed] for matrix in (self.turns, self.loops))
@@ -179,7 +179,7 @@ class _Poisson:
         return solution - self.share @ solution
 
     def functional(self, rows: csr_matrix, places: IntArray) -> FloatArray:
-        """Return (k, p) the values of linear functionals (k, n) of the log conformal factor for a quarter turn at places."""
+        """Return (k, p) linear functionals (k, n) of the log conformal factor for a quarter turn at each place."""
         values = np.empty((rows.shape[0], len(places)))
         for start in range(0, rows.shape[0], 64):  # not all at once, which would take much memory
             block = slice(start, start + 64)

@@ -20,7 +20,7 @@ from .integer_map import IntegerGrid
 
 
 def target_scales(source: Source, checked: CheckedMesh, sizes: Any) -> FloatArray:
-    """Return (n,) the target log conformal factor of a flattening at the vertices of a mesh: minus the log of the sizes.
+    """Return (n,) the target log conformal factor of a flattening at the vertices: minus the log of the sizes.
 
     Args:
         source: the input.
