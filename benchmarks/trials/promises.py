@@ -41,7 +41,7 @@ SENTENCES = {
     "angles": r"Around [\d,]+ (vertex|vertices) the angle sum differs from its target",
     "sides": r"The two sides of seams differ in length|.* no seam or cone is exact",
     "lengths": r"Lengths along the boundary are not preserved",
-    "round": r"The boundary is not quite round",
+    "round": r"The boundary is not a circle",
     "needles": r"[\d,]+ triangles? with a QC distortion above 1000|There (is|are) .*(flipped|degenerate) triangle",
     "rotations": r"Seam rotations are .* rad off multiples of [\d.e+-]+ rad",
     "area": r"The triangles of (all components|a component) have an area distortion",

@@ -162,12 +162,12 @@ def test_arrays_that_do_not_fit_the_mesh_are_refused():
 
 def test_a_round_boundary_that_is_none_is_told():
     result = flatten(*shapes.grid(6, 5), boundary="disk")
-    assert not any("not quite round" in note for note in result.notes)
+    assert not any("not a circle" in note for note in result.notes)
     rim = TriangleMesh(result.vertices, result.faces).is_boundary_vertex
     uv = result.uv.copy()
     point = result.uv_faces[np.isin(result.faces, np.flatnonzero(rim))][0]
     uv[point] += 0.3 * (uv.mean(axis=0) - uv[point])
-    assert any("not quite round: at vertex" in note for note in unmet_guarantees(spoiled(result, uv)))
+    assert any("not a circle: at vertex" in note for note in unmet_guarantees(spoiled(result, uv)))
 
 
 def test_needles_are_named():

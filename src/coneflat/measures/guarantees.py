@@ -282,7 +282,7 @@ def _round_boundary(result: Flattening, unit: float) -> Iterator[str]:
     worst = int(np.argmax(off))
     if off[worst] > NOT_ROUND:
         yield (
-            f"The boundary is not quite round: at vertex {on_round[worst]} it turns by "
+            f"The boundary is not a circle: at vertex {on_round[worst]} it turns by "
             f"{-missing[on_round[worst]]:.3g} rad instead of {even[worst]:.3g} rad."
         )
 
@@ -316,5 +316,5 @@ def _distortion(result: Flattening) -> Iterator[str]:
     if len(needles):
         yield (
             f"{plural(len(needles), 'triangle')} with a QC distortion above {NEEDLE_QC:g}: {list_some(needles)}; up to "
-            f"{measures.qc_max:.2g}. Remesh there, if they cover a visible area."
+            f"{measures.qc_max:.2g}. Remesh there if this area is visible."
         )

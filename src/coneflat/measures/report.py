@@ -136,7 +136,7 @@ def _curvature_row(d: Distortion) -> Row:
     error, largest = (
         f"{number_text(value, '.2e')} pi" for value in (d.curvature_error, d.curvature_error_max)
     )
-    return "curvature error", error, f"||target - K|| / n; worst {largest}"
+    return "curvature error", error, f"||target - K|| / n; maximum {largest}"
 
 
 def _metric_row(result: Flattening) -> Row:
@@ -164,7 +164,7 @@ def _solved_map_rows(result: Flattening) -> dict[str, Row]:
                 number_text(solve.qc_mean_unrelaxed, ".4f"),
                 number_text(solve.qc_max_unrelaxed, ".4g"),
             )
-            relaxed = f"; before {moved} {mean}, worst {largest}"
+            relaxed = f"; before {moved} {mean}, maximum {largest}"
         name, value, meaning = rows["QC distortion"]
         rows["QC distortion"] = (name, value, meaning + relaxed)
     return rows
@@ -176,7 +176,7 @@ def map_rows(d: Distortion) -> dict[str, Row]:
         (
             "QC distortion",
             number_text(d.qc_mean, ".4f"),
-            f"1 is conformal; 95% below {number_text(d.qc_p95, '.4f')}, worst {number_text(d.qc_max, '.4g')}",
+            f"1 is conformal; p95 {number_text(d.qc_p95, '.4f')}, maximum {number_text(d.qc_max, '.4g')}",
         ),
         (
             "area distortion",
@@ -192,24 +192,24 @@ def map_rows(d: Distortion) -> dict[str, Row]:
         (
             "degenerate",
             f"{d.degenerate:,}",
-            f"without area in the plane; {d.degenerate_input:,} have none on the model",
+            f"without area in the plane; {d.degenerate_input:,} without area on the model",
         ),
         (
             "overlap",
             f"{number_text(100 * d.overlap, '.3g')} %" if d.overlapping_pairs else "none",
-            f"of the covered area is covered twice; {plural(d.overlapping_pairs, 'pair')} of triangles",
+            f"of the covered area is in several triangles; {plural(d.overlapping_pairs, 'pair')} of triangles overlap",
         ),
-        ("charts", f"{d.charts:,}", f"pieces of the layout; {d.mirrored_charts:,} mirrored"),
+        ("charts", f"{d.charts:,}", f"UV islands; {d.mirrored_charts:,} mirrored"),
         (
             "texel density",
             number_text(d.density_spread, ".3f"),
-            "spread: 95% quantile divided by 5% quantile",
+            "spread: 95th percentile divided by 5th percentile",
         ),
         ("seam length", number_text(d.seam_length, ".3f"), "divided by the square root of the area"),
         (
             "seam mismatch",
             number_text(d.seam_mismatch, ".1e"),
-            f"relative, of the lengths of both sides; worst {number_text(d.seam_mismatch_max, '.1e')}",
+            f"relative, of the lengths of both sides; maximum {number_text(d.seam_mismatch_max, '.1e')}",
         ),
     )
     return {row[0]: row for row in rows}

@@ -55,7 +55,7 @@ class Requirement:
         """Return a message if a report violates the requirement, else None; unknown values violate it."""
         value = measures.get(self.name)
         if not isinstance(value, (int, float)) or not math.isfinite(value):
-            return f"{self.name} is unknown, but {self} is required"
+            return f"{self.name} has no value, but {self} is required"
         pairs = measures.get("overlapping_pairs")
         if self.name == "overlap" and value == 0 and isinstance(pairs, int) and pairs > 0:
             # Overlaps also count if their fraction of the area is rounded to zero.
