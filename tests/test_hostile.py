@@ -225,7 +225,7 @@ def test_data_that_are_lost_without_a_note_are_found(monkeypatch):
 def test_triangles_that_rounding_destroys_are_found(monkeypatch):
     seeds = range(24)
     assert not any(run_case("offset", seed).breaches for seed in seeds)
-    monkeypatch.setattr("coneflat.io.gltf.positions.FAR", np.inf)
+    monkeypatch.setattr("coneflat.io.gltf.positions.MAX_DISTANCE", np.inf)
     causes = [cause for seed in seeds for cause, _ in run_case("offset", seed).breaches]
     assert "offsets: .glb is another shape" in causes
 
