@@ -222,8 +222,9 @@ def _equal_sides(result: Flattening, unit: float) -> Iterator[str]:
     is_marked = any(settings.get(name) is not None for name in ("seams", "sharp_angle"))
     is_tied = is_marked and settings.get("method") != "free seams"
     tolerance = EXACT_TOLERANCE if _is_exact(result) else ROUGH_TOLERANCE if is_tied else np.inf
-    if not result.distortion.seam_mismatch_max > tolerance:
+    if not np.isfinite(tolerance):
         return
+    # Also edges whose sides are so close that they are measured as no seam.
     mesh = TriangleMesh(result.vertices, result.faces)
     first, second = (
         np.abs(sides_between(result.corner_uv)).ravel()[mesh.edge_halfedges[~mesh.is_boundary_edge]].T
