@@ -87,7 +87,7 @@ def lay_out_component(surface: ConeSurface, component: Component, steps: Steps) 
     cones = find_cones(surface, replace(component.cones, rotations=rotations))  # Sections 3.1 and 3.2
     metric = steps.find_metric(surface, cones, component.metric)  # 2.3
     costs = seam_costs(component.mesh, component.lengths, component.seams, cones.is_polyhedral)
-    disk = cut_to_disk(component.mesh, cones.cones, costs, component.seams)  # 4.2
+    disk = cut_to_disk(component.mesh, cones.cones, costs, component.seams)  # 4.3
     layout = lay_out(metric, disk, steps.untangles)  # 4.3
     areas = weighted_areas(surface.areas, component.cones.weights)
     return layout.with_area_distortion(cones.log_scale, areas).with_notes(*cones.notes)

@@ -9,11 +9,16 @@ import shapes
 import coneflat
 from coneflat.atlas import pack_charts
 from coneflat.atlas.charts import Outlines, read_charts
-from coneflat.atlas.orient import border_directions, straight_directions, straight_runs
+from coneflat.atlas.orient import border_directions, straight_runs
 from coneflat.atlas.pack import arrange_charts
 
 CROSS = ((1, 0), (0, 1), (1, 1), (2, 1), (3, 1), (1, 2))
 ANGLES = (0.0, np.pi / 4, 1.234)
+
+
+def straight_directions(sides):
+    """Return the directions of the straight parts of one border, (s, 2) sides in any order."""
+    return border_directions(Outlines(sides, np.array([0, len(sides)])))[0]
 
 
 def squares(places, cells: int = 1, turn: float = 0.0, noise: float = 0.0):

@@ -27,7 +27,11 @@ RELATIVE_TOLERANCE = 1e-6
 
 
 def border_directions(outlines: Outlines) -> list[FloatArray]:
-    """Return for each chart the directions of the straight parts of its border, see `straight_directions`."""
+    """Return for each chart the directions, radians in [0, pi / 2), of the straight parts of its border.
+
+    There are none if too little is straight. Perpendicular directions count as one. Several directions are returned
+    only if the same length of the border is in each, as for a regular polygon.
+    """
     runs, chart = straight_runs(outlines)
     lengths, angles = np.abs(runs), np.mod(np.angle(runs), HALF_PI)
     order = np.lexsort((angles, chart))
@@ -242,18 +246,6 @@ def fill_hull(points: FloatArray, hull: IntArray) -> int:
     return count
 
 
-def straight_directions(sides: ComplexArray) -> FloatArray:
-    """Return the directions, radians in [0, pi / 2), of the straight parts of a border; none if too little is straight.
-
-    Perpendicular directions count as one. Several directions are returned only if the same length of the border is in
-    each, as for a regular polygon.
-
-    Args:
-        sides: (s, 2) start and end of each side of an outline as complex numbers, in any order.
-    """
-    return border_directions(Outlines(sides, np.array([0, len(sides)])))[0]
-
-
 @compiled
 def common_directions(
     angles: FloatArray, lengths: FloatArray, start: IntArray, borders: FloatArray
@@ -321,7 +313,7 @@ def along_axes(directions: list[FloatArray], turned: FloatArray, angles: FloatAr
     """Return (k, t) True for the angles that rotate a chart's straight border closest to the axes; all if it has none.
 
     Args:
-        directions: for each of k charts the directions of its straight border, see `straight_directions`.
+        directions: for each of k charts the directions of its straight border, see `border_directions`.
         turned: (k,) the angle by which each chart is already rotated, radians.
         angles: (k, t) further rotation angles to choose from, radians.
     """

@@ -105,11 +105,11 @@ def descend(
     """
     report = progress or (lambda step, energy: None)
     if not problem.motions.has_offset:
-        return minimise(points, problem, tolerance, steps, report)
+        return minimise_energy(points, problem, tolerance, steps, report)
     start = reach_constraints(points, problem, steps, report, stride)
     if start.remaining or not problem.elements.count:
         return start
-    end = minimise(
+    end = minimise_energy(
         start.points,
         problem,
         tolerance,
@@ -165,7 +165,9 @@ def feasible_length(problem: Problem, maps: Maps, change: Maps, first: float) ->
     return float(lengths[0])
 
 
-def minimise(points: ComplexArray, problem: Problem, tolerance: float, steps: int, report: Report) -> Descent:
+def minimise_energy(
+    points: ComplexArray, problem: Problem, tolerance: float, steps: int, report: Report
+) -> Descent:
     """Return points of lower energy; see `descend` for the arguments.
 
     Notes:

@@ -47,7 +47,7 @@ def find_seams(
         OptionError: costs are not positive numbers.
 
     Notes:
-        Cones and boundary loops are connected by an approximate Steiner tree (Section 4.2 of the paper): the shortest
+        Cones and boundary loops are connected by an approximate Steiner tree (Section 4.3 of the paper): the shortest
         paths from all of them divide the vertices into regions, and a minimum spanning tree is chosen of the cheapest
         paths between regions; it costs at most twice as much as the cheapest tree. On a surface of genus g, 2 g loops
         from a tree-cotree decomposition are added, each the shortest through its edge.
@@ -91,7 +91,7 @@ def find_seams(
 
 @stage("cut")
 def cut_to_disk(mesh: TriangleMesh, cones: IntArray, costs: FloatArray, spec: SeamSpec) -> Cut:
-    """Return a connected mesh cut open to a disk with the cones on its border (Section 4.2 of the paper).
+    """Return a connected mesh cut open to a disk with the cones on its border (Section 4.3 of the paper).
 
     Args:
         mesh: the mesh.

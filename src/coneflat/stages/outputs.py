@@ -46,7 +46,6 @@ class ConeSolution:
             not prescribed.
         inverse: the factorized Laplacian that gave phi, if it still exists: solutions are zero on the boundary,
             or have zero mean without one.
-        is_searched: the sparse search chose the cones, so that others can be tried.
         notes: unmet requests, one sentence each.
     """
 
@@ -54,7 +53,6 @@ class ConeSolution:
     target: FloatArray
     log_scale: FloatArray
     inverse: LaplacianInverse | None = None
-    is_searched: bool = False
     notes: tuple[str, ...] = ()
 
     @property

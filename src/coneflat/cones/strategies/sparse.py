@@ -35,7 +35,7 @@ def place_sparse(surface: ConeSurface, spec: ConeSpec) -> ConeSolution:
     if coneless is not None:
         return replace(coneless, notes=unmet_requests(mesh, coneless.cones, 0.0, spec))
     if needs_no_cone(surface, spec):
-        return replace(surface.linear_model(spec).solution_of(NO_CONES, np.empty(0)), is_searched=True)
+        return surface.linear_model(spec).solution_of(NO_CONES, np.empty(0))
     search = surface.search(spec)
     result: SparseCones | QuantisedCones
     if spec.quantum is not None:
@@ -47,7 +47,7 @@ def place_sparse(surface: ConeSurface, spec: ConeSpec) -> ConeSolution:
     solution = result.solution
     cones = solution.cones[~mesh.is_boundary_vertex[solution.cones]]
     notes = unmet_requests(mesh, cones, result.distortion, spec)
-    return replace(solution, cones=cones, is_searched=True, notes=notes)
+    return replace(solution, cones=cones, notes=notes)
 
 
 def needs_no_cone(surface: ConeSurface, spec: ConeSpec) -> bool:
