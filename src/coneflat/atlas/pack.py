@@ -12,6 +12,7 @@ from ..base.defaults import PADDING, RESOLUTION
 from ..base.text import short_repr
 from ..errors import OptionError
 from .charts import Charts, Outlines, read_charts
+from .grid import Packing
 from .orient import (
     HALF_PI,
     RELATIVE_TOLERANCE,
@@ -21,7 +22,7 @@ from .orient import (
     square_angle,
     straight_angles,
 )  # fmt: skip
-from .place import Packing, pack
+from .tight_packing import pack_outlines
 
 ROTATIONS = ("any", "quarter", "none")
 # MAX_PLACEMENTS limits the number of charts times the number of angles tried for each; for many charts quarter turns
@@ -113,7 +114,7 @@ def pack_known(charts: Charts, resolution: int, padding: float, rotate: str | in
         angles = np.tile(np.arange(turns) * (2 * np.pi / turns), (charts.count, 1))
         allowed = along_axes(directions, straight, angles)
         gap = padding / resolution / inner
-        packing = pack(outlines, area, angles, allowed, gap, min(tiles, charts.count))
+        packing = pack_outlines(outlines, area, angles, allowed, gap, min(tiles, charts.count))
 
     scale = inner / (packing.side or 1.0)
     factors = scale * frame * np.exp(1j * packing.angle)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..atlas import ChartLayout, Effort, Outlines, as_disk, pack, square_angle, with_charts
+from ..atlas import ChartLayout, Effort, Outlines, as_disk, pack_outlines, square_angle, with_charts
 from ..base import FloatArray, check_cancelled
 from ..errors import OptionError
 from ..stages import Layout
@@ -209,7 +209,7 @@ def _covered_fraction(outlines: Sequence[Outline], area: float, gap: float, need
     angles = np.tile(np.arange(0, 2 * np.pi, np.pi / 4), (len(outlines), 1))
     effort = replace(QUICK, max_side=(area / max(needed, 1e-9)) ** 0.5)
     try:
-        packing = pack(joined, area, angles, np.ones(angles.shape, dtype=bool), gap, 1, effort)
+        packing = pack_outlines(joined, area, angles, np.ones(angles.shape, dtype=bool), gap, 1, effort)
     except OptionError:
         return 0.0
     return area / packing.side**2
