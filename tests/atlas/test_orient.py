@@ -9,7 +9,7 @@ from shapes import hill, rotation
 
 from coneflat import TriangleMesh
 from coneflat.atlas import arrange_charts, pack_charts
-from coneflat.atlas.orient import square_angle, straight_angle
+from coneflat.atlas.rectangles import square_angle, straight_angle
 
 NONE = np.empty(0)  # directions of a border that is not straight
 

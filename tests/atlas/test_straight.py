@@ -8,8 +8,9 @@ import shapes
 
 import coneflat
 from coneflat.atlas import pack_charts
+from coneflat.atlas.border_runs import straight_runs
 from coneflat.atlas.charts import Outlines, read_charts
-from coneflat.atlas.orient import border_directions, straight_runs
+from coneflat.atlas.orient import border_directions
 from coneflat.atlas.pack import arrange_charts
 
 CROSS = ((1, 0), (0, 1), (1, 1), (2, 1), (3, 1), (1, 2))

@@ -2,8 +2,8 @@
 
 from .charts import ChartLayout, Outlines, Seams
 from .injective import separate_overlaps, with_charts
-from .orient import square_angle, straight_angle
 from .pack import Packed, arrange_charts, pack_charts
+from .rectangles import square_angle, straight_angle
 from .split import as_disk
 from .tight_packing import Effort, pack_outlines
 from .touch import round_safely, separate_touching

@@ -13,15 +13,8 @@ from ..base.text import short_repr
 from ..errors import OptionError
 from .charts import Charts, Outlines, read_charts
 from .grid import Packing
-from .orient import (
-    HALF_PI,
-    RELATIVE_TOLERANCE,
-    along_axes,
-    border_directions,
-    mean_rise,
-    square_angle,
-    straight_angles,
-)  # fmt: skip
+from .orient import along_axes, border_directions, mean_rise, straight_angles
+from .rectangles import HALF_PI, RELATIVE_TOLERANCE, square_angle
 from .tight_packing import pack_outlines
 
 ROTATIONS = ("any", "quarter", "none")

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..base.jit import compiled
 from .masks import Masks
+
+#: Columns, one for each cell of tiles.
+Cells: TypeAlias = NDArray[np.int16]
 
 
 class Plan(NamedTuple):
@@ -91,7 +95,7 @@ def place_all(
 
 
 @compiled
-def filled_tiles(tiles: int, rows: int, width: int) -> IntArray:
+def filled_tiles(tiles: int, rows: int, width: int) -> Cells:
     """Return (tiles, rows, width) cells that contain the width: tiles that are free."""
     cells = np.empty((tiles, rows, width), dtype=np.int16)
     for t in range(tiles):
@@ -103,7 +107,7 @@ def filled_tiles(tiles: int, rows: int, width: int) -> IntArray:
 
 @compiled
 def find_lowest(
-    taken: IntArray, clear: IntArray, runs: IntArray, left: int, right: int, low: int, above: int
+    taken: Cells, clear: Cells, runs: IntArray, left: int, right: int, low: int, above: int
 ) -> tuple[int, int, int]:
     """Return the column and row of the lowest place where a shape fits, and the work.
 
@@ -128,7 +132,7 @@ def find_lowest(
 
 
 @compiled
-def occupy(taken: IntArray, runs: IntArray, column: int, row: int, reach: IntArray) -> None:
+def occupy(taken: Cells, runs: IntArray, column: int, row: int, reach: IntArray) -> None:
     """Mark the cells of a tile that are too close to a shape for other charts, each by its own column.
 
     Args:
@@ -147,7 +151,7 @@ def occupy(taken: IntArray, runs: IntArray, column: int, row: int, reach: IntArr
 
 
 @compiled
-def link_cells(taken: IntArray, clear: IntArray, left: int, right: int, low: int, high: int) -> None:
+def link_cells(taken: Cells, clear: Cells, left: int, right: int, low: int, high: int) -> None:
     """Update which occupied cell and which free cell follow each cell of some rows of a tile.
 
     Args:
