@@ -12,6 +12,7 @@ from command import command
 import coneflat
 from coneflat import errors, measure_uv, unwrap
 from coneflat.geometry import signed_double_areas
+from coneflat.mesh.charts import point_seams
 
 
 def mirrored(vertices, faces):
@@ -160,15 +161,41 @@ def test_scale_motion_and_numbering_change_nothing():
         assert measures.seam_length == pytest.approx(base.seam_length, rel=1e-4)
 
 
-def test_seams_of_the_user_are_added():
+def level_edges(side):
+    """The mesh of the ball, and a chain of its edges in the half on a side of the mirror plane."""
     vertices, faces = SHAPES["ball"]
     mesh = coneflat.TriangleMesh(vertices, faces)
-    level = np.isclose(vertices[mesh.edges][:, :, 2], np.median(vertices[:, 2]), atol=0.05).all(axis=1)
-    edges = mesh.edges[level & (vertices[mesh.edges][:, :, 0] >= 0).all(axis=1)]
-    result = unwrap(vertices, faces, stack="mirrored", seams=edges)
-    seams = {tuple(edge) for edge in np.sort(result.seams, axis=1).tolist()}
-    assert {tuple(edge) for edge in np.sort(edges, axis=1).tolist()} <= seams
+    is_level = np.isclose(vertices[mesh.edges][:, :, 2], np.median(vertices[:, 2]), atol=0.05).all(axis=1)
+    return mesh, mesh.edges[is_level & (side * vertices[mesh.edges][:, :, 0] >= 0).all(axis=1)]
+
+
+def edge_set(pairs):
+    return {tuple(pair) for pair in np.sort(pairs, axis=1).tolist()}
+
+
+def edges_with_two_points(result):
+    """The edges whose two sides have different UV points."""
+    mesh = coneflat.TriangleMesh(result.vertices, result.faces)
+    return edge_set(mesh.edges[point_seams(mesh, result.uv_faces)])
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_marked_edges_of_either_half_are_cut_in_both(side):
+    mesh, edges = level_edges(side)
+    result = unwrap(mesh.vertices, mesh.faces, stack="mirrored", seams=edges)
+    assert edge_set(edges) | edge_set(level_edges(-side)[1]) <= edge_set(result.seams)
+    assert edge_set(result.seams) == edges_with_two_points(result)
     assert result.settings["seams"] == edges.tolist()
+
+
+def test_a_marked_edge_whose_image_is_forbidden_is_no_seam():
+    mesh, edges = level_edges(-1)
+    result = unwrap(
+        mesh.vertices, mesh.faces, stack="mirrored", seams=edges, no_seams=level_edges(1)[1], charts="one"
+    )
+    assert edge_set(result.seams) == edges_with_two_points(result)
+    assert not edge_set(edges) & edge_set(result.seams)
+    assert any(f"{len(edges)} marked edges are not cut" in note for note in result.notes)
 
 
 def moved(vertices, faces):

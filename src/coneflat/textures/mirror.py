@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..base import BoolArray, FloatArray, IntArray, plural
+from ..base import BoolArray, FloatArray, IntArray, Unmet, plural
 from ..errors import OptionError
 from ..mesh.connectivity import TriangleMesh
 from ..options import Options
@@ -60,6 +60,8 @@ def half_of(prepared: Prepared, source: Source, options: Options) -> tuple[Share
         prepared: the input.
         source, options: those that it was prepared with.
 
+    An edge is cut if it or its mirror image is marked, unless its half forbids it.
+
     Raises:
         OptionError: as of `find_mirror`.
         SeamError: an edge on the plane must not be cut.
@@ -67,8 +69,7 @@ def half_of(prepared: Prepared, source: Source, options: Options) -> tuple[Share
     checked = prepared.checked
     mirror = find_mirror(checked.mesh)
     ends = checked.mesh.edges[mirror.middle]
-    seams = _with_further_seams(options.seams, checked.vertex_origin[ends])
-    cut = source.prepared(replace(options, seams=seams))
+    cut = _with_images_of_marks(mirror, ends, source, options)
     half = [_with_free(component, ends) for component in cut.components if mirror.is_half[component.faces[0]]]
     plane = [*mirror.plane[:3].tolist(), float(np.ldexp(mirror.plane[3], -checked.exponent))]
     shared = SharedTexels(
@@ -79,6 +80,42 @@ def half_of(prepared: Prepared, source: Source, options: Options) -> tuple[Share
         settings={"mirror_plane": plane},
     )
     return shared, replace(cut, components=tuple(half))
+
+
+def _with_images_of_marks(mirror: Mirror, ends: IntArray, source: Source, options: Options) -> Prepared:
+    """Return the input cut along the mirror plane and marked edges, those of the other half at their mirror images too.
+
+    Args:
+        mirror, ends: the symmetry, and (k, 2) the edges on the plane.
+        source, options: the input, and the options for it.
+    """
+    cut = _with_seams(source, options, ends)
+    corners = cut.checked.mesh.faces.ravel()
+    image = np.arange(len(cut.checked.mesh.vertices))
+    image[corners[mirror.images.ravel()]] = corners[mirror.corners.ravel()]
+    forbidden = [
+        component.vertices[component.mesh.edges[component.seams.is_forbidden]] for component in cut.components
+    ]
+    images, listed = np.sort(image[cut.seams], axis=1), np.sort(cut.seams, axis=1) @ [len(image), 1]
+    keys, forbidden_keys = (
+        images @ [len(image), 1],
+        np.sort(np.concatenate(forbidden), axis=1) @ [len(image), 1],
+    )
+    is_blocked = np.isin(keys, forbidden_keys)
+    is_missing = ~np.isin(keys, listed) & ~is_blocked
+    if is_missing.any():
+        cut = _with_seams(source, options, np.concatenate([ends, images[is_missing]]))
+    if not is_blocked.any():
+        return cut
+    count, verb = plural(int(is_blocked.sum()), "marked edge"), "is" if is_blocked.sum() == 1 else "are"
+    note = Unmet(f"{count} {verb} not cut: in the half that is unwrapped, the mirror images must not be cut.")
+    return replace(cut, notes=(*cut.notes, note))
+
+
+def _with_seams(source: Source, options: Options, pairs: IntArray) -> Prepared:
+    """Return the input with further marked edges, pairs (k, 2) of vertices of the checked mesh."""
+    origin = source.checked(options.repair).vertex_origin
+    return source.prepared(replace(options, seams=_with_further_seams(options.seams, origin[pairs])))
 
 
 def _with_further_seams(seams: Any, pairs: IntArray) -> Any:

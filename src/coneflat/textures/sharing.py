@@ -64,7 +64,7 @@ def with_shared_texels(result: Flattening, shared: SharedTexels, prepared: Prepa
         uv_faces=_uv_faces_of_all(result, unwrapped, len(faces), shared),
         cones=cones,
         curvatures=curvatures,
-        seams=_seams_of_all(result.seams, faces, shared),
+        seams=_seams_of_all(result, faces, shared),
         log_scale=at_vertices(result.log_scale),
         prescribed=at_vertices(result.prescribed),
         curvature_residual=at_vertices(result.curvature_residual),
@@ -98,13 +98,25 @@ def _cones_of_all(result: Flattening, faces: IntArray, partner: IntArray) -> tup
     return cones, np.where(is_cone, curvature, curvature[partner])[cones]
 
 
-def _seams_of_all(seams: IntArray, faces: IntArray, shared: SharedTexels) -> IntArray:
-    """Return (k, 2) the seams (j, 2), and the edges of triangles that share texels whose partners are seams."""
-    partner = np.full(faces.size, -1)
+def _seams_of_all(result: Flattening, faces: IntArray, shared: SharedTexels) -> IntArray:
+    """Return (k, 2) the seams of the unwrapped triangles, and the edges of the others whose partners are seams.
+
+    Args:
+        result: the result for the unwrapped triangles, which may list edges of the others.
+        faces: (m, 3) all triangles.
+        shared: the triangles that share texels.
+    """
+    partner, unit = np.full(faces.size, -1), int(faces.max()) + 1
     partner[shared.corners] = shared.partners
-    corners = shared.corners.reshape(-1, 3)
-    ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2)
+    ends = _sides(shared.corners.reshape(-1, 3))
     edges, partner_edges = (np.sort(faces.ravel()[of], axis=1) for of in (ends, partner[ends]))
-    seams, unit = np.sort(seams, axis=1), int(faces.max()) + 1
+    unwrapped_edges = np.sort(_sides(result.faces), axis=1) @ [unit, 1]
+    seams = np.sort(result.seams, axis=1)
+    seams = seams[np.isin(seams @ [unit, 1], unwrapped_edges)]
     is_seam = np.isin(partner_edges @ [unit, 1], seams @ [unit, 1])
     return np.unique(np.concatenate([seams, edges[is_seam]]), axis=0)
+
+
+def _sides(faces: IntArray) -> IntArray:
+    """Return (3m, 2) the ends of the sides of faces (m, 3)."""
+    return np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
