@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..base import TYPED_TOLERANCE, BoolArray, FloatArray, IntArray, check_cancelled
-from ..cones import MAX_POLYHEDRON_CORNERS
+from ..base import BoolArray, FloatArray, IntArray, check_cancelled
 from ..geometry import double_areas, find_overlaps, signed_double_areas
 from ..linalg import factorize
 from ..mesh import open_along, tie_key
@@ -37,26 +36,13 @@ def cuts_together(models: Sequence[CutModel]) -> list[Candidate | None]:
     """Return a candidate for each component; None for components with an energy above the bound.
 
     The next cone of a component is where its log conformal factor is the largest, if it is zero at the cones so far, as
-    in Section 3.2 of the paper. Cones are added until the energy is within the bound. A polyhedron with few corners is
-    also opened at all of them, and the cheaper cut is taken.
+    in Section 3.2 of the paper. Cones are added until the energy is within the bound.
 
     Args:
         models: the components, with the same bound.
     """
     group = _MinorComponents(models)
-    candidates = group.candidates_from(group.first_cones())
-    polyhedra = [
-        i
-        for i in np.flatnonzero(group.corner_counts() > 0).tolist()
-        if (candidate := candidates[i]) is None or len(candidate.layout.seams)
-    ]
-    if polyhedra:
-        opened = _MinorComponents([models[i] for i in polyhedra])
-        for i, at_corners in zip(polyhedra, opened.candidates_from(opened.corners()), strict=True):
-            searched = candidates[i]
-            if at_corners is not None and (searched is None or at_corners.cost < searched.cost):
-                candidates[i] = at_corners
-    return candidates
+    return group.candidates_from(group.first_cones())
 
 
 class _MinorComponents:
@@ -169,15 +155,6 @@ class _MinorComponents:
         is_closed = np.bincount(self._component_of_vertex, on_boundary, len(self._models)) == 0
         cones[self._largest(curvature - curvature.min() + 1, is_closed)] = True
         return cones
-
-    def corners(self) -> BoolArray:
-        """Return (n,) the vertices with curvature."""
-        return (np.abs(self._surface.curvature) > TYPED_TOLERANCE) & self._is_allowed
-
-    def corner_counts(self) -> IntArray:
-        """Return (c,) the number of corners of each component, 0 if it is more than `MAX_POLYHEDRON_CORNERS`."""
-        counts = np.bincount(self._component_of_vertex, self.corners(), len(self._models)).astype(np.int64)
-        return np.where(counts <= MAX_POLYHEDRON_CORNERS, counts, 0)
 
     def _with_more_cones(
         self, cones: BoolArray, is_open: BoolArray, allowed: FloatArray
