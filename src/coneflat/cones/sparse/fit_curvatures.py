@@ -152,24 +152,50 @@ def best_free(
 
     Hundreds of sets of cones are fitted; with array operations, a flattening takes up to a third longer.
     """
-    # Compiling array expressions takes as long as all the rest of the function.
+    free, best, remainder = free_right_sides(gram, slope, total, state, curvatures)
+    ones = np.ones(len(free))
+    solve_both(gram, free, best, ones)
+    if math.isnan(total) or len(free) == 0:
+        return free, best, 0.0
+    sum_best, sum_ones = 0.0, 0.0
+    for i in range(len(free) - 1, -1, -1):
+        sum_best += best[i]
+        sum_ones += ones[i]
+    multiplier = (sum_best - remainder) / sum_ones
+    for i in range(len(free)):
+        best[i] -= multiplier * ones[i]
+    return free, best, multiplier
+
+
+@compiled
+def free_right_sides(
+    gram: FloatArray, slope: FloatArray, total: float, state: IntArray, curvatures: FloatArray
+) -> tuple[IntArray, FloatArray, float]:
+    """Return the free variables, the right-hand sides of their equations, and what is left to them of the sum."""
+    # Compiling array expressions takes as long as all the rest.
     variables, count = np.empty(len(state), np.int64), 0
     for j in range(len(state)):
         if state[j] == 0:
             variables[count] = j
             count += 1
-    free, largest, left = variables[:count], 0.0, total
-    best, ones, cholesky = np.empty(count), np.empty(count), np.empty((count, count))
+    free, best, remainder = variables[:count], np.empty(count), total
     for i in range(count):
-        best[i], ones[i] = -slope[free[i]], 1.0
+        best[i] = -slope[free[i]]
     for j in range(len(state)):
         if state[j] != 0:
-            left -= curvatures[j]
+            remainder -= curvatures[j]
             for i in range(count):
                 best[i] -= gram[free[i], j] * curvatures[j]
+    return free, best, remainder
+
+
+@compiled
+def solve_both(gram: FloatArray, free: IntArray, best: FloatArray, ones: FloatArray) -> None:
+    """Solve the equations of free variables for two right-hand sides (f,), in place, by a Cholesky factorization."""
+    count, largest = len(free), 0.0
+    cholesky = np.empty((count, count))
     for i in range(count):
         largest = max(largest, gram[free[i], free[i]])
-    # Cholesky factorization, and forward substitution of both right-hand sides.
     for i in range(count):
         for j in range(i + 1):
             value = gram[free[i], free[j]]
@@ -181,21 +207,12 @@ def best_free(
             ones[i] -= cholesky[i, j] * ones[j]
         best[i] /= cholesky[i, i]
         ones[i] /= cholesky[i, i]
-    sum_best, sum_ones = 0.0, 0.0
     for i in range(count - 1, -1, -1):
         for j in range(i + 1, count):
             best[i] -= cholesky[j, i] * best[j]
             ones[i] -= cholesky[j, i] * ones[j]
         best[i] /= cholesky[i, i]
         ones[i] /= cholesky[i, i]
-        sum_best += best[i]
-        sum_ones += ones[i]
-    if math.isnan(total) or count == 0:
-        return free, best, 0.0
-    multiplier = (sum_best - left) / sum_ones
-    for i in range(count):
-        best[i] -= multiplier * ones[i]
-    return free, best, multiplier
 
 
 @compiled
