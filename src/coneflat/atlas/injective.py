@@ -19,14 +19,10 @@ from .glue import glue_charts
 from .split import as_disk, split_overlaps, unpinched
 
 # Minimum areas of a chart to try, as fractions of the total area. Where the cheapest cuts leave several charts,
-# costlier cuts with larger pieces may leave fewer.
+# costlier cuts with larger pieces may leave fewer: a figure of 5,000 triangles gets 9 instead of 11.
 MIN_CHART_AREAS = (0.0, 0.002, 0.01)
-# Number of triangles above which the larger minimum areas are tried only if there are slivers.
-LARGE_TRIANGLES = 50_000
 # Number of charts at which splitting stops and the next minimum area is tried: most charts would be glued on again.
 MAX_SMALL_CHARTS = 64
-# A chart below this fraction of the area is a sliver.
-SLIVER_AREA = 0.001
 
 
 def injective_charts(
@@ -59,7 +55,7 @@ def injective_charts(
     if not len(pairs):
         return glue_charts(mesh, single_chart, lengths).renumbered()
     disk = as_disk(points, corners) if disk is None else unpinched(disk.moved_to(points))
-    candidates: list[tuple[int, int, float, int, ChartLayout]] = []
+    candidates = list[ChartLayout]()
     shares = MIN_CHART_AREAS[:tries]
     for share in shares:
         min_area = share * float(np.abs(areas).sum())
@@ -68,13 +64,10 @@ def injective_charts(
         if chart is None:
             continue
         layout = glue_charts(mesh, single_chart.split(chart), lengths).renumbered()
-        sizes = np.bincount(layout.chart, weights=np.abs(areas))
-        slivers = int((sizes < SLIVER_AREA * sizes.sum()).sum())
-        cost = float(lengths[Seams(mesh, layout).edges].sum())
-        candidates.append((slivers, len(sizes), cost, len(candidates), layout))
-        if len(sizes) == 1 or (not slivers and len(corners) > LARGE_TRIANGLES):
+        candidates.append(layout)
+        if not layout.chart.any():
             break
-    return min(candidates, key=lambda candidate: candidate[:-1])[-1]
+    return min(candidates, key=lambda layout: (layout.chart.max(), lengths[Seams(mesh, layout).edges].sum()))
 
 
 @stage("atlas")

@@ -12,7 +12,8 @@ from .charts import Outlines
 from .grid import Grid, Packing, Placed, grid_of
 from .placement import Plan
 
-# The work after which the search ends, in comparisons of runs of cells: about a second.
+# The work after which the search ends, in comparisons of runs of cells: about a second. Without it, 20,000 cards take
+# 29 s instead of 1.4, and cover 0.74 instead of 0.70.
 MAX_WORK = 40_000_000
 
 
@@ -23,12 +24,10 @@ class Effort:
     Attributes:
         columns: minimum number of columns of the grid.
         tries: number of changes that are tried.
-        max_side: largest side that is of use; the search ends after a third of the tries if it is not reached.
     """
 
     columns: int = 400
     tries: int = 150
-    max_side: float = np.inf
 
 
 def pack_outlines(
@@ -80,11 +79,9 @@ def _improved(grid: Grid, placed: Placed, width: int, effort: Effort) -> tuple[P
     rng, permitted = np.random.default_rng(0), placed.plan.allowed
     best = last = placed
     step, work = width // 16, 0
-    useful_width = int(min(effort.max_side / grid.masks.cell, width)) + 1
-    for attempt in range(effort.tries):
-        goal = max(min(width - step, useful_width), grid.narrowest)
-        is_late = width > useful_width and attempt > effort.tries // 3
-        if goal >= width or work > MAX_WORK or is_late:
+    for _ in range(effort.tries):
+        goal = max(width - step, grid.narrowest)
+        if goal >= width or work > MAX_WORK:
             break
         check_cancelled()
         limit = goal + goal // 4 if last is best else min(last.height, goal + goal // 4)
@@ -94,7 +91,7 @@ def _improved(grid: Grid, placed: Placed, width: int, effort: Effort) -> tuple[P
         if candidate.height <= goal:
             best, last, width = candidate, candidate, goal
             step = max(1, min((goal - candidate.height) // 2, goal // 16))
-        elif step > 1 and width <= useful_width:
+        elif step > 1:
             step //= 2
         elif last is best or candidate.height <= last.height:
             last = candidate

@@ -38,7 +38,6 @@ class Candidate:
         cost: the cost of its seams.
         distortion: an area distortion for which its cones are found.
         is_separated: whether its overlaps are separated, which may add seams.
-        is_from_coarse: whether its cones are those of a coarse mesh.
         keeps_points: whether its points stay where they are if it is cut further.
     """
 
@@ -47,7 +46,6 @@ class Candidate:
     cost: float
     distortion: float
     is_separated: bool = False
-    is_from_coarse: bool = False
     keeps_points: bool = False
 
 

@@ -55,9 +55,9 @@ def best_cut(model: CutModel) -> Candidate:
     candidate = _from_coarse(model)
     if not model.is_within(candidate):
         # The bound is too low, or the surface too noisy, for the cones of a coarse mesh.
-        return _best_of_searched(model, [replace(candidate, is_from_coarse=False)])
+        return _best_of_searched(model, [candidate])
     model.surface.close_search()
-    return replace(model.separated(candidate), is_from_coarse=True)
+    return model.separated(candidate)
 
 
 def is_large(component: Component) -> bool:
@@ -90,7 +90,7 @@ def _from_coarse(model: CutModel) -> Candidate:
     candidate = model.candidate(layout, layout.statistics.area_distortion_linear)
     excess = candidate.energy - model.bound.largest
     if 0 < excess <= MAX_EXCESS * model.bound.allowed:
-        return shortened(model, replace(candidate, is_from_coarse=True))
+        return shortened(model, candidate)
     return candidate
 
 

@@ -44,10 +44,7 @@ def cut_further(model: CutModel, candidate: Candidate, layout: Layout) -> Candid
 
 def _best_of_moved(model: CutModel, start: Candidate) -> Candidate:
     """Return the candidate with moved tips whose seams cost least, or the start if none is better."""
-    bound = model.bound
-    slack, is_large = bound.largest - start.energy, len(model.component.faces) > MANY_TRIANGLES
-    # With the cones of a coarse mesh, tips are moved there; here, only if much slack is left.
-    if is_large or (start.is_from_coarse and 0 <= slack <= 5 * (model.settled_bound - bound.largest)):
+    if len(model.component.faces) > MANY_TRIANGLES:
         return start
     candidates = [model.separated(candidate) for candidate in _with_moved_tips(model, start)]
     for candidate in sorted(candidates, key=lambda candidate: candidate.cost):

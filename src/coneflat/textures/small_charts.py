@@ -21,8 +21,9 @@ from .candidates import TOLERANCE, Candidate, CutModel
 from .free_seams import as_one_chart, freed
 from .tips import RINGS
 
-# Charts below this fraction of the component's area are joined to others; the number of seams that are tried. With 0.05
-# instead, 42 models have seams and charts that are 3% and 13% less, but cover 0.02 less of the texture.
+# Charts below this fraction of the component's area are joined to others; the number of seams that are tried. 3holes of
+# 5,000 triangles gets 3 charts instead of 4, and a figure of 69,000 triangles 4 instead of 8. With 0.05 instead, 42
+# models have seams and charts that are 3% and 13% less, but cover 0.02 less of the texture.
 SMALL_AREA, MAX_JOINS = 0.005, 8
 
 
