@@ -7,7 +7,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import BoolArray, IntArray
+from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..base.jit import compiled
 from .masks import Masks
 
@@ -16,15 +16,17 @@ Cells: TypeAlias = NDArray[np.int16]
 
 
 class Plan(NamedTuple):
-    """The order in which k charts are placed, and their allowed shapes.
+    """The order in which k charts are placed, and restrictions on their placement.
 
     Attributes:
         order: (k,) the charts in the order of placement.
         allowed: (j,) True for the shapes that may be used.
+        offset: (k,) minimum column of a chart, as a fraction of the free columns next to it.
     """
 
     order: IntArray
     allowed: BoolArray
+    offset: FloatArray
 
 
 def reach_of(gap: float) -> IntArray:
@@ -44,7 +46,7 @@ def place_all(
     """Fill tiles of cells from below: each chart is placed where its top is lowest, and leftmost among these places.
 
     Args:
-        plan: the order of charts and their allowed shapes.
+        plan: the order of charts and the restrictions on their placement.
         group: (k,) group of each chart; charts of a group are so similar that none is tried below the previous one.
         masks: the shapes of charts, the same number for each chart.
         reach: (d,) two cells of different charts are too close if their distance is less than d rows and at most
@@ -68,8 +70,10 @@ def place_all(
                 continue
             shape_runs, right = runs[first[j] : first[j + 1]], width - size[j, 0]
             for t in range(tiles):
-                low, above = floor[t, group[c]], best - size[j, 1]
-                x, y, steps = find_lowest(taken[t], clear[t], shape_runs, right, low, above)
+                x, y, steps = find_lowest(
+                    taken[t], clear[t], shape_runs, int(plan.offset[c] * right), right, floor[t, group[c]],
+                    best - size[j, 1],
+                )  # fmt: skip
                 work += steps
                 if y >= 0:
                     best, shape, tile, column, row = y + size[j, 1], j, t, x, y
@@ -103,15 +107,15 @@ def filled_tiles(tiles: int, rows: int, width: int) -> Cells:
 
 @compiled
 def find_lowest(
-    taken: Cells, clear: Cells, runs: IntArray, right: int, low: int, above: int
+    taken: Cells, clear: Cells, runs: IntArray, left: int, right: int, low: int, above: int
 ) -> tuple[int, int, int]:
     """Return the column and row of the lowest place where a shape fits, and the work.
 
-    The column is at most `right`, the row from `low` to below `above`, or -1 if the shape does not fit.
+    The column is from `left` to `right`, the row from `low` to below `above`, or -1 if the shape does not fit.
     """
     work, k = 0, 0
     for y in range(low, above):
-        x, fits = 0, 0
+        x, fits = left, 0
         while x <= right and fits < len(runs):
             work += 1
             row, start = y + runs[k, 0], x + runs[k, 1]
@@ -124,7 +128,7 @@ def find_lowest(
                 k = k + 1 if k + 1 < len(runs) else 0
         if x <= right:
             return x, y, work
-    return 0, -1, work
+    return left, -1, work
 
 
 @compiled
