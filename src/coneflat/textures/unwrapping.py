@@ -39,8 +39,8 @@ from .shortening import MANY_TRIANGLES, cut_further
 from .small_charts import join_small_charts
 from .stacked import without_copies
 
-# Components with less than this share of the area are cut together. With 0.05 instead, 26 models in one file take 40%
-# less time, and their seams are 10% longer.
+# Components with less than this share of the area are cut together: 3,000 take 21 s instead of 140. With 0.05
+# instead, 26 models in one file take 40% less time, and their seams are 10% longer.
 MINOR_SHARE = 0.03
 # Fraction of the work that searches for the cuts; the rest packs and measures.
 SEARCHING = 0.8
