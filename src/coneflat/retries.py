@@ -21,8 +21,8 @@ from .flattening import (
 from .geometry import dihedral_angles
 from .geometry.opening import RISKY_AREA, thickness, with_slack
 from .groups import ComponentProgress, groups_of_small
+from .measures import mean_qc
 from .mesh.connectivity import TriangleMesh
-from .optimise import mean_qc
 from .options import Options
 from .source import Component, Prepared, Source
 from .stages import Layout

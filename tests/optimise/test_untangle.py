@@ -12,13 +12,11 @@ from stored_meshes import stored_heights
 
 import coneflat
 from coneflat import TriangleMesh
-from coneflat.geometry import edge_lengths
+from coneflat.geometry import edge_lengths, rest_sides
 from coneflat.geometry.planar import heights, signed_double_areas
 from coneflat.geometry.straight import FlatTriangles
 from coneflat.optimise import embedded_disks
-from coneflat.optimise.patches import DEGENERATE_HEIGHT, Patches
-from coneflat.optimise.relaxing import rest_sides
-from coneflat.optimise.untangling import untangle
+from coneflat.optimise.untangling import DEGENERATE_HEIGHT, Patches, untangle
 
 
 def fan(rim, noise, seed):
