@@ -127,10 +127,10 @@ def qc_distortion(lengths: FloatArray, places: FloatArray) -> FloatArray:
     corners = as_complex(places)
     corners -= corners[:, :1]
     size_a, size_b = (np.abs((factors * corners).sum(axis=1)) for factors in (a_of, b_of))
-    is_positive = size_a > size_b  # False for triangles without area on the surface
-    ratios = np.full(len(lengths), np.inf)
-    ratios[is_positive] = ((size_a + size_b) / (size_a - size_b))[is_positive]
-    return ratios
+    # For triangles without area on the surface, the comparison is with NaN.
+    return np.divide(
+        size_a + size_b, size_a - size_b, out=np.full(len(lengths), np.inf), where=size_a > size_b
+    )
 
 
 def triangle_energies(lengths: FloatArray, places: FloatArray) -> FloatArray:

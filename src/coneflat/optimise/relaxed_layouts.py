@@ -11,7 +11,7 @@ import numpy as np
 from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, mask_of, rows_of
 from ..base.notes import Unmet
 from ..base.progress import report_detail, stage
-from ..errors import LengthError, MetricError, SeamError
+from ..errors import LengthError, SeamError
 from ..geometry import double_areas
 from ..geometry.operators import MIN_WEIGHT, area_distortion, at_unit_scale, vertex_areas, weighted_areas
 from ..geometry.planar import layout_curvature, qc_distortion, signed_double_areas, vertex_log_scale
@@ -45,8 +45,9 @@ def relax_layouts(
 ) -> list[Layout]:
     """Return layouts with less distortion, the same cones and the same seams, relaxed as one mesh.
 
-    A boundary with prescribed lengths or shape does not move. A layout whose seams do not have sides of equal lengths,
-    so that these cannot be held, is returned unchanged, with a note if the relaxation of all triangles was requested.
+    A boundary with prescribed lengths or shape does not move. A single layout whose seams do not have sides of equal
+    lengths, so that these cannot be held, is returned unchanged, with a note if the relaxation of all triangles was
+    requested.
 
     Args:
         layouts: layouts of connected meshes.
@@ -58,18 +59,14 @@ def relax_layouts(
 
     Raises:
         MetricError: a relaxation found no finite step.
+        SeamError, LengthError: the seams of one of several layouts cannot be held.
     """
     if spec.is_off or not layouts:
         return list(layouts)
     try:
         return _relaxed(LayoutGroup(layouts, weights), spec)
-    except (SeamError, LengthError, MetricError) as error:  # a metric that did not converge
+    except (SeamError, LengthError) as error:  # a metric that did not converge
         if len(layouts) > 1:
-            return [
-                relax_layouts([layout], [layout_weights], spec)[0]
-                for layout, layout_weights in zip(layouts, weights, strict=True)
-            ]
-        if isinstance(error, MetricError):
             raise
         return [layouts[0].with_notes(Unmet(f"Not relaxed: {error}.")) if spec.relaxes_all else layouts[0]]
 
