@@ -7,7 +7,7 @@ import shapes
 
 import coneflat
 from coneflat import retries
-from coneflat.errors import CurvatureError
+from coneflat.errors import CurvatureError, MetricError
 
 
 def test_a_later_search_that_fails_leaves_the_first_layout(monkeypatch):
@@ -56,3 +56,21 @@ def test_a_component_that_fails_leaves_the_layouts_of_others():
     components = {3: "first", 5: "bad", 8: "last"}
     layouts = retries.without_failures(flatten, components)
     assert layouts == {3: "layout of first", 8: "layout of last"}
+
+
+@pytest.mark.parametrize("rounds", [1, 3])
+def test_an_error_while_relaxing_names_its_component(rounds, monkeypatch):
+    """Small components are relaxed together, so the one that fails is found by relaxing each alone."""
+    relax = retries.relax_components
+
+    def refuse(components, layouts, steps):
+        if any(component.mesh.is_boundary_vertex.any() for component in components):
+            raise MetricError("relaxation found no finite step")
+        return relax(components, layouts, steps)
+
+    monkeypatch.setattr(retries, "relax_components", refuse)
+    ball, hill = shapes.sphere(rounds), shapes.hill()
+    with pytest.raises(MetricError, match=f"in the component of vertex {len(ball[0])} .*no finite step"):
+        coneflat.flatten(*shapes.join(ball, hill))
+    with pytest.raises(MetricError, match="^relaxation found"):
+        coneflat.flatten(*hill)

@@ -10,9 +10,8 @@ from scipy.sparse import csr_matrix
 from coneflat import TriangleMesh
 from coneflat.base import FloatArray, plural
 from coneflat.errors import MetricError
-from coneflat.geometry import double_areas
+from coneflat.geometry import double_areas, rest_sides
 from coneflat.layout import far_pins, pinned_least_squares
-from coneflat.optimise import rest_sides
 from coneflat.stages import ConeSolution, Cut, Embedding, FlatMetric
 
 

@@ -11,8 +11,8 @@ from .base.notes import Unmet
 from .cones import uses_sparse_search
 from .geometry.operators import area_distortion
 from .geometry.planar import mean_energy, signed_double_areas
+from .measures import mean_qc
 from .measures.guarantees import EXTREME_QC
-from .optimise import mean_qc
 from .options import Options
 from .source.components import Component
 from .stages import Layout

@@ -18,6 +18,17 @@ from .stages import Layout, RelaxSpec
 SMALL_TRIANGLES, GROUP_TRIANGLES = 500, 40_000
 
 
+@contextmanager
+def errors_of(component: Component, names_component: bool) -> Iterator[None]:
+    """Run the block, whose errors name the component if the flag is set."""
+    try:
+        yield
+    except (CurvatureError, MetricError, SeamError) as error:
+        if not names_component:
+            raise
+        raise type(error)(f"{component.location}: {error}") from error
+
+
 class ComponentProgress:
     """Progress of work on components, and the component in the errors of this work.
 
@@ -38,13 +49,9 @@ class ComponentProgress:
         """Run the work on the next component in the block."""
         self._begun += 1
         place = f"component {self._begun:,} of {self._count:,}" if self._count > 1 else ""
-        try:
-            with component_at_work(place, self._share_per_triangle * len(component.faces)):
-                yield
-        except (CurvatureError, MetricError, SeamError) as error:
-            if not self._names_components:
-                raise
-            raise type(error)(f"{component.location}: {error}") from error
+        work = component_at_work(place, self._share_per_triangle * len(component.faces))
+        with work, errors_of(component, self._names_components):
+            yield
 
 
 def groups_of_small(components: Mapping[int, Component], relax: RelaxSpec) -> list[list[int]]:

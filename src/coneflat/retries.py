@@ -10,7 +10,7 @@ import numpy as np
 from .base.progress import stage
 from .bounds import TOLERATED_EXCESS, borders_and_distortion, excess, is_too_distorted, rank
 from .cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, uses_sparse_search, with_corners
-from .errors import ConvergenceError, CurvatureError, MetricError, OptionError, SeamError
+from .errors import ConvergenceError, CurvatureError, LengthError, MetricError, OptionError, SeamError
 from .flattening import (
     Steps,
     finish_component,
@@ -20,9 +20,9 @@ from .flattening import (
 )
 from .geometry import dihedral_angles
 from .geometry.opening import RISKY_AREA, thickness, with_slack
-from .groups import ComponentProgress, groups_of_small
+from .groups import ComponentProgress, errors_of, groups_of_small
+from .measures import mean_qc
 from .mesh.connectivity import TriangleMesh
-from .optimise import mean_qc
 from .options import Options
 from .source import Component, Prepared, Source
 from .stages import Layout
@@ -99,11 +99,23 @@ def finish_components(
     progress = ComponentProgress(components, 1 - LAYING_OUT, steps.names_components)
     finished = dict[int, Layout]()
     for group in groups_of_small(components, steps.relax):
-        relaxed = relax_components([components[i] for i in group], [layouts[i] for i in group], steps)
+        relaxed = relax_group([components[i] for i in group], [layouts[i] for i in group], steps)
         for i, layout in zip(group, relaxed, strict=True):
             with progress.at(components[i]):
                 finished[i] = finish_component(components[i], layout, steps)
     return finished
+
+
+def relax_group(components: Sequence[Component], layouts: Sequence[Layout], steps: Steps) -> Sequence[Layout]:
+    """Return relaxed layouts: of all components together, or after a failure of each alone, so that it is named."""
+    if len(components) == 1:
+        with errors_of(components[0], steps.names_components):
+            return relax_components(components, layouts, steps)
+    try:
+        return relax_components(components, layouts, steps)
+    except (*FAILURES, LengthError):
+        pairs = zip(components, layouts, strict=True)
+        return [relax_group([component], [layout], steps)[0] for component, layout in pairs]
 
 
 def finish_within_bound(

@@ -10,13 +10,11 @@ from coneflat import TriangleMesh, errors
 from coneflat.geometry import edge_lengths, flat_triangles
 from coneflat.geometry.intrinsic import halfedge_twins
 from coneflat.geometry.planar import heights
-from coneflat.geometry.straight import FlatTriangles, straight_triangles
+from coneflat.geometry.straight import FlatTriangles, rest_sides, straight_triangles
 from coneflat.geometry.unfolding import _close_gaps, unfold
 from coneflat.mesh import cut_open
 from coneflat.metric.exact import exact_metric
-from coneflat.optimise.patches import DEGENERATE_HEIGHT
-from coneflat.optimise.relaxing import rest_sides
-from coneflat.optimise.untangling import untangle
+from coneflat.optimise.untangling import DEGENERATE_HEIGHT, untangle
 from coneflat.seams import find_seams
 
 

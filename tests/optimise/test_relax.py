@@ -7,15 +7,13 @@ import pytest
 import shapes
 
 from coneflat import TriangleMesh, errors, flatten
-from coneflat.geometry import edge_lengths
+from coneflat.geometry import edge_lengths, rest_sides
 from coneflat.geometry.planar import sides_between, signed_double_areas
 from coneflat.optimise import Lines, PointConstraints, StretchEnergy, relax
-from coneflat.optimise.constraints import check_constraints
 from coneflat.optimise.elements import Elements
 from coneflat.optimise.energies import UntanglingEnergy
-from coneflat.optimise.motions import find_motions, find_restrictions
-from coneflat.optimise.relaxing import rest_sides
-from coneflat.optimise.seam_chains import find_chains
+from coneflat.optimise.motions import find_motions
+from coneflat.optimise.restrictions import check_constraints, find_chains, find_restrictions
 
 ENERGIES = [
     StretchEnergy(0),
@@ -88,7 +86,7 @@ def test_the_gradient_of_a_cut_surface_is_that_of_its_energy(energy):
     restrictions = find_restrictions(mesh, corners, z, is_free, check_constraints(PointConstraints(), uv))
     motions = find_motions(z, restrictions)
     target_shapes = rest_sides(edge_lengths(mesh.vertices, mesh.faces))
-    elements = Elements(motions, corners, target_shapes, 1.0, np.ones(len(corners)))
+    elements = Elements.of(motions, corners, target_shapes, 1.0, np.ones(len(corners)))
 
     def total(step):
         return elements.energies(energy, elements.maps(z + motions.shifts(step))).sum()

@@ -12,13 +12,13 @@ from stored_meshes import stored_heights
 
 import coneflat
 from coneflat import TriangleMesh
-from coneflat.geometry import edge_lengths
+from coneflat.geometry import edge_lengths, rest_sides
 from coneflat.geometry.planar import heights, signed_double_areas
 from coneflat.geometry.straight import FlatTriangles
 from coneflat.optimise import embedded_disks
-from coneflat.optimise.patches import DEGENERATE_HEIGHT, Patches
-from coneflat.optimise.relaxing import rest_sides
-from coneflat.optimise.untangling import untangle
+from coneflat.optimise.untangling import DEGENERATE_HEIGHT, Patches, untangle
+
+UNTANGLING = import_module("coneflat.optimise.untangling")
 
 
 def fan(rim, noise, seed):
@@ -293,6 +293,20 @@ class TestMarkedSeams:
         assert np.count_nonzero(np.abs(turned) > 1e-9) < 8
 
 
+def patches_around(centres):
+    """Hexagons whose centres are moved, and whose triangles are equilateral on the surface."""
+    points, faces = [], []
+    for i, centre in enumerate(centres):
+        points += [*np.exp(1j * np.pi / 3 * np.arange(6)), centre]
+        faces += [(7 * i + k, 7 * i + (k + 1) % 6, 7 * i + 6) for k in range(6)]
+    places, faces = np.array(points)[np.array(faces)], np.array(faces)
+    sides = places[:, [2, 0, 1]] - places[:, [1, 2, 0]]
+    twin = coneflat.geometry.intrinsic.halfedge_twins(TriangleMesh(np.zeros((len(points), 3)), faces))
+    flat = FlatTriangles(sides.ravel(), np.ones(sides.size, dtype=complex), twin)
+    is_movable = np.arange(len(points)) % 7 == 6
+    return Patches(flat, faces, sides, is_movable, rest_sides(np.ones((len(faces), 3))))
+
+
 class TestPatches:
     def test_a_vertex_without_valid_position_stays_flipped(self):
         """A vertex whose six neighbours are held in an order around it that no place of it makes upright."""
@@ -306,3 +320,20 @@ class TestPatches:
         movable = np.arange(7) == 6
         patches = Patches(flat, faces, sides, movable, rest_sides(np.ones((6, 3))))
         assert not (heights(patches.moved(patches.solve())) > 0).all()
+
+    @pytest.mark.parametrize("singular", [0, 1, 2])
+    def test_a_singular_patch_ends_alone(self, singular, monkeypatch):
+        descend = UNTANGLING.descend
+
+        def refuse_one(points, problem, **options):
+            if 2 * singular in problem.elements.unknowns:
+                raise coneflat.errors.MetricError("the Hessian is singular")
+            return descend(points, problem, **options)
+
+        centres = [1.5, 1.2j, -1.4]
+        alone = np.concatenate([patches_around([centre]).solve() for centre in centres])
+        assert (heights(patches_around(centres).moved(alone)) > 0).all()
+        monkeypatch.setattr(UNTANGLING, "descend", refuse_one)
+        shifts = patches_around(centres).solve()
+        alone[singular] = 0
+        assert np.allclose(shifts, alone, rtol=1e-9)

@@ -16,7 +16,7 @@ from coneflat.geometry.nearest import Stars, slide_near
 from coneflat.geometry.planar import signed_double_areas
 from coneflat.geometry.triangles import double_areas, edge_lengths
 from coneflat.mesh.connectivity import TriangleMesh
-from coneflat.optimise.seam_chains import find_chains
+from coneflat.optimise import find_chains
 from coneflat.quadmesh.alignment import aligned
 from coneflat.quadmesh.extract import extract_quads
 from coneflat.quadmesh.quad_mesh import least_jacobians

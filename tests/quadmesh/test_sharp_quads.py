@@ -10,8 +10,8 @@ from scipy.sparse import block_diag, csr_matrix
 from test_integer_grid import check_laws
 
 from coneflat import errors, integer_grid, quads
+from coneflat.linalg.elimination import solutions_of
 from coneflat.mesh.connectivity import TriangleMesh
-from coneflat.optimise.elimination import solutions_of
 from coneflat.quadmesh.extract import extract_quads
 from coneflat.quadmesh.features import edge_indices, sharp_edges
 from coneflat.quadmesh.quality import measure_quads

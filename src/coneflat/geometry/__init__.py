@@ -17,6 +17,7 @@ from .planar import (
     layout_curvature,
     map_factors,
     mean_energy,
+    qc_distortion,
     sides_between,
     signed_angles,
     signed_double_areas,
@@ -24,7 +25,7 @@ from .planar import (
     vertex_log_scale,
 )
 from .quarter_turns import TURNS, UNITS, quarters_around, rotated, turn
-from .straight import FlatTriangles, flat_triangles
+from .straight import FlatTriangles, flat_triangles, rest_sides
 from .triangles import (
     CREASE_COSINE,
     corner_angles,
@@ -46,6 +47,7 @@ __all__ = [
     "cotangents", "dihedral_angles", "double_areas", "edge_lengths", "face_normals", "fill_nearest",
     "fill_orientations", "find_overlaps", "flat_triangles", "handle_loops", "halfedge_twins", "is_broken",
     "approximate_overlap_areas", "layout_curvature", "map_factors", "mean_energy", "mollify", "orientation",
-    "quarters_around", "rotated", "sides_between", "signed_angles", "signed_double_areas", "triangle_energies",
-    "turn", "unit_vectors", "vertex_log_scale", "vertex_normals", "visible_share",
+    "qc_distortion", "quarters_around", "rest_sides", "rotated", "sides_between", "signed_angles",
+    "signed_double_areas", "triangle_energies", "turn", "unit_vectors", "vertex_log_scale", "vertex_normals",
+    "visible_share",
 ]  # fmt: skip

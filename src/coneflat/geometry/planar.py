@@ -6,6 +6,7 @@ import numpy as np
 
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh
+from .straight import rest_sides
 from .triangles import cotangents, double_areas
 
 # Height divided by longest side below which a triangle counts as degenerate, neither positively oriented nor flipped:
@@ -16,8 +17,8 @@ MIN_AREA = 1e-12
 
 
 def as_complex(places: FloatArray) -> ComplexArray:
-    """Return (k,) complex points x + i y from (k, 2) coordinates."""
-    return places[:, 0] + 1j * places[:, 1]
+    """Return complex points x + i y from (..., 2) coordinates of any shape."""
+    return places[..., 0] + 1j * places[..., 1]
 
 
 def as_pairs(points: ComplexArray) -> FloatArray:
@@ -64,16 +65,16 @@ def sides_between(corners: FloatArray) -> ComplexArray:
     return sides.view(np.complex128)[..., 0]
 
 
-def map_factors(rest_sides: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+def map_factors(shapes: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
     """Return (m, 3) and (m, 3) the derivatives of a and b in the map z -> a z + b conj(z) by the corner positions.
 
-    The map takes each triangle from its rest shape, with the sides `rest` (m, 3), to the plane. Its singular values
+    The map takes each triangle from its rest shape, to the plane. Its singular values
     are |a| + |b| and |a| - |b|. For triangles without area the result is NaN or infinite.
 
     Args:
-        rest_sides: (m, 3) sides of the triangles before the map, as complex numbers.
+        shapes: (m, 3) sides of the triangles before the map, as complex numbers.
     """
-    r0, r1 = rest_sides[:, 0], rest_sides[:, 1]
+    r0, r1 = shapes[:, 0], shapes[:, 1]
     area = r0 * np.conj(r1) - np.conj(r0) * r1
     with np.errstate(divide="ignore", invalid="ignore"):
         sides = (np.conj(r1) / area, -np.conj(r0) / area), (-r1 / area, r0 / area)
@@ -113,6 +114,23 @@ def vertex_log_scale(mesh: TriangleMesh, before: FloatArray, after: FloatArray) 
     around = [np.bincount(corner, np.repeat(areas, 3), count) for areas in (before, after)]
     area_before, area_after = (np.maximum(areas, MIN_AREA * areas.mean()) for areas in around)
     return np.log(area_after / area_before) / 2
+
+
+def qc_distortion(lengths: FloatArray, places: FloatArray) -> FloatArray:
+    """Return (m,) ratios of the singular values of triangles' maps, infinite if flipped or without area.
+
+    Args:
+        lengths: (m, 3) side lengths on the surface.
+        places: (m, 3, 2) corners in the plane.
+    """
+    a_of, b_of = map_factors(rest_sides(lengths))
+    corners = as_complex(places)
+    corners -= corners[:, :1]
+    size_a, size_b = (np.abs((factors * corners).sum(axis=1)) for factors in (a_of, b_of))
+    # For triangles without area on the surface, the comparison is with NaN.
+    return np.divide(
+        size_a + size_b, size_a - size_b, out=np.full(len(lengths), np.inf), where=size_a > size_b
+    )
 
 
 def triangle_energies(lengths: FloatArray, places: FloatArray) -> FloatArray:

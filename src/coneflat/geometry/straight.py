@@ -81,6 +81,13 @@ def straight_triangles(
     return FlatTriangles(sides, turns, twin)
 
 
+def rest_sides(lengths: FloatArray) -> ComplexArray:
+    """Return (m, 3) the complex side vectors of triangles with given lengths (m, 3), positively oriented."""
+    sides = np.empty(lengths.size, dtype=np.complex128)
+    place_triangles(np.ascontiguousarray(lengths).ravel(), sides)
+    return sides.reshape(-1, 3)
+
+
 @compiled
 def place_triangles(length: FloatArray, sides: ComplexArray) -> None:
     """Write the three sides of each triangle as vectors in its own frame, with the longest side along x."""

@@ -17,8 +17,7 @@ from ..geometry.planar import layout_curvature
 from ..geometry.straight import FlatTriangles, straight_triangles
 from ..geometry.triangles import corner_angles
 from ..geometry.unfolding import unfold_from
-from ..mesh.connectivity import TriangleMesh
-from ..optimise.relaxed_layouts import joined
+from ..mesh.connectivity import TriangleMesh, joined_meshes
 from ..optimise.untangling import find_degenerate
 from ..stages import Layout, SolveStatistics
 
@@ -40,7 +39,7 @@ def lay_out_flat_disks(
     if not meshes:
         return []
     first, starts = (np.cumsum([0, *map(len, arrays)]) for arrays in (fixed, lengths))
-    mesh, sides = joined(meshes, first), np.concatenate(lengths)
+    mesh, sides = joined_meshes(meshes), np.concatenate(lengths)
     flat = straight_triangles(intrinsic_triangulation(mesh, sides), _NONE)
     is_flat = _are_flat_disks(mesh, sides, flat, first, starts)
     points = unfold_from(flat, mesh.faces, starts[:-1])

@@ -12,9 +12,8 @@ from ..base.text import plural
 from ..errors import MetricError
 from ..geometry import angle_defect, corner_angles, double_areas
 from ..geometry.planar import layout_curvature, signed_double_areas, vertex_log_scale
-from ..geometry.straight import FlatTriangles
+from ..geometry.straight import FlatTriangles, rest_sides
 from ..geometry.unfolding import unfold
-from ..optimise.relaxing import rest_sides
 from ..optimise.untangling import MAX_RINGS, untangle
 from ..stages import Cut, Embedding, FlatMetric, Layout
 from .least_squares import least_squares_layout

@@ -1,6 +1,6 @@
 """Measures of a parameterization, reports and guarantees."""
 
-from .distortion import angle_sum_errors, measure, measure_map, quantile, sum_angles
+from .distortion import angle_sum_errors, mean_qc, measure, measure_map, quantile, sum_angles
 from .guarantees import undefined_measures, unmet_guarantees
 from .report import (
     FIRST_ROWS,
@@ -17,7 +17,6 @@ from .requirements import REPORTED, Requirement, breaches, parse_requirements
 
 __all__ = [
     "FIRST_ROWS", "MAP_MEASURES", "REPORTED", "Requirement", "Row", "SUMMARY_MEASURES", "angle_sum_errors", "as_rows",
-    "breaches", "map_rows", "measure", "measure_map", "number_text", "packing_row", "parse_requirements", "path_text",
-    "quantile",
-    "sum_angles", "undefined_measures", "unmet_guarantees",
+    "breaches", "map_rows", "mean_qc", "measure", "measure_map", "number_text", "packing_row", "parse_requirements",
+    "path_text", "quantile", "sum_angles", "undefined_measures", "unmet_guarantees",
 ]  # fmt: skip

@@ -13,11 +13,14 @@ from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats, 
 from ..base.jit import compiled
 from ..base.text import list_some, short_repr
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
+from ..geometry import double_areas
 from ..geometry.intrinsic import check_lengths
 from ..geometry.overlap import Overlaps, overlaps_of_mesh
+from ..geometry.planar import qc_distortion
 from ..geometry.straight import place_triangles
 from ..mesh.charts import both_sides, joined_edges, label_charts
 from ..mesh.connectivity import TriangleMesh
+from ..stages import Layout
 
 ZERO_AREA = 1e-12  # twice the area over the longest side squared; smaller ones are rounding errors
 
@@ -232,6 +235,15 @@ def measure_map(
         curvature_error=curvature_error[0],
         curvature_error_max=curvature_error[1],
     )
+
+
+def mean_qc(layout: Layout) -> float:
+    """Return the mean quasi-conformal distortion of a layout by area, over positively oriented triangles."""
+    ratios = qc_distortion(layout.lengths, layout.points[layout.corners])
+    is_positive = np.isfinite(ratios)
+    if not is_positive.any():
+        return math.inf
+    return _mean(ratios[is_positive], double_areas(layout.lengths)[is_positive])
 
 
 def _scale_measures(

@@ -8,6 +8,7 @@ opposite corner.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -259,6 +260,15 @@ class _Sorted:
         """Return the places of each component in the order."""
         starts = self.starts.tolist()
         return [slice(begin, end) for begin, end in pairwise(starts)]
+
+
+def joined_meshes(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
+    """Return the union of meshes, with vertices and faces in their order; a single mesh is returned itself."""
+    if len(meshes) == 1:
+        return meshes[0]
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
+    return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
 
 def nearby(faces: IntArray, seeds: BoolArray, rings: int) -> BoolArray:

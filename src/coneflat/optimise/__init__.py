@@ -1,12 +1,10 @@
 """A solver that reduces the distortion of a layout while the sides of seams stay rigid copies of each other."""
 
-from .constraints import Lines, PointConstraints
 from .energies import StretchEnergy
-from .free_seams import embedded_disks, relaxed_disks, untangled_disk
-from .relaxed_layouts import joined, mean_qc, relax_layouts
-from .relaxing import Relaxed, relax, rest_sides
-from .seam_chains import SeamChains, find_chains
-from .seam_untangling import untangle_seams
+from .free_seams import embedded_disks, relaxed_disks, untangle_seams, untangled_disk
+from .relaxed_layouts import relax_layouts
+from .relaxing import Relaxed, relax
+from .restrictions import Lines, PointConstraints, SeamChains, find_chains
 
 __all__ = [
     "Lines",
@@ -16,12 +14,9 @@ __all__ = [
     "StretchEnergy",
     "embedded_disks",
     "find_chains",
-    "joined",
-    "mean_qc",
     "relax",
     "relaxed_disks",
     "relax_layouts",
-    "rest_sides",
     "untangle_seams",
     "untangled_disk",
 ]

@@ -7,8 +7,9 @@ thus in the unknowns that move these.
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csc_matrix
@@ -56,22 +57,39 @@ class Maps:
         return falling
 
 
+@dataclass(frozen=True, eq=False)
 class Elements:
     """The triangles that unknowns move.
 
+    The unknowns of an element are those of its corners in order; an unknown may occur twice.
+
     Attributes:
         faces: (f,) the triangles.
-        count: the number of unknowns k.
-        unknowns: (k,) their indices among those of the motions.
-        parts: number of parts, which are connected components of unknowns that share triangles.
-        part, unknown_part: (f,), (k,) the part of each triangle and of each unknown.
+        corners: (f, 3) their points.
         weight: (f,) weight of each triangle's energy.
+        a_of, b_of: (f, 3) the derivatives of a and b by the positions of the corners.
+        start: (f + 1,) the start of the unknowns of each element in the following arrays.
+        unknown: the unknowns; k for the offset.
+        alpha, beta: the derivatives of a and b by each of them.
+        unknowns: (k,) the indices of the unknowns among those of the motions.
     """
 
-    def __init__(
-        self, motions: Motions, corners: IntArray, rest_sides: ComplexArray, unit: float, weight: FloatArray
-    ) -> None:
-        """Find the triangles that the motions move, and the derivatives of their maps.
+    faces: IntArray
+    corners: IntArray
+    weight: FloatArray
+    a_of: ComplexArray
+    b_of: ComplexArray
+    start: IntArray
+    unknown: IntArray
+    alpha: ComplexArray
+    beta: ComplexArray
+    unknowns: IntArray
+
+    @classmethod
+    def of(
+        cls, motions: Motions, corners: IntArray, rest_sides: ComplexArray, unit: float, weight: FloatArray
+    ) -> Elements:
+        """Return the triangles that the motions move, with the derivatives of their maps.
 
         Args:
             motions: the motions of points.
@@ -81,83 +99,91 @@ class Elements:
             weight: (m,) weights of the triangles.
         """
         matrix = motions.matrix
-        moves = np.diff(matrix.indptr) > 0
-        self.faces = np.flatnonzero(has_any(moves, corners))
-        self.count, self.weight = motions.count, weight[self.faces]
-        self.unknowns = np.arange(self.count)
-        corners = corners[self.faces]
-        self._corners = corners
-        self._a_of, self._b_of = map_factors(unit * rest_sides[self.faces])
-        # The unknowns of an element are those of its corners in order; an unknown may occur twice.
-        sizes = np.diff(matrix.indptr)[corners.ravel()]
+        faces = np.flatnonzero(has_any(np.diff(matrix.indptr) > 0, corners))
+        corners = corners[faces]
+        a_of, b_of = map_factors(unit * rest_sides[faces])
+        points = corners.ravel()
+        sizes = np.diff(matrix.indptr)[points]
         ends = np.cumsum(sizes)
-        self._start = np.concatenate([[0], ends[2::3]])
-        entry = np.arange(len(sizes)).repeat(sizes)
-        at = (
-            matrix.indptr[corners.ravel()].repeat(sizes)
-            + np.arange(int(sizes.sum()))
-            - (ends - sizes).repeat(sizes)
+        corner = np.arange(len(sizes)).repeat(sizes)
+        at = matrix.indptr[points].repeat(sizes) + np.arange(int(sizes.sum())) - (ends - sizes).repeat(sizes)
+        return cls(
+            faces,
+            corners,
+            weight[faces],
+            a_of,
+            b_of,
+            start=np.concatenate([[0], ends[2::3]]),
+            unknown=matrix.indices[at].astype(np.int64),
+            alpha=a_of.ravel()[corner] * matrix.data[at],
+            beta=b_of.ravel()[corner] * matrix.data[at],
+            unknowns=np.arange(motions.count),
         )
-        self._unknown = matrix.indices[at].astype(np.int64)
-        self._alpha = self._a_of.ravel()[entry] * matrix.data[at]
-        self._beta = self._b_of.ravel()[entry] * matrix.data[at]
-        self._find_pattern()
 
     def of_parts(self, chosen: BoolArray) -> Elements:
         """Return the elements of chosen parts (parts,), with renumbered parts and unknowns."""
-        is_chosen, is_chosen_unknown = chosen[self.part], chosen[self.unknown_part]
-        unknowns = np.flatnonzero(is_chosen_unknown)
+        rows = chosen[self.part]
+        is_chosen_unknown = chosen[self.unknown_part]
+        unknowns = self.unknowns[is_chosen_unknown]
         number = np.append(np.cumsum(is_chosen_unknown) - 1, len(unknowns))
-        restricted, sizes = copy(self), np.diff(self._start)
-        entries = is_chosen.repeat(sizes)
-        restricted.faces, restricted.weight, restricted.count = (
-            self.faces[is_chosen],
-            self.weight[is_chosen],
-            len(unknowns),
+        sizes = np.diff(self.start)
+        entries = rows.repeat(sizes)
+        return Elements(
+            self.faces[rows],
+            self.corners[rows],
+            self.weight[rows],
+            self.a_of[rows],
+            self.b_of[rows],
+            start=np.concatenate([[0], np.cumsum(sizes[rows])]),
+            unknown=number[self.unknown[entries]],
+            alpha=self.alpha[entries],
+            beta=self.beta[entries],
+            unknowns=unknowns,
         )
-        restricted._corners, restricted._a_of, restricted._b_of = (
-            self._corners[is_chosen],
-            self._a_of[is_chosen],
-            self._b_of[is_chosen],
-        )
-        restricted._start = np.concatenate([[0], np.cumsum(sizes[is_chosen])])
-        restricted._unknown = number[self._unknown[entries]]
-        restricted._alpha, restricted._beta = self._alpha[entries], self._beta[entries]
-        restricted.unknowns = self.unknowns[unknowns]
-        restricted._find_pattern()
-        return restricted
 
-    def _find_pattern(self) -> None:
-        k, sizes = self.count, np.diff(self._start)
-        self._squares = np.concatenate([[0], np.cumsum(sizes**2)])
-        self._slots = np.full(self._squares[-1], -1)
-        order = sort_by_counting(self._unknown, k + 1)
-        first = np.searchsorted(self._unknown[order], np.arange(k + 2))
-        owner = np.arange(len(sizes)).repeat(sizes)
-        rows, starts = find_entries(
-            self._start, self._unknown, owner, self._squares, first, order, self._slots
-        )
-        # One matrix for all steps, so that its pattern is analysed once.
-        self._matrix = csc_matrix((np.zeros(len(rows)), rows, starts), shape=(k, k))
-        self._indices, self._indptr = self._matrix.indices, self._matrix.indptr
-        self._diagonal = np.flatnonzero(self._indices == np.arange(k).repeat(np.diff(self._indptr)))
-        self.parts, self.unknown_part = label_components(
-            k, self._indices.astype(np.int64), np.arange(k).repeat(np.diff(self._indptr))
-        )
-        first = self._unknown[self._start[:-1]]
-        self.part = np.append(self.unknown_part, 0)[first]  # any part for the offset: all share a step
+    @property
+    def count(self) -> int:
+        """The number k of unknowns."""
+        return len(self.unknowns)
+
+    @cached_property
+    def pattern(self) -> Pattern:
+        """The entries of the Hessian."""
+        return Pattern.of(self.start, self.unknown, self.count)
+
+    @cached_property
+    def _labels(self) -> tuple[int, IntArray]:
+        """The number of parts, which are connected components of unknowns that share triangles; and (k,) these."""
+        indices, indptr = self.pattern.matrix.indices, self.pattern.matrix.indptr
+        columns = np.arange(self.count).repeat(np.diff(indptr))
+        return label_components(self.count, indices.astype(np.int64), columns)
+
+    @property
+    def parts(self) -> int:
+        """The number of parts: connected components of unknowns that share triangles."""
+        return self._labels[0]
+
+    @property
+    def unknown_part(self) -> IntArray:
+        """(k,) the part of each unknown."""
+        return self._labels[1]
+
+    @cached_property
+    def part(self) -> IntArray:
+        """(f,) the part of each triangle; any part for those that only the offset moves, as all parts share a step."""
+        return np.append(self.unknown_part, 0)[self.unknown[self.start[:-1]]]
 
     def maps(self, points: ComplexArray) -> Maps:
         """Return the maps at given positions (u,) of all points."""
-        places = points[self._corners]
+        places = points[self.corners]
         # Relative to a corner, to avoid cancellation far from the origin.
         places = places - places[:, :1]
-        return Maps((self._a_of * places).sum(axis=1), (self._b_of * places).sum(axis=1))
+        return Maps((self.a_of * places).sum(axis=1), (self.b_of * places).sum(axis=1))
 
     def change(self, step: FloatArray) -> Maps:
         """Return the change of the maps for a step of the unknowns, with the offset as the last entry (k + 1,)."""
-        values = step[self._unknown]
-        sums = [np.add.reduceat(factor * values, self._start[:-1]) for factor in (self._alpha, self._beta)]
+        values = step[self.unknown]
+        sums = [np.add.reduceat(factor * values, self.start[:-1]) for factor in (self.alpha, self.beta)]
         return Maps(sums[0], sums[1])
 
     def energies(self, energy: Energy, maps: Maps) -> FloatArray:
@@ -185,59 +211,108 @@ class Elements:
             energy: the energy.
             maps: the current maps.
             offset: the prescribed change of the last unknown, which is not solved for.
-
-        Notes:
-            In the lengths A = |a| and B = |b|, and their directions, a triangle's Hessian decouples into a block of
-            two by two for the lengths and one number each for the directions, psi_A / A and psi_B / B (in other
-            coordinates: Smith, de Goes, Kim, "Analytic eigensystems for isotropic distortion energies", 2019). Each
-            block is projected to a positive semidefinite one.
         """
-        size_a, size_b = np.abs(maps.a), np.abs(maps.b)
-        derivatives = energy.derivatives(size_a + size_b, size_a - size_b)
-        by_a, by_b = derivatives.by_1 + derivatives.by_2, derivatives.by_1 - derivatives.by_2
-        first = derivatives.by_11 + 2 * derivatives.by_12 + derivatives.by_22
-        last = derivatives.by_11 - 2 * derivatives.by_12 + derivatives.by_22
-        cross = derivatives.by_11 - derivatives.by_22
-        unit_a, turn_a = _polar(maps.a, size_a, size_b, by_a, first)
-        unit_b, turn_b = _polar(maps.b, size_b, size_a, by_b, last)
-        middle, half = (first + last) / 2, (first - last) / 2
-        radius = np.hypot(half, cross)
-        high, low = np.maximum(middle + radius, 0.0), np.maximum(middle - radius, 0.0)
-        share = np.divide((high - low) / 2, radius, out=np.zeros_like(radius), where=radius > 0)
-        bends = (
-            np.stack(
-                [
-                    (high + low) / 2 + share * half,
-                    (high + low) / 2 - share * half,
-                    share * cross,
-                    np.maximum(turn_a, 0.0),
-                    np.maximum(turn_b, 0.0),
-                ],
-                axis=1,
-            )
-            * self.weight[:, None]
-        )
-        slopes = np.stack([by_a, by_b], axis=1) * self.weight[:, None]
+        derivatives = polar_derivatives(energy, maps)
         gradient, pull = np.zeros(self.count + 1), np.zeros(self.count + 1)
-        values = np.zeros(len(self._indices))
+        values = np.zeros(len(self.pattern.matrix.data))
         add_elements(
-            self._start,
-            self._unknown,
-            self._squares,
-            self._slots,
-            self._alpha,
-            self._beta,
-            unit_a,
-            unit_b,
-            slopes,
-            bends,
+            self.start,
+            self.unknown,
+            self.pattern.squares,
+            self.pattern.slots,
+            self.alpha,
+            self.beta,
+            derivatives.unit_a,
+            derivatives.unit_b,
+            derivatives.slopes * self.weight[:, None],
+            derivatives.bends * self.weight[:, None],
             gradient,
             pull,
             values,
         )
-        values[self._diagonal] *= 1 + RELATIVE_RIDGE
-        self._matrix.data = values
-        return gradient[: self.count], offset * pull[: self.count], self._matrix
+        values[self.pattern.diagonal] *= 1 + RELATIVE_RIDGE
+        # One matrix for all steps, so that its pattern is analysed once.
+        self.pattern.matrix.data = values
+        return gradient[: self.count], offset * pull[: self.count], self.pattern.matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """The entries of the Hessian.
+
+    Attributes:
+        squares: (f + 1,) the start of the pairs of unknowns of each element.
+        slots: the entry of each pair; -1 for pairs with the offset.
+        matrix: (k, k) matrix with these entries.
+        diagonal: (k,) the entries of its diagonal.
+    """
+
+    squares: IntArray
+    slots: IntArray
+    matrix: csc_matrix
+    diagonal: IntArray
+
+    @classmethod
+    def of(cls, start: IntArray, unknown: IntArray, count: int) -> Pattern:
+        """Return the entries for elements with `start` and `unknown` as of `Elements`, and a number of unknowns."""
+        sizes = np.diff(start)
+        squares = np.concatenate([[0], np.cumsum(sizes**2)])
+        slots = np.full(squares[-1], -1)
+        order = sort_by_counting(unknown, count + 1)
+        first = np.searchsorted(unknown[order], np.arange(count + 2))
+        owner = np.arange(len(sizes)).repeat(sizes)
+        rows, starts = find_entries(start, unknown, owner, squares, first, order, slots)
+        matrix = csc_matrix((np.zeros(len(rows)), rows, starts), shape=(count, count))
+        diagonal = np.flatnonzero(matrix.indices == np.arange(count).repeat(np.diff(matrix.indptr)))
+        return cls(squares, slots, matrix, diagonal)
+
+
+class PolarDerivatives(NamedTuple):
+    """Derivatives of energies by a and b in polar coordinates, with positive semidefinite second derivatives.
+
+    Attributes:
+        unit_a, unit_b: (f,) directions of a and b as unit complex numbers.
+        slopes: (f, 2) derivatives by |a| and |b|.
+        bends: (f, 5) second derivatives: by |a|, by |b|, mixed, and perpendicular to a and b.
+    """
+
+    unit_a: ComplexArray
+    unit_b: ComplexArray
+    slopes: FloatArray
+    bends: FloatArray
+
+
+def polar_derivatives(energy: Energy, maps: Maps) -> PolarDerivatives:
+    """Return the derivatives of the energies of triangles by a and b.
+
+    Notes:
+        In the lengths A = |a| and B = |b|, and their directions, a triangle's Hessian decouples into a block of two by
+        two for the lengths and one number each for the directions, psi_A / A and psi_B / B (in other coordinates:
+        Smith, de Goes, Kim, "Analytic eigensystems for isotropic distortion energies", 2019). Each block is projected
+        to a positive semidefinite one.
+    """
+    size_a, size_b = np.abs(maps.a), np.abs(maps.b)
+    derivatives = energy.derivatives(size_a + size_b, size_a - size_b)
+    by_a, by_b = derivatives.by_1 + derivatives.by_2, derivatives.by_1 - derivatives.by_2
+    by_aa = derivatives.by_11 + 2 * derivatives.by_12 + derivatives.by_22
+    by_bb = derivatives.by_11 - 2 * derivatives.by_12 + derivatives.by_22
+    unit_a, turn_a = _polar(maps.a, size_a, size_b, by_a, by_aa)
+    unit_b, turn_b = _polar(maps.b, size_b, size_a, by_b, by_bb)
+    block = _semidefinite(by_aa, by_bb, derivatives.by_11 - derivatives.by_22)
+    bends = np.stack([*block, np.maximum(turn_a, 0.0), np.maximum(turn_b, 0.0)], axis=1)
+    return PolarDerivatives(unit_a, unit_b, np.stack([by_a, by_b], axis=1), bends)
+
+
+def _semidefinite(
+    first: FloatArray, last: FloatArray, cross: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return symmetric blocks of two by two, by diagonal and mixed entry (f,), with negative eigenvalues set to 0."""
+    middle, half = (first + last) / 2, (first - last) / 2
+    radius = np.hypot(half, cross)
+    high, low = np.maximum(middle + radius, 0.0), np.maximum(middle - radius, 0.0)
+    share = np.divide((high - low) / 2, radius, out=np.zeros_like(radius), where=radius > 0)
+    mean = (high + low) / 2
+    return mean + share * half, mean - share * half, share * cross
 
 
 def _polar(

@@ -13,14 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, mask_of
+from ..base.arrays import ComplexArray, FloatArray, IntArray, mask_of
 from ..errors import OptionError
 from ..geometry.planar import as_complex
-from ..mesh.charts import point_vertices
-from ..mesh.connectivity import TriangleMesh
-from .constraints import CheckedConstraints
-from .elimination import RELATIVE_ROUNDING, solutions_of
-from .seam_chains import SeamChains, constrained_chains
+from ..linalg.elimination import RELATIVE_ROUNDING, solutions_of
+from .restrictions import CheckedConstraints, Restrictions, SeamChains
 
 # Unit of the rounding gaps between the sides of seams. In this unit they are large enough not to be treated as zero.
 CLOSING_UNIT = 2.0**-40
@@ -53,23 +50,6 @@ class Motions:
     def shifts(self, step: FloatArray) -> ComplexArray:
         """Return (u,) the complex shifts of the points for a step (k + 1,) of the unknowns and the offset."""
         return np.asarray(self.matrix @ step)
-
-
-@dataclass(frozen=True, eq=False)
-class Restrictions:
-    """What restricts the motions of points.
-
-    Attributes:
-        vertex: (u,) the vertex of each point.
-        is_free: (u,) True for points that may move; the translation of a seam that contains others is fixed.
-        chains: the seams, across which rotations are preserved.
-        constraints: further constraints.
-    """
-
-    vertex: IntArray
-    is_free: BoolArray
-    chains: SeamChains
-    constraints: CheckedConstraints
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,30 +88,6 @@ class Entries(NamedTuple):
     point: IntArray
     source: IntArray
     shift: ComplexArray
-
-
-def find_restrictions(
-    mesh: TriangleMesh,
-    corners: IntArray,
-    points: ComplexArray,
-    is_free: BoolArray,
-    constraints: CheckedConstraints,
-) -> Restrictions:
-    """Return what restricts the motions of a layout's points.
-
-    Args:
-        mesh: the mesh.
-        corners: (m, 3) the point at each triangle corner.
-        points: (u,) positions in the plane as complex numbers.
-        is_free: (n,) True for vertices that may move.
-        constraints: constraints on points.
-
-    Raises:
-        SeamError: the sides of a seam are not rigid copies of each other.
-    """
-    vertex = point_vertices(mesh.faces, corners, len(points))
-    chains = constrained_chains(mesh, corners, points, vertex, constraints)
-    return Restrictions(vertex, is_free[vertex], chains, constraints)
 
 
 def find_motions(points: ComplexArray, restrictions: Restrictions) -> Motions:

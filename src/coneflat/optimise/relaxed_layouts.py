@@ -11,15 +11,14 @@ import numpy as np
 from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, mask_of, rows_of
 from ..base.notes import Unmet
 from ..base.progress import report_detail, stage
-from ..errors import LengthError, MetricError, SeamError
+from ..errors import LengthError, SeamError
 from ..geometry import double_areas
 from ..geometry.operators import MIN_WEIGHT, area_distortion, at_unit_scale, vertex_areas, weighted_areas
-from ..geometry.planar import as_complex, layout_curvature, map_factors, signed_double_areas, vertex_log_scale
-from ..mesh.connectivity import TriangleMesh, label_components, nearby
+from ..geometry.planar import layout_curvature, qc_distortion, signed_double_areas, vertex_log_scale
+from ..mesh.connectivity import joined_meshes, label_components, nearby
 from ..stages import Layout, RelaxSpec
-from .elements import Maps
 from .energies import StretchEnergy
-from .relaxing import relax, rest_sides
+from .relaxing import relax
 
 # Triangles with more quasi-conformal distortion than this are relaxed, with this number of rings around them. Measured:
 # with a twentieth of the vertices of a fine mesh and three quarters of a coarse one free, the mean comes within 0.0025
@@ -46,8 +45,9 @@ def relax_layouts(
 ) -> list[Layout]:
     """Return layouts with less distortion, the same cones and the same seams, relaxed as one mesh.
 
-    A boundary with prescribed lengths or shape does not move. A layout whose seams do not have sides of equal lengths,
-    so that these cannot be held, is returned unchanged, with a note if the relaxation of all triangles was requested.
+    A boundary with prescribed lengths or shape does not move. A single layout whose seams do not have sides of equal
+    lengths, so that these cannot be held, is returned unchanged, with a note if the relaxation of all triangles was
+    requested.
 
     Args:
         layouts: layouts of connected meshes.
@@ -59,26 +59,16 @@ def relax_layouts(
 
     Raises:
         MetricError: a relaxation found no finite step.
+        SeamError, LengthError: the seams of one of several layouts cannot be held.
     """
     if spec.is_off or not layouts:
         return list(layouts)
     try:
         return _relaxed(LayoutGroup(layouts, weights), spec)
-    except (SeamError, LengthError, MetricError) as error:  # a metric that did not converge
+    except (SeamError, LengthError) as error:  # a metric that did not converge
         if len(layouts) > 1:
-            return [
-                relax_layouts([layout], [layout_weights], spec)[0]
-                for layout, layout_weights in zip(layouts, weights, strict=True)
-            ]
-        if isinstance(error, MetricError):
             raise
         return [layouts[0].with_notes(Unmet(f"Not relaxed: {error}.")) if spec.relaxes_all else layouts[0]]
-
-
-def mean_qc(layout: Layout) -> float:
-    """Return the mean quasi-conformal distortion of a layout by area, over positively oriented triangles."""
-    group = LayoutGroup([layout], [None])
-    return float(group.means(group.ratios(group.points))[0])
 
 
 def _relaxed(group: LayoutGroup, spec: RelaxSpec) -> list[Layout]:
@@ -146,7 +136,7 @@ class LayoutGroup:
         self._vertices = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
         self._faces = np.cumsum([0, *(len(mesh.faces) for mesh in meshes)])
         self._points = np.cumsum([0, *(len(layout.points) for layout in layouts)])
-        self.mesh = meshes[0] if len(meshes) == 1 else joined(meshes, self._vertices)
+        self.mesh = joined_meshes(meshes)
         self.points = np.concatenate([layout.points for layout in layouts])
         self.corners = np.concatenate(
             [layout.corners + start for layout, start in zip(layouts, self._points, strict=False)]
@@ -195,13 +185,8 @@ class LayoutGroup:
         chosen: the triangles to compute, the others are set to infinity; None for all.
         """
         ratios = np.full(len(self.mesh.faces), np.inf)
-        every = np.arange(len(ratios)) if chosen is None else chosen
-        a_of, b_of = map_factors(rest_sides(self.lengths[every]))
-        places = as_complex(points)[self.corners[every]]
-        places -= places[:, :1]
-        larger, smaller = Maps((a_of * places).sum(axis=1), (b_of * places).sum(axis=1)).singular_values()
-        is_positive = smaller > 0  # False for triangles without area on the surface
-        ratios[every[is_positive]] = larger[is_positive] / smaller[is_positive]
+        at = slice(None) if chosen is None else chosen
+        ratios[at] = qc_distortion(self.lengths[at], rows_of(points, self.corners[at]))
         return ratios
 
     def means(self, ratios: FloatArray) -> FloatArray:
@@ -278,9 +263,3 @@ class LayoutGroup:
                 )
             )
         return layouts
-
-
-def joined(meshes: Sequence[TriangleMesh], starts: IntArray) -> TriangleMesh:
-    """Return the union of meshes; the vertex indices of each are shifted by its start."""
-    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
-    return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))

@@ -25,13 +25,13 @@ from ..errors import ArrayShapeError, ConvergenceError, OptionError
 from ..geometry import double_areas, edge_lengths
 from ..geometry.intrinsic import check_lengths
 from ..geometry.planar import as_complex, as_pairs, heights, sides_between, signed_double_areas
-from ..geometry.straight import place_triangles
+from ..geometry.straight import rest_sides
 from ..mesh.connectivity import TriangleMesh
-from .constraints import PointConstraints, check_constraints
 from .elements import Elements
 from .energies import Energy, StretchEnergy
-from .motions import close_seams, find_motions, find_restrictions
+from .motions import close_seams, find_motions
 from .newton import RELATIVE_ROUNDING, Problem, descend
+from .restrictions import PointConstraints, check_constraints, find_restrictions
 
 # The last step is the first one whose predicted decrease is at most this fraction of the energy minus its lower bound;
 # and the maximum number of steps.
@@ -129,7 +129,7 @@ def relax(
     z = as_complex(places)
     restrictions = find_restrictions(mesh, corner, z, is_free, checked)
     motions = find_motions(z, restrictions)
-    elements = Elements(motions, corner, shapes, unit, share)
+    elements = Elements.of(motions, corner, shapes, unit, share)
     if not elements.count and not motions.has_offset:
         return unmoved
     problem = Problem(motions, elements, StretchEnergy() if energy is None else energy)
@@ -178,13 +178,6 @@ def _movable(
     height = np.minimum(heights(candidate_shapes), heights(sides_between(corners[candidates])))
     is_degenerate = (height <= RELATIVE_ROUNDING) | (areas[candidates] <= 0)
     return shapes, is_free & ~mask_of(len(is_free), mesh.faces[candidates[is_degenerate]])
-
-
-def rest_sides(lengths: FloatArray) -> ComplexArray:
-    """Return (m, 3) the complex side vectors of triangles with given lengths (m, 3), positively oriented."""
-    sides = np.empty(lengths.size, dtype=np.complex128)
-    place_triangles(np.ascontiguousarray(lengths).ravel(), sides)
-    return sides.reshape(-1, 3)
 
 
 def _flags(free: ArrayLike | None, count: int) -> BoolArray:

@@ -13,8 +13,7 @@ from ..base import BoolArray, FloatArray, IntArray, Unmet, mask_of, plural
 from ..geometry import coarse_mesh, double_areas, edge_lengths
 from ..geometry.nearest import Stars, TriangleTree, slide_near
 from ..mesh import NEXT, PREVIOUS, CheckedMesh
-from ..mesh.connectivity import TriangleMesh
-from ..optimise import joined
+from ..mesh.connectivity import TriangleMesh, joined_meshes
 from .cross_field import sharp_ends
 from .features import edge_indices, vertex_graph, without_pillows
 from .limits import MAX_SQUARES, NO_LIMIT, SquareLimit
@@ -122,7 +121,7 @@ class SimplerMesh:
             coarse_mesh(part, max(16, int(count * area_of(part))))[0]
             for part, _, _ in bare_mesh.split_components()
         ]
-        small = without_pillows(joined(parts, np.cumsum([0, *(len(part.vertices) for part in parts)])))
+        small = without_pillows(joined_meshes(parts))
         # More would be refused.
         small = short_edges(small, 4 * side, self.limit.squares / 3)[0]
         n, middles = len(small.vertices), small.halfedge_edges.reshape(-1, 3)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..base import BoolArray, ComplexArray, FloatArray, IntArray, mask_of
+from ..geometry import rest_sides
 from ..mesh import NEXT, PREVIOUS
-from ..optimise import rest_sides
 from .features import split_longest
 from .grid_layout import GridLayout, at_origin, find_sides, joined_charts
 

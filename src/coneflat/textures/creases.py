@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..geometry import dihedral_angles
-from ..optimise import joined as joined_meshes
+from ..mesh.connectivity import joined_meshes
 from ..source import Component
 
 # Dihedral angle of sharp edges in radians; and the preference for seams along them if only they bend the surface: twice
@@ -22,7 +22,7 @@ def along_sharp_edges(components: Sequence[Component]) -> list[Component]:
     On machined parts, seams along sharp edges are short and hidden; on noise, sharp edges say nothing of the shape.
     """
     starts = np.cumsum([0, *(len(component.vertices) for component in components)])
-    mesh, count = joined_meshes([component.mesh for component in components], starts), len(components)
+    mesh, count = joined_meshes([component.mesh for component in components]), len(components)
     angles = np.abs(dihedral_angles(mesh))
     lengths = np.concatenate([component.lengths.ravel() for component in components])
     bending = angles * lengths[mesh.edge_halfedges[:, 0]]

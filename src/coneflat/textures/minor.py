@@ -10,8 +10,8 @@ from ..base import BoolArray, FloatArray, IntArray, check_cancelled
 from ..geometry import double_areas, find_overlaps, signed_double_areas
 from ..linalg import factorize
 from ..mesh import open_along, tie_key
-from ..mesh.connectivity import TriangleMesh
-from ..optimise import StretchEnergy, embedded_disks, joined, relax
+from ..mesh.connectivity import TriangleMesh, joined_meshes
+from ..optimise import StretchEnergy, embedded_disks, relax
 from ..seams import TIE_BREAK, find_seams
 from ..stages import Surface
 from .candidates import TOLERANCE, Candidate, CutModel
@@ -62,7 +62,7 @@ class _MinorComponents:
         self._component_of_vertex = np.arange(len(models)).repeat(vertex_counts)
         self._first_vertex = np.cumsum([0, *vertex_counts])
         self._first_edge = np.cumsum([0, *(len(component.mesh.edges) for component in components)])
-        self._mesh = joined([component.mesh for component in components], self._first_vertex)
+        self._mesh = joined_meshes([component.mesh for component in components])
         self._lengths = np.concatenate([component.lengths for component in components])
         self._areas = double_areas(self._lengths) / 2
         self._costs = np.concatenate([model.seam_costs for model in models])

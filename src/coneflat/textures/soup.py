@@ -11,10 +11,9 @@ import numpy as np
 from ..atlas import pack_charts, round_safely
 from ..base import BoolArray, FloatArray, IntArray, Unmet, plural
 from ..errors import ConeflatError, OptionError
-from ..geometry import as_pairs, edge_lengths, signed_double_areas
+from ..geometry import as_pairs, edge_lengths, rest_sides, signed_double_areas
 from ..io import stored_in_glb
 from ..mesh import EdgeGroups, end_corners, glue_layers, label_faces, split_vertices, weld
-from ..optimise import rest_sides
 from ..options import read_options
 from ..result import Flattening
 from .options import MAX_RESOLUTION, UnwrapOptions
