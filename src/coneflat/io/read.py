@@ -22,7 +22,7 @@ from .join import Joined, join_borders
 from .mesh_file import MeshFile, check_corners, differing_properties, without_short_faces
 from .obj import parse_obj
 from .off import is_off, parse_off
-from .ply import parse_ply
+from .ply.read import parse_ply
 from .split import usable_normals
 from .stl import is_stl, parse_stl
 
