@@ -11,12 +11,12 @@ import numpy as np
 
 from ..atlas import round_safely
 from ..base.arrays import FloatArray
+from ..base.formats import Use, endings
 from ..base.notes import Unmet
 from ..base.text import plural, short_repr
 from ..errors import OptionError
 from ..measures.guarantees import DOUBLE, SINGLE, first_faces, remeasured
 from ..mesh.polygons import polygon_of
-from ..options.declared import FORMATS
 from ..result import Flattening
 from .attributes import ALPHA, VERTEX_COLOURS, Attribute, losses, old_textures
 from .convex_pieces import find_pieces
@@ -31,7 +31,7 @@ from .ply.write import kept_in_ply, ply_has_textures, write_ply
 from .texture import Texture, find_texture
 
 #: Endings of the files that `write_flattening` writes, each in `_FORMATS`.
-OUTPUT_FORMATS = tuple(f".{name}" for name in FORMATS)
+OUTPUT_FORMATS = endings(Use.FLATTENING)
 
 
 class OutputFormat(NamedTuple):
