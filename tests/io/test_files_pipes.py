@@ -9,9 +9,9 @@ from shapes import hill
 
 import coneflat
 from coneflat.apps.cli.main import cli
+from coneflat.base.formats import FREESURFER
 from coneflat.errors import MeshFileError
 from coneflat.io import INPUT_FORMATS, read_mesh_from
-from coneflat.io.brains import FREESURFER
 
 trimesh = pytest.importorskip("trimesh")
 

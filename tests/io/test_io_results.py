@@ -12,7 +12,7 @@ from full_obj import cut_bar, read_bar
 
 import coneflat
 from coneflat.errors import ConeflatError, MeshFileError, UnknownFormatError
-from coneflat.io import atomic_write, check_output, write, write_flattening
+from coneflat.io import atomic_write, check_output, read, write, write_flattening
 from coneflat.io.texture import read_picture
 from coneflat.io.write import OUTPUT_FORMATS
 
@@ -85,9 +85,10 @@ def bar(tmp_path):
     return read_bar(tmp_path)
 
 
-def test_every_declared_format_is_written():
-    """The declared endings, which commands list, are those of the writers."""
+def test_every_declared_format_is_read_and_written():
+    """The declared endings, which commands list, are those of the readers and the writers."""
     assert set(OUTPUT_FORMATS) == set(write._FORMATS)
+    assert set(read.INPUT_FORMATS) == set(read._FORMATS)
 
 
 class TestTargets:

@@ -117,7 +117,7 @@ def measure_uv(
     in `flatten` before it is measured, but overlaps are those of all triangles. Corners without UVs are counted.
 
     Args:
-        mesh: a path (.obj, .ply, .gltf, .glb with UVs, or a result as .npz), a `MeshFile`, a `Flattening`; or vertices
+        mesh: a path of a mesh with UVs, or of a result (.npz); a `MeshFile`, a `Flattening`; or vertices
             (n, 3) with
         faces: (m, 3) vertex indices, and
         corner_uv: (m, 3, 2) the UV of every triangle corner, v upwards; NaN where there is none.

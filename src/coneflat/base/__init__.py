@@ -19,6 +19,7 @@ from .defaults import (
     TYPED_TOLERANCE,
 )
 from .entry_points import EntryPoint
+from .formats import Use, endings, with_formats
 from .notes import Unmet, inner_calls, warn_of, warns
 from .progress import Progress, Stopwatch, cancel_with, check_cancelled, report_detail, stage, timing
 from .text import MAX_LISTED, exit_text, list_some, plural, printable, short_repr
@@ -43,10 +44,10 @@ if TYPE_CHECKING:
 __all__ = [
     "BAKED_RESOLUTION", "BoolArray", "CHECKER_CELLS", "ComplexArray", "DISTORTION", "DOTS_PER_INCH", "EntryPoint",
     "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE", "MAX_LISTED", "MIN_CONE_ANGLE", "Progress", "Stopwatch",
-    "THREADS", "TYPED_TOLERANCE", "Unmet", "as_floats", "as_indices", "cache_folder", "cancel_with",
-    "check_cancelled", "compilation", "compiled", "dots", "exit_text", "has_any", "inner_calls", "limit_threads",
-    "list_some", "mask_of", "plural", "printable", "report_detail", "short_repr", "stage", "timing", "unit_exponent",
-    "warn_of", "warns",
+    "THREADS", "TYPED_TOLERANCE", "Unmet", "Use", "as_floats", "as_indices", "cache_folder", "cancel_with",
+    "check_cancelled", "compilation", "compiled", "dots", "endings", "exit_text", "has_any", "inner_calls",
+    "limit_threads", "list_some", "mask_of", "plural", "printable", "report_detail", "short_repr", "stage", "timing",
+    "unit_exponent", "warn_of", "warns", "with_formats",
 ]  # fmt: skip
 
 

@@ -16,9 +16,9 @@ from .files import (
     readable,
     remove_unfinished,
 )
+from .gltf.glb import FOR_INDICES, FOR_VERTICES, MATERIAL, Glb, bounds
 from .gltf.positions import local_positions
 from .gltf.references import keys_of
-from .gltf.write import FOR_INDICES, FOR_VERTICES, MATERIAL, Glb, bounds
 from .join import Joined
 from .mapped import UVMesh, as_uv_mesh, has_uv, uv_mesh_of
 from .materials import (
@@ -36,7 +36,7 @@ from .materials import (
 from .npz import CheckedArrays, number, read_archive, read_flattening
 from .obj import lines_of, relocated
 from .packages import as_input
-from .ply import write_parts
+from .ply.write import write_parts
 from .read import INPUT_FORMATS, find_meshes, read_joined, read_mesh, read_mesh_from
 from .split import SplitMesh, shading_normals, split_at_seams
 from .texture import (

@@ -21,8 +21,6 @@ from .attributes import Attribute
 from .files import PathName, as_path, imported, read_bytes, readable
 from .mesh_file import MeshFile
 
-#: Names of FreeSurfer's surfaces, which stand in the place of an ending: lh.pial. Others are recognized by content.
-FREESURFER = (".pial", ".white", ".inflated", ".sphere", ".orig", ".smoothwm")
 #: Endings of files with one value for each vertex, in addition to names such as lh.sulc.
 VALUES = (".gii", ".mgh", ".mgz", ".sulc", ".curv", ".thickness", ".area", ".volume")
 # How FreeSurfer's surfaces of triangles begin, and those of quads, with positions in hundredths of a millimetre or as

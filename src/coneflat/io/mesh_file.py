@@ -20,7 +20,7 @@ from .attributes import Attribute
 if TYPE_CHECKING:
     from .gltf.read import GltfScene
     from .obj import ObjText
-    from .ply import PlyHeader
+    from .ply.header import PlyHeader
 
 #: Corners of a face at least; files may have faces with fewer.
 MIN_CORNERS = 3

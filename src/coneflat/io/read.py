@@ -12,17 +12,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..base.formats import FREESURFER, Use, endings
 from ..base.text import short_repr
 from ..errors import EmptyMeshError, MeshFileError, OptionError, UnknownFormatError
 from ..mesh.check import weld as weld_vertices
-from .brains import FREESURFER, is_freesurfer, is_gifti, parse_freesurfer, parse_gifti
+from .brains import is_freesurfer, is_gifti, parse_freesurfer, parse_gifti
 from .files import PIPE, PathName, as_path, known_ending, read_bytes, read_input, readable
 from .gltf.read import is_glb, is_gltf, parse_gltf
 from .join import Joined, join_borders
 from .mesh_file import MeshFile, check_corners, differing_properties, without_short_faces
 from .obj import parse_obj
 from .off import is_off, parse_off
-from .ply import parse_ply
+from .ply.read import parse_ply
 from .split import usable_normals
 from .stl import is_stl, parse_stl
 
@@ -44,7 +45,8 @@ class InputFormat(NamedTuple):
     shares_vertices: bool = True
 
 
-#: The formats by ending, in the order in which a content is compared with them; any other content is taken for OBJ.
+#: How each format of `base/formats.py` is read, in the order in which a content is compared with them; any other
+#: content is taken for OBJ.
 _FORMATS = {
     ".obj": InputFormat(parse_obj, lambda content: False, is_text=True),
     ".ply": InputFormat(parse_ply, lambda content: content.startswith(b"ply"), is_text=True),
@@ -56,16 +58,15 @@ _FORMATS = {
     **dict.fromkeys(FREESURFER, InputFormat(parse_freesurfer, is_freesurfer)),
 }
 #: Endings of the files that `read_mesh` reads.
-INPUT_FORMATS = tuple(_FORMATS)
+INPUT_FORMATS = endings(Use.MESH)
 
 
 def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
     """Return the mesh of a file, with its polygons, in the file's own order of vertices and faces.
 
-    The format is given by the path's ending, in upper or lower case: .obj, .ply, .stl, .off, .gltf, .glb; .gii and
-    names such as lh.pial for brains. FreeSurfer's surfaces with other names are recognized by their content. All
-    meshes of a glTF scene are combined, each transformed by its nodes. NaN and infinite coordinates are not rejected
-    here.
+    The format is given by the path's ending, in upper or lower case: one of `INPUT_FORMATS`, or of FreeSurfer's names
+    such as lh.pial. FreeSurfer's surfaces with further names are recognized by their content. All meshes of a glTF
+    scene are combined, each transformed by its nodes. NaN and infinite coordinates are not rejected here.
 
     OBJ, OFF, PLY and STL have parsers in this package, because libraries renumber vertices, split polygons, or drop the
     groups, materials and comments that are needed to write an OBJ.

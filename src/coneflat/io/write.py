@@ -11,26 +11,27 @@ import numpy as np
 
 from ..atlas import round_safely
 from ..base.arrays import FloatArray
+from ..base.formats import Use, endings
 from ..base.notes import Unmet
 from ..base.text import plural, short_repr
 from ..errors import OptionError
 from ..measures.guarantees import DOUBLE, SINGLE, first_faces, remeasured
 from ..mesh.polygons import polygon_of
-from ..options.declared import FORMATS
 from ..result import Flattening
 from .attributes import ALPHA, VERTEX_COLOURS, Attribute, losses, old_textures
 from .convex_pieces import find_pieces
 from .files import PathName, atomic_write, checked_target
 from .gltf.positions import local_positions
-from .gltf.write import kept_in_glb, scene_losses, write_glb
+from .gltf.scene import scene_losses
+from .gltf.write import kept_in_glb, write_glb
 from .mesh_file import MeshFile
 from .npz import write_npz
 from .obj import kept_in_obj, obj_has_textures, write_obj
-from .ply import kept_in_ply, ply_has_textures, write_ply
+from .ply.write import kept_in_ply, ply_has_textures, write_ply
 from .texture import Texture, find_texture
 
 #: Endings of the files that `write_flattening` writes, each in `_FORMATS`.
-OUTPUT_FORMATS = tuple(f".{name}" for name in FORMATS)
+OUTPUT_FORMATS = endings(Use.FLATTENING)
 
 
 class OutputFormat(NamedTuple):

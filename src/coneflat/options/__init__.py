@@ -3,7 +3,6 @@
 from .combined import SEARCH_OPTIONS, Options
 from .declared import (
     CONES,
-    FORMATS,
     MAX_SHOWN_TRIANGLES,
     PAPER,
     RARE,
@@ -51,7 +50,7 @@ from .texts import (
 
 __all__ = [
     "ANGLE", "ANGLE_OR_NONE", "AtlasOptions", "CONES", "COUNT", "Choice", "ConeBounds", "ConeNumber", "ConeOptions",
-    "CurveOptions", "Declaration", "Direction", "Edges", "FORMATS", "FindOptions", "Flag", "Kind",
+    "CurveOptions", "Declaration", "Direction", "Edges", "FindOptions", "Flag", "Kind",
     "MAX_SHOWN_TRIANGLES", "MetricOptions", "Number", "Options", "PAPER", "RARE", "RunOptions", "SHOWS",
     "Vertices", "VerticesOrEdges", "Weights", "WordOrVertices", "as_number", "as_integer", "declarations", "option",
     "SEARCH_OPTIONS", "SeamOptions", "parse_angle", "read_edges", "read_numbers", "read_options", "read_vertices",

@@ -65,8 +65,6 @@ Cones = str | Mapping[int, float] | Mapping[int, float | None] | Iterable[int]
 PAPER: Mapping[str, Any] = {"cones": "greedy", "max_cones": None, "method": "linear", "charts": "one"}
 
 
-#: Formats in which flattened meshes are written: file extensions.
-FORMATS = ("obj", "ply", "glb", "npz")
 #: Largest number of triangles that the page draws. Larger meshes, which a browser rotates slowly, are simplified.
 MAX_SHOWN_TRIANGLES = 500_000
 #: What the page of the viewer can show first.

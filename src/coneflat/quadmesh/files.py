@@ -14,7 +14,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from ..base import FloatArray, IntArray
+from ..base import FloatArray, IntArray, Use, endings
 from ..errors import MeshError, MeshFileError
 from ..geometry import quarters_around, sides_between, vertex_normals
 from ..geometry.nearest import TriangleTree
@@ -51,11 +51,11 @@ from .quad_mesh import QuadMesh, least_jacobians
 #: Names of the formats that meshio writes, by their extensions.
 _MESHIO = {".vtk": "vtk", ".vtu": "vtu", ".inp": "abaqus", ".msh": "gmsh"}
 #: Extensions of the files that `write_quads` writes.
-QUAD_FORMATS = (".obj", ".ply", ".glb", ".npz", *_MESHIO)
+QUAD_FORMATS = endings(Use.QUADS | Use.MESHIO)
 #: Arrays from which a quad mesh is restored.
 _NAMES = ("vertices", "quads", "faces", "barycentric", "surface_vertices", "surface_faces", "report")
 #: Extensions of the files that `write_grid` writes.
-GRID_FORMATS = (".obj", ".npz")
+GRID_FORMATS = endings(Use.GRID)
 #: Names of the arrays of an integer grid.
 _ARRAYS = [field.name for field in fields(IntegerGrid) if str(field.type).endswith("Array")]
 #: Arrays from which a grid is restored.

@@ -8,7 +8,9 @@ the motions must have the vertex as a fixed point, which is a linear equation of
 from __future__ import annotations
 
 from collections import defaultdict, deque
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
@@ -17,7 +19,7 @@ from ..base import BoolArray, ComplexArray, FloatArray, IntArray, mask_of
 from ..errors import GridError
 from ..geometry import TURNS, UNITS, as_pairs, complex_sums
 from ..optimise import SeamChains
-from .grid_layout import GridLayout, charts_of, first_points, joining_chains
+from .grid_layout import GridLayout, Sides, charts_of, first_points, joining_chains
 from .options import GRID_TOLERANCE
 
 
@@ -59,11 +61,60 @@ class Transitions:
 def find_transitions(layout: GridLayout) -> Transitions:
     """Return the transitions of a layout.
 
+    Every point is expressed by a base point and the variables: points on sides, points inside of chains, and the copies
+    of each node. Loops around nodes that do not close yield the equations, and so do the motions of charts, which are
+    free until they are fixed.
+
     Raises:
         SeamError: the sides of a seam are not congruent.
         GridError: the sides of a seam are not related by quarter turns.
+
+    Notes:
+        With the equations, the layouts of a grid are the integer points of a linear space (Bommer et al. 2009,
+        "Mixed-integer quadrangulation").
     """
     chains = layout.chains()
+    quarters = _quarter_turns(chains)
+    columns = _Columns(len(quarters), len(layout.nodes), len(layout.sides.axis))
+    vertex = layout.vertex
+    on_sides = _points_on_sides(layout, chains, vertex)
+    loops = [
+        _loop_around(node, quarters, columns, layout.sides)
+        for node in _find_nodes(layout, chains, vertex, on_sides)
+    ]
+    expressions = [
+        _along_sides(layout, on_sides, columns),
+        _inside_chains(layout, chains, quarters, on_sides, columns),
+        *(loop.copies for loop in loops),
+    ]
+    equations = [row for loop in loops for row in loop.equations]
+    equations += [columns.row(column) for column in _free_motions(layout, chains, vertex, columns)]
+    base, turn = np.arange(len(vertex)), np.zeros(len(vertex), dtype=np.int64)
+    fixed = np.isin(vertex, layout.nodes)[:, None].repeat(2, axis=1)
+    for expression in expressions:
+        base[expression.points], turn[expression.points] = expression.base, expression.turn
+        fixed[expression.points[expression.fixed_rows], expression.fixed_axes] = True
+    row, column, coefficient = (
+        np.concatenate(parts) for parts in zip(*(part.entries for part in expressions), strict=True)
+    )
+    return Transitions(
+        chains=chains,
+        quarters=quarters,
+        base=base,
+        turn=turn,
+        shifts=coo_matrix((coefficient, (row, column)), shape=(2 * len(vertex), columns.total)).tocsr(),
+        fixed=fixed,
+        equations=np.array(equations, dtype=np.int64).reshape(len(equations), columns.total),
+        values=_present_values(layout, chains, quarters, vertex),
+    )
+
+
+def _quarter_turns(chains: SeamChains) -> IntArray:
+    """Return (c,) the quarter turns of each chain, 0 to 3.
+
+    Raises:
+        GridError: the sides of a seam are not related by quarter turns.
+    """
     angle = np.angle(chains.rotation) / (np.pi / 2)
     quarters = np.rint(angle).astype(np.int64)
     off = float(np.abs(angle - quarters).max(initial=0.0)) * np.pi / 2
@@ -72,169 +123,251 @@ def find_transitions(layout: GridLayout) -> Transitions:
             f"rotations of seams are up to {off:.2g} rad from quarter turns: flatten with quantise=pi/2 and "
             "correct_handles, and a mesh with several boundaries with boundary='straight'"
         )
-    return _Builder(layout, chains, quarters % 4).transitions()
+    return quarters % 4
 
 
-class _Builder:
-    def __init__(self, layout: GridLayout, chains: SeamChains, quarters: IntArray) -> None:
-        count = len(layout.points)
-        self.layout, self.points, self.sides = layout, layout.points, layout.sides
-        self.chains, self.quarters, self.chain_count = chains, quarters, len(quarters)
-        self.cones, self.vertex = layout.nodes, layout.vertex
-        self.cone_points = first_points(self.vertex)[self.cones]
-        self.first_side = 2 * (self.chain_count + len(self.cones))
-        self.size = self.first_side + len(self.sides.axis)
-        self.base, self.turn = np.arange(count), np.zeros(count, dtype=np.int64)
-        self.fixed = np.isin(self.vertex, self.cones)[:, None].repeat(2, axis=1)
-        self.sides_at: dict[int, list[int]] = defaultdict(list)
-        self.entries: list[tuple[IntArray, IntArray, IntArray]] = []
-        self.equations: list[IntArray] = []
+class _Columns(NamedTuple):
+    """The numbers of the variables: x and y of chains, x and y of nodes, then the coordinates of sides."""
 
-    def transitions(self) -> Transitions:
-        """Return the transitions."""
-        chains, points = self.chains, self.points
-        self._add_regular(self._add_sides())
-        self._add_nodes()
-        self._fix_charts()
-        row, column, value = (np.concatenate(parts) for parts in zip(*self.entries, strict=True))
-        shifts = coo_matrix((value, (row, column)), shape=(2 * len(points), self.size)).tocsr()
-        off = points[chains.right] - UNITS[self.quarters[chains.chain], None] * points[chains.left]
-        translation = complex_sums(chains.chain, off.mean(axis=1), self.chain_count)
-        translation /= np.bincount(chains.chain)
-        places = np.concatenate([translation, points[self.cone_points]])
-        side = self.sides.side
-        common = as_pairs(points[self.sides.points])[np.arange(len(side)), self.sides.axis[side]]
-        means = np.bincount(side, common) / np.bincount(side)
-        values = np.concatenate([as_pairs(places).ravel(), means])
-        equations = np.array(self.equations, dtype=np.int64).reshape(len(self.equations), self.size)
-        return Transitions(chains, self.quarters, self.base, self.turn, shifts, self.fixed, equations, values)
+    chains: int
+    nodes: int
+    sides: int
 
-    def _add_regular(self, on_side: IntArray) -> None:
-        """Express the right points inside chains by the left ones; `on_side` (u,) is the side of a point or -1."""
-        chains = self.chains
-        inside = ~chains.is_node[chains.vertices]
-        right, at = np.unique(chains.right[inside], return_index=True)
-        left = chains.left[inside][at]
-        chain = np.broadcast_to(chains.chain[:, None], chains.left.shape)[inside][at]
-        self.base[right] = left
-        self.turn[right] = self.quarters[chain]
-        for axis in range(2):
-            self.entries.append((2 * right + axis, 2 * chain + axis, np.ones(len(right), dtype=np.int64)))
-        fixed = on_side[left] >= 0
-        right, side = right[fixed], on_side[left[fixed]]
-        factors = TURNS[self.quarters[chain[fixed]], :, self.sides.axis[side]]
-        for axis in range(2):
-            self.entries.append((2 * right + axis, self.first_side + side, factors[:, axis]))
+    @property
+    def first_side(self) -> int:
+        return 2 * (self.chains + self.nodes)
 
-    def _add_sides(self) -> IntArray:
-        """Express a coordinate of points on sides by the variable of the side; points at ends of seams follow later.
+    @property
+    def total(self) -> int:
+        return self.first_side + self.sides
 
-        Return (u,) the side of each such point, else -1.
-        """
-        chains = self.chains
-        at_node = chains.is_node[chains.vertices]
-        is_end = mask_of(len(self.points), np.stack([chains.left, chains.right])[:, at_node])
-        points, side = self.sides.points, self.sides.side
-        special = is_end[points] | self.fixed[points, 0]
-        for point, side_number in zip(points[special].tolist(), side[special].tolist(), strict=True):
-            self.sides_at[point].append(side_number)
-        points, side = points[~special], side[~special]
-        axis = self.sides.axis[side]
-        self.fixed[points, axis] = True
-        self.entries.append((2 * points + axis, self.first_side + side, np.ones(len(points), dtype=np.int64)))
-        on_side = np.full(len(self.points), -1)
-        on_side[points] = side
-        return on_side
+    def translation(self, chain: int) -> IntArray:
+        """Return (2, v) the translation of a chain."""
+        return self._pair(chain)
 
-    def _add_nodes(self) -> None:
-        """Express the copies of each node by one of them, and add the equations of the loop around it."""
-        chains = self.chains
-        relations: dict[int, set[tuple[int, int, int]]] = defaultdict(set)
-        for k, end in np.argwhere(chains.is_node[chains.vertices]).tolist():
-            triple = (int(chains.left[k, end]), int(chains.right[k, end]), int(chains.chain[k]))
-            relations[int(chains.vertices[k, end])].add(triple)
-        of_cone = {int(v): i for i, v in enumerate(self.cones)}
-        start = first_points(self.vertex)
-        on_side = np.array(sorted(self.sides_at, reverse=True), dtype=np.int64)
-        start[self.vertex[on_side]] = on_side
-        start[self.cones] = self.cone_points
-        for v in sorted(set(relations) | set(of_cone)):
-            self._add_node(v, int(start[v]), sorted(relations.get(v, ())), of_cone.get(v))
+    def place(self, node: int) -> IntArray:
+        """Return (2, v) the position of a node."""
+        return self._pair(self.chains + node)
 
-    def _add_node(self, v: int, start: int, relations: list[tuple[int, int, int]], cone: int | None) -> None:
-        copies = self._copies_of_node(v, start, relations, cone)
-        for point, (turn, shift) in copies.items():
-            if cone is None:
-                self.base[point], self.turn[point] = start, turn
-            for side in self.sides_at.get(point, ()):  # the sides that contain the point
-                equation = shift[self.sides.axis[side]].copy()
-                equation[self.first_side + side] -= 1
-                self.equations.extend([equation] if equation.any() else [])
-            row, column = np.nonzero(shift)
-            self.entries.append((2 * point + row, column, shift[row, column]))
+    def row(self, column: int) -> IntArray:
+        """Return (v,) the coefficients of a single variable."""
+        row = np.zeros(self.total, dtype=np.int64)
+        row[column] = 1
+        return row
 
-    def _base_shift(self, start: int, cone: int | None) -> IntArray:
-        """Return (2, v) the coefficients of the base point of a node: variables of its cone, or of its side."""
-        shift = np.zeros((2, self.size), dtype=np.int64)
-        if cone is not None:
-            at = 2 * (self.chain_count + cone)
-            shift[:, at : at + 2] = np.eye(2)
-        elif start in self.sides_at:
-            side = self.sides_at[start][0]
-            axis = int(self.sides.axis[side])
-            shift[axis, self.first_side + side] = 1
-            self.fixed[start, axis] = True
-        return shift
+    def _pair(self, number: int) -> IntArray:
+        return np.stack([self.row(2 * number), self.row(2 * number + 1)])
 
-    def _copies_of_node(
-        self, v: int, start: int, relations: list[tuple[int, int, int]], cone: int | None
-    ) -> dict[int, tuple[int, IntArray]]:
-        """Return the quarter turns and the shift (2, v) of each copy of a node, and add the equations of its loop.
 
-        Args:
-            v: the node.
-            start: its base point.
-            relations: left point, right point and chain of each seam at the node.
-            cone: its number among the cones, or None.
+class _Expression(NamedTuple):
+    """Some points as functions of the variables: i^turn times a base point, plus a shift.
 
-        Raises:
-            GridError: the loop is not closed, or the node must be a cone.
-        """
-        copies = {start: (0, self._base_shift(start, cone))}
-        left_over, waiting = deque(relations), 0
-        while left_over:
-            left, right, chain = left_over.popleft()
-            quarter, across = int(self.quarters[chain]), np.zeros((2, self.size), dtype=np.int64)
-            across[:, 2 * chain : 2 * chain + 2] = np.eye(2)
-            if left in copies:
-                turn, shift = copies[left]
-                turn, shift = (turn + quarter) % 4, TURNS[quarter] @ shift + across
-                if right not in copies:
-                    copies[right] = turn, shift
-                    continue
-                if cone is None and copies[right][0] != turn:
-                    raise GridError(
-                        f"vertex {v} has an angle of {4 + copies[right][0] - turn} quarter turns but is not a cone"
-                    )
-                self.equations.extend(row for row in shift - copies[right][1] if row.any())
-            elif right in copies:
-                turn, shift = copies[right]
-                copies[left] = (turn - quarter) % 4, TURNS[-quarter % 4] @ (shift - across)
-            else:
-                left_over.append((left, right, chain))  # until one of both is in `copies`
-                waiting += 1
-                if waiting > len(relations) ** 2:
-                    raise GridError(f"the seams at vertex {v} do not connect all its copies")
-        return copies
+    Attributes:
+        points: (k,) the points.
+        base, turn: (k,) their base points, and quarter turns from 0 to 3.
+        entries: row, column and coefficient of the entries of `Transitions.shifts`.
+        fixed_rows, fixed_axes: indices into `points`, and axes, of the coordinates that are given by the shift alone.
+    """
 
-    def _fix_charts(self) -> None:
-        """Fix the free motions of charts: some seams between them, and a cone or side of each component."""
-        chart, component = charts_of(self.layout, self.chains)
-        coned, firsts = np.unique(component[self.cone_points], return_index=True)
-        fixed = np.concatenate([joining_chains(self.chains, chart), self.chain_count + firsts])
-        straight, firsts = np.unique(component[self.sides.points], return_index=True)
-        sides = self.sides.side[firsts[~np.isin(straight, coned)]]
-        columns = np.concatenate([(2 * fixed[:, None] + [0, 1]).ravel(), self.first_side + sides])
-        rows = np.zeros((len(columns), self.size), dtype=np.int64)
-        rows[np.arange(len(columns)), columns] = 1
-        self.equations.extend(rows)
+    points: IntArray
+    base: IntArray
+    turn: IntArray
+    entries: tuple[IntArray, IntArray, IntArray]
+    fixed_rows: IntArray
+    fixed_axes: IntArray
+
+
+class _OnSides(NamedTuple):
+    """The points on straight sides.
+
+    Attributes:
+        points, side: the points that are not copies of nodes, and the side of each.
+        at_nodes: the sides of each of the others.
+    """
+
+    points: IntArray
+    side: IntArray
+    at_nodes: dict[int, list[int]]
+
+
+def _points_on_sides(layout: GridLayout, chains: SeamChains, vertex: IntArray) -> _OnSides:
+    """Return the points on sides, of a layout whose points have these vertices (u,)."""
+    points, side = layout.sides.points, layout.sides.side
+    at_node = chains.is_node[chains.vertices]
+    is_end = mask_of(len(vertex), np.stack([chains.left, chains.right])[:, at_node])
+    is_copy = is_end[points] | np.isin(vertex[points], layout.nodes)
+    at_nodes: dict[int, list[int]] = defaultdict(list)
+    for point, side_number in zip(points[is_copy].tolist(), side[is_copy].tolist(), strict=True):
+        at_nodes[point].append(side_number)
+    return _OnSides(points[~is_copy], side[~is_copy], dict(at_nodes))
+
+
+def _along_sides(layout: GridLayout, on_sides: _OnSides, columns: _Columns) -> _Expression:
+    """Express a coordinate of points on sides by the variable of the side."""
+    points, side = on_sides.points, on_sides.side
+    axis = layout.sides.axis[side]
+    entries = 2 * points + axis, columns.first_side + side, np.ones(len(points), dtype=np.int64)
+    return _Expression(points, points, np.zeros_like(points), entries, np.arange(len(points)), axis)
+
+
+def _inside_chains(
+    layout: GridLayout, chains: SeamChains, quarters: IntArray, on_sides: _OnSides, columns: _Columns
+) -> _Expression:
+    """Express the right points inside chains by the left ones and the translation of the chain."""
+    inside = ~chains.is_node[chains.vertices]
+    right, at = np.unique(chains.right[inside], return_index=True)
+    left = chains.left[inside][at]
+    chain = np.broadcast_to(chains.chain[:, None], chains.left.shape)[inside][at]
+    entries = [(2 * right + axis, 2 * chain + axis, np.ones(len(right), dtype=np.int64)) for axis in range(2)]
+    # A left point on a side is given by the side's variable, which the chain rotates.
+    side_of = np.full(len(layout.points), -1)
+    side_of[on_sides.points] = on_sides.side
+    is_sided = side_of[left] >= 0
+    sided, side = right[is_sided], side_of[left[is_sided]]
+    factors = TURNS[quarters[chain[is_sided]], :, layout.sides.axis[side]]
+    entries += [(2 * sided + axis, columns.first_side + side, factors[:, axis]) for axis in range(2)]
+    row, column, coefficient = (np.concatenate(parts) for parts in zip(*entries, strict=True))
+    no_index = np.empty(0, dtype=np.int64)
+    return _Expression(right, left, quarters[chain], (row, column, coefficient), no_index, no_index)
+
+
+class _Node(NamedTuple):
+    """A vertex at which chains end, or that is a cone.
+
+    Attributes:
+        vertex: the vertex.
+        start: its base point.
+        number: its number among the nodes of the layout, or None.
+        seams: left point, right point and chain of each seam edge at the vertex.
+        sides: the sides of each of its copies that are on sides.
+    """
+
+    vertex: int
+    start: int
+    number: int | None
+    seams: list[tuple[int, int, int]]
+    sides: dict[int, list[int]]
+
+
+def _find_nodes(
+    layout: GridLayout, chains: SeamChains, vertex: IntArray, on_sides: _OnSides
+) -> Iterable[_Node]:
+    """Yield the nodes of a layout, whose points have these vertices (u,)."""
+    seams: dict[int, set[tuple[int, int, int]]] = defaultdict(set)
+    for k, end in np.argwhere(chains.is_node[chains.vertices]).tolist():
+        triple = (int(chains.left[k, end]), int(chains.right[k, end]), int(chains.chain[k]))
+        seams[int(chains.vertices[k, end])].add(triple)
+    numbers = {int(node): i for i, node in enumerate(layout.nodes)}
+    start = first_points(vertex)
+    # Other vertices start on a side, where they have a copy on one.
+    sided = np.array(sorted(on_sides.at_nodes, reverse=True), dtype=np.int64)
+    sided = sided[~np.isin(vertex[sided], layout.nodes)]
+    start[vertex[sided]] = sided
+    for v in sorted(seams.keys() | numbers.keys()):
+        yield _Node(v, int(start[v]), numbers.get(v), sorted(seams.get(v, ())), on_sides.at_nodes)
+
+
+class _Loop(NamedTuple):
+    """The copies of a node, and (v,) the equations that close the loop around it and keep copies on their sides."""
+
+    copies: _Expression
+    equations: list[IntArray]
+
+
+def _loop_around(node: _Node, quarters: IntArray, columns: _Columns, sides: Sides) -> _Loop:
+    """Return the copies of a node as functions of its base point.
+
+    Raises:
+        GridError: the loop around the node is not closed, or the node must be a cone.
+    """
+    start_sides = node.sides.get(node.start, []) if node.number is None else []
+    shift = (
+        np.zeros((2, columns.total), dtype=np.int64) if node.number is None else columns.place(node.number)
+    )
+    start_axes = sides.axis[start_sides[:1]]
+    for side, axis in zip(start_sides[:1], start_axes, strict=True):
+        shift[axis, columns.first_side + side] = 1
+    copies, equations = _copies_of(node, shift, quarters, columns)
+    for point, (_, shift) in copies.items():
+        for side in node.sides.get(point, ()):
+            equation = shift[sides.axis[side]] - columns.row(columns.first_side + side)
+            equations += [equation] if equation.any() else []
+    points = np.array(list(copies), dtype=np.int64)
+    turns = np.array([turn for turn, _ in copies.values()], dtype=np.int64)
+    row, column = np.nonzero(shifts := np.concatenate([shift for _, shift in copies.values()]))
+    entries = (2 * points.repeat(2) + np.tile([0, 1], len(points)))[row], column, shifts[row, column]
+    is_fixed = node.number is not None
+    base, turn = (points, 0 * turns) if is_fixed else (np.full_like(points, node.start), turns)
+    return _Loop(_Expression(points, base, turn, entries, np.zeros_like(start_axes), start_axes), equations)
+
+
+def _copies_of(
+    node: _Node, start_shift: IntArray, quarters: IntArray, columns: _Columns
+) -> tuple[dict[int, tuple[int, IntArray]], list[IntArray]]:
+    """Return the quarter turns and the shift (2, v) of each copy of a node, and the equations of the loop around it.
+
+    A seam of which one side is expressed yields the other side; one with both sides expressed yields equations.
+
+    Args:
+        node: the node.
+        start_shift: (2, v) the shift of its base point.
+        quarters: (c,) quarter turns of each chain.
+        columns: the variables.
+
+    Raises:
+        GridError: the loop is not closed, or the node must be a cone.
+    """
+    copies, equations = {node.start: (0, start_shift)}, list[IntArray]()
+    left_over, waiting = deque(node.seams), 0
+    while left_over:
+        left, right, chain = left_over.popleft()
+        quarter, across = int(quarters[chain]), columns.translation(chain)
+        if left in copies:
+            turn, shift = copies[left]
+            turn, shift = (turn + quarter) % 4, TURNS[quarter] @ shift + across
+            if right not in copies:
+                copies[right] = turn, shift
+                continue
+            if node.number is None and copies[right][0] != turn:
+                raise GridError(
+                    f"vertex {node.vertex} has an angle of {4 + copies[right][0] - turn} quarter turns but is not a "
+                    "cone"
+                )
+            equations += [row for row in shift - copies[right][1] if row.any()]
+        elif right in copies:
+            turn, shift = copies[right]
+            copies[left] = (turn - quarter) % 4, TURNS[-quarter % 4] @ (shift - across)
+        else:
+            left_over.append((left, right, chain))  # until one of both is in `copies`
+            waiting += 1
+            if waiting > len(node.seams) ** 2:
+                raise GridError(f"the seams at vertex {node.vertex} do not connect all its copies")
+    return copies, equations
+
+
+def _free_motions(layout: GridLayout, chains: SeamChains, vertex: IntArray, columns: _Columns) -> list[int]:
+    """Return the variables that are 0 to fix the free motions of charts.
+
+    They are the translations of some seams between charts, and the position of a node or a side of each component.
+    """
+    chart, component = charts_of(layout, chains)
+    node_points = first_points(vertex)[layout.nodes]
+    noded, first_nodes = np.unique(component[node_points], return_index=True)
+    pairs = np.concatenate([joining_chains(chains, chart), columns.chains + first_nodes])
+    straight, first_sides = np.unique(component[layout.sides.points], return_index=True)
+    sides = layout.sides.side[first_sides[~np.isin(straight, noded)]]
+    return [*(2 * pairs[:, None] + [0, 1]).ravel().tolist(), *(columns.first_side + sides).tolist()]
+
+
+def _present_values(
+    layout: GridLayout, chains: SeamChains, quarters: IntArray, vertex: IntArray
+) -> FloatArray:
+    """Return (v,) the variables of a layout, up to rounding: means over the points that they refer to."""
+    points, sides = layout.points, layout.sides
+    off = points[chains.right] - UNITS[quarters[chains.chain], None] * points[chains.left]
+    translation = complex_sums(chains.chain, off.mean(axis=1), len(quarters)) / np.bincount(chains.chain)
+    places = np.concatenate([translation, points[first_points(vertex)[layout.nodes]]])
+    common = as_pairs(points[sides.points])[np.arange(len(sides.side)), sides.axis[sides.side]]
+    return np.concatenate(
+        [as_pairs(places).ravel(), np.bincount(sides.side, common) / np.bincount(sides.side)]
+    )

@@ -13,9 +13,9 @@ from shapes import grid, sphere
 
 import coneflat
 from coneflat.apps.brains import flatten_cortex, measure_flat, metric_distortion, read_flat
+from coneflat.base.formats import FREESURFER
 from coneflat.errors import MeshFileError, OptionError, UnknownFormatError
 from coneflat.io import INPUT_FORMATS, read_label, read_vertex_values
-from coneflat.io.brains import FREESURFER
 
 nibabel = pytest.importorskip("nibabel")
 

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...base import plural, printable
-from ...options import FORMATS, Options, declarations, read_options
+from ...options import Options, declarations, read_options
 from ...textures import MAX_ENERGY, TextureOptions, UnwrapOptions
 from .flags import (
+    FORMAT_CHOICE,
     GroupedCommand,
     check_combinations,
     flag,
@@ -48,7 +49,7 @@ class BatchFlags:
     """
 
     out: Path = path_flag(required=True)
-    format: str = flag("obj", type=click.Choice(FORMATS))
+    format: str = flag("obj", type=FORMAT_CHOICE)
     summary: Path | None = path_flag()
     jobs: int | None = flag(type=int)
     time_limit: float = flag(3600.0, type=float)

@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
-from ...base import plural
-from ...options import FORMATS, ConeNumber, Direction, RunOptions, option, strength
+from ...base import Use, endings, plural
+from ...options import ConeNumber, Direction, RunOptions, option, strength
 from .flags import GroupedCommand, flag, keywords, option_flags, path_flag, pop_flags, verbosity_options
 from .measure_command import rows_of_measures
 
@@ -32,8 +32,8 @@ class BrainFlags:
     """Output.
 
     Attributes:
-        output: File to write: a GIFTI surface (.gii), a FreeSurfer patch (.3d), or a result (.npz, .obj, .ply, .glb),
-            which view and figure show; repeat for several.  [default: SURFACE's name with .flat.gii]
+        output: File to write: a GIFTI surface (.gii), a FreeSurfer patch (.3d), or a result ({FLATTENING}), which
+            view and figure show; repeat for several.  [default: SURFACE's name with .flat.gii]
         remove_label: Label to cut off, such as the medial wall: FILE.label, or FILE:NAME for an .annot or a label .gii;
             repeat for several.
         keep_label: Label that no cut crosses.
@@ -68,7 +68,7 @@ def brain(context: click.Context, /, surface: Path, verbosity: str | None, **par
 
     flags, options = pop_flags(params, BrainFlags), keywords({**params, "repair": True}, BrainOptions)
     outputs = flags.output or (Path(f"{surface.name}.flat.gii"),)
-    formats = (*FLAT_FORMATS, *(f".{name}" for name in FORMATS))
+    formats = (*FLAT_FORMATS, *endings(Use.FLATTENING))
     for path in outputs:
         checked_target(path, formats, "flat maps are written as")
     if flags.report is not None:

@@ -14,6 +14,7 @@ from click.core import ParameterSource
 
 from ... import PAPER
 from ... import options as declared
+from ...base import Use, endings, with_formats
 from ...errors import OptionError
 from ...options import (
     MAX_SHOWN_TRIANGLES,
@@ -45,6 +46,8 @@ G = TypeVar("G")
 INPUT_NAMES = ("repair", "strict")
 #: Words of a choice that the help lists in place of a value; of more, it lists them in the description.
 MAX_LISTED_WORDS = 5
+#: Formats of flattened meshes, as flags name them.
+FORMAT_CHOICE = click.Choice([ending.removeprefix(".") for ending in endings(Use.FLATTENING)])
 #: Further spellings of options.
 SPELLINGS = {"quantise": ("--quantize",), "quads": ("--faces",), "output": ("-o",)}
 
@@ -108,6 +111,12 @@ def flag(default: Any = None, **arguments: Any) -> Any:
 def path_flag(default: Path | None = None, **arguments: Any) -> Any:
     """Return a field of an option that only a command has and that is a path."""
     return flag(default, type=click.Path(path_type=Path), **arguments)
+
+
+def names_formats(command: Command) -> Command:
+    """Replace {MESH} and the names of other uses in the help of a command by the endings of files; see `Use`."""
+    command.__doc__ = with_formats(command.__doc__ or "")
+    return command
 
 
 def _angle(value: Any) -> float:
@@ -179,7 +188,7 @@ def _may_fit_any_mesh(declaration: Declaration) -> bool:
 
 def _flag(declaration: Declaration) -> Callable[[Command], Command]:
     """Return a decorator that adds one option; its value is None, or an empty tuple, if it is not given."""
-    kind, name, doc = declaration.kind, declaration.name, declaration.doc
+    kind, name, doc = declaration.kind, declaration.name, with_formats(declaration.doc)
     spelling = flag_name(name)
     if declaration.default is True:
         spelling += f"/--no-{spelling[2:]}"

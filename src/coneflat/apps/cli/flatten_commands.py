@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...options import FORMATS, Options, declarations
+from ...options import Options, declarations
 from ...textures import UnwrapOptions
 from .flags import (
+    FORMAT_CHOICE,
     GroupedCommand,
     check_combinations,
     check_required,
@@ -20,6 +21,7 @@ from .flags import (
     input_options,
     is_given,
     keywords,
+    names_formats,
     option_flags,
     paper_option,
     path_flag,
@@ -37,7 +39,7 @@ class FileFlags:
     """Output.
 
     Attributes:
-        output: File to write: .obj, .ply, .glb or .npz; - for standard output.  [default: MESH's name with _uv, as
+        output: File to write: {FLATTENING}; - for standard output.  [default: MESH's name with _uv, as
             .obj; - if MESH is -]
         format: Format for standard output, or if -o is not given.  [default: obj]
         texture: Texture of a .glb: a checkerboard, or an image file.
@@ -46,7 +48,7 @@ class FileFlags:
     """
 
     output: Path | None = path_flag()
-    format: str | None = flag(type=click.Choice(FORMATS))
+    format: str | None = flag(type=FORMAT_CHOICE)
     texture: str | None = flag(metavar="checker|IMAGE")
     report: Path | None = path_flag()
     project: Path | None = path_flag()
@@ -65,10 +67,11 @@ class FileFlags:
 @require_option
 @verbosity_options
 @click.pass_context
+@names_formats
 def flatten(context: click.Context, /, **params: Any) -> None:
     """Flatten MESH and write it with UV coordinates.
 
-    MESH is a file (.obj, .ply, .stl, .off, .gltf, .glb, .gii, lh.pial), or - for standard input.
+    MESH is a file ({MESH}), or - for standard input.
 
     \b
     Examples:
@@ -100,10 +103,11 @@ def flatten(context: click.Context, /, **params: Any) -> None:
 @require_option
 @verbosity_options
 @click.pass_context
+@names_formats
 def unwrap(context: click.Context, /, **params: Any) -> None:
     """Write MESH with UV coordinates for a texture: nearly isometric, with the shortest seams.
 
-    MESH is a file (.obj, .ply, .stl, .off, .gltf, .glb, .gii, lh.pial), or - for standard input.
+    MESH is a file ({MESH}), or - for standard input.
 
     \b
     Examples:

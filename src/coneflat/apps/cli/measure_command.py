@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .flags import QUIET, check_required, input_options, require_option, verbosity_options
+from .flags import QUIET, check_required, input_options, names_formats, require_option, verbosity_options
 
 if TYPE_CHECKING:
     from ...measures import Row
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 @require_option
 @input_options
 @verbosity_options
+@names_formats
 def measure(
     file: Path,
     surface: Path | None,
@@ -34,7 +35,7 @@ def measure(
     weld: bool | None,
     verbosity: str | None,
 ) -> None:
-    """Measure the UVs of FILE: a mesh with UVs (.obj, .ply, .gltf, .glb) of any program, or a result (.npz).
+    """Measure the UVs of FILE: a mesh with UVs ({UV}) of any program, or a result (.npz).
 
     \b
     Examples:

@@ -15,6 +15,7 @@ from .flags import (
     input_options,
     is_given,
     keywords,
+    names_formats,
     option_flags,
     path_flag,
     pop_flags,
@@ -32,7 +33,7 @@ class QuadFlags:
     """Output.
 
     Attributes:
-        output: File for the quads: .obj, .ply, .glb or .npz; by meshio .vtk, .vtu, .inp or .msh.  [default: MESH's name
+        output: File for the quads: {QUADS}; by meshio {MESHIO}.  [default: MESH's name
             with _quads, as .obj; none if --grid or --view is given]
         grid: File for the integer grid that the quads are extracted from: .obj, with texture coordinates in units of
             grid squares, or .npz.
@@ -53,12 +54,13 @@ class QuadFlags:
 @input_options
 @verbosity_options
 @click.pass_context
+@names_formats
 def quads(
     context: click.Context, /, mesh: Path, weld: bool | None, verbosity: str | None, **params: Any
 ) -> None:
     """Convert MESH to a mesh of quads only, with few irregular vertices.
 
-    MESH is a file (.obj, .ply, .stl, .off, .gltf, .glb, .gii, lh.pial), or an integer grid (.npz) that --grid has
+    MESH is a file ({MESH}), or an integer grid (.npz) that --grid has
     written.
 
     \b

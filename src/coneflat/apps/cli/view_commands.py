@@ -16,6 +16,7 @@ from .flags import (
     flag,
     input_options,
     most_option,
+    names_formats,
     option_flags,
     path_flag,
     pop_flags,
@@ -50,6 +51,7 @@ class ViewFlags:
 @input_options
 @most_option
 @verbosity_options
+@names_formats
 def view(
     file: Path,
     color: str | None,
@@ -61,7 +63,7 @@ def view(
 ) -> None:
     """Write a page that shows FILE and its layout side by side.
 
-    FILE is a mesh (.obj, .ply, .stl, .off, .gltf, .glb, .gii, lh.pial) or a result (.npz) of `coneflat flatten`,
+    FILE is a mesh ({MESH}) or a result (.npz) of `coneflat flatten`,
     `coneflat unwrap` or `coneflat quads`. A mesh without UVs is flattened first, with default options. The page is a
     single HTML file.
 

@@ -1,0 +1,1 @@
+"""PLY files, text and binary: reading, which keeps polygons and all properties, and writing."""
