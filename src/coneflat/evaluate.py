@@ -93,7 +93,7 @@ def evaluate(
         overlaps: overlapping pairs of the result's triangles; None to compute them.
         notes: further notes.
     """
-    checked, input_mesh = prepared.checked, prepared.input_mesh
+    checked = prepared.checked
     with stage("pack"):
         numbering, order, mesh = _result_mesh(prepared)
         packed = _pack(layouts, order, mesh, options)
@@ -104,12 +104,8 @@ def evaluate(
             prepared, mesh, cones, curvatures, packed, options, overlaps
         )
         rotations = _rotations(layouts, packed.uv[packed.component_corners], options)
-        weights = [layout.area if len(layouts) > 1 else 1.0 for layout in layouts]
-        statistics = SolveStatistics.of_all([layout.statistics for layout in layouts], weights)
-        face_corners = input_mesh.face_corners
-        if face_corners is not None and input_mesh.source is not None:
-            face_corners = reorder_corners(checked, face_corners)
-    faces = np.concatenate([component.faces for component in prepared.components])
+        statistics = _statistics(layouts)
+        face_corners = _face_corners(prepared)
     lengths = prepared.user_lengths
     result = Flattening(
         vertices=numbering.positions,
@@ -123,9 +119,7 @@ def evaluate(
         log_scale=numbering.spread([layout.log_scale for layout in layouts]),
         prescribed=curvatures.prescribed,
         curvature_residual=curvatures.residual,
-        seams=np.concatenate(
-            [numbering.of_checked[prepared.seams], numbering.renumber([layout.seams for layout in layouts])]
-        ),
+        seams=_seams(prepared, layouts, numbering),
         distortion=distortion.rescaled(checked.exponent * np.log(2)),
         seconds=stage_seconds(),
         notes=(*checked.notes, *prepared.notes, *counted_notes([layout.notes for layout in layouts]), *notes),
@@ -133,12 +127,37 @@ def evaluate(
         solve=statistics,
         rotations=rotations,
         vertex_origin=numbering.vertex_origin,
-        face_origin=checked.face_origin[np.sort(faces)],
+        face_origin=checked.face_origin[np.sort(_component_faces(prepared))],
         face_corners=face_corners,
-        source=input_mesh.source,
+        source=prepared.input_mesh.source,
         lengths=None if lengths is None else np.ldexp(lengths, -checked.exponent),
     )
     return replace(result, notes=(*result.notes, *unmet_guarantees(result)))
+
+
+def _component_faces(prepared: Prepared) -> IntArray:
+    """Return (m,) the triangles of the checked mesh that are in the result, concatenated by component."""
+    return np.concatenate([component.faces for component in prepared.components])
+
+
+def _face_corners(prepared: Prepared) -> IntArray | None:
+    """Return (m, 3) the polygon corner at each corner of the result's triangles, or None if the input has none."""
+    input_mesh = prepared.input_mesh
+    if input_mesh.face_corners is None or input_mesh.source is None:
+        return input_mesh.face_corners
+    return reorder_corners(prepared.checked, input_mesh.face_corners)
+
+
+def _seams(prepared: Prepared, layouts: Sequence[Layout], numbering: _Numbering) -> IntArray:
+    """Return (k, 2) the seams, as pairs of vertices of the result: the marked ones first."""
+    layout_seams = numbering.renumber([layout.seams for layout in layouts])
+    return np.concatenate([numbering.of_checked[prepared.seams], layout_seams])
+
+
+def _statistics(layouts: Sequence[Layout]) -> SolveStatistics:
+    """Return the statistics of all components, means weighted by their areas."""
+    weights = [layout.area if len(layouts) > 1 else 1.0 for layout in layouts]
+    return SolveStatistics.of_all([layout.statistics for layout in layouts], weights)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,8 +239,7 @@ def _result_mesh(prepared: Prepared) -> tuple[_Numbering, IntArray, TriangleMesh
     Triangles are sorted in the order of the input's faces.
     """
     checked, numbering = prepared.checked, _number_vertices(prepared)
-    origin = np.concatenate([component.faces for component in prepared.components])
-    order = np.argsort(origin, kind="stable")
+    order = np.argsort(_component_faces(prepared), kind="stable")
     faces = rows_of(numbering.renumber([component.mesh.faces for component in prepared.components]), order)
     points = np.ldexp(numbering.positions, checked.exponent)
     return numbering, order, _with_connectivity(checked.mesh, points, faces)
