@@ -68,8 +68,8 @@ def sides_between(corners: FloatArray) -> ComplexArray:
 def map_factors(shapes: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
     """Return (m, 3) and (m, 3) the derivatives of a and b in the map z -> a z + b conj(z) by the corner positions.
 
-    The map takes each triangle from its rest shape, to the plane. Its singular values
-    are |a| + |b| and |a| - |b|. For triangles without area the result is NaN or infinite.
+    The map takes each triangle from its rest shape to the plane. Its singular values are |a| + |b| and
+    |a| - |b|. For triangles without area the result is NaN or infinite.
 
     Args:
         shapes: (m, 3) sides of the triangles before the map, as complex numbers.

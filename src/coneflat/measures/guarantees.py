@@ -13,7 +13,7 @@ from ..base.notes import Unmet
 from ..base.text import list_some, plural
 from ..geometry.overlap import Overlaps
 from ..geometry.planar import sides_between, signed_double_areas
-from ..mesh.connectivity import TriangleMesh, label_faces
+from ..mesh.connectivity import TriangleMesh, are_among, label_faces
 from .distortion import angle_sum_errors, measure, measure_map
 from .report import MAP_MEASURES
 from .seam_data import Rotations, seam_rotations
@@ -143,10 +143,8 @@ def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:
         for mesh, layout in ((old_mesh, result), (new_mesh, changed))
     )
     # Polygons may have other diagonals, so edges are identified by their ends.
-    names_before, names = (
-        mesh.edges[~mesh.is_boundary_edge] @ [len(result.vertices), 1] for mesh in (old_mesh, new_mesh)
-    )
-    bound = ~np.isin(names, names_before[~before.binds(off)])
+    edges_before, edges = (mesh.edges[~mesh.is_boundary_edge] for mesh in (old_mesh, new_mesh))
+    bound = ~are_among(edges, edges_before[~before.binds(off)])
     return replace(before, worst=float(after[bound].max(initial=0.0)))
 
 

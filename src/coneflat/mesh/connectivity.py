@@ -271,6 +271,13 @@ def joined_meshes(meshes: Sequence[TriangleMesh]) -> TriangleMesh:
     return TriangleMesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
 
+def are_among(pairs: IntArray, edges: IntArray) -> BoolArray:
+    """Return (k,) whether unordered pairs of vertices (k, 2), such as edges, are among edges (j, 2)."""
+    unit = 1 + max(int(pairs.max(initial=0)), int(edges.max(initial=0)))
+    keys, edge_keys = (np.sort(ends, axis=1) @ [unit, 1] for ends in (pairs, edges))
+    return np.isin(keys, edge_keys)
+
+
 def nearby(faces: IntArray, seeds: BoolArray, rings: int) -> BoolArray:
     """Return (n,) True for the vertices of seed triangles (m,) and of `rings` rings of triangles around them."""
     inside = mask_of(int(faces.max()) + 1, faces[seeds])

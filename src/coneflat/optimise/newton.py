@@ -313,6 +313,10 @@ def search_line(
         first: (p,) the first lengths.
         is_allowed: returns which lengths (p,) are allowed, from them and the energies. Lengths that are not allowed
             after `HALVINGS` trials become 0.
+
+    See Also:
+        coneflat.linalg.newton.minimise: its line search has one length, and compares slopes instead of energies, which
+            is possible only for convex functions.
     """
     lengths = first.copy()
     for _ in range(HALVINGS):

@@ -44,7 +44,7 @@ from ..io import (
 )
 from ..io.mesh_file import MeshFile
 from ..mesh.check import check_mesh
-from ..mesh.connectivity import TriangleMesh
+from ..mesh.connectivity import TriangleMesh, are_among
 from .integer_map import IntegerGrid, grid_of_corners, on_lines
 from .quad_mesh import QuadMesh, least_jacobians
 
@@ -327,7 +327,7 @@ def _require_mesh(path: Path, vertices: FloatArray, faces: IntArray) -> None:
 
 def _require_lines(path: Path, grid: IntegerGrid) -> None:
     """Raise MeshFileError unless corners are grid points with the given angles, and features edges on grid lines."""
-    mesh, corners, n = TriangleMesh(grid.vertices, grid.faces), grid.corners, len(grid.vertices)
+    mesh, corners = TriangleMesh(grid.vertices, grid.faces), grid.corners
     quarters = quarters_around(mesh, sides_between(grid.corner_grid))[corners]
     places = grid.corner_grid[np.isin(grid.faces, corners)]
     is_twice = len(np.unique(corners)) < len(corners)
@@ -335,8 +335,7 @@ def _require_lines(path: Path, grid: IntegerGrid) -> None:
         raise MeshFileError(
             f"{path} holds no integer grid: its corners are listed twice, are not on grid points, or have other angles"
         )
-    line_keys = mesh.edges[on_lines(mesh, grid.corner_grid)] @ [n, 1]
-    if not np.isin(np.sort(grid.features, axis=1) @ [n, 1], line_keys).all():
+    if not are_among(grid.features, mesh.edges[on_lines(mesh, grid.corner_grid)]).all():
         raise MeshFileError(f"{path} holds no integer grid: its sharp edges are not edges on grid lines")
 
 

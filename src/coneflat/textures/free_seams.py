@@ -19,7 +19,7 @@ from ..geometry import (
     vertex_log_scale,
 )
 from ..mesh import label_faces, open_along
-from ..mesh.connectivity import TriangleMesh
+from ..mesh.connectivity import TriangleMesh, are_among
 from ..optimise import relaxed_disks, untangled_disk
 from ..seams import find_seams
 from ..stages import Layout, SeamSpec, SolveStatistics
@@ -171,6 +171,4 @@ def as_one_chart(layout: Layout, faces: IntArray) -> Layout:
 
 def seam_edges(layout: Layout) -> IntArray:
     """Return (k,) the edges of the seams of a layout."""
-    mesh, count = layout.mesh, len(layout.mesh.vertices)
-    keys = np.sort(mesh.edges, axis=1) @ [count, 1]
-    return np.flatnonzero(np.isin(keys, np.sort(layout.seams, axis=1) @ [count, 1]))
+    return np.flatnonzero(are_among(layout.mesh.edges, layout.seams))

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..base import BoolArray, FloatArray, IntArray, Unmet, plural
 from ..errors import OptionError
-from ..mesh.connectivity import TriangleMesh
+from ..mesh.connectivity import TriangleMesh, are_among
 from ..options import Options
 from ..source import Component, Prepared, Source
 from .sharing import SharedTexels
@@ -56,11 +56,11 @@ class NoMirror:
 def half_of(prepared: Prepared, source: Source, options: Options) -> tuple[SharedTexels, Prepared]:
     """Return which half of an input shares the texels of the other, and the other half, cut along the mirror plane.
 
+    An edge is cut if it or its mirror image is marked, unless its half forbids it.
+
     Args:
         prepared: the input.
         source, options: those that it was prepared with.
-
-    An edge is cut if it or its mirror image is marked, unless its half forbids it.
 
     Raises:
         OptionError: as of `find_mirror`.
@@ -96,13 +96,9 @@ def _with_images_of_marks(mirror: Mirror, ends: IntArray, source: Source, option
     forbidden = [
         component.vertices[component.mesh.edges[component.seams.is_forbidden]] for component in cut.components
     ]
-    images, listed = np.sort(image[cut.seams], axis=1), np.sort(cut.seams, axis=1) @ [len(image), 1]
-    keys, forbidden_keys = (
-        images @ [len(image), 1],
-        np.sort(np.concatenate(forbidden), axis=1) @ [len(image), 1],
-    )
-    is_blocked = np.isin(keys, forbidden_keys)
-    is_missing = ~np.isin(keys, listed) & ~is_blocked
+    images = image[cut.seams]
+    is_blocked = are_among(images, np.concatenate(forbidden))
+    is_missing = ~are_among(images, cut.seams) & ~is_blocked
     if is_missing.any():
         cut = _with_seams(source, options, np.concatenate([ends, images[is_missing]]))
     if not is_blocked.any():

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..base import FloatArray, IntArray, mask_of
+from ..mesh.connectivity import are_among
 from ..result import Flattening
 from ..source import Prepared, result_numbering
 
@@ -106,15 +107,13 @@ def _seams_of_all(result: Flattening, faces: IntArray, shared: SharedTexels) -> 
         faces: (m, 3) all triangles.
         shared: the triangles that share texels.
     """
-    partner, unit = np.full(faces.size, -1), int(faces.max()) + 1
+    partner = np.full(faces.size, -1)
     partner[shared.corners] = shared.partners
     ends = _sides(shared.corners.reshape(-1, 3))
     edges, partner_edges = (np.sort(faces.ravel()[of], axis=1) for of in (ends, partner[ends]))
-    unwrapped_edges = np.sort(_sides(result.faces), axis=1) @ [unit, 1]
     seams = np.sort(result.seams, axis=1)
-    seams = seams[np.isin(seams @ [unit, 1], unwrapped_edges)]
-    is_seam = np.isin(partner_edges @ [unit, 1], seams @ [unit, 1])
-    return np.unique(np.concatenate([seams, edges[is_seam]]), axis=0)
+    seams = seams[are_among(seams, _sides(result.faces))]
+    return np.unique(np.concatenate([seams, edges[are_among(partner_edges, seams)]]), axis=0)
 
 
 def _sides(faces: IntArray) -> IntArray:
