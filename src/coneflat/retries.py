@@ -8,7 +8,14 @@ from dataclasses import replace
 import numpy as np
 
 from .base.progress import stage
-from .bounds import TOLERATED_EXCESS, borders_and_distortion, excess, is_too_distorted, rank
+from .bounds import (
+    TOLERATED_EXCESS,
+    borders_and_distortion,
+    distortion_cost,
+    excess,
+    is_too_distorted,
+    rank,
+)
 from .cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, uses_sparse_search, with_corners
 from .errors import ConvergenceError, CurvatureError, LengthError, MetricError, OptionError, SeamError
 from .flattening import (
@@ -19,11 +26,12 @@ from .flattening import (
     relax_components,
 )
 from .geometry import dihedral_angles
-from .geometry.opening import RISKY_AREA, thickness, with_slack
+from .geometry.opening import RISKY_AREA, thickness
 from .groups import ComponentProgress, errors_of, groups_of_small
 from .measures import mean_qc
 from .mesh.connectivity import TriangleMesh
 from .options import Options
+from .seams import find_seams
 from .source import Component, Prepared, Source
 from .stages import Layout
 
@@ -50,8 +58,18 @@ def lay_out_components(components: Mapping[int, Component], steps: Steps) -> dic
     layouts = {}
     for i, component in components.items():
         with progress.at(component):
-            layouts[i] = lay_out_with_thick_triangles(component, steps)
+            layouts[i] = lay_out_with_kept_holes(component, steps)
     return layouts
+
+
+def lay_out_with_kept_holes(component: Component, steps: Steps) -> Layout:
+    """Return the layout of a component in one chart; holes that are to be kept are opened if no metric is found."""
+    if not component.keeps_holes:
+        return lay_out_with_thick_triangles(component, steps)
+    try:
+        return lay_out_with_thick_triangles(component, steps)
+    except FAILURES:
+        return lay_out_with_thick_triangles(component.with_opened_holes(), steps)
 
 
 def lay_out_with_thick_triangles(component: Component, steps: Steps) -> Layout:
@@ -64,7 +82,7 @@ def lay_out_with_thick_triangles(component: Component, steps: Steps) -> Layout:
     except ConvergenceError:
         if not (thickness(component.lengths) < RISKY_AREA).any():
             raise
-    return lay_out_with_feasible_cones(replace(component, lengths=with_slack(component.lengths)), steps)
+    return lay_out_with_feasible_cones(component.with_slack(), steps)
 
 
 def lay_out_with_feasible_cones(component: Component, steps: Steps) -> Layout:
@@ -116,6 +134,38 @@ def relax_group(components: Sequence[Component], layouts: Sequence[Layout], step
     except (*FAILURES, LengthError):
         pairs = zip(components, layouts, strict=True)
         return [relax_group([component], [layout], steps)[0] for component, layout in pairs]
+
+
+def finish_with_best_holes(
+    components: Mapping[int, Component], layouts: Mapping[int, Layout], steps: Steps
+) -> dict[int, Layout]:
+    """Return finished layouts, with the holes of each component kept or opened, whichever is better.
+
+    Keeping holes saves the seams to them, but the borders of opened ones absorb curvature, as the ends of a tube do.
+    """
+    finished = finish_within_bound(components, layouts, steps)
+    opened = {
+        i: component.with_opened_holes()
+        for i, component in components.items()
+        if component.keeps_holes and not is_best_with_holes(component, finished[i])
+    }
+
+    def flatten(members: Mapping[int, Component]) -> dict[int, Layout]:
+        return finish_within_bound(members, lay_out_components(members, steps), steps)
+
+    return finished | better_layouts(without_failures(flatten, opened), finished, opened)
+
+
+def is_best_with_holes(component: Component, layout: Layout) -> bool:
+    """Return whether a layout with kept holes ranks before any with opened ones: these need seams to all holes.
+
+    The seams that are found are at most twice as long as the shortest ones.
+    """
+    if len(layout.seams) or layout.notes or excess([component], [layout]) > TOLERATED_EXCESS:
+        return False
+    lengths = component.lengths.ravel()[component.mesh.edge_halfedges[:, 0]]
+    seams = find_seams(component.mesh, layout.cones, lengths)
+    return distortion_cost([layout]) < lengths[seams].sum() / 2 / np.sqrt(layout.area)
 
 
 def finish_within_bound(

@@ -12,7 +12,8 @@ from ..base.progress import stage
 from ..base.text import plural
 from ..geometry.overlap import overlaps_of_mesh
 from ..geometry.planar import signed_double_areas
-from ..mesh.connectivity import TriangleMesh
+from ..mesh.connectivity import TriangleMesh, label_faces
+from ..mesh.holes import find_holes, with_fans
 from ..stages import Layout, SeamSpec
 from .charts import ChartLayout, Seams
 from .glue import glue_charts
@@ -24,6 +25,8 @@ MIN_CHART_AREAS = (0.0, 0.002, 0.01)
 # Number of charts at which splitting stops and the next minimum area is tried: most charts would be glued on again. A
 # surface with 50 handles takes 25 s instead of 28.
 MAX_SMALL_CHARTS = 64
+# Cost of cutting a side in a hole, relative to the mean cost.
+NO_COST = 1e-9
 
 
 def injective_charts(
@@ -42,7 +45,7 @@ def injective_charts(
     Args:
         mesh: the mesh.
         points: (u, 2) positions in the plane, at the mesh's scale.
-        corners: (m, 3) point index of each triangle corner; the triangles form one disk.
+        corners: (m, 3) point index of each triangle corner; the triangles form one disk, which may have holes.
         lengths: (e,) costs of cutting the edges.
         disk: a mesh whose faces are the corners, with a vertex for each point; None to compute it.
         tries: how many of the minimum areas of a chart are tried: one for the cheapest cuts, all for few charts.
@@ -56,19 +59,36 @@ def injective_charts(
     if not len(pairs):
         return glue_charts(mesh, single_chart, lengths).renumbered()
     disk = as_disk(points, corners) if disk is None else unpinched(disk.moved_to(points))
+    disk, side_costs = _without_holes(disk, lengths[mesh.halfedge_edges])
+    disk_areas = np.pad(np.abs(areas), (0, len(disk.faces) - len(areas)))
     candidates = list[ChartLayout]()
     shares = MIN_CHART_AREAS[:tries]
     for share in shares:
-        min_area = share * float(np.abs(areas).sum())
+        min_area = share * float(disk_areas.sum())
         max_charts = MAX_SMALL_CHARTS if share < shares[-1] else np.inf
-        chart = split_overlaps(disk, lengths[mesh.halfedge_edges], np.abs(areas), pairs, min_area, max_charts)
+        chart = split_overlaps(disk, side_costs, disk_areas, pairs, min_area, max_charts)
         if chart is None:
             continue
-        layout = glue_charts(mesh, single_chart.split(chart), lengths).renumbered()
+        layout = single_chart.split(chart[: len(areas)])
+        if len(disk.faces) > len(areas):  # a piece that only filled holes connect is in several charts
+            layout = replace(layout, chart=label_faces(layout.corners, len(layout.points))[1])
+        layout = glue_charts(mesh, layout, lengths).renumbered()
         candidates.append(layout)
         if not layout.chart.any():
             break
     return min(candidates, key=lambda layout: (layout.chart.max(), lengths[Seams(mesh, layout).edges].sum()))
+
+
+def _without_holes(disk: TriangleMesh, costs: FloatArray) -> tuple[TriangleMesh, FloatArray]:
+    """Return a disk with filled holes, and the costs (3m,) of cutting its sides: next to nothing in and along holes."""
+    holes = find_holes(disk)
+    if not holes:
+        return disk, costs
+    filled = with_fans(disk, [disk.tails[hole] for hole in holes])
+    side_costs = np.full(filled.faces.size, NO_COST * costs.mean())
+    side_costs[: len(costs)] = costs
+    side_costs[np.concatenate(holes)] = side_costs[-1]
+    return filled, side_costs
 
 
 @stage("atlas")
