@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base import IntArray
 from ..geometry import coarse_mesh, double_areas, edge_lengths, mollify
-from ..source import Component
+from ..source import Component, Fill
 
 
 def coarse_component(component: Component, count: int) -> tuple[Component, IntArray]:
@@ -18,7 +18,8 @@ def coarse_component(component: Component, count: int) -> tuple[Component, IntAr
     Options for vertices are kept; none of the edges are avoided or forbidden.
     """
     mesh, vertices, faces = coarse_mesh(component.mesh, count)
-    lengths, is_no_edge = edge_lengths(mesh.vertices, mesh.faces), np.zeros(len(mesh.edges), dtype=bool)
+    distances, is_no_edge = edge_lengths(mesh.vertices, mesh.faces), np.zeros(len(mesh.edges), dtype=bool)
+    lengths = mollify(distances, mesh)[0]
 
     def at_vertices(spec: Any, *names: str) -> Any:
         """Return a specification with the values of its arrays (n,) at the vertices that are kept."""
@@ -26,13 +27,15 @@ def coarse_component(component: Component, count: int) -> tuple[Component, IntAr
         return replace(spec, **{name: array[vertices] for name, array in arrays.items() if array is not None})
 
     seams = at_vertices(component.seams, "visibility", "weights")
+    metric = at_vertices(component.metric, "keeps_length", "names")
     return Component(
         mesh,
         component.vertices[vertices],
         faces,
-        mollify(lengths, mesh)[0],
-        double_areas(lengths),
+        lengths,
+        double_areas(distances),
         at_vertices(component.cones, "is_allowed", "absorbs_curvature", "names"),
-        at_vertices(component.metric, "keeps_length", "names"),
+        metric,
         replace(seams, is_avoided=is_no_edge, is_forbidden=is_no_edge),
+        None if component.fill is None else Fill.of(mesh, lengths, metric.keeps_length),
     ), vertices
