@@ -13,11 +13,10 @@ from ..base.text import plural
 from ..geometry.overlap import overlaps_of_mesh
 from ..geometry.planar import signed_double_areas
 from ..mesh.connectivity import TriangleMesh, label_faces
-from ..mesh.holes import find_holes, with_fans
 from ..stages import Layout, SeamSpec
 from .charts import ChartLayout, Seams
 from .glue import glue_charts
-from .split import as_disk, split_overlaps, unpinched
+from .split import as_disk, filled_disk, split_overlaps, unpinched
 
 # Minimum areas of a chart to try, as fractions of the total area. Where the cheapest cuts leave several charts,
 # costlier cuts with larger pieces may leave fewer: a figure of 5,000 triangles gets 9 instead of 11.
@@ -25,8 +24,6 @@ MIN_CHART_AREAS = (0.0, 0.002, 0.01)
 # Number of charts at which splitting stops and the next minimum area is tried: most charts would be glued on again. A
 # surface with 50 handles takes 25 s instead of 28.
 MAX_SMALL_CHARTS = 64
-# Cost of cutting a side in a hole, relative to the mean cost.
-NO_COST = 1e-9
 
 
 def injective_charts(
@@ -59,7 +56,7 @@ def injective_charts(
     if not len(pairs):
         return glue_charts(mesh, single_chart, lengths).renumbered()
     disk = as_disk(points, corners) if disk is None else unpinched(disk.moved_to(points))
-    disk, side_costs = _without_holes(disk, lengths[mesh.halfedge_edges])
+    disk, side_costs = filled_disk(disk, lengths[mesh.halfedge_edges])
     disk_areas = np.pad(np.abs(areas), (0, len(disk.faces) - len(areas)))
     candidates = list[ChartLayout]()
     shares = MIN_CHART_AREAS[:tries]
@@ -77,18 +74,6 @@ def injective_charts(
         if not layout.chart.any():
             break
     return min(candidates, key=lambda layout: (layout.chart.max(), lengths[Seams(mesh, layout).edges].sum()))
-
-
-def _without_holes(disk: TriangleMesh, costs: FloatArray) -> tuple[TriangleMesh, FloatArray]:
-    """Return a disk with filled holes, and the costs (3m,) of cutting its sides: next to nothing in and along holes."""
-    holes = find_holes(disk)
-    if not holes:
-        return disk, costs
-    filled = with_fans(disk, [disk.tails[hole] for hole in holes])
-    side_costs = np.full(filled.faces.size, NO_COST * costs.mean())
-    side_costs[: len(costs)] = costs
-    side_costs[np.concatenate(holes)] = side_costs[-1]
-    return filled, side_costs
 
 
 @stage("atlas")

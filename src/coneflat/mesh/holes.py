@@ -1,4 +1,4 @@
-"""Holes of a connected mesh, which are its boundary loops but the longest one, and their filling with triangles."""
+"""Holes of a mesh, the boundary loops of each component but the longest one, and their filling with triangles."""
 
 from __future__ import annotations
 
@@ -12,21 +12,27 @@ from .ties import argmax_tied, mesh_tie_key, tie_key
 
 
 def find_holes(mesh: TriangleMesh, lengths: FloatArray | None = None) -> list[IntArray]:
-    """Return for each hole of a connected mesh (b,) its half-edges in order, the mesh on the left.
+    """Return for each hole (b,) its half-edges in order, the mesh on the left.
 
     A walk starts at the vertex with the largest tie key, and holes are in the order of these keys.
 
     Args:
         mesh: the mesh; its boundary loops share no vertex.
-        lengths: (m, 3) side lengths, by which the longest loop is found; None for distances of vertices.
+        lengths: (m, 3) side lengths, by which the longest loop of each component is found; None for distances of
+            vertices.
     """
-    if mesh.euler_characteristic > 0 or not mesh.is_boundary_edge.any():
-        return []  # at most one loop
-    key, walks = _tie_key(mesh), mesh.boundary_walks()
+    walks = mesh.boundary_walks()
+    if len(walks) <= 1:
+        return []
+    key = _tie_key(mesh)
     walks = [np.roll(walk, -int(np.argmax(key[mesh.tails[walk]]))) for walk in walks]
-    first_keys = np.array([key[mesh.tails[walk[0]]] for walk in walks])
-    outer = argmax_tied(np.array([_length(mesh, walk, lengths) for walk in walks]), first_keys)
-    return [walks[i] for i in np.argsort(-first_keys, kind="stable") if i != outer]
+    starts = mesh.tails[[walk[0] for walk in walks]]
+    size, component = np.array([_length(mesh, walk, lengths) for walk in walks]), mesh.components[1][starts]
+    is_hole = np.ones(len(walks), dtype=bool)
+    for label in np.unique(component):
+        loops = np.flatnonzero(component == label)
+        is_hole[loops[argmax_tied(size[loops], key[starts[loops]])]] = False
+    return [walks[i] for i in np.argsort(-key[starts], kind="stable").tolist() if is_hole[i]]
 
 
 def _tie_key(mesh: TriangleMesh) -> FloatArray:

@@ -47,9 +47,11 @@ class Fill:
             mesh, lengths: a connected mesh and its (m, 3) side lengths.
             is_open: (n,) vertices, such as those of marked seams, whose holes are not filled; None for none.
         """
-        holes = find_holes(mesh, lengths)
+        # A mesh with a positive Euler characteristic has at most one boundary loop.
+        holes = find_holes(mesh, lengths) if mesh.euler_characteristic <= 0 else []
+        if is_open is not None:
+            holes = [hole for hole in holes if not is_open[mesh.tails[hole]].any()]
         if holes:
-            holes = [hole for hole in holes if not (is_open is not None and is_open[mesh.tails[hole]].any())]
             curvature = angle_defect(mesh.faces, corner_angles(lengths), mesh.is_boundary_vertex)
             missing = [curvature[mesh.tails[hole]].sum() + 2 * np.pi for hole in holes]
             holes = [hole for hole, total in zip(holes, missing, strict=True) if abs(total) <= MAX_MISSING]

@@ -60,7 +60,7 @@ def best_cut(model: CutModel) -> Candidate:
         # The bound is too low, or the surface too noisy, for the cones of a coarse mesh.
         candidate = _best_of_searched(variant, [candidate])
         if variant.component.keeps_holes and not model.is_within(candidate):
-            candidate = _better(model, candidate, _best_of_searched(model.with_holes(False)))
+            candidate = _best_within(model, candidate, _best_of_searched(model.with_holes(False)))
         return candidate
     variant.surface.close_search()
     return model.separated(candidate)
@@ -69,7 +69,7 @@ def best_cut(model: CutModel) -> Candidate:
 def _best_of_variants(model: CutModel, search: Callable[[CutModel], Candidate]) -> tuple[CutModel, Candidate]:
     """Return the better variant of a component, with its holes kept or opened, and the candidate that a search gives.
 
-    Opened holes are tried only if there are seams anyway, or if the bound is not met.
+    Opened holes are tried only where the bound is not met, or with seams anyway.
     """
     opened, variant = model.with_holes(False), model.with_holes(True)
     if not variant.component.keeps_holes:
@@ -78,14 +78,14 @@ def _best_of_variants(model: CutModel, search: Callable[[CutModel], Candidate]) 
         candidate = search(variant)
     except FAILURES:
         return opened, search(opened)
-    if model.is_within(candidate) and not len(candidate.layout.seams):
+    if model.is_within(candidate) and not (model.bound.is_finite and len(candidate.layout.seams)):
         return variant, candidate
     opened_candidate = search(opened)
-    best = _better(model, candidate, opened_candidate)
+    best = _best_within(model, candidate, opened_candidate)
     return (variant if best is candidate else opened), best
 
 
-def _better(model: CutModel, *candidates: Candidate) -> Candidate:
+def _best_within(model: CutModel, *candidates: Candidate) -> Candidate:
     """Return the candidate within the bound whose seams cost least, or else the one with the least energy."""
     within = [candidate for candidate in candidates if model.is_within(candidate)]
     lowest = min(candidates, key=lambda candidate: candidate.energy)
