@@ -24,7 +24,7 @@ from .mesh.connectivity import TriangleMesh
 from .metric import find_metric as conformal_metric
 from .options import Options, read_options, takes
 from .result import Flattening
-from .retries import cut_along_sharp_edges, finish_with_best_holes, lay_out_components
+from .retries import cut_along_sharp_edges, finish_with_best_holes, lay_out_components, with_kept_holes
 from .source import Component, Prepared, Source
 from .source.copies import find_copies
 from .stages import Layout, RelaxSpec
@@ -125,14 +125,21 @@ def flatten_components(
         flat = lay_out_flat_components(components) if is_conformal else {}
     with stage("check"):
         copies = find_copies(components, flat)
-    variants = [component.with_kept_holes() if is_conformal else component for component in components]
-    originals = {i: variant for i, variant in enumerate(variants) if copies[i] is None and i not in flat}
+
+    def variant(component: Component) -> Component:
+        return with_kept_holes(component, steps) if is_conformal else component
+
+    originals = {
+        i: variant(component) for i, component in enumerate(components) if copies[i] is None and i not in flat
+    }
     layouts = lay_out_components(originals, steps)
     if on_layouts is not None:
         on_layouts(with_copies(flat | layouts, components, copies))
     finished = flat | finish_with_best_holes(originals, layouts, steps)
     # Notes contain vertex indices, so copies of components with notes are computed, too.
-    noted = {i: variants[i] for i, copy in enumerate(copies) if copy and finished[copy.first].notes}
+    noted = {
+        i: variant(components[i]) for i, copy in enumerate(copies) if copy and finished[copy.first].notes
+    }
     finished |= finish_with_best_holes(noted, lay_out_components(noted, steps), steps)
     return with_copies(finished, components, copies)
 

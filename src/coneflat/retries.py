@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -32,7 +33,7 @@ from .measures import mean_qc
 from .mesh.connectivity import TriangleMesh
 from .options import Options
 from .seams import find_seams
-from .source import Component, Prepared, Source
+from .source import Component, Prepared, Source, coarse_component, has_vertex_options, is_large
 from .stages import Layout
 
 # Largest number of cone searches for a layout.
@@ -136,24 +137,44 @@ def relax_group(components: Sequence[Component], layouts: Sequence[Layout], step
         return [relax_group([component], [layout], steps)[0] for component, layout in pairs]
 
 
-def finish_with_best_holes(
-    components: Mapping[int, Component], layouts: Mapping[int, Layout], steps: Steps
-) -> dict[int, Layout]:
-    """Return finished layouts, with the holes of each component kept or opened, whichever is better.
+def with_kept_holes(component: Component, steps: Steps) -> Component:
+    """Return a component with its holes kept where they can be; a large one only if it is better so on a coarse mesh.
 
     Keeping holes saves the seams to them, but the borders of opened ones absorb curvature, as the ends of a tube do.
     """
+    variant = component.with_kept_holes()
+    if not variant.keeps_holes or not is_compared_on_coarse(component):
+        return variant
+    coarse = coarse_component(variant)[0]
+    flatten = partial(flatten_within_bound, steps=steps)
+    kept_layout = without_failures(flatten, {0: coarse}).get(0)
+    if kept_layout is None:
+        return component
+    if is_best_with_holes(coarse, kept_layout):
+        return variant
+    opened = without_failures(flatten, {0: coarse.with_opened_holes()})
+    return component if better_layouts(opened, {0: kept_layout}, {0: coarse}) else variant
+
+
+def is_compared_on_coarse(component: Component) -> bool:
+    """Return whether keeping the holes of a component is decided on a coarse mesh, which saves half of the time."""
+    return is_large(component) and not has_vertex_options(component)
+
+
+def finish_with_best_holes(
+    components: Mapping[int, Component], layouts: Mapping[int, Layout], steps: Steps
+) -> dict[int, Layout]:
+    """Return finished layouts; those with kept holes are compared with others if it is not known which are better."""
     finished = finish_within_bound(components, layouts, steps)
     opened = {
         i: component.with_opened_holes()
         for i, component in components.items()
-        if component.keeps_holes and not is_best_with_holes(component, finished[i])
+        if component.keeps_holes
+        and (finished[i].notes or not is_compared_on_coarse(component))
+        and not is_best_with_holes(component, finished[i])
     }
-
-    def flatten(members: Mapping[int, Component]) -> dict[int, Layout]:
-        return finish_within_bound(members, lay_out_components(members, steps), steps)
-
-    return finished | better_layouts(without_failures(flatten, opened), finished, opened)
+    candidates = without_failures(partial(flatten_within_bound, steps=steps), opened)
+    return finished | better_layouts(candidates, finished, opened)
 
 
 def is_best_with_holes(component: Component, layout: Layout) -> bool:
@@ -166,6 +187,11 @@ def is_best_with_holes(component: Component, layout: Layout) -> bool:
     lengths = component.lengths.ravel()[component.mesh.edge_halfedges[:, 0]]
     seams = find_seams(component.mesh, layout.cones, lengths)
     return distortion_cost([layout]) < lengths[seams].sum() / 2 / np.sqrt(layout.area)
+
+
+def flatten_within_bound(components: Mapping[int, Component], steps: Steps) -> dict[int, Layout]:
+    """Return the finished layouts of components, see `finish_within_bound`."""
+    return finish_within_bound(components, lay_out_components(components, steps), steps)
 
 
 def finish_within_bound(

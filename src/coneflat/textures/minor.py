@@ -13,11 +13,12 @@ from ..mesh import open_along, tie_key
 from ..mesh.connectivity import TriangleMesh, joined_meshes
 from ..optimise import StretchEnergy, embedded_disks, relax
 from ..seams import TIE_BREAK, find_seams
+from ..source import is_large
 from ..stages import Surface
 from .candidates import TOLERANCE, Candidate, CutModel
 from .free_seams import laid_out
 from .options import ENERGY_PER_AREA, ISOMETRIC
-from .search import FIRST_DISTORTION, is_large
+from .search import FIRST_DISTORTION
 
 # Number of times that cones are added.
 MAX_ROUNDS = 12

@@ -17,10 +17,9 @@ from ..base import mask_of
 from ..cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, with_corners
 from ..errors import CurvatureError, MetricError, SeamError
 from ..seams import without_loose_ends
-from ..source import Component
+from ..source import coarse_component, is_large
 from ..stages import VertexCurvatures
 from .candidates import Candidate, CutModel
-from .coarse import coarse_component
 from .energy import EnergyBound
 from .free_seams import recut, seam_edges
 from .options import ISOMETRIC
@@ -33,9 +32,8 @@ ENOUGH_SEARCHES = 5
 # The search ends where the costs within and beyond the bound differ by less than this factor, or the numbers of cones
 # by one. A surface of 50 handles needs about 160 cones, and each search for them more than a second.
 SIMILAR_COSTS = 1.06
-# Number of triangles of a coarse mesh; and what its energy has more, relative to what is allowed above that of an
-# isometry.
-COARSE, COARSE_EXCESS = 4_000, 0.15
+# What the energy of a coarse mesh has more, relative to what is allowed above that of an isometry.
+COARSE_EXCESS = 0.15
 # Energy above the bound, relative to what is allowed above that of an isometry, from which a candidate is given up.
 # Moving the tips of those hardly ever succeeds: trying it takes a tenth more time for seams shorter by 0.5%.
 MAX_EXCESS = 0.2
@@ -92,11 +90,6 @@ def _best_within(model: CutModel, *candidates: Candidate) -> Candidate:
     return min(within, key=model.expected_cost, default=lowest)
 
 
-def is_large(component: Component) -> bool:
-    """Return whether the cones of a component are searched on a coarse mesh."""
-    return len(component.faces) > 2 * COARSE
-
-
 def _with_fewest_seams(model: CutModel) -> Candidate:
     """Return a candidate cut between the fewest cones, and only along closed curves where there are handles."""
     mesh = model.component.mesh
@@ -113,7 +106,7 @@ def _with_fewest_seams(model: CutModel) -> Candidate:
 
 def _from_coarse(model: CutModel) -> tuple[CutModel, Candidate]:
     """Return the variant of a component that is better on a coarse mesh, and a candidate with the best cones there."""
-    coarse, vertices = coarse_component(model.component, COARSE)
+    coarse, vertices = coarse_component(model.component)
     bound = EnergyBound(model.bound.plus(COARSE_EXCESS), model.bound.by_area)
     coarse_variant, best = _best_of_variants(CutModel(coarse, bound, model.steps), _best_of_searched)
     variant = model.with_holes(coarse_variant.component.keeps_holes)

@@ -1,4 +1,4 @@
-"""Coarse components, on which the cones of large ones are searched."""
+"""Coarse components, on which the cones of large ones are searched, and variants of them compared."""
 
 from __future__ import annotations
 
@@ -7,17 +7,27 @@ from typing import Any
 
 import numpy as np
 
-from ..base import IntArray
+from ..base.arrays import IntArray
 from ..geometry import coarse_mesh, double_areas, edge_lengths, mollify
-from ..source import Component, Fill
+from .components import Component
+from .fill import Fill
+
+# Number of triangles of a coarse component; one with more than twice as many is large.
+COARSE = 4_000
 
 
-def coarse_component(component: Component, count: int) -> tuple[Component, IntArray]:
-    """Return a component with about `count` triangles, and (k,) the vertices of the given one that it keeps.
+def is_large(component: Component) -> bool:
+    """Return whether a component has so many triangles that a coarse one saves time."""
+    return len(component.faces) > 2 * COARSE
 
-    Options for vertices are kept; none of the edges are avoided or forbidden.
+
+def coarse_component(component: Component) -> tuple[Component, IntArray]:
+    """Return a component with about `COARSE` triangles, and (k,) the vertices of the given one that it keeps.
+
+    Options for vertices are kept, except cones and corners, and the importance of vertices; none of the edges are
+    avoided or forbidden.
     """
-    mesh, vertices, faces = coarse_mesh(component.mesh, count)
+    mesh, vertices, faces = coarse_mesh(component.mesh, COARSE)
     distances, is_no_edge = edge_lengths(mesh.vertices, mesh.faces), np.zeros(len(mesh.edges), dtype=bool)
     lengths = mollify(distances, mesh)[0]
 
@@ -38,4 +48,5 @@ def coarse_component(component: Component, count: int) -> tuple[Component, IntAr
         metric,
         replace(seams, is_avoided=is_no_edge, is_forbidden=is_no_edge),
         None if component.fill is None else Fill.of(mesh, lengths, metric.keeps_length),
+        component.keeps_holes,
     ), vertices
