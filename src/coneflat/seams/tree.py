@@ -1,7 +1,8 @@
 """Seams of a connected mesh.
 
 Seams may end anywhere on a boundary loop, as if it were contracted to a point. Boundary loops and cones are connected
-by a tree; on surfaces with handles, the shortest loops around them are cut as well. This cuts the mesh to a disk.
+by a tree; on surfaces with handles, the shortest loops around them are cut as well. This cuts the mesh to a disk. Holes
+that are kept need not be connected.
 """
 
 from __future__ import annotations
