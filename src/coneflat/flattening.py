@@ -50,6 +50,7 @@ class Steps:
         quantum: rotations across seams are multiples of it, radians; None for any rotation.
         untangles: inverted triangles of a first layout are turned back.
         names_components: errors name the component.
+        keeps_holes: holes are kept where this is better.
     """
 
     surface_of: SurfaceOf = ConeSurface.of
@@ -59,6 +60,7 @@ class Steps:
     quantum: float | None = None
     untangles: bool = True
     names_components: bool = False
+    keeps_holes: bool = True
 
     def surface(self, component: Component) -> ConeSurface:
         """Return a component with the operators of its metric."""

@@ -142,7 +142,7 @@ def with_kept_holes(component: Component, steps: Steps) -> Component:
 
     Keeping holes saves the seams to them, but the borders of opened ones absorb curvature, as the ends of a tube do.
     """
-    variant = component.with_kept_holes()
+    variant = component.with_kept_holes() if steps.keeps_holes else component
     if not variant.keeps_holes or not is_compared_on_coarse(component):
         return variant
     coarse = coarse_component(variant)[0]
