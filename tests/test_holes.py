@@ -19,17 +19,17 @@ def with_holes(mesh, centres, radius):
     """Return a mesh without the triangles within a radius of places in its first two coordinates."""
     vertices, faces = mesh
     middles = vertices[faces].mean(axis=1)[:, :2]
-    far = np.linalg.norm(middles[:, None] - np.asarray(centres)[None], axis=2).min(axis=1) > radius
-    far |= np.ptp(vertices[faces][:, :, 0], axis=1) > 0.5  # around a tube
-    used, corners = np.unique(faces[far], return_inverse=True)
-    return vertices[used], corners.reshape(-1, 3)
+    is_outside = np.linalg.norm(middles[:, None] - np.asarray(centres)[None], axis=2).min(axis=1) > radius
+    is_outside |= np.ptp(vertices[faces][:, :, 0], axis=1) > 0.5  # around a tube
+    vertex_indices, corners = np.unique(faces[is_outside], return_inverse=True)
+    return vertices[vertex_indices], corners.reshape(-1, 3)
 
 
 def sheet(count, size=40, height=0.1):
     """Return a curved sheet with count x count holes."""
-    whole = shapes.grid(size, size, lambda x, y: height * np.sin(3 * x) * np.cos(2.5 * y))
+    uncut = shapes.grid(size, size, lambda x, y: height * np.sin(3 * x) * np.cos(2.5 * y))
     places = (np.arange(count) + 0.5) / count
-    return with_holes(whole, [(x + 0.02, y - 0.01) for x in places for y in places], 0.25 / count)
+    return with_holes(uncut, [(x + 0.02, y - 0.01) for x in places for y in places], 0.25 / count)
 
 
 def tower(rows=3, columns=5, around=60, along=36, waves=0.08):

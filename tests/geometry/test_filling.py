@@ -22,8 +22,8 @@ def plate_with_letter():
     vertices, faces = shapes.grid(12, 10)
     x, y = vertices[faces].mean(axis=1)[:, :2].T
     is_l = ((x > 0.3) & (x < 0.42) & (y > 0.2) & (y < 0.8)) | ((x > 0.3) & (x < 0.8) & (y > 0.2) & (y < 0.3))
-    used, corners = np.unique(faces[~is_l], return_inverse=True)
-    return check_mesh(vertices[used] @ shapes.rotation(), corners.reshape(-1, 3)).mesh
+    vertex_indices, corners = np.unique(faces[~is_l], return_inverse=True)
+    return check_mesh(vertices[vertex_indices] @ shapes.rotation(), corners.reshape(-1, 3)).mesh
 
 
 def test_a_flat_surface_stays_flat():

@@ -67,8 +67,8 @@ def test_flat_disks_keep_holes_around_which_they_close_up():
     vertices, faces = shapes.grid(9, 9)
     middles = vertices[faces].mean(axis=1)
     frame = vertices, faces[np.abs(middles[:, :2] - 0.5).max(axis=1) > 0.2]
-    used, corners = np.unique(frame[1], return_inverse=True)
-    frame = vertices[used] @ shapes.rotation(), corners.reshape(-1, 3)
+    vertex_indices, corners = np.unique(frame[1], return_inverse=True)
+    frame = vertices[vertex_indices] @ shapes.rotation(), corners.reshape(-1, 3)
     flat_frame, tube = laid_out(frame, shapes.cylinder(12, 3))
     assert tube is None
     np.testing.assert_allclose(

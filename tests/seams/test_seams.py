@@ -243,8 +243,8 @@ def test_passing_a_kept_hole_costs_nothing():
     vertices, faces = shapes.grid(12, 12)
     x, y = vertices[faces].mean(axis=1)[:, :2].T
     hole = (np.abs(x - 0.5) < 1 / 12) & (y > 1 / 12) & (y < 8 / 12)
-    used, corners = np.unique(faces[~hole], return_inverse=True)
-    mesh = TriangleMesh(vertices[used], corners.reshape(-1, 3))
+    vertex_indices, corners = np.unique(faces[~hole], return_inverse=True)
+    mesh = TriangleMesh(vertices[vertex_indices], corners.reshape(-1, 3))
     cone = int(np.argmin(np.linalg.norm(mesh.vertices[:, :2] - [0.5, 9 / 12], axis=1)))
     costs = lengths_of(mesh)
     seams = find_seams(mesh, np.array([cone]), costs, kept_holes=find_holes(mesh))

@@ -114,7 +114,7 @@ def unpinched(mesh: TriangleMesh) -> TriangleMesh:
 
 
 def filled_disk(disk: TriangleMesh, costs: FloatArray) -> tuple[TriangleMesh, FloatArray]:
-    """Return a disk with filled holes, and the costs of cutting its sides: next to nothing in and along holes.
+    """Return a disk with filled holes, and the costs of cutting its sides: almost zero in and along holes.
 
     Args:
         disk: the m triangles, which come first in the result.

@@ -31,7 +31,7 @@ from ..io import as_input
 from ..measures import unmet_guarantees
 from ..mesh import with_fans
 from ..mesh.connectivity import TriangleMesh
-from ..options import declarations, read_options
+from ..options import Options, declarations, read_options
 from ..result import Flattening
 from ..source import Source
 from .aligned_cones import aligned_flattening
