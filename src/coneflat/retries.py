@@ -17,7 +17,7 @@ from .bounds import (
     is_too_distorted,
     rank,
 )
-from .cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, uses_sparse_search, with_corners
+from .cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, ConeSurface, uses_sparse_search, with_corners
 from .errors import ConvergenceError, CurvatureError, LengthError, MetricError, OptionError, SeamError
 from .flattening import (
     Steps,
@@ -146,7 +146,8 @@ def with_kept_holes(component: Component, steps: Steps) -> Component:
     if not variant.keeps_holes or not is_compared_on_coarse(component):
         return variant
     coarse = coarse_component(variant)[0]
-    flatten = partial(flatten_within_bound, steps=steps)
+    # A cache of surfaces would hold those of coarse meshes, which are made anew each time.
+    flatten = partial(flatten_within_bound, steps=replace(steps, surface_of=ConeSurface.of))
     kept_layout = without_failures(flatten, {0: coarse}).get(0)
     if kept_layout is None:
         return component

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, dots
+from ..base.arrays import BoolArray, FloatArray, IntArray, dots, mask_of
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh, are_among
 from ..mesh.holes import with_fans
 from .opening import mollify
@@ -61,5 +61,7 @@ def _are_unfit(
     is_unfit = ~(dots(normals, totals[hole]) > -ROUNDING * dots(totals, totals)[hole])
     sides = np.stack([triangles[:, NEXT].ravel(), triangles[:, PREVIOUS].ravel()], axis=1)
     borders = np.concatenate([np.stack([polygon, np.roll(polygon, -1)], axis=1) for polygon in polygons])
-    is_doubled = are_among(sides, mesh.edges) & ~are_among(sides, borders)
+    on_border = mask_of(len(mesh.vertices), borders)
+    chords = mesh.edges[on_border[mesh.edges[:, 0]] & on_border[mesh.edges[:, 1]]]
+    is_doubled = are_among(sides, chords) & ~are_among(sides, borders)
     return np.asarray(is_unfit | is_doubled.reshape(-1, 3).any(axis=1))
