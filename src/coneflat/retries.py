@@ -16,6 +16,7 @@ from .bounds import (
     excess,
     is_too_distorted,
     rank,
+    seam_length,
 )
 from .cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, ConeSurface, uses_sparse_search, with_corners
 from .errors import ConvergenceError, CurvatureError, LengthError, MetricError, OptionError, SeamError
@@ -32,7 +33,7 @@ from .groups import ComponentProgress, errors_of, groups_of_small
 from .measures import mean_qc
 from .mesh.connectivity import TriangleMesh
 from .options import Options
-from .seams import find_seams
+from .seams import NO_EDGES, find_seams
 from .source import Component, Prepared, Source, coarse_component, has_vertex_options, is_large
 from .stages import Layout
 
@@ -183,11 +184,12 @@ def is_best_with_holes(component: Component, layout: Layout) -> bool:
 
     The seams that are found are at most twice as long as the shortest ones.
     """
-    if len(layout.seams) or layout.notes or excess([component], [layout]) > TOLERATED_EXCESS:
+    if layout.notes or excess([component], [layout]) > TOLERATED_EXCESS:
         return False
     lengths = component.lengths.ravel()[component.mesh.edge_halfedges[:, 0]]
-    seams = find_seams(component.mesh, layout.cones, lengths)
-    return distortion_cost([layout]) < lengths[seams].sum() / 2 / np.sqrt(layout.area)
+    opening = find_seams(component.mesh, NO_EDGES, lengths)
+    size = np.sqrt(layout.area)
+    return seam_length(layout) / size + distortion_cost([layout]) < lengths[opening].sum() / 2 / size
 
 
 def flatten_within_bound(components: Mapping[int, Component], steps: Steps) -> dict[int, Layout]:

@@ -16,10 +16,10 @@ import numpy as np
 from ..base import mask_of
 from ..cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, with_corners
 from ..errors import CurvatureError, MetricError, SeamError
-from ..seams import without_loose_ends
+from ..seams import NO_EDGES, find_seams, without_loose_ends
 from ..source import coarse_component, is_large
 from ..stages import VertexCurvatures
-from .candidates import Candidate, CutModel
+from .candidates import COST_PER_ENERGY, Candidate, CutModel
 from .energy import EnergyBound
 from .free_seams import recut, seam_edges
 from .options import ISOMETRIC
@@ -67,7 +67,7 @@ def best_cut(model: CutModel) -> Candidate:
 def _best_of_variants(model: CutModel, search: Callable[[CutModel], Candidate]) -> tuple[CutModel, Candidate]:
     """Return the better variant of a component, with its holes kept or opened, and the candidate that a search gives.
 
-    Opened holes are tried only where the bound is not met, or with seams anyway.
+    Opened holes are tried only where the bound is not met, or if their seams may cost less.
     """
     opened, variant = model.with_holes(False), model.with_holes(True)
     if not variant.component.keeps_holes:
@@ -76,11 +76,22 @@ def _best_of_variants(model: CutModel, search: Callable[[CutModel], Candidate]) 
         candidate = search(variant)
     except FAILURES:
         return opened, search(opened)
-    if model.is_within(candidate) and not (model.bound.is_finite and len(candidate.layout.seams)):
+    if model.is_within(candidate) and _is_cheapest(model, candidate):
         return variant, candidate
     opened_candidate = search(opened)
     best = _best_within(model, candidate, opened_candidate)
     return (variant if best is candidate else opened), best
+
+
+def _is_cheapest(model: CutModel, candidate: Candidate) -> bool:
+    """Return whether no seams to all holes cost less than those of a candidate that keeps them.
+
+    The seams that are found cost at most twice as much as the cheapest ones.
+    """
+    if not (model.bound.is_finite and len(candidate.layout.seams)):
+        return True
+    opening = model.seam_costs[find_seams(model.component.mesh, NO_EDGES, model.seam_costs)].sum()
+    return bool(model.expected_cost(candidate) <= opening / 2 - COST_PER_ENERGY * candidate.layout.area**0.5)
 
 
 def _best_within(model: CutModel, *candidates: Candidate) -> Candidate:
