@@ -67,11 +67,8 @@ def sort_pairs(tails: IntArray, heads: IntArray, bound: int) -> tuple[IntArray, 
     Returns:
         (k,) the order; (k,) True where a pair in this order differs from the one before.
     """
-    low, high = np.minimum(tails, heads), np.maximum(tails, heads)
-    order: IntArray = np.argsort(low * np.int64(bound) + high, kind="stable")
-    is_first = np.ones(len(order), dtype=bool)
-    is_first[1:] = (np.diff(low[order]) != 0) | (np.diff(high[order]) != 0)
-    return order, is_first
+    tails, heads = (np.ascontiguousarray(nodes, dtype=np.int64) for nodes in (tails, heads))
+    return order_pairs(tails, heads, bound)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,14 +96,7 @@ class TriangleMesh:
     def _pairing(self) -> tuple[IntArray, IntArray, IntArray]:
         """Edges as vertex pairs (e, 2), edge of each half-edge (3m,), half-edges of each edge (e, 2)."""
         tails, heads = (self.faces.take(corners, axis=1).ravel() for corners in (NEXT, PREVIOUS))
-        order, is_first = sort_pairs(tails, heads, len(self.vertices))
-        edge_of = np.empty(len(order), dtype=np.int64)
-        edge_of[order] = np.cumsum(is_first) - 1
-        starts = np.flatnonzero(is_first)
-        ends = np.append(starts[1:], len(order)) - 1
-        first = order[starts]
-        pairs = np.sort(np.stack([tails[first], heads[first]], axis=1), axis=1)
-        return pairs, edge_of, np.stack([first, np.where(ends > starts, order[ends], -1)], axis=1)
+        return number_edges(tails, heads, *order_pairs(tails, heads, len(self.vertices)))
 
     def moved_to(self, vertices: FloatArray) -> TriangleMesh:
         """Return the mesh with other vertex positions (n, 3); cached connectivity is shared."""
@@ -363,6 +353,63 @@ def sort_keys(keys: IntArray) -> None:
                 before -= gap
             keys[before + gap] = key
         gap //= 3
+
+
+@compiled
+def order_pairs(tails: IntArray, heads: IntArray, bound: int) -> tuple[IntArray, BoolArray]:
+    """Return the result of `sort_pairs`: pairs are counted by their smaller index, then sorted by the larger one."""
+    starts = np.zeros(bound + 1, np.int64)
+    for k in range(len(tails)):
+        starts[min(tails[k], heads[k]) + 1] += 1
+    for v in range(bound):
+        starts[v + 1] += starts[v]
+    # The high 32 bits of a key are the larger index, the low ones the number of the pair.
+    keys, place = np.empty(len(tails), np.int64), starts.copy()
+    for k in range(len(tails)):
+        low, high = min(tails[k], heads[k]), max(tails[k], heads[k])
+        keys[place[low]] = (high << 32) | k
+        place[low] += 1
+    is_first = np.empty(len(tails), np.bool_)
+    for v in range(bound):
+        sort_keys(keys[starts[v] : starts[v + 1]])
+        before = -1
+        for at in range(starts[v], starts[v + 1]):
+            high = keys[at] >> 32
+            is_first[at] = high != before
+            before = high
+            keys[at] &= 0xFFFFFFFF
+    return keys, is_first
+
+
+@compiled
+def number_edges(
+    tails: IntArray, heads: IntArray, order: IntArray, is_first: BoolArray
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Return edges as vertex pairs (e, 2), the edge of each half-edge (h,), and the half-edges of each edge (e, 2).
+
+    Args:
+        tails, heads: (h,) ends of the half-edges.
+        order, is_first: (h,) half-edges by edge, and whether each is the first of its edge, see `sort_pairs`.
+    """
+    count = 0
+    for at in range(len(order)):
+        count += is_first[at]
+    pairs, edge_of, sides = (
+        np.empty((count, 2), np.int64),
+        np.empty(len(order), np.int64),
+        np.empty((count, 2), np.int64),
+    )
+    edge = -1
+    for at in range(len(order)):
+        h = order[at]
+        if is_first[at]:
+            edge += 1
+            pairs[edge, 0], pairs[edge, 1] = min(tails[h], heads[h]), max(tails[h], heads[h])
+            sides[edge, 0], sides[edge, 1] = h, -1
+        else:
+            sides[edge, 1] = h
+        edge_of[h] = edge
+    return pairs, edge_of, sides
 
 
 @compiled
