@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..base.arrays import FloatArray, IntArray, as_floats
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..geometry.coverage import cancel_sides
-from ..geometry.layers import open_sides
 from ..geometry.planar import bounds
-from ..mesh.charts import both_sides, point_seams
+from ..mesh.charts import both_sides, open_sides, point_seams
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh, label_components
 
 # Area relative to the square of the extent. A chart below this is a line, up to rounding.

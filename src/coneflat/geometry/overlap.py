@@ -21,9 +21,10 @@ from ..base.arrays import (
 )
 from ..base.jit import compiled
 from ..errors import ArrayShapeError, OptionError
+from ..mesh.charts import open_sides
 from .coverage import overlap_areas
 from .fans import are_disjoint, find_fans
-from .layers import may_overlap, open_sides
+from .layers import may_overlap
 from .orientation import counterclockwise, orientation
 
 # Relative to the largest coordinate: smaller coordinates count as 0, so that products do not underflow.

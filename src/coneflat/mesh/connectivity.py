@@ -334,6 +334,13 @@ def end_corners(halfedges: IntArray) -> tuple[IntArray, IntArray]:
     return base + NEXT[corner], base + PREVIOUS[corner]
 
 
+@compiled
+def ends_of_side(h: int) -> tuple[int, int]:
+    """Return the start and end corner of a half-edge, like `end_corners`; remainders would take longer."""
+    corner = h - 3 * (h // 3)
+    return (h + 1 if corner < 2 else h - 2), (h + 2 if corner == 0 else h - 1)
+
+
 # Up to this number, keys are sorted by insertion; more are sorted by merging, as quicksort is quadratic around vertices
 # of high valence.
 MAX_INSERTION_SORT = 64
