@@ -16,7 +16,6 @@ from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..geometry import double_areas
 from ..geometry.intrinsic import check_lengths
 from ..geometry.overlap import Overlaps, overlaps_of_mesh
-from ..geometry.planar import qc_distortion
 from ..geometry.straight import place_triangles
 from ..mesh.charts import both_sides, joined_edges, label_charts
 from ..mesh.connectivity import TriangleMesh
@@ -239,11 +238,10 @@ def measure_map(
 
 def mean_qc(layout: Layout) -> float:
     """Return the mean quasi-conformal distortion of a layout by area, over positively oriented triangles."""
-    ratios = qc_distortion(layout.lengths, layout.points[layout.corners])
-    is_positive = np.isfinite(ratios)
+    is_positive = np.isfinite(layout.qc)
     if not is_positive.any():
         return math.inf
-    return _mean(ratios[is_positive], double_areas(layout.lengths)[is_positive])
+    return _mean(layout.qc[is_positive], double_areas(layout.lengths)[is_positive])
 
 
 def _scale_measures(
