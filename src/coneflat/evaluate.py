@@ -132,7 +132,7 @@ def evaluate(
         source=prepared.input_mesh.source,
         lengths=None if lengths is None else np.ldexp(lengths, -checked.exponent),
     )
-    return replace(result, notes=(*result.notes, *unmet_guarantees(result)))
+    return replace(result, notes=(*result.notes, *unmet_guarantees(result, mesh=mesh)))
 
 
 def _component_faces(prepared: Prepared) -> IntArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arrays import BoolArray, IntArray
+from .arrays import BoolArray, FloatArray, IntArray
 from .jit import compiled
 
 
@@ -21,6 +21,18 @@ def edges_at_nodes(ends: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
     flat = ends.reshape(-1)
     starts = np.concatenate([[0], np.cumsum(np.bincount(flat, minlength=nodes))])
     return starts, np.argsort(flat, kind="stable") // 2
+
+
+@compiled
+def largest_at(places: IntArray, values: FloatArray, count: int) -> FloatArray:
+    """Return (count,) the largest of the values (k,) that have each place (k,), 0 if none is larger.
+
+    NumPy's `maximum.at` takes ten times as long.
+    """
+    largest = np.zeros(count)
+    for k in range(len(places)):
+        largest[places[k]] = max(largest[places[k]], values[k])
+    return largest
 
 
 @compiled

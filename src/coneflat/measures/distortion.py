@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -260,7 +261,7 @@ def _scale_measures(
     scales = np.log(np.abs(uv_area[chosen]) / weights) / 2
     log_area_scale = np.full(len(area), np.nan)
     log_area_scale[chosen] = scales
-    low, high = (quantile(scales, weights, fraction) for fraction in (0.05, 0.95))
+    low, high = quantiles(scales, weights, (0.05, 0.95))
     return {
         "log_area_scale": log_area_scale,
         "qc_mean": _mean(ratios, weights),
@@ -369,11 +370,17 @@ def _mean(values: FloatArray, weights: FloatArray) -> float:
 
 def quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:
     """Return the weighted quantile of values for a fraction from 0 to 1; NaN for empty arrays."""
+    return quantiles(values, weights, (fraction,))[0]
+
+
+def quantiles(values: FloatArray, weights: FloatArray, fractions: Sequence[float]) -> list[float]:
+    """Return the weighted quantiles of values for several fractions, see `quantile`."""
     if not len(values):
-        return float("nan")
+        return [float("nan")] * len(fractions)
     order = np.argsort(values)
     cumulated = np.cumsum(weights[order])
-    return float(values[order[np.searchsorted(cumulated, fraction * cumulated[-1])]])
+    places = np.searchsorted(cumulated, np.array(fractions) * cumulated[-1])
+    return values[order[places]].tolist()
 
 
 def _place_separately(lengths: FloatArray) -> tuple[FloatArray, IntArray]:
