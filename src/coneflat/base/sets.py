@@ -63,14 +63,20 @@ def label_nodes(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntA
         parent[v] = v
     for e in range(len(tails)):
         unite(parent, tails[e], heads[e])
+    return number_trees(parent), parent
+
+
+@compiled
+def number_trees(parent: IntArray) -> int:
+    """Replace the parents in a union-find forest by the numbers of the trees, by first node; return their count."""
     number = 0
-    for v in range(count):  # a parent has a smaller index than its children
+    for v in range(len(parent)):  # a parent has a smaller index than its children
         if parent[v] == v:
             parent[v] = number
             number += 1
         else:
             parent[v] = parent[parent[v]]
-    return number, parent
+    return number
 
 
 @compiled

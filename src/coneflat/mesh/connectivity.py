@@ -18,7 +18,7 @@ from scipy.sparse import csr_matrix
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, mask_of
 from ..base.jit import compiled
-from ..base.sets import edges_at_nodes, label_nodes
+from ..base.sets import edges_at_nodes, label_nodes, number_trees, unite
 
 NEXT = np.array([1, 2, 0])
 PREVIOUS = np.array([2, 0, 1])
@@ -287,19 +287,8 @@ def corner_fans(faces: IntArray, halfedges: IntArray, partners: IntArray) -> tup
         The number of fans (classes of joined corners) and the fan of each corner (m, 3). If all interior edges are
         glued, a vertex of a manifold has one fan. If seams are not glued, the fans are the vertices of the cut mesh.
     """
-    flat = faces.ravel()
-    # The end corners of both half-edges, ordered so that the same vertex comes first.
-    start, end = end_corners(halfedges)
-    partner_start, partner_end = end_corners(partners)
-    opposed = flat[start] == flat[partner_end]
-    partner_start, partner_end = (
-        np.where(opposed, partner_end, partner_start),
-        np.where(opposed, partner_start, partner_end),
-    )
-    count, labels = label_components(
-        faces.size, np.concatenate([start, end]), np.concatenate([partner_start, partner_end])
-    )
-    return count, labels.reshape(faces.shape)
+    count, labels = label_fans(faces.ravel(), *map(np.ascontiguousarray, (halfedges, partners)))
+    return int(count), labels.reshape(faces.shape)
 
 
 def split_vertices(
@@ -360,6 +349,20 @@ def sort_keys(keys: IntArray) -> None:
                 before -= gap
             keys[before + gap] = key
         gap //= 3
+
+
+@compiled
+def label_fans(corners: IntArray, halfedges: IntArray, partners: IntArray) -> tuple[int, IntArray]:
+    """Return the result of `corner_fans` for (3m,) the vertex at each corner."""
+    parent = np.arange(len(corners))
+    for k in range(len(halfedges)):
+        start, end = ends_of_side(halfedges[k])
+        partner_start, partner_end = ends_of_side(partners[k])
+        if corners[start] != corners[partner_end]:  # the faces have different orientations
+            partner_start, partner_end = partner_end, partner_start
+        unite(parent, start, partner_end)
+        unite(parent, end, partner_start)
+    return number_trees(parent), parent
 
 
 @compiled
