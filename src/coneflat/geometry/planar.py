@@ -128,9 +128,9 @@ def qc_distortion(lengths: FloatArray, places: FloatArray) -> FloatArray:
     """
     # The map z -> a z + b conj(z) has the singular values |a| + |b| and |a| - |b|. Both are multiplied by the same
     # number here, which is 0 for triangles without area on the surface.
-    rest, flat = rest_sides(lengths), sides_between(places)
-    a = np.conj(rest[:, 1]) * flat[:, 0] - np.conj(rest[:, 0]) * flat[:, 1]
-    b = rest[:, 0] * flat[:, 1] - rest[:, 1] * flat[:, 0]
+    shapes, sides = rest_sides(lengths), sides_between(places)
+    a = np.conj(shapes[:, 1]) * sides[:, 0] - np.conj(shapes[:, 0]) * sides[:, 1]
+    b = shapes[:, 0] * sides[:, 1] - shapes[:, 1] * sides[:, 0]
     size_a, size_b = np.abs(a), np.abs(b)
     return np.divide(
         size_a + size_b, size_a - size_b, out=np.full(len(lengths), np.inf), where=size_a > size_b
