@@ -38,9 +38,18 @@ def signed_double_areas(corners: FloatArray) -> FloatArray:
 
 def bounds(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return (m, 2) the smallest and (m, 2) the largest coordinates of triangles with corners (m, 3, 2)."""
-    # NumPy is slow at extrema along an axis of length three.
-    first, second, third = (corners[:, k] for k in range(3))
-    return np.minimum(np.minimum(first, second), third), np.maximum(np.maximum(first, second), third)
+    low, high = np.empty((2, len(corners), 2))
+    for x in range(2):  # NumPy is slow at extrema along short axes
+        first, second, third = corners[:, :, x].T
+        low[:, x] = np.minimum(np.minimum(first, second), third)
+        high[:, x] = np.maximum(np.maximum(first, second), third)
+    return low, high
+
+
+def enclosing_box(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return (2,) the smallest and (2,) the largest coordinates of boxes from `low` to `high` (k, 2)."""
+    # NumPy is slow at extrema of pairs.
+    return np.array([x.min() for x in low.T]), np.array([x.max() for x in high.T])
 
 
 def signed_angles(sides: ComplexArray) -> FloatArray:
