@@ -8,6 +8,7 @@ from .arrays import BoolArray, FloatArray, IntArray
 from .jit import compiled
 
 
+@compiled
 def edges_at_nodes(ends: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
     """Return the incident edges of each node in compressed form.
 
@@ -16,11 +17,22 @@ def edges_at_nodes(ends: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
         nodes: number n of nodes.
 
     Returns:
-        (n + 1,) where the edges of each node start, and (2e,) these edges; each edge is listed at both of its ends.
+        (n + 1,) where the edges of each node start, and (2e,) these edges, ascending at each node; each edge is listed
+        at both of its ends.
     """
-    flat = ends.reshape(-1)
-    starts = np.concatenate([[0], np.cumsum(np.bincount(flat, minlength=nodes))])
-    return starts, np.argsort(flat, kind="stable") // 2
+    starts = np.zeros(nodes + 1, np.int64)
+    for e in range(len(ends)):
+        for x in range(2):
+            starts[ends[e, x] + 1] += 1
+    for v in range(nodes):
+        starts[v + 1] += starts[v]
+    place, sides = starts.copy(), np.empty(2 * len(ends), np.int64)
+    for e in range(len(ends)):
+        for x in range(2):
+            v = ends[e, x]
+            sides[place[v]] = e
+            place[v] += 1
+    return starts, sides
 
 
 @compiled

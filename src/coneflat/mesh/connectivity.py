@@ -160,6 +160,12 @@ class TriangleMesh:
         return edges_at_nodes(self.edges, len(self.vertices))
 
     @cached_property
+    def face_pairs(self) -> tuple[IntArray, tuple[IntArray, IntArray]]:
+        """Pairs of faces that share an edge (k, 2), by edge, and those of each face, as in `incident_edges`."""
+        pairs = self.edge_faces[~self.is_boundary_edge]
+        return pairs, edges_at_nodes(pairs, len(self.faces))
+
+    @cached_property
     def boundary_loops(self) -> tuple[int, IntArray]:
         """The number of boundary loops, and (n,) the loop of each vertex; -1 at inner vertices."""
         on_boundary = np.flatnonzero(self.is_boundary_vertex)
