@@ -17,7 +17,8 @@ from ...errors import CurvatureError
 from ...stages import ConeSolution
 from ..sparse.dense_model import MIN_RELATIVE_GAIN
 from ..sparse.fine_model import MAX_ROUNDS, MIN_PROMISED_GAIN
-from ..sparse.search import COARSE_MODEL_ERROR, ConeSearch
+from ..sparse.search import ConeSearch
+from ..sparse.starts import COARSE_MODEL_ERROR
 from .lattice import IndexedCones, Lattice
 from .moves import Quanta
 
@@ -125,7 +126,7 @@ def make_lattice(search: ConeSearch, quantum: float) -> Lattice:
             f"no multiple of {quantum / np.pi:.4g} pi lies within the bounds of cone curvatures, {limits.text()}, and "
             "contributes to their sum"
         )
-    return Lattice(search.coarse, Quanta(float(quantum), lower, upper, total is not None), total)
+    return Lattice(search.dense_starts.model, Quanta(float(quantum), lower, upper, total is not None), total)
 
 
 def _order_to_round_in(search: ConeSearch, members: IntArray) -> IntArray:
@@ -143,7 +144,7 @@ def _order_to_round_in(search: ConeSearch, members: IntArray) -> IntArray:
 
 def search_coarse(search: ConeSearch, lattice: Lattice, goal: float, max_count: int) -> None:
     """Find good sets of cones on the coarse model, of all sizes up to slightly more than needed."""
-    model, best = search.coarse, lattice.best
+    model, best = search.dense_starts.model, lattice.best
     fewest = max(lattice.fewest, len(model.fixed))
     max_count = min(max_count + 1, search.max_cones)
     model.climb(goal / COARSE_MODEL_ERROR, max_count)
@@ -184,7 +185,7 @@ def _offer(lattice: Lattice, cones: IndexedCones | None, max_count: float = math
 def refine(search: ConeSearch, lattice: Lattice, fine: Lattice, size: int) -> float:
     """Move the cones of the best coarse set of a size over the mesh until E converges; return E^2."""
     model, start = search.fine, lattice.best[size]
-    members = model.insert(search.places[start.members])
+    members = model.insert(search.dense_starts.places[start.members])
     cones = fine.exchanged(fine.descended(members, start.indices))
     for _ in range(MAX_ROUNDS):
         known_count = len(model.unknowns)

@@ -32,14 +32,11 @@ from ...mesh.connectivity import TriangleMesh
 from ...mesh.ties import tie_key
 from ...stages import ConeSolution
 from ..solution import TIE_TOLERANCE
-from .coarse_model import candidates
-from .dense_model import STALL_FACTOR, ConeSet, DenseModel
+from .dense_model import STALL_FACTOR, ConeSet
 from .fine_model import FineModel
 from .limits import MAX_SEARCHED, Limits
 from .linear_model import LinearModel
-
-# Error of the coarse model as a factor of E^2; sets within this factor of the goal are evaluated on the mesh.
-COARSE_MODEL_ERROR = 1.35
+from .starts import CoarseMeshStarts, DenseStarts, Starts
 
 
 @dataclass(frozen=True)
@@ -83,7 +80,9 @@ class ConeSearch:
         coneflat.cones.greedy_cones: the search of the paper.
     """
 
-    def __init__(self, linear: LinearModel, fine: FineModel, usable: BoolArray) -> None:
+    def __init__(
+        self, linear: LinearModel, fine: FineModel, usable: BoolArray, coarse_search: CoarseMeshStarts | None = None
+    ) -> None:
         """Set up a search for cones at vertices.
 
         Args:
@@ -96,20 +95,9 @@ class ConeSearch:
         """
         self.operator, self.limits = linear.operator, fine.limits
         self._linear, self._usable = linear, usable
-        required = fine.unknowns[fine.fixed]
-        self.limits.check_available(usable, self.operator.vertices[required])
+        self.limits.check_available(usable, self.operator.vertices[fine.unknowns[fine.fixed]])
         self.fine = fine.restricted(usable[self.operator.vertices])
-        self.places = np.concatenate([required, candidates(linear.coarse, self.fine.fitness)])
-        kernel, slope = linear.coarse.at(self.places)
-        self.coarse = DenseModel(
-            np.ascontiguousarray(kernel),
-            slope,
-            linear.coarse.constant,
-            np.arange(len(self.places)) >= len(required),
-            fine.fixed,
-            self.limits,
-            fine.lower_bounds[self.places],
-        )
+        self._coarse_search = coarse_search
         # What the last refinement of each size started from, and the sizes that more cones hardly improve.
         self._refined = dict[int, tuple[float, ...]]()
         self._stalled = set[int]()
@@ -198,9 +186,19 @@ class ConeSearch:
         return self if np.array_equal(usable, self._usable) else ConeSearch(self._linear, self.fine, usable)
 
     @cached_property
+    def dense_starts(self) -> DenseStarts:
+        """The sets on the coarse basis of the mesh."""
+        return DenseStarts(self._linear.coarse, self.fine)
+
+    @property
+    def starts(self) -> Starts:
+        """The sets that those of the mesh start from."""
+        return self._coarse_search or self.dense_starts
+
+    @cached_property
     def max_cones(self) -> int:
         """The largest number of cones searched for."""
-        largest = min(MAX_SEARCHED + len(self.fine.fixed), len(self.places))
+        largest = min(MAX_SEARCHED + len(self.fine.fixed), self.starts.max_size)
         return largest if self.limits.largest is None else min(largest, self.limits.largest)
 
     def fewest(self, distortion: float = DISTORTION, max_count: int | None = None) -> SparseCones:
@@ -220,7 +218,8 @@ class ConeSearch:
             self.limits.check_count(max_count, len(self.fine.fixed))
         max_count = self.max_cones if max_count is None else min(max_count, self.max_cones)
         goal = distortion * distortion
-        count = self._find_sufficient(self._search_coarse(goal, max_count), goal, max_count)
+        self.starts.find_fewest(goal, max_count)
+        count = self._find_sufficient(len(self.starts.best.fewest(goal, max_count)), goal, max_count)
         while count > max(self.limits.fewest, len(self.fine.fixed)) and self._refine(count - 1) <= goal:
             count -= 1
         # If it is not reached: the fewest cones that are nearly as good as the best set.
@@ -243,9 +242,8 @@ class ConeSearch:
         """
         self.limits.check_count(count, len(self.fine.fixed))
         count = min(count, self.max_cones)
-        self._climb(0.0, count + 1, count)
-        self.coarse.descend(count - 2, count + 1)
-        self._refine(max(size for size in self.coarse.best.sizes if size <= count))
+        self.starts.find_best(count)
+        self._refine(max(size for size in self.starts.best.sizes if size <= count))
         fewer = 2 * count // 3
         if self._refine(fewer) < math.inf:
             self.fine.refine(self.fine.extended(self.fine.best[fewer].members, 0.0, count))
@@ -258,8 +256,7 @@ class ConeSearch:
             max_count: largest number of cones.
         """
         max_count = min(max_count, self.max_cones)
-        self.coarse.climb(0.0, max_count)
-        self.coarse.descend(1, max_count)
+        self.starts.find_all(max_count)
         # First upwards, then downwards: the best set may be the next larger set without one of its cones.
         for count in (*range(max_count + 1), *range(max_count, -1, -1)):
             self._refine(count)
@@ -269,13 +266,6 @@ class ConeSearch:
             if count <= max_count and (not curve or cones.distortion < curve[-1].distortion - TIE_TOLERANCE):
                 curve.append(cones)
         return curve
-
-    def _search_coarse(self, goal: float, max_count: int) -> int:
-        """Find good sets on the coarse model, of all sizes up to slightly more than needed; return the needed size."""
-        self._climb(goal / COARSE_MODEL_ERROR, max_count, max_count)
-        count = len(self.coarse.best.fewest(goal, max_count))
-        self.coarse.descend(count - 3, count + 1)
-        return len(self.coarse.best.fewest(goal, max_count))
 
     def _find_sufficient(self, count: int, goal: float, max_count: int) -> int:
         """Return how many cones reach E^2 <= goal on the mesh, or stall; the search starts with `count`."""
@@ -290,19 +280,6 @@ class ConeSearch:
                 self._stalled |= {start, len(added)}
         return len(best.fewest(goal, max_count))
 
-    def _climb(self, bound: float, max_count: int, count: int) -> None:
-        """Find sets of up to `max_count` cones on the coarse model; raise CurvatureError if all exceed `count`."""
-        best = self.coarse.best
-        known_sizes = [size for size in best.sizes if size <= max_count]
-        if all(best.energy(size) > bound for size in known_sizes):
-            self.coarse.climb(bound, max_count, max(known_sizes, default=None))
-        if min(self.coarse.best.sizes, default=count + 1) > count:
-            raise CurvatureError(
-                f"no set of {count} cones was found that absorbs a total curvature of "
-                f"{self.limits.total / np.pi:.4g} pi within their bounds: allow more cones or other angles, or choose "
-                "the greedy search (--cones greedy), which has no bounds"
-            )
-
     def _refine(self, count: int) -> float:
         """Refine the best set of a size on the mesh; return its E^2, infinite if there is none.
 
@@ -311,12 +288,12 @@ class ConeSearch:
         """
         report_detail(plural(count, "cone"))
         fine, starts = self.fine, []
-        state = (self.coarse.best.energy(count), fine.best.energy(count + 1), fine.best.energy(count - 1))
+        state = (self.starts.best.energy(count), fine.best.energy(count + 1), fine.best.energy(count - 1))
         if self._refined.get(count) == state:
             return fine.best.energy(count)
         self._refined[count] = state
-        if count in self.coarse.best:
-            starts.append(fine.insert(self.places[self.coarse.best[count].members]))
+        if count in self.starts.best:
+            starts.append(fine.insert(self.starts.unknowns(count)))
         if count + 1 in fine.best:
             shrunk = fine.shrunk(fine.best[count + 1].members)
             starts += [] if shrunk is None else [shrunk]
