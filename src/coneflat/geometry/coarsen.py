@@ -294,7 +294,9 @@ def cheapest_edges(mesh: Collapses, heads: IntArray) -> None:
                 head = mesh.corners[start + (corner - start + step) % 3]
                 cost = edge_cost(mesh.points, mesh.quadrics, tail, head)
                 cost = TEN_DIGITS * cost - (TEN_DIGITS * cost - cost)
-                if cost < mesh.cost[tail] or (cost == mesh.cost[tail] and mesh.key[head] < mesh.key[heads[tail]]):
+                if cost < mesh.cost[tail] or (
+                    cost == mesh.cost[tail] and mesh.key[head] < mesh.key[heads[tail]]
+                ):
                     mesh.cost[tail], heads[tail] = cost, head
 
 

@@ -18,7 +18,7 @@ from ...stages import ConeSolution
 from ..sparse.dense_model import MIN_RELATIVE_GAIN
 from ..sparse.fine_model import MAX_ROUNDS, MIN_PROMISED_GAIN
 from ..sparse.search import ConeSearch
-from ..sparse.starts import COARSE_MODEL_ERROR
+from ..sparse.starts import DenseStarts
 from .lattice import IndexedCones, Lattice
 from .moves import Quanta
 
@@ -87,7 +87,7 @@ def quantise_cones(
         if refine(search, lattice, fine, size) <= goal:
             break
     for size in reversed(sizes[: sizes.index(first)]):
-        is_near = lattice.best.energy(size) <= goal * COARSE_MODEL_ERROR
+        is_near = lattice.best.energy(size) <= goal * DenseStarts.error
         if not is_near or not refine(search, lattice, fine, size) <= goal:
             break
     best = fine.best.fewest(goal)
@@ -147,7 +147,7 @@ def search_coarse(search: ConeSearch, lattice: Lattice, goal: float, max_count: 
     model, best = search.dense_starts.model, lattice.best
     fewest = max(lattice.fewest, len(model.fixed))
     max_count = min(max_count + 1, search.max_cones)
-    model.climb(goal / COARSE_MODEL_ERROR, max_count)
+    model.climb(goal / DenseStarts.error, max_count)
     for cones in model.best:
         # Of many sizes, fewer are rounded: growing finds the others.
         if len(cones) % max(1, len(cones) // 32) == 0:
@@ -165,7 +165,7 @@ def search_coarse(search: ConeSearch, lattice: Lattice, goal: float, max_count: 
         stalled = 0 if best.energy(size) < smallest * (1 - MIN_PROMISED_GAIN) else stalled + 1
         smallest = min(smallest, best.energy(size))
     # The fewest cones do not matter where none meet the goal.
-    ratio = MAX_ENERGY_RATIO if best.fewest(goal).energy <= goal * COARSE_MODEL_ERROR else 0.0
+    ratio = MAX_ENERGY_RATIO if best.fewest(goal).energy <= goal * DenseStarts.error else 0.0
     for size in reversed(best.sizes):
         if best.energy(size) > goal * ratio and size < max_count:
             break
@@ -177,7 +177,7 @@ def _offer(lattice: Lattice, cones: IndexedCones | None, max_count: float = math
     if (
         cones is not None
         and len(cones) <= max_count
-        and cones.energy < COARSE_MODEL_ERROR * lattice.best.energy(len(cones))
+        and cones.energy < DenseStarts.error * lattice.best.energy(len(cones))
     ):
         lattice.best.offer(lattice.exchanged(cones))
 

@@ -29,7 +29,8 @@ class FineModel(DenseModel):
     Its candidates are the vertices whose Green's functions have been computed.
 
     Attributes:
-        unknowns: (m,) the vertex of each candidate, in the numbering of the Green operator.
+        operator: the Green operator of the mesh.
+        unknowns: (m,) the vertex of each candidate, in the numbering of the operator.
         lower_bounds: (f,) lower bound of the curvature at each unknown, radians.
     """
 
@@ -41,12 +42,12 @@ class FineModel(DenseModel):
         super().__init__(
             np.empty((0, 0)), empty, linear.distortion**2, empty.astype(bool), fixed, limits, empty
         )
-        self._linear, self._operator = linear, linear.operator
+        self._linear, self.operator = linear, linear.operator
         self.unknowns: IntArray = np.empty(0, dtype=np.int64)
         self.lower_bounds = lower_bounds
         self._usable = np.ones(len(lower_bounds), dtype=bool)
-        self._indptr = self._operator.laplacian.indptr.astype(np.int64)
-        self._indices = self._operator.laplacian.indices.astype(np.int64)
+        self._indptr = self.operator.laplacian.indptr.astype(np.int64)
+        self._indices = self.operator.laplacian.indices.astype(np.int64)
         # Buffers of `fill_ball`.
         self._is_reached = np.zeros(len(lower_bounds), dtype=bool)
         self._reached, self._shares = np.empty(len(lower_bounds), np.int64), np.empty(len(lower_bounds))
@@ -54,7 +55,7 @@ class FineModel(DenseModel):
         self._responses: list[FloatArray] = []
         self._means: list[FloatArray] = []
         if len(required):
-            self._add(required, self._operator.responses(required))
+            self._add(required, self.operator.responses(required))
 
     def restricted(self, usable: BoolArray) -> FineModel:
         """Return the model with further cones at the usable unknowns (f,) only, and without sets of cones.
@@ -85,8 +86,8 @@ class FineModel(DenseModel):
         is_new = mask_of(len(self._usable), unknowns)
         is_new[self.unknowns] = False
         added = np.flatnonzero(is_new)
-        for batch in self._operator.batches(added):
-            self._add(batch, self._operator.responses(batch))
+        for batch in self.operator.batches(added):
+            self._add(batch, self.operator.responses(batch))
         order = np.argsort(self.unknowns, kind="stable")
         return order[np.searchsorted(self.unknowns, unknowns, sorter=order)]
 
@@ -102,7 +103,7 @@ class FineModel(DenseModel):
         """Add k vertices with their Green's functions (k, f)."""
         size = len(self.unknowns)
         self.unknowns = np.concatenate([self.unknowns, added])
-        areas = self._operator.areas
+        areas = self.operator.areas
         weighted, means = responses * areas, responses @ areas
         self._responses.append(responses)
         self._means.append(means)
@@ -119,11 +120,13 @@ class FineModel(DenseModel):
         self.usable[self.fixed] = False
         self.lower = self.lower_bounds[self.unknowns]
 
-    def refine(self, members: IntArray) -> float:
-        """Move cones over the mesh until E converges; return E^2 of the best set of this number of cones."""
+    def refine(self, members: IntArray, goal: float = 0.0) -> float:
+        """Move cones over the mesh until E converges, or E^2 <= goal; return E^2 of the best set of this number."""
         cones = self.exchanged(members)
         self.best.offer(cones)
         for _ in range(MAX_ROUNDS):
+            if cones.energy <= goal:
+                break
             known_count, before = len(self.unknowns), cones.energy
             self.insert(self.targets(cones.members, self.fit(cones.members).curvatures, before))
             if len(self.unknowns) == known_count:
@@ -178,7 +181,7 @@ class FineModel(DenseModel):
             is_member = (members >= first) & (members < first + len(block))
             log_scale += curvatures[is_member] @ block[members[is_member] - first]
             first += len(block)
-        return self._operator.solve(self._operator.weighted(log_scale))
+        return self.operator.solve(self.operator.weighted(log_scale))
 
     def neighbours(self, unknown: int, size: int) -> tuple[IntArray, FloatArray]:
         """Return the usable unknowns (p,) nearest to one, and estimates of the distances of their Green's functions.
@@ -189,7 +192,14 @@ class FineModel(DenseModel):
         a factor of 2.
         """
         count = fill_ball(
-            self._indptr, self._indices, self._operator.areas, unknown, size, self._is_reached, self._reached, self._shares
+            self._indptr,
+            self._indices,
+            self.operator.areas,
+            unknown,
+            size,
+            self._is_reached,
+            self._reached,
+            self._shares,
         )
         reached, share = self._reached[:count], np.maximum(self._shares[:count], MIN_SHARE)
         distances = share * (0.3 - np.log(share) / 2) / (4 * np.pi**2)

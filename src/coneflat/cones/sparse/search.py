@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -36,7 +36,7 @@ from .dense_model import STALL_FACTOR, ConeSet
 from .fine_model import FineModel
 from .limits import MAX_SEARCHED, Limits
 from .linear_model import LinearModel
-from .starts import CoarseMeshStarts, DenseStarts, Starts
+from .starts import DenseStarts, StartsOf
 
 
 @dataclass(frozen=True)
@@ -64,13 +64,12 @@ class ConeSearch:
 
     Attributes:
         fine: the model with the energies of sets on the mesh; its required cones are always cones.
-        coarse: the model in which sets are searched first, at one vertex for each function of the coarse basis.
-        places: (c,) unknown of each candidate of the coarse model, required cones first.
+        starts: the sets of a smaller model, on which cones are searched first.
         limits: bounds and sum of the curvatures.
         operator: the Laplacian of the vertices that can be cones.
 
     Notes:
-        Sets of each size are found on the coarse model, by adding cones one at a time and exchanging members
+        Sets of each size are found on a smaller model, by adding cones one at a time and exchanging members
         (`DenseModel`), and are then moved over the mesh (`FineModel.refine`). Matching pursuit adds the candidate
         that lowers E^2 most if all curvatures are fitted again; moves follow the gradient of E^2. References are in
         the docstring of the module.
@@ -80,24 +79,23 @@ class ConeSearch:
         coneflat.cones.greedy_cones: the search of the paper.
     """
 
-    def __init__(
-        self, linear: LinearModel, fine: FineModel, usable: BoolArray, coarse_search: CoarseMeshStarts | None = None
-    ) -> None:
+    def __init__(self, linear: LinearModel, fine: FineModel, usable: BoolArray, starts_of: StartsOf) -> None:
         """Set up a search for cones at vertices.
 
         Args:
             linear: the linear model of the mesh.
             fine: the model of the sets on the mesh, with the required cones.
             usable: (n,) mask of the other vertices that may be cones.
+            starts_of: returns the sets that the search starts from.
 
         Raises:
             CurvatureError: cones at these vertices cannot absorb the curvature.
         """
         self.operator, self.limits = linear.operator, fine.limits
-        self._linear, self._usable = linear, usable
+        self._linear, self._usable, self._starts_of = linear, usable, starts_of
         self.limits.check_available(usable, self.operator.vertices[fine.unknowns[fine.fixed]])
         self.fine = fine.restricted(usable[self.operator.vertices])
-        self._coarse_search = coarse_search
+        self.starts = starts_of(self.fine)
         # What the last refinement of each size started from, and the sizes that more cones hardly improve.
         self._refined = dict[int, tuple[float, ...]]()
         self._stalled = set[int]()
@@ -114,6 +112,7 @@ class ConeSearch:
         required: Iterable[int] = (),
         allowed: BoolArray | None = None,
         max_angles: FloatArray | None = None,
+        starts_of: StartsOf | None = None,
     ) -> ConeSearch:
         """Return a search on a linear model.
 
@@ -126,6 +125,7 @@ class ConeSearch:
             allowed: (n,) mask of the other vertices that may be cones; None: all.
             max_angles: (n,) largest cone angle at each vertex, radians, in addition to `max_cone_angle`; None: no
                 further bound.
+            starts_of: returns the sets that the search starts from; None: those on the coarse basis of the model.
 
         Raises:
             OptionError: an option is not valid.
@@ -142,10 +142,12 @@ class ConeSearch:
         lower = np.full(len(operator.vertices), limits.lower)
         if max_angles is not None:
             lower = np.maximum(lower, np.minimum(math.tau - max_angles[operator.vertices], 0.0))
+        if starts_of is None:  # before the fine model, as the coarse one is computed during the factorization
+            starts_of = partial(DenseStarts, linear.coarse)
         fine = FineModel(linear, operator.unknowns_of(cones), limits, lower)
-        # The fine model will need the score; it is computed while the coarse model is set up.
+        # The fine model will need the score; it is computed while the smaller model is set up.
         with concurrently(lambda: linear.score, 2 * len(operator.vertices)):
-            return cls(linear, fine, usable)
+            return cls(linear, fine, usable, starts_of)
 
     @classmethod
     def from_mesh(
@@ -183,22 +185,23 @@ class ConeSearch:
             CurvatureError: cones at these vertices cannot absorb the curvature.
         """
         usable = ~self._linear.is_boundary & allowed
-        return self if np.array_equal(usable, self._usable) else ConeSearch(self._linear, self.fine, usable)
+        if np.array_equal(usable, self._usable):
+            return self
+        return ConeSearch(self._linear, self.fine, usable, self._starts_of)
 
     @cached_property
     def dense_starts(self) -> DenseStarts:
         """The sets on the coarse basis of the mesh."""
-        return DenseStarts(self._linear.coarse, self.fine)
-
-    @property
-    def starts(self) -> Starts:
-        """The sets that those of the mesh start from."""
-        return self._coarse_search or self.dense_starts
+        return (
+            self.starts
+            if isinstance(self.starts, DenseStarts)
+            else DenseStarts(self._linear.coarse, self.fine)
+        )
 
     @cached_property
     def max_cones(self) -> int:
         """The largest number of cones searched for."""
-        largest = min(MAX_SEARCHED + len(self.fine.fixed), self.starts.max_size)
+        largest = min(MAX_SEARCHED + len(self.fine.fixed), self.starts.largest)
         return largest if self.limits.largest is None else min(largest, self.limits.largest)
 
     def fewest(self, distortion: float = DISTORTION, max_count: int | None = None) -> SparseCones:
