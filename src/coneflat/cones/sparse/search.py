@@ -221,9 +221,8 @@ class ConeSearch:
             self.limits.check_count(max_count, len(self.fine.fixed))
         max_count = self.max_cones if max_count is None else min(max_count, self.max_cones)
         goal = distortion * distortion
-        self.starts.find_fewest(goal, max_count)
-        count = self._find_sufficient(len(self.starts.best.fewest(goal, max_count)), goal, max_count)
-        while count > max(self.limits.fewest, len(self.fine.fixed)) and self._refine(count - 1) <= goal:
+        count = self._find_sufficient(goal, max_count)
+        while self._may_suffice(count - 1, goal) and self._refine(count - 1, goal) <= goal:
             count -= 1
         # If it is not reached: the fewest cones that are nearly as good as the best set.
         smallest_energy = self.fine.best.fewest(goal, max_count).energy
@@ -270,10 +269,16 @@ class ConeSearch:
                 curve.append(cones)
         return curve
 
-    def _find_sufficient(self, count: int, goal: float, max_count: int) -> int:
-        """Return how many cones reach E^2 <= goal on the mesh, or stall; the search starts with `count`."""
-        fine, best = self.fine, self.fine.best
-        self._refine(count)
+    def _find_sufficient(self, goal: float, max_count: int) -> int:
+        """Return how many cones reach E^2 <= goal on the mesh, or stall."""
+        fine, best, excess = self.fine, self.fine.best, 0.0
+        # On a noisy mesh E^2 exceeds that of the smaller model: a second search allows for it.
+        for _ in range(2):
+            self.starts.find_fewest(goal - excess, max_count)
+            start = self.starts.best.fewest(goal - excess, max_count)
+            excess = self._refine(len(start), goal) - start.energy
+            if not goal < start.energy + excess or excess >= goal / 2:
+                break
         while best.fewest(goal, max_count).energy > goal:
             start = max(size for size in best.sizes if size <= max_count)
             if start in {max_count, *self._stalled}:
@@ -283,10 +288,16 @@ class ConeSearch:
                 self._stalled |= {start, len(added)}
         return len(best.fewest(goal, max_count))
 
-    def _refine(self, count: int) -> float:
-        """Refine the best set of a size on the mesh; return its E^2, infinite if there is none.
+    def _may_suffice(self, count: int, goal: float) -> bool:
+        """Return whether a set of a size may meet the goal on the mesh."""
+        known = self.starts.best
+        is_bad = count in known and known.energy(count) > goal * self.starts.error
+        return count >= max(self.limits.fewest, len(self.fine.fixed)) and not is_bad
 
-        It starts from the best of the set of the coarse model, the next larger set without one cone, and the next
+    def _refine(self, count: int, goal: float = 0.0) -> float:
+        """Refine the best set of a size on the mesh, until E^2 <= goal; return its E^2, infinite if there is none.
+
+        It starts from the best of the set of the smaller model, the next larger set without one cone, and the next
         smaller set with one more.
         """
         report_detail(plural(count, "cone"))
@@ -303,7 +314,7 @@ class ConeSearch:
         if count - 1 in fine.best:
             starts.append(fine.extended(fine.best[count - 1].members, 0.0, count))
         if starts:
-            fine.refine(min(starts, key=fine.energy))
+            fine.refine(min(starts, key=fine.energy), goal)
         return fine.best.energy(count)
 
     def _cones(self, best: ConeSet) -> SparseCones:
