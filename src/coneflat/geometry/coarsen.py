@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of
+from ..base.arrays import BoolArray, FloatArray, IntArray, dots, mask_of
 from ..base.jit import compiled
 from ..mesh.connectivity import TriangleMesh
 from ..mesh.ties import mesh_tie_key
@@ -58,7 +58,7 @@ def coarse_mesh(mesh: TriangleMesh, count: int, anchors: IntArray | None = None)
     """
     faces = mesh.faces.astype(np.int64, order="C")
     points = mesh.vertices - mesh.vertices.mean(axis=0)
-    points /= max(float(np.abs(points).max()), np.finfo(float).tiny)
+    points /= math.sqrt(max(float(dots(points, points).max()), np.finfo(float).tiny))
     is_anchor = np.zeros(len(points), dtype=bool) if anchors is None else mask_of(len(points), anchors)
     first, last, target, seen = np.full((4, len(points)), -1)
     collapses = Collapses(
@@ -153,7 +153,6 @@ def add_quadrics(mesh: Collapses, borders: IntArray) -> None:
         face, side = border // 3, border % 3
         tail, head = corners[3 * face + (side + 1) % 3], corners[3 * face + (side + 2) % 3]
         along, normal = points[head] - points[tail], normals[face]
-        square = (along * along).sum()
         size = (normal * normal).sum()
         across = np.cross(along, normal) / math.sqrt(max(size, 1e-300))
         offset = -(across * points[tail]).sum()
@@ -163,7 +162,7 @@ def add_quadrics(mesh: Collapses, borders: IntArray) -> None:
 
 @compiled
 def edge_cost(points: FloatArray, quadrics: FloatArray, tail: int, head: int) -> float:
-    """Return the cost of the collapse of a vertex to another one."""
+    """Return the rounded cost of the collapse of a vertex to another one."""
     x, y, z = points[head, 0], points[head, 1], points[head, 2]
     a, b = quadrics[tail], quadrics[head]
     cost = (
@@ -173,7 +172,8 @@ def edge_cost(points: FloatArray, quadrics: FloatArray, tail: int, head: int) ->
     )  # fmt: skip
     x, y, z = x - points[tail, 0], y - points[tail, 1], z - points[tail, 2]
     square = x * x + y * y + z * z
-    return cost + LENGTH_WEIGHT * square * square
+    cost += LENGTH_WEIGHT * square * square
+    return TEN_DIGITS * cost - (TEN_DIGITS * cost - cost)
 
 
 @compiled
@@ -282,7 +282,7 @@ def collapse(mesh: Collapses, tail: int, head: int) -> int:
 
 @compiled
 def cheapest_edges(mesh: Collapses, heads: IntArray) -> None:
-    """Write the cheapest edge from each vertex, with its rounded cost, by a loop over the triangles.
+    """Write the cheapest edge from each vertex, and its cost, by a loop over the triangles.
 
     Large meshes do not fit into the caches: a loop over the triangles around each vertex takes three times as long.
     """
@@ -293,7 +293,6 @@ def cheapest_edges(mesh: Collapses, heads: IntArray) -> None:
             for step in range(1, 0 if mesh.is_anchor[tail] else 3 if mesh.is_boundary[tail] else 2):
                 head = mesh.corners[start + (corner - start + step) % 3]
                 cost = edge_cost(mesh.points, mesh.quadrics, tail, head)
-                cost = TEN_DIGITS * cost - (TEN_DIGITS * cost - cost)
                 if cost < mesh.cost[tail] or (
                     cost == mesh.cost[tail] and mesh.key[head] < mesh.key[heads[tail]]
                 ):

@@ -63,7 +63,7 @@ class CoarseSurface:
         linear = LinearModel.of(
             cotangent_laplacian(faces, cotangents(lengths), size),
             angle_defect(faces, corner_angles(lengths), coarse.mesh.is_boundary_vertex),
-            np.bincount(coarse.clusters, share, size),
+            np.bincount(coarse.clusters, weights=share, minlength=size),
             is_boundary[coarse.vertices],
             mesh_tie_key(mesh)[coarse.vertices],
             COARSE_UNKNOWNS,

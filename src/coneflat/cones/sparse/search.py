@@ -25,7 +25,7 @@ from ...base.defaults import DISTORTION, MAX_CONE_ANGLE, MIN_CONE_ANGLE
 from ...base.progress import report_detail
 from ...base.text import list_some, plural
 from ...base.threads import concurrently
-from ...errors import CurvatureError, OptionError
+from ...errors import OptionError
 from ...geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, edge_lengths, mollify
 from ...geometry.operators import vertex_areas, weighted_areas
 from ...mesh.connectivity import TriangleMesh
