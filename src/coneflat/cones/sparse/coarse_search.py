@@ -26,8 +26,8 @@ from .linear_model import LinearModel
 from .search import ConeSearch
 from .starts import DenseStarts
 
-# Number of triangles of the coarse mesh, and of unknowns of its own coarse basis. E of a set of cones on the coarse mesh
-# differs by 2% from that on the mesh. With fewer unknowns, more cones are found; with more, the search takes longer.
+# Number of triangles of the coarse mesh, and of unknowns of its own coarse basis. E of cones there differs by 2% from
+# that on the mesh. With fewer unknowns, more cones are found; with more, the search takes longer.
 COARSE_TRIANGLES, COARSE_UNKNOWNS = 4_000, 750
 
 
@@ -63,7 +63,7 @@ class CoarseSurface:
         linear = LinearModel.of(
             cotangent_laplacian(faces, cotangents(lengths), size),
             angle_defect(faces, corner_angles(lengths), coarse.mesh.is_boundary_vertex),
-            np.bincount(coarse.clusters, weights=share, minlength=size),
+            np.bincount(coarse.clusters, weights=share, minlength=size).astype(np.float64),
             is_boundary[coarse.vertices],
             mesh_tie_key(mesh)[coarse.vertices],
             COARSE_UNKNOWNS,

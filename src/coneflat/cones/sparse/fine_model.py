@@ -187,9 +187,9 @@ class FineModel(DenseModel):
         """Return the usable unknowns (p,) nearest to one, and estimates of the distances of their Green's functions.
 
         They are reached in steps along edges, in complete rings until there are `size`. The difference of the Green's
-        functions of vertices at a distance r is nearly a dipole, whose squared norm is r^2 log(R / r) / (4 pi), relative
-        to the area pi R^2 of the surface. pi r^2 is the area within the rings. Most estimates have the right size up to
-        a factor of 2.
+        functions of vertices at a distance r is nearly that of a dipole, whose squared norm is r^2 log(R / r) / (4 pi),
+        relative to the area pi R^2 of the surface. pi r^2 is the area within the rings. Most estimates are within a
+        factor of 2.
         """
         count = fill_ball(
             self._indptr,

@@ -275,9 +275,10 @@ class ConeSearch:
         # On a noisy mesh E^2 exceeds that of the smaller model: a second search allows for it.
         for _ in range(2):
             self.starts.find_fewest(goal - excess, max_count)
-            start = self.starts.best.fewest(goal - excess, max_count)
-            excess = self._refine(len(start), goal) - start.energy
-            if not goal < start.energy + excess or excess >= goal / 2:
+            cones = self.starts.best.fewest(goal - excess, max_count)
+            energy = self._refine(len(cones), goal)
+            excess = energy - cones.energy
+            if energy <= goal or excess >= goal / 2:
                 break
         while best.fewest(goal, max_count).energy > goal:
             start = max(size for size in best.sizes if size <= max_count)
@@ -309,8 +310,7 @@ class ConeSearch:
         if count in self.starts.best:
             starts.append(fine.insert(self.starts.unknowns(count)))
         if count + 1 in fine.best:
-            shrunk = fine.shrunk(fine.best[count + 1].members)
-            starts += [] if shrunk is None else [shrunk]
+            starts += fine.shrunk(fine.best[count + 1].members)
         if count - 1 in fine.best:
             starts.append(fine.extended(fine.best[count - 1].members, 0.0, count))
         if starts:
