@@ -72,3 +72,31 @@ def test_thin_triangles_are_not_folded_over(height, largest_count):
         sides = mesh.vertices[mesh.faces][:, 1:] - mesh.vertices[mesh.faces][:, :1]
         assert (np.cross(sides[:, 0], sides[:, 1])[:, 2] >= 0).all()
     assert len(mesh.faces) <= largest_count < len(sheet.faces)
+
+
+def test_every_vertex_is_in_the_cluster_of_one_that_remains(sphere: TriangleMesh):
+    coarse = coarse_mesh(sphere, 1_000)
+    assert np.array_equal(coarse.clusters[coarse.vertices], np.arange(len(coarse.vertices)))
+    away = np.linalg.norm(sphere.vertices - coarse.mesh.vertices[coarse.clusters], axis=1)
+    assert np.median(away) < 0.08
+    assert away.max() < 0.4
+
+
+@pytest.mark.parametrize("count", [100, 1_000])
+def test_anchors_remain(sphere: TriangleMesh, count):
+    """Few triangles are reached with a queue of edges only, many also in rounds."""
+    anchors = np.arange(7, len(sphere.vertices), 97)
+    assert np.isin(anchors, coarse_mesh(sphere, count, anchors).vertices).all()
+
+
+@pytest.mark.parametrize("count", [300, 2_000])
+def test_renumbering_and_similarity_change_nothing_on_symmetric_meshes(count):
+    vertices, faces = shapes.subdivide(*shapes.subdivide(*shapes.hill(40, 30)))
+    mesh = TriangleMesh(vertices, faces)
+    coarse = coarse_mesh(mesh, count)
+    rotated = TriangleMesh(3e-5 * vertices @ shapes.rotation().T, faces)
+    assert np.array_equal(coarse_mesh(rotated, count).vertices, coarse.vertices)
+    order = np.random.default_rng(1).permutation(len(vertices))
+    renumbered = TriangleMesh(vertices[order], np.argsort(order)[faces][::-1])
+    kept = order[coarse_mesh(renumbered, count).vertices]
+    assert np.array_equal(np.sort(kept), coarse.vertices)

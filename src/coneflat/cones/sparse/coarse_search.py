@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from ...base.arrays import BoolArray, FloatArray, IntArray, mask_of
+from ...errors import CurvatureError
 from ...geometry import (
     angle_defect,
     coarse_mesh,
@@ -24,7 +25,7 @@ from .dense_model import BestSets, ConeSet
 from .fine_model import FineModel
 from .linear_model import LinearModel
 from .search import ConeSearch
-from .starts import DenseStarts
+from .starts import DenseStarts, Starts
 
 # Number of triangles of the coarse mesh, and of unknowns of its own coarse basis. E of cones there differs by 2% from
 # that on the mesh. With fewer unknowns, more cones are found; with more, the search takes longer.
@@ -70,30 +71,37 @@ class CoarseSurface:
         )
         return cls(linear, coarse.vertices, coarse.clusters)
 
-    def starts(self, fine: FineModel) -> CoarseStarts:
+    def starts(self, fine: FineModel) -> Starts:
         """Return the sets of cones on the coarse mesh for the required cones, usable vertices and limits of a model.
 
-        Raises:
-            CurvatureError: cones at the usable vertices cannot absorb the curvature.
+        If too few clusters have a usable vertex, they are sets on the coarse basis of the model.
         """
+        places, is_usable = self._representatives(fine)
         operator = self.linear.operator
+        required = operator.unknowns_of(self.clusters[fine.operator.vertices[fine.unknowns[fine.fixed]]])
+        model = FineModel(self.linear, required, fine.limits, fine.lower_bounds[places])
+        usable = mask_of(len(self.vertices), operator.vertices[is_usable])
+        try:
+            search = ConeSearch(self.linear, model, usable, partial(DenseStarts, self.linear.coarse))
+        except CurvatureError:
+            return DenseStarts(fine.linear.coarse, fine)
+        return CoarseStarts(search, places)
+
+    def _representatives(self, fine: FineModel) -> tuple[IntArray, BoolArray]:
+        """Return (f,) the unknown of a model for each unknown here, and (f,) whether it may be a further cone.
+
+        If the vertex that the coarse mesh has kept may not, and is no cone, it is the fittest of its cluster.
+        """
+        operator, fitness = self.linear.operator, fine.fitness
         clusters = operator.unknowns_of(self.clusters[fine.operator.vertices])
         places = fine.operator.unknowns_of(self.vertices[operator.vertices])
-        is_usable = fine.fitness[places] > 0
-        # A vertex that cannot be a cone is represented by the fittest one of its cluster.
-        others = np.flatnonzero((fine.fitness > 0) & (clusters >= 0) & ~is_usable[clusters])
-        fittest = others[np.argsort(-fine.fitness[others], kind="stable")]
-        replaced, first = np.unique(clusters[fittest], return_index=True)
-        required = clusters[fine.unknowns[fine.fixed]]
-        replaced, first = replaced[~np.isin(replaced, required)], first[~np.isin(replaced, required)]
-        places[replaced] = fittest[first]
-        is_usable[replaced] = True
-        model = FineModel(self.linear, required, fine.limits, fine.lower_bounds[places])
-        usable, starts_of = (
-            mask_of(len(self.vertices), operator.vertices[is_usable]),
-            partial(DenseStarts, self.linear.coarse),
-        )
-        return CoarseStarts(ConeSearch(self.linear, model, usable, starts_of), places)
+        is_open = fitness[places] == 0
+        is_open[clusters[fine.unknowns[fine.fixed]]] = False
+        candidates = np.flatnonzero((fitness > 0) & (clusters >= 0) & is_open[clusters])
+        fittest = candidates[np.argsort(-fitness[candidates], kind="stable")]
+        represented, first = np.unique(clusters[fittest], return_index=True)
+        places[represented] = fittest[first]
+        return places, fitness[places] > 0
 
 
 class CoarseStarts:

@@ -29,7 +29,8 @@ class FineModel(DenseModel):
     Its candidates are the vertices whose Green's functions have been computed.
 
     Attributes:
-        operator: the Green operator of the mesh.
+        linear: the linear model of the mesh.
+        operator: its Green operator.
         unknowns: (m,) the vertex of each candidate, in the numbering of the operator.
         lower_bounds: (f,) lower bound of the curvature at each unknown, radians.
     """
@@ -42,7 +43,7 @@ class FineModel(DenseModel):
         super().__init__(
             np.empty((0, 0)), empty, linear.distortion**2, empty.astype(bool), fixed, limits, empty
         )
-        self._linear, self.operator = linear, linear.operator
+        self.linear, self.operator = linear, linear.operator
         self.unknowns: IntArray = np.empty(0, dtype=np.int64)
         self.lower_bounds = lower_bounds
         self._usable = np.ones(len(lower_bounds), dtype=bool)
@@ -115,7 +116,7 @@ class FineModel(DenseModel):
         gram[:size, size:] = rows[:, :size].T
         gram[size:, size:] = (rows[:, size:] + rows[:, size:].T) / 2
         self.gram = gram
-        self.slope = self._linear.score[self.unknowns]
+        self.slope = self.linear.score[self.unknowns]
         self.usable = self._usable[self.unknowns]
         self.usable[self.fixed] = False
         self.lower = self.lower_bounds[self.unknowns]
@@ -175,7 +176,7 @@ class FineModel(DenseModel):
 
     def _score(self, members: IntArray, curvatures: FloatArray) -> FloatArray:
         """Return (f,) half the derivative of E^2 by the curvature of a cone at each vertex."""
-        log_scale = self._linear.log_scale.copy()
+        log_scale = self.linear.log_scale.copy()
         first = 0
         for block in self._responses:
             is_member = (members >= first) & (members < first + len(block))
