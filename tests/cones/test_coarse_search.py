@@ -53,39 +53,39 @@ def test_the_bound_holds_on_the_mesh(bumpy):
 
 
 def test_no_more_cones_than_without_a_coarse_mesh(bumpy):
-    whole = coneflat.cones.ConeSearch.from_mesh(check_mesh(*bumpy).mesh)
+    search = coneflat.cones.ConeSearch.from_mesh(check_mesh(*bumpy).mesh)
     for distortion in (0.06, 0.1, 0.2):
-        expected = len(whole.fewest(distortion).solution.cones)
-        found = coneflat.find_cones(*bumpy, distortion=distortion)
-        assert found.distortion <= distortion
-        assert len(found.vertices) <= expected + (expected > 10)
+        expected = len(search.fewest(distortion).solution.cones)
+        cones = coneflat.find_cones(*bumpy, distortion=distortion)
+        assert cones.distortion <= distortion
+        assert len(cones.vertices) <= expected + (expected > 10)
 
 
 def test_required_cones_and_their_order_stay(bumpy):
     required = [4321, 17, 9000]
-    found = coneflat.find_cones(*bumpy, required_cones=required)
-    assert list(found.vertices[:3]) == required
+    cones = coneflat.find_cones(*bumpy, required_cones=required)
+    assert list(cones.vertices[:3]) == required
 
 
 def test_cones_are_at_allowed_vertices(bumpy):
     """Of a hundred vertices the coarse mesh keeps few: the others represent their clusters."""
     allowed = np.random.default_rng(3).choice(len(bumpy[0]), 100, replace=False)
     forbidden = np.setdiff1d(np.arange(len(bumpy[0])), allowed)
-    found = coneflat.find_cones(*bumpy, forbidden_cones=forbidden)
-    assert np.isin(found.vertices, allowed).all()
-    assert found.distortion < 0.5
+    cones = coneflat.find_cones(*bumpy, forbidden_cones=forbidden)
+    assert np.isin(cones.vertices, allowed).all()
+    assert cones.distortion < 0.5
 
 
 def test_allowed_vertices_that_share_a_cluster():
     """Four neighbours are enough for the curvature of a sphere, but not four clusters."""
     vertices, faces = shapes.sphere(5)
     surface = surface_of(vertices, faces)
-    near = np.argsort(((vertices - vertices[100]) ** 2).sum(axis=1))[:5]
+    neighbours = np.argsort(((vertices - vertices[100]) ** 2).sum(axis=1))[:5]
     allowed = np.zeros(len(vertices), dtype=bool)
-    allowed[near] = True
+    allowed[neighbours] = True
     search = surface.search(spec_of(surface, allowed))
-    assert np.isin(search.fewest(0.2).solution.cones, near).all()
-    allowed[near[2:]] = False
+    assert np.isin(search.fewest(0.2).solution.cones, neighbours).all()
+    allowed[neighbours[2:]] = False
     with pytest.raises(CurvatureError):
         surface.search(spec_of(surface, allowed))
 
@@ -93,16 +93,16 @@ def test_allowed_vertices_that_share_a_cluster():
 def test_noise_needs_cones_beyond_those_of_the_coarse_mesh(bumpy):
     vertices, faces = bumpy
     rough = vertices + np.random.default_rng(0).normal(scale=0.012, size=vertices.shape)
-    found = coneflat.find_cones(rough, faces)
-    assert found.distortion <= 0.2
-    assert not found.notes
+    cones = coneflat.find_cones(rough, faces)
+    assert cones.distortion <= 0.2
+    assert not cones.notes
 
 
 def test_a_sheet_keeps_its_boundary():
     vertices, faces = shapes.subdivide(*shapes.subdivide(*shapes.hill(50, 40)))
     vertices = vertices * [1, 1, 3]
-    found = coneflat.find_cones(vertices, faces, distortion=0.05)
+    cones = coneflat.find_cones(vertices, faces, distortion=0.05)
     mesh = check_mesh(vertices, faces).mesh
-    assert len(found.vertices)
-    assert found.distortion <= 0.05
-    assert not mesh.is_boundary_vertex[found.vertices].any()
+    assert len(cones.vertices)
+    assert cones.distortion <= 0.05
+    assert not mesh.is_boundary_vertex[cones.vertices].any()

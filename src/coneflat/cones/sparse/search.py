@@ -291,8 +291,8 @@ class ConeSearch:
 
     def _may_suffice(self, count: int, goal: float) -> bool:
         """Return whether a set of a size may meet the goal on the mesh."""
-        known = self.starts.best
-        is_bad = count in known and known.energy(count) > goal * self.starts.error
+        sets = self.starts.best
+        is_bad = count in sets and sets.energy(count) > goal * self.starts.error
         return count >= max(self.limits.fewest, len(self.fine.fixed)) and not is_bad
 
     def _refine(self, count: int, goal: float = 0.0) -> float:
