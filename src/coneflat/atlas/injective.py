@@ -16,7 +16,7 @@ from ..mesh.connectivity import TriangleMesh, label_faces
 from ..stages import Layout, SeamSpec
 from .charts import ChartLayout, Seams
 from .glue import glue_charts
-from .split import as_disk, filled_disk, split_overlaps, unpinched
+from .split import as_disk, filled_disk, find_steps, split_overlaps, unpinched
 
 # Minimum areas of a chart to try, as fractions of the total area. Where the cheapest cuts leave several charts,
 # costlier cuts with larger pieces may leave fewer: a figure of 5,000 triangles gets 9 instead of 11.
@@ -58,12 +58,13 @@ def injective_charts(
     disk = as_disk(points, corners) if disk is None else unpinched(disk.moved_to(points))
     disk, side_costs = filled_disk(disk, lengths[mesh.halfedge_edges])
     disk_areas = np.pad(np.abs(areas), (0, len(disk.faces) - len(areas)))
+    steps = find_steps(pairs, disk.faces)
     candidates = list[ChartLayout]()
     shares = MIN_CHART_AREAS[:tries]
     for share in shares:
         min_area = share * float(disk_areas.sum())
         max_charts = MAX_SMALL_CHARTS if share < shares[-1] else np.inf
-        chart = split_overlaps(disk, side_costs, disk_areas, pairs, min_area, max_charts)
+        chart = split_overlaps(disk, side_costs, disk_areas, pairs, min_area, max_charts, steps)
         if chart is None:
             continue
         layout = single_chart.split(chart[: len(areas)])

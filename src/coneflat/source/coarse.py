@@ -27,7 +27,8 @@ def coarse_component(component: Component) -> tuple[Component, IntArray]:
     Options for vertices are kept, except cones and corners, and the importance of vertices; none of the edges are
     avoided or forbidden.
     """
-    mesh, vertices, faces = coarse_mesh(component.mesh, COARSE)
+    coarse = coarse_mesh(component.mesh, COARSE)
+    mesh, vertices = coarse.mesh, coarse.vertices
     distances, is_no_edge = edge_lengths(mesh.vertices, mesh.faces), np.zeros(len(mesh.edges), dtype=bool)
     lengths = mollify(distances, mesh)[0]
 
@@ -41,7 +42,7 @@ def coarse_component(component: Component) -> tuple[Component, IntArray]:
     return Component(
         mesh,
         component.vertices[vertices],
-        faces,
+        coarse.faces,
         lengths,
         double_areas(distances),
         at_vertices(component.cones, "is_allowed", "absorbs_curvature", "names"),
