@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapes
 
-from coneflat import TriangleMesh
+from coneflat import TriangleMesh, unwrap
 from coneflat.atlas import pack_charts
 from coneflat.flattening import Steps
 from coneflat.geometry import signed_double_areas
@@ -73,7 +73,7 @@ def efficiency(*layouts):
 @pytest.fixture(scope="module", params=[plus, starfish], ids=["plus", "starfish"])
 def branching(request):
     layout, costs = layout_of(*grid(request.param))
-    return layout, costs, cut_for_packing([layout], [costs].__getitem__, GAP)[0]
+    return layout, costs, cut_for_packing([layout], [costs].__getitem__, GAP, 1.0)[0]
 
 
 def test_a_branching_chart_is_cut_and_packs_more_tightly(branching):
@@ -109,27 +109,72 @@ def test_the_added_seams_are_bounded(branching):
     assert present < after <= present + SHARE * borders * (1 + 1e-9)
 
 
+@pytest.fixture(scope="module")
+def cross():
+    """A closed surface of four branches."""
+    vertices, faces = shapes.blocks([" # ", " # ", "####", " # ", " # "], 4)
+    # Without sharp edges and symmetry, which decide where it is cut.
+    return vertices + 0.3 * np.sin(vertices[:, [1, 2, 0]] + [0, 1, 2]), faces
+
+
+@pytest.mark.parametrize("strength", [0.1, 0.2, 0.5, 0.9])
+def test_cuts_are_at_most_a_share_of_the_seams_of_each_layout(cross, strength):
+    (layout, costs), (sheet, sheet_costs) = layout_of(*cross), layout_of(*grid(plus))
+    cut_layout, same_sheet = cut_for_packing(
+        [layout, sheet], [costs, sheet_costs].__getitem__, GAP, strength
+    )
+    total = seam_length(cut_layout, costs)
+    assert total - seam_length(layout, costs) <= strength * total * (1 + 1e-9)
+    assert same_sheet is sheet
+
+
+def test_without_strength_nothing_is_cut(branching):
+    layout, costs, _ = branching
+    assert cut_for_packing([layout], [costs].__getitem__, GAP, 0.0)[0] is layout
+
+
+@pytest.mark.slow
+def test_seams_and_coverage_rise_with_the_strength(cross):
+    results = [unwrap(*cross, packing_cuts=strength) for strength in (0, 0.25, 0.5, 1)]
+    lengths = np.array([result.distortion.seam_length for result in results])
+    assert (lengths[1:] >= 0.98 * lengths[:-1]).all()
+    assert lengths[-1] > lengths[0]
+    assert results[-1].packing_efficiency > 1.1 * results[0].packing_efficiency
+    assert all(result.distortion.energy <= 4.1 for result in results)
+
+
+def test_a_bent_sheet_within_the_bound_is_cut_only_with_the_largest_strength():
+    vertices, faces = grid(plus)
+    x, y = vertices[:, 0] - 0.5, vertices[:, 1] - 0.5
+    sheet = np.column_stack([x, y, 0.8 * (x**2 + y**2)]), faces
+    whole, cut = unwrap(*sheet), unwrap(*sheet, packing_cuts=1)
+    assert 4 + 1e-6 < whole.distortion.energy <= 4.1
+    assert (len(whole.seams), whole.distortion.charts) == (0, 1)
+    assert cut.distortion.charts > 1
+    assert cut.packing_efficiency > 1.2 * whole.packing_efficiency
+
+
 def test_edges_of_infinite_cost_are_not_cut(branching):
     layout, costs, cut_layout = branching
     cut = np.isin(
         np.sort(layout.mesh.edges, axis=1) @ [len(layout.mesh.vertices), 1],
         np.sort(cut_layout.seams, axis=1) @ [len(layout.mesh.vertices), 1],
     )
-    constrained = cut_for_packing([layout], [np.where(cut, np.inf, costs)].__getitem__, GAP)[0]
+    constrained = cut_for_packing([layout], [np.where(cut, np.inf, costs)].__getitem__, GAP, 1.0)[0]
     assert np.isfinite(seam_length(constrained, np.where(cut, np.inf, costs)))
-    assert cut_for_packing([layout], [np.full(len(costs), np.inf)].__getitem__, GAP)[0] is layout
+    assert cut_for_packing([layout], [np.full(len(costs), np.inf)].__getitem__, GAP, 1.0)[0] is layout
 
 
 def test_a_square_is_not_cut():
     layout, costs = layout_of(*grid(square, 24))
-    assert cut_for_packing([layout], [costs].__getitem__, GAP)[0] is layout
+    assert cut_for_packing([layout], [costs].__getitem__, GAP, 1.0)[0] is layout
 
 
 @pytest.mark.slow
 def test_only_large_charts_of_several_layouts_are_cut():
     (large, large_costs), (small, small_costs) = layout_of(*grid(plus)), layout_of(*grid(plus, 20))
     small = replace(small, points=small.points / 20)
-    large_cut, small_cut = cut_for_packing([large, small], [large_costs, small_costs].__getitem__, GAP)
+    large_cut, small_cut = cut_for_packing([large, small], [large_costs, small_costs].__getitem__, GAP, 1.0)
     assert large_cut.chart.max() > large.chart.max()
     assert small_cut is small
 
@@ -140,21 +185,21 @@ def test_scale_motion_and_numbering_change_nothing():
     # Without equal paths, among which the numbering would choose.
     vertices = vertices + np.random.default_rng(0).uniform(-0.2, 0.2, vertices.shape) / 48 * [1, 1, 0]
     layout, costs = layout_of(vertices, faces)
-    cut_layout = cut_for_packing([layout], [costs].__getitem__, GAP)[0]
+    cut_layout = cut_for_packing([layout], [costs].__getitem__, GAP, 1.0)[0]
     other_vertices, other_faces, _ = shapes.renumber(vertices, faces)
     turned = other_vertices @ shapes.rotation().T * 7 + 3
     turned_layout, turned_costs = layout_of(turned, other_faces)
-    again = cut_for_packing([turned_layout], [turned_costs].__getitem__, GAP)[0]
+    again = cut_for_packing([turned_layout], [turned_costs].__getitem__, GAP, 1.0)[0]
     assert again.chart.max() == cut_layout.chart.max()
     relative = [
         seam_length(version, cost) / np.sqrt(version.area)
         for version, cost in ((cut_layout, costs), (again, turned_costs))
     ]
     assert relative[1] == pytest.approx(relative[0], rel=1e-6)
-    assert cut_for_packing([layout], [costs].__getitem__, GAP)[0].chart.tolist() == cut_layout.chart.tolist()
+    assert cut_for_packing([layout], [costs].__getitem__, GAP, 1.0)[0].chart.tolist() == cut_layout.chart.tolist()
 
 
 @pytest.mark.slow
 def test_with_a_gap_that_leaves_no_space_nothing_is_cut():
     layout, costs = layout_of(*grid(plus, 20))
-    assert cut_for_packing([layout, layout, layout], lambda _: costs, 0.6)[0] is layout
+    assert cut_for_packing([layout, layout, layout], lambda _: costs, 0.6, 1.0)[0] is layout

@@ -20,6 +20,7 @@ from ..options import (
     as_integer,
     declarations,
     option,
+    strength,
 )
 
 if TYPE_CHECKING:
@@ -76,6 +77,7 @@ class TextureOptions:
     """
 
     max_energy: float = option(MAX_ENERGY, Number(is_positive=True))
+    packing_cuts: float = option(0.25, strength(1.0))
     area: float | None = option(None, Number(MIN_AREA, MAX_AREA, optional=True))
     texel_density: float | None = option(None, Number(is_positive=True, optional=True))
     stack: str = option("none", Choice(("none", "mirrored", "copies")))

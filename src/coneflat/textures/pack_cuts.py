@@ -19,10 +19,14 @@ from ..base import FloatArray, check_cancelled
 from ..errors import OptionError
 from ..stages import Layout
 from .chart_pieces import MAX_CUTS, Cut, Outline, Piece
+from .free_seams import seam_edges
 
-# A cut must increase the covered fraction of the square by PRICE for each length of the square root of the area, and
-# all cuts together may cost SHARE of the charts' borders, in which a seam counts twice, or the root of the area: with
-# SHARE alone, 48 models have seams 2% shorter in total, and fandisk covers 0.57 of the texture instead of 0.76.
+EXPONENT = 1.0
+
+# With strength 1, a cut must increase the covered fraction of the square by PRICE for each length of the square root of
+# the area. All cuts together may cost SHARE of the charts' borders, in which a seam counts twice, or the root of the
+# area: with SHARE alone, 48 models have seams 2% shorter in total, and fandisk covers 0.57 of the texture instead of
+# 0.76.
 PRICE, SHARE = 0.1, 0.15
 # Smallest area of a piece relative to that of all charts, and the largest number of charts that are considered. Smaller
 # charts fit between larger ones.
@@ -33,23 +37,36 @@ QUICK = Effort(columns=128, tries=12)
 
 
 def cut_for_packing(
-    layouts: Sequence[Layout], costs: Callable[[int], FloatArray], gap: float
+    layouts: Sequence[Layout], costs: Callable[[int], FloatArray], gap: float, strength: float
 ) -> list[Layout]:
     """Return layouts whose charts are cut such that they cover more of a square, where this is worth the seams.
+
+    The cuts of a layout are at most the share of its seams, these cuts included, that the strength is. With less than
+    1, layouts without seams are not cut.
 
     Args:
         layouts: layouts of one or several meshes, which are packed together.
         costs: returns for a layout, by its index, (e,) the costs of cutting its mesh's edges, infinite for those not to
             cut.
         gap: minimum distance between charts, relative to the side of the square.
+        strength: from 0, for no cuts, to 1.
     """
+    if strength == 0:
+        return list(layouts)
     charts = _largest_charts(layouts, costs)
     area = sum(chart.area for chart in charts)
     if not area > 0:
         return list(layouts)
     borders = sum(float(chart.border_costs[np.isfinite(chart.border_costs)].sum()) for chart in charts)
-    search = _BeamSearch(area, max(SHARE * borders, area**0.5), gap)
+    seams = np.array([_seam_cost(layout, costs(i)) for i, layout in enumerate(layouts)])
+    search = _BeamSearch(area, max(SHARE * borders, area**0.5), seams, strength, gap)
     return _with_pieces(layouts, charts, search.best_from(charts).pieces)
+
+
+def _seam_cost(layout: Layout, costs: FloatArray) -> float:
+    """Return the cost of the seams of a layout that need not be avoided."""
+    seam_costs = costs[seam_edges(layout)]
+    return float(seam_costs[np.isfinite(seam_costs)].sum())
 
 
 def cut_into(layouts: Sequence[Layout], costs: Callable[[int], FloatArray], count: int) -> list[Layout]:
@@ -117,28 +134,34 @@ class _State:
 
     Attributes:
         pieces: the pieces.
-        cost: cost of the cuts.
+        costs: (l,) cost of the cuts of each layout.
         value: the covered fraction of the square, less the price of the cuts.
     """
 
     pieces: tuple[Piece, ...]
-    cost: float
+    costs: FloatArray
     value: float
 
-    def after(self, cut: Cut, cost: float, value: float) -> _State:
-        """Return the state after a further cut."""
-        uncut = [piece for piece in self.pieces if piece is not cut.piece]
-        return _State((*uncut, *cut.pieces), cost, value)
+    def costs_after(self, cut: Cut) -> FloatArray:
+        """Return (l,) the costs after a further cut."""
+        costs = self.costs.copy()
+        costs[cut.piece.layout] += cut.cost
+        return costs
 
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
-    """A state with a further cut, and the cost and value of the state after it."""
+    """A state with a further cut, and the costs (l,) and the value of the state after it."""
 
     state: _State
     cut: Cut
-    cost: float
+    costs: FloatArray
     value: float
+
+    def state_after(self) -> _State:
+        """Return the state after the cut."""
+        uncut = [piece for piece in self.state.pieces if piece is not self.cut.piece]
+        return _State((*uncut, *self.cut.pieces), self.costs, self.value)
 
 
 @dataclass(frozen=True)
@@ -147,24 +170,26 @@ class _BeamSearch:
 
     Attributes:
         area: area of all charts.
-        budget: what cuts may cost.
+        budget: what all cuts together may cost.
+        seams: (l,) cost of the seams of each layout before the cuts.
+        strength: the largest share of cuts among the seams of a layout; 0 would be an infinite price.
         gap: minimum distance between charts, relative to the side of the square.
     """
 
     area: float
     budget: float
+    seams: FloatArray
+    strength: float
     gap: float
 
     def best_from(self, charts: Sequence[Piece]) -> _State:
         """Return the pieces of charts with the largest value."""
         outlines = [chart.outline for chart in charts]
-        best = _State(tuple(charts), 0.0, _covered_fraction(outlines, self.area, self.gap))
+        best = _State(tuple(charts), np.zeros(len(self.seams)), _covered_fraction(outlines, self.area, self.gap))
         states, without_gain = [best], 0
         while states and without_gain < PATIENCE:
             check_cancelled()
-            states = [
-                trial.state.after(trial.cut, trial.cost, trial.value) for trial in self._best_trials(states)
-            ]
+            states = [trial.state_after() for trial in self._best_trials(states)]
             without_gain += 1
             if states and states[0].value > best.value:
                 best, without_gain = states[0], 0
@@ -174,22 +199,26 @@ class _BeamSearch:
         """Return the trials with the largest values of one further cut of each state."""
         trials = list[_Trial]()
         for state in states:
-            cuts = [
-                cut for piece in state.pieces for cut in piece.cuts if state.cost + cut.cost <= self.budget
-            ]
+            cuts = [cut for piece in state.pieces for cut in piece.cuts if self._allows(state, cut)]
             for cut in sorted(cuts, key=lambda cut: cut.score)[:MAX_CUTS]:
-                cost = state.cost + cut.cost
-                if any(abs(cost - trial.cost) <= 1e-9 * cost for trial in trials):  # in another order
-                    continue
+                costs = state.costs_after(cut)
+                if any(np.allclose(costs, trial.costs, rtol=1e-9, atol=0) for trial in trials):
+                    continue  # the same cuts in another order
                 # A trial that cannot be among the best need not be packed well.
                 needed = trials[CONTINUED - 1].value if len(trials) >= CONTINUED else -np.inf
-                trials.append(_Trial(state, cut, cost, self._value_after(state, cut, cost, needed)))
+                trials.append(_Trial(state, cut, costs, self._value_after(state, cut, needed)))
                 trials.sort(key=lambda trial: -trial.value)
         return trials[:CONTINUED]
 
-    def _value_after(self, state: _State, cut: Cut, cost: float, needed: float) -> float:
+    def _allows(self, state: _State, cut: Cut) -> bool:
+        """Return whether a further cut is within the budget and the share that cuts may be of the seams."""
+        costs = state.costs_after(cut)
+        is_share_small = (1 - self.strength) * costs <= self.strength * self.seams
+        return bool(costs.sum() <= self.budget and is_share_small.all())
+
+    def _value_after(self, state: _State, cut: Cut, needed: float) -> float:
         """Return the value after a cut; one that is below the needed value may be too small."""
-        price = PRICE * cost / self.area**0.5
+        price = PRICE / self.strength**EXPONENT * state.costs_after(cut).sum() / self.area**0.5
         outlines = [piece.outline for piece in state.pieces if piece is not cut.piece]
         return _covered_fraction([*outlines, *cut.outlines], self.area, self.gap, price + needed) - price
 

@@ -247,7 +247,8 @@ def _cut_to_pack(
     if isinstance(options.charts, int):
         layouts = cut_into(layouts, costs, options.charts)
     elif options.charts == "atlas" and options.up is None and np.isfinite(options.bound):
-        layouts = cut_for_packing(layouts, costs, options.padding / stage_options.resolution)
+        gap = options.padding / stage_options.resolution
+        layouts = cut_for_packing(layouts, costs, gap, options.packing_cuts)
     finished = {}
     for i, layout in zip(order, layouts, strict=True):
         candidate, model = candidates[i], models[i]
