@@ -120,9 +120,7 @@ def cross():
 @pytest.mark.parametrize("strength", [0.1, 0.2, 0.5, 0.9])
 def test_cuts_are_at_most_a_share_of_the_seams_of_each_layout(cross, strength):
     (layout, costs), (sheet, sheet_costs) = layout_of(*cross), layout_of(*grid(plus))
-    cut_layout, same_sheet = cut_for_packing(
-        [layout, sheet], [costs, sheet_costs].__getitem__, GAP, strength
-    )
+    cut_layout, same_sheet = cut_for_packing([layout, sheet], [costs, sheet_costs].__getitem__, GAP, strength)
     total = seam_length(cut_layout, costs)
     assert total - seam_length(layout, costs) <= strength * total * (1 + 1e-9)
     assert same_sheet is sheet
@@ -196,7 +194,10 @@ def test_scale_motion_and_numbering_change_nothing():
         for version, cost in ((cut_layout, costs), (again, turned_costs))
     ]
     assert relative[1] == pytest.approx(relative[0], rel=1e-6)
-    assert cut_for_packing([layout], [costs].__getitem__, GAP, 1.0)[0].chart.tolist() == cut_layout.chart.tolist()
+    assert (
+        cut_for_packing([layout], [costs].__getitem__, GAP, 1.0)[0].chart.tolist()
+        == cut_layout.chart.tolist()
+    )
 
 
 @pytest.mark.slow

@@ -59,8 +59,7 @@ def test_noise_that_a_coarse_mesh_does_not_have_needs_its_own_cones():
 @pytest.mark.parametrize("shape", [shapes.sphere(3), shapes.genus(2)], ids=["one chart", "several charts"])
 def test_the_exact_metric_need_not_converge(shape, monkeypatch):
     # Whether a cut pays for packing may depend on small differences.
-    monkeypatch.setattr("coneflat.textures.unwrapping.cut_for_packing", lambda layouts, *_: layouts)
-    exact = unwrap(*shape).distortion.seam_length
+    exact = unwrap(*shape, packing_cuts=0).distortion.seam_length
 
     def diverge(*_):
         raise errors.ConvergenceError("the exact metric did not converge")
@@ -68,7 +67,7 @@ def test_the_exact_metric_need_not_converge(shape, monkeypatch):
     monkeypatch.setattr("coneflat.metric.solve.ExactSolver.metric", diverge)
     with pytest.raises(errors.ConvergenceError):
         coneflat.flatten(*shape)
-    d = unwrap(*shape).distortion
+    d = unwrap(*shape, packing_cuts=0).distortion
     assert (d.flipped, d.overlapping_pairs) == (0, 0)
     assert d.energy <= 4.1
     assert d.seam_length == pytest.approx(exact, rel=0.05)
@@ -243,24 +242,20 @@ def test_the_energy_of_a_stretched_square():
 
 
 @pytest.mark.slow
-def test_branching_charts_are_cut_to_fill_the_texture(shared, cow, monkeypatch):
-    monkeypatch.setattr("coneflat.textures.unwrapping.cut_for_packing", lambda layouts, *_: layouts)
-    uncut = unwrap(shared("spot.obj"))
-    assert cow.packing_efficiency > max(0.65, 1.15 * uncut.packing_efficiency)
-    assert cow.distortion.seam_length <= 1.35 * uncut.distortion.seam_length
-    assert max(cow.distortion.energy, uncut.distortion.energy) <= 4.1
+def test_branching_charts_are_cut_to_fill_the_texture(shared):
+    uncut, cut = (unwrap(shared("hand.obj"), packing_cuts=strength) for strength in (0, 1))
+    assert cut.packing_efficiency > max(0.65, 1.15 * uncut.packing_efficiency)
+    assert cut.distortion.seam_length <= 1.35 * uncut.distortion.seam_length
+    assert max(cut.distortion.energy, uncut.distortion.energy) <= 4.1
 
 
 @pytest.mark.slow
-def test_a_chart_with_short_seams_is_cut_as_well(shared, fandisk, monkeypatch):
-    """Cuts may cost as much as the root of the area, even if the seams are hardly longer; sharp edges cost less."""
-    joined = fandisk
-    monkeypatch.setattr("coneflat.textures.unwrapping.cut_for_packing", lambda layouts, *_: layouts)
-    separate = unwrap(shared("fandisk.obj"))
-    assert separate.distortion.charts == 1
-    assert joined.distortion.charts <= 4
-    assert joined.packing_efficiency > max(0.7, 1.2 * separate.packing_efficiency)
-    assert joined.distortion.seam_length <= separate.distortion.seam_length + 1.5
+def test_a_chart_with_short_seams_is_cut_as_well(shared):
+    """Cuts may cost as much as the root of the area, even if the seams are hardly longer."""
+    uncut, cut = (unwrap(shared("camelhead.off"), packing_cuts=strength) for strength in (0, 1))
+    assert uncut.distortion.charts < cut.distortion.charts <= 4
+    assert cut.packing_efficiency > max(0.7, 1.1 * uncut.packing_efficiency)
+    assert cut.distortion.seam_length <= uncut.distortion.seam_length + 1.5
 
 
 @pytest.mark.slow
@@ -373,12 +368,9 @@ def test_forbidden_edges_that_are_cut_are_counted(shared):
     ("name", "max_length"),
     [("rocker-arm.obj", 1.85), ("fandisk.obj", 1.5), *((name, 2.6) for name in at_hand("elephant.obj"))],
 )
-def test_the_search_for_a_loose_bound_on_a_coarse_mesh_tries_other_cones(
-    shared, name, max_length, monkeypatch
-):
+def test_the_search_for_a_loose_bound_on_a_coarse_mesh_tries_other_cones(shared, name, max_length):
     """With those of the first search alone, the elephant's seams are longer by a third."""
-    monkeypatch.setattr("coneflat.textures.unwrapping.cut_for_packing", lambda layouts, *_: layouts)
-    assert unwrap(shared(name), max_energy=5.0).distortion.seam_length < max_length
+    assert unwrap(shared(name), max_energy=5.0, packing_cuts=0).distortion.seam_length < max_length
 
 
 def test_small_charts_inside_another_one_are_joined(monkeypatch):
