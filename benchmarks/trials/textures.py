@@ -46,6 +46,8 @@ def unwrap_mesh(
     options = {name: value for name, value in drawn.items() if name in declarations(UnwrapOptions)} | fixed
     if rng.random() < 0.5:
         options["max_energy"] = float(rng.choice([4.001, 4.02, 4.05, 4.2, 4.5, 6.0, 40.0]))
+    if rng.random() < 0.3:
+        options["packing_cuts"] = float(rng.choice([0.0, 0.1, 0.5, 1.0]))
     if rng.random() < 0.05 and "resolution" not in options:
         options["texel_density"] = float(10 ** rng.uniform(-3, 3))
     outcome.recipe = f"unwrap {made}; {in_short(options)}"

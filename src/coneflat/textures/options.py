@@ -31,6 +31,8 @@ ISOMETRIC, MAX_ENERGY = 4.0, 4.1
 #: The energy above that of an isometry, relative to the squared area distortion, of layouts with the least energy:
 #: 17 to 27 on seven models.
 ENERGY_PER_AREA = 20.0
+#: The default strength of cuts for packing: see the table in the documentation of `unwrap`.
+PACKING_CUTS = 0.25
 #: Largest number of texels along a side.
 MAX_RESOLUTION = 2**16
 #: Bounds of the area distortion allowed. Below, the energy would be that of an isometry up to rounding; above, areas
@@ -69,6 +71,9 @@ class TextureOptions:
             the singular values and of their inverses, 4 if nothing is stretched. A smaller value needs longer seams.
         area: Largest area distortion of each component instead of an energy: the standard deviation of the log
             conformal factor, weighted by area; from 1e-6 to 100.
+        packing_cuts: Strength of cuts that only serve a tighter packing: their largest share of the seams of each
+            component. With a smaller one, a cut must also gain more. 0: no such cuts; 1: components that need no seams
+            are cut as well.
         texel_density: Texels per unit of length of the model, at least, instead of a resolution, which is then a
             multiple of 4 that suffices, while 4 texels less do not.
         stack: mirrored: the two halves of a model that is mirrored vertex by vertex share their texels. It is cut along
@@ -77,8 +82,8 @@ class TextureOptions:
     """
 
     max_energy: float = option(MAX_ENERGY, Number(is_positive=True))
-    packing_cuts: float = option(0.25, strength(1.0))
     area: float | None = option(None, Number(MIN_AREA, MAX_AREA, optional=True))
+    packing_cuts: float = option(PACKING_CUTS, strength(1.0))
     texel_density: float | None = option(None, Number(is_positive=True, optional=True))
     stack: str = option("none", Choice(("none", "mirrored", "copies")))
 

@@ -185,7 +185,9 @@ class _BeamSearch:
     def best_from(self, charts: Sequence[Piece]) -> _State:
         """Return the pieces of charts with the largest value."""
         outlines = [chart.outline for chart in charts]
-        best = _State(tuple(charts), np.zeros(len(self.seams)), _covered_fraction(outlines, self.area, self.gap))
+        best = _State(
+            tuple(charts), np.zeros(len(self.seams)), _covered_fraction(outlines, self.area, self.gap)
+        )
         states, without_gain = [best], 0
         while states and without_gain < PATIENCE:
             check_cancelled()

@@ -59,8 +59,8 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
     """Return UVs for a texture: the shortest seams for which the layout is nearly isometric.
 
     Unlike in `flatten`, the two sides of a seam may differ, which lowers the distortion. Cones are only the ends of
-    seams. Branches of charts are cut off where the texture gains more than the seams cost, unless `charts` is "one" or
-    `up` is given.
+    seams. Branches of charts are cut off where the texture gains more than the seams cost, by the strength
+    `packing_cuts`; not if `charts` is "one" or a number, or `up` is given.
 
     Args:
         mesh, faces: as for `coneflat.flatten`.

@@ -22,7 +22,8 @@ from .paint import Paint, Region
 
 #: Options whose controls are made from their declarations, with the labels of these.
 FURTHER_OPTIONS = {
-    "area": "Area distortion at most", "stack": "Stack halves", "tiles": "Tiles (UDIM)", "up": "Up in the texture",
+    "area": "Area distortion at most", "packing_cuts": "Cuts for packing", "stack": "Stack halves",
+    "tiles": "Tiles (UDIM)", "up": "Up in the texture",
     "quantise": "Multiples of angle, °", "max_cones": "Cones at most", "min_cone_angle": "Smallest cone angle, °",
     "max_cone_angle": "Largest cone angle, °", "relax": "Relax",
 }  # fmt: skip
