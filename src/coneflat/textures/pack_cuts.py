@@ -21,12 +21,9 @@ from ..stages import Layout
 from .chart_pieces import MAX_CUTS, Cut, Outline, Piece
 from .free_seams import seam_edges
 
-EXPONENT = 1.0
-
-# With strength 1, a cut must increase the covered fraction of the square by PRICE for each length of the square root of
-# the area. All cuts together may cost SHARE of the charts' borders, in which a seam counts twice, or the root of the
-# area: with SHARE alone, 48 models have seams 2% shorter in total, and fandisk covers 0.57 of the texture instead of
-# 0.76.
+# A cut must increase the covered fraction of the square by PRICE, over the root of the strength, for each length of the
+# square root of the area. All cuts together may cost SHARE of the charts' borders, in which a seam counts twice, or the
+# root of the area: with SHARE alone, 48 models have seams 2% shorter in total.
 PRICE, SHARE = 0.1, 0.15
 # Smallest area of a piece relative to that of all charts, and the largest number of charts that are considered. Smaller
 # charts fit between larger ones.
@@ -182,6 +179,11 @@ class _BeamSearch:
     strength: float
     gap: float
 
+    @property
+    def price(self) -> float:
+        """The covered fraction that cuts must gain for each length of the root of the area."""
+        return PRICE / self.strength**0.5
+
     def best_from(self, charts: Sequence[Piece]) -> _State:
         """Return the pieces of charts with the largest value."""
         outlines = [chart.outline for chart in charts]
@@ -220,7 +222,7 @@ class _BeamSearch:
 
     def _value_after(self, state: _State, cut: Cut, needed: float) -> float:
         """Return the value after a cut; one that is below the needed value may be too small."""
-        price = PRICE / self.strength**EXPONENT * state.costs_after(cut).sum() / self.area**0.5
+        price = self.price * state.costs_after(cut).sum() / self.area**0.5
         outlines = [piece.outline for piece in state.pieces if piece is not cut.piece]
         return _covered_fraction([*outlines, *cut.outlines], self.area, self.gap, price + needed) - price
 

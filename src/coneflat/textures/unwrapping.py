@@ -60,7 +60,7 @@ def unwrap(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> Flatten
 
     Unlike in `flatten`, the two sides of a seam may differ, which lowers the distortion. Cones are only the ends of
     seams. Branches of charts are cut off where the texture gains more than the seams cost, by the strength
-    `packing_cuts`; not if `charts` is "one" or a number, or `up` is given.
+    `packing_cuts`; not if `charts` is "one" or a number, `seams` is "none", or `up` is given.
 
     Args:
         mesh, faces: as for `coneflat.flatten`.
