@@ -110,6 +110,7 @@ def test_a_sphere_without_cones_is_drawn_when_it_is_opened_again(open_mesh, tmp_
         session.act({"do": "remove", "vertex": vertex})
     state = settled(session)
     assert state["stale"]
+    session.close()
     again = Session(tmp_path)
     try:
         again.open(tmp_path / "mesh.obj")

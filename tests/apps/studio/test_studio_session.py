@@ -141,12 +141,14 @@ class TestSession:
 
     def test_choices_are_stored_immediately(self, session, tmp_path):
         session.act({"do": "set", "name": "stretch", "value": 0.5})
-        again = Session(tmp_path)  # as if the first had been killed
+        expected = session.state()["choices"]
+        session.close()  # It writes nothing.
+        again = Session(tmp_path)
         try:
             again.open(tmp_path / "ball.obj")
-            assert again.state()["choices"] == session.state()["choices"]
+            assert again.state()["choices"] == expected
             again.open(session.project_file)
-            assert again.state()["choices"] == session.state()["choices"]
+            assert again.state()["choices"] == expected
         finally:
             again.close()
 

@@ -6,7 +6,8 @@ import hashlib
 import json
 import os
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 from unicodedata import category
@@ -29,14 +30,18 @@ class Project:
         mesh: path of the mesh file.
         sha256: SHA-256 of its content, hexadecimal.
         choices: the choices of the user.
+        revision: SHA-256 of the content of the project's file; "" if there is none yet.
     """
 
     mesh: Path
     sha256: str
     choices: Choices
+    revision: str = field(default="", compare=False)
 
-    def save(self, path: Path) -> None:
-        """Write the project, with the path of the mesh relative to it; no incomplete file is left.
+    def save(self, path: Path) -> str:
+        """Write the project, with the path of the mesh relative to it, and return the revision.
+
+        No incomplete file is left.
 
         Raises:
             MeshFileError: the file cannot be written.
@@ -47,9 +52,10 @@ class Project:
             "mesh": {"path": _relative(self.mesh, path.parent), "sha256": self.sha256},
             "choices": self.choices.as_plain(),
         }
+        text = f"{json.dumps(content, indent=1, allow_nan=False)}\n"
         with atomic_write(path, "w") as stream:
-            json.dump(content, stream, indent=1, allow_nan=False)
-            stream.write("\n")
+            stream.write(text)
+        return _sha256(text.encode("utf-8"))
 
     def check_mesh(self) -> None:
         """Check that the mesh is the one for which the choices were made.
@@ -77,12 +83,31 @@ def read_project(path: Path) -> Project:
     try:
         if path.stat().st_size > 64 * 1024 * 1024:  # A project with a million drawn edges is smaller.
             raise ProjectError(f"{path} is not a project: it has {path.stat().st_size:,} bytes")
-        content = json.loads(path.read_text(encoding="utf-8"))
+        stored = path.read_bytes()
+        content = json.loads(stored.decode("utf-8"))
     except OSError as error:
         raise ProjectError(f"cannot read {path}: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:
         raise ProjectError(f"{path} is not a project: it is not JSON") from error
-    return _project(path, content)
+    return replace(_project(path, content), revision=_sha256(stored))
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def is_changed(path: Path, revision: str) -> bool:
+    """Return whether the file of a project is of another revision than the given one; a removed file is not."""
+    try:
+        return file_hash(path) != revision
+    except MeshFileError:
+        return False
+
+
+def unused_name(path: Path) -> Path:
+    """Return the path with the lowest number, from 2 on, added to the name that no file has."""
+    names = (path.with_stem(f"{path.stem}-{number}") for number in count(2))
+    return next(name for name in names if not name.exists())
 
 
 def _project(path: Path, content: Any) -> Project:
@@ -127,36 +152,39 @@ def _relative(path: Path, folder: Path) -> str:
         return str(path.resolve())
 
 
-def open_project(path: Path, folder: Path, only_within: bool = False) -> tuple[Project, Path]:
-    """Return the project of a mesh or of a project file, and the path of its file.
+def project_path(path: Path, folder: Path) -> Path:
+    """Return the path of the project file of a mesh, in a folder; or of a project, which is its own."""
+    return path if path.suffix.lower() == ENDING else folder / f"{path.stem}_studio{ENDING}"
 
-    A mesh whose project is in the folder is opened with the choices in it.
+
+def open_project(path: Path, file: Path, within: Path | None = None) -> Project:
+    """Return the project of a mesh or of a project file; a mesh is opened with the choices in its project.
 
     Args:
         path: path of a mesh or a project.
-        folder: folder of the projects of meshes.
-        only_within: whether the mesh of a project must be in the folder, too.
+        file: path of the project file, see `project_path`.
+        within: folder in which the mesh of a project must be; None if it may be anywhere.
 
     Raises:
         MeshFileError: the mesh cannot be read.
         ProjectError: the project cannot be read, or belongs to another mesh.
     """
-    if path.suffix.lower() == ENDING:
+    if path == file:
         project = read_project(path)
-        if only_within and not project.mesh.resolve().is_relative_to(folder):
+        if within is not None and not project.mesh.resolve().is_relative_to(within):
             raise ProjectError(f"the mesh of {path.name} is outside the folder of the session")
         project.check_mesh()
-        return project, path
-    sha256, file = file_hash(path), folder / f"{path.stem}_studio{ENDING}"
+        return project
+    sha256 = file_hash(path)
     if not file.exists():
-        return Project(path, sha256, Choices()), file
+        return Project(path, sha256, Choices())
     before = read_project(file)
     if before.sha256 != sha256:
         raise ProjectError(
             f"{file} is a project of another mesh: its SHA-256 begins with {before.sha256[:12]}, that of "
             f"{path} with {sha256[:12]}; move it away, or work in another folder"
         )
-    return Project(path, sha256, before.choices), file
+    return replace(before, mesh=path)
 
 
 def safe_name(name: str) -> str:

@@ -44,11 +44,11 @@ def run_studio(
     from .session import Session
 
     folder = Path() if file is None or file.suffix.lower() != ".json" else file.parent
-    session = Session(folder, color, most_triangles)
     with open_listener(port) as listener:
         port = listener.getsockname()[1]
         token = secrets.token_urlsafe(24)
         address = page_address(port, token)
+        session = Session(folder, color, most_triangles, address)
         try:
             if file is not None:
                 session.open(file)

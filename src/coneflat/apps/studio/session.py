@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
@@ -15,9 +16,10 @@ from ...errors import MeshFileError, StudioError
 from ...io import read_joined
 from ...options import as_integer
 from .choices import Choices
+from .lock import ProjectLock, lock_path
 from .messages import command_line, misplaced_warning, python_lines
 from .outputs import MAX_QUADS, QUAD_FORMATS, RESULT_FILES, curve_options
-from .project import Project, file_within, open_project
+from .project import Project, file_within, is_changed, open_project, project_path, unused_name
 from .steps import STEPS, History
 from .worker import Head, SentPictures, Worker
 
@@ -45,12 +47,20 @@ class Session:
         is_early: whether that is a preview, which the final layout will replace.
     """
 
-    def __init__(self, folder: Path, color: str | None = None, most_triangles: int | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        color: str | None = None,
+        most_triangles: int | None = None,
+        address: str = "",
+    ) -> None:
         """Args:
         folder: folder of projects.
         color: name of values that are shown as colours, as in `own_quantity`.
         most_triangles: largest number of triangles shown; None for the default of the viewer.
+        address: address of the page, which other studios are told that open the same project.
         """
+        self._address = address
         self._look = {"color": color, "most": most_triangles}
         self.folder = folder.resolve()
         self.version = self.layout = 0
@@ -58,6 +68,9 @@ class Session:
         self.project_file: Path | None = None
         self._mesh: Path | None = None
         self._sha256 = ""
+        self._lock: ProjectLock | None = None
+        self._revision = ""  # Of the project file when it was read or written last.
+        self._project_notes: tuple[str, ...] = ()
         self._history = History(Choices())
         # Number of meshes and projects opened so far, and that of the last one that was repaired automatically.
         self._opened = self._repaired = 0
@@ -83,9 +96,10 @@ class Session:
 
         Raises:
             MeshFileError: the mesh cannot be read.
-            ProjectError: the project cannot be read, or belongs to another mesh.
+            ProjectError: the project cannot be read, belongs to another mesh, or is open in another studio.
         """
-        self._begin(*open_project(path, self.folder))
+        with self._changed, self._locked(project_path(path, self.folder)) as file:
+            self._begin(open_project(path, file), file)
 
     def open_named(self, name: str) -> None:
         """Open a mesh or a project in the folder of the session.
@@ -94,19 +108,41 @@ class Session:
             StudioError: there is no such file in the folder.
             MeshFileError, ProjectError: as in `open`.
         """
-        project, file = open_project(file_within(name, self.folder), self.folder, only_within=True)
-        read_joined(project.mesh)  # What is shown is replaced only by a mesh that can be read.
-        self._begin(project, file)
+        path = file_within(name, self.folder)
+        with self._changed, self._locked(project_path(path, self.folder)) as file:
+            project = open_project(path, file, within=self.folder)
+            read_joined(project.mesh)  # What is shown is replaced only by a mesh that can be read.
+            self._begin(project, file)
+
+    @contextmanager
+    def _locked(self, file: Path) -> Iterator[Path]:
+        """Yield a project file, which is locked; it replaces the one that was open unless the block fails.
+
+        Raises:
+            ProjectError: another studio has the project open.
+        """
+        lock, before = self._lock, self._lock
+        if before is None or lock_path(before.project) != lock_path(file):
+            lock = ProjectLock(file, self._address)
+        try:
+            yield file
+        except BaseException:
+            if lock is not None and lock is not before:
+                lock.release()
+            raise
+        self._lock = lock
+        if before is not None and before is not lock:
+            before.release()
 
     def _begin(self, project: Project, file: Path) -> None:
-        with self._changed:
-            self._mesh, self._sha256, self.project_file = project.mesh.resolve(), project.sha256, file
-            self._history = History(project.choices)
-            self._opened += 1
-            self._chosen += 1
-            self._current = _Shown(seconds=self._current.seconds)
-            self.is_early, self._last = False, None
-            self._flatten()
+        self._mesh, self._sha256, self.project_file = project.mesh.resolve(), project.sha256, file
+        self._revision, self._project_notes = project.revision, ()
+        self._history = History(project.choices)
+        self._opened += 1
+        self._chosen += 1
+        self._current = _Shown(seconds=self._current.seconds)
+        self.is_early, self._last = False, None
+        self._flatten()
 
     # Actions of the user.
 
@@ -193,10 +229,22 @@ class Session:
         assert self._mesh is not None
         assert self.project_file is not None
         self._trouble = None
+        if is_changed(self.project_file, self._revision):
+            self._leave_project(self.project_file)
         try:
-            Project(self._mesh, self._sha256, self._history.now).save(self.project_file)
+            project = Project(self._mesh, self._sha256, self._history.now)
+            self._revision = project.save(self.project_file)
         except MeshFileError as error:
             self._tell(f"the project is not saved: {error}", again=True)
+
+    def _leave_project(self, file: Path) -> None:
+        """Continue in a new file: another program has written the project since this session read or wrote it."""
+        with self._locked(unused_name(file)) as renamed:
+            self.project_file, self._revision = renamed, ""
+        self._project_notes = (
+            *self._project_notes,
+            f"Another program has changed {file.name}, which is left as it is; choices are saved in {renamed.name}.",
+        )
 
     def _tell(self, text: str, repair: bool = False, again: bool = False) -> None:
         """Set the error that the page shows, and whether a repair or another attempt may help."""
@@ -236,7 +284,7 @@ class Session:
                 "stale": is_stale,
                 "found": list(shown.cones),
                 "seconds": sum(shown.seconds.values()),
-                "warnings": [*warnings, *(() if is_stale else shown.warnings)],
+                "warnings": [*self._project_notes, *warnings, *(() if is_stale else shown.warnings)],
                 **({} if received == self._chosen else {"choices": self._history.now.as_plain(), **texts}),
             }
 
@@ -330,9 +378,11 @@ class Session:
             return self._changed.wait_for(lambda: self._busy is None, seconds)
 
     def close(self) -> None:
-        """End the worker process, and wake everyone who waits for events."""
+        """End the worker process, unlock the project, and wake everyone who waits for events."""
         self._worker.end()
         with self._changed:
+            if self._lock is not None:
+                self._lock.release()
             self._notify()
 
     # Messages of the worker.
