@@ -152,12 +152,6 @@ class TestSession:
         finally:
             again.close()
 
-    def test_another_mesh_of_the_same_name_overwrites_no_project(self, session, tmp_path):
-        (tmp_path / "other").mkdir()
-        shapes.write_obj(tmp_path / "other" / "ball.obj", *shapes.sphere(2))
-        with pytest.raises(ProjectError, match="is a project of another mesh"):
-            session.open(tmp_path / "other" / "ball.obj")
-
     def test_links_lead_nowhere_else(self, session, tmp_path_factory, tmp_path):
         elsewhere = tmp_path_factory.mktemp("other")
         shapes.write_obj(elsewhere / "secret.obj", *shapes.sphere(1))

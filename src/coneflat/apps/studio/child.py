@@ -28,6 +28,7 @@ from ..view import Model, PageText, Quantity, content_of, head_and_block, own_qu
 from .choices import Choices
 from .messages import angle_warning, page_message, with_warnings
 from .outputs import bad_places, curve_data, own_picture, quads_file, repaired, result_file, without_layout
+from .places import shape_message, shape_of
 from .worker import Head, read_frame, with_hashes, write_frame
 
 #: The text that stands for unknown numbers, and the title of the preview.
@@ -91,10 +92,16 @@ class JobRunner:
         self._model: Model | None = None
         self._max_triangles: int | None = None
         self._own_texture: tuple[Texture, FloatArray] | None = None
+        # Path and hash of the mesh that was read, and of the one whose shape the session has got.
         self._read: tuple[str, str] | None = None
+        self._told: tuple[str, str] | None = None
 
     def flatten(
-        self, job: Head, report: Callable[[str, float], None], show: Callable[[Head, bytes], None]
+        self,
+        job: Head,
+        report: Callable[[str, float], None],
+        show: Callable[[Head, bytes], None],
+        tell_shape: Callable[[Mapping[str, str], bytes], None] = lambda head, body: None,
     ) -> tuple[Head, bytes]:
         """Return a layout as data for the page: numbers and texts, and the bytes of arrays.
 
@@ -102,10 +109,14 @@ class JobRunner:
             job: the mesh and the choices.
             report: called with the stage and the completed fraction.
             show: called with a preview of the layout, in the same form.
+            tell_shape: called with the shape of the mesh after it was read, as of `shape_message`.
         """
 
         self.result, self._max_triangles = None, job.get("most")
         source, flattener = self._open(job["mesh"], job["sha256"], report)
+        if self._told != self._read:
+            tell_shape(*shape_message(shape_of(source.mesh), job["sha256"]))
+            self._told = self._read
         name, furthest = Path(job["mesh"]).name, 0.0
 
         def report_max(stage: str, fraction: float) -> None:
@@ -246,10 +257,15 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
             check_current()
             write_frame(answers, {"job": number, "early": head}, body)
 
+        def tell_shape(head: Mapping[str, str], body: bytes, number: int = number) -> None:
+            write_frame(answers, {"job": number, "shape": head}, body)
+
         try:
             with cancel_with(check_current):
                 head, body = (
-                    bench.flatten(job, report, show) if job["do"] == "flatten" else bench.make(job, report)
+                    bench.flatten(job, report, show, tell_shape)
+                    if job["do"] == "flatten"
+                    else bench.make(job, report)
                 )
             write_frame(answers, {"job": number, "done": head}, body)
         except Superseded:
@@ -271,7 +287,8 @@ def main() -> None:
     """Serve over standard input and output; what libraries print is redirected to standard error."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    with inner_calls():  # The page shows the notes.
+    # The page shows the notes. The pipe is broken if the studio was killed.
+    with inner_calls(), suppress(BrokenPipeError):
         serve(Jobs(sys.stdin.buffer), answers)
 
 

@@ -19,6 +19,7 @@ from .choices import Choices
 from .lock import ProjectLock, lock_path
 from .messages import command_line, misplaced_warning, python_lines
 from .outputs import MAX_QUADS, QUAD_FORMATS, RESULT_FILES, curve_options
+from .places import Places, Shape, shape_received
 from .project import Project, file_within, is_changed, open_project, project_path, unused_name
 from .steps import STEPS, History
 from .worker import Head, SentPictures, Worker
@@ -71,6 +72,10 @@ class Session:
         self._lock: ProjectLock | None = None
         self._revision = ""  # Of the project file when it was read or written last.
         self._project_notes: tuple[str, ...] = ()
+        self._shape: Shape | None = (
+            None  # Of the mesh, once the worker has read it; until then, places are those opened.
+        )
+        self._places: Places | None = None
         self._history = History(Choices())
         # Number of meshes and projects opened so far, and that of the last one that was repaired automatically.
         self._opened = self._repaired = 0
@@ -136,7 +141,8 @@ class Session:
 
     def _begin(self, project: Project, file: Path) -> None:
         self._mesh, self._sha256, self.project_file = project.mesh.resolve(), project.sha256, file
-        self._revision, self._project_notes = project.revision, ()
+        self._revision, self._project_notes = project.revision, project.notes
+        self._shape, self._places = None, project.places
         self._history = History(project.choices)
         self._opened += 1
         self._chosen += 1
@@ -208,6 +214,8 @@ class Session:
     def _apply_step(self, before: Choices) -> None:
         """Save the choices after a step, and flatten if the layout depends on what has changed."""
         self._chosen += 1
+        if self._shape is None:
+            self._places = None
         if not self._history.now.flattens_like(before):
             return self._flatten()
         trouble = self._trouble
@@ -232,7 +240,10 @@ class Session:
         if is_changed(self.project_file, self._revision):
             self._leave_project(self.project_file)
         try:
-            project = Project(self._mesh, self._sha256, self._history.now)
+            chosen = self._history.now
+            if self._shape is not None:
+                self._places = self._shape.places(chosen.vertices())
+            project = Project(self._mesh, self._sha256, chosen, self._places)
             self._revision = project.save(self.project_file)
         except MeshFileError as error:
             self._tell(f"the project is not saved: {error}", again=True)
@@ -389,6 +400,8 @@ class Session:
 
     def _on_message(self, head: Head, body: bytes) -> None:
         with self._changed:
+            if "shape" in head:
+                return self._take_shape(head["shape"], body)
             if head["job"] in self._answers and "stage" not in head:
                 self._answers[head["job"]] = (head, body)
                 return self._changed.notify_all()
@@ -417,6 +430,15 @@ class Session:
                     self._tell(head["done"]["missing"])
                 self.is_early, self._last = False, None
             return self._notify()
+
+    def _take_shape(self, head: Mapping[str, str], body: bytes) -> None:
+        """Store the shape of the mesh, and write where the vertices of the choices are."""
+        if head["sha256"] != self._sha256:
+            return
+        self._shape, trouble = shape_received(head, body), self._trouble
+        if len(self._history.now.vertices()):
+            self._save()
+            self._trouble = self._trouble or trouble
 
     def _show(self, data: Head, body: bytes, job: int, is_bare: bool = False) -> None:
         self.layout += 1
