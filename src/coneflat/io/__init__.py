@@ -51,6 +51,7 @@ from .texture import (
 )
 from .write import (
     OUTPUT_FORMATS,
+    as_stored,
     as_written,
     check_output,
     kept_attributes,
@@ -61,8 +62,8 @@ from .write import (
 )
 
 __all__ = [
-    "ALPHA", "as_bytes", "as_input", "as_path", "as_uv_mesh", "as_written", "atomic_write", "Attribute", "bounds",
-    "cell_side", "check_cells", "check_output", "check_target", "checked_target", "CheckedArrays", "CLAMP",
+    "ALPHA", "as_bytes", "as_input", "as_path", "as_stored", "as_uv_mesh", "as_written", "atomic_write", "Attribute",
+    "bounds", "cell_side", "check_cells", "check_output", "check_target", "checked_target", "CheckedArrays", "CLAMP",
     "DARK_CELL", "decode_image", "encode_png", "find_meshes", "FOR_INDICES", "FOR_VERTICES", "Glb", "GROUPS",
     "has_uv", "ImageTexture", "imported", "INPUT_FORMATS", "Joined", "kept_attributes", "keys_of", "known_ending",
     "LIGHT_CELL", "linear_colours", "lines_of", "local_positions", "losses", "make_folder", "MATERIAL", "MATERIALS",

@@ -72,7 +72,8 @@ def test_a_mesh_that_needs_repair_is_repaired_with_a_note_and_an_undo(open_mesh,
     session, state = open_mesh(*make())
     assert (state["trouble"], state["bare"], state["undo"]) == (None, False, 1)
     assert state["choices"]["options"] == {"repair": True}
-    (warning,) = state["warnings"]
+    warning, *notes = state["warnings"]
+    assert notes == session.picture()[0]["notes"]
     assert warning.startswith(f"The mesh was repaired: {wrong}")
     assert "repair=True" not in warning
     bad = session.picture()[0]["bad"]

@@ -24,10 +24,30 @@ from ...base import FloatArray, cancel_with, inner_calls
 from ...errors import DegenerateFaceError, NonManifoldError, NonOrientableError
 from ...io import Joined, Texture, read_joined
 from ...options import MAX_SHOWN_TRIANGLES
-from ..view import Model, PageText, Quantity, content_of, head_and_block, own_quantity, pack, shown_rows
+from ..view import (
+    Model,
+    PageText,
+    Quantity,
+    content_of,
+    head_and_block,
+    own_quantity,
+    pack,
+    shown_rows,
+    text_of,
+)
 from .choices import Choices
-from .messages import angle_warning, page_message, with_warnings
-from .outputs import bad_places, curve_data, own_picture, quads_file, repaired, result_file, without_layout
+from .messages import misplaced_warning, page_message, with_warnings
+from .outputs import (
+    SavedFile,
+    as_shown,
+    bad_places,
+    curve_data,
+    own_picture,
+    quads_file,
+    repaired,
+    result_file,
+    without_layout,
+)
 from .places import shape_message, shape_of
 from .worker import Head, read_frame, with_hashes, write_frame
 
@@ -126,7 +146,7 @@ class JobRunner:
 
         def show_first(first: Flattening) -> None:
             report_max("preview", furthest)
-            show(*self._picture(first, name, FIRST_TITLE))
+            show(*self._picture(first, name, _text_of_preview(first)))
 
         chosen = Choices.from_plain(job["choices"])
         words = source.map_options(chosen.keywords())
@@ -143,13 +163,18 @@ class JobRunner:
                 quantity = own_quantity(result, job["color"])
             except ConeflatError as error:
                 missing = {"missing": page_message(str(error))}
-        head, body = self._picture(result, name, quantity=quantity)
+        shown = as_shown(result)
+        head, body = self._picture(result, name, text_of(shown), quantity=quantity)
+        head["head"]["notes"] = [page_message(note) for note in shown.notes]
         self.result = result
-        warnings = angle_warning(chosen, result)
+        # The session warns of choices itself, as soon as they are made.
+        warned = {page_message(note) for note in misplaced_warning(chosen)}
+        warnings = tuple(note for note in head["head"]["notes"] if note not in warned)
         if chosen.options.get("repair"):
             checked, wrong = repaired(source)
             head["head"]["bad"] = bad_places(checked)
-            warnings += (f"The mesh was repaired: {wrong}. “Undo” reverts this.",) if wrong else ()
+            repair = (f"The mesh was repaired: {wrong}. “Undo” reverts this.",) if wrong else ()
+            warnings = (*repair, *warnings)
         return {**head, **missing, "warnings": warnings}, body
 
     def bare(self, job: Head) -> tuple[Head, bytes]:
@@ -157,7 +182,9 @@ class JobRunner:
         with suppress(ConeflatError):
             if self._source is not None:
                 checked, _ = repaired(self._source)
-                data, block = self._picture(without_layout(checked), Path(job["mesh"]).name, BARE_TITLE)
+                data, block = self._picture(
+                    without_layout(checked), Path(job["mesh"]).name, PageText(BARE_TITLE, [])
+                )
                 data["head"] |= {"bad": bad_places(checked), "show": "plain"}
                 return data, block
         return {}, b""
@@ -166,30 +193,25 @@ class JobRunner:
         """Return the output of another job: a file of the result, quads, or a curve."""
 
         if job["do"] == "export":
-            return {}, result_file(self.result, job["ending"])
+            return _answer(result_file(self.result, job["ending"]))
         source, _ = self._open(job["mesh"], job["sha256"], report)
         chosen = Choices.from_plain(job["choices"])
         if job["do"] == "quads":
-            return {}, quads_file(source, chosen, job["count"], job["ending"], report)
+            return _answer(quads_file(source, chosen, job["count"], job["ending"], report))
         return curve_data(source, chosen, report), b""
 
     def _picture(
-        self, result: Flattening, name: str, title: str = "", quantity: Quantity | None = None
+        self, result: Flattening, name: str, text: PageText, quantity: Quantity | None = None
     ) -> tuple[Head, bytes]:
-        """Return the page data of a result.
+        """Return the page data of a result, without notes.
 
         Args:
             result: the result.
             name: name of the mesh.
-            title: title of a preview or a mesh without a layout, which has no numbers; "" for a final layout.
+            text: title and rows of the page.
             quantity: quantity that is shown as colours.
         """
 
-        text = None
-        if title:
-            rows = [] if title == BARE_TITLE else shown_rows(result)
-            text = PageText(title, [(measure, PLACEHOLDER, meaning) for measure, _, meaning in rows])
-            result = replace(result, notes=())
         if self._model is None or not self._model.is_of(result):
             self._model = Model.of(result)
         content = content_of(result, self._max_triangles or MAX_SHOWN_TRIANGLES, self._model, quantity)
@@ -202,7 +224,7 @@ class JobRunner:
         # A simplified mesh is sent in full, too, for painting and drawing, up to 4 million triangles.
         if content.left_out and len(result.faces) <= 4_000_000:
             head, block = with_all_triangles(head, block, self._model, result)
-        head["notes"] = [page_message(note) for note in head["notes"]]
+        head["notes"] = []
         cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
         data = {"head": with_hashes(head, block), "found": cones.tolist(), "seconds": result.seconds}
         return data, block
@@ -217,6 +239,17 @@ class JobRunner:
             self._source, self._flattener, self._read = source, Flattener(source.mesh), (mesh, sha256)
             self._own_texture = None if source.mesh.scene is None else own_picture(source.mesh)
         return self._source, self._flattener
+
+
+def _answer(saved: SavedFile) -> tuple[Head, bytes]:
+    return {"notes": [page_message(note) for note in saved.notes]}, saved.content
+
+
+def _text_of_preview(first: Flattening) -> PageText:
+    """Return the title and the rows of a preview, which has no numbers."""
+    return PageText(
+        FIRST_TITLE, [(measure, PLACEHOLDER, meaning) for measure, _, meaning in shown_rows(first)]
+    )
 
 
 def with_all_triangles(head: Head, block: bytes, model: Model, result: Flattening) -> tuple[Head, bytes]:

@@ -72,6 +72,8 @@ class Session:
         self._lock: ProjectLock | None = None
         self._revision = ""  # Of the project file when it was read or written last.
         self._project_notes: tuple[str, ...] = ()
+        # Notes on the file that was saved last, and the number of the layout that it contains.
+        self._saved_notes: tuple[int, tuple[str, ...]] = 0, ()
         self._shape: Shape | None = (
             None  # Of the mesh, once the worker has read it; until then, places are those opened.
         )
@@ -279,6 +281,8 @@ class Session:
             # The layout is that of earlier choices, and no other is being computed.
             is_stale = bool(shown.shown) and not (shown.is_bare or self._busy or shown.job == self._job)
             warnings, texts = self._choice_texts(project)
+            saved_job, saved_notes = self._saved_notes
+            notes = () if is_stale else (*shown.warnings, *(saved_notes if saved_job == shown.job else ()))
             return {
                 "version": self.version,
                 "opened": self._opened,
@@ -295,7 +299,7 @@ class Session:
                 "stale": is_stale,
                 "found": list(shown.cones),
                 "seconds": sum(shown.seconds.values()),
-                "warnings": [*self._project_notes, *warnings, *(() if is_stale else shown.warnings)],
+                "warnings": list(dict.fromkeys((*self._project_notes, *warnings, *notes))),
                 **({} if received == self._chosen else {"choices": self._history.now.as_plain(), **texts}),
             }
 
@@ -318,14 +322,14 @@ class Session:
             return None if self._current.shown is None else self._sent.without(received, self._current.shown)
 
     def export(self, ending: str) -> bytes:
-        """Return the content of a file of the result.
+        """Return the content of a file of the result; the notes on it become warnings of the state.
 
         Raises:
             StudioError: there is no result, or the format is unknown.
         """
         if ending not in RESULT_FILES:
             raise StudioError(f"unknown format {short_repr(ending)}: choose from {', '.join(RESULT_FILES)}")
-        return self._request({"do": "export", "ending": ending})[1]
+        return self._saved({"do": "export", "ending": ending})
 
     def quads(self, ending: str, count: object) -> bytes:
         """Return the content of a file of approximately `count` quads; a change of the choices cancels it.
@@ -341,7 +345,7 @@ class Session:
         number = as_integer("the number of quads", count)
         if not 1 <= number <= MAX_QUADS:
             raise StudioError(f"the number of quads must be from 1 to {MAX_QUADS:,}, got {number:,}")
-        return self._request({"do": "quads", "ending": ending, "count": number})[1]
+        return self._saved({"do": "quads", "ending": ending, "count": number})
 
     def curve(self) -> dict[str, Any]:
         """Return the distortion for each number of cones, see `curve_data`; a change of the choices cancels it.
@@ -354,6 +358,14 @@ class Session:
             if key not in self._curves:
                 self._curves[key] = self._request({"do": "curve"})[0]
             return self._curves[key]
+
+    def _saved(self, job: Head) -> bytes:
+        """Return the content of a file that the worker makes, and store the notes on it."""
+        head, content = self._request(job)
+        with self._changed:
+            self._saved_notes = self._current.job, tuple(head["notes"])
+            self._notify()
+        return content
 
     def _request(self, job: Head) -> tuple[Head, bytes]:
         """Return the output of a job of the worker other than a flattening."""
