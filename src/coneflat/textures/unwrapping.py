@@ -243,6 +243,8 @@ def _cut_to_pack(
     def costs(k: int) -> FloatArray:
         return models[order[k]].costs
 
+    if isinstance(options.charts, int):
+        candidates = {i: _without_slivers(models[i], candidates[i]) for i in order}
     layouts = [candidates[i].layout for i in order]
     if isinstance(options.charts, int):
         layouts = cut_into(layouts, costs, options.charts)
@@ -256,10 +258,13 @@ def _cut_to_pack(
             candidate = replace(candidate, layout=layout)
         else:
             candidate = cut_further(model, candidate, layout)
-        if options.charts == "atlas" and candidate.layout.chart.any():
-            candidate = join_small_charts(model, candidate)
-        finished[i] = candidate
+        finished[i] = candidate if options.charts == "one" else _without_slivers(model, candidate)
     return finished
+
+
+def _without_slivers(model: CutModel, candidate: Candidate) -> Candidate:
+    """Return a candidate whose small charts are joined to others where they fit."""
+    return join_small_charts(model, candidate) if candidate.layout.chart.any() else candidate
 
 
 def _measured_layouts(

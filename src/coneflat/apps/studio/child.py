@@ -36,7 +36,7 @@ from ..view import (
     text_of,
 )
 from .choices import Choices
-from .messages import misplaced_warning, page_message, with_warnings
+from .messages import misplaced_warning, notes_on_controls, page_message, with_warnings
 from .outputs import (
     SavedFile,
     as_shown,
@@ -175,7 +175,8 @@ class JobRunner:
             head["head"]["bad"] = bad_places(checked)
             repair = (f"The mesh was repaired: {wrong}. “Undo” reverts this.",) if wrong else ()
             warnings = (*repair, *warnings)
-        return {**head, **missing, "warnings": warnings}, body
+        on_controls = notes_on_controls(head["head"]["notes"])
+        return {**head, **missing, "warnings": warnings, "on_controls": on_controls}, body
 
     def bare(self, job: Head) -> tuple[Head, bytes]:
         """Return the page data of the mesh of a failed job without a layout; nothing if no triangle can be drawn."""

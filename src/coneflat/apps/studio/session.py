@@ -28,7 +28,10 @@ PATIENCE = 600.0  # Seconds that exports wait for the current flattening.
 
 
 class _Shown(NamedTuple):
-    """What is shown: page data, cones, seconds per stage, warnings, the job, and whether there is no layout."""
+    """What is shown: page data, cones, seconds per stage, warnings, the job, whether there is no layout, and notes.
+
+    These are on values of controls that are not met, by their option.
+    """
 
     shown: tuple[Head, bytes] | None = None
     cones: Sequence[int] = ()
@@ -36,6 +39,7 @@ class _Shown(NamedTuple):
     warnings: Sequence[str] = ()
     job: int = 0
     is_bare: bool = False
+    on_controls: Mapping[str, str] = MappingProxyType({})
 
 
 class Session:
@@ -298,6 +302,7 @@ class Session:
                 "bare": shown.is_bare,
                 "stale": is_stale,
                 "found": list(shown.cones),
+                "on_controls": {} if is_stale else dict(shown.on_controls),
                 "seconds": sum(shown.seconds.values()),
                 "warnings": list(dict.fromkeys((*self._project_notes, *warnings, *notes))),
                 **({} if received == self._chosen else {"choices": self._history.now.as_plain(), **texts}),
@@ -456,7 +461,13 @@ class Session:
         self.layout += 1
         picture = self._sent.numbered((data["head"], body))
         self._current = _Shown(
-            picture, data["found"], data["seconds"], data.get("warnings", ()), job, is_bare
+            picture,
+            data["found"],
+            data["seconds"],
+            data.get("warnings", ()),
+            job,
+            is_bare,
+            data.get("on_controls", {}),
         )
 
     def _restore_layout(self) -> None:
