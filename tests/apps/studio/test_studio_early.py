@@ -19,6 +19,7 @@ from coneflat.apps.studio.session import Session
 from coneflat.apps.studio.worker import SentPictures, read_frame, with_hashes, write_frame
 from coneflat.apps.view.page.payload import pack
 from coneflat.base.progress import check_cancelled
+from coneflat.errors import StudioError
 
 
 class Mute:
@@ -184,3 +185,42 @@ def test_a_change_cancels_the_separation_of_overlaps(tmp_path, monkeypatch):
             heard.append(read_frame(hearing)[0])
     assert {"job": 1, "given_up": True} in heard
     assert not any(message["job"] == 1 and "done" in message for message in heard)
+
+
+class TestModelAlone:
+    """The model, which is shown before its first layout is computed."""
+
+    def test_the_model_comes_before_its_first_layout_alone(self, tmp_path):
+        path = shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(2))
+        told, stages = [], []
+        runner = JobRunner()
+        job = {"mesh": str(path), "sha256": "", "choices": Choices().as_plain()}
+        for is_first in (True, False):
+            runner.flatten(
+                {**job, "first": is_first},
+                lambda stage, _: stages.append(stage),
+                lambda head, body: None,
+                lambda kind, head, body: told.append((kind, head, list(stages))),
+            )
+        assert [kind for kind, *_ in told] == ["model", "shape"]
+        _, model, before = told[0]
+        assert model["head"]["title"] == "Computing the first layout"
+        assert (model["head"]["show"], model["head"]["triangles"], model["found"]) == ("plain", 320, [])
+        assert set(before) == {"read", "check"}
+
+    def test_it_is_shown_until_the_layout_comes(self, tmp_path):
+        session = Session(tmp_path)
+        session._worker = Mute()
+        session.open(shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(1)))
+        (job,) = session._worker.jobs
+        assert (job["first"], job["bare"]) == (True, True)
+        TestFirstViews.answer(session, "model", job["job"], "alone")
+        state = session.state()
+        assert (state["bare"], bool(state["busy"]), state["stale"]) == (True, True, False)
+        # No cones are known, so that none of them can be placed by hand.
+        with pytest.raises(StudioError, match="the cones are not found yet"):
+            session.act({"do": "add", "vertex": 3})
+        TestFirstViews.answer(session, "done", job["job"], "layout")
+        assert (session.state()["bare"], session.picture()[0]["title"]) == (False, "layout")
+        session.act({"do": "add", "vertex": 3})
+        assert session._worker.jobs[-1]["first"] is False

@@ -35,8 +35,7 @@ time.sleep(600)
 
 
 def add_cone(session, vertex):
-    session.act({"do": "hand"})
-    session.act({"do": "add", "vertex": vertex})
+    session.act({"do": "lock", "vertex": vertex, "locked": True})
 
 
 class TestLock:

@@ -51,9 +51,10 @@ from .outputs import (
 from .places import shape_message, shape_of
 from .worker import Head, read_frame, with_hashes, write_frame
 
-#: The text that stands for unknown numbers, and the title of the preview.
+#: The text that stands for unknown numbers, and the titles of pages without a final layout.
 PLACEHOLDER = "…"
 BARE_TITLE = "No layout"
+COMPUTING_TITLE = "Computing the first layout"
 FIRST_TITLE = "Preview: distortion is not yet reduced, and overlaps are not yet removed  ·  …"
 
 
@@ -121,7 +122,7 @@ class JobRunner:
         job: Head,
         report: Callable[[str, float], None],
         show: Callable[[Head, bytes], None],
-        tell_shape: Callable[[Mapping[str, str], bytes], None] = lambda head, body: None,
+        tell: Callable[[str, Mapping[str, Any], bytes], None] = lambda kind, head, body: None,
     ) -> tuple[Head, bytes]:
         """Return a layout as data for the page: numbers and texts, and the bytes of arrays.
 
@@ -129,13 +130,19 @@ class JobRunner:
             job: the mesh and the choices.
             report: called with the stage and the completed fraction.
             show: called with a preview of the layout, in the same form.
-            tell_shape: called with the shape of the mesh after it was read, as of `shape_message`.
+            tell: called with the kind of a message and its content after the mesh was read: "model" for its page data
+                without a layout, if the job is the `first` one, and "shape", as of `shape_message`.
         """
 
         self.result, self._max_triangles = None, job.get("most")
         source, flattener = self._open(job["mesh"], job["sha256"], report)
+        if job.get("first"):
+            report("check", 0.0)
+            model, body = self.bare(job, COMPUTING_TITLE)
+            if model:
+                tell("model", model, body)
         if self._told != self._read:
-            tell_shape(*shape_message(shape_of(source.mesh), job["sha256"]))
+            tell("shape", *shape_message(shape_of(source.mesh), job["sha256"]))
             self._told = self._read
         name, furthest = Path(job["mesh"]).name, 0.0
 
@@ -178,13 +185,13 @@ class JobRunner:
         on_controls = notes_on_controls(head["head"]["notes"])
         return {**head, **missing, "warnings": warnings, "on_controls": on_controls}, body
 
-    def bare(self, job: Head) -> tuple[Head, bytes]:
-        """Return the page data of the mesh of a failed job without a layout; nothing if no triangle can be drawn."""
+    def bare(self, job: Head, title: str = BARE_TITLE) -> tuple[Head, bytes]:
+        """Return the page data of the mesh of a job without a layout; nothing if no triangle can be drawn."""
         with suppress(ConeflatError):
             if self._source is not None:
                 checked, _ = repaired(self._source)
                 data, block = self._picture(
-                    without_layout(checked), Path(job["mesh"]).name, PageText(BARE_TITLE, [])
+                    without_layout(checked), Path(job["mesh"]).name, PageText(title, [])
                 )
                 data["head"] |= {"bad": bad_places(checked), "show": "plain"}
                 return data, block
@@ -291,13 +298,13 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
             check_current()
             write_frame(answers, {"job": number, "early": head}, body)
 
-        def tell_shape(head: Mapping[str, str], body: bytes, number: int = number) -> None:
-            write_frame(answers, {"job": number, "shape": head}, body)
+        def tell(kind: str, head: Mapping[str, Any], body: bytes, number: int = number) -> None:
+            write_frame(answers, {"job": number, kind: head}, body)
 
         try:
             with cancel_with(check_current):
                 head, body = (
-                    bench.flatten(job, report, show, tell_shape)
+                    bench.flatten(job, report, show, tell)
                     if job["do"] == "flatten"
                     else bench.make(job, report)
                 )

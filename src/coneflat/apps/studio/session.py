@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
+from subprocess import Popen
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -21,7 +22,7 @@ from .messages import command_line, misplaced_warning, python_lines
 from .outputs import MAX_QUADS, QUAD_FORMATS, RESULT_FILES, curve_options
 from .places import Places, Shape, shape_received
 from .project import Project, file_within, is_changed, open_project, project_path, unused_name
-from .steps import STEPS, History
+from .steps import STEPS, STEPS_ON_CONES, History
 from .worker import Head, SentPictures, Worker
 
 PATIENCE = 600.0  # Seconds that exports wait for the current flattening.
@@ -58,12 +59,14 @@ class Session:
         color: str | None = None,
         most_triangles: int | None = None,
         address: str = "",
+        process: Popen[bytes] | None = None,
     ) -> None:
         """Args:
         folder: folder of projects.
         color: name of values that are shown as colours, as in `own_quantity`.
         most_triangles: largest number of triangles shown; None for the default of the viewer.
         address: address of the page, which other studios are told that open the same project.
+        process: worker process that was started in advance, see `start_process`.
         """
         self._address = address
         self._look = {"color": color, "most": most_triangles}
@@ -98,7 +101,7 @@ class Session:
         self._curves: dict[tuple[str, str], dict[str, Any]] = {}
         self._changed = threading.Condition(threading.RLock())
         self._listeners: list[Callable[[], None]] = []
-        self._worker = Worker(self._on_message, self._on_exit)
+        self._worker = Worker(self._on_message, self._on_exit, process)
 
     # Meshes and projects.
 
@@ -183,6 +186,7 @@ class Session:
                 if history.undo() if kind == "undo" else history.redo():
                     self._apply_step(before)
             else:
+                self._require_cones(str(kind))
                 try:
                     chosen = STEPS[str(kind)](history.now, action, self._current.cones)
                 except (KeyError, TypeError) as error:
@@ -210,6 +214,12 @@ class Session:
         if self._mesh is None:
             raise StudioError("no mesh is open: drop one on the page, or run coneflat studio MESH")
 
+    def _require_cones(self, kind: str) -> None:
+        """Raise an error for steps on cones that the first search has not found yet."""
+        is_first = self._busy is not None and (self._current.shown is None or self._current.is_bare)
+        if kind in STEPS_ON_CONES and is_first and not self._history.now.by_hand:
+            raise StudioError("the cones are not found yet: wait for the first layout")
+
     def _take_step(self, chosen: Choices, stroke: object) -> None:
         """Take a step if the choices differ."""
         chosen.keywords()
@@ -235,7 +245,8 @@ class Session:
         self._job += 1
         self._busy = {"stage": "", "fraction": 0.0}
         self._notify()
-        bare = {"bare": self._current.shown is None or self._current.is_bare}
+        is_first = self._current.shown is None
+        bare = {"first": is_first, "bare": is_first or self._current.is_bare}
         self._worker.send({"do": "flatten", "job": self._job, **bare, **self._look, **self._of_mesh()})
 
     def _save(self) -> None:
@@ -426,6 +437,8 @@ class Session:
                 return None
             if "stage" in head:
                 self._busy = {"stage": head["stage"], "fraction": head["fraction"]}
+            elif "model" in head:
+                self._show(head["model"], body, head["job"], is_bare=True)
             elif "early" in head:
                 self._last = self._last or self._current
                 self._show(head["early"], body, head["job"])

@@ -66,6 +66,7 @@ class Studio {
     document.body.classList.toggle("empty", !this.news.mesh);
     document.body.classList.toggle("bare", !this.news.layout || this.news.bare);
     document.body.classList.toggle("alone", this.news.bare);
+    document.body.classList.toggle("computing", Boolean(this.news.busy));
     document.body.classList.toggle("stale", this.news.stale);
     if (!this.viewer) document.getElementById("name").textContent = this.news.mesh ?? "";
     if (model) this.take(model);
