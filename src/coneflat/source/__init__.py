@@ -4,10 +4,10 @@ from .components import Component, Prepared
 from .constraints import vertex_numbers
 from .copies import find_copies
 from .input_mesh import at_unit_size, result_numbering
-from .preparation import Source
+from .preparation import LatestCache, Source
 from .rounding import rounding_notes
 
 __all__ = [
-    "Component", "Prepared", "Source", "at_unit_size", "find_copies", "result_numbering", "rounding_notes",
-    "vertex_numbers",
+    "Component", "LatestCache", "Prepared", "Source", "at_unit_size", "find_copies", "result_numbering",
+    "rounding_notes", "vertex_numbers",
 ]  # fmt: skip

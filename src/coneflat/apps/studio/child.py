@@ -14,16 +14,17 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import ConeflatError, Flattener, Flattening, unwrap
+from ... import ConeflatError, Flattener, Flattening
 from ...base import FloatArray, cancel_with, inner_calls
 from ...errors import DegenerateFaceError, NonManifoldError, NonOrientableError
 from ...io import Joined, Texture, read_joined
 from ...options import MAX_SHOWN_TRIANGLES
+from ...textures import Unwrapper
 from ..view import (
     Model,
     PageText,
@@ -97,6 +98,14 @@ class Jobs:
         return self._is_closed or job != self._newest
 
 
+class Opened(NamedTuple):
+    """A mesh that was read, and what maps it repeatedly."""
+
+    source: Joined
+    flattener: Flattener
+    unwrapper: Unwrapper
+
+
 class JobRunner:
     """Runs jobs, and caches what depends on the mesh alone.
 
@@ -108,8 +117,7 @@ class JobRunner:
         """early_from: number of polygons from which on a preview is shown; for fewer the final layout is as fast."""
         self.result: Flattening | None = None
         self._early_from = early_from
-        self._source: Joined | None = None
-        self._flattener: Flattener | None = None
+        self._opened: Opened | None = None
         self._model: Model | None = None
         self._max_triangles: int | None = None
         self._own_texture: tuple[Texture, FloatArray] | None = None
@@ -135,7 +143,7 @@ class JobRunner:
         """
 
         self.result, self._max_triangles = None, job.get("most")
-        source, flattener = self._open(job["mesh"], job["sha256"], report)
+        source, flattener, unwrapper = self._open(job["mesh"], job["sha256"], report)
         if job.get("first"):
             report("check", 0.0)
             model, body = self.bare(job, COMPUTING_TITLE)
@@ -158,7 +166,7 @@ class JobRunner:
         chosen = Choices.from_plain(job["choices"])
         words = source.map_options(chosen.keywords())
         if chosen.for_texture:
-            result = unwrap(source.mesh, progress=report_max, **words)
+            result = unwrapper.unwrap(progress=report_max, **words)
         else:
             on_preview = show_first if len(source.mesh.offsets) - 1 >= self._early_from else None
             result = flattener.flatten(on_preview=on_preview, progress=report_max, **words)
@@ -188,8 +196,8 @@ class JobRunner:
     def bare(self, job: Head, title: str = BARE_TITLE) -> tuple[Head, bytes]:
         """Return the page data of the mesh of a job without a layout; nothing if no triangle can be drawn."""
         with suppress(ConeflatError):
-            if self._source is not None:
-                checked, _ = repaired(self._source)
+            if self._opened is not None:
+                checked, _ = repaired(self._opened.source)
                 data, block = self._picture(
                     without_layout(checked), Path(job["mesh"]).name, PageText(title, [])
                 )
@@ -202,7 +210,7 @@ class JobRunner:
 
         if job["do"] == "export":
             return _answer(result_file(self.result, job["ending"]))
-        source, _ = self._open(job["mesh"], job["sha256"], report)
+        source, *_ = self._open(job["mesh"], job["sha256"], report)
         chosen = Choices.from_plain(job["choices"])
         if job["do"] == "quads":
             return _answer(quads_file(source, chosen, job["count"], job["ending"], report))
@@ -237,16 +245,17 @@ class JobRunner:
         data = {"head": with_hashes(head, block), "found": cones.tolist(), "seconds": result.seconds}
         return data, block
 
-    def _open(self, mesh: str, sha256: str, report: Callable[[str, float], None]) -> tuple[Joined, Flattener]:
-
-        if self._source is None or self._flattener is None or self._read != (mesh, sha256):
+    def _open(self, mesh: str, sha256: str, report: Callable[[str, float], None]) -> Opened:
+        """Return the mesh of a job, which is read if it is another one than before."""
+        if self._opened is None or self._read != (mesh, sha256):
             report("read", 0.0)
-            self._source = self._flattener = self._model = None  # The memory may not suffice for both.
+            self._opened = self._model = None  # The memory may not suffice for both.
             repaired.cache_clear()
             source = read_joined(Path(mesh))
-            self._source, self._flattener, self._read = source, Flattener(source.mesh), (mesh, sha256)
+            self._opened = Opened(source, Flattener(source.mesh), Unwrapper(source.mesh))
+            self._read = mesh, sha256
             self._own_texture = None if source.mesh.scene is None else own_picture(source.mesh)
-        return self._source, self._flattener
+        return self._opened
 
 
 def _answer(saved: SavedFile) -> tuple[Head, bytes]:
