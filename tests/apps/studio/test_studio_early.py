@@ -15,6 +15,7 @@ import shapes
 import coneflat
 from coneflat.apps.studio.child import PLACEHOLDER, JobRunner, Jobs, serve
 from coneflat.apps.studio.choices import Choices
+from coneflat.apps.studio.layouts import MAX_LAYOUTS
 from coneflat.apps.studio.session import Session
 from coneflat.apps.studio.worker import SentPictures, read_frame, with_hashes, write_frame
 from coneflat.apps.view.page.payload import pack
@@ -224,3 +225,57 @@ class TestModelAlone:
         assert (session.state()["bare"], session.picture()[0]["title"]) == (False, "layout")
         session.act({"do": "add", "vertex": 3})
         assert session._worker.jobs[-1]["first"] is False
+
+
+class TestLatestLayouts:
+    """Layouts that are shown again when steps are undone."""
+
+    @pytest.fixture
+    def calls(self, monkeypatch):
+        """The options of all maps that are computed, in turn."""
+        computed, flatten = [], coneflat.Flattener.flatten
+
+        def counted(flattener, **options):
+            computed.append(options)
+            return flatten(flattener, **options)
+
+        monkeypatch.setattr(coneflat.Flattener, "flatten", counted)
+        return computed
+
+    @staticmethod
+    def flatten(runner, path, chosen):
+        job = {"mesh": str(path), "sha256": path.name, "choices": chosen.as_plain()}
+        head, body = runner.flatten(job, lambda *_: None, lambda *_: None)
+        return head["head"]["title"], head["found"], body, runner.result.uv.tobytes()
+
+    def test_undone_steps_compute_nothing(self, tmp_path, calls):
+        path = shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(1))
+        runner = JobRunner()
+        chosen = [Choices().with_option("stretch", step / 20) for step in range(MAX_LAYOUTS)]
+        layouts = [self.flatten(runner, path, choices) for choices in chosen]
+        assert len(calls) == MAX_LAYOUTS
+        assert [self.flatten(runner, path, choices) for choices in reversed(chosen)] == layouts[::-1]
+        self.flatten(runner, path, chosen[0].with_units("mm", "cm"))
+        assert len(calls) == MAX_LAYOUTS
+        # The one that was asked for longest ago is dropped.
+        self.flatten(runner, path, Choices().with_option("stretch", 0.9))
+        self.flatten(runner, path, chosen[0])
+        assert len(calls) == MAX_LAYOUTS + 1
+        assert self.flatten(runner, path, chosen[-1]) == layouts[-1]
+        assert len(calls) == MAX_LAYOUTS + 2
+
+    def test_layouts_of_another_mesh_are_not_taken(self, tmp_path, calls):
+        runner = JobRunner()
+        paths = [shapes.write_obj(tmp_path / f"{level}.obj", *shapes.sphere(level)) for level in (1, 2)]
+        first, second = (self.flatten(runner, path, Choices()) for path in paths)
+        assert first != second
+        assert self.flatten(runner, paths[0], Choices()) == first
+        assert len(calls) == 3
+
+    def test_large_layouts_are_fewer(self, tmp_path, calls, monkeypatch):
+        monkeypatch.setattr("coneflat.apps.studio.layouts.MAX_TRIANGLES", 200)
+        path = shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(1))  # 80 triangles
+        runner, chosen = JobRunner(), [Choices().with_option("stretch", step / 20) for step in range(3)]
+        for choices in (*chosen, chosen[1], chosen[0]):
+            self.flatten(runner, path, choices)
+        assert len(calls) == 4

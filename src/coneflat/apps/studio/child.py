@@ -37,6 +37,7 @@ from ..view import (
     text_of,
 )
 from .choices import Choices
+from .layouts import LatestLayouts, MadeLayout
 from .messages import misplaced_warning, notes_on_controls, page_message, with_warnings
 from .outputs import (
     SavedFile,
@@ -118,6 +119,7 @@ class JobRunner:
         self.result: Flattening | None = None
         self._early_from = early_from
         self._opened: Opened | None = None
+        self._layouts = LatestLayouts()
         self._model: Model | None = None
         self._max_triangles: int | None = None
         self._own_texture: tuple[Texture, FloatArray] | None = None
@@ -143,7 +145,7 @@ class JobRunner:
         """
 
         self.result, self._max_triangles = None, job.get("most")
-        source, flattener, unwrapper = self._open(job["mesh"], job["sha256"], report)
+        source, *_ = self._open(job["mesh"], job["sha256"], report)
         if job.get("first"):
             report("check", 0.0)
             model, body = self.bare(job, COMPUTING_TITLE)
@@ -152,25 +154,20 @@ class JobRunner:
         if self._told != self._read:
             tell("shape", *shape_message(shape_of(source.mesh), job["sha256"]))
             self._told = self._read
-        name, furthest = Path(job["mesh"]).name, 0.0
+        made = self._layouts.get(job)
+        if made is None:
+            made = self._made(job, report, show)
+            self._layouts.put(job, made)
+        self.result = made.result
+        return made.head, made.body
 
-        def report_max(stage: str, fraction: float) -> None:
-            nonlocal furthest
-            furthest = max(furthest, fraction)
-            report(stage, furthest)
-
-        def show_first(first: Flattening) -> None:
-            report_max("preview", furthest)
-            show(*self._picture(first, name, _text_of_preview(first)))
-
+    def _made(
+        self, job: Head, report: Callable[[str, float], None], show: Callable[[Head, bytes], None]
+    ) -> MadeLayout:
+        """Return the layout of a job, which is computed; arguments as of `flatten`."""
+        source, *_ = self._open(job["mesh"], job["sha256"], report)
         chosen = Choices.from_plain(job["choices"])
-        words = source.map_options(chosen.keywords())
-        if chosen.for_texture:
-            result = unwrapper.unwrap(progress=report_max, **words)
-        else:
-            on_preview = show_first if len(source.mesh.offsets) - 1 >= self._early_from else None
-            result = flattener.flatten(on_preview=on_preview, progress=report_max, **words)
-        result = with_warnings(replace(result, notes=source.all_notes(result.notes)), chosen)
+        result = with_warnings(self._mapped(job, chosen, report, show), chosen)
         report("picture", 1.0)
         quantity, missing = None, {}
         if job.get("color"):
@@ -179,19 +176,46 @@ class JobRunner:
             except ConeflatError as error:
                 missing = {"missing": page_message(str(error))}
         shown = as_shown(result)
-        head, body = self._picture(result, name, text_of(shown), quantity=quantity)
-        head["head"]["notes"] = [page_message(note) for note in shown.notes]
-        self.result = result
+        head, body = self._picture(result, Path(job["mesh"]).name, text_of(shown), quantity=quantity)
+        notes = head["head"]["notes"] = [page_message(note) for note in shown.notes]
         # The session warns of choices itself, as soon as they are made.
         warned = {page_message(note) for note in misplaced_warning(chosen)}
-        warnings = tuple(note for note in head["head"]["notes"] if note not in warned)
+        warnings = tuple(note for note in notes if note not in warned)
         if chosen.options.get("repair"):
             checked, wrong = repaired(source)
             head["head"]["bad"] = bad_places(checked)
             repair = (f"The mesh was repaired: {wrong}. “Undo” reverts this.",) if wrong else ()
             warnings = (*repair, *warnings)
-        on_controls = notes_on_controls(head["head"]["notes"])
-        return {**head, **missing, "warnings": warnings, "on_controls": on_controls}, body
+        texts = {"warnings": warnings, "on_controls": notes_on_controls(notes)}
+        return MadeLayout(result, {**head, **missing, **texts}, body)
+
+    def _mapped(
+        self,
+        job: Head,
+        chosen: Choices,
+        report: Callable[[str, float], None],
+        show: Callable[[Head, bytes], None],
+    ) -> Flattening:
+        """Return the map of a job with the notes on its mesh; arguments as of `flatten`."""
+        source, flattener, unwrapper = self._open(job["mesh"], job["sha256"], report)
+        furthest = 0.0
+
+        def report_max(stage: str, fraction: float) -> None:
+            nonlocal furthest
+            furthest = max(furthest, fraction)
+            report(stage, furthest)
+
+        def show_first(first: Flattening) -> None:
+            report_max("preview", furthest)
+            show(*self._picture(first, Path(job["mesh"]).name, _text_of_preview(first)))
+
+        words = source.map_options(chosen.keywords())
+        if chosen.for_texture:
+            result = unwrapper.unwrap(progress=report_max, **words)
+        else:
+            on_preview = show_first if len(source.mesh.offsets) - 1 >= self._early_from else None
+            result = flattener.flatten(on_preview=on_preview, progress=report_max, **words)
+        return replace(result, notes=source.all_notes(result.notes))
 
     def bare(self, job: Head, title: str = BARE_TITLE) -> tuple[Head, bytes]:
         """Return the page data of the mesh of a job without a layout; nothing if no triangle can be drawn."""
@@ -250,6 +274,7 @@ class JobRunner:
         if self._opened is None or self._read != (mesh, sha256):
             report("read", 0.0)
             self._opened = self._model = None  # The memory may not suffice for both.
+            self._layouts = LatestLayouts()
             repaired.cache_clear()
             source = read_joined(Path(mesh))
             self._opened = Opened(source, Flattener(source.mesh), Unwrapper(source.mesh))

@@ -217,7 +217,8 @@ class Session:
     def _require_cones(self, kind: str) -> None:
         """Raise an error for steps on cones that the first search has not found yet."""
         is_first = self._busy is not None and (self._current.shown is None or self._current.is_bare)
-        if kind in STEPS_ON_CONES and is_first and not self._history.now.by_hand:
+        chosen = self._history.now
+        if kind in STEPS_ON_CONES and is_first and not (chosen.by_hand or chosen.for_texture):
             raise StudioError("the cones are not found yet: wait for the first layout")
 
     def _take_step(self, chosen: Choices, stroke: object) -> None:
