@@ -204,5 +204,8 @@ def test_the_command_prints_its_address_first_and_lives_on_this_machine(tmp_path
             assert state["layout"] == 2
         finally:
             process.send_signal(signal.SIGINT)
-            assert process.wait(30) is not None
+            ending = process.stdout.read()
+            code = process.wait(30)
+    assert ending == f"Studio ended. Choices are in {tmp_path.resolve() / 'ball_studio.json'}.\n"
+    assert code == 0
     assert read_project(Path(tmp_path) / "ball_studio.json").choices == Choices()

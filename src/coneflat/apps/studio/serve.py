@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+import signal
 import socket
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -25,8 +26,8 @@ def run_studio(
     say: Callable[[str], None],
     color: str | None,
     most_triangles: int,
-) -> None:
-    """Serve a session until it is interrupted.
+) -> Path | None:
+    """Serve a session until it is interrupted, and return the path of the project with its choices, if there is one.
 
     Args:
         file: path of a mesh or a project to open.
@@ -58,7 +59,13 @@ def run_studio(
         say(address)
         if opens:
             open_address(address)
-        server_class(session, token, port).run(sockets=[listener])
+        server = server_class(session, token, port)
+        try:
+            server.run(sockets=[listener])
+        except KeyboardInterrupt:
+            if server.signal != signal.SIGINT:  # Ctrl-C is the usual end.
+                raise
+        return session.project_file
 
 
 def studio_server() -> type[StudioServer]:
