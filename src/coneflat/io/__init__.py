@@ -70,7 +70,7 @@ __all__ = [
     "MATERIALS", "Materials", "MIRRORED", "nibabel", "number", "OBJECTS", "OUTPUT_FORMATS", "PIPE", "read_archive",
     "read_bytes", "read_flattening", "read_joined", "read_label", "read_materials", "read_mesh", "read_mesh_from",
     "read_picture", "read_structure", "read_vertex_values", "readable", "relocated", "remove_unfinished", "REPEAT",
-    "shading_normals", "slot_of", "SLOTS", "SPECULAR", "split_at_seams", "SplitMesh", "stored_in_glb", "Texture", "texture_files",
-    "to_linear", "to_srgb", "TRANSFORM", "uv_mesh_of", "UVMesh", "VALUES", "VERTEX_COLOURS", "write_flattening",
-    "write_measured", "write_parts", "write_stream",
+    "shading_normals", "slot_of", "SLOTS", "SPECULAR", "split_at_seams", "SplitMesh", "stored_in_glb", "Texture",
+    "texture_files", "to_linear", "to_srgb", "TRANSFORM", "uv_mesh_of", "UVMesh", "VALUES", "VERTEX_COLOURS",
+    "write_flattening", "write_measured", "write_parts", "write_stream",
 ]  # fmt: skip
