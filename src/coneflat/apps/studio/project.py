@@ -176,17 +176,16 @@ def project_path(path: Path, folder: Path) -> Path:
     first = folder / f"{path.stem}_studio{ENDING}"
     second = folder / f"{path.stem}_{path.suffix[1:].lower()}_studio{ENDING}"
     numbered = (second.with_stem(f"{second.stem}-{number}") for number in count(2))
-    sha256 = file_hash(path)
-    return next(file for file in chain((first, second), numbered) if _is_project_of(file, path, sha256))
+    return next(file for file in chain((first, second), numbered) if _is_project_of(file, path))
 
 
-def _is_project_of(file: Path, mesh: Path, sha256: str) -> bool:
+def _is_project_of(file: Path, mesh: Path) -> bool:
     """Return whether a project file is that of a mesh, or does not exist; the mesh may have been changed or moved."""
     if not file.exists():
         return True
     project = read_project(file)
     is_moved = project.mesh.name == mesh.name and not project.mesh.exists()
-    return project.sha256 == sha256 or project.mesh.resolve() == mesh.resolve() or is_moved
+    return project.mesh.resolve() == mesh.resolve() or is_moved or project.sha256 == file_hash(mesh)
 
 
 def open_project(path: Path, file: Path, within: Path | None = None) -> Project:
