@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from .base.arrays import FloatArray
+from .base.arrays import FloatArray, rows_of
 from .base.notes import Unmet
 from .cones import uses_sparse_search
 from .geometry.operators import area_distortion
-from .geometry.planar import mean_energy, signed_double_areas
+from .geometry.planar import mean_energy
 from .measures import mean_qc
 from .measures.guarantees import EXTREME_QC
 from .options import Options
@@ -56,7 +56,7 @@ def excess(components: Sequence[Component], layouts: Sequence[Layout]) -> float:
     if not bounded:
         return 0.0
     areas = np.concatenate([component.double_areas for component, _ in bounded])
-    flat = np.concatenate([signed_double_areas(layout.points[layout.corners]) for _, layout in bounded])
+    flat = np.concatenate([layout.flat_double_areas for _, layout in bounded])
     chosen = (areas > 0) & (flat > 0)
     log_scale = np.log(flat[chosen] / areas[chosen]) / 2
     return area_distortion(log_scale, areas[chosen]) / components[0].cones.distortion
@@ -75,7 +75,7 @@ def borders_and_distortion(components: Sequence[Component], layouts: Sequence[La
     A seam counts once, the two borders of components that it separates half each.
     """
     areas = np.array([layout.area for layout in layouts])
-    energies = [mean_energy(layout.lengths, layout.points[layout.corners]) for layout in layouts]
+    energies = [mean_energy(layout.lengths, rows_of(layout.points, layout.corners)) for layout in layouts]
     length = sum(
         seam_length(layout) + border_length(component) / 2
         for component, layout in zip(components, layouts, strict=True)

@@ -103,7 +103,7 @@ def evaluate(
         packed, distortion = _separated_and_measured(
             prepared, mesh, cones, curvatures, packed, options, overlaps
         )
-        rotations = _rotations(layouts, packed.uv[packed.component_corners], options)
+        rotations = _rotations(layouts, packed, options)
         statistics = _statistics(layouts)
         face_corners = _face_corners(prepared)
     lengths = prepared.user_lengths
@@ -132,7 +132,7 @@ def evaluate(
         source=prepared.input_mesh.source,
         lengths=None if lengths is None else np.ldexp(lengths, -checked.exponent),
     )
-    return replace(result, notes=(*result.notes, *unmet_guarantees(result)))
+    return replace(result, notes=(*result.notes, *unmet_guarantees(result, mesh=mesh)))
 
 
 def _component_faces(prepared: Prepared) -> IntArray:
@@ -275,13 +275,11 @@ def _pack(layouts: Sequence[Layout], order: IntArray, mesh: TriangleMesh, option
     return _Packed(uv, corners, component_corners, packed.scale, packed.efficiency)
 
 
-def _rotations(layouts: Sequence[Layout], corner_uv: FloatArray, options: Options) -> Rotations | None:
-    """Return how far seam rotations within components are from multiples of the quantum; None without a quantum.
-
-    corner_uv: (m, 3, 2) points of the triangle corners, concatenated by component.
-    """
+def _rotations(layouts: Sequence[Layout], packed: _Packed, options: Options) -> Rotations | None:
+    """Return how far seam rotations within components are from multiples of the quantum; None without a quantum."""
     if options.quantise is None:
         return None
+    corner_uv = rows_of(packed.uv, packed.component_corners)
     places_of_components = np.split(corner_uv, np.cumsum([len(layout.corners) for layout in layouts])[:-1])
     return Rotations.of_all(
         [

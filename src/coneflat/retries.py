@@ -278,7 +278,7 @@ def cut_along_sharp_edges(
     distorted = [
         i
         for i, (component, layout) in enumerate(zip(prepared.components, layouts, strict=True))
-        if is_machined(component.mesh) and is_too_distorted(component, layout)
+        if is_too_distorted(component, layout) and is_machined(component.mesh)
     ]
     if not distorted:
         return uncut

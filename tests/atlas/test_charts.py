@@ -11,7 +11,7 @@ from coneflat.atlas.charts import ChartLayout, Seams
 from coneflat.atlas.glue import glue_charts
 from coneflat.atlas.injective import injective_charts
 from coneflat.atlas.sheet import Sheet
-from coneflat.atlas.split import _layers, _steps, as_disk, largest_layers, split_overlaps
+from coneflat.atlas.split import _layers, as_disk, find_steps, largest_layers, split_overlaps
 from coneflat.geometry.overlap import find_overlaps
 from coneflat.mesh.charts import label_charts
 from coneflat.mesh.connectivity import TriangleMesh, label_components
@@ -209,7 +209,7 @@ class TestSplit:
         """Of crumpled paper, whose overlaps are many, and some of them wound up."""
         disk, _, pairs = crumpled(18, seed)
         areas = np.random.default_rng(seed).uniform(1, 2, len(disk.faces))
-        steps = _steps(pairs, disk.faces)
+        steps = find_steps(pairs, disk.faces)
         count, region = label_components(2 * len(pairs), *np.hstack([steps, steps ^ 1]))
         # Each region is there twice, its layers in either order.
         every = [_layers(pairs, np.flatnonzero(region == i)) for i in range(count)]

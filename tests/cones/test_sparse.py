@@ -93,7 +93,7 @@ def test_a_search_without_possible_gain_ends():
     search = search_on(vertices, faces, positive_only=True)
     result = search.fewest(0.01)
     assert result.distortion > 0.01
-    assert max(search.coarse.best.sizes) < 30
+    assert max(search.starts.best.sizes) < 30
     assert not result.solution.cones.size
 
 

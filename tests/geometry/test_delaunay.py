@@ -8,7 +8,7 @@ import shapes
 
 from coneflat import TriangleMesh
 from coneflat.geometry import angle_defect, corner_angles, double_areas, edge_lengths
-from coneflat.geometry.delaunay import intrinsic_delaunay, make_delaunay
+from coneflat.geometry.delaunay import euclidean_suspects, intrinsic_delaunay, make_delaunay
 from coneflat.geometry.intrinsic import halfedge_twins, intrinsic_triangulation
 from coneflat.geometry.straight import straight_triangles
 
@@ -54,6 +54,19 @@ class TestIntrinsicDelaunay:
         np.testing.assert_allclose(curvature(triangulation, mesh.is_boundary_vertex), before, atol=1e-11)
         areas = double_areas(triangulation.length.reshape(-1, 3))
         assert areas.sum() == pytest.approx(double_areas(lengths).sum(), rel=1e-12)
+
+    @pytest.mark.parametrize("stretch", [1, 30])
+    def test_edges_that_are_left_out_at_first_need_no_flip(self, stretch):
+        """Also those of a grid of squares, whose diagonals are Delaunay up to rounding."""
+        for mesh in (noisy_mesh(SURFACES["torus"]), TriangleMesh(*shapes.grid(12, 12))):
+            stretched = mesh.moved_to(mesh.vertices * [stretch, 1, 1])
+            lengths = edge_lengths(stretched.vertices, stretched.faces)
+            every = intrinsic_triangulation(stretched, lengths)
+            suspects = euclidean_suspects(every)
+            assert len(suspects) < len(every.twin)
+            triangulation, flips = intrinsic_delaunay(stretched, lengths)
+            np.testing.assert_array_equal(make_delaunay(every), flips)
+            np.testing.assert_array_equal(every.length, triangulation.length)
 
     def test_gluing_is_consistent(self):
         triangulation, _ = intrinsic_delaunay(

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coneflat.geometry.layers import may_overlap, open_sides
+from coneflat.geometry.layers import may_overlap
 from coneflat.geometry.overlap import find_overlaps, overlaps_of_mesh
+from coneflat.mesh.charts import open_sides
 from coneflat.mesh.connectivity import TriangleMesh
 
 

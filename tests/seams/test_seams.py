@@ -9,7 +9,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from coneflat import TriangleMesh, errors
 from coneflat.atlas.sheet import grown
-from coneflat.linalg.shortest_paths import MultiGraph
+from coneflat.linalg.shortest_paths import MultiGraph, Regions
 from coneflat.mesh import cut_open
 from coneflat.mesh.connectivity import label_components
 from coneflat.seams import find_seams
@@ -195,6 +195,26 @@ def test_sets_grow_by_the_nearest_nodes(min_size):
         region = np.flatnonzero(paths.source == seed)
         nearest = region[np.argsort(paths.distance[region])][: max(1, int(min_size))]
         assert set(np.flatnonzero(grown(paths, chosen, np.ones(graph.nodes), min_size))) == set(nearest)
+
+
+@pytest.mark.parametrize("total", [0.0, 4.5, 8.0])
+def test_a_search_ends_where_both_regions_are_large_enough(total):
+    graph = random_graph(5)
+    is_second = np.arange(graph.nodes) == 30
+    weights = np.random.default_rng(5).uniform(0.5, 1.5, graph.nodes)
+    paths = graph.shortest_paths(np.array([3, 30]))
+    limited = graph.shortest_paths(np.array([3, 30]), regions=Regions(is_second, weights, total))
+    ends = []
+    for seed in (3, 30):
+        region = np.flatnonzero(paths.source == seed)
+        region = region[np.argsort(paths.distance[region])]
+        ends.append(paths.distance[region[np.argmax(np.cumsum(weights[region]) > total)]])
+    inside = paths.distance <= max(ends)
+    assert 1 < np.count_nonzero(inside) < graph.nodes
+    for name in ("distance", "before", "edge", "source"):
+        np.testing.assert_array_equal(getattr(limited, name)[inside], getattr(paths, name)[inside])
+    assert (limited.distance[~inside] > max(ends)).all()
+    assert np.isinf(limited.distance).any()
 
 
 def test_seams_of_components_are_independent():

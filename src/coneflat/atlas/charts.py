@@ -8,12 +8,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base.arrays import FloatArray, IntArray, as_floats
+from ..base.arrays import FloatArray, IntArray, as_floats, mask_of
 from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..geometry.coverage import cancel_sides
-from ..geometry.layers import open_sides
 from ..geometry.planar import bounds
-from ..mesh.charts import both_sides, point_seams
+from ..mesh.charts import both_sides, open_sides, point_seams
 from ..mesh.connectivity import NEXT, PREVIOUS, TriangleMesh, label_components
 
 # Area relative to the square of the extent. A chart below this is a line, up to rounding.
@@ -194,8 +193,8 @@ class ChartLayout:
     def split(self, chart: IntArray) -> ChartLayout:
         """Return the layout split into smaller charts, (m,) the chart of each triangle, with separate points."""
         keys = chart[:, None] * len(self.points) + self.corners
-        distinct, corners = numbered(keys)
-        return ChartLayout(self.points[distinct % len(self.points)], corners, chart)
+        distinct, corners = np.unique(keys, return_inverse=True)
+        return ChartLayout(self.points[distinct % len(self.points)], corners.reshape(keys.shape), chart)
 
     def joined(self, pairs: IntArray) -> ChartLayout:
         """Return the layout with pairs of points (k, 2) merged into the point with the smallest index."""
@@ -205,15 +204,14 @@ class ChartLayout:
 
     def renumbered(self) -> ChartLayout:
         """Return the layout without unused points and with charts numbered from 0."""
-        distinct, corners = numbered(self.corners)
-        chart = numbered(self.chart)[1]
-        return ChartLayout(self.points[distinct], corners, chart, self.seams)
+        indices, corners = numbered(self.corners)
+        return ChartLayout(self.points[indices], corners, numbered(self.chart)[1], self.seams)
 
 
 def numbered(values: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the sorted distinct values, and the index of each value among them."""
-    distinct, places = np.unique(values, return_inverse=True)
-    return distinct, places.reshape(values.shape)
+    """Return the sorted distinct values, small integers from 0, and the index of each value among them."""
+    is_used = mask_of(int(values.max()) + 1, values)
+    return np.flatnonzero(is_used), (np.cumsum(is_used) - 1)[values]
 
 
 def same_points(count: int, pairs: IntArray) -> IntArray:

@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, mask_of
+from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, mask_of, rows_of
 from ..base.progress import check_cancelled
 from ..geometry.overlap import find_overlaps
-from ..geometry.planar import as_pairs, bounds, signed_double_areas
+from ..geometry.planar import as_pairs, bounds, enclosing_box, signed_double_areas
 from ..mesh.connectivity import TriangleMesh
 from .charts import ChartLayout, Seams, same_points
 
@@ -134,7 +134,7 @@ class _Gluing:
         return True
 
     def _corners(self, faces: IntArray) -> FloatArray:
-        return as_pairs(self.places[self.corners[faces]])
+        return as_pairs(self.places.take(rows_of(self.corners, faces)))
 
     def _fits(self, fixed: int, moved: int) -> bool:
         """Return True if the moved chart's triangles are positively oriented and do not overlap the other chart."""
@@ -143,13 +143,12 @@ class _Gluing:
             return False
         low, high = bounds(corners)
         fixed_faces = self.faces[fixed]
-        fixed_faces = fixed_faces[
-            _touch(self.low[fixed_faces], self.high[fixed_faces], low.min(axis=0), high.max(axis=0))
-        ]
-        if not len(fixed_faces):
+        fixed_low, fixed_high = rows_of(self.low, fixed_faces), rows_of(self.high, fixed_faces)
+        is_near = _touch(fixed_low, fixed_high, *enclosing_box(low, high))
+        if not is_near.any():
             return True
-        lowest, highest = self.low[fixed_faces].min(axis=0), self.high[fixed_faces].max(axis=0)
-        is_close = _touch(low, high, lowest, highest)
+        fixed_faces = fixed_faces[is_near]
+        is_close = _touch(low, high, *enclosing_box(fixed_low[is_near], fixed_high[is_near]))
         together = np.concatenate([corners[is_close], self._corners(fixed_faces)])
         return not len(find_overlaps(together, limit=1).pairs)
 
@@ -161,5 +160,7 @@ def _members(label: IntArray, numbers: IntArray) -> list[IntArray]:
 
 def _touch(low: FloatArray, high: FloatArray, box_low: FloatArray, box_high: FloatArray) -> BoolArray:
     """Return (k,) True for boxes from `low` to `high` (k, 2) that touch the box from `box_low` to `box_high` (2,)."""
-    does_touch = (high >= box_low) & (low <= box_high)
-    return does_touch[:, 0] & does_touch[:, 1]
+    does_touch = np.ones(len(low), dtype=bool)
+    for x in range(2):  # NumPy is slow at arrays of pairs
+        does_touch &= (high[:, x] >= box_low[x]) & (low[:, x] <= box_high[x])
+    return does_touch

@@ -16,7 +16,7 @@ from ..mesh.connectivity import TriangleMesh
 from ..stages import Layout, SeamSpec
 from .charts import ChartLayout, Seams
 from .glue import glue_charts
-from .split import as_disk, split_overlaps, unpinched
+from .split import as_disk, find_steps, split_overlaps, unpinched
 
 # Minimum areas of a chart to try, as fractions of the total area. Where the cheapest cuts leave several charts,
 # costlier cuts with larger pieces may leave fewer: a figure of 5,000 triangles gets 9 instead of 11.
@@ -56,12 +56,14 @@ def injective_charts(
     if not len(pairs):
         return glue_charts(mesh, single_chart, lengths).renumbered()
     disk = as_disk(points, corners) if disk is None else unpinched(disk.moved_to(points))
+    steps = find_steps(pairs, disk.faces)
     candidates = list[ChartLayout]()
+    costs = lengths[mesh.halfedge_edges]
     shares = MIN_CHART_AREAS[:tries]
     for share in shares:
         min_area = share * float(np.abs(areas).sum())
         max_charts = MAX_SMALL_CHARTS if share < shares[-1] else np.inf
-        chart = split_overlaps(disk, lengths[mesh.halfedge_edges], np.abs(areas), pairs, min_area, max_charts)
+        chart = split_overlaps(disk, costs, np.abs(areas), pairs, min_area, max_charts, steps)
         if chart is None:
             continue
         layout = glue_charts(mesh, single_chart.split(chart), lengths).renumbered()

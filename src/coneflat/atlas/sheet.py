@@ -7,15 +7,19 @@ off are small: neither the search for a cut nor the labelling of its sides visit
 
 from __future__ import annotations
 
+from functools import cached_property
 from itertools import product
 
 import numpy as np
 
-from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, rows_of
 from ..geometry.intrinsic import halfedge_twins
-from ..linalg.shortest_paths import MultiGraph, Paths
+from ..linalg.shortest_paths import MultiGraph, Paths, Regions
 from ..mesh.connectivity import TriangleMesh
 from .sheet_kernels import split_piece, walk_border
+
+# Bound of the relative rounding error of sums of areas.
+AREA_ROUNDING = 1e-9
 
 
 class Sheet:
@@ -111,20 +115,30 @@ class Sheet:
             areas: (m,) areas of the triangles.
             min_area: area up to which each set is extended, where possible.
         """
-        disk, inside = self.disk, self._inside(index)
-        a, b, c = (disk.vertices[disk.faces[:, corner]] for corner in range(3))
-        middles = a + b + c
-        steps = (middles[inside[:, 0]] - middles[inside[:, 1]]) / 3
-        lengths = np.hypot(steps[:, 0], steps[:, 1])
-        paths = MultiGraph(len(disk.faces), inside, lengths).shortest_paths(
-            np.flatnonzero(first_set | second_set)
+        regions = Regions(second_set, areas, (1 + AREA_ROUNDING) * min_area)
+        paths = self._dual(np.where(self._is_inside(index), self._steps, np.inf)).shortest_paths(
+            np.flatnonzero(first_set | second_set), regions=regions
         )
         return grown(paths, first_set, areas, min_area), grown(paths, second_set, areas, min_area)
 
-    def _inside(self, index: int) -> IntArray:
-        """Return (k, 2) the pairs of triangles of a piece that share an edge, in the order of edges."""
-        pairs = self.disk.edge_faces[~self.disk.is_boundary_edge]
-        return pairs[(self.piece[pairs[:, 0]] == index) & (self.piece[pairs[:, 1]] == index)]
+    @cached_property
+    def _steps(self) -> FloatArray:
+        """(k,) the distances between the middles of triangles that share an edge, see `TriangleMesh.face_pairs`."""
+        a, b, c = (rows_of(self.disk.vertices, self.disk.faces[:, corner]) for corner in range(3))
+        first, second = (rows_of(a + b + c, faces) for faces in self.disk.face_pairs[0].T)
+        steps = (first - second) / 3
+        return np.hypot(steps[:, 0], steps[:, 1])
+
+    def _dual(self, costs: FloatArray) -> MultiGraph:
+        """Return the graph of the triangles, with the costs (k,) of steps between those that share an edge."""
+        pairs, incident = self.disk.face_pairs
+        return MultiGraph(len(self.piece), pairs, costs, incident)
+
+    def _is_inside(self, index: int) -> BoolArray:
+        """Return (k,) whether both triangles that share an edge are in a piece."""
+        first, second = self.disk.face_pairs[0].T
+        is_member = self.piece == index
+        return is_member[first] & is_member[second]
 
     def _both_to_the_border(
         self, index: int, border: IntArray, first_set: BoolArray, second_set: BoolArray
@@ -151,11 +165,9 @@ class Sheet:
         """
         if chosen[border].any():
             return chosen
-        inside = self._inside(index)
-        inside = inside[~blocked[inside].any(axis=1)]
-        dual = MultiGraph(len(chosen), inside, np.ones(len(inside)))
+        is_open = self._is_inside(index) & ~has_any(blocked, self.disk.face_pairs[0])
         free = border[~blocked[border]]
-        paths = dual.shortest_paths(np.flatnonzero(chosen), free)
+        paths = self._dual(np.where(is_open, 1.0, np.inf)).shortest_paths(np.flatnonzero(chosen), free)
         nearest = free[np.argsort(paths.distance[free], kind="stable")[:1]]
         if not np.isfinite(paths.distance[nearest]).any():
             return None

@@ -17,6 +17,7 @@ def split_overlaps(
     pairs: IntArray,
     min_area: float = 0.0,
     max_charts: float = np.inf,
+    steps: IntArray | None = None,
 ) -> IntArray | None:
     """Return (m,) the chart of each triangle, from 0, such that no chart has both triangles of a pair.
 
@@ -30,6 +31,7 @@ def split_overlaps(
         pairs: (k, 2) triangles to separate, one pair or more, in lexicographic order.
         min_area: minimum area that a chart should have.
         max_charts: number of charts at which splitting stops.
+        steps: the steps between the pairs, if they are known, see `find_steps`.
 
     Returns:
         The charts, or None if `max_charts` charts are not enough.
@@ -37,7 +39,7 @@ def split_overlaps(
     chart, count = np.zeros(len(areas), dtype=np.int64), 1
     sheets = [_Sheet(disk, costs, areas, np.arange(len(areas)), 0)]
     # Pieces of sheets, with the pairs in each and the steps between them.
-    waiting = [(sheets[0], 0, pairs, _steps(pairs, disk.faces))]
+    waiting = [(sheets[0], 0, pairs, find_steps(pairs, disk.faces) if steps is None else steps)]
     while waiting and count < max_charts:
         check_cancelled()
         sheet, index, pairs, steps = waiting.pop()
@@ -110,7 +112,7 @@ def unpinched(mesh: TriangleMesh) -> TriangleMesh:
 
 
 def _steps_between(steps: IntArray, chosen: BoolArray) -> IntArray:
-    """Return the steps between chosen pairs (k,), renumbered, see `_steps`."""
+    """Return the steps between chosen pairs (k,), renumbered, see `find_steps`."""
     number, is_within = np.cumsum(chosen) - 1, chosen[steps // 2].all(axis=0)
     return np.asarray(2 * number[steps[:, is_within] // 2] + steps[:, is_within] % 2)
 
@@ -123,7 +125,7 @@ def largest_layers(pairs: IntArray, steps: IntArray, areas: FloatArray) -> tuple
 
     Args:
         pairs: (k, 2) overlapping triangles, in lexicographic order.
-        steps: the steps between them, see `_steps`.
+        steps: the steps between them, see `find_steps`.
         areas: (m,) areas of the triangles.
     """
     count, label = label_components(2 * len(pairs), *np.concatenate([steps, steps ^ 1], axis=1))
@@ -140,7 +142,7 @@ def largest_layers(pairs: IntArray, steps: IntArray, areas: FloatArray) -> tuple
 
 
 def _layers(pairs: IntArray, members: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the first and second triangles of pairs numbered as in `_steps`; those of one pair if they intersect."""
+    """Return the first and second triangles of pairs, see `find_steps`; those of one pair if they intersect."""
     firsts, seconds = pairs.ravel()[members], pairs.ravel()[members ^ 1]
     first_layer, second_layer = np.unique(firsts), np.unique(seconds)
     return (
@@ -150,7 +152,7 @@ def _layers(pairs: IntArray, members: IntArray) -> tuple[IntArray, IntArray]:
     )
 
 
-def _steps(pairs: IntArray, triangles: IntArray) -> IntArray:
+def find_steps(pairs: IntArray, triangles: IntArray) -> IntArray:
     """Return (2, s) the pairs of an overlap that are adjacent: the second triangle is replaced by a neighbour.
 
     Pair i has number 2i in its given order and 2i + 1 in the other order.

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arrays import BoolArray, IntArray
+from .arrays import BoolArray, FloatArray, IntArray
 from .jit import compiled
 
 
+@compiled
 def edges_at_nodes(ends: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
     """Return the incident edges of each node in compressed form.
 
@@ -16,11 +17,34 @@ def edges_at_nodes(ends: IntArray, nodes: int) -> tuple[IntArray, IntArray]:
         nodes: number n of nodes.
 
     Returns:
-        (n + 1,) where the edges of each node start, and (2e,) these edges; each edge is listed at both of its ends.
+        (n + 1,) where the edges of each node start, and (2e,) these edges, ascending at each node; each edge is listed
+        at both of its ends.
     """
-    flat = ends.reshape(-1)
-    starts = np.concatenate([[0], np.cumsum(np.bincount(flat, minlength=nodes))])
-    return starts, np.argsort(flat, kind="stable") // 2
+    starts = np.zeros(nodes + 1, np.int64)
+    for e in range(len(ends)):
+        for x in range(2):
+            starts[ends[e, x] + 1] += 1
+    for v in range(nodes):
+        starts[v + 1] += starts[v]
+    place, sides = starts.copy(), np.empty(2 * len(ends), np.int64)
+    for e in range(len(ends)):
+        for x in range(2):
+            v = ends[e, x]
+            sides[place[v]] = e
+            place[v] += 1
+    return starts, sides
+
+
+@compiled
+def largest_at(places: IntArray, values: FloatArray, count: int) -> FloatArray:
+    """Return (count,) the largest of the values (k,) that have each place (k,), 0 if none is larger.
+
+    NumPy's `maximum.at` takes ten times as long.
+    """
+    largest = np.zeros(count)
+    for k in range(len(places)):
+        largest[places[k]] = max(largest[places[k]], values[k])
+    return largest
 
 
 @compiled
@@ -51,14 +75,20 @@ def label_nodes(count: int, tails: IntArray, heads: IntArray) -> tuple[int, IntA
         parent[v] = v
     for e in range(len(tails)):
         unite(parent, tails[e], heads[e])
+    return number_trees(parent), parent
+
+
+@compiled
+def number_trees(parent: IntArray) -> int:
+    """Replace the parents in a union-find forest by the numbers of the trees, by first node; return their count."""
     number = 0
-    for v in range(count):  # a parent has a smaller index than its children
+    for v in range(len(parent)):  # a parent has a smaller index than its children
         if parent[v] == v:
             parent[v] = number
             number += 1
         else:
             parent[v] = parent[parent[v]]
-    return number, parent
+    return number
 
 
 @compiled

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
-from ..base.threads import MEMORY_BOUND_TRIANGLES
+from ..base.threads import MEMORY_BOUND_TRIANGLES, concurrently
 from ..geometry.operators import weighted_areas
 from ..mesh.ties import mesh_tie_key
 from ..stages import ConeSpec, Surface
+from .sparse.coarse_search import CoarseSurface
 from .sparse.limits import largest_cone_angles
 from .sparse.linear_model import LinearModel
-from .sparse.search import ConeSearch
+from .sparse.search import ConeSearch, required_vertices
+from .sparse.starts import StartsOf
+
+# Number of triangles up to which a search on a coarse mesh first takes no less time.
+MAX_WITHOUT_COARSE_MESH = 20_000
 
 
 @dataclass(eq=False)
@@ -58,9 +64,9 @@ class ConeSurface(Surface):
         if self._search is not None:
             self._search = self._search.restricted(spec.is_allowed)
             return self._search
-        mesh = self.mesh
+        mesh, linear = self.mesh, self.linear_model(spec)
         search = ConeSearch.of(
-            self.linear_model(spec),
+            linear,
             mesh.euler_characteristic,
             # A boundary corner of angle a has the curvature pi - a; inner cones use the same bound of curvature.
             min_cone_angle=spec.min_angle + (np.pi if spec.searches_corners else 0.0),
@@ -69,10 +75,26 @@ class ConeSurface(Surface):
             required=spec.required,
             allowed=spec.is_allowed,
             max_angles=largest_cone_angles(mesh, self.widest),
+            starts_of=self._starts(linear, spec),
         )
         if len(mesh.faces) <= MEMORY_BOUND_TRIANGLES:  # else it would use too much memory
             self._search = search
         return search
+
+    def _starts(self, linear: LinearModel, spec: ConeSpec) -> StartsOf | None:
+        """Return what gives the sets of cones on a coarse mesh; None if the mesh is so small that it needs none."""
+        count = len(self.mesh.faces)
+        if count <= MAX_WITHOUT_COARSE_MESH:
+            return None
+        share, required = (
+            weighted_areas(self.areas, spec.weights),
+            required_vertices(spec.required, linear.is_boundary),
+        )
+        with concurrently(
+            partial(CoarseSurface.of, self.mesh, share, linear.is_boundary, required), count
+        ) as making:
+            linear.operator.factorize()
+            return making.result().starts
 
     def close_search(self) -> None:
         """Delete the cached search, which uses much memory and whose results later searches would reuse."""

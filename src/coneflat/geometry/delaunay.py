@@ -14,11 +14,12 @@ import math
 
 import numpy as np
 
-from ..base.arrays import FloatArray, IntArray, Numbers
+from ..base.arrays import BoolArray, FloatArray, IntArray, Numbers
 from ..base.jit import compiled
 from ..linalg.heap import drop_first, push
 from ..mesh.connectivity import TriangleMesh
 from .intrinsic import IntrinsicTriangulation, intrinsic_triangulation
+from .triangles import cotangents
 
 # Largest number of flips per edge. The number is finite in theory; in floating point, this limit ends the cycles that
 # the tolerance of the test does not prevent.
@@ -60,6 +61,16 @@ def make_delaunay(
     )
 
 
+def euclidean_suspects(triangulation: IntrinsicTriangulation) -> IntArray:
+    """Return both half-edges of the edges that may violate the Delaunay condition, ascending.
+
+    All edges with a cotangent sum that is surely positive are left out. This takes a third of the time of the
+    condition.
+    """
+    cots = cotangents(triangulation.length.reshape(-1, 3))
+    return np.flatnonzero(may_violate(triangulation.twin, cots.ravel()))
+
+
 def intrinsic_delaunay(mesh: TriangleMesh, lengths: FloatArray) -> tuple[IntrinsicTriangulation, IntArray]:
     """Return the intrinsic Delaunay triangulation of a mesh, and (k,) the flipped half-edges, in order.
 
@@ -68,12 +79,27 @@ def intrinsic_delaunay(mesh: TriangleMesh, lengths: FloatArray) -> tuple[Intrins
         lengths: (m, 3) side lengths, model units, that satisfy the triangle inequality.
     """
     triangulation = intrinsic_triangulation(mesh, lengths)
-    return triangulation, make_delaunay(triangulation)
+    return triangulation, make_delaunay(triangulation, suspects=euclidean_suspects(triangulation))
 
 
 # Bound of the rounding error of a slack relative to the perimeter: a few ulps of lengths that are products of three
 # factors, with a wide margin, since an edge that is flipped because of rounding could flip back and forth forever.
 SLACK_ROUNDING = 1e-14
+# Bound of the rounding error of a cotangent, relative to 1 plus its magnitude, in the same sense.
+COTANGENT_ROUNDING = 1e-12
+
+
+@compiled
+def may_violate(twin: IntArray, cots: FloatArray) -> BoolArray:
+    """Return (3m,) whether the sum of the cotangents (3m,) opposite an edge may be negative."""
+    is_suspect = np.zeros(len(twin), np.bool_)
+    for h in range(len(twin)):
+        t = twin[h]
+        # Cotangents of triangles without area are not numbers.
+        is_suspect[h] = t >= 0 and not (
+            cots[h] + cots[t] > COTANGENT_ROUNDING * (2.0 + abs(cots[h]) + abs(cots[t]))
+        )
+    return is_suspect
 
 
 @compiled

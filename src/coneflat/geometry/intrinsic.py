@@ -55,22 +55,22 @@ def check_lengths(
     values = as_lengths(lengths, len(mesh.faces))
     with np.errstate(all="ignore"):
         areas = double_areas(values)  # 0 or not finite for every invalid triangle
-    pairs = mesh.edge_halfedges[~mesh.is_boundary_edge]
-    length_at_first, length_at_second = values.ravel()[pairs].T
-    has_equal_sides = np.array_equal(length_at_first, length_at_second)
+    # The second length of a boundary edge is that of any side, and not used.
+    length_at_first, length_at_second = values.take(mesh.edge_halfedges).T
+    is_inner = ~mesh.is_boundary_edge
+    has_equal_sides = not (is_inner & (length_at_first != length_at_second)).any()
     if not flat and has_equal_sides and (areas > 0).all() and np.isfinite(areas).all():
         return values
     faces = np.arange(len(values)) if face_names is None else face_names
     _refuse_numbers(values, faces, flat)
-    differ = np.flatnonzero(
-        np.abs(length_at_first - length_at_second)
-        > LENGTH_ROUNDING * np.maximum(length_at_first, length_at_second)
-    )
+    off = np.abs(length_at_first - length_at_second)
+    longer = np.maximum(length_at_first, length_at_second)
+    differ = np.flatnonzero(is_inner & (off > LENGTH_ROUNDING * longer))
     if len(differ):
-        edges = mesh.edges[~mesh.is_boundary_edge][differ]
+        edges = mesh.edges[differ]
         names = edges if vertex_names is None else vertex_names[edges]
         first = differ[0]
-        first_face, second_face = faces[pairs[first] // 3]
+        first_face, second_face = faces[mesh.edge_faces[first]]
         raise LengthError(
             f"{plural(len(differ), 'edge')} with different lengths on their two sides: "
             f"{list_some([f'{a}-{b}' for a, b in names[:6]], len(differ))}; edge {names[0, 0]}-{names[0, 1]} is "
@@ -79,7 +79,7 @@ def check_lengths(
         )
     if not has_equal_sides:
         values = values.copy()
-        values.ravel()[pairs[:, 1]] = length_at_first
+        values.ravel()[mesh.edge_halfedges[is_inner, 1]] = length_at_first[is_inner]
     unit = np.ldexp(values, -np.frexp(values.max())[1])
     spare = slacks(unit).min(axis=1)
     is_broken = np.asarray(spare < -LENGTH_ROUNDING * unit.max(axis=1))

@@ -12,30 +12,11 @@ import numpy as np
 
 from ..base.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from ..base.jit import compiled
-from ..mesh.connectivity import end_corners
 
 # Number of cells along a side of the grid, divided by the square root of the number of triangles, and its maximum.
 CELLS_PER_ROOT, MAX_CELLS = 1.5, 2048
 # Number of triangles below which no grid is used, and mean number of rows that a side crosses above which none is used.
 MIN_TRIANGLES, MAX_ROWS_PER_SIDE = 2000, 20
-
-
-def open_sides(edge_halfedges: IntArray, corners: FloatArray, group: IntArray) -> BoolArray:
-    """Return (3m,) which half-edges are open: their twin does not connect exactly the same points of the plane.
-
-    Args:
-        edge_halfedges: (e, 2) the half-edges of each edge, see `TriangleMesh`.
-        corners: (m, 3, 2) corners of the triangles in the plane.
-        group: (m,) group of each triangle. Only sides of the same group cancel; all sides of negative groups are open.
-    """
-    is_open = np.ones(3 * len(corners), dtype=bool)
-    h, t = edge_halfedges[edge_halfedges[:, 1] >= 0].T
-    places = np.ascontiguousarray(corners).view(np.complex128).ravel()
-    (start, end), (other_start, other_end) = end_corners(h), end_corners(t)
-    is_closed = (group[h // 3] == group[t // 3]) & (group[h // 3] >= 0)
-    is_closed &= (places[start] == places[other_end]) & (places[end] == places[other_start])
-    is_open[h[is_closed]] = is_open[t[is_closed]] = False
-    return is_open
 
 
 def may_overlap(corners: FloatArray, signs: IntArray, is_open: BoolArray) -> IntArray:
@@ -44,7 +25,7 @@ def may_overlap(corners: FloatArray, signs: IntArray, is_open: BoolArray) -> Int
     Args:
         corners: (m, 3, 2) corners of the triangles.
         signs: (m,) 1 counterclockwise, -1 clockwise, 0 without area.
-        is_open: (3m,) True for half-edges that do not cancel in pairs; see `open_sides`.
+        is_open: (3m,) True for half-edges that do not cancel in pairs; see `mesh.charts.open_sides`.
     """
     every = np.flatnonzero(signs)
     if len(every) < MIN_TRIANGLES:
@@ -54,14 +35,14 @@ def may_overlap(corners: FloatArray, signs: IntArray, is_open: BoolArray) -> Int
     ends = np.stack([corners[face, (corner + 1) % 3], corners[face, (corner + 2) % 3]], axis=1)
     ends = np.where((signs[face] < 0)[:, None, None], ends[:, ::-1], ends)
     flat = np.ascontiguousarray(corners).reshape(-1, 6)
-    low, high = (pick(pick(corners, axis=0), axis=0) for pick in (np.min, np.max))
+    x, y = corners[..., 0], corners[..., 1]  # NumPy is slow at extrema of pairs
+    low, extent = (float(x.min()), float(y.min())), float(max(np.ptp(x), np.ptp(y)))
     count = min(int(CELLS_PER_ROOT * math.sqrt(len(corners))), MAX_CELLS)
-    extent = float((high - low).max())
     # The extent is half a cell less than the grid, so that the points of largest coordinates are in the last cells.
     scale = (count - 0.5) / extent if extent > 0 else 0.0
     if not 0 < scale < np.inf or np.abs(np.diff(ends[..., 1])).sum() * scale > MAX_ROWS_PER_SIDE * len(every):
         return every
-    grid = float(low[0]), float(low[1]), scale
+    grid = *low, scale
     marks, steps = np.zeros((2, count + 2, count + 2), dtype=np.int32)
     trace_sides(ends.reshape(-1, 4), *grid, marks, steps)
     sum_cells(marks, steps)

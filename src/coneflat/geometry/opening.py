@@ -89,7 +89,8 @@ def with_slack(lengths: FloatArray) -> FloatArray:
 def thickness(lengths: FloatArray) -> FloatArray:
     """Return (m,) twice the area of triangles divided by the square of their longest side; 0 without any length."""
     lengths = as_triples(lengths)
-    squares = lengths.max(axis=1) ** 2
+    a, b, c = lengths.T
+    squares = np.maximum(np.maximum(a, b), c) ** 2
     return np.divide(double_areas(lengths), squares, out=np.zeros(len(lengths)), where=squares > 0)
 
 

@@ -28,17 +28,28 @@ def as_pairs(points: ComplexArray) -> FloatArray:
 
 def signed_double_areas(corners: FloatArray) -> FloatArray:
     """Return (m,) twice the area of triangles with corners (m, 3, 2), negative for clockwise ones."""
+    x, y = corners[..., 0], corners[..., 1]  # NumPy is slow at arrays of pairs
     with np.errstate(over="ignore", invalid="ignore"):
-        side_b, side_c = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        areas: FloatArray = side_b[:, 0] * side_c[:, 1] - side_b[:, 1] * side_c[:, 0]
+        areas: FloatArray = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) - (y[:, 1] - y[:, 0]) * (
+            x[:, 2] - x[:, 0]
+        )
     return areas
 
 
 def bounds(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return (m, 2) the smallest and (m, 2) the largest coordinates of triangles with corners (m, 3, 2)."""
-    # NumPy is slow at extrema along an axis of length three.
-    first, second, third = (corners[:, k] for k in range(3))
-    return np.minimum(np.minimum(first, second), third), np.maximum(np.maximum(first, second), third)
+    low, high = np.empty((2, len(corners), 2))
+    for x in range(2):  # NumPy is slow at extrema along short axes
+        first, second, third = corners[:, :, x].T
+        low[:, x] = np.minimum(np.minimum(first, second), third)
+        high[:, x] = np.maximum(np.maximum(first, second), third)
+    return low, high
+
+
+def enclosing_box(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return (2,) the smallest and (2,) the largest coordinates of boxes from `low` to `high` (k, 2)."""
+    # NumPy is slow at extrema of pairs.
+    return np.array([x.min() for x in low.T]), np.array([x.max() for x in high.T])
 
 
 def signed_angles(sides: ComplexArray) -> FloatArray:
@@ -59,10 +70,11 @@ def heights(sides: ComplexArray) -> FloatArray:
 
 def sides_between(corners: FloatArray) -> ComplexArray:
     """Return (m, 3) the sides, as complex numbers, of triangles with corners (m, 3, 2)."""
-    sides = np.empty(corners.shape)
+    points = np.ascontiguousarray(corners).view(np.complex128)[..., 0]  # NumPy is slow at arrays of pairs
+    sides = np.empty(points.shape, dtype=np.complex128)
     for i in range(3):
-        np.subtract(corners[:, PREVIOUS[i]], corners[:, NEXT[i]], out=sides[:, i])
-    return sides.view(np.complex128)[..., 0]
+        np.subtract(points[:, PREVIOUS[i]], points[:, NEXT[i]], out=sides[:, i])
+    return sides
 
 
 def map_factors(shapes: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
@@ -123,11 +135,12 @@ def qc_distortion(lengths: FloatArray, places: FloatArray) -> FloatArray:
         lengths: (m, 3) side lengths on the surface.
         places: (m, 3, 2) corners in the plane.
     """
-    a_of, b_of = map_factors(rest_sides(lengths))
-    corners = as_complex(places)
-    corners -= corners[:, :1]
-    size_a, size_b = (np.abs((factors * corners).sum(axis=1)) for factors in (a_of, b_of))
-    # For triangles without area on the surface, the comparison is with NaN.
+    # The map z -> a z + b conj(z) has the singular values |a| + |b| and |a| - |b|. Both are multiplied by the same
+    # number here, which is 0 for triangles without area on the surface.
+    shapes, sides = rest_sides(lengths), sides_between(places)
+    a = np.conj(shapes[:, 1]) * sides[:, 0] - np.conj(shapes[:, 0]) * sides[:, 1]
+    b = shapes[:, 0] * sides[:, 1] - shapes[:, 1] * sides[:, 0]
+    size_a, size_b = np.abs(a), np.abs(b)
     return np.divide(
         size_a + size_b, size_a - size_b, out=np.full(len(lengths), np.inf), where=size_a > size_b
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,6 +40,20 @@ class Paths:
         return np.array(list(on_paths), dtype=np.int64)
 
 
+class Regions(NamedTuple):
+    """How far two regions grow around the sources of shortest paths.
+
+    Attributes:
+        is_second: (n,) True for the sources of the second region.
+        weights: (n,) weight of each node.
+        total: weight of each region up to which it grows.
+    """
+
+    is_second: BoolArray
+    weights: FloatArray
+    total: float
+
+
 @dataclass(frozen=True, eq=False)
 class MultiGraph:
     """An undirected graph with edge costs; parallel edges and loops are allowed.
@@ -59,20 +74,38 @@ class MultiGraph:
     def _incident(self) -> tuple[IntArray, IntArray]:
         return edges_at_nodes(self.ends, self.nodes) if self.incident_edges is None else self.incident_edges
 
-    def shortest_paths(self, sources: IntArray, targets: IntArray | None = None) -> Paths:
+    def shortest_paths(
+        self, sources: IntArray, targets: IntArray | None = None, regions: Regions | None = None
+    ) -> Paths:
         """Return the shortest paths from the sources; edges of infinite cost are not used.
 
         Args:
             sources: (s,) nodes.
             targets: (t,) nodes. The search ends at the nearest of them. Nodes that are farther away are not reached,
                 or have a distance that is too large. None: all nodes are reached.
+            regions: the search ends where both regions, of the nodes nearest to their sources, have more than the
+                total weight, after all nodes of the same distance. None: it does not end.
         """
         is_target = np.zeros(self.nodes, dtype=bool)
         if targets is not None:
             is_target[targets] = True
         distance = np.full(self.nodes, np.inf)
         before, edge, source = np.full((3, self.nodes), -1)
-        find_paths(*self._incident, self.ends, self.costs, sources, is_target, distance, before, edge, source)
+        limits = Regions(is_target, np.empty(0), np.inf) if regions is None else regions
+        find_paths(
+            *self._incident,
+            self.ends,
+            self.costs,
+            sources,
+            is_target,
+            limits.is_second,
+            limits.weights,
+            limits.total,
+            distance,
+            before,
+            edge,
+            source,
+        )
         return Paths(distance, before, edge, source)
 
     def minimum_spanning_tree(self) -> IntArray:
@@ -89,6 +122,9 @@ def find_paths(
     costs: FloatArray,
     sources: IntArray,
     is_target: BoolArray,
+    is_second: BoolArray,
+    weights: FloatArray,
+    total: float,
     distance: FloatArray,
     before: IntArray,
     edge: IntArray,
@@ -103,22 +139,30 @@ def find_paths(
         ends, costs: (e, 2) the nodes and (e,) the cost of each edge.
         sources: (s,) nodes.
         is_target: (n,) whether a node is a target.
+        is_second, weights, total: see `Regions`; no weights if the search is not limited.
         distance: (n,) infinite on entry; see `Paths`.
         before, edge, source: (n,) -1 on entry; see `Paths`.
     """
     keys, items = np.empty(len(sides) + len(sources)), np.empty(len(sides) + len(sources), np.int64)
-    size = 0
+    size, first_weight, second_weight, farthest = 0, 0.0, 0.0, np.inf
     for v in sources:
         if distance[v] > 0.0:
             distance[v], source[v] = 0.0, v
             size = push(keys, items, size, 0.0, v)
     while size > 0:
         key, v = keys[0], items[0]
-        if is_target[v]:
+        if is_target[v] or key > farthest:
             break
         size = drop_first(keys, items, size)
         if key > distance[v]:
             continue
+        if len(weights) > 0:
+            if is_second[source[v]]:
+                second_weight += weights[v]
+            else:
+                first_weight += weights[v]
+            if farthest == np.inf and min(first_weight, second_weight) > total:
+                farthest = key
         for i in range(starts[v], starts[v + 1]):
             e = sides[i]
             neighbour = ends[e, 0] + ends[e, 1] - v

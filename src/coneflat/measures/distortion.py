@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,7 +17,6 @@ from ..errors import ArrayShapeError, NonFiniteError, OptionError
 from ..geometry import double_areas
 from ..geometry.intrinsic import check_lengths
 from ..geometry.overlap import Overlaps, overlaps_of_mesh
-from ..geometry.planar import qc_distortion
 from ..geometry.straight import place_triangles
 from ..mesh.charts import both_sides, joined_edges, label_charts
 from ..mesh.connectivity import TriangleMesh
@@ -239,11 +239,10 @@ def measure_map(
 
 def mean_qc(layout: Layout) -> float:
     """Return the mean quasi-conformal distortion of a layout by area, over positively oriented triangles."""
-    ratios = qc_distortion(layout.lengths, layout.points[layout.corners])
-    is_positive = np.isfinite(ratios)
+    is_positive = np.isfinite(layout.qc)
     if not is_positive.any():
         return math.inf
-    return _mean(ratios[is_positive], double_areas(layout.lengths)[is_positive])
+    return _mean(layout.qc[is_positive], double_areas(layout.lengths)[is_positive])
 
 
 def _scale_measures(
@@ -262,7 +261,7 @@ def _scale_measures(
     scales = np.log(np.abs(uv_area[chosen]) / weights) / 2
     log_area_scale = np.full(len(area), np.nan)
     log_area_scale[chosen] = scales
-    low, high = (quantile(scales, weights, fraction) for fraction in (0.05, 0.95))
+    low, high = quantiles(scales, weights, (0.05, 0.95))
     return {
         "log_area_scale": log_area_scale,
         "qc_mean": _mean(ratios, weights),
@@ -371,11 +370,17 @@ def _mean(values: FloatArray, weights: FloatArray) -> float:
 
 def quantile(values: FloatArray, weights: FloatArray, fraction: float) -> float:
     """Return the weighted quantile of values for a fraction from 0 to 1; NaN for empty arrays."""
+    return quantiles(values, weights, (fraction,))[0]
+
+
+def quantiles(values: FloatArray, weights: FloatArray, fractions: Sequence[float]) -> list[float]:
+    """Return the weighted quantiles of values for several fractions, see `quantile`."""
     if not len(values):
-        return float("nan")
+        return [float("nan")] * len(fractions)
     order = np.argsort(values)
     cumulated = np.cumsum(weights[order])
-    return float(values[order[np.searchsorted(cumulated, fraction * cumulated[-1])]])
+    places = np.searchsorted(cumulated, np.array(fractions) * cumulated[-1])
+    return values[order[places]].tolist()
 
 
 def _place_separately(lengths: FloatArray) -> tuple[FloatArray, IntArray]:

@@ -43,22 +43,26 @@ SAME_AREA = 1e-6
 ROUGH_TOLERANCE = 0.01
 
 
-def unmet_guarantees(result: Flattening, unit: float = DOUBLE) -> tuple[Unmet, ...]:
+def unmet_guarantees(
+    result: Flattening, unit: float = DOUBLE, mesh: TriangleMesh | None = None
+) -> tuple[Unmet, ...]:
     """Return a note, one sentence, for each guarantee of the options that a result does not meet.
 
     Args:
         result: the result with its measures.
         unit: relative rounding of the coordinates.
+        mesh: a mesh with the result's faces, whose connectivity is reused, if there is one.
     """
+    mesh = TriangleMesh(result.vertices, result.faces) if mesh is None else mesh.moved_to(result.vertices)
     notes = (
         *_undefined(result),
         *_orientation(result),
         *_overlaps(result),
-        *_angle_sums(result, unit),
-        *_equal_sides(result, unit),
-        *_boundary_lengths(result, unit),
-        *_round_boundary(result, unit),
-        *_seam_rotations(result, unit),
+        *_angle_sums(result, unit, mesh),
+        *_equal_sides(result, unit, mesh),
+        *_boundary_lengths(result, unit, mesh),
+        *_round_boundary(result, unit, mesh),
+        *_seam_rotations(result, unit, mesh),
         *_distortion(result),
     )
     return tuple(map(Unmet, notes))
@@ -198,12 +202,11 @@ def _overlaps(result: Flattening) -> Iterator[str]:
         yield f"{plural(count, 'pair')} of triangles {verb} in the atlas, on {share:.2g} of the covered area."
 
 
-def _angle_sums(result: Flattening, unit: float) -> Iterator[str]:
+def _angle_sums(result: Flattening, unit: float, mesh: TriangleMesh) -> Iterator[str]:
     largest = result.distortion.angle_sum_error
     tolerance = EXACT_TOLERANCE if _is_exact(result) else WINDING_TOLERANCE
     if not largest > tolerance:
         return
-    mesh = TriangleMesh(result.vertices, result.faces)
     errors, change = angle_sum_errors(mesh, result.corner_uv, result.prescribed)
     with np.errstate(invalid="ignore"):
         off = np.flatnonzero(np.abs(errors) > tolerance + MAX_ROUNDINGS * unit * change)
@@ -215,7 +218,7 @@ def _angle_sums(result: Flattening, unit: float) -> Iterator[str]:
         )
 
 
-def _equal_sides(result: Flattening, unit: float) -> Iterator[str]:
+def _equal_sides(result: Flattening, unit: float, mesh: TriangleMesh) -> Iterator[str]:
     settings = result.settings
     is_marked = any(settings.get(name) is not None for name in ("seams", "sharp_angle"))
     is_tied = is_marked and settings.get("method") != "free seams"
@@ -223,7 +226,6 @@ def _equal_sides(result: Flattening, unit: float) -> Iterator[str]:
     if not np.isfinite(tolerance):
         return
     # Also edges whose sides are so close that they are measured as no seam.
-    mesh = TriangleMesh(result.vertices, result.faces)
     first, second = (
         np.abs(sides_between(result.corner_uv)).ravel()[mesh.edge_halfedges[~mesh.is_boundary_edge]].T
     )
@@ -234,10 +236,9 @@ def _equal_sides(result: Flattening, unit: float) -> Iterator[str]:
         yield f"The two sides of seams differ in length: relative difference up to {worst:.2g}."
 
 
-def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
+def _boundary_lengths(result: Flattening, unit: float, mesh: TriangleMesh) -> Iterator[str]:
     if result.settings.get("boundary") != "lengths":
         return
-    mesh = TriangleMesh(result.vertices, result.faces)
     sides = mesh.edge_halfedges[mesh.is_boundary_edge, 0]
     # Scaling by a power of two avoids underflow of squares.
     exponent = unit_exponent(mesh.vertices)
@@ -252,12 +253,11 @@ def _boundary_lengths(result: Flattening, unit: float) -> Iterator[str]:
         yield f"Lengths along the boundary are not preserved: relative difference up to {worst:.2g}."
 
 
-def _round_boundary(result: Flattening, unit: float) -> Iterator[str]:
+def _round_boundary(result: Flattening, unit: float, mesh: TriangleMesh) -> Iterator[str]:
     """Yield a note if the turning angle of a round boundary is not uniform along its length in the plane."""
     boundary = result.settings.get("boundary", "free")
     if boundary != "disk" and isinstance(boundary, str):
         return
-    mesh = TriangleMesh(result.vertices, result.faces)
     count, loop = mesh.boundary_loops
     if isinstance(boundary, Mapping):
         origin = np.arange(len(loop)) if result.vertex_origin is None else result.vertex_origin
@@ -286,11 +286,10 @@ def _round_boundary(result: Flattening, unit: float) -> Iterator[str]:
         )
 
 
-def _seam_rotations(result: Flattening, unit: float) -> Iterator[str]:
+def _seam_rotations(result: Flattening, unit: float, mesh: TriangleMesh) -> Iterator[str]:
     rotations = result.rotations
     if rotations is None or not rotations.worst > EXACT_TOLERANCE:
         return
-    mesh = TriangleMesh(result.vertices, result.faces)
     sides = np.abs(sides_between(result.corner_uv)).ravel()
     shorter = sides[mesh.edge_halfedges[~mesh.is_boundary_edge]].min(axis=1)
     off = seam_rotations(mesh, result.corner_uv, rotations.quantum)

@@ -7,10 +7,11 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, rows_of
+from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Numbers, rows_of
+from ..base.jit import compiled
 from ..base.text import plural
 from ..errors import MetricError, SeamError
-from .connectivity import TriangleMesh, end_corners, label_components, split_vertices
+from .connectivity import TriangleMesh, end_corners, ends_of_side, label_components, split_vertices
 
 # Largest UV distance, relative to the UV edge length, at which the two sides of an edge count as joined.
 JOIN_TOLERANCE = 1e-6
@@ -33,6 +34,20 @@ def both_sides(mesh: TriangleMesh, edges: IntArray, at_corners: Values) -> tuple
     return flat[np.stack(first_face, axis=1)], flat[np.stack(second_face[::-1], axis=1)]
 
 
+def open_sides(edge_halfedges: IntArray, at_corners: Numbers, group: IntArray | None = None) -> BoolArray:
+    """Return (3m,) which half-edges are open: their twin does not have exactly the same values at its ends.
+
+    Args:
+        edge_halfedges: (e, 2) the half-edges of each edge, see `TriangleMesh`; those that are missing are open.
+        at_corners: (m, 3) or (m, 3, k) values at the corners, such as places in the plane.
+        group: (m,) group of each face; edges between groups are open, and so are those of negative groups. None: all
+            faces are in one group.
+    """
+    values = np.ascontiguousarray(at_corners).reshape(3 * len(at_corners), -1)
+    groups = np.zeros(len(at_corners), dtype=np.int64) if group is None else group
+    return find_open_sides(edge_halfedges, values, groups)
+
+
 def point_seams(mesh: TriangleMesh, corners: IntArray, among: IntArray | None = None) -> IntArray:
     """Return the inner edges whose two sides have different points.
 
@@ -41,9 +56,9 @@ def point_seams(mesh: TriangleMesh, corners: IntArray, among: IntArray | None = 
         corners: (m, 3) the point at each corner.
         among: edges to choose from; None: all.
     """
-    inner = np.flatnonzero(~mesh.is_boundary_edge) if among is None else among[~mesh.is_boundary_edge[among]]
-    first_side, second_side = both_sides(mesh, inner, corners)
-    return inner[(first_side[:, 0] != second_side[:, 0]) | (first_side[:, 1] != second_side[:, 1])]
+    halfedges = mesh.edge_halfedges if among is None else mesh.edge_halfedges[among]
+    seams = np.flatnonzero(open_sides(halfedges, corners)[halfedges[:, 0]] & (halfedges[:, 1] >= 0))
+    return seams if among is None else among[seams]
 
 
 def point_vertices(faces: IntArray, corners: IntArray, count: int) -> IntArray:
@@ -61,14 +76,14 @@ def uv_seams(mesh: TriangleMesh, corner_uv: FloatArray) -> IntArray:
 def joined_edges(mesh: TriangleMesh, corner_uv: FloatArray) -> BoolArray:
     """Return (e,) True for inner edges whose two sides coincide in the plane; `corner_uv` is (m, 3, 2)."""
     uv = np.ascontiguousarray(corner_uv, dtype=np.float64)
-    inner = np.flatnonzero(~mesh.is_boundary_edge)
-    first_side, second_side = both_sides(mesh, inner, uv.view(np.complex128)[..., 0])
-    gap = np.abs(first_side - second_side).max(axis=1)
+    joined = ~open_sides(mesh.edge_halfedges, uv)[mesh.edge_halfedges[:, 0]]
+    unequal = np.flatnonzero(~joined & ~mesh.is_boundary_edge)
+    first_side, second_side = both_sides(mesh, unequal, uv.view(np.complex128)[..., 0])
+    gap = np.abs(first_side - second_side).max(axis=1, initial=0.0)
     length = np.maximum(
         np.abs(first_side[:, 1] - first_side[:, 0]), np.abs(second_side[:, 1] - second_side[:, 0])
     )
-    joined = np.zeros(len(mesh.edges), dtype=bool)
-    joined[inner] = gap <= JOIN_TOLERANCE * length
+    joined[unequal] = gap <= JOIN_TOLERANCE * length
     return joined
 
 
@@ -131,3 +146,22 @@ def open_along(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
     is_glued[seams] = False
     origin, faces = split_vertices(mesh.faces, len(mesh.vertices), *mesh.edge_halfedges[is_glued].T)
     return CutMesh(TriangleMesh(rows_of(mesh.vertices, origin), faces), origin)
+
+
+@compiled
+def find_open_sides(edge_halfedges: IntArray, values: Numbers, group: IntArray) -> BoolArray:
+    """Return the result of `open_sides` for values (3m, k)."""
+    is_open = np.ones(len(values), np.bool_)
+    for e in range(len(edge_halfedges)):
+        h, t = edge_halfedges[e, 0], edge_halfedges[e, 1]
+        if t < 0 or group[h // 3] < 0 or group[h // 3] != group[t // 3]:
+            continue
+        start, end = ends_of_side(h)
+        twin_start, twin_end = ends_of_side(t)
+        is_equal = True
+        for x in range(values.shape[1]):
+            if values[start, x] != values[twin_end, x] or values[end, x] != values[twin_start, x]:
+                is_equal = False
+        if is_equal:
+            is_open[h] = is_open[t] = False
+    return is_open

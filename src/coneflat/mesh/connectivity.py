@@ -18,7 +18,7 @@ from scipy.sparse import csr_matrix
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, has_any, mask_of
 from ..base.jit import compiled
-from ..base.sets import edges_at_nodes, label_nodes
+from ..base.sets import edges_at_nodes, label_nodes, number_trees, unite
 
 NEXT = np.array([1, 2, 0])
 PREVIOUS = np.array([2, 0, 1])
@@ -67,11 +67,8 @@ def sort_pairs(tails: IntArray, heads: IntArray, bound: int) -> tuple[IntArray, 
     Returns:
         (k,) the order; (k,) True where a pair in this order differs from the one before.
     """
-    low, high = np.minimum(tails, heads), np.maximum(tails, heads)
-    order: IntArray = np.argsort(low * np.int64(bound) + high, kind="stable")
-    is_first = np.ones(len(order), dtype=bool)
-    is_first[1:] = (np.diff(low[order]) != 0) | (np.diff(high[order]) != 0)
-    return order, is_first
+    tails, heads = (np.ascontiguousarray(nodes, dtype=np.int64) for nodes in (tails, heads))
+    return order_pairs(tails, heads, bound)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,14 +96,7 @@ class TriangleMesh:
     def _pairing(self) -> tuple[IntArray, IntArray, IntArray]:
         """Edges as vertex pairs (e, 2), edge of each half-edge (3m,), half-edges of each edge (e, 2)."""
         tails, heads = (self.faces.take(corners, axis=1).ravel() for corners in (NEXT, PREVIOUS))
-        order, is_first = sort_pairs(tails, heads, len(self.vertices))
-        edge_of = np.empty(len(order), dtype=np.int64)
-        edge_of[order] = np.cumsum(is_first) - 1
-        starts = np.flatnonzero(is_first)
-        ends = np.append(starts[1:], len(order)) - 1
-        first = order[starts]
-        pairs = np.sort(np.stack([tails[first], heads[first]], axis=1), axis=1)
-        return pairs, edge_of, np.stack([first, np.where(ends > starts, order[ends], -1)], axis=1)
+        return number_edges(tails, heads, *order_pairs(tails, heads, len(self.vertices)))
 
     def moved_to(self, vertices: FloatArray) -> TriangleMesh:
         """Return the mesh with other vertex positions (n, 3); cached connectivity is shared."""
@@ -168,6 +158,12 @@ class TriangleMesh:
     def incident_edges(self) -> tuple[IntArray, IntArray]:
         """Incident edges of the vertices: where those of each vertex start, (n + 1,), and the edges, (2e,)."""
         return edges_at_nodes(self.edges, len(self.vertices))
+
+    @cached_property
+    def face_pairs(self) -> tuple[IntArray, tuple[IntArray, IntArray]]:
+        """Pairs of faces that share an edge (k, 2), by edge, and those of each face, as in `incident_edges`."""
+        pairs = self.edge_faces[~self.is_boundary_edge]
+        return pairs, edges_at_nodes(pairs, len(self.faces))
 
     @cached_property
     def boundary_loops(self) -> tuple[int, IntArray]:
@@ -297,19 +293,8 @@ def corner_fans(faces: IntArray, halfedges: IntArray, partners: IntArray) -> tup
         The number of fans (classes of joined corners) and the fan of each corner (m, 3). If all interior edges are
         glued, a vertex of a manifold has one fan. If seams are not glued, the fans are the vertices of the cut mesh.
     """
-    flat = faces.ravel()
-    # The end corners of both half-edges, ordered so that the same vertex comes first.
-    start, end = end_corners(halfedges)
-    partner_start, partner_end = end_corners(partners)
-    opposed = flat[start] == flat[partner_end]
-    partner_start, partner_end = (
-        np.where(opposed, partner_end, partner_start),
-        np.where(opposed, partner_start, partner_end),
-    )
-    count, labels = label_components(
-        faces.size, np.concatenate([start, end]), np.concatenate([partner_start, partner_end])
-    )
-    return count, labels.reshape(faces.shape)
+    count, labels = label_fans(faces.ravel(), *map(np.ascontiguousarray, (halfedges, partners)))
+    return int(count), labels.reshape(faces.shape)
 
 
 def split_vertices(
@@ -344,6 +329,13 @@ def end_corners(halfedges: IntArray) -> tuple[IntArray, IntArray]:
     return base + NEXT[corner], base + PREVIOUS[corner]
 
 
+@compiled
+def ends_of_side(h: int) -> tuple[int, int]:
+    """Return the start and end corner of a half-edge, like `end_corners`; remainders would take longer."""
+    corner = h - 3 * (h // 3)
+    return (h + 1 if corner < 2 else h - 2), (h + 2 if corner == 0 else h - 1)
+
+
 # Up to this number, keys are sorted by insertion; more are sorted by merging, as quicksort is quadratic around vertices
 # of high valence.
 MAX_INSERTION_SORT = 64
@@ -363,6 +355,77 @@ def sort_keys(keys: IntArray) -> None:
                 before -= gap
             keys[before + gap] = key
         gap //= 3
+
+
+@compiled
+def label_fans(corners: IntArray, halfedges: IntArray, partners: IntArray) -> tuple[int, IntArray]:
+    """Return the result of `corner_fans` for (3m,) the vertex at each corner."""
+    parent = np.arange(len(corners))
+    for k in range(len(halfedges)):
+        start, end = ends_of_side(halfedges[k])
+        partner_start, partner_end = ends_of_side(partners[k])
+        if corners[start] != corners[partner_end]:  # the faces have different orientations
+            partner_start, partner_end = partner_end, partner_start
+        unite(parent, start, partner_end)
+        unite(parent, end, partner_start)
+    return number_trees(parent), parent
+
+
+@compiled
+def order_pairs(tails: IntArray, heads: IntArray, bound: int) -> tuple[IntArray, BoolArray]:
+    """Return the result of `sort_pairs`: pairs are counted by their smaller index, then sorted by the larger one."""
+    starts = np.zeros(bound + 1, np.int64)
+    for k in range(len(tails)):
+        starts[min(tails[k], heads[k]) + 1] += 1
+    for v in range(bound):
+        starts[v + 1] += starts[v]
+    # The high 32 bits of a key are the larger index, the low ones the number of the pair.
+    keys, place = np.empty(len(tails), np.int64), starts.copy()
+    for k in range(len(tails)):
+        low, high = min(tails[k], heads[k]), max(tails[k], heads[k])
+        keys[place[low]] = (high << 32) | k
+        place[low] += 1
+    is_first = np.empty(len(tails), np.bool_)
+    for v in range(bound):
+        sort_keys(keys[starts[v] : starts[v + 1]])
+        before = -1
+        for at in range(starts[v], starts[v + 1]):
+            high = keys[at] >> 32
+            is_first[at] = high != before
+            before = high
+            keys[at] &= 0xFFFFFFFF
+    return keys, is_first
+
+
+@compiled
+def number_edges(
+    tails: IntArray, heads: IntArray, order: IntArray, is_first: BoolArray
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Return edges as vertex pairs (e, 2), the edge of each half-edge (h,), and the half-edges of each edge (e, 2).
+
+    Args:
+        tails, heads: (h,) ends of the half-edges.
+        order, is_first: (h,) half-edges by edge, and whether each is the first of its edge, see `sort_pairs`.
+    """
+    count = 0
+    for at in range(len(order)):
+        count += is_first[at]
+    pairs, edge_of, sides = (
+        np.empty((count, 2), np.int64),
+        np.empty(len(order), np.int64),
+        np.empty((count, 2), np.int64),
+    )
+    edge = -1
+    for at in range(len(order)):
+        h = order[at]
+        if is_first[at]:
+            edge += 1
+            pairs[edge, 0], pairs[edge, 1] = min(tails[h], heads[h]), max(tails[h], heads[h])
+            sides[edge, 0], sides[edge, 1] = h, -1
+        else:
+            sides[edge, 1] = h
+        edge_of[h] = edge
+    return pairs, edge_of, sides
 
 
 @compiled

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..base.arrays import BoolArray, FloatArray, IntArray, as_floats, mask_of
 from ..base.text import list_some, plural
 from ..errors import ArrayShapeError, CurvatureError, NonFiniteError
-from ..geometry.delaunay import make_delaunay
+from ..geometry.delaunay import euclidean_suspects, make_delaunay
 from ..geometry.intrinsic import IntrinsicTriangulation, check_lengths, double, intrinsic_triangulation
 from ..geometry.straight import FlatTriangles, straight_triangles
 from ..geometry.triangles import double_areas
@@ -225,7 +225,9 @@ class _Attempt:
     def is_solved(self) -> bool:
         """Whether the residual is within the tolerance, or within the rounding errors at needles."""
         state = self.state
-        return not state.broken and state.largest <= max(self.tolerance, self.problem.rounding_error(state))
+        if state.broken:
+            return False
+        return state.largest <= self.tolerance or state.largest <= self.problem.rounding_error(state)
 
 
 def _attempted(conditions: _Conditions, initial: FloatArray, settings: _Settings, doubled: bool) -> _Attempt:
@@ -242,7 +244,10 @@ def _attempted(conditions: _Conditions, initial: FloatArray, settings: _Settings
     else:
         problem = conditions.problem(triangulation, settings.preconditioner)
     if settings.delaunay:
-        problem.records.append(make_delaunay(triangulation) if flipped is None else flipped[1])
+        if flipped is None:
+            problem.records.append(make_delaunay(triangulation, suspects=euclidean_suspects(triangulation)))
+        else:
+            problem.records.append(flipped[1])
     state, steps = find_scale(problem, initial[original], settings.tolerance, settings.max_steps)
     return _Attempt(problem, state, original, steps, settings.tolerance, settings.delaunay, doubled)
 

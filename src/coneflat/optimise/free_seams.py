@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of
+from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of, rows_of
 from ..base.notes import Unmet
 from ..base.progress import stage
 from ..base.text import list_some, plural
@@ -45,7 +45,7 @@ def untangle_seams(layout: Layout, spec: ConeSpec, stretch: float, quantum: floa
     See Also:
         untangled_disk: which moves the points.
     """
-    sides = sides_between(layout.points[layout.corners])
+    sides = sides_between(rows_of(layout.points, layout.corners))
     was_bad = find_degenerate(sides)
     if quantum is not None or not was_bad.any():
         return layout

@@ -156,10 +156,14 @@ class LayoutGroup:
         return np.bincount(self._of_face[at], values[at], len(self.layouts)).astype(np.float64)
 
     @cached_property
+    def flat_areas(self) -> FloatArray:
+        """(m,) the areas of the triangles in the plane."""
+        return np.abs(np.concatenate([layout.flat_double_areas for layout in self.layouts])) / 2
+
+    @cached_property
     def lengths_as_laid_out(self) -> FloatArray:
         """Return (m, 3) the side lengths scaled so that each mesh has the area of its layout and equal weight."""
-        laid_out = self._sums(np.abs(signed_double_areas(self.points[self.corners])))
-        unit = np.sqrt(laid_out / (2 * self._sums(self.areas)))
+        unit = np.sqrt(self._sums(self.flat_areas) / self._sums(self.areas))
         return np.asarray(self.lengths * unit[self._of_face, None])
 
     @cached_property
@@ -236,7 +240,7 @@ class LayoutGroup:
         curvature = np.where(changed, layout_curvature(mesh, corners, changed), old)
         # Areas are relative to those of each layout, as the threshold for zero area is.
         unit = self._sums(self.areas)[self._of_face]
-        before, after = (np.abs(signed_double_areas(p[self.corners])) / 2 for p in (self.points, points))
+        before, after = self.flat_areas, np.abs(signed_double_areas(corners)) / 2
         growth = np.log(self._sums(after) / self._sums(before)) / 2
         old = np.concatenate([layout.log_scale for layout in self.layouts])
         log_scale = np.where(was_free, vertex_log_scale(mesh, self.areas / unit, after / unit), old)

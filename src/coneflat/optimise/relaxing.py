@@ -120,11 +120,12 @@ def relax(
     checked = check_constraints(constraints, places)
     areas = double_areas(sides) / 2
     share = areas * _weights(weights, len(mesh.faces))
-    shapes, is_free = _movable(mesh, places[corner], sides, areas, _flags(free, len(mesh.vertices)))
+    flat = rows_of(places, corner)
+    shapes, is_free = _movable(mesh, flat, sides, areas, _flags(free, len(mesh.vertices)))
     unmoved = Relaxed(places, 0.0, 0.0, 0, is_free)
     if not is_free.any():
         return unmoved
-    area = np.abs(signed_double_areas(rows_of(places, corner))).sum() / 2
+    area = np.abs(signed_double_areas(flat)).sum() / 2
     unit = 1.0 if to_scale else float(np.sqrt(area / areas.sum()))
     z = as_complex(places)
     restrictions = find_restrictions(mesh, corner, z, is_free, checked)

@@ -146,7 +146,8 @@ def aligned_cones(
     angle, origin = SHARP_ANGLE if sharp_angle is None else sharp_angle, np.arange(len(mesh.vertices))
     degrees = np.bincount(mesh.faces.ravel(), minlength=len(mesh.vertices))
     if len(mesh.faces) > 2 * COARSE_TRIANGLES:
-        mesh, origin, _ = coarse_mesh(mesh, COARSE_TRIANGLES)
+        coarse = coarse_mesh(mesh, COARSE_TRIANGLES)
+        mesh, origin = coarse.mesh, coarse.vertices
     directions, start = directions_and_indices(mesh, angle)
     scale = None if log_scale is None else log_scale[origin]
     model = MapModel(mesh, directions.combined, min_quarters, max_quarters, degrees[origin], scale)

@@ -185,7 +185,8 @@ def _with_few_triangles(mesh: TriangleMesh, side: float) -> tuple[TriangleMesh, 
             mesh, int(np.clip(4 * quads, COARSE_TRIANGLES // 6, finest))
         )
     if len(simple.faces) > 2 * count:
-        simple, vertex_origin, face_origin = coarse_mesh(mesh, int(count))
+        coarse = coarse_mesh(mesh, int(count))
+        simple, vertex_origin, face_origin = coarse.mesh, coarse.vertices, coarse.faces
     return simple, vertex_origin, face_origin
 
 

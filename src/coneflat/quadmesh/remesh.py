@@ -65,10 +65,11 @@ def remeshed(mesh: TriangleMesh, count: int) -> tuple[TriangleMesh, IntArray, In
             face_origin[origin],
             np.append(vertex_origin, np.full(len(thicker.vertices) - len(vertex_origin), n)),
         )
-        thicker, remaining, origin = coarse_mesh(thicker, count)
+        coarse = coarse_mesh(thicker, count)
+        thicker = coarse.mesh
         vertex_origin, face_origin, step, share = (
-            vertex_origin[remaining],
-            face_origin[origin],
+            vertex_origin[coarse.vertices],
+            face_origin[coarse.faces],
             step + 1,
             is_thin(thicker).mean(),
         )

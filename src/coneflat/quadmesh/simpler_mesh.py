@@ -118,7 +118,7 @@ class SimplerMesh:
         # For about twice the quads that their areas need: these are less regular.
         count = 2 / 3 / side**2
         parts = [
-            coarse_mesh(part, max(16, int(count * area_of(part))))[0]
+            coarse_mesh(part, max(16, int(count * area_of(part)))).mesh
             for part, _, _ in bare_mesh.split_components()
         ]
         small = without_pillows(joined_meshes(parts))

@@ -64,7 +64,8 @@ def find_seams(
     """
     is_forbidden = mask_of(len(mesh.edges), forbidden)
     key = mesh_tie_key(mesh)
-    costs = _checked(edge_costs, len(mesh.edges)) * (1 + TIE_BREAK * key[mesh.edges].sum(axis=1))
+    first_keys, second_keys = key.take(mesh.edges).T
+    costs = _checked(edge_costs, len(mesh.edges)) * (1 + TIE_BREAK * (first_keys + second_keys))
     for is_costly in (is_avoided, is_forbidden):
         if is_costly is not None and is_costly.any():
             costs = np.where(is_costly, costs + costs.sum(), costs)
@@ -182,7 +183,8 @@ def _lengthened(mesh: TriangleMesh, costs: FloatArray, seams: BoolArray) -> Bool
     """Return seams that are longer by an edge where they consist of one: such a cut duplicates no vertex."""
     longer, is_border = seams.copy(), seams | mesh.is_boundary_edge
     degree = np.bincount(mesh.edges[is_border].ravel(), minlength=len(mesh.vertices))
-    for edge in np.flatnonzero(seams & (degree[mesh.edges] == 1).all(axis=1)):
+    cut = np.flatnonzero(seams)
+    for edge in cut[(degree[mesh.edges[cut]] == 1).all(axis=1)]:
         is_adjacent = np.isin(mesh.edges, mesh.edges[edge]).sum(axis=1) == 1
         longer[np.argmin(np.where(is_adjacent, costs, np.inf))] = True
     return longer

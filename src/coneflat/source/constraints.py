@@ -107,7 +107,7 @@ def locate_constraints(checked: CheckedMesh, options: Options, input_mesh: Input
 def _locate(checked: CheckedMesh, noun: str, prescribed: Mapping[int, float | None]) -> VertexCurvatures:
     """Return given cones, which must be inner vertices, given corners, which must be on the boundary, or both."""
     names, origin = np.array(list(prescribed), dtype=np.int64), checked.vertex_origin
-    for name in np.setdiff1d(names, origin):
+    for name in names[~np.isin(names, origin)]:
         raise OptionError(f"{noun} {name} is not a vertex of a face: indices are from 0 to {origin[-1]}")
     vertices = np.searchsorted(origin, names)
     on_boundary = checked.mesh.is_boundary_vertex[vertices]

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.sparse import csc_matrix
 
 from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..base.sets import largest_at
 from ..base.threads import MEMORY_BOUND_TRIANGLES
 from ..geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents
 from ..geometry.delaunay import intrinsic_delaunay
@@ -225,8 +226,7 @@ class Surface:
                 cots = cotangents(sides)
         angles = corner_angles(lengths)
         curvature = angle_defect(mesh.faces, angles, mesh.is_boundary_vertex)
-        widest = np.zeros(n)
-        np.maximum.at(widest, mesh.faces.ravel(), angles.ravel())
+        widest = largest_at(mesh.faces.ravel(), angles.ravel(), n)
         widest /= np.where(mesh.is_boundary_vertex, np.pi, 2 * np.pi) - curvature
         laplacian, areas = cotangent_laplacian(faces, cots, n), vertex_areas(faces, sides, n)
         cached_delaunay = delaunay if len(faces) <= MEMORY_BOUND_TRIANGLES else None

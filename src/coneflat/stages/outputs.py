@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csc_matrix
 
-from ..base.arrays import BoolArray, FloatArray, IntArray
+from ..base.arrays import BoolArray, FloatArray, IntArray, rows_of
 from ..geometry import double_areas
 from ..geometry.operators import area_distortion
+from ..geometry.planar import qc_distortion, signed_double_areas
 from ..geometry.straight import FlatTriangles
 from ..mesh.connectivity import TriangleMesh
 
@@ -228,6 +230,16 @@ class Layout:
     def area(self) -> float:
         """The area of the mesh before scaling."""
         return float(double_areas(self.lengths).sum() / 2)
+
+    @cached_property
+    def flat_double_areas(self) -> FloatArray:
+        """(m,) twice the signed areas of the triangles in the plane."""
+        return signed_double_areas(rows_of(self.points, self.corners))
+
+    @cached_property
+    def qc(self) -> FloatArray:
+        """(m,) the quasi-conformal distortion of each triangle, infinite if it is flipped or has no area."""
+        return qc_distortion(self.lengths, rows_of(self.points, self.corners))
 
     @property
     def prescribed(self) -> FloatArray:

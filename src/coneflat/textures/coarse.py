@@ -17,7 +17,8 @@ def coarse_component(component: Component, count: int) -> tuple[Component, IntAr
 
     Options for vertices are kept; none of the edges are avoided or forbidden.
     """
-    mesh, vertices, faces = coarse_mesh(component.mesh, count)
+    coarse = coarse_mesh(component.mesh, count)
+    mesh, vertices = coarse.mesh, coarse.vertices
     lengths, is_no_edge = edge_lengths(mesh.vertices, mesh.faces), np.zeros(len(mesh.edges), dtype=bool)
 
     def at_vertices(spec: Any, *names: str) -> Any:
@@ -29,7 +30,7 @@ def coarse_component(component: Component, count: int) -> tuple[Component, IntAr
     return Component(
         mesh,
         component.vertices[vertices],
-        faces,
+        coarse.faces,
         mollify(lengths, mesh)[0],
         double_areas(lengths),
         at_vertices(component.cones, "is_allowed", "absorbs_curvature", "names"),

@@ -155,13 +155,10 @@ def _affordable_moves(
     """
     operator = search.operator
     score = operator.solve(operator.weighted(log_scale))
-    cones, targets = _moves_nearby(search, places)
+    cones, targets, distances = _moves_nearby(search, places)
     if not len(cones):
         return None
     moved, origins = curvatures[cones], places[cones]
-    distances = np.concatenate(
-        [search.fine.squared_distances(places[c], targets[cones == c]) for c in np.unique(cones)]
-    )
     costs = 2 * moved * (score[targets] - score[origins]) + penalty * moved**2 * distances
     affordable = np.flatnonzero(costs + min(costs.min(), 0.0) <= slack)
     turns = moved[:, None] * (by_curvature[targets] - by_curvature[origins])
@@ -173,12 +170,14 @@ def _affordable_moves(
     )
 
 
-def _moves_nearby(search: ConeSearch, places: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the cone and the target of all moves to usable vertices nearby; required cones are not moved."""
+def _moves_nearby(search: ConeSearch, places: IntArray) -> tuple[IntArray, IntArray, FloatArray]:
+    """Return the cone, the target and the distance of all moves to usable vertices; required cones are not moved."""
     size = min(MAX_NEIGHBOURS, 1 + MAX_COMPARED // len(places)) if len(places) else 0
-    cones, targets = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
-    for i in range(len(search.coarse.fixed), len(places)):
-        neighbours = search.fine.neighbours(int(places[i]), size)
-        targets.append(neighbours[~np.isin(neighbours, places)])
+    cones, targets, distances = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)], [np.empty(0)]
+    for i in range(len(search.fine.fixed), len(places)):
+        neighbours, lengths = search.fine.neighbours(int(places[i]), size)
+        is_free = ~np.isin(neighbours, places)
+        targets.append(neighbours[is_free])
+        distances.append(lengths[is_free])
         cones.append(np.full(len(targets[-1]), i))
-    return np.concatenate(cones), np.concatenate(targets)
+    return np.concatenate(cones), np.concatenate(targets), np.concatenate(distances)

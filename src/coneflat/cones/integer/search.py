@@ -17,7 +17,8 @@ from ...errors import CurvatureError
 from ...stages import ConeSolution
 from ..sparse.dense_model import MIN_RELATIVE_GAIN
 from ..sparse.fine_model import MAX_ROUNDS, MIN_PROMISED_GAIN
-from ..sparse.search import COARSE_MODEL_ERROR, ConeSearch
+from ..sparse.search import ConeSearch
+from ..sparse.starts import DenseStarts
 from .lattice import IndexedCones, Lattice
 from .moves import Quanta
 
@@ -86,7 +87,7 @@ def quantise_cones(
         if refine(search, lattice, fine, size) <= goal:
             break
     for size in reversed(sizes[: sizes.index(first)]):
-        is_near = lattice.best.energy(size) <= goal * COARSE_MODEL_ERROR
+        is_near = lattice.best.energy(size) <= goal * DenseStarts.error
         if not is_near or not refine(search, lattice, fine, size) <= goal:
             break
     best = fine.best.fewest(goal)
@@ -125,7 +126,7 @@ def make_lattice(search: ConeSearch, quantum: float) -> Lattice:
             f"no multiple of {quantum / np.pi:.4g} pi lies within the bounds of cone curvatures, {limits.text()}, and "
             "contributes to their sum"
         )
-    return Lattice(search.coarse, Quanta(float(quantum), lower, upper, total is not None), total)
+    return Lattice(search.dense_starts.model, Quanta(float(quantum), lower, upper, total is not None), total)
 
 
 def _order_to_round_in(search: ConeSearch, members: IntArray) -> IntArray:
@@ -143,10 +144,10 @@ def _order_to_round_in(search: ConeSearch, members: IntArray) -> IntArray:
 
 def search_coarse(search: ConeSearch, lattice: Lattice, goal: float, max_count: int) -> None:
     """Find good sets of cones on the coarse model, of all sizes up to slightly more than needed."""
-    model, best = search.coarse, lattice.best
+    model, best = search.dense_starts.model, lattice.best
     fewest = max(lattice.fewest, len(model.fixed))
     max_count = min(max_count + 1, search.max_cones)
-    model.climb(goal / COARSE_MODEL_ERROR, max_count)
+    model.climb(goal / DenseStarts.error, max_count)
     for cones in model.best:
         # Of many sizes, fewer are rounded: growing finds the others.
         if len(cones) % max(1, len(cones) // 32) == 0:
@@ -164,7 +165,7 @@ def search_coarse(search: ConeSearch, lattice: Lattice, goal: float, max_count: 
         stalled = 0 if best.energy(size) < smallest * (1 - MIN_PROMISED_GAIN) else stalled + 1
         smallest = min(smallest, best.energy(size))
     # The fewest cones do not matter where none meet the goal.
-    ratio = MAX_ENERGY_RATIO if best.fewest(goal).energy <= goal * COARSE_MODEL_ERROR else 0.0
+    ratio = MAX_ENERGY_RATIO if best.fewest(goal).energy <= goal * DenseStarts.error else 0.0
     for size in reversed(best.sizes):
         if best.energy(size) > goal * ratio and size < max_count:
             break
@@ -176,7 +177,7 @@ def _offer(lattice: Lattice, cones: IndexedCones | None, max_count: float = math
     if (
         cones is not None
         and len(cones) <= max_count
-        and cones.energy < COARSE_MODEL_ERROR * lattice.best.energy(len(cones))
+        and cones.energy < DenseStarts.error * lattice.best.energy(len(cones))
     ):
         lattice.best.offer(lattice.exchanged(cones))
 
@@ -184,7 +185,7 @@ def _offer(lattice: Lattice, cones: IndexedCones | None, max_count: float = math
 def refine(search: ConeSearch, lattice: Lattice, fine: Lattice, size: int) -> float:
     """Move the cones of the best coarse set of a size over the mesh until E converges; return E^2."""
     model, start = search.fine, lattice.best[size]
-    members = model.insert(search.places[start.members])
+    members = model.insert(search.dense_starts.places[start.members])
     cones = fine.exchanged(fine.descended(members, start.indices))
     for _ in range(MAX_ROUNDS):
         known_count = len(model.unknowns)

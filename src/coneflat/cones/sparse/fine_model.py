@@ -15,6 +15,10 @@ from .linear_model import LinearModel
 
 # Smallest predicted relative decrease of E^2 for which a move is tried.
 MIN_PROMISED_GAIN = 1e-3
+# Number of vertices near a cone that are considered: at least this number, and one of so many parts of the mesh.
+MIN_NEIGHBOURS, PARTS = 40, 300
+# Smallest area from which a distance is estimated.
+MIN_SHARE = 1e-300
 # Largest number of rounds of moves for a set of cones; most sets converge after three or four.
 MAX_ROUNDS = 12
 
@@ -25,7 +29,9 @@ class FineModel(DenseModel):
     Its candidates are the vertices whose Green's functions have been computed.
 
     Attributes:
-        unknowns: (m,) the vertex of each candidate, in the numbering of the Green operator.
+        linear: the linear model of the mesh.
+        operator: its Green operator.
+        unknowns: (m,) the vertex of each candidate, in the numbering of the operator.
         lower_bounds: (f,) lower bound of the curvature at each unknown, radians.
     """
 
@@ -35,22 +41,22 @@ class FineModel(DenseModel):
         """Return the model whose candidates are the required cones, unknowns (s,); all unknowns are usable."""
         empty, fixed = np.empty(0), np.arange(len(required))
         super().__init__(
-            np.empty((0, 0)), empty, linear.coarse.constant, empty.astype(bool), fixed, limits, empty
+            np.empty((0, 0)), empty, linear.distortion**2, empty.astype(bool), fixed, limits, empty
         )
-        self._linear, self._coarse, self._operator = linear, linear.coarse, linear.operator
+        self.linear, self.operator = linear, linear.operator
         self.unknowns: IntArray = np.empty(0, dtype=np.int64)
         self.lower_bounds = lower_bounds
         self._usable = np.ones(len(lower_bounds), dtype=bool)
-        self._indptr = self._operator.laplacian.indptr.astype(np.int64)
-        self._indices = self._operator.laplacian.indices.astype(np.int64)
+        self._indptr = self.operator.laplacian.indptr.astype(np.int64)
+        self._indices = self.operator.laplacian.indices.astype(np.int64)
         # Buffers of `fill_ball`.
         self._is_reached = np.zeros(len(lower_bounds), dtype=bool)
-        self._reached = np.empty(len(lower_bounds), np.int64)
+        self._reached, self._shares = np.empty(len(lower_bounds), np.int64), np.empty(len(lower_bounds))
         # The Green's functions of the candidates and their means, in blocks in the order in which they were added.
         self._responses: list[FloatArray] = []
         self._means: list[FloatArray] = []
         if len(required):
-            self._add(required, self._operator.responses(required))
+            self._add(required, self.operator.responses(required))
 
     def restricted(self, usable: BoolArray) -> FineModel:
         """Return the model with further cones at the usable unknowns (f,) only, and without sets of cones.
@@ -81,8 +87,8 @@ class FineModel(DenseModel):
         is_new = mask_of(len(self._usable), unknowns)
         is_new[self.unknowns] = False
         added = np.flatnonzero(is_new)
-        for batch in self._operator.batches(added):
-            self._add(batch, self._operator.responses(batch))
+        for batch in self.operator.batches(added):
+            self._add(batch, self.operator.responses(batch))
         order = np.argsort(self.unknowns, kind="stable")
         return order[np.searchsorted(self.unknowns, unknowns, sorter=order)]
 
@@ -98,7 +104,7 @@ class FineModel(DenseModel):
         """Add k vertices with their Green's functions (k, f)."""
         size = len(self.unknowns)
         self.unknowns = np.concatenate([self.unknowns, added])
-        areas = self._operator.areas
+        areas = self.operator.areas
         weighted, means = responses * areas, responses @ areas
         self._responses.append(responses)
         self._means.append(means)
@@ -110,16 +116,18 @@ class FineModel(DenseModel):
         gram[:size, size:] = rows[:, :size].T
         gram[size:, size:] = (rows[:, size:] + rows[:, size:].T) / 2
         self.gram = gram
-        self.slope = self._linear.score[self.unknowns]
+        self.slope = self.linear.score[self.unknowns]
         self.usable = self._usable[self.unknowns]
         self.usable[self.fixed] = False
         self.lower = self.lower_bounds[self.unknowns]
 
-    def refine(self, members: IntArray) -> float:
-        """Move cones over the mesh until E converges; return E^2 of the best set of this number of cones."""
+    def refine(self, members: IntArray, goal: float = 0.0) -> float:
+        """Move cones over the mesh until E converges, or E^2 <= goal; return E^2 of the best set of this number."""
         cones = self.exchanged(members)
         self.best.offer(cones)
         for _ in range(MAX_ROUNDS):
+            if cones.energy <= goal:
+                break
             known_count, before = len(self.unknowns), cones.energy
             self.insert(self.targets(cones.members, self.fit(cones.members).curvatures, before))
             if len(self.unknowns) == known_count:
@@ -131,24 +139,23 @@ class FineModel(DenseModel):
         return self.best.energy(len(cones))
 
     def targets(self, members: IntArray, curvatures: FloatArray, energy: float) -> IntArray:
-        """Return the unknowns to which cones should move, by the score and the distances of the coarse model.
+        """Return the unknowns to which cones should move, by the score and estimated distances.
 
         Moving curvature k from s to t changes E^2 by 2 k (q_t - q_s) + k^2 ||g_s - g_t||^2, where q is the score.
         """
         score = self._score(members, curvatures)
-        # The neighbourhood covers a few functions of the coarse model; beyond it, the distances are not accurate.
-        size = max(40, 4 * len(self._usable) // self._coarse.size)
+        size = max(MIN_NEIGHBOURS, len(self._usable) // PARTS)
         taken = self.unknowns[members]
         is_free = self._usable.copy()
         is_free[taken] = False
         targets = []
         for place in range(len(self.fixed), len(members)):
             s, k = int(taken[place]), curvatures[place]
-            neighbours = self._ball(s, size)
-            neighbours = neighbours[is_free[neighbours]]
+            neighbours, distances = self.neighbours(s, size)
+            neighbours, distances = neighbours[is_free[neighbours]], distances[is_free[neighbours]]
             if not len(neighbours) or k == 0:
                 continue
-            change = 2 * k * (score[neighbours] - score[s]) + k * k * self.squared_distances(s, neighbours)
+            change = 2 * k * (score[neighbours] - score[s]) + k * k * distances
             best = argmin_tied(change)
             if change[best] < -MIN_PROMISED_GAIN * energy:
                 targets.append(int(neighbours[best]))
@@ -169,32 +176,48 @@ class FineModel(DenseModel):
 
     def _score(self, members: IntArray, curvatures: FloatArray) -> FloatArray:
         """Return (f,) half the derivative of E^2 by the curvature of a cone at each vertex."""
-        log_scale = self._linear.log_scale.copy()
+        log_scale = self.linear.log_scale.copy()
         first = 0
         for block in self._responses:
             is_member = (members >= first) & (members < first + len(block))
             log_scale += curvatures[is_member] @ block[members[is_member] - first]
             first += len(block)
-        return self._operator.solve(self._operator.weighted(log_scale))
+        return self.operator.solve(self.operator.weighted(log_scale))
 
-    def neighbours(self, unknown: int, size: int) -> IntArray:
-        """Return the usable unknowns among the `size` nearest to an unknown."""
-        ball = self._ball(unknown, size)
-        return ball[self._usable[ball]]
+    def neighbours(self, unknown: int, size: int) -> tuple[IntArray, FloatArray]:
+        """Return the usable unknowns (p,) nearest to one, and estimates of the distances of their Green's functions.
 
-    def _ball(self, centre: int, size: int) -> IntArray:
-        """Return the unknowns nearest to one in steps along edges, in complete rings until `size` are reached."""
-        count = fill_ball(self._indptr, self._indices, centre, size, self._is_reached, self._reached)
-        return self._reached[:count].copy()
-
-    def squared_distances(self, unknown: int, targets: IntArray) -> FloatArray:
-        """Return (p,) approximate squared distances of the Green's function of an unknown from those of targets."""
-        return self._coarse.squared_distances(unknown, targets)
+        They are reached in steps along edges, in complete rings until there are `size`. The difference of the Green's
+        functions of vertices at a distance r is nearly that of a dipole, whose squared norm is r^2 log(R / r) / (4 pi),
+        relative to the area pi R^2 of the surface. pi r^2 is the area within the rings. Most estimates are within a
+        factor of 2.
+        """
+        count = fill_ball(
+            self._indptr,
+            self._indices,
+            self.operator.areas,
+            unknown,
+            size,
+            self._is_reached,
+            self._reached,
+            self._shares,
+        )
+        reached, share = self._reached[:count], np.maximum(self._shares[:count], MIN_SHARE)
+        distances = share * (0.3 - np.log(share) / 2) / (4 * np.pi**2)
+        is_usable = self._usable[reached]
+        return reached[is_usable], distances[is_usable]
 
 
 @compiled
 def fill_ball(
-    indptr: IntArray, indices: IntArray, centre: int, size: int, is_reached: BoolArray, reached: IntArray
+    indptr: IntArray,
+    indices: IntArray,
+    areas: FloatArray,
+    centre: int,
+    size: int,
+    is_reached: BoolArray,
+    reached: IntArray,
+    shares: FloatArray,
 ) -> int:
     """Write the vertices nearest to a vertex in steps along edges, in complete rings until `size` are reached.
 
@@ -202,22 +225,28 @@ def fill_ball(
 
     Args:
         indptr, indices: the neighbours of the vertices.
+        areas: (n,) areas of the vertices.
         centre, size: the vertex, and the number of vertices.
         is_reached: (n,) False, and again on return.
         reached: (n,) buffer for the vertices.
+        shares: (n,) buffer for the area within the middle of the ring of each vertex.
 
     Returns:
         The number of vertices written.
     """
-    reached[0], is_reached[centre], start, count = centre, True, 0, 1
+    reached[0], shares[0], is_reached[centre], start, count = centre, 0.0, True, 0, 1
+    inner, ring = 0.0, areas[centre]
     while count < size and start < count:
         end = count
+        inner, ring = inner + ring, 0.0
         for i in range(start, end):
             for e in range(indptr[reached[i]], indptr[reached[i] + 1]):
                 if not is_reached[indices[e]]:
                     is_reached[indices[e]] = True
                     reached[count] = indices[e]
+                    ring += areas[indices[e]]
                     count += 1
+        shares[end:count] = inner + ring / 2
         start = end
     for i in range(count):
         is_reached[reached[i]] = False

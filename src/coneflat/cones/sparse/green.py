@@ -53,6 +53,10 @@ class GreenOperator:
         inner = _grounded(self.laplacian) if self.is_closed else self.laplacian
         return factorize(csc_matrix(inner.T))  # symmetric: its rows are its columns
 
+    def factorize(self) -> None:
+        """Factorize the Laplacian, if it is not yet."""
+        _ = self._factor
+
     @property
     def break_even(self) -> int:
         """Number of solves that take as long as a factorization."""

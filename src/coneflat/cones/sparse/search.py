@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -25,21 +25,18 @@ from ...base.defaults import DISTORTION, MAX_CONE_ANGLE, MIN_CONE_ANGLE
 from ...base.progress import report_detail
 from ...base.text import list_some, plural
 from ...base.threads import concurrently
-from ...errors import CurvatureError, OptionError
+from ...errors import OptionError
 from ...geometry import angle_defect, corner_angles, cotangent_laplacian, cotangents, edge_lengths, mollify
 from ...geometry.operators import vertex_areas, weighted_areas
 from ...mesh.connectivity import TriangleMesh
 from ...mesh.ties import tie_key
 from ...stages import ConeSolution
 from ..solution import TIE_TOLERANCE
-from .coarse_model import candidates
-from .dense_model import STALL_FACTOR, ConeSet, DenseModel
+from .dense_model import STALL_FACTOR, ConeSet
 from .fine_model import FineModel
 from .limits import MAX_SEARCHED, Limits
 from .linear_model import LinearModel
-
-# Error of the coarse model as a factor of E^2; sets within this factor of the goal are evaluated on the mesh.
-COARSE_MODEL_ERROR = 1.35
+from .starts import DenseStarts, StartsOf
 
 
 @dataclass(frozen=True)
@@ -67,13 +64,12 @@ class ConeSearch:
 
     Attributes:
         fine: the model with the energies of sets on the mesh; its required cones are always cones.
-        coarse: the model in which sets are searched first, at one vertex for each function of the coarse basis.
-        places: (c,) unknown of each candidate of the coarse model, required cones first.
+        starts: the sets of a smaller model, on which cones are searched first.
         limits: bounds and sum of the curvatures.
         operator: the Laplacian of the vertices that can be cones.
 
     Notes:
-        Sets of each size are found on the coarse model, by adding cones one at a time and exchanging members
+        Sets of each size are found on a smaller model, by adding cones one at a time and exchanging members
         (`DenseModel`), and are then moved over the mesh (`FineModel.refine`). Matching pursuit adds the candidate
         that lowers E^2 most if all curvatures are fitted again; moves follow the gradient of E^2. References are in
         the docstring of the module.
@@ -83,33 +79,23 @@ class ConeSearch:
         coneflat.cones.greedy_cones: the search of the paper.
     """
 
-    def __init__(self, linear: LinearModel, fine: FineModel, usable: BoolArray) -> None:
+    def __init__(self, linear: LinearModel, fine: FineModel, usable: BoolArray, starts_of: StartsOf) -> None:
         """Set up a search for cones at vertices.
 
         Args:
             linear: the linear model of the mesh.
             fine: the model of the sets on the mesh, with the required cones.
             usable: (n,) mask of the other vertices that may be cones.
+            starts_of: returns the sets that the search starts from.
 
         Raises:
             CurvatureError: cones at these vertices cannot absorb the curvature.
         """
         self.operator, self.limits = linear.operator, fine.limits
-        self._linear, self._usable = linear, usable
-        required = fine.unknowns[fine.fixed]
-        self.limits.check_available(usable, self.operator.vertices[required])
+        self._linear, self._usable, self._starts_of = linear, usable, starts_of
+        self.limits.check_available(usable, self.operator.vertices[fine.unknowns[fine.fixed]])
         self.fine = fine.restricted(usable[self.operator.vertices])
-        self.places = np.concatenate([required, candidates(linear.coarse, self.fine.fitness)])
-        kernel, slope = linear.coarse.at(self.places)
-        self.coarse = DenseModel(
-            np.ascontiguousarray(kernel),
-            slope,
-            linear.coarse.constant,
-            np.arange(len(self.places)) >= len(required),
-            fine.fixed,
-            self.limits,
-            fine.lower_bounds[self.places],
-        )
+        self.starts = starts_of(self.fine)
         # What the last refinement of each size started from, and the sizes that more cones hardly improve.
         self._refined = dict[int, tuple[float, ...]]()
         self._stalled = set[int]()
@@ -126,6 +112,7 @@ class ConeSearch:
         required: Iterable[int] = (),
         allowed: BoolArray | None = None,
         max_angles: FloatArray | None = None,
+        starts_of: StartsOf | None = None,
     ) -> ConeSearch:
         """Return a search on a linear model.
 
@@ -138,6 +125,7 @@ class ConeSearch:
             allowed: (n,) mask of the other vertices that may be cones; None: all.
             max_angles: (n,) largest cone angle at each vertex, radians, in addition to `max_cone_angle`; None: no
                 further bound.
+            starts_of: returns the sets that the search starts from; None: those on the coarse basis of the model.
 
         Raises:
             OptionError: an option is not valid.
@@ -154,10 +142,12 @@ class ConeSearch:
         lower = np.full(len(operator.vertices), limits.lower)
         if max_angles is not None:
             lower = np.maximum(lower, np.minimum(math.tau - max_angles[operator.vertices], 0.0))
+        if starts_of is None:  # before the fine model, as the coarse one is computed during the factorization
+            starts_of = partial(DenseStarts, linear.coarse)
         fine = FineModel(linear, operator.unknowns_of(cones), limits, lower)
-        # The fine model will need the score; it is computed while the coarse model is set up.
+        # The fine model will need the score; it is computed while the smaller model is set up.
         with concurrently(lambda: linear.score, 2 * len(operator.vertices)):
-            return cls(linear, fine, usable)
+            return cls(linear, fine, usable, starts_of)
 
     @classmethod
     def from_mesh(
@@ -195,12 +185,23 @@ class ConeSearch:
             CurvatureError: cones at these vertices cannot absorb the curvature.
         """
         usable = ~self._linear.is_boundary & allowed
-        return self if np.array_equal(usable, self._usable) else ConeSearch(self._linear, self.fine, usable)
+        if np.array_equal(usable, self._usable):
+            return self
+        return ConeSearch(self._linear, self.fine, usable, self._starts_of)
+
+    @cached_property
+    def dense_starts(self) -> DenseStarts:
+        """The sets on the coarse basis of the mesh."""
+        return (
+            self.starts
+            if isinstance(self.starts, DenseStarts)
+            else DenseStarts(self._linear.coarse, self.fine)
+        )
 
     @cached_property
     def max_cones(self) -> int:
         """The largest number of cones searched for."""
-        largest = min(MAX_SEARCHED + len(self.fine.fixed), len(self.places))
+        largest = min(MAX_SEARCHED + len(self.fine.fixed), self.starts.largest)
         return largest if self.limits.largest is None else min(largest, self.limits.largest)
 
     def fewest(self, distortion: float = DISTORTION, max_count: int | None = None) -> SparseCones:
@@ -220,8 +221,8 @@ class ConeSearch:
             self.limits.check_count(max_count, len(self.fine.fixed))
         max_count = self.max_cones if max_count is None else min(max_count, self.max_cones)
         goal = distortion * distortion
-        count = self._find_sufficient(self._search_coarse(goal, max_count), goal, max_count)
-        while count > max(self.limits.fewest, len(self.fine.fixed)) and self._refine(count - 1) <= goal:
+        count = self._find_sufficient(goal, max_count)
+        while self._may_suffice(count - 1, goal) and self._refine(count - 1, goal) <= goal:
             count -= 1
         # If it is not reached: the fewest cones that are nearly as good as the best set.
         smallest_energy = self.fine.best.fewest(goal, max_count).energy
@@ -243,9 +244,8 @@ class ConeSearch:
         """
         self.limits.check_count(count, len(self.fine.fixed))
         count = min(count, self.max_cones)
-        self._climb(0.0, count + 1, count)
-        self.coarse.descend(count - 2, count + 1)
-        self._refine(max(size for size in self.coarse.best.sizes if size <= count))
+        self.starts.find_best(count)
+        self._refine(max(size for size in self.starts.best.sizes if size <= count))
         fewer = 2 * count // 3
         if self._refine(fewer) < math.inf:
             self.fine.refine(self.fine.extended(self.fine.best[fewer].members, 0.0, count))
@@ -258,8 +258,7 @@ class ConeSearch:
             max_count: largest number of cones.
         """
         max_count = min(max_count, self.max_cones)
-        self.coarse.climb(0.0, max_count)
-        self.coarse.descend(1, max_count)
+        self.starts.find_all(max_count)
         # First upwards, then downwards: the best set may be the next larger set without one of its cones.
         for count in (*range(max_count + 1), *range(max_count, -1, -1)):
             self._refine(count)
@@ -270,17 +269,17 @@ class ConeSearch:
                 curve.append(cones)
         return curve
 
-    def _search_coarse(self, goal: float, max_count: int) -> int:
-        """Find good sets on the coarse model, of all sizes up to slightly more than needed; return the needed size."""
-        self._climb(goal / COARSE_MODEL_ERROR, max_count, max_count)
-        count = len(self.coarse.best.fewest(goal, max_count))
-        self.coarse.descend(count - 3, count + 1)
-        return len(self.coarse.best.fewest(goal, max_count))
-
-    def _find_sufficient(self, count: int, goal: float, max_count: int) -> int:
-        """Return how many cones reach E^2 <= goal on the mesh, or stall; the search starts with `count`."""
-        fine, best = self.fine, self.fine.best
-        self._refine(count)
+    def _find_sufficient(self, goal: float, max_count: int) -> int:
+        """Return how many cones reach E^2 <= goal on the mesh, or stall."""
+        fine, best, excess = self.fine, self.fine.best, 0.0
+        # On a noisy mesh E^2 exceeds that of the smaller model: a second search allows for it.
+        for _ in range(2):
+            self.starts.find_fewest(goal - excess, max_count)
+            cones = self.starts.best.fewest(goal - excess, max_count)
+            energy = self._refine(len(cones), goal)
+            excess = energy - cones.energy
+            if energy <= goal or excess >= goal / 2:
+                break
         while best.fewest(goal, max_count).energy > goal:
             start = max(size for size in best.sizes if size <= max_count)
             if start in {max_count, *self._stalled}:
@@ -290,40 +289,32 @@ class ConeSearch:
                 self._stalled |= {start, len(added)}
         return len(best.fewest(goal, max_count))
 
-    def _climb(self, bound: float, max_count: int, count: int) -> None:
-        """Find sets of up to `max_count` cones on the coarse model; raise CurvatureError if all exceed `count`."""
-        best = self.coarse.best
-        known_sizes = [size for size in best.sizes if size <= max_count]
-        if all(best.energy(size) > bound for size in known_sizes):
-            self.coarse.climb(bound, max_count, max(known_sizes, default=None))
-        if min(self.coarse.best.sizes, default=count + 1) > count:
-            raise CurvatureError(
-                f"no set of {count} cones was found that absorbs a total curvature of "
-                f"{self.limits.total / np.pi:.4g} pi within their bounds: allow more cones or other angles, or choose "
-                "the greedy search (--cones greedy), which has no bounds"
-            )
+    def _may_suffice(self, count: int, goal: float) -> bool:
+        """Return whether a set of a size may meet the goal on the mesh."""
+        sets = self.starts.best
+        is_bad = count in sets and sets.energy(count) > goal * self.starts.error
+        return count >= max(self.limits.fewest, len(self.fine.fixed)) and not is_bad
 
-    def _refine(self, count: int) -> float:
-        """Refine the best set of a size on the mesh; return its E^2, infinite if there is none.
+    def _refine(self, count: int, goal: float = 0.0) -> float:
+        """Refine the best set of a size on the mesh, until E^2 <= goal; return its E^2, infinite if there is none.
 
-        It starts from the best of the set of the coarse model, the next larger set without one cone, and the next
+        It starts from the best of the set of the smaller model, the next larger set without one cone, and the next
         smaller set with one more.
         """
         report_detail(plural(count, "cone"))
         fine, starts = self.fine, []
-        state = (self.coarse.best.energy(count), fine.best.energy(count + 1), fine.best.energy(count - 1))
+        state = (self.starts.best.energy(count), fine.best.energy(count + 1), fine.best.energy(count - 1))
         if self._refined.get(count) == state:
             return fine.best.energy(count)
         self._refined[count] = state
-        if count in self.coarse.best:
-            starts.append(fine.insert(self.places[self.coarse.best[count].members]))
+        if count in self.starts.best:
+            starts.append(fine.insert(self.starts.unknowns(count)))
         if count + 1 in fine.best:
-            shrunk = fine.shrunk(fine.best[count + 1].members)
-            starts += [] if shrunk is None else [shrunk]
+            starts += fine.shrunk(fine.best[count + 1].members)
         if count - 1 in fine.best:
             starts.append(fine.extended(fine.best[count - 1].members, 0.0, count))
         if starts:
-            fine.refine(min(starts, key=fine.energy))
+            fine.refine(min(starts, key=fine.energy), goal)
         return fine.best.energy(count)
 
     def _cones(self, best: ConeSet) -> SparseCones:
