@@ -23,6 +23,8 @@ TOLERATED_EXCESS = 1.02
 # Dirichlet energy. A cube opens at its eight corners (2.86) instead of five cones (1.93) with an energy that is 0.3
 # higher; a sheet of 5 x 5 vertices stays closed where its nine (2.5) would lower the energy by 0.03.
 SEAMS_PER_ENERGY = 20.0
+# The mean symmetric Dirichlet energy of an isometry.
+ISOMETRIC = 4.0
 
 
 def rank(components: Sequence[Component], layouts: Sequence[Layout]) -> tuple[int, float, float]:
@@ -74,13 +76,19 @@ def borders_and_distortion(components: Sequence[Component], layouts: Sequence[La
 
     A seam counts once, the two borders of components that it separates half each.
     """
-    areas = np.array([layout.area for layout in layouts])
-    energies = [mean_energy(layout.lengths, rows_of(layout.points, layout.corners)) for layout in layouts]
+    area = sum(layout.area for layout in layouts)
     length = sum(
         seam_length(layout) + border_length(component) / 2
         for component, layout in zip(components, layouts, strict=True)
     )
-    return float(length / np.sqrt(areas.sum()) + SEAMS_PER_ENERGY * np.average(energies, weights=areas))
+    return float(length / np.sqrt(area)) + distortion_cost(layouts)
+
+
+def distortion_cost(layouts: Sequence[Layout]) -> float:
+    """Return the length of seams, relative to the square root of the area, that the distortion of layouts is worth."""
+    areas = [layout.area for layout in layouts]
+    energies = [mean_energy(layout.lengths, rows_of(layout.points, layout.corners)) for layout in layouts]
+    return float(SEAMS_PER_ENERGY * (np.average(energies, weights=areas) - ISOMETRIC))
 
 
 def seam_length(layout: Layout) -> float:

@@ -101,7 +101,7 @@ def _knee(counts: IntArray, distortions: FloatArray) -> int:
 @takes(FindOptions)
 @warns("found.notes")
 def find_cones(mesh: Any, faces: ArrayLike | None = None, **options: Any) -> FoundCones:
-    """Find the cones of the largest component of a mesh, without flattening it.
+    """Find the cones of the largest component of a mesh, without flattening it; the borders of holes absorb curvature.
 
     Args:
         mesh, faces: as for `coneflat.flatten`.

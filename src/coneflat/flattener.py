@@ -24,7 +24,7 @@ from .mesh.connectivity import TriangleMesh
 from .metric import find_metric as conformal_metric
 from .options import Options, read_options, takes
 from .result import Flattening
-from .retries import cut_along_sharp_edges, finish_within_bound, lay_out_components
+from .retries import cut_along_sharp_edges, finish_with_best_holes, lay_out_components, with_kept_holes
 from .source import Component, Prepared, Source
 from .source.copies import find_copies
 from .stages import Layout, RelaxSpec
@@ -77,6 +77,7 @@ def flatten_source(
     surface_of: SurfaceOf = ConeSurface.of,
     find_metric: FindMetric = conformal_metric,
     on_preview: Preview | None = None,
+    keeps_holes: bool = True,
 ) -> Flattening:
     """Return the flattening of a mesh by parsed options; see `flatten`.
 
@@ -87,6 +88,7 @@ def flatten_source(
         find_metric: returns the flat metric for the cones of a component.
         on_preview: called with the first layout: one chart per component, before triangles are relaxed and overlaps are
             separated; its overlaps are not measured.
+        keeps_holes: holes are not opened by seams where this is better.
 
     Raises:
         ConeflatError: as for `flatten`.
@@ -101,6 +103,8 @@ def flatten_source(
             separates=options.charts == "atlas",
             quantum=options.quantise,
             names_components=len(prepared.components) > 1,
+            # Another map cannot be computed for the filled mesh.
+            keeps_holes=keeps_holes and find_metric is conformal_metric,
         )
         show = None if on_preview is None else partial(_preview, prepared, options, on_preview)
         with limit_threads(options.threads):
@@ -125,15 +129,21 @@ def flatten_components(
     with stage("check"):
         copies = find_copies(components, flat)
     originals = {
-        i: component for i, component in enumerate(components) if copies[i] is None and i not in flat
+        i: with_kept_holes(component, steps)
+        for i, component in enumerate(components)
+        if copies[i] is None and i not in flat
     }
     layouts = lay_out_components(originals, steps)
     if on_layouts is not None:
         on_layouts(with_copies(flat | layouts, components, copies))
-    finished = flat | finish_within_bound(originals, layouts, steps)
+    finished = flat | finish_with_best_holes(originals, layouts, steps)
     # Notes contain vertex indices, so copies of components with notes are computed, too.
-    noted = {i: components[i] for i, copy in enumerate(copies) if copy and finished[copy.first].notes}
-    finished |= finish_within_bound(noted, lay_out_components(noted, steps), steps)
+    noted = {
+        i: with_kept_holes(components[i], steps)
+        for i, copy in enumerate(copies)
+        if copy and finished[copy.first].notes
+    }
+    finished |= finish_with_best_holes(noted, lay_out_components(noted, steps), steps)
     return with_copies(finished, components, copies)
 
 

@@ -50,6 +50,7 @@ class Steps:
         quantum: rotations across seams are multiples of it, radians; None for any rotation.
         untangles: inverted triangles of a first layout are turned back.
         names_components: errors name the component.
+        keeps_holes: holes are kept where this is better.
     """
 
     surface_of: SurfaceOf = ConeSurface.of
@@ -59,10 +60,12 @@ class Steps:
     quantum: float | None = None
     untangles: bool = True
     names_components: bool = False
+    keeps_holes: bool = True
 
     def surface(self, component: Component) -> ConeSurface:
         """Return a component with the operators of its metric."""
-        return self.surface_of(component.mesh, component.lengths, component.is_exact)
+        filled = component.filled
+        return self.surface_of(filled.mesh, filled.lengths, filled.is_exact)
 
 
 def lay_out_component(surface: ConeSurface, component: Component, steps: Steps) -> Layout:
@@ -83,14 +86,16 @@ def lay_out_component(surface: ConeSurface, component: Component, steps: Steps) 
         SeamError: every set of seams needs forbidden edges.
     """
     # Rotations along handles can be measured only in the metric of a set of cones, so this is a function.
-    rotations = loop_rotations(surface, component.metric) if component.cones.quantum else None
-    cones = find_cones(surface, replace(component.cones, rotations=rotations))  # Sections 3.1 and 3.2
-    metric = steps.find_metric(surface, cones, component.metric)  # 2.3
+    filled = component.filled
+    rotations = loop_rotations(surface, filled.metric) if filled.cones.quantum else None
+    cones = find_cones(surface, replace(filled.cones, rotations=rotations))  # Sections 3.1 and 3.2
+    metric = component.without_fill(steps.find_metric(surface, cones, filled.metric))  # 2.3
     costs = seam_costs(component.mesh, component.lengths, component.seams, cones.is_polyhedral)
-    disk = cut_to_disk(component.mesh, cones.cones, costs, component.seams)  # 4.3
+    disk = cut_to_disk(component.mesh, cones.cones, costs, component.seams, component.kept_holes)  # 4.3
     layout = lay_out(metric, disk, steps.untangles)  # 4.3
-    areas = weighted_areas(surface.areas, component.cones.weights)
-    return layout.with_area_distortion(cones.log_scale, areas).with_notes(*cones.notes)
+    n = len(component.mesh.vertices)
+    areas = weighted_areas(surface.areas, filled.cones.weights)[:n]
+    return layout.with_area_distortion(cones.log_scale[:n], areas).with_notes(*cones.notes)
 
 
 def relax_components(

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from .base.progress import stage
-from .bounds import TOLERATED_EXCESS, borders_and_distortion, excess, is_too_distorted, rank
-from .cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, uses_sparse_search, with_corners
+from .bounds import (
+    TOLERATED_EXCESS,
+    borders_and_distortion,
+    distortion_cost,
+    excess,
+    is_too_distorted,
+    rank,
+    seam_length,
+)
+from .cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, ConeSurface, uses_sparse_search, with_corners
 from .errors import ConvergenceError, CurvatureError, LengthError, MetricError, OptionError, SeamError
 from .flattening import (
     Steps,
@@ -19,12 +28,13 @@ from .flattening import (
     relax_components,
 )
 from .geometry import dihedral_angles
-from .geometry.opening import RISKY_AREA, thickness, with_slack
+from .geometry.opening import RISKY_AREA, thickness
 from .groups import ComponentProgress, errors_of, groups_of_small
 from .measures import mean_qc
 from .mesh.connectivity import TriangleMesh
 from .options import Options
-from .source import Component, Prepared, Source
+from .seams import NO_EDGES, find_seams
+from .source import Component, Prepared, Source, coarse_component, has_vertex_options, is_large
 from .stages import Layout
 
 # Largest number of cone searches for a layout.
@@ -50,8 +60,18 @@ def lay_out_components(components: Mapping[int, Component], steps: Steps) -> dic
     layouts = {}
     for i, component in components.items():
         with progress.at(component):
-            layouts[i] = lay_out_with_thick_triangles(component, steps)
+            layouts[i] = lay_out_with_kept_holes(component, steps)
     return layouts
+
+
+def lay_out_with_kept_holes(component: Component, steps: Steps) -> Layout:
+    """Return the layout of a component in one chart; holes that are to be kept are opened if no metric is found."""
+    if not component.keeps_holes:
+        return lay_out_with_thick_triangles(component, steps)
+    try:
+        return lay_out_with_thick_triangles(component, steps)
+    except FAILURES:
+        return lay_out_with_thick_triangles(component.with_opened_holes(), steps)
 
 
 def lay_out_with_thick_triangles(component: Component, steps: Steps) -> Layout:
@@ -64,7 +84,7 @@ def lay_out_with_thick_triangles(component: Component, steps: Steps) -> Layout:
     except ConvergenceError:
         if not (thickness(component.lengths) < RISKY_AREA).any():
             raise
-    return lay_out_with_feasible_cones(replace(component, lengths=with_slack(component.lengths)), steps)
+    return lay_out_with_feasible_cones(component.with_slack(), steps)
 
 
 def lay_out_with_feasible_cones(component: Component, steps: Steps) -> Layout:
@@ -116,6 +136,65 @@ def relax_group(components: Sequence[Component], layouts: Sequence[Layout], step
     except (*FAILURES, LengthError):
         pairs = zip(components, layouts, strict=True)
         return [relax_group([component], [layout], steps)[0] for component, layout in pairs]
+
+
+def with_kept_holes(component: Component, steps: Steps) -> Component:
+    """Return a component with its holes kept where they can be; a large one only if it is better so on a coarse mesh.
+
+    Keeping holes saves the seams to them, but the borders of opened ones absorb curvature, as the ends of a tube do.
+    """
+    variant = component.with_kept_holes() if steps.keeps_holes else component
+    if not variant.keeps_holes or not is_compared_on_coarse(component):
+        return variant
+    coarse = coarse_component(variant)[0]
+    # A cache of surfaces would hold those of coarse meshes, which are made anew each time.
+    flatten = partial(flatten_within_bound, steps=replace(steps, surface_of=ConeSurface.of))
+    kept_layout = without_failures(flatten, {0: coarse}).get(0)
+    if kept_layout is None:
+        return component
+    if is_best_with_holes(coarse, kept_layout):
+        return variant
+    opened = without_failures(flatten, {0: coarse.with_opened_holes()})
+    return component if better_layouts(opened, {0: kept_layout}, {0: coarse}) else variant
+
+
+def is_compared_on_coarse(component: Component) -> bool:
+    """Return whether keeping the holes of a component is decided on a coarse mesh, which saves half of the time."""
+    return is_large(component) and not has_vertex_options(component)
+
+
+def finish_with_best_holes(
+    components: Mapping[int, Component], layouts: Mapping[int, Layout], steps: Steps
+) -> dict[int, Layout]:
+    """Return finished layouts; those with kept holes are compared with others if it is not known which are better."""
+    finished = finish_within_bound(components, layouts, steps)
+    opened = {
+        i: component.with_opened_holes()
+        for i, component in components.items()
+        if component.keeps_holes
+        and (finished[i].notes or not is_compared_on_coarse(component))
+        and not is_best_with_holes(component, finished[i])
+    }
+    candidates = without_failures(partial(flatten_within_bound, steps=steps), opened)
+    return finished | better_layouts(candidates, finished, opened)
+
+
+def is_best_with_holes(component: Component, layout: Layout) -> bool:
+    """Return whether a layout with kept holes ranks before any with opened ones: these need seams to all holes.
+
+    The seams that are found are at most twice as long as the shortest ones.
+    """
+    if layout.notes or excess([component], [layout]) > TOLERATED_EXCESS:
+        return False
+    lengths = component.lengths.ravel()[component.mesh.edge_halfedges[:, 0]]
+    opening = find_seams(component.mesh, NO_EDGES, lengths)
+    size = np.sqrt(layout.area)
+    return seam_length(layout) / size + distortion_cost([layout]) < lengths[opening].sum() / 2 / size
+
+
+def flatten_within_bound(components: Mapping[int, Component], steps: Steps) -> dict[int, Layout]:
+    """Return the finished layouts of components, see `finish_within_bound`."""
+    return finish_within_bound(components, lay_out_components(components, steps), steps)
 
 
 def finish_within_bound(

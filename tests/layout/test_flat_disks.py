@@ -63,6 +63,23 @@ def test_curved_and_overlapping_components_are_not_laid_out():
     assert laid_out(spiral(0.8))[0] is not None
 
 
+def test_flat_disks_keep_holes_around_which_they_close_up():
+    vertices, faces = shapes.grid(9, 9)
+    middles = vertices[faces].mean(axis=1)
+    frame = vertices, faces[np.abs(middles[:, :2] - 0.5).max(axis=1) > 0.2]
+    vertex_indices, corners = np.unique(frame[1], return_inverse=True)
+    frame = vertices[vertex_indices] @ shapes.rotation(), corners.reshape(-1, 3)
+    flat_frame, tube = laid_out(frame, shapes.cylinder(12, 3))
+    assert tube is None
+    np.testing.assert_allclose(
+        edge_lengths(np.pad(flat_frame.points, ((0, 0), (0, 1))), flat_frame.corners),
+        edge_lengths(*frame),
+        rtol=1e-9,
+    )
+    result = coneflat.flatten(*frame, boundary="lengths")
+    assert (result.distortion.seam_length, result.notes) == (0, ())
+
+
 def test_a_flat_disk_that_would_overlap_itself_is_cut():
     result = coneflat.flatten(*spiral(1.4))
     assert (result.distortion.charts, result.distortion.overlapping_pairs) == (2, 0)

@@ -15,6 +15,7 @@ from coneflat import TriangleMesh
 from coneflat.geometry import edge_lengths, rest_sides
 from coneflat.geometry.planar import heights, signed_double_areas
 from coneflat.geometry.straight import FlatTriangles
+from coneflat.mesh.connectivity import joined_meshes
 from coneflat.optimise import embedded_disks
 from coneflat.optimise.untangling import DEGENERATE_HEIGHT, Patches, untangle
 
@@ -171,6 +172,16 @@ class TestFreeSeams:
         points = embedded_disks(mesh, np.zeros(count, dtype=int), np.full(count, 1.5 / count))
         assert signed_double_areas(points[mesh.faces]).min() > 0
         assert signed_double_areas(points[mesh.faces]).sum() == pytest.approx(3)
+
+    def test_embedded_disks_may_have_holes(self):
+        vertices, faces = spikes(12, 1.0, "0")
+        x, y = vertices[faces].mean(axis=1)[:, :2].T
+        is_hole = (np.hypot(x - 0.3, y - 0.3) < 0.13) | (np.hypot(x - 0.7, y - 0.6) < 0.2)
+        pierced = coneflat.check_mesh(vertices, faces[~is_hole], repair=True).mesh
+        mesh = joined_meshes([pierced, TriangleMesh(vertices, faces)])
+        disk = np.repeat([0, 1], [len(pierced.faces), len(faces)])
+        points = embedded_disks(mesh, disk, np.ones(len(disk)))
+        assert signed_double_areas(points[mesh.faces]).min() > 0
 
 
 def touched(before, after):

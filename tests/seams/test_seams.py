@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 from coneflat import TriangleMesh, errors
 from coneflat.atlas.sheet import grown
 from coneflat.linalg.shortest_paths import MultiGraph, Regions
-from coneflat.mesh import cut_open
+from coneflat.mesh import cut_open, find_holes
 from coneflat.mesh.connectivity import label_components
 from coneflat.seams import find_seams
 
@@ -231,3 +231,42 @@ def test_seams_of_components_are_independent():
 def lengths_along_edges(mesh):
     ends = mesh.vertices[mesh.edges]
     return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+
+
+def planar_domain(seed):
+    return TriangleMesh(*remove_faces(shapes.hill(24, 20), 6, seed))
+
+
+def test_kept_holes_need_no_seams():
+    mesh = planar_domain(0)
+    assert len(find_seams(mesh, NONE, lengths_of(mesh), kept_holes=find_holes(mesh))) == 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_seams_through_kept_holes_leave_one_piece(seed):
+    mesh = planar_domain(seed)
+    holes, inside = find_holes(mesh), np.flatnonzero(~mesh.is_boundary_vertex)
+    cones = np.random.default_rng(seed).choice(inside, 8, replace=False)
+    costs = lengths_of(mesh)
+    seams = find_seams(mesh, cones, costs, kept_holes=holes)
+    cut = cut_open(mesh, seams, len(holes)).mesh
+    assert cut.components[0] == 1
+    assert cut.euler_characteristic == 2 - cut.boundary_loops[0]
+    assert np.isin(cones, mesh.edges[seams]).all()
+    assert not mesh.is_boundary_edge[seams].any()
+    # Reaching all holes as well costs more.
+    assert costs[seams].sum() < costs[find_seams(mesh, cones, costs)].sum()
+
+
+def test_passing_a_kept_hole_costs_nothing():
+    """A cone three edges from the border, but one from a hole that ends one edge from the border."""
+    vertices, faces = shapes.grid(12, 12)
+    x, y = vertices[faces].mean(axis=1)[:, :2].T
+    hole = (np.abs(x - 0.5) < 1 / 12) & (y > 1 / 12) & (y < 8 / 12)
+    vertex_indices, corners = np.unique(faces[~hole], return_inverse=True)
+    mesh = TriangleMesh(vertices[vertex_indices], corners.reshape(-1, 3))
+    cone = int(np.argmin(np.linalg.norm(mesh.vertices[:, :2] - [0.5, 9 / 12], axis=1)))
+    costs = lengths_of(mesh)
+    seams = find_seams(mesh, np.array([cone]), costs, kept_holes=find_holes(mesh))
+    assert costs[seams].sum() == pytest.approx(2 / 12)
+    assert cut_open(mesh, seams, 1).mesh.boundary_loops[0] == 1

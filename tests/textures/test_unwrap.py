@@ -19,9 +19,8 @@ from coneflat.geometry import corner_angles, signed_double_areas
 from coneflat.io import as_input
 from coneflat.options import Options
 from coneflat.retries import lay_out_with_thick_triangles
-from coneflat.source import Source
+from coneflat.source import Source, coarse_component
 from coneflat.textures import unwrapping
-from coneflat.textures.coarse import coarse_component
 from coneflat.textures.creases import along_sharp_edges
 from coneflat.textures.free_seams import freed
 from coneflat.textures.small_charts import join_small_charts
@@ -285,7 +284,7 @@ def test_the_cut_of_a_large_mesh_is_searched_on_a_coarse_one(monkeypatch):
     """The seams are hardly longer than those found on the mesh itself."""
     shape = shapes.torus(120, 40)
     coarse = unwrap(*shape).distortion
-    monkeypatch.setattr("coneflat.textures.search.COARSE", len(shape[1]))
+    monkeypatch.setattr("coneflat.source.coarse.COARSE", len(shape[1]))
     fine = unwrap(*shape).distortion
     assert max(coarse.energy, fine.energy) <= 4.1
     assert (coarse.flipped, coarse.overlapping_pairs) == (0, 0)
@@ -320,7 +319,7 @@ def test_a_small_texel_density_is_reached(density):
 
 
 def test_a_mesh_that_cannot_be_made_coarse_is_searched_itself(monkeypatch):
-    monkeypatch.setattr("coneflat.textures.search.COARSE", 2)
+    monkeypatch.setattr("coneflat.source.coarse.COARSE", 2)
     assert unwrap(*shapes.torus(16, 8)).distortion.flipped == 0
 
 
@@ -338,12 +337,13 @@ def test_seams_follow_sharp_edges_where_these_bend_the_surface():
     assert creases == [pytest.approx(0.3), 0.0]
 
 
-def test_a_coarse_component_keeps_what_belongs_to_its_vertices():
+def test_a_coarse_component_keeps_what_belongs_to_its_vertices(monkeypatch):
+    monkeypatch.setattr("coneflat.source.coarse.COARSE", 300)
     vertices, faces = shapes.hill(20, 20)
     weights = np.arange(1.0, len(vertices) + 1)
     options = Options(forbidden_cones=[3, 50], boundary="lengths", seam_weights=weights)
     component = Source(as_input(vertices, faces)).prepared(options).components[0]
-    coarse, vertices_kept = coarse_component(component, 300)
+    coarse, vertices_kept = coarse_component(component)
     assert np.array_equal(coarse.vertices, component.vertices[vertices_kept])
     assert np.array_equal(coarse.mesh.vertices, component.mesh.vertices[vertices_kept])
     for coarse_values, fine_values in (

@@ -12,11 +12,11 @@ from ..base.progress import stage
 from ..base.text import plural
 from ..geometry.overlap import overlaps_of_mesh
 from ..geometry.planar import signed_double_areas
-from ..mesh.connectivity import TriangleMesh
+from ..mesh.connectivity import TriangleMesh, label_faces
 from ..stages import Layout, SeamSpec
 from .charts import ChartLayout, Seams
 from .glue import glue_charts
-from .split import as_disk, find_steps, split_overlaps, unpinched
+from .split import as_disk, filled_disk, find_steps, split_overlaps, unpinched
 
 # Minimum areas of a chart to try, as fractions of the total area. Where the cheapest cuts leave several charts,
 # costlier cuts with larger pieces may leave fewer: a figure of 5,000 triangles gets 9 instead of 11.
@@ -42,7 +42,7 @@ def injective_charts(
     Args:
         mesh: the mesh.
         points: (u, 2) positions in the plane, at the mesh's scale.
-        corners: (m, 3) point index of each triangle corner; the triangles form one disk.
+        corners: (m, 3) point index of each triangle corner; the triangles form one disk, which may have holes.
         lengths: (e,) costs of cutting the edges.
         disk: a mesh whose faces are the corners, with a vertex for each point; None to compute it.
         tries: how many of the minimum areas of a chart are tried: one for the cheapest cuts, all for few charts.
@@ -56,17 +56,21 @@ def injective_charts(
     if not len(pairs):
         return glue_charts(mesh, single_chart, lengths).renumbered()
     disk = as_disk(points, corners) if disk is None else unpinched(disk.moved_to(points))
+    disk, side_costs = filled_disk(disk, lengths[mesh.halfedge_edges])
+    disk_areas = np.pad(np.abs(areas), (0, len(disk.faces) - len(areas)))
     steps = find_steps(pairs, disk.faces)
     candidates = list[ChartLayout]()
-    costs = lengths[mesh.halfedge_edges]
     shares = MIN_CHART_AREAS[:tries]
     for share in shares:
-        min_area = share * float(np.abs(areas).sum())
+        min_area = share * float(disk_areas.sum())
         max_charts = MAX_SMALL_CHARTS if share < shares[-1] else np.inf
-        chart = split_overlaps(disk, costs, np.abs(areas), pairs, min_area, max_charts, steps)
+        chart = split_overlaps(disk, side_costs, disk_areas, pairs, min_area, max_charts, steps)
         if chart is None:
             continue
-        layout = glue_charts(mesh, single_chart.split(chart), lengths).renumbered()
+        layout = single_chart.split(chart[: len(areas)])
+        if len(disk.faces) > len(areas):  # a piece that only filled holes connect is in several charts
+            layout = replace(layout, chart=label_faces(layout.corners, len(layout.points))[1])
+        layout = glue_charts(mesh, layout, lengths).renumbered()
         candidates.append(layout)
         if not layout.chart.any():
             break

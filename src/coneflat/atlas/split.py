@@ -7,7 +7,11 @@ import numpy as np
 from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of
 from ..base.progress import check_cancelled
 from ..mesh.connectivity import NEXT, TriangleMesh, corner_fans, label_components, sort_pairs
+from ..mesh.holes import find_holes, with_fans
 from .sheet import Sheet
+
+# Cost of cutting a side in a hole, relative to the mean cost.
+NO_COST = 1e-9
 
 
 def split_overlaps(
@@ -109,6 +113,23 @@ def unpinched(mesh: TriangleMesh) -> TriangleMesh:
     vertices = np.empty((count, 2))
     vertices[fans] = mesh.vertices[mesh.faces]
     return TriangleMesh(vertices, fans)
+
+
+def filled_disk(disk: TriangleMesh, costs: FloatArray) -> tuple[TriangleMesh, FloatArray]:
+    """Return a disk with filled holes, and the costs of cutting its sides: almost zero in and along holes.
+
+    Args:
+        disk: the m triangles, which come first in the result.
+        costs: (3m,) the costs of cutting their sides.
+    """
+    holes = find_holes(disk)
+    if not holes:
+        return disk, costs
+    filled = with_fans(disk, [disk.tails[hole] for hole in holes])
+    side_costs = np.full(filled.faces.size, NO_COST * costs.mean())
+    side_costs[: len(costs)] = costs
+    side_costs[np.concatenate(holes)] = side_costs[-1]
+    return filled, side_costs
 
 
 def _steps_between(steps: IntArray, chosen: BoolArray) -> IntArray:

@@ -36,6 +36,14 @@ class FlatTriangles:
         sides = self.sides.reshape(-1, 3)
         return (np.conj(sides[:, 0]) * sides[:, 1]).imag <= 0
 
+    def first(self, face_count: int) -> FlatTriangles:
+        """Return the first triangles; edges shared with the others are on the boundary."""
+        count = 3 * face_count
+        twin, turns = self.twin[:count].copy(), self.turns[:count].copy()
+        outside = twin >= count
+        twin[outside], turns[outside] = -1, 1.0
+        return FlatTriangles(self.sides[:count].copy(), turns, twin)
+
 
 def flat_triangles(mesh: TriangleMesh, lengths: ArrayLike) -> FlatTriangles:
     """Return the triangles of a mesh in the plane, with given side lengths: a flat metric on the mesh itself.
@@ -72,13 +80,10 @@ def straight_triangles(
     turns = np.empty(len(twin), dtype=np.complex128)
     place_triangles(triangulation.length, sides)
     undo_flips(twin, tail, sides, turns, np.asarray(flips, dtype=np.int64))
-    if face_count is not None and 3 * face_count < len(twin):
-        count = 3 * face_count
-        twin, sides, turns = twin[:count].copy(), sides[:count].copy(), turns[:count].copy()
-        outside = twin >= count
-        twin[outside] = -1
-        turns[outside] = 1.0
-    return FlatTriangles(sides, turns, twin)
+    triangles = FlatTriangles(sides, turns, twin)
+    if face_count is None or 3 * face_count == len(twin):
+        return triangles
+    return triangles.first(face_count)
 
 
 def rest_sides(lengths: FloatArray) -> ComplexArray:

@@ -1,4 +1,4 @@
-"""Layouts of many small disks that are flat already, all at once: they are unfolded, and nothing is distorted.
+"""Layouts of many small flat disks, with holes or without, all at once: they are unfolded, and nothing is distorted.
 
 For leaf cards and single triangles, the stages called for one component after the other take far longer.
 """
@@ -13,7 +13,7 @@ from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..geometry.intrinsic import intrinsic_triangulation
 from ..geometry.operators import angle_defect
 from ..geometry.overlap import has_overlaps
-from ..geometry.planar import layout_curvature
+from ..geometry.planar import layout_curvature, sides_between
 from ..geometry.straight import FlatTriangles, straight_triangles
 from ..geometry.triangles import corner_angles
 from ..geometry.unfolding import unfold_from
@@ -23,6 +23,9 @@ from ..stages import Layout, SolveStatistics
 
 # Largest curvature inside a flat disk, radians: the accuracy to which the exact metric is computed.
 FLAT_CURVATURE = 1e-10
+# Largest difference of the sides of an unfolded triangle from its lengths, relative to the longest: more than rounding,
+# and less than what remains open around a hole.
+CLOSED = 1e-9
 _NONE, _NO_PAIRS = np.empty(0, dtype=np.int64), np.empty((0, 2), dtype=np.int64)
 
 
@@ -30,6 +33,8 @@ def lay_out_flat_disks(
     meshes: Sequence[TriangleMesh], lengths: Sequence[FloatArray], fixed: Sequence[BoolArray]
 ) -> list[Layout | None]:
     """Return the isometric layout of each mesh; None for those that are not flat disks, or would overlap themselves.
+
+    Disks may have holes around which the layout closes up.
 
     Args:
         meshes: connected meshes.
@@ -43,6 +48,8 @@ def lay_out_flat_disks(
     flat = straight_triangles(intrinsic_triangulation(mesh, sides), _NONE)
     is_flat = _are_flat_disks(mesh, sides, flat, first, starts)
     points = unfold_from(flat, mesh.faces, starts[:-1])
+    gaps = np.abs(np.abs(sides_between(points[mesh.faces])) - sides).max(axis=1) > CLOSED * sides.max(axis=1)
+    is_flat &= np.bincount(np.arange(len(meshes)).repeat(np.diff(starts)), gaps, len(meshes)) == 0
     is_flat &= ~has_overlaps(points[mesh.faces], starts)
     curvature = layout_curvature(mesh, points[mesh.faces])
     target = np.where(mesh.is_boundary_vertex, curvature, 0.0)
@@ -81,6 +88,8 @@ def _are_flat_disks(
 ) -> BoolArray:
     """Return (k,) whether each component is a disk without curvature inside and without degenerate triangles.
 
+    It may have holes.
+
     Args:
         mesh: the union of k components.
         lengths, flat: the side lengths of its triangles, and the triangles in the plane.
@@ -93,7 +102,8 @@ def _are_flat_disks(
     of_loop = np.zeros(loops, dtype=np.int64)
     of_loop[loop[mesh.is_boundary_vertex]] = of_vertex[mesh.is_boundary_vertex]
     euler = np.diff(first) - np.bincount(of_edge, minlength=count) + np.diff(starts)
-    is_disk = (euler == 1) & (np.bincount(of_loop, minlength=count) == 1)
+    loops_of = np.bincount(of_loop, minlength=count)
+    is_disk = (euler == 2 - loops_of) & (loops_of > 0)
     defect = angle_defect(mesh.faces, corner_angles(lengths), mesh.is_boundary_vertex)
     is_curved = ~mesh.is_boundary_vertex & ~(np.abs(defect) <= FLAT_CURVATURE)
     is_bad = find_degenerate(flat.sides.reshape(-1, 3))

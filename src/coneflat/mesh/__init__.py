@@ -23,12 +23,13 @@ from .connectivity import (
     split_vertices,
 )
 from .doubled import EdgeGroups, glue_layers
+from .holes import find_holes, with_fans
 from .polygons import polygon_of
 from .ties import tie_key
 
 __all__ = [
     "CheckedMesh", "CutMesh", "EdgeGroups", "NEXT", "PREVIOUS", "REPAIR_ADVICE", "corner_fans", "cut_open",
-    "end_corners", "glue_layers", "joined_edges", "label_charts", "label_components", "label_faces", "left_out",
-    "nearby", "open_along", "point_seams", "point_vertices", "polygon_of", "sort_pairs", "split_vertices",
-    "tie_key", "uv_seams", "weld",
+    "end_corners", "find_holes", "glue_layers", "joined_edges", "label_charts", "label_components", "label_faces",
+    "left_out", "nearby", "open_along", "point_seams", "point_vertices", "polygon_of", "sort_pairs",
+    "split_vertices", "tie_key", "uv_seams", "weld", "with_fans",
 ]  # fmt: skip

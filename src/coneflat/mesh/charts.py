@@ -105,16 +105,17 @@ class CutMesh:
     origin: IntArray
 
 
-def cut_open(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
-    """Return a connected mesh cut along edges into disks.
+def cut_open(mesh: TriangleMesh, seams: IntArray, holes: int = 0) -> CutMesh:
+    """Return a connected mesh cut along edges into disks, or into one disk with holes.
 
     Args:
         mesh: the mesh.
         seams: (k,) edges, none of them on the boundary.
+        holes: largest number of holes; with holes, the result is connected.
 
     Raises:
         SeamError: an index is not that of an edge.
-        MetricError: a component of the cut mesh is not a disk.
+        MetricError: a component of the cut mesh is not a disk, or it is not a disk with holes.
     """
     if len(seams) and not 0 <= seams.min() <= seams.max() < len(mesh.edges):
         raise SeamError(f"seams must be edges from 0 to {len(mesh.edges) - 1:,}")
@@ -128,7 +129,8 @@ def cut_open(mesh: TriangleMesh, seams: IntArray) -> CutMesh:
     pieces = cut.mesh.components[0] if loops > 1 else 1
     euler = len(cut.origin) - (len(mesh.edges) + len(seams)) + len(mesh.faces)
     # A slit of a single edge has the same vertices on both sides, so it does not open the mesh.
-    if euler != pieces or loops != pieces or len(sides) == 2:
+    is_disk = pieces == loops == euler or (pieces == 1 and loops == 2 - euler <= 1 + holes)
+    if not is_disk or len(sides) == 2:
         raise MetricError(
             f"cutting along {plural(len(seams), 'edge')} does not give disks: Euler characteristic {euler}, "
             f"{plural(loops, 'boundary loop')}"

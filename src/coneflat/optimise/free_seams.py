@@ -16,6 +16,7 @@ from ..geometry.straight import FlatTriangles, rest_sides
 from ..geometry.unfolding import unfold
 from ..linalg import factorize
 from ..mesh.connectivity import TriangleMesh
+from ..mesh.holes import find_holes, with_fans
 from ..stages import ConeSpec, Layout
 from .energies import StretchEnergy
 from .relaxed_layouts import LayoutGroup
@@ -94,7 +95,7 @@ def relaxed_disks(
     If triangles are flipped at the start, all points move, and the minimisation starts from an embedding.
 
     Args:
-        disks: one or several disks as one mesh.
+        disks: one or several disks as one mesh, which may have holes.
         points: (c, 2) the points at the start.
         lengths: (m, 3) side lengths of the triangles on the surface.
         of_face: (m,) the disk of each triangle.
@@ -115,7 +116,7 @@ def untangled_disk(
     """Return points of a disk whose inverted triangles are positively oriented, except those that cannot be untangled.
 
     Args:
-        disk: the disk; the angles at its border are free.
+        disk: the disk, which may have holes; the angles at its borders are free.
         points: (c, 2) its points.
         lengths: (m, 3) side lengths of its triangles on the surface.
         fixed: (c,) points that do not move.
@@ -139,7 +140,7 @@ def untangled_disk(
     if may_wind:
         untangled = untangle(untangled.flat, disk.faces, np.full_like(angles, np.nan), *fixed_input, rings)
     places, moved = unfold(untangled.flat, disk.faces), mask_of(len(points), untangled.moved)
-    if len(untangled.left) and not (may_wind or fixed.any()) and disk.boundary_loops[0] == 1:
+    if len(untangled.left) and not (may_wind or fixed.any()) and disk.components[0] == 1:
         areas = np.abs(signed_double_areas(places[disk.faces])) / 2
         embedded = embedded_disks(disk, np.zeros(len(areas), dtype=np.int64), areas)
         if not find_degenerate(sides_between(embedded[disk.faces])).any():
@@ -150,8 +151,10 @@ def untangled_disk(
 def embedded_disks(disks: TriangleMesh, of_face: IntArray, areas: FloatArray) -> FloatArray:
     """Return (c, 2) points of disks by Tutte's embedding: borders on circles, inner points at neighbour means.
 
+    Holes are filled, so that their borders are inside.
+
     Args:
-        disks: one or several disks as one mesh.
+        disks: one or several disks as one mesh, which may have holes.
         of_face: (m,) the disk of each triangle.
         areas: (m,) areas of the triangles; each disk gets the area of its triangles.
 
@@ -162,14 +165,17 @@ def embedded_disks(disks: TriangleMesh, of_face: IntArray, areas: FloatArray) ->
     """
     count, of = len(disks.vertices), np.zeros(len(disks.vertices), dtype=np.int64)
     of[disks.faces] = of_face[:, None]
-    points = np.zeros((count, 2))
-    for walk in disks.boundary_walks():
+    holes = find_holes(disks, np.ones(disks.faces.shape))
+    filled = with_fans(disks, [disks.tails[hole] for hole in holes])
+    points = np.zeros((len(filled.vertices), 2))
+    for walk in filled.boundary_walks():
         turn = 2 * np.pi * np.arange(len(walk)) / len(walk)
-        points[disks.tails[walk]] = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    inside = np.flatnonzero(~disks.is_boundary_vertex)
+        points[filled.tails[walk]] = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    inside = np.flatnonzero(~filled.is_boundary_vertex)
     if len(inside):
-        rows = cotangent_laplacian(disks.faces, np.ones(disks.faces.shape), count)[inside]
+        rows = cotangent_laplacian(filled.faces, np.ones(filled.faces.shape), len(points))[inside]
         points[inside] = factorize(rows[:, inside]).solve(-(rows @ points))
+    points = points[:count]
     flat = np.bincount(of_face, np.abs(signed_double_areas(points[disks.faces])) / 2)
     scale = np.sqrt(np.bincount(of_face, areas) / np.maximum(flat, np.finfo(float).tiny))
     return np.asarray(scale[of, None] * points)

@@ -29,8 +29,9 @@ from ..flattener import flatten_source
 from ..geometry import coarse_mesh, double_areas, edge_lengths
 from ..io import as_input
 from ..measures import unmet_guarantees
+from ..mesh import with_fans
 from ..mesh.connectivity import TriangleMesh
-from ..options import declarations, read_options
+from ..options import Options, declarations, read_options
 from ..result import Flattening
 from ..source import Source
 from .aligned_cones import aligned_flattening
@@ -43,7 +44,7 @@ from .no_grid import NoGrid, or_reason
 from .options import QUADS, QuadOptions, flattening_defaults
 from .quad_mesh import QuadMesh
 from .relaxing import GridGoal
-from .remesh import MAX_CORNERS, MAX_HOLES, area_of, filled_mesh, is_thin, manageable_parts, part_of, remeshed
+from .remesh import MAX_CORNERS, MAX_HOLES, area_of, is_thin, manageable_parts, part_of, remeshed
 from .request import GridRequest
 from .round_layout import DOUBLINGS_BEFORE_OTHER_CONES, MAX_DOUBLINGS, RoundingRules, rounded_grid
 from .simpler_mesh import SimplerMesh
@@ -138,7 +139,7 @@ def on_coarse_mesh(request: GridRequest) -> tuple[GridRequest, SimplerMesh | Non
     walks, is_jagged = (walks, is_jagged) if request.boundary == "auto" else ([], False)
     part, part_vertices = part_of(mesh, is_manageable)
     loops = [np.searchsorted(part_vertices, mesh.tails[walk]) for walk in walks]
-    filled, notes = filled_mesh(part, loops), list(checked.notes)
+    filled, notes = with_fans(part, loops), list(checked.notes)
     simple, vertex_origin, face_origin = _with_few_triangles(filled, side)
     if simple is filled and is_manageable.all() and not (loops or is_jagged):
         return request, None
@@ -359,7 +360,9 @@ def flattened_map(
     options = {**request.options, "boundary": boundary or requested}
     request.stages.done = 0.0
     with request.stages("flatten"):
-        flattening = flatten_source(request.source, read_options({**flattening_defaults(options), **options}))
+        parsed: Options = read_options({**flattening_defaults(options), **options})
+        # With kept holes, an aeroplane with 27 borders gets 156 irregular vertices instead of 97.
+        flattening = flatten_source(request.source, parsed, keeps_holes=False)
     return SeamlessMap(flattening, requires_sides, note=note)
 
 

@@ -95,14 +95,6 @@ def part_of(mesh: TriangleMesh, is_in: BoolArray) -> tuple[TriangleMesh, IntArra
     return TriangleMesh(mesh.vertices[vertices], faces.reshape(-1, 3)), vertices
 
 
-def filled_mesh(mesh: TriangleMesh, loops: list[IntArray]) -> TriangleMesh:
-    """Return a mesh with some boundaries filled, given as their vertices, by triangles around their centroids."""
-    n = len(mesh.vertices)
-    centres = [mesh.vertices[loop].mean(axis=0, keepdims=True) for loop in loops]
-    fans = [np.stack([np.roll(loop, -1), loop, 0 * loop + n + k], axis=1) for k, loop in enumerate(loops)]
-    return TriangleMesh(np.concatenate([mesh.vertices, *centres]), np.concatenate([mesh.faces, *fans]))
-
-
 def manageable_parts(mesh: TriangleMesh, side: float) -> tuple[BoolArray, list[IntArray], bool]:
     """Return (m,) the triangles of components to search grids for, the half-edges of boundaries of theirs to fill, and
     whether the longest of one has too many corners.

@@ -1,10 +1,13 @@
 """Seams of a connected mesh.
 
 Seams may end anywhere on a boundary loop, as if it were contracted to a point. Boundary loops and cones are connected
-by a tree; on surfaces with handles, the shortest loops around them are cut as well. This cuts the mesh to a disk.
+by a tree; on surfaces with handles, the shortest loops around them are cut as well. This cuts the mesh to a disk. Holes
+that are kept need not be connected.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -16,6 +19,7 @@ from ..geometry.operators import at_safe_scale
 from ..linalg.shortest_paths import MultiGraph, Paths
 from ..mesh.charts import cut_open
 from ..mesh.connectivity import TriangleMesh, label_components
+from ..mesh.holes import with_fans
 from ..mesh.ties import mesh_tie_key
 from ..stages import Cut, SeamSpec
 
@@ -23,6 +27,8 @@ NO_EDGES = np.empty(0, dtype=np.int64)
 # Relative change of costs that breaks ties. On grids many paths are equally long; if rounding chose among them, the
 # result would depend on the numbering. The value is far above rounding and far below visible differences of seams.
 TIE_BREAK = 1e-7
+# Cost of an edge that costs nothing, relative to the mean cost: paths of more of them remain longer.
+NO_COST = 1e-9
 
 
 def find_seams(
@@ -32,8 +38,11 @@ def find_seams(
     is_avoided: BoolArray | None = None,
     *,
     forbidden: IntArray = NO_EDGES,
+    kept_holes: Sequence[IntArray] = (),
 ) -> IntArray:
     """Return (k,) the edges to cut so that a mesh becomes a disk with all cones on its border.
+
+    No seam has to reach holes that are kept. Where seams pass one, this costs nothing.
 
     Args:
         mesh: the mesh; it may have several components if each of them has a cone or a boundary.
@@ -41,6 +50,7 @@ def find_seams(
         edge_costs: (e,) positive costs, for example the edge lengths, or the result of `edge_costs`.
         is_avoided: (e,) True for edges that are cut only if necessary, such as diagonals of polygons.
         forbidden: edges that must not be cut.
+        kept_holes: the half-edges of boundary loops that may remain holes, in order; not all loops.
 
     Raises:
         SeamError: every set of seams needs forbidden edges.
@@ -70,16 +80,7 @@ def find_seams(
         if is_costly is not None and is_costly.any():
             costs = np.where(is_costly, costs + costs.sum(), costs)
 
-    is_cut = mesh.is_boundary_edge.copy()
-    is_end = mask_of(len(mesh.vertices), mesh.edges[is_cut])
-    is_end[cones] = True
-    if is_end.any():
-        is_cut |= _tree(mesh, costs, is_cut, is_end)
-        is_end[mesh.edges[is_cut]] = True
-        is_cut |= _loops(mesh, costs, is_cut, is_end)
-    else:
-        is_end[np.argmax(key)] = True
-        is_cut = without_loose_ends(mesh, _loops(mesh, costs, is_cut, is_end))
+    is_cut = _opened(mesh, costs, cones) if not kept_holes else _opened_around(mesh, costs, cones, kept_holes)
     seams = _lengthened(mesh, costs, is_cut & ~mesh.is_boundary_edge)
     count = int((seams & is_forbidden).sum())
     if count:
@@ -90,8 +91,39 @@ def find_seams(
     return np.flatnonzero(seams)
 
 
+def _opened(mesh: TriangleMesh, costs: FloatArray, cones: IntArray) -> BoolArray:
+    """Return (e,) the edges of the border of a mesh after it is cut to a disk with all cones on its border."""
+    is_cut = mesh.is_boundary_edge.copy()
+    is_end = mask_of(len(mesh.vertices), mesh.edges[is_cut])
+    is_end[cones] = True
+    if is_end.any():
+        is_cut |= _tree(mesh, costs, is_cut, is_end)
+        is_end[mesh.edges[is_cut]] = True
+        return is_cut | _loops(mesh, costs, is_cut, is_end)
+    is_end[np.argmax(mesh_tie_key(mesh))] = True
+    return without_loose_ends(mesh, _loops(mesh, costs, is_cut, is_end))
+
+
+def _opened_around(
+    mesh: TriangleMesh, costs: FloatArray, cones: IntArray, holes: Sequence[IntArray]
+) -> BoolArray:
+    """Return (e,) the same as `_opened`, for the mesh with filled holes: seams in and along these cost nothing."""
+    filled = with_fans(mesh, [mesh.tails[hole] for hole in holes])
+    place = filled.halfedge_edges[mesh.edge_halfedges[:, 0]]
+    filled_costs = np.full(len(filled.edges), NO_COST * costs.mean())
+    on_border = mask_of(len(costs), mesh.halfedge_edges[np.concatenate(holes)])
+    filled_costs[place[~on_border]] = costs[~on_border]
+    return _opened(filled, filled_costs, cones)[place]
+
+
 @stage("cut")
-def cut_to_disk(mesh: TriangleMesh, cones: IntArray, costs: FloatArray, spec: SeamSpec) -> Cut:
+def cut_to_disk(
+    mesh: TriangleMesh,
+    cones: IntArray,
+    costs: FloatArray,
+    spec: SeamSpec,
+    kept_holes: Sequence[IntArray] = (),
+) -> Cut:
     """Return a connected mesh cut open to a disk with the cones on its border (Section 4.3 of the paper).
 
     Args:
@@ -99,13 +131,15 @@ def cut_to_disk(mesh: TriangleMesh, cones: IntArray, costs: FloatArray, spec: Se
         cones: (s,) vertices that the seams must reach.
         costs: (e,) costs of cutting the edges, positive.
         spec: the edges to avoid and the forbidden ones.
+        kept_holes: boundary loops that may remain holes, see `find_seams`.
 
     Raises:
         SeamError: every set of seams needs forbidden edges.
         OptionError: costs are not positive numbers.
     """
-    seams = find_seams(mesh, cones, costs, spec.is_avoided, forbidden=np.flatnonzero(spec.is_forbidden))
-    return Cut(cut_open(mesh, seams).mesh, seams)
+    forbidden = np.flatnonzero(spec.is_forbidden)
+    seams = find_seams(mesh, cones, costs, spec.is_avoided, forbidden=forbidden, kept_holes=kept_holes)
+    return Cut(cut_open(mesh, seams, len(kept_holes)).mesh, seams)
 
 
 def _checked(costs: FloatArray, count: int) -> FloatArray:

@@ -8,9 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.arrays import FloatArray, IntArray, mask_of
+from ..geometry.opening import with_slack
 from ..mesh.check import CheckedMesh
 from ..mesh.connectivity import TriangleMesh
-from ..stages import ConeSpec, MetricSpec, SeamSpec
+from ..stages import ConeSpec, FlatMetric, MetricSpec, SeamSpec
+from .fill import Fill
 from .input_mesh import InputMesh
 
 
@@ -24,6 +26,8 @@ class Component:
         lengths: (m, 3) side lengths, with which every triangle has area.
         double_areas: (m,) twice the areas of the triangles before any were opened.
         cones, metric, seams: specifications.
+        fill: the mesh with filled holes; None if there are none, or if they must be opened.
+        keeps_holes: no seam has to reach the holes: the curvature along their borders is that of the filled mesh.
     """
 
     mesh: TriangleMesh
@@ -34,6 +38,8 @@ class Component:
     cones: ConeSpec
     metric: MetricSpec
     seams: SeamSpec
+    fill: Fill | None = None
+    keeps_holes: bool = False
 
     @property
     def is_exact(self) -> bool:
@@ -44,6 +50,38 @@ class Component:
     def location(self) -> str:
         """The vertex and the number of triangles by which messages name the component."""
         return f"in the component of vertex {self.cones.names[0]} ({len(self.faces):,} triangles)"
+
+    @property
+    def kept_holes(self) -> list[IntArray]:
+        """For each hole that no seam has to reach its half-edges in order."""
+        return self.fill.holes if self.fill is not None and self.keeps_holes else []
+
+    @property
+    def filled(self) -> Component:
+        """The component for which cones and metric are computed: with filled holes if they are kept."""
+        if self.fill is None or not self.keeps_holes:
+            return self
+        cones, metric = self.fill.specifications(self.cones, self.metric)
+        return replace(self, mesh=self.fill.mesh, lengths=self.fill.lengths, cones=cones, metric=metric)
+
+    def without_fill(self, metric: FlatMetric) -> FlatMetric:
+        """Return the metric of the component that is part of a metric of `filled`."""
+        if self.fill is None or not self.keeps_holes:
+            return metric
+        return self.fill.removed_from(metric, self.mesh, self.lengths, self.metric.keeps_area)
+
+    def with_kept_holes(self) -> Component:
+        """Return the component with its holes kept, where they can be."""
+        return self if self.fill is None else replace(self, keeps_holes=True)
+
+    def with_opened_holes(self) -> Component:
+        """Return the component with seams to all of its holes."""
+        return replace(self, keeps_holes=False)
+
+    def with_slack(self) -> Component:
+        """Return the component with triangles that are all thicker, see `with_slack` of `geometry.opening`."""
+        fill = None if self.fill is None else replace(self.fill, lengths=with_slack(self.fill.lengths))
+        return replace(self, lengths=with_slack(self.lengths), fill=fill)
 
     def with_distortion(self, factor: float) -> Component:
         """Return the component with another bound of the area distortion, multiplied by a factor."""

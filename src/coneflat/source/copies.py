@@ -56,7 +56,7 @@ def find_copies(
         return copies
     kinds: dict[tuple[object, ...], list[int]] = {}
     for i, component in enumerate(components):
-        if i in excluded or _has_vertex_options(component):
+        if i in excluded or has_vertex_options(component):
             continue
         key = _copy_key(component) if rounding is None else (component.mesh.faces.tobytes(),)
         alike = kinds.setdefault(key, [])
@@ -75,7 +75,7 @@ def copied(first: Layout, component: Component, scale: float) -> Layout:
     return replace(first, mesh=component.mesh, lengths=component.lengths, points=scale * first.points)
 
 
-def _has_vertex_options(component: Component) -> bool:
+def has_vertex_options(component: Component) -> bool:
     """Return whether options name single vertices of a component."""
     cones = component.cones
     weights = cones.weights, component.seams.weights, component.seams.visibility

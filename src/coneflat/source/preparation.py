@@ -21,6 +21,7 @@ from ..mesh.connectivity import TriangleMesh
 from ..options import Options
 from .components import Prepared
 from .constraints import locate_constraints
+from .fill import Fill
 from .input_mesh import InputMesh, at_unit_size, lengths_of_input, reorder_corners
 from .marked_edges import effective_marks, forbidden_edges, marked_edges
 from .rounding import named_rounding, rounding_notes
@@ -94,7 +95,10 @@ class Source:
         if options.marks_seams:
             constraints.check_off_seams(seams)
             constraints = replace(constraints, on_marks=mask_of(len(constraints.names), seams))
-        submeshes = self._submeshes.of((key, marked.tobytes()), lambda: _split(checked.mesh, marked, lengths))
+        submeshes = self._submeshes.of(
+            (key, marked.tobytes()),
+            lambda: _split(checked.mesh, marked, lengths, fills_holes=user_lengths is None),
+        )
         values = MeshValues(
             constraints,
             is_diagonal,
@@ -210,10 +214,21 @@ def _boundary_notes(mesh: TriangleMesh, seams: IntArray, options: Options) -> li
     return ["The surface has no boundary, so the option boundary has no effect."]
 
 
-def _split(mesh: TriangleMesh, marked: IntArray, lengths: FloatArray) -> tuple[Submesh, ...]:
-    """Return the connected components of a mesh after cutting it along edges (k,); lengths: (m, 3)."""
+def _split(
+    mesh: TriangleMesh, marked: IntArray, lengths: FloatArray, fills_holes: bool
+) -> tuple[Submesh, ...]:
+    """Return the connected components of a mesh after cutting it along edges.
+
+    Args:
+        mesh: the mesh.
+        marked: (k,) the edges; holes that they open are not filled.
+        lengths: (m, 3) side lengths.
+        fills_holes: whether lengths are distances of vertices, so that holes can be filled.
+    """
     opened = open_along(mesh, marked) if len(marked) else CutMesh(mesh, np.arange(len(mesh.vertices)))
-    return tuple(
-        Submesh(component, opened.origin[vertices], faces, lengths[faces])
-        for component, vertices, faces in opened.mesh.split_components()
-    )
+    is_marked = mask_of(len(mesh.vertices), mesh.edges[marked])[opened.origin]
+    submeshes = []
+    for component, vertices, faces in opened.mesh.split_components():
+        fill = Fill.of(component, lengths[faces], is_marked[vertices]) if fills_holes else None
+        submeshes.append(Submesh(component, opened.origin[vertices], faces, lengths[faces], fill))
+    return tuple(submeshes)

@@ -11,6 +11,7 @@ from ..options import Options
 from ..stages import ConeSpec, MetricSpec, SeamSpec
 from .components import Component
 from .constraints import Constraints
+from .fill import Fill
 from .marked_edges import unreachable
 
 
@@ -21,12 +22,14 @@ class Submesh(NamedTuple):
         mesh: the mesh.
         vertices, faces: (n,), (m,) indices in the whole mesh.
         lengths: (m, 3) side lengths.
+        fill: the mesh with filled holes; None if there are none, or if they must be opened.
     """
 
     mesh: TriangleMesh
     vertices: IntArray
     faces: IntArray
     lengths: FloatArray
+    fill: Fill | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +53,7 @@ class MeshValues:
 
 def specified_component(submesh: Submesh, values: MeshValues, options: Options) -> Component:
     """Return a component with its specifications."""
-    mesh, vertices, faces, lengths = submesh
+    mesh, vertices, faces, lengths, fill = submesh
     constraints, is_forbidden = values.constraints.within(vertices), values.is_forbidden[faces]
     boundary = _boundary_kind(mesh, constraints, options)
     on_marks = mesh.is_boundary_vertex & (False if constraints.on_marks is None else constraints.on_marks)
@@ -67,7 +70,9 @@ def specified_component(submesh: Submesh, values: MeshValues, options: Options) 
         is_forbidden=is_forbidden.ravel()[sides],
     )
     metric = _metric_spec(mesh, constraints, boundary, on_marks, options)
-    return Component(mesh, vertices, faces, lengths, values.double_areas[faces], cones, metric, seams)
+    # A prescribed boundary is that of the holes, too.
+    fill = fill if boundary == "free" else None
+    return Component(mesh, vertices, faces, lengths, values.double_areas[faces], cones, metric, seams, fill)
 
 
 def _boundary_kind(mesh: TriangleMesh, constraints: Constraints, options: Options) -> str:

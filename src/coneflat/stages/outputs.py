@@ -70,7 +70,7 @@ class ConeSolution:
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """A connected mesh cut open to a disk.
+    """A connected mesh cut open to a disk, which may have holes.
 
     Attributes:
         mesh: the cut mesh; its faces are those of the original mesh, in the same order.
@@ -207,7 +207,7 @@ class Layout:
         is_fixed: (n,) boundary vertices that must not move.
         statistics: statistics of the solvers.
         notes: unmet requests, one sentence each.
-        disk: the mesh cut to a disk, with one vertex per point and `corners` as faces; or None.
+        disk: the mesh cut to a disk, which may have holes, with one vertex per point and `corners` as faces; or None.
     """
 
     mesh: TriangleMesh

@@ -66,9 +66,16 @@ class CutModel:
     @cached_property
     def surface(self) -> ConeSurface:
         """The component with its operators, which searches for cones share."""
-        surface = ConeSurface.of(self.component.mesh, self.component.lengths, self.component.is_exact)
+        surface = self.steps.surface(self.component)
         surface.is_reused = True
         return surface
+
+    def with_holes(self, are_kept: bool) -> CutModel:
+        """Return the model of the component with its holes kept, where they can be, or opened."""
+        component = self.component
+        return replace(
+            self, component=component.with_kept_holes() if are_kept else component.with_opened_holes()
+        )
 
     @cached_property
     def seam_costs(self) -> FloatArray:
@@ -140,6 +147,8 @@ class CutModel:
 
     def expected_cost(self, candidate: Candidate) -> float:
         """Return the cost of the seams at which the energy would be the largest allowed, roughly."""
+        if not self.bound.is_finite:
+            return candidate.cost
         excess = (candidate.energy - self.bound.largest) / self.bound.allowed
         return candidate.cost + excess * COST_PER_ENERGY * float(np.sqrt(candidate.layout.area))
 

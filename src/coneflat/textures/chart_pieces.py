@@ -7,8 +7,9 @@ from functools import cached_property
 
 import numpy as np
 
-from ..atlas import as_disk, straight_angle
+from ..atlas import as_disk, filled_disk, straight_angle
 from ..base import BoolArray, ComplexArray, FloatArray, IntArray
+from ..geometry import signed_double_areas
 from ..linalg import MultiGraph
 from ..mesh import label_charts
 from ..mesh.connectivity import TriangleMesh
@@ -90,8 +91,8 @@ class Piece:
     Attributes:
         layout: the index of its layout.
         faces: (m,) indices of its triangles there.
-        disk: the triangles as a mesh in the plane.
-        costs: (3m,) cost of cutting the side opposite each corner.
+        disk: the triangles as a mesh in the plane, before those that fill holes.
+        costs: cost of cutting the side opposite each corner of the disk.
         min_area: smallest area of a piece to cut off.
     """
 
@@ -101,11 +102,19 @@ class Piece:
     costs: FloatArray
     min_area: float
 
+    @classmethod
+    def of(
+        cls, layout: int, faces: IntArray, disk: TriangleMesh, costs: FloatArray, min_area: float
+    ) -> Piece:
+        """Return a piece of triangles (m,) of a layout, which are those of the disk, with its holes filled."""
+        return cls(layout, faces, *filled_disk(disk, costs), min_area)
+
     def subset(self, is_chosen: BoolArray) -> Piece:
-        """Return the chosen triangles (m,) as a piece."""
+        """Return the chosen triangles of the disk as a piece."""
         disk = as_disk(self.disk.vertices, self.disk.faces[is_chosen])
         costs = self.costs.reshape(-1, 3)[is_chosen].ravel()
-        return Piece(self.layout, self.faces[is_chosen], disk, costs, self.min_area)
+        faces = self.faces[is_chosen[: len(self.faces)]]
+        return Piece(self.layout, faces, disk, costs, self.min_area)
 
     @cached_property
     def places(self) -> ComplexArray:
@@ -113,8 +122,15 @@ class Piece:
         return np.ascontiguousarray(self.disk.vertices).view(np.complex128)[:, 0]
 
     @cached_property
+    def area(self) -> float:
+        """The area of its triangles, without holes."""
+        return float(
+            np.abs(signed_double_areas(self.disk.vertices[self.disk.faces[: len(self.faces)]])).sum() / 2
+        )
+
+    @cached_property
     def outline(self) -> Outline:
-        """The outline."""
+        """The outline, without those of holes."""
         outer = self.disk.edge_halfedges[self.disk.is_boundary_edge, 0]
         return Outline.of(self.places[np.stack(self.disk.ends_of(outer), axis=1)])
 
@@ -132,7 +148,7 @@ class Piece:
     @cached_property
     def cuts(self) -> list[Cut]:
         """Cuts that differ from each other, the shortest ones relative to the area that they separate."""
-        if self.outline.area < 2 * self.min_area or self.disk.boundary_loops[0] > 1:
+        if self.outline.area < 2 * self.min_area:
             return []
         border = _Border.of(self)
         starts, ends = _narrow_pairs(self, border)

@@ -18,7 +18,7 @@ from ..geometry import (
     triangle_energies,
     vertex_log_scale,
 )
-from ..mesh import label_faces, open_along
+from ..mesh import find_holes, label_faces, open_along
 from ..mesh.connectivity import TriangleMesh, are_among
 from ..optimise import relaxed_disks, untangled_disk
 from ..seams import find_seams
@@ -68,7 +68,9 @@ def _untangled(layout: Layout, disk: TriangleMesh, spec: SeamSpec | None) -> Lay
     edges, lengths = layout.mesh.halfedge_edges[sides], layout.lengths.ravel()[sides]
     forbidden = np.flatnonzero(spec.is_forbidden[edges])
     with suppress(SeamError):
-        paths = find_seams(disk, winding, lengths, spec.is_avoided[edges], forbidden=forbidden)
+        holes = find_holes(disk, layout.lengths)
+        costs = lengths, spec.is_avoided[edges]
+        paths = find_seams(disk, winding, *costs, forbidden=forbidden, kept_holes=holes)
         return recut(untangled, np.union1d(seam_edges(layout), edges[paths]))
     return layout
 

@@ -13,11 +13,12 @@ from ..mesh import open_along, tie_key
 from ..mesh.connectivity import TriangleMesh, joined_meshes
 from ..optimise import StretchEnergy, embedded_disks, relax
 from ..seams import TIE_BREAK, find_seams
+from ..source import is_large
 from ..stages import Surface
 from .candidates import TOLERANCE, Candidate, CutModel
 from .free_seams import laid_out
 from .options import ENERGY_PER_AREA, ISOMETRIC
-from .search import FIRST_DISTORTION, is_large
+from .search import FIRST_DISTORTION
 
 # Number of times that cones are added.
 MAX_ROUNDS = 12
@@ -63,6 +64,12 @@ class _MinorComponents:
         self._first_vertex = np.cumsum([0, *vertex_counts])
         self._first_edge = np.cumsum([0, *(len(component.mesh.edges) for component in components)])
         self._mesh = joined_meshes([component.mesh for component in components])
+        sides = 3 * np.cumsum([0, *(len(component.faces) for component in components)])
+        self._kept_holes = [
+            first + hole
+            for first, component in zip(sides.tolist(), components, strict=False)
+            for hole in component.with_kept_holes().kept_holes
+        ]
         self._lengths = np.concatenate([component.lengths for component in components])
         self._areas = double_areas(self._lengths) / 2
         self._costs = np.concatenate([model.seam_costs for model in models])
@@ -83,7 +90,13 @@ class _MinorComponents:
             if not is_open.any():
                 break
             cones, distortion = self._with_more_cones(cones, is_open, distortion)
-            seams = find_seams(self._mesh, np.flatnonzero(cones), self._costs, self._is_avoided)
+            seams = find_seams(
+                self._mesh,
+                np.flatnonzero(cones),
+                self._costs,
+                self._is_avoided,
+                kept_holes=self._kept_holes,
+            )
             places = self._with_laid_out(open_along(self._mesh, seams).mesh, places, is_open)
             energies = self._energies(places)
             # The energy above that of an isometry is about a multiple of the square of the distortion.

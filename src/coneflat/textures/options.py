@@ -87,8 +87,8 @@ class UnwrapOptions(TextureOptions, SeamOptions, AtlasOptions, RunOptions):
 
     Attributes:
         seams: Edges that must be cut, as pairs of vertices; input, for the seams of the UVs in the file; or none, for
-            no seams but those that open each component to a disk, whatever the energy. In Python, ("input", pairs)
-            and ("none", pairs) combine a word with edges.
+            no seams but those that open each component to a disk, which may have holes, whatever the energy. In Python,
+            ("input", pairs) and ("none", pairs) combine a word with edges.
         charts: atlas: move seams and add cuts until no triangles overlap. one: a single chart per component, which may
             overlap itself. Or a number of charts: they are cut where they are narrow until there are as many.
     """

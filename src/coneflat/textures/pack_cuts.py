@@ -45,7 +45,7 @@ def cut_for_packing(
         gap: minimum distance between charts, relative to the side of the square.
     """
     charts = _largest_charts(layouts, costs)
-    area = sum(chart.outline.area for chart in charts)
+    area = sum(chart.area for chart in charts)
     if not area > 0:
         return list(layouts)
     borders = sum(float(chart.border_costs[np.isfinite(chart.border_costs)].sum()) for chart in charts)
@@ -95,7 +95,7 @@ def _largest_charts(
         layout, faces = layouts[i], np.flatnonzero(layouts[i].chart == chart)
         disk = as_disk(layout.points, layout.corners[faces])
         side_costs = costs(i)[layout.mesh.halfedge_edges].reshape(-1, 3)[faces].ravel()
-        charts.append(Piece(i, faces, disk, side_costs, min_area))
+        charts.append(Piece.of(i, faces, disk, side_costs, min_area))
     return charts
 
 

@@ -8,18 +8,19 @@ coarse mesh, and only the cones found there are taken over, unless the mesh itse
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
 from ..base import mask_of
 from ..cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, with_corners
-from ..seams import without_loose_ends
-from ..source import Component
+from ..errors import CurvatureError, MetricError, SeamError
+from ..seams import NO_EDGES, find_seams, without_loose_ends
+from ..source import coarse_component, is_large
 from ..stages import VertexCurvatures
-from .candidates import Candidate, CutModel
-from .coarse import coarse_component
+from .candidates import COST_PER_ENERGY, Candidate, CutModel
 from .energy import EnergyBound
 from .free_seams import recut, seam_edges
 from .options import ISOMETRIC
@@ -32,37 +33,78 @@ ENOUGH_SEARCHES = 5
 # The search ends where the costs within and beyond the bound differ by less than this factor, or the numbers of cones
 # by one. A surface of 50 handles needs about 160 cones, and each search for them more than a second.
 SIMILAR_COSTS = 1.06
-# Number of triangles of a coarse mesh; and what its energy has more, relative to what is allowed above that of an
-# isometry.
-COARSE, COARSE_EXCESS = 4_000, 0.15
+# What the energy of a coarse mesh has more, relative to what is allowed above that of an isometry.
+COARSE_EXCESS = 0.15
 # Energy above the bound, relative to what is allowed above that of an isometry, from which a candidate is given up.
 # Moving the tips of those hardly ever succeeds: trying it takes a tenth more time for seams shorter by 0.5%.
 MAX_EXCESS = 0.2
+#: Errors of a candidate, after which others are tried: with opened holes, or without a coarse mesh.
+FAILURES = CurvatureError, MetricError, SeamError
 
 
 def best_cut(model: CutModel) -> Candidate:
     """Return the candidate within the bound whose seams cost least, or else the one with the least energy.
 
-    Without a bound, the seams are those that open the component to a disk.
+    Without a bound, the seams are those that open the component to a disk, or to a disk with holes.
 
     Raises:
         CurvatureError, MetricError, SeamError: a candidate could not be laid out.
     """
     if not model.bound.is_finite:
-        return _with_fewest_seams(model)
+        return _best_of_variants(model, _with_fewest_seams)[1]
     if not is_large(model.component) or model.component.seams.is_forbidden.any():
-        return _best_of_searched(model)
-    candidate = _from_coarse(model)
+        return _best_of_variants(model, _best_of_searched)[1]
+    try:
+        variant, candidate = _from_coarse(model)
+    except FAILURES:
+        return _best_of_variants(model, _best_of_searched)[1]
     if not model.is_within(candidate):
         # The bound is too low, or the surface too noisy, for the cones of a coarse mesh.
-        return _best_of_searched(model, [candidate])
-    model.surface.close_search()
+        candidate = _best_of_searched(variant, [candidate])
+        if variant.component.keeps_holes and not model.is_within(candidate):
+            candidate = _best_within(model, candidate, _best_of_searched(model.with_holes(False)))
+        return candidate
+    variant.surface.close_search()
     return model.separated(candidate)
 
 
-def is_large(component: Component) -> bool:
-    """Return whether the cones of a component are searched on a coarse mesh."""
-    return len(component.faces) > 2 * COARSE
+def _best_of_variants(model: CutModel, search: Callable[[CutModel], Candidate]) -> tuple[CutModel, Candidate]:
+    """Return the better variant of a component, with its holes kept or opened, and the candidate that a search gives.
+
+    Opened holes are tried only where the bound is not met, or if their seams may cost less.
+    """
+    opened, variant = model.with_holes(False), model.with_holes(True)
+    if not variant.component.keeps_holes:
+        return opened, search(opened)
+    try:
+        candidate = search(variant)
+    except FAILURES:
+        return opened, search(opened)
+    if model.is_within(candidate) and _is_cheapest(model, candidate):
+        return variant, candidate
+    with suppress(*FAILURES):
+        opened_candidate = search(opened)
+        if _best_within(model, candidate, opened_candidate) is opened_candidate:
+            return opened, opened_candidate
+    return variant, candidate
+
+
+def _is_cheapest(model: CutModel, candidate: Candidate) -> bool:
+    """Return whether no seams to all holes cost less than those of a candidate that keeps them.
+
+    The seams that are found cost at most twice as much as the cheapest ones.
+    """
+    if not (model.bound.is_finite and len(candidate.layout.seams)):
+        return True
+    opening = model.seam_costs[find_seams(model.component.mesh, NO_EDGES, model.seam_costs)].sum()
+    return bool(model.expected_cost(candidate) <= opening / 2 - COST_PER_ENERGY * candidate.layout.area**0.5)
+
+
+def _best_within(model: CutModel, *candidates: Candidate) -> Candidate:
+    """Return the candidate within the bound whose seams cost least, or else the one with the least energy."""
+    within = [candidate for candidate in candidates if model.is_within(candidate)]
+    lowest = min(candidates, key=lambda candidate: candidate.energy)
+    return min(within, key=model.expected_cost, default=lowest)
 
 
 def _with_fewest_seams(model: CutModel) -> Candidate:
@@ -79,19 +121,20 @@ def _with_fewest_seams(model: CutModel) -> Candidate:
     return model.settled(model.separated(candidate))
 
 
-def _from_coarse(model: CutModel) -> Candidate:
-    """Return a candidate with the cones that are best on a coarse mesh."""
-    coarse, vertices = coarse_component(model.component, COARSE)
+def _from_coarse(model: CutModel) -> tuple[CutModel, Candidate]:
+    """Return the variant of a component that is better on a coarse mesh, and a candidate with the best cones there."""
+    coarse, vertices = coarse_component(model.component)
     bound = EnergyBound(model.bound.plus(COARSE_EXCESS), model.bound.by_area)
-    best = _best_of_searched(CutModel(coarse, bound, model.steps))
+    coarse_variant, best = _best_of_variants(CutModel(coarse, bound, model.steps), _best_of_searched)
+    variant = model.with_holes(coarse_variant.component.keeps_holes)
     cones = vertices[best.layout.cones]
     prescribed = VertexCurvatures(cones, np.full(len(cones), np.nan))
-    layout = model.laid_out(replace(model.component.cones, strategy="prescribed", prescribed=prescribed))
-    candidate = model.candidate(layout, layout.statistics.area_distortion_linear)
+    layout = variant.laid_out(replace(model.component.cones, strategy="prescribed", prescribed=prescribed))
+    candidate = variant.candidate(layout, layout.statistics.area_distortion_linear)
     excess = candidate.energy - model.bound.largest
     if 0 < excess <= MAX_EXCESS * model.bound.allowed:
-        return shortened(model, candidate)
-    return candidate
+        candidate = shortened(variant, candidate)
+    return variant, candidate
 
 
 def _best_of_searched(model: CutModel, earlier: Sequence[Candidate] = ()) -> Candidate:
