@@ -103,6 +103,17 @@ def test_there_are_as_many_charts_as_requested(shape):
         assert any("instead of" in note for note in result.notes) == (count < few.distortion.charts), count
 
 
+def test_slivers_are_no_charts_that_are_requested(shared):
+    """Overlaps leave charts of few triangles, which are joined to others."""
+    result = unwrap(shared("spot.obj"), max_energy=4.02, charts=12)
+    corners = result.vertices[result.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = np.bincount(result.seam_data.face_chart, np.linalg.norm(normals, axis=1))
+    assert is_valid(result)
+    assert result.distortion.charts == 12
+    assert areas.min() > 0.005 * areas.sum()
+
+
 def test_charts_are_counted_over_all_components():
     component = shapes.sphere(2)
     result = unwrap(*shapes.join(component, (component[0] + 5, component[1])), charts=7)

@@ -37,7 +37,7 @@ from .npz import CheckedArrays, number, read_archive, read_flattening
 from .obj import lines_of, relocated
 from .packages import as_input
 from .ply.write import write_parts
-from .read import INPUT_FORMATS, find_meshes, read_joined, read_mesh, read_mesh_from
+from .read import INPUT_FORMATS, export_advice, find_meshes, read_joined, read_mesh, read_mesh_from
 from .split import SplitMesh, shading_normals, split_at_seams
 from .texture import (
     DARK_CELL,
@@ -51,6 +51,7 @@ from .texture import (
 )
 from .write import (
     OUTPUT_FORMATS,
+    as_stored,
     as_written,
     check_output,
     kept_attributes,
@@ -61,15 +62,15 @@ from .write import (
 )
 
 __all__ = [
-    "ALPHA", "as_bytes", "as_input", "as_path", "as_uv_mesh", "as_written", "atomic_write", "Attribute", "bounds",
-    "cell_side", "check_cells", "check_output", "check_target", "checked_target", "CheckedArrays", "CLAMP",
-    "DARK_CELL", "decode_image", "encode_png", "find_meshes", "FOR_INDICES", "FOR_VERTICES", "Glb", "GROUPS",
-    "has_uv", "ImageTexture", "imported", "INPUT_FORMATS", "Joined", "kept_attributes", "keys_of", "known_ending",
-    "LIGHT_CELL", "linear_colours", "lines_of", "local_positions", "losses", "make_folder", "MATERIAL", "MATERIALS",
-    "Materials", "MIRRORED", "nibabel", "number", "OBJECTS", "OUTPUT_FORMATS", "PIPE", "read_archive", "read_bytes",
-    "read_flattening", "read_joined", "read_label", "read_materials", "read_mesh", "read_mesh_from", "read_picture",
-    "read_structure", "read_vertex_values", "readable", "relocated", "remove_unfinished", "REPEAT", "shading_normals",
-    "slot_of", "SLOTS", "SPECULAR", "split_at_seams", "SplitMesh", "stored_in_glb", "Texture", "texture_files",
-    "to_linear", "to_srgb", "TRANSFORM", "uv_mesh_of", "UVMesh", "VALUES", "VERTEX_COLOURS", "write_flattening",
-    "write_measured", "write_parts", "write_stream",
+    "ALPHA", "as_bytes", "as_input", "as_path", "as_stored", "as_uv_mesh", "as_written", "atomic_write", "Attribute",
+    "bounds", "cell_side", "check_cells", "check_output", "check_target", "checked_target", "CheckedArrays", "CLAMP",
+    "DARK_CELL", "decode_image", "encode_png", "export_advice", "find_meshes", "FOR_INDICES", "FOR_VERTICES", "Glb",
+    "GROUPS", "has_uv", "ImageTexture", "imported", "INPUT_FORMATS", "Joined", "kept_attributes", "keys_of",
+    "known_ending", "LIGHT_CELL", "linear_colours", "lines_of", "local_positions", "losses", "make_folder", "MATERIAL",
+    "MATERIALS", "Materials", "MIRRORED", "nibabel", "number", "OBJECTS", "OUTPUT_FORMATS", "PIPE", "read_archive",
+    "read_bytes", "read_flattening", "read_joined", "read_label", "read_materials", "read_mesh", "read_mesh_from",
+    "read_picture", "read_structure", "read_vertex_values", "readable", "relocated", "remove_unfinished", "REPEAT",
+    "shading_normals", "slot_of", "SLOTS", "SPECULAR", "split_at_seams", "SplitMesh", "stored_in_glb", "Texture",
+    "texture_files", "to_linear", "to_srgb", "TRANSFORM", "uv_mesh_of", "UVMesh", "VALUES", "VERTEX_COLOURS",
+    "write_flattening", "write_measured", "write_parts", "write_stream",
 ]  # fmt: skip

@@ -124,13 +124,14 @@ def as_path(path: object) -> Path:
         raise MeshFileError(f"a file name must be text or a path, got {type(path).__name__}") from error
 
 
-def known_ending(path: Path, endings: Collection[str], usage: str) -> str:
+def known_ending(path: Path, endings: Collection[str], usage: str, advice: str = "") -> str:
     """Return the ending of a path in lower case if it is known.
 
     Args:
         path: the path.
         endings: the known endings.
         usage: how files with these endings are used, for the message: "meshes are read from".
+        advice: what to do with the file, for the message.
 
     Raises:
         UnknownFormatError: the ending is not known.
@@ -138,7 +139,7 @@ def known_ending(path: Path, endings: Collection[str], usage: str) -> str:
     ending = path.suffix.lower()
     if ending not in endings:
         wrong = f"ends with {path.suffix!r}, which is not a known format" if path.suffix else "has no ending"
-        raise UnknownFormatError(f"{path} {wrong}; {usage} {', '.join(endings)}")
+        raise UnknownFormatError(f"{path} {wrong}{advice}; {usage} {', '.join(endings)}")
     return ending
 
 

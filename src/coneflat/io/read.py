@@ -61,6 +61,22 @@ _FORMATS = {
 INPUT_FORMATS = endings(Use.MESH)
 
 
+#: What to do with the files of modellers, which are not read, by their endings.
+_ADVICE = {
+    **dict.fromkeys(
+        (".fbx", ".dae", ".3ds", ".max", ".ma", ".mb", ".c4d", ".usd", ".usda", ".usdc", ".usdz"),
+        "export glTF (.glb) from the program that made it",
+    ),
+    ".blend": "export glTF (.glb) from Blender, or map it there with the extension of `coneflat blender`",
+}
+
+
+def export_advice(ending: str) -> str:
+    """Return what to do with a file of a modeller, in brackets after a space; "" for other endings."""
+    advice = _ADVICE.get(ending.lower())
+    return "" if advice is None else f" ({advice})"
+
+
 def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
     """Return the mesh of a file, with its polygons, in the file's own order of vertices and faces.
 
@@ -108,7 +124,7 @@ def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
         content = read_bytes(path)
         if is_freesurfer(content):
             return read_mesh_from(content, path, weld)
-    ending = known_ending(path, INPUT_FORMATS, "meshes are read from")
+    ending = known_ending(path, INPUT_FORMATS, "meshes are read from", export_advice(path.suffix))
     return read_mesh_from(read_bytes(path), path, weld, ending)
 
 

@@ -165,10 +165,15 @@ def as_written(result: Flattening, ending: str, *, has_texture: bool = False) ->
     """
     if not isinstance(ending, str):
         raise OptionError(f"ending must be text such as .glb, got {short_repr(ending)}")
-    form = _FORMATS.get(ending)
-    stored = result if form is None else form.stored(result)
+    stored = as_stored(result, ending)
     lost = tuple(note for note in left_out(stored, ending, has_texture) if note not in stored.notes)
     return replace(stored, notes=(*stored.notes, *lost)) if lost else stored
+
+
+def as_stored(result: Flattening, ending: str) -> Flattening:
+    """Return a result as `as_written` does, without the notes on data of the input that the format does not keep."""
+    form = _FORMATS.get(ending)
+    return result if form is None else form.stored(result)
 
 
 def _in_single_precision(result: Flattening) -> Flattening:

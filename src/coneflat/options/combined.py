@@ -15,6 +15,13 @@ from .declared import WIDEST_CONE, AtlasOptions, ConeOptions, MetricOptions, Run
 SEARCH_OPTIONS = ("cone_count", "positive_only", "weights", "required_cones", "forbidden_cones", "quantise")
 
 
+def _degrees_advice(angle: float) -> str:
+    """Return how to write an angle in degrees, for one that is hardly in radians; "" for others."""
+    if not 4 * math.pi < angle <= 720:
+        return ""
+    return f"; for {angle:g} degrees write {angle:g}deg, in Python math.radians({angle:g})"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions):
     """Parsed options of `coneflat.flatten`, as `read_options` returns them.
@@ -43,9 +50,11 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
         smallest, widest, quantum = self.min_cone_angle, self.max_cone_angle, self.quantise
         if not 0 < smallest <= WIDEST_CONE:
             largest = f"{WIDEST_CONE / math.pi:g} pi"
-            yield f"the smallest cone angle must be positive and at most {largest}, got {smallest:g} radians"
+            expected = f"the smallest cone angle must be positive and at most {largest}"
+            yield f"{expected}, got {smallest:g} radians{_degrees_advice(smallest)}"
         if widest is not None and not widest > smallest:
-            yield f"the largest cone angle ({widest:g} radians) must exceed the smallest ({smallest:g})"
+            advice = _degrees_advice(smallest)
+            yield f"the largest cone angle ({widest:g} radians) must exceed the smallest ({smallest:g}){advice}"
         if not self.searches_cones:
             # The curvatures of given cones without one minimize the weighted area distortion. If all are given, handles
             # can be corrected to a quantum, and a straight boundary has corners among them.
@@ -61,7 +70,7 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
         if quantum is not None and not MIN_QUANTUM <= quantum <= 2 * math.pi * (1 + TYPED_TOLERANCE):
             yield (
                 f"quantise must be from {MIN_QUANTUM:g} radians (a smaller quantum has no effect) to 2 pi, got "
-                f"{quantum:g}"
+                f"{quantum:g}{_degrees_advice(quantum)}"
             )
 
     def _other_errors(self) -> Iterator[str]:
@@ -70,7 +79,8 @@ class Options(ConeOptions, MetricOptions, SeamOptions, AtlasOptions, RunOptions)
             largest = f"a quarter of the resolution of {self.resolution:,}"
             yield f"padding must be from 0 to {largest}, got {self.padding:g}"
         if self.sharp_angle is not None and not 0 < self.sharp_angle < math.pi:
-            yield f"the sharp angle must be between 0 and pi, got {self.sharp_angle:g} radians"
+            advice = _degrees_advice(self.sharp_angle)
+            yield f"the sharp angle must be between 0 and pi, got {self.sharp_angle:g} radians{advice}"
 
     def _is_set(self, name: str) -> bool:
         value = getattr(self, name)

@@ -6,10 +6,10 @@ from .constraints import vertex_numbers
 from .copies import find_copies, has_vertex_options
 from .fill import Fill
 from .input_mesh import at_unit_size, result_numbering
-from .preparation import Source
+from .preparation import LatestCache, Source
 from .rounding import rounding_notes
 
 __all__ = [
-    "Component", "Fill", "Prepared", "Source", "at_unit_size", "coarse_component", "find_copies",
+    "Component", "Fill", "LatestCache", "Prepared", "Source", "at_unit_size", "coarse_component", "find_copies",
     "has_vertex_options", "is_large", "result_numbering", "rounding_notes", "vertex_numbers",
 ]  # fmt: skip

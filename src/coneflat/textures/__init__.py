@@ -12,13 +12,15 @@ from .options import MAX_ENERGY, TextureOptions, UnwrapOptions
 
 if TYPE_CHECKING:
     from .soup import UnwrappedSoup, unwrap_soup
-    from .unwrapping import unwrap, unwrap_source
+    from .unwrapping import Unwrapper, unwrap, unwrap_source
 
 __all__ = [
-    "MAX_ENERGY", "TextureOptions", "UnwrapOptions", "UnwrappedSoup", "unwrap", "unwrap_soup", "unwrap_source",
+    "MAX_ENERGY", "TextureOptions", "UnwrapOptions", "UnwrappedSoup", "Unwrapper", "unwrap", "unwrap_soup",
+    "unwrap_source",
 ]  # fmt: skip
 
 _HOMES = {
+    "Unwrapper": "unwrapping",
     "unwrap": "unwrapping",
     "unwrap_source": "unwrapping",
     "unwrap_soup": "soup",

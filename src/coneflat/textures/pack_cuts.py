@@ -20,6 +20,7 @@ from ..errors import OptionError
 from ..stages import Layout
 from .chart_pieces import MAX_CUTS, Cut, Outline, Piece
 from .free_seams import seam_edges
+from .small_charts import SMALL_AREA, count_charts
 
 # A cut must increase the covered fraction of the square by PRICE, over the root of the strength, for each length of the
 # square root of the area. All cuts together may cost SHARE of the charts' borders, in which a seam counts twice, or the
@@ -69,14 +70,17 @@ def _seam_cost(layout: Layout, costs: FloatArray) -> float:
 def cut_into(layouts: Sequence[Layout], costs: Callable[[int], FloatArray], count: int) -> list[Layout]:
     """Return layouts whose charts are cut until there are `count`, as far as possible.
 
-    The next cut is always the shortest one relative to the root of the area that it separates.
+    The next cut is always the shortest one relative to the root of the area that it separates. Charts that are smaller
+    than a piece may be, such as slivers that were overlaps, are not counted.
 
     Args:
         layouts, costs: as for `cut_for_packing`.
         count: the number of all charts.
     """
-    charts = _largest_charts(layouts, costs, 1 / (4 * count))
-    pieces, missing = list(charts), count - sum(int(layout.chart.max()) + 1 for layout in layouts)
+    min_piece = 1 / (4 * count)
+    charts = _largest_charts(layouts, costs, min_piece)
+    min_chart = min(min_piece, SMALL_AREA)
+    pieces, missing = list(charts), count - sum(count_charts(layout, min_chart) for layout in layouts)
     while missing > 0:
         check_cancelled()
         cuts = [min(piece.cuts, key=lambda cut: cut.score) for piece in pieces if piece.cuts]

@@ -9,6 +9,7 @@ coarse mesh, and only the cones found there are taken over, unless the mesh itse
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -37,7 +38,7 @@ COARSE_EXCESS = 0.15
 # Energy above the bound, relative to what is allowed above that of an isometry, from which a candidate is given up.
 # Moving the tips of those hardly ever succeeds: trying it takes a tenth more time for seams shorter by 0.5%.
 MAX_EXCESS = 0.2
-#: Errors of a component whose holes are kept, after which they are opened.
+#: Errors of a candidate, after which others are tried: with opened holes, or without a coarse mesh.
 FAILURES = CurvatureError, MetricError, SeamError
 
 
@@ -53,7 +54,10 @@ def best_cut(model: CutModel) -> Candidate:
         return _best_of_variants(model, _with_fewest_seams)[1]
     if not is_large(model.component) or model.component.seams.is_forbidden.any():
         return _best_of_variants(model, _best_of_searched)[1]
-    variant, candidate = _from_coarse(model)
+    try:
+        variant, candidate = _from_coarse(model)
+    except FAILURES:
+        return _best_of_variants(model, _best_of_searched)[1]
     if not model.is_within(candidate):
         # The bound is too low, or the surface too noisy, for the cones of a coarse mesh.
         candidate = _best_of_searched(variant, [candidate])
@@ -78,9 +82,11 @@ def _best_of_variants(model: CutModel, search: Callable[[CutModel], Candidate]) 
         return opened, search(opened)
     if model.is_within(candidate) and _is_cheapest(model, candidate):
         return variant, candidate
-    opened_candidate = search(opened)
-    best = _best_within(model, candidate, opened_candidate)
-    return (variant if best is candidate else opened), best
+    with suppress(*FAILURES):
+        opened_candidate = search(opened)
+        if _best_within(model, candidate, opened_candidate) is opened_candidate:
+            return opened, opened_candidate
+    return variant, candidate
 
 
 def _is_cheapest(model: CutModel, candidate: Candidate) -> bool:

@@ -51,6 +51,13 @@ def join_small_charts(model: CutModel, candidate: Candidate) -> Candidate:
     return candidate
 
 
+def count_charts(layout: Layout, min_share: float = SMALL_AREA) -> int:
+    """Return the number of charts, at least 1, without those that have less than a share of the component's area."""
+    sides = layout.points[layout.corners[:, 1:]] - layout.points[layout.corners[:, :1]]
+    areas = np.bincount(layout.chart, np.abs(np.linalg.det(sides)))
+    return max(int(np.count_nonzero(areas >= min_share * areas.sum())), 1)
+
+
 def _chart_seams(layout: Layout) -> Seams:
     return Seams(layout.mesh, ChartLayout(layout.points, layout.corners, layout.chart))
 

@@ -12,6 +12,7 @@ from functools import partial
 import pytest
 import shapes
 from click.testing import CliRunner
+from command import command
 
 from coneflat import errors, measure_uv
 from coneflat.apps.batch import find_jobs, run_batch
@@ -174,6 +175,21 @@ def test_interrupted_batches_keep_what_they_have(models, tmp_path):
     assert time.perf_counter() - start < 60
     assert len(rows_of(tmp_path / "summary.csv")) == 1
     assert len(run_batch(jobs, tmp_path).rows) == 3
+
+
+def test_interrupted_batches_say_that_they_can_continue(models, tmp_path, monkeypatch):
+    def interrupted(jobs, folder, *, listener, **_):
+        listener({"mesh": "a.obj", "status": "failed", "error": "none", "seconds": None}, 1, 2)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("coneflat.apps.batch.run_batch", interrupted)
+    for words, expected in (
+        ((), "interrupted after 1 mesh: if the same command is run again, it continues with the others"),
+        (("--redo",), "with --redo, all are flattened again"),
+    ):
+        done = command("batch", models, "--out", tmp_path / "out", *words)
+        assert done.returncode == 130
+        assert expected in done.stderr.splitlines()[-1]
 
 
 @pytest.mark.slow

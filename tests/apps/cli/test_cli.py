@@ -59,6 +59,28 @@ def test_the_time_row_has_all_that_a_command_takes(model, tmp_path):
     assert sum(seconds.values()) == pytest.approx(float(total), abs=0.005 * len(seconds) + 0.01)
 
 
+@pytest.mark.parametrize("words", [[], ["batch"], ["flatten"]])
+def test_help_is_a_command(words):
+    done, expected = run("help", *words), run(*words, "--help")
+    assert (done.returncode, done.stdout) == (0, expected.stdout)
+    assert done.stdout.startswith("Usage: ")
+
+
+@pytest.mark.parametrize(
+    ("file", "advice"),
+    [
+        ("a.obj", "`coneflat flatten a.obj` or `coneflat unwrap a.obj` or `coneflat studio a.obj`"),
+        ("A B.GLB", "`coneflat flatten 'A B.GLB'` or "),
+        ("a.npz", "`coneflat view a.npz`"),
+        ("a_studio.json", "`coneflat studio a_studio.json`"),
+    ],
+)
+def test_a_file_without_a_command_gets_advice(file, advice):
+    done = run(file)
+    assert done.returncode == 2
+    assert f"{file} is a file, not a command: use {advice}" in done.stderr
+
+
 def test_paper_is_the_published_method(model, tmp_path):
     done = run("flatten", model, "--paper", "--report", "paper.json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -94,6 +116,14 @@ def test_paper_is_the_published_method(model, tmp_path):
         (["empty.obj"], "empty.obj"),
         (["text.ply"], "text.ply"),
         (["model.xyz"], ".xyz"),
+        (
+            ["model.fbx"],
+            "'.fbx', which is not a known format (export glTF (.glb) from the program that made it);",
+        ),
+        (["model.blend"], "or map it there with the extension of `coneflat blender`)"),
+        (["model.obj", "--sharp-angle", "40"], "got 40 radians; for 40 degrees write 40deg"),
+        (["model.obj", "--quantise", "90"], "got 90; for 90 degrees write 90deg"),
+        (["model.obj", "--min-cone-angle", "120"], "the smallest (120); for 120 degrees write 120deg"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(model, tmp_path, arguments, message):

@@ -72,7 +72,8 @@ def test_a_mesh_that_needs_repair_is_repaired_with_a_note_and_an_undo(open_mesh,
     session, state = open_mesh(*make())
     assert (state["trouble"], state["bare"], state["undo"]) == (None, False, 1)
     assert state["choices"]["options"] == {"repair": True}
-    (warning,) = state["warnings"]
+    warning, *notes = state["warnings"]
+    assert notes == session.picture()[0]["notes"]
     assert warning.startswith(f"The mesh was repaired: {wrong}")
     assert "repair=True" not in warning
     bad = session.picture()[0]["bad"]
@@ -110,6 +111,7 @@ def test_a_sphere_without_cones_is_drawn_when_it_is_opened_again(open_mesh, tmp_
         session.act({"do": "remove", "vertex": vertex})
     state = settled(session)
     assert state["stale"]
+    session.close()
     again = Session(tmp_path)
     try:
         again.open(tmp_path / "mesh.obj")

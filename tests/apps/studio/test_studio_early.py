@@ -15,10 +15,12 @@ import shapes
 import coneflat
 from coneflat.apps.studio.child import PLACEHOLDER, JobRunner, Jobs, serve
 from coneflat.apps.studio.choices import Choices
+from coneflat.apps.studio.layouts import MAX_LAYOUTS
 from coneflat.apps.studio.session import Session
 from coneflat.apps.studio.worker import SentPictures, read_frame, with_hashes, write_frame
 from coneflat.apps.view.page.payload import pack
 from coneflat.base.progress import check_cancelled
+from coneflat.errors import StudioError
 
 
 class Mute:
@@ -184,3 +186,96 @@ def test_a_change_cancels_the_separation_of_overlaps(tmp_path, monkeypatch):
             heard.append(read_frame(hearing)[0])
     assert {"job": 1, "given_up": True} in heard
     assert not any(message["job"] == 1 and "done" in message for message in heard)
+
+
+class TestModelAlone:
+    """The model, which is shown before its first layout is computed."""
+
+    def test_the_model_comes_before_its_first_layout_alone(self, tmp_path):
+        path = shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(2))
+        told, stages = [], []
+        runner = JobRunner()
+        job = {"mesh": str(path), "sha256": "", "choices": Choices().as_plain()}
+        for is_first in (True, False):
+            runner.flatten(
+                {**job, "first": is_first},
+                lambda stage, _: stages.append(stage),
+                lambda head, body: None,
+                lambda kind, head, body: told.append((kind, head, list(stages))),
+            )
+        assert [kind for kind, *_ in told] == ["model", "shape"]
+        _, model, before = told[0]
+        assert model["head"]["title"] == "Computing the first layout"
+        assert (model["head"]["show"], model["head"]["triangles"], model["found"]) == ("plain", 320, [])
+        assert set(before) == {"read", "check"}
+
+    def test_it_is_shown_until_the_layout_comes(self, tmp_path):
+        session = Session(tmp_path)
+        session._worker = Mute()
+        session.open(shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(1)))
+        (job,) = session._worker.jobs
+        assert (job["first"], job["bare"]) == (True, True)
+        TestFirstViews.answer(session, "model", job["job"], "alone")
+        state = session.state()
+        assert (state["bare"], bool(state["busy"]), state["stale"]) == (True, True, False)
+        # No cones are known, so that none of them can be placed by hand.
+        with pytest.raises(StudioError, match="the cones are not found yet"):
+            session.act({"do": "add", "vertex": 3})
+        TestFirstViews.answer(session, "done", job["job"], "layout")
+        assert (session.state()["bare"], session.picture()[0]["title"]) == (False, "layout")
+        session.act({"do": "add", "vertex": 3})
+        assert session._worker.jobs[-1]["first"] is False
+
+
+class TestLatestLayouts:
+    """Layouts that are shown again when steps are undone."""
+
+    @pytest.fixture
+    def calls(self, monkeypatch):
+        """The options of all maps that are computed, in turn."""
+        computed, flatten = [], coneflat.Flattener.flatten
+
+        def counted(flattener, **options):
+            computed.append(options)
+            return flatten(flattener, **options)
+
+        monkeypatch.setattr(coneflat.Flattener, "flatten", counted)
+        return computed
+
+    @staticmethod
+    def flatten(runner, path, chosen):
+        job = {"mesh": str(path), "sha256": path.name, "choices": chosen.as_plain()}
+        head, body = runner.flatten(job, lambda *_: None, lambda *_: None)
+        return head["head"]["title"], head["found"], body, runner.result.uv.tobytes()
+
+    def test_undone_steps_compute_nothing(self, tmp_path, calls):
+        path = shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(1))
+        runner = JobRunner()
+        chosen = [Choices().with_option("stretch", step / 20) for step in range(MAX_LAYOUTS)]
+        layouts = [self.flatten(runner, path, choices) for choices in chosen]
+        assert len(calls) == MAX_LAYOUTS
+        assert [self.flatten(runner, path, choices) for choices in reversed(chosen)] == layouts[::-1]
+        self.flatten(runner, path, chosen[0].with_units("mm", "cm"))
+        assert len(calls) == MAX_LAYOUTS
+        # The one that was asked for longest ago is dropped.
+        self.flatten(runner, path, Choices().with_option("stretch", 0.9))
+        self.flatten(runner, path, chosen[0])
+        assert len(calls) == MAX_LAYOUTS + 1
+        assert self.flatten(runner, path, chosen[-1]) == layouts[-1]
+        assert len(calls) == MAX_LAYOUTS + 2
+
+    def test_layouts_of_another_mesh_are_not_taken(self, tmp_path, calls):
+        runner = JobRunner()
+        paths = [shapes.write_obj(tmp_path / f"{level}.obj", *shapes.sphere(level)) for level in (1, 2)]
+        first, second = (self.flatten(runner, path, Choices()) for path in paths)
+        assert first != second
+        assert self.flatten(runner, paths[0], Choices()) == first
+        assert len(calls) == 3
+
+    def test_large_layouts_are_fewer(self, tmp_path, calls, monkeypatch):
+        monkeypatch.setattr("coneflat.apps.studio.layouts.MAX_TRIANGLES", 200)
+        path = shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(1))  # 80 triangles
+        runner, chosen = JobRunner(), [Choices().with_option("stretch", step / 20) for step in range(3)]
+        for choices in (*chosen, chosen[1], chosen[0]):
+            self.flatten(runner, path, choices)
+        assert len(calls) == 4

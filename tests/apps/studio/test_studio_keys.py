@@ -93,7 +93,7 @@ def test_a_start_page_opens_the_sample(browser, tmp_path):
         visit = StudioVisit(browser, served)
         assert visit.page.locator("#open-first").count() == 1
         visit.page.click("#sample")
-        visit.wait("studio.layout === 1 && !studio.isBusy()")
+        visit.wait("studio.hasLayout() && !studio.isBusy()")
         visit.settle()
         title = visit.page.inner_text("#title")
         assert "1 chart" in title

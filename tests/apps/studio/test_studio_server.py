@@ -117,7 +117,11 @@ class TestPage:
         assert page.post("/mesh?name=ball.obj", content=ball.read_bytes()).status_code == 200
         assert session.wait_until_idle(120)
         state = page.get("/state").json()
-        assert (state["mesh"], state["layout"], state["trouble"]) == ("ball.obj", 1, None)
+        assert (state["mesh"], state["layout"], state["trouble"]) == (
+            "ball.obj",
+            2,
+            None,
+        )  # The model alone was the first.
         content = page.get("/layout").content
         size = struct.unpack("<I", content[:4])[0]
         head = json.loads(content[4 : 4 + size])
@@ -133,7 +137,10 @@ class TestPage:
 
     def test_refused_requests_are_answered_with_the_reason(self, page, ball):
         page.post("/mesh?name=ball.obj", content=ball.read_bytes())
-        answer = page.post("/act", json={"do": "remove", "vertex": 10**9})
+        answer = page.post("/act", json={"do": "remove", "vertex": 3})
+        assert answer.status_code == 400
+        assert "the cones are not found yet" in answer.text
+        answer = page.post("/act", json={"do": "lock", "vertex": 10**9, "locked": False})
         assert answer.status_code == 400
         assert "vertex 1000000000 is not a cone" in answer.text
         deep = b'{"do": "cut", "path": ' + b"[" * 900 + b"]" * 900 + b"}"

@@ -10,7 +10,7 @@ import pytest
 
 import coneflat
 from coneflat.apps.studio.choices import DECLARED, Choices
-from coneflat.apps.studio.messages import CONTROLS, misplaced_warning, page_message
+from coneflat.apps.studio.messages import CONTROLS, misplaced_warning, notes_on_controls, page_message
 from coneflat.apps.studio.page import studio_page
 from coneflat.apps.studio.paint import Region
 from coneflat.base.defaults import MAX_CONE_ANGLE
@@ -143,3 +143,11 @@ class TestWords:
             assert page_message(f"try {flag}.") == (
                 f"try “{CONTROLS[name]}”." if name in CONTROLS else f"try {flag} of coneflat flatten."
             )
+
+
+def test_notes_on_numbers_are_found_by_their_option():
+    count = (
+        "200 cones instead of the 500 asked for: searches place 200 at most, in addition to required ones."
+    )
+    charts = "The texture has 1 chart instead of 2: no further cut divides one."
+    assert notes_on_controls(["Another note.", count, charts]) == {"cone_count": count, "charts": charts}

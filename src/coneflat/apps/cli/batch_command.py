@@ -106,16 +106,22 @@ def batch(
     with Console(verbosity) as console:
         console.say([f"flattening {plural(len(todo), 'mesh', 'meshes')} into {printable(flags.out)}"])
         console.progress("flatten", 0.0)
-        outcome = run_batch(
-            todo,
-            flags.out.absolute(),
-            processes=flags.jobs,
-            limit=flags.time_limit,
-            dask=flags.dask,
-            redo=flags.redo,
-            summary=flags.summary,
-            listener=_listener(console, rows),
-        )
+        try:
+            outcome = run_batch(
+                todo,
+                flags.out.absolute(),
+                processes=flags.jobs,
+                limit=flags.time_limit,
+                dask=flags.dask,
+                redo=flags.redo,
+                summary=flags.summary,
+                listener=_listener(console, rows),
+            )
+        except KeyboardInterrupt as error:
+            again = "with --redo, all are flattened again" if flags.redo else "it continues with the others"
+            raise KeyboardInterrupt(
+                f"interrupted after {plural(len(rows), 'mesh', 'meshes')}: if the same command is run again, {again}"
+            ) from error
         console.say(_outcome_lines(outcome, len(todo)))
         console.say(_slowest(rows, console.elapsed))
         console.finish([table])

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import gc
 import os
+import shlex
 import signal
 import sys
 import time
 from _thread import start_new_thread
 from contextlib import suppress
+from pathlib import Path
 from types import FrameType
 from typing import IO, Any, NoReturn
 
 import click
 
 from ... import ConeflatError, __version__
-from ...base import inner_calls
+from ...base import Use, endings, inner_calls
 from .batch_command import batch
 from .blender_command import blender
 from .brain_command import brain
@@ -34,7 +36,32 @@ class Interrupted(KeyboardInterrupt):
     """A signal; after a plain KeyboardInterrupt inside `exec`, Python ends with the code of SIGINT in any case."""
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+class Commands(click.Group):
+    """The commands; `coneflat help` is their help, and a file instead of a command gets advice."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Parse arguments: help is the option --help of the command after it."""
+        return super().parse_args(ctx, [*args[1:2], "--help"] if args[:1] == ["help"] else args)
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command of arguments; if that is a file, the error names the commands for it."""
+        if args[0] not in self.commands and (names := commands_for(args[0])):
+            advice = " or ".join(f"`coneflat {name} {shlex.quote(args[0])}`" for name in names)
+            ctx.fail(f"{args[0]} is a file, not a command: use {advice}.")
+        return super().resolve_command(ctx, args)
+
+
+def commands_for(file: str) -> tuple[str, ...]:
+    """Return the commands that a file is usually an argument of; none if it does not look like a file."""
+    ending = Path(file).suffix.lower()
+    if ending in endings(Use.MESH):
+        return "flatten", "unwrap", "studio"
+    return {".npz": ("view",), ".json": ("studio",)}.get(ending, ())
+
+
+@click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="coneflat")
 @click.pass_context
 def cli(context: click.Context) -> None:
@@ -94,8 +121,8 @@ def _exit_code(received: list[int]) -> int:
         return _fail(f"{error.format_message()}{_hint(error)}", ExitCode.USER_ERROR)
     except ConeflatError as error:
         return _fail(str(error), ExitCode.USER_ERROR)
-    except (KeyboardInterrupt, click.exceptions.Abort):
-        return _fail_interrupted(received)
+    except (KeyboardInterrupt, click.exceptions.Abort) as error:
+        return _fail_interrupted(received, str(error.__cause__ or error))
     except OSError as error:
         # Errors of files are raised as ConeflatError, so this one is from the terminal, a full device, or a pipe whose
         # reader has ended as in `coneflat ... | head`.
@@ -184,9 +211,10 @@ def _fail_to_print(error: OSError) -> int:
     return _fail(f"cannot print: {error.strerror or error}", ExitCode.INTERNAL_ERROR)
 
 
-def _fail_interrupted(received: list[int]) -> int:
+def _fail_interrupted(received: list[int], message: str = "") -> int:
     # Without a signal that was received, it was SIGINT.
-    return _fail("interrupted; no incomplete file was left", ExitCode.SIGNALLED + (received or [2])[0])
+    code = ExitCode.SIGNALLED + (received or [2])[0]
+    return _fail(message or "interrupted; no incomplete file was left", code)
 
 
 def _fail(message: str, code: int) -> int:

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from ...base import printable
 from ...options import SHOWS
 from .flags import (
     QUIET,
@@ -134,7 +135,7 @@ def studio(
     The address of the page is printed first. It can be used on this machine only, and contains a secret token. A mesh
     can also be dropped on the page. The choices are saved in the current folder in a project, MESH's name with
     _studio.json, from which the studio can continue, and of which `coneflat flatten --project` or `coneflat unwrap
-    --project` computes the same layout. Ctrl-C ends the studio.
+    --project` computes the same layout. Ctrl-C ends the studio, with exit code 0.
 
     \b
     Examples:
@@ -149,4 +150,7 @@ def studio(
         if verbosity != QUIET or no_open:
             click.echo(line)
 
-    run_studio(file, port, opens=not no_open, say=say, color=color, most_triangles=most_triangles)
+    project = run_studio(file, port, opens=not no_open, say=say, color=color, most_triangles=most_triangles)
+    if verbosity != QUIET:
+        place = f" Choices are in {printable(project)}." if project is not None and project.exists() else ""
+        click.echo(f"Studio ended.{place}")

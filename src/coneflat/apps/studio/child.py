@@ -14,25 +14,49 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import ConeflatError, Flattener, Flattening, unwrap
+from ... import ConeflatError, Flattener, Flattening
 from ...base import FloatArray, cancel_with, inner_calls
 from ...errors import DegenerateFaceError, NonManifoldError, NonOrientableError
 from ...io import Joined, Texture, read_joined
 from ...options import MAX_SHOWN_TRIANGLES
-from ..view import Model, PageText, Quantity, content_of, head_and_block, own_quantity, pack, shown_rows
+from ...textures import Unwrapper
+from ..view import (
+    Model,
+    PageText,
+    Quantity,
+    content_of,
+    head_and_block,
+    own_quantity,
+    pack,
+    shown_rows,
+    text_of,
+)
 from .choices import Choices
-from .messages import angle_warning, page_message, with_warnings
-from .outputs import bad_places, curve_data, own_picture, quads_file, repaired, result_file, without_layout
+from .layouts import LatestLayouts, MadeLayout
+from .messages import misplaced_warning, notes_on_controls, page_message, with_warnings
+from .outputs import (
+    SavedFile,
+    as_shown,
+    bad_places,
+    curve_data,
+    own_picture,
+    quads_file,
+    repaired,
+    result_file,
+    without_layout,
+)
+from .places import shape_message, shape_of
 from .worker import Head, read_frame, with_hashes, write_frame
 
-#: The text that stands for unknown numbers, and the title of the preview.
+#: The text that stands for unknown numbers, and the titles of pages without a final layout.
 PLACEHOLDER = "…"
 BARE_TITLE = "No layout"
+COMPUTING_TITLE = "Computing the first layout"
 FIRST_TITLE = "Preview: distortion is not yet reduced, and overlaps are not yet removed  ·  …"
 
 
@@ -75,6 +99,14 @@ class Jobs:
         return self._is_closed or job != self._newest
 
 
+class Opened(NamedTuple):
+    """A mesh that was read, and what maps it repeatedly."""
+
+    source: Joined
+    flattener: Flattener
+    unwrapper: Unwrapper
+
+
 class JobRunner:
     """Runs jobs, and caches what depends on the mesh alone.
 
@@ -86,15 +118,21 @@ class JobRunner:
         """early_from: number of polygons from which on a preview is shown; for fewer the final layout is as fast."""
         self.result: Flattening | None = None
         self._early_from = early_from
-        self._source: Joined | None = None
-        self._flattener: Flattener | None = None
+        self._opened: Opened | None = None
+        self._layouts = LatestLayouts()
         self._model: Model | None = None
         self._max_triangles: int | None = None
         self._own_texture: tuple[Texture, FloatArray] | None = None
+        # Path and hash of the mesh that was read, and of the one whose shape the session has got.
         self._read: tuple[str, str] | None = None
+        self._told: tuple[str, str] | None = None
 
     def flatten(
-        self, job: Head, report: Callable[[str, float], None], show: Callable[[Head, bytes], None]
+        self,
+        job: Head,
+        report: Callable[[str, float], None],
+        show: Callable[[Head, bytes], None],
+        tell: Callable[[str, Mapping[str, Any], bytes], None] = lambda kind, head, body: None,
     ) -> tuple[Head, bytes]:
         """Return a layout as data for the page: numbers and texts, and the bytes of arrays.
 
@@ -102,11 +140,65 @@ class JobRunner:
             job: the mesh and the choices.
             report: called with the stage and the completed fraction.
             show: called with a preview of the layout, in the same form.
+            tell: called with the kind of a message and its content after the mesh was read: "model" for its page data
+                without a layout, if the job is the `first` one, and "shape", as of `shape_message`.
         """
 
         self.result, self._max_triangles = None, job.get("most")
-        source, flattener = self._open(job["mesh"], job["sha256"], report)
-        name, furthest = Path(job["mesh"]).name, 0.0
+        source, *_ = self._open(job["mesh"], job["sha256"], report)
+        if job.get("first"):
+            report("check", 0.0)
+            model, body = self.bare(job, COMPUTING_TITLE)
+            if model:
+                tell("model", model, body)
+        if self._told != self._read:
+            tell("shape", *shape_message(shape_of(source.mesh), job["sha256"]))
+            self._told = self._read
+        made = self._layouts.get(job)
+        if made is None:
+            made = self._made(job, report, show)
+            self._layouts.put(job, made)
+        self.result = made.result
+        return made.head, made.body
+
+    def _made(
+        self, job: Head, report: Callable[[str, float], None], show: Callable[[Head, bytes], None]
+    ) -> MadeLayout:
+        """Return the layout of a job, which is computed; arguments as of `flatten`."""
+        source, *_ = self._open(job["mesh"], job["sha256"], report)
+        chosen = Choices.from_plain(job["choices"])
+        result = with_warnings(self._mapped(job, chosen, report, show), chosen)
+        report("picture", 1.0)
+        quantity, missing = None, {}
+        if job.get("color"):
+            try:
+                quantity = own_quantity(result, job["color"])
+            except ConeflatError as error:
+                missing = {"missing": page_message(str(error))}
+        shown = as_shown(result)
+        head, body = self._picture(result, Path(job["mesh"]).name, text_of(shown), quantity=quantity)
+        notes = head["head"]["notes"] = [page_message(note) for note in shown.notes]
+        # The session warns of choices itself, as soon as they are made.
+        warned = {page_message(note) for note in misplaced_warning(chosen)}
+        warnings = tuple(note for note in notes if note not in warned)
+        if chosen.options.get("repair"):
+            checked, wrong = repaired(source)
+            head["head"]["bad"] = bad_places(checked)
+            repair = (f"The mesh was repaired: {wrong}. “Undo” reverts this.",) if wrong else ()
+            warnings = (*repair, *warnings)
+        texts = {"warnings": warnings, "on_controls": notes_on_controls(notes)}
+        return MadeLayout(result, {**head, **missing, **texts}, body)
+
+    def _mapped(
+        self,
+        job: Head,
+        chosen: Choices,
+        report: Callable[[str, float], None],
+        show: Callable[[Head, bytes], None],
+    ) -> Flattening:
+        """Return the map of a job with the notes on its mesh; arguments as of `flatten`."""
+        source, flattener, unwrapper = self._open(job["mesh"], job["sha256"], report)
+        furthest = 0.0
 
         def report_max(stage: str, fraction: float) -> None:
             nonlocal furthest
@@ -115,38 +207,24 @@ class JobRunner:
 
         def show_first(first: Flattening) -> None:
             report_max("preview", furthest)
-            show(*self._picture(first, name, FIRST_TITLE))
+            show(*self._picture(first, Path(job["mesh"]).name, _text_of_preview(first)))
 
-        chosen = Choices.from_plain(job["choices"])
         words = source.map_options(chosen.keywords())
         if chosen.for_texture:
-            result = unwrap(source.mesh, progress=report_max, **words)
+            result = unwrapper.unwrap(progress=report_max, **words)
         else:
             on_preview = show_first if len(source.mesh.offsets) - 1 >= self._early_from else None
             result = flattener.flatten(on_preview=on_preview, progress=report_max, **words)
-        result = with_warnings(replace(result, notes=source.all_notes(result.notes)), chosen)
-        report("picture", 1.0)
-        quantity, missing = None, {}
-        if job.get("color"):
-            try:
-                quantity = own_quantity(result, job["color"])
-            except ConeflatError as error:
-                missing = {"missing": page_message(str(error))}
-        head, body = self._picture(result, name, quantity=quantity)
-        self.result = result
-        warnings = angle_warning(chosen, result)
-        if chosen.options.get("repair"):
-            checked, wrong = repaired(source)
-            head["head"]["bad"] = bad_places(checked)
-            warnings += (f"The mesh was repaired: {wrong}. “Undo” reverts this.",) if wrong else ()
-        return {**head, **missing, "warnings": warnings}, body
+        return replace(result, notes=source.all_notes(result.notes))
 
-    def bare(self, job: Head) -> tuple[Head, bytes]:
-        """Return the page data of the mesh of a failed job without a layout; nothing if no triangle can be drawn."""
+    def bare(self, job: Head, title: str = BARE_TITLE) -> tuple[Head, bytes]:
+        """Return the page data of the mesh of a job without a layout; nothing if no triangle can be drawn."""
         with suppress(ConeflatError):
-            if self._source is not None:
-                checked, _ = repaired(self._source)
-                data, block = self._picture(without_layout(checked), Path(job["mesh"]).name, BARE_TITLE)
+            if self._opened is not None:
+                checked, _ = repaired(self._opened.source)
+                data, block = self._picture(
+                    without_layout(checked), Path(job["mesh"]).name, PageText(title, [])
+                )
                 data["head"] |= {"bad": bad_places(checked), "show": "plain"}
                 return data, block
         return {}, b""
@@ -155,30 +233,25 @@ class JobRunner:
         """Return the output of another job: a file of the result, quads, or a curve."""
 
         if job["do"] == "export":
-            return {}, result_file(self.result, job["ending"])
-        source, _ = self._open(job["mesh"], job["sha256"], report)
+            return _answer(result_file(self.result, job["ending"]))
+        source, *_ = self._open(job["mesh"], job["sha256"], report)
         chosen = Choices.from_plain(job["choices"])
         if job["do"] == "quads":
-            return {}, quads_file(source, chosen, job["count"], job["ending"], report)
+            return _answer(quads_file(source, chosen, job["count"], job["ending"], report))
         return curve_data(source, chosen, report), b""
 
     def _picture(
-        self, result: Flattening, name: str, title: str = "", quantity: Quantity | None = None
+        self, result: Flattening, name: str, text: PageText, quantity: Quantity | None = None
     ) -> tuple[Head, bytes]:
-        """Return the page data of a result.
+        """Return the page data of a result, without notes.
 
         Args:
             result: the result.
             name: name of the mesh.
-            title: title of a preview or a mesh without a layout, which has no numbers; "" for a final layout.
+            text: title and rows of the page.
             quantity: quantity that is shown as colours.
         """
 
-        text = None
-        if title:
-            rows = [] if title == BARE_TITLE else shown_rows(result)
-            text = PageText(title, [(measure, PLACEHOLDER, meaning) for measure, _, meaning in rows])
-            result = replace(result, notes=())
         if self._model is None or not self._model.is_of(result):
             self._model = Model.of(result)
         content = content_of(result, self._max_triangles or MAX_SHOWN_TRIANGLES, self._model, quantity)
@@ -191,21 +264,34 @@ class JobRunner:
         # A simplified mesh is sent in full, too, for painting and drawing, up to 4 million triangles.
         if content.left_out and len(result.faces) <= 4_000_000:
             head, block = with_all_triangles(head, block, self._model, result)
-        head["notes"] = [page_message(note) for note in head["notes"]]
+        head["notes"] = []
         cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
         data = {"head": with_hashes(head, block), "found": cones.tolist(), "seconds": result.seconds}
         return data, block
 
-    def _open(self, mesh: str, sha256: str, report: Callable[[str, float], None]) -> tuple[Joined, Flattener]:
-
-        if self._source is None or self._flattener is None or self._read != (mesh, sha256):
+    def _open(self, mesh: str, sha256: str, report: Callable[[str, float], None]) -> Opened:
+        """Return the mesh of a job, which is read if it is another one than before."""
+        if self._opened is None or self._read != (mesh, sha256):
             report("read", 0.0)
-            self._source = self._flattener = self._model = None  # The memory may not suffice for both.
+            self._opened = self._model = None  # The memory may not suffice for both.
+            self._layouts = LatestLayouts()
             repaired.cache_clear()
             source = read_joined(Path(mesh))
-            self._source, self._flattener, self._read = source, Flattener(source.mesh), (mesh, sha256)
+            self._opened = Opened(source, Flattener(source.mesh), Unwrapper(source.mesh))
+            self._read = mesh, sha256
             self._own_texture = None if source.mesh.scene is None else own_picture(source.mesh)
-        return self._source, self._flattener
+        return self._opened
+
+
+def _answer(saved: SavedFile) -> tuple[Head, bytes]:
+    return {"notes": [page_message(note) for note in saved.notes]}, saved.content
+
+
+def _text_of_preview(first: Flattening) -> PageText:
+    """Return the title and the rows of a preview, which has no numbers."""
+    return PageText(
+        FIRST_TITLE, [(measure, PLACEHOLDER, meaning) for measure, _, meaning in shown_rows(first)]
+    )
 
 
 def with_all_triangles(head: Head, block: bytes, model: Model, result: Flattening) -> tuple[Head, bytes]:
@@ -246,10 +332,15 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
             check_current()
             write_frame(answers, {"job": number, "early": head}, body)
 
+        def tell(kind: str, head: Mapping[str, Any], body: bytes, number: int = number) -> None:
+            write_frame(answers, {"job": number, kind: head}, body)
+
         try:
             with cancel_with(check_current):
                 head, body = (
-                    bench.flatten(job, report, show) if job["do"] == "flatten" else bench.make(job, report)
+                    bench.flatten(job, report, show, tell)
+                    if job["do"] == "flatten"
+                    else bench.make(job, report)
                 )
             write_frame(answers, {"job": number, "done": head}, body)
         except Superseded:
@@ -271,7 +362,8 @@ def main() -> None:
     """Serve over standard input and output; what libraries print is redirected to standard error."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    with inner_calls():  # The page shows the notes.
+    # The page shows the notes. The pipe is broken if the studio was killed.
+    with inner_calls(), suppress(BrokenPipeError):
         serve(Jobs(sys.stdin.buffer), answers)
 
 

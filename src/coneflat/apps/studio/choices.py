@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...base import MAX_CONE_ANGLE, short_repr
+from ...base import MAX_CONE_ANGLE, IntArray, short_repr
 from ...errors import OptionError, StudioError
 from ...options import Flag, Options, as_integer, as_number, declarations, read_options
 from ...textures import UnwrapOptions
@@ -239,6 +239,15 @@ class Choices:
     def flattens_like(self, choices: Choices) -> bool:
         """Return whether these choices give the same layout as others."""
         return replace(self, units=choices.units) == choices
+
+    def vertices(self) -> IntArray:
+        """Return the vertices of the mesh that the choices name, ascending."""
+        paths, paint = (*self.cuts, *self.uncut), self.paint
+        regions = (paint.no_cone, paint.no_seam, *(region for _, region in paint.importance))
+        named = chain(
+            (cone.vertex for cone in self.cones), *paths, self.corners, *map(Region.vertices, regions)
+        )
+        return np.unique(np.fromiter(named, dtype=np.int64))
 
     # Conversion.
 

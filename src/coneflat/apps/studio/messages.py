@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 import shlex
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +36,13 @@ _NAMED = re.compile(
     rf"|\b(?P<name>{'|'.join(name for name in CONTROLS if '_' in name)})\b"
     rf"|(?:\A|(?<= and ))(?P<first>{'|'.join(CONTROLS)})(?=(?: none| mirrored| '\w+')? (?:and|must|cannot|is|needs)\b)"
 )
+
+
+#: Notes on unmet numbers, by their option.
+_UNMET_NUMBERS = {
+    "cone_count": re.compile(r"\A[\d,]+ cones? instead of the [\d,]+ asked for"),
+    "charts": re.compile(r"\AThe texture has [\d,]+ charts? instead of"),
+}
 
 
 def page_message(message: str) -> str:
@@ -80,6 +88,11 @@ def angle_warning(chosen: Choices, result: Flattening) -> tuple[str, ...]:
         f"With the typed angles, {plural(len(outside), 'cone')} cannot have an angle from {math.degrees(low):g} to "
         f"{math.degrees(high):g} degrees: {list_some(outside)}. Change them, or add a cone whose angle is computed.",
     )
+
+
+def notes_on_controls(notes: Iterable[str]) -> dict[str, str]:
+    """Return the notes on numbers that were requested and are not met, by their option."""
+    return {name: note for note in notes for name, pattern in _UNMET_NUMBERS.items() if pattern.search(note)}
 
 
 def with_warnings(result: Flattening, chosen: Choices) -> Flattening:

@@ -7,6 +7,7 @@ import secrets
 import tempfile
 import threading
 from collections.abc import Mapping
+from contextlib import ExitStack
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -71,16 +72,15 @@ class Studio:
         home = Path() if folder is None else Path(folder)
         if is_project or self._own_folder is not None:
             home = file.parent
-        self._session = Session(home, color)
-        try:
-            self._session.open(file)
-            token, listener = secrets.token_urlsafe(24), open_listener(0)
+        with ExitStack() as failing:
+            token, listener = secrets.token_urlsafe(24), failing.enter_context(open_listener(0))
             port = listener.getsockname()[1]
             self.address = page_address(port, token) if through is None else _proxied(through, port, token)
+            self._session = Session(home, color, address=self.address)
+            failing.callback(self._session.close)
+            self._session.open(file)
             self._server = server_class(self._session, token, port, framed=True, proxied=through is not None)
-        except BaseException:
-            self._session.close()
-            raise
+            failing.pop_all()
         self._thread = threading.Thread(target=self._server.run, args=([listener],), daemon=True)
         self._thread.start()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from io import BytesIO
 from types import SimpleNamespace
@@ -16,12 +16,16 @@ import numpy as np
 from ... import ConeflatError, Flattening, MeshFile, TriangleMesh, check_mesh
 from ...base import MAX_CONES, FloatArray
 from ...errors import MeshError, StudioError
-from ...io import Joined, Texture, as_input, encode_png, write_stream
+from ...io import Joined, Texture, as_input, as_stored, as_written, encode_png, write_stream
 from ...mesh import REPAIR_ADVICE, CheckedMesh, end_corners
 from ..transfer.materials import BASE, Painted
-from ..view import outline_halfedges
+from ..view import outline_halfedges, shown_rows
 from .choices import DECLARED, Choices
 
+#: The format whose measures are shown.
+SHOWN_FORMAT = ".obj"
+#: Measures of saved files that are compared with those shown; others differ in rounding.
+COMPARED = ("flipped", "overlap", "QC distortion", "energy")
 #: File formats of quads.
 QUAD_FORMATS = (".obj", ".ply", ".glb")
 MAX_QUADS = 1_000_000
@@ -34,43 +38,80 @@ QUAD_OPTIONS = ("forbidden_cones", "weights", "sharp_angle", "stretch", "repair"
 Progress = Callable[[str, float], None]
 
 
-def result_file(result: Flattening | None, ending: str) -> bytes:
-    """Return the content of a file of a result; ending: one of `RESULT_FILES`.
+@dataclass(frozen=True)
+class SavedFile:
+    """A file of a result.
+
+    Attributes:
+        content: its bytes.
+        notes: sentences on what the file does not keep, and on measures that differ from those shown.
+    """
+
+    content: bytes
+    notes: tuple[str, ...] = ()
+
+
+def result_file(result: Flattening | None, ending: str) -> SavedFile:
+    """Return a file of a result; ending: one of `RESULT_FILES`.
 
     Raises:
         StudioError: there is no result.
     """
     if result is None:
         raise StudioError("there is nothing to save: the last change could not be flattened")
-    return RESULT_FILES[ending].content(result, ending)
+    file = RESULT_FILES[ending]
+    saved = file.save(result, ending)
+    return replace(saved, notes=tuple(f"{file.label}: {note}" for note in saved.notes))
 
 
-def _mesh_file(result: Flattening, ending: str) -> bytes:
-    """Return the content of a mesh file with the UVs."""
+def as_shown(result: Flattening) -> Flattening:
+    """Return a result with the measures that are shown: those of an OBJ, the one format that keeps polygons."""
+    return as_stored(result, SHOWN_FORMAT)
+
+
+def _mesh_file(result: Flattening, ending: str) -> SavedFile:
+    """Return a mesh file with the UVs."""
     stream = BytesIO()
-    write_stream(result, stream, ending)
-    return stream.getvalue()
+    stored = as_written(write_stream(result, stream, ending), ending)
+    shown = as_shown(result)
+    told = {*result.notes, *shown.notes}
+    notes = (note for note in stored.notes if note not in told)
+    return SavedFile(stream.getvalue(), (*differing_measures(shown, stored), *notes))
 
 
-def _layout_picture(result: Flattening, ending: str) -> bytes:
+def differing_measures(shown: Flattening, stored: Flattening) -> tuple[str, ...]:
+    """Return a sentence on the measures of a file whose texts differ from those shown, or nothing."""
+    before, after = ({name: value for name, value, _ in shown_rows(result)} for result in (shown, stored))
+    differing = [
+        f"{name} {after[name]}, shown {before[name]}"
+        for name in COMPARED
+        if name in before and name in after and before[name] != after[name]
+    ]
+    if not differing:
+        return ()
+    return (f"the measures of the file differ from those shown: {'; '.join(differing)}.",)
+
+
+def _layout_picture(result: Flattening, ending: str) -> SavedFile:
     """Return a picture of the layout."""
     from ..view import make_figure, write_figure
 
     stream = BytesIO()
     write_figure(make_figure(result, "layout"), stream, ending)
-    return stream.getvalue()
+    return SavedFile(stream.getvalue())
 
 
-def _layout_svg(result: Flattening, _: str) -> bytes:
-    return layout_svg(result).encode("utf-8")
+def _layout_svg(result: Flattening, _: str) -> SavedFile:
+    return SavedFile(layout_svg(result).encode("utf-8"))
 
 
-def _report(result: Flattening, _: str) -> bytes:
-    return (json.dumps(result.report(), indent=2) + "\n").encode("utf-8")
+def _report(result: Flattening, _: str) -> SavedFile:
+    """Return the report of the measures that are shown."""
+    return SavedFile((json.dumps(as_shown(result).report(), indent=2) + "\n").encode("utf-8"))
 
 
-def quads_file(source: Joined, choices: Choices, count: int, ending: str, report: Progress) -> bytes:
-    """Return the content of a file of quads of a mesh.
+def quads_file(source: Joined, choices: Choices, count: int, ending: str, report: Progress) -> SavedFile:
+    """Return a file of quads of a mesh.
 
     Quads have their own cones, with curvatures that are multiples of 90 degrees. The choices that apply are forbidden
     cones, importance, sharp edges, the trade-off between angles and areas, and a straight boundary.
@@ -92,7 +133,7 @@ def quads_file(source: Joined, choices: Choices, count: int, ending: str, report
     quad_mesh = quads(source.mesh, quads=count, progress=report, **source.map_options(options))
     stream = BytesIO()
     write_quads_stream(quad_mesh, stream, ending)
-    return stream.getvalue()
+    return SavedFile(stream.getvalue(), tuple(f"Quads: {note}" for note in source.all_notes(quad_mesh.notes)))
 
 
 def curve_data(source: Joined, choices: Choices, report: Progress) -> dict[str, Any]:
@@ -157,13 +198,13 @@ class ResultFile:
     Attributes:
         label, title: text of its button on the page, and the tooltip.
         stem: added to the name of the mesh in the name of the file.
-        content: returns the content of the file of a result with an ending.
+        save: returns the file of a result with an ending.
     """
 
     label: str
     title: str
     stem: str
-    content: Callable[[Flattening, str], bytes]
+    save: Callable[[Flattening, str], SavedFile]
 
 
 #: The files of a result by their ending, in the order of their buttons.

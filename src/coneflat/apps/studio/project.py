@@ -6,7 +6,9 @@ import hashlib
 import json
 import os
 import re
-from dataclasses import dataclass
+import shutil
+from dataclasses import dataclass, field, replace
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 from unicodedata import category
@@ -14,8 +16,10 @@ from unicodedata import category
 from ... import ConeflatError
 from ...base import short_repr
 from ...errors import MeshFileError, ProjectError, StudioError
-from ...io import atomic_write
+from ...io import atomic_write, read_joined
+from .carry import carried_over
 from .choices import Choices
+from .places import Places, shape_of
 
 KIND, VERSION = "coneflat project", 1
 ENDING = ".json"
@@ -29,14 +33,22 @@ class Project:
         mesh: path of the mesh file.
         sha256: SHA-256 of its content, hexadecimal.
         choices: the choices of the user.
+        places: where the vertices of the choices are on the mesh; None if that is not known.
+        revision: SHA-256 of the content of the project's file; "" if there is none yet.
+        notes: sentences on choices that were carried over from a mesh that has changed.
     """
 
     mesh: Path
     sha256: str
     choices: Choices
+    places: Places | None = field(default=None, compare=False)
+    revision: str = field(default="", compare=False)
+    notes: tuple[str, ...] = field(default=(), compare=False)
 
-    def save(self, path: Path) -> None:
-        """Write the project, with the path of the mesh relative to it; no incomplete file is left.
+    def save(self, path: Path) -> str:
+        """Write the project, with the path of the mesh relative to it, and return the revision.
+
+        No incomplete file is left.
 
         Raises:
             MeshFileError: the file cannot be written.
@@ -46,10 +58,12 @@ class Project:
             "version": VERSION,
             "mesh": {"path": _relative(self.mesh, path.parent), "sha256": self.sha256},
             "choices": self.choices.as_plain(),
+            **({} if self.places is None else {"places": self.places.as_plain()}),
         }
+        text = f"{json.dumps(content, indent=1, allow_nan=False)}\n"
         with atomic_write(path, "w") as stream:
-            json.dump(content, stream, indent=1, allow_nan=False)
-            stream.write("\n")
+            stream.write(text)
+        return _sha256(text.encode("utf-8"))
 
     def check_mesh(self) -> None:
         """Check that the mesh is the one for which the choices were made.
@@ -64,7 +78,8 @@ class Project:
         if sha256 != self.sha256:
             raise ProjectError(
                 f"{self.mesh} is not the mesh that the project was made with: its SHA-256 begins with {sha256[:12]}, "
-                f"not {self.sha256[:12]}, so vertex numbers may have changed"
+                f"not {self.sha256[:12]}, so vertex numbers may have changed; coneflat studio opens the project and "
+                "carries the choices over"
             )
 
 
@@ -77,12 +92,31 @@ def read_project(path: Path) -> Project:
     try:
         if path.stat().st_size > 64 * 1024 * 1024:  # A project with a million drawn edges is smaller.
             raise ProjectError(f"{path} is not a project: it has {path.stat().st_size:,} bytes")
-        content = json.loads(path.read_text(encoding="utf-8"))
+        stored = path.read_bytes()
+        content = json.loads(stored.decode("utf-8"))
     except OSError as error:
         raise ProjectError(f"cannot read {path}: {error.strerror or error}") from error
     except (ValueError, RecursionError) as error:
         raise ProjectError(f"{path} is not a project: it is not JSON") from error
-    return _project(path, content)
+    return replace(_project(path, content), revision=_sha256(stored))
+
+
+def _sha256(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()
+
+
+def is_changed(path: Path, revision: str) -> bool:
+    """Return whether the file of a project is of another revision than the given one; a removed file is not."""
+    try:
+        return file_hash(path) != revision
+    except MeshFileError:
+        return False
+
+
+def unused_name(path: Path) -> Path:
+    """Return the path with the lowest number, from 2 on, added to the name that no file has."""
+    names = (path.with_stem(f"{path.stem}-{number}") for number in count(2))
+    return next(name for name in names if not name.exists())
 
 
 def _project(path: Path, content: Any) -> Project:
@@ -96,11 +130,12 @@ def _project(path: Path, content: Any) -> Project:
         mesh = content["mesh"]
         file, sha256 = Path(str(mesh["path"])), str(mesh["sha256"])
         choices = Choices.from_plain(content["choices"])
+        places = Places.from_plain(content.get("places"), len(choices.vertices()))
     except ConeflatError as error:
         raise ProjectError(f"{path} contains choices that are not valid: {error}") from error
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ProjectError(f"{path} is not a project: an entry is missing or not valid ({error})") from error
-    return Project(Path(os.path.normpath(path.parent / file)), sha256, choices)
+    return Project(Path(os.path.normpath(path.parent / file)), sha256, choices, places)
 
 
 def file_hash(path: Path) -> str:
@@ -127,36 +162,83 @@ def _relative(path: Path, folder: Path) -> str:
         return str(path.resolve())
 
 
-def open_project(path: Path, folder: Path, only_within: bool = False) -> tuple[Project, Path]:
-    """Return the project of a mesh or of a project file, and the path of its file.
+def project_path(path: Path, folder: Path) -> Path:
+    """Return the path of the project file of a mesh, in a folder; or of a project, which is its own.
 
-    A mesh whose project is in the folder is opened with the choices in it.
-
-    Args:
-        path: path of a mesh or a project.
-        folder: folder of the projects of meshes.
-        only_within: whether the mesh of a project must be in the folder, too.
+    Meshes of the same name, such as bunny.obj and bunny.ply, have a project each.
 
     Raises:
         MeshFileError: the mesh cannot be read.
-        ProjectError: the project cannot be read, or belongs to another mesh.
+        ProjectError: a project cannot be read.
     """
     if path.suffix.lower() == ENDING:
-        project = read_project(path)
-        if only_within and not project.mesh.resolve().is_relative_to(folder):
-            raise ProjectError(f"the mesh of {path.name} is outside the folder of the session")
-        project.check_mesh()
-        return project, path
-    sha256, file = file_hash(path), folder / f"{path.stem}_studio{ENDING}"
+        return path
+    first = folder / f"{path.stem}_studio{ENDING}"
+    second = folder / f"{path.stem}_{path.suffix[1:].lower()}_studio{ENDING}"
+    numbered = (second.with_stem(f"{second.stem}-{number}") for number in count(2))
+    return next(file for file in chain((first, second), numbered) if _is_project_of(file, path))
+
+
+def _is_project_of(file: Path, mesh: Path) -> bool:
+    """Return whether a project file is that of a mesh, or does not exist; the mesh may have been changed or moved."""
     if not file.exists():
-        return Project(path, sha256, Choices()), file
-    before = read_project(file)
-    if before.sha256 != sha256:
-        raise ProjectError(
-            f"{file} is a project of another mesh: its SHA-256 begins with {before.sha256[:12]}, that of "
-            f"{path} with {sha256[:12]}; move it away, or work in another folder"
-        )
-    return Project(path, sha256, before.choices), file
+        return True
+    project = read_project(file)
+    is_moved = project.mesh.name == mesh.name and not project.mesh.exists()
+    return project.mesh.resolve() == mesh.resolve() or is_moved or project.sha256 == file_hash(mesh)
+
+
+def open_project(path: Path, file: Path, within: Path | None = None) -> Project:
+    """Return the project of a mesh or of a project file; a mesh is opened with the choices in its project.
+
+    Args:
+        path: path of a mesh or a project.
+        file: path of the project file, see `project_path`.
+        within: folder in which the mesh of a project must be; None if it may be anywhere.
+
+    Raises:
+        MeshFileError: the mesh cannot be read.
+        ProjectError: the project cannot be read, or its mesh is missing.
+    """
+    if not file.exists() and path != file:
+        return Project(path, file_hash(path), Choices())
+    project = read_project(file)
+    mesh = project.mesh if path == file else path
+    if within is not None and not mesh.resolve().is_relative_to(within):
+        raise ProjectError(f"the mesh of {path.name} is outside the folder of the session")
+    try:
+        sha256 = file_hash(mesh)
+    except MeshFileError as error:
+        raise ProjectError(f"the project's mesh is missing: {error}") from error
+    opened = replace(project, mesh=mesh, sha256=sha256)
+    return opened if sha256 == project.sha256 else _with_changed_mesh(opened, file)
+
+
+def _with_changed_mesh(project: Project, file: Path) -> Project:
+    """Return a project whose mesh has changed, with the choices that can be carried over to it.
+
+    They keep their vertices if the connectivity is the same. If choices have no place on the mesh, the project as it
+    was is copied to another file.
+    """
+    if not len(project.choices.vertices()):
+        return project
+    mesh = read_joined(project.mesh).mesh
+    shape, places = shape_of(mesh), project.places
+    if places is not None and places.connectivity == shape.connectivity:
+        return replace(project, places=shape.places(project.choices.vertices()))
+    carried = carried_over(project.choices, places, mesh)
+    how = "keep the numbers of their vertices" if places is None else "are at the nearest vertices"
+    note = f"{project.mesh.name} has changed since {file.name} was saved: the choices {how}."
+    if carried.lost:
+        copy = unused_name(file)
+        shutil.copyfile(file, copy)
+        note += f" Without a place on it: {', '.join(carried.lost)}. The project as it was is in {copy.name}."
+    return replace(
+        project,
+        choices=carried.choices,
+        places=shape.places(carried.choices.vertices()),
+        notes=(note,),
+    )
 
 
 def safe_name(name: str) -> str:

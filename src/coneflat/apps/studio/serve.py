@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import secrets
+import signal
 import socket
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...errors import OptionError, StudioError
-from ..view import open_address
+from .worker import start_process
 
 if TYPE_CHECKING:
     from .server import StudioServer
@@ -24,8 +26,8 @@ def run_studio(
     say: Callable[[str], None],
     color: str | None,
     most_triangles: int,
-) -> None:
-    """Serve a session until it is interrupted.
+) -> Path | None:
+    """Serve a session until it is interrupted, and return the path of the project with its choices, if there is one.
 
     Args:
         file: path of a mesh or a project to open.
@@ -40,24 +42,30 @@ def run_studio(
         StudioError: the port is not available.
         MeshFileError, ProjectError: the file cannot be read.
     """
-    server_class = studio_server()
-    from .session import Session
+    process = start_process()
+    with process, ExitStack() as ending, open_listener(port) as listener:
+        ending.callback(process.kill)
+        server_class = studio_server()
+        from ..view import open_address
+        from .session import Session
 
-    folder = Path() if file is None or file.suffix.lower() != ".json" else file.parent
-    session = Session(folder, color, most_triangles)
-    with open_listener(port) as listener:
-        port = listener.getsockname()[1]
-        token = secrets.token_urlsafe(24)
+        folder = Path() if file is None or file.suffix.lower() != ".json" else file.parent
+        token, port = secrets.token_urlsafe(24), listener.getsockname()[1]
         address = page_address(port, token)
+        session = Session(folder, color, most_triangles, address, process)
+        ending.callback(session.close)
+        if file is not None:
+            session.open(file)
+        say(address)
+        if opens:
+            open_address(address)
+        server = server_class(session, token, port)
         try:
-            if file is not None:
-                session.open(file)
-            say(address)
-            if opens:
-                open_address(address)
-            server_class(session, token, port).run(sockets=[listener])
-        finally:
-            session.close()
+            server.run(sockets=[listener])
+        except KeyboardInterrupt:
+            if server.signal != signal.SIGINT:  # Ctrl-C is the usual end.
+                raise
+        return session.project_file
 
 
 def studio_server() -> type[StudioServer]:

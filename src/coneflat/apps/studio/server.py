@@ -11,6 +11,7 @@ import struct
 from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
 from pathlib import Path
+from types import FrameType
 
 import uvicorn
 from anyio.to_thread import run_sync
@@ -22,7 +23,7 @@ from starlette.types import ASGIApp
 
 from ... import ConeflatError, sample_path
 from ...errors import StudioError
-from ...io import INPUT_FORMATS
+from ...io import INPUT_FORMATS, export_advice
 from .guard import MAX_REQUEST_BYTES, Guard
 from .messages import page_message
 from .page import studio_page
@@ -36,7 +37,11 @@ REFUSED = (ConeflatError, ValueError, RecursionError, ClientDisconnect)
 
 
 class StudioServer(uvicorn.Server):
-    """Serves a session until it is interrupted, and then closes the session."""
+    """Serves a session until it is interrupted, and then closes the session.
+
+    Attributes:
+        signal: number of the signal that has ended it; 0 before.
+    """
 
     def __init__(self, session: Session, token: str, port: int, **access: bool) -> None:
         super().__init__(
@@ -49,7 +54,13 @@ class StudioServer(uvicorn.Server):
                 timeout_graceful_shutdown=1,
             )
         )
+        self.signal = 0
         self._session = session
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Note a signal, and end."""
+        self.signal = sig
+        super().handle_exit(sig, frame)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Close the session, and shut down."""
@@ -170,7 +181,10 @@ class Routes:
         requested = file_within(request.query_params.get("name", ""), folder)
         path = file_within(safe_name(requested.name), folder)
         if path.suffix.lower() not in (*INPUT_FORMATS, ".json"):
-            raise StudioError(f"{path.name} is not in a format that can be read: {', '.join(INPUT_FORMATS)}")
+            advice = export_advice(path.suffix)
+            raise StudioError(
+                f"{path.name} is not in a format that can be read{advice}: {', '.join(INPUT_FORMATS)}"
+            )
         before = set(folder.glob("*"))  # none if the folder is gone
         stored = await _store(request, path)
         try:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
+from subprocess import Popen
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -15,17 +17,22 @@ from ...errors import MeshFileError, StudioError
 from ...io import read_joined
 from ...options import as_integer
 from .choices import Choices
+from .lock import ProjectLock, lock_path
 from .messages import command_line, misplaced_warning, python_lines
 from .outputs import MAX_QUADS, QUAD_FORMATS, RESULT_FILES, curve_options
-from .project import Project, file_within, open_project
-from .steps import STEPS, History
+from .places import Places, Shape, shape_received
+from .project import Project, file_within, is_changed, open_project, project_path, unused_name
+from .steps import STEPS, STEPS_ON_CONES, History
 from .worker import Head, SentPictures, Worker
 
 PATIENCE = 600.0  # Seconds that exports wait for the current flattening.
 
 
 class _Shown(NamedTuple):
-    """What is shown: page data, cones, seconds per stage, warnings, the job, and whether there is no layout."""
+    """What is shown: page data, cones, seconds per stage, warnings, the job, whether there is no layout, and notes.
+
+    These are on values of controls that are not met, by their option.
+    """
 
     shown: tuple[Head, bytes] | None = None
     cones: Sequence[int] = ()
@@ -33,6 +40,7 @@ class _Shown(NamedTuple):
     warnings: Sequence[str] = ()
     job: int = 0
     is_bare: bool = False
+    on_controls: Mapping[str, str] = MappingProxyType({})
 
 
 class Session:
@@ -45,12 +53,22 @@ class Session:
         is_early: whether that is a preview, which the final layout will replace.
     """
 
-    def __init__(self, folder: Path, color: str | None = None, most_triangles: int | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        color: str | None = None,
+        most_triangles: int | None = None,
+        address: str = "",
+        process: Popen[bytes] | None = None,
+    ) -> None:
         """Args:
         folder: folder of projects.
         color: name of values that are shown as colours, as in `own_quantity`.
         most_triangles: largest number of triangles shown; None for the default of the viewer.
+        address: address of the page, which other studios are told that open the same project.
+        process: worker process that was started in advance, see `start_process`.
         """
+        self._address = address
         self._look = {"color": color, "most": most_triangles}
         self.folder = folder.resolve()
         self.version = self.layout = 0
@@ -58,6 +76,15 @@ class Session:
         self.project_file: Path | None = None
         self._mesh: Path | None = None
         self._sha256 = ""
+        self._lock: ProjectLock | None = None
+        self._revision = ""  # Of the project file when it was read or written last.
+        self._project_notes: tuple[str, ...] = ()
+        # Notes on the file that was saved last, and the number of the layout that it contains.
+        self._saved_notes: tuple[int, tuple[str, ...]] = 0, ()
+        self._shape: Shape | None = (
+            None  # Of the mesh, once the worker has read it; until then, places are those opened.
+        )
+        self._places: Places | None = None
         self._history = History(Choices())
         # Number of meshes and projects opened so far, and that of the last one that was repaired automatically.
         self._opened = self._repaired = 0
@@ -74,7 +101,7 @@ class Session:
         self._curves: dict[tuple[str, str], dict[str, Any]] = {}
         self._changed = threading.Condition(threading.RLock())
         self._listeners: list[Callable[[], None]] = []
-        self._worker = Worker(self._on_message, self._on_exit)
+        self._worker = Worker(self._on_message, self._on_exit, process)
 
     # Meshes and projects.
 
@@ -83,9 +110,10 @@ class Session:
 
         Raises:
             MeshFileError: the mesh cannot be read.
-            ProjectError: the project cannot be read, or belongs to another mesh.
+            ProjectError: the project cannot be read, belongs to another mesh, or is open in another studio.
         """
-        self._begin(*open_project(path, self.folder))
+        with self._changed, self._locked(project_path(path, self.folder)) as file:
+            self._begin(open_project(path, file), file)
 
     def open_named(self, name: str) -> None:
         """Open a mesh or a project in the folder of the session.
@@ -94,19 +122,42 @@ class Session:
             StudioError: there is no such file in the folder.
             MeshFileError, ProjectError: as in `open`.
         """
-        project, file = open_project(file_within(name, self.folder), self.folder, only_within=True)
-        read_joined(project.mesh)  # What is shown is replaced only by a mesh that can be read.
-        self._begin(project, file)
+        path = file_within(name, self.folder)
+        with self._changed, self._locked(project_path(path, self.folder)) as file:
+            project = open_project(path, file, within=self.folder)
+            read_joined(project.mesh)  # What is shown is replaced only by a mesh that can be read.
+            self._begin(project, file)
+
+    @contextmanager
+    def _locked(self, file: Path) -> Iterator[Path]:
+        """Yield a project file, which is locked; it replaces the one that was open unless the block fails.
+
+        Raises:
+            ProjectError: another studio has the project open.
+        """
+        lock, before = self._lock, self._lock
+        if before is None or lock_path(before.project) != lock_path(file):
+            lock = ProjectLock(file, self._address)
+        try:
+            yield file
+        except BaseException:
+            if lock is not None and lock is not before:
+                lock.release()
+            raise
+        self._lock = lock
+        if before is not None and before is not lock:
+            before.release()
 
     def _begin(self, project: Project, file: Path) -> None:
-        with self._changed:
-            self._mesh, self._sha256, self.project_file = project.mesh.resolve(), project.sha256, file
-            self._history = History(project.choices)
-            self._opened += 1
-            self._chosen += 1
-            self._current = _Shown(seconds=self._current.seconds)
-            self.is_early, self._last = False, None
-            self._flatten()
+        self._mesh, self._sha256, self.project_file = project.mesh.resolve(), project.sha256, file
+        self._revision, self._project_notes = project.revision, project.notes
+        self._shape, self._places = None, project.places
+        self._history = History(project.choices)
+        self._opened += 1
+        self._chosen += 1
+        self._current = _Shown(seconds=self._current.seconds)
+        self.is_early, self._last = False, None
+        self._flatten()
 
     # Actions of the user.
 
@@ -135,6 +186,7 @@ class Session:
                 if history.undo() if kind == "undo" else history.redo():
                     self._apply_step(before)
             else:
+                self._require_cones(str(kind))
                 try:
                     chosen = STEPS[str(kind)](history.now, action, self._current.cones)
                 except (KeyError, TypeError) as error:
@@ -162,6 +214,13 @@ class Session:
         if self._mesh is None:
             raise StudioError("no mesh is open: drop one on the page, or run coneflat studio MESH")
 
+    def _require_cones(self, kind: str) -> None:
+        """Raise an error for steps on cones that the first search has not found yet."""
+        is_first = self._busy is not None and (self._current.shown is None or self._current.is_bare)
+        chosen = self._history.now
+        if kind in STEPS_ON_CONES and is_first and not (chosen.by_hand or chosen.for_texture):
+            raise StudioError("the cones are not found yet: wait for the first layout")
+
     def _take_step(self, chosen: Choices, stroke: object) -> None:
         """Take a step if the choices differ."""
         chosen.keywords()
@@ -172,6 +231,8 @@ class Session:
     def _apply_step(self, before: Choices) -> None:
         """Save the choices after a step, and flatten if the layout depends on what has changed."""
         self._chosen += 1
+        if self._shape is None:
+            self._places = None
         if not self._history.now.flattens_like(before):
             return self._flatten()
         trouble = self._trouble
@@ -185,7 +246,8 @@ class Session:
         self._job += 1
         self._busy = {"stage": "", "fraction": 0.0}
         self._notify()
-        bare = {"bare": self._current.shown is None or self._current.is_bare}
+        is_first = self._current.shown is None
+        bare = {"first": is_first, "bare": is_first or self._current.is_bare}
         self._worker.send({"do": "flatten", "job": self._job, **bare, **self._look, **self._of_mesh()})
 
     def _save(self) -> None:
@@ -193,10 +255,25 @@ class Session:
         assert self._mesh is not None
         assert self.project_file is not None
         self._trouble = None
+        if is_changed(self.project_file, self._revision):
+            self._leave_project(self.project_file)
         try:
-            Project(self._mesh, self._sha256, self._history.now).save(self.project_file)
+            chosen = self._history.now
+            if self._shape is not None:
+                self._places = self._shape.places(chosen.vertices())
+            project = Project(self._mesh, self._sha256, chosen, self._places)
+            self._revision = project.save(self.project_file)
         except MeshFileError as error:
             self._tell(f"the project is not saved: {error}", again=True)
+
+    def _leave_project(self, file: Path) -> None:
+        """Continue in a new file: another program has written the project since this session read or wrote it."""
+        with self._locked(unused_name(file)) as renamed:
+            self.project_file, self._revision = renamed, ""
+        self._project_notes = (
+            *self._project_notes,
+            f"Another program has changed {file.name}, which is left as it is; choices are saved in {renamed.name}.",
+        )
 
     def _tell(self, text: str, repair: bool = False, again: bool = False) -> None:
         """Set the error that the page shows, and whether a repair or another attempt may help."""
@@ -220,6 +297,8 @@ class Session:
             # The layout is that of earlier choices, and no other is being computed.
             is_stale = bool(shown.shown) and not (shown.is_bare or self._busy or shown.job == self._job)
             warnings, texts = self._choice_texts(project)
+            saved_job, saved_notes = self._saved_notes
+            notes = () if is_stale else (*shown.warnings, *(saved_notes if saved_job == shown.job else ()))
             return {
                 "version": self.version,
                 "opened": self._opened,
@@ -235,8 +314,9 @@ class Session:
                 "bare": shown.is_bare,
                 "stale": is_stale,
                 "found": list(shown.cones),
+                "on_controls": {} if is_stale else dict(shown.on_controls),
                 "seconds": sum(shown.seconds.values()),
-                "warnings": [*warnings, *(() if is_stale else shown.warnings)],
+                "warnings": list(dict.fromkeys((*self._project_notes, *warnings, *notes))),
                 **({} if received == self._chosen else {"choices": self._history.now.as_plain(), **texts}),
             }
 
@@ -259,14 +339,14 @@ class Session:
             return None if self._current.shown is None else self._sent.without(received, self._current.shown)
 
     def export(self, ending: str) -> bytes:
-        """Return the content of a file of the result.
+        """Return the content of a file of the result; the notes on it become warnings of the state.
 
         Raises:
             StudioError: there is no result, or the format is unknown.
         """
         if ending not in RESULT_FILES:
             raise StudioError(f"unknown format {short_repr(ending)}: choose from {', '.join(RESULT_FILES)}")
-        return self._request({"do": "export", "ending": ending})[1]
+        return self._saved({"do": "export", "ending": ending})
 
     def quads(self, ending: str, count: object) -> bytes:
         """Return the content of a file of approximately `count` quads; a change of the choices cancels it.
@@ -282,7 +362,7 @@ class Session:
         number = as_integer("the number of quads", count)
         if not 1 <= number <= MAX_QUADS:
             raise StudioError(f"the number of quads must be from 1 to {MAX_QUADS:,}, got {number:,}")
-        return self._request({"do": "quads", "ending": ending, "count": number})[1]
+        return self._saved({"do": "quads", "ending": ending, "count": number})
 
     def curve(self) -> dict[str, Any]:
         """Return the distortion for each number of cones, see `curve_data`; a change of the choices cancels it.
@@ -295,6 +375,14 @@ class Session:
             if key not in self._curves:
                 self._curves[key] = self._request({"do": "curve"})[0]
             return self._curves[key]
+
+    def _saved(self, job: Head) -> bytes:
+        """Return the content of a file that the worker makes, and store the notes on it."""
+        head, content = self._request(job)
+        with self._changed:
+            self._saved_notes = self._current.job, tuple(head["notes"])
+            self._notify()
+        return content
 
     def _request(self, job: Head) -> tuple[Head, bytes]:
         """Return the output of a job of the worker other than a flattening."""
@@ -330,15 +418,19 @@ class Session:
             return self._changed.wait_for(lambda: self._busy is None, seconds)
 
     def close(self) -> None:
-        """End the worker process, and wake everyone who waits for events."""
+        """End the worker process, unlock the project, and wake everyone who waits for events."""
         self._worker.end()
         with self._changed:
+            if self._lock is not None:
+                self._lock.release()
             self._notify()
 
     # Messages of the worker.
 
     def _on_message(self, head: Head, body: bytes) -> None:
         with self._changed:
+            if "shape" in head:
+                return self._take_shape(head["shape"], body)
             if head["job"] in self._answers and "stage" not in head:
                 self._answers[head["job"]] = (head, body)
                 return self._changed.notify_all()
@@ -346,6 +438,8 @@ class Session:
                 return None
             if "stage" in head:
                 self._busy = {"stage": head["stage"], "fraction": head["fraction"]}
+            elif "model" in head:
+                self._show(head["model"], body, head["job"], is_bare=True)
             elif "early" in head:
                 self._last = self._last or self._current
                 self._show(head["early"], body, head["job"])
@@ -368,11 +462,26 @@ class Session:
                 self.is_early, self._last = False, None
             return self._notify()
 
+    def _take_shape(self, head: Mapping[str, str], body: bytes) -> None:
+        """Store the shape of the mesh, and write where the vertices of the choices are."""
+        if head["sha256"] != self._sha256:
+            return
+        self._shape, trouble = shape_received(head, body), self._trouble
+        if len(self._history.now.vertices()):
+            self._save()
+            self._trouble = self._trouble or trouble
+
     def _show(self, data: Head, body: bytes, job: int, is_bare: bool = False) -> None:
         self.layout += 1
         picture = self._sent.numbered((data["head"], body))
         self._current = _Shown(
-            picture, data["found"], data["seconds"], data.get("warnings", ()), job, is_bare
+            picture,
+            data["found"],
+            data["seconds"],
+            data.get("warnings", ()),
+            job,
+            is_bare,
+            data.get("on_controls", {}),
         )
 
     def _restore_layout(self) -> None:

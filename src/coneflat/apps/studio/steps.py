@@ -46,6 +46,10 @@ STEPS: dict[str, Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]]
 }
 
 
+#: Steps on the cones of a search, which must have found them.
+STEPS_ON_CONES = ("hand", "add", "move", "remove", "angle")
+
+
 class History:
     """The undo history of the choices.
 

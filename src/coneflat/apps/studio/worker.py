@@ -31,14 +31,22 @@ COMMAND = [sys.executable, "-m", "coneflat.apps.studio.child"]
 class Worker:
     """A process that is started when the first job is sent."""
 
-    def __init__(self, on_message: Callable[[Head, bytes], None], on_exit: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        on_message: Callable[[Head, bytes], None],
+        on_exit: Callable[[str], None],
+        process: subprocess.Popen[bytes] | None = None,
+    ) -> None:
         """Args:
         on_message: called with every message of the process, from a thread.
         on_exit: called with a text that says how the process ended, unless `end` has ended it.
+        process: one that was started in advance.
         """
         self._on_message, self._on_exit = on_message, on_exit
-        self._process: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
+        self._process: subprocess.Popen[bytes] | None = None
+        if process is not None:
+            self._listen_to(process)
 
     def send(self, job: Head) -> None:
         """Send a job to the process.
@@ -68,15 +76,13 @@ class Worker:
 
     def _started(self) -> subprocess.Popen[bytes]:
         if self._process is None or self._process.poll() is not None:
-            try:
-                # An interrupt of this process must not interrupt the worker. It ends when its input is closed.
-                self._process = subprocess.Popen(
-                    COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
-                )
-            except OSError as error:
-                raise StudioError(f"no process could be started: {error.strerror or error}") from error
-            threading.Thread(target=self._listen, args=(self._process,), daemon=True).start()
+            return self._listen_to(start_process())
         return self._process
+
+    def _listen_to(self, process: subprocess.Popen[bytes]) -> subprocess.Popen[bytes]:
+        self._process = process
+        threading.Thread(target=self._listen, args=(process,), daemon=True).start()
+        return process
 
     def _listen(self, process: subprocess.Popen[bytes]) -> None:
         assert process.stdin is not None
@@ -90,6 +96,21 @@ class Worker:
             process.stdin.close()
         if self._process is process:  # It was not ended by `end`.
             self._on_exit(exit_text(code))
+
+
+def start_process() -> subprocess.Popen[bytes]:
+    """Return a worker process; it loads its modules, which takes a second, while this one continues.
+
+    Raises:
+        StudioError: no process can be started.
+    """
+    try:
+        # An interrupt of this process must not interrupt the worker. It ends when its input is closed.
+        return subprocess.Popen(
+            COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
+        )
+    except OSError as error:
+        raise StudioError(f"no process could be started: {error.strerror or error}") from error
 
 
 def write_frame(stream: IO[bytes], head: Head, body: bytes = b"") -> None:

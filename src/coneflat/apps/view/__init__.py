@@ -11,7 +11,7 @@ from .figures.render import Barycentrics
 from .figures.uv_layout import draw_layout, fill_layout, layout_aspect
 from .from_uv import own_flattening, shown_rows, uv_flattening
 from .page.content import Model, content_of, outline_halfedges
-from .page.payload import PageText, head_and_block, pack
+from .page.payload import PageText, head_and_block, pack, text_of
 from .page.webpage import (
     check_page,
     notebook_html,
@@ -30,6 +30,5 @@ __all__ = [
     "draw_cones", "draw_layout", "draw_quantity", "eye_direction", "fill_layout", "head_and_block", "layout_aspect",
     "make_figure", "mark_handles", "mark_scale", "new_figure", "notebook_html", "open_address", "open_page",
     "outline_halfedges", "own_flattening", "own_quantity", "pack", "page_around", "page_html", "page_of_quads",
-    "save_figure",
-    "show_mesh", "shown_rows", "uv_flattening", "view_aspect", "write_figure", "write_page",
+    "save_figure", "show_mesh", "shown_rows", "text_of", "uv_flattening", "view_aspect", "write_figure", "write_page",
 ]  # fmt: skip

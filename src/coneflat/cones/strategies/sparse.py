@@ -13,6 +13,7 @@ from ...base.text import plural
 from ...mesh.connectivity import TriangleMesh
 from ...stages import ConeSolution, ConeSpec
 from ..sparse import ConeSearch, SparseCones
+from ..sparse.limits import MAX_SEARCHED
 from ..surface import ConeSurface
 from .none import NO_CONES, coneless_solution
 
@@ -97,11 +98,13 @@ def unmet_requests(
     if spec.count is not None:
         if cone_count == spec.count:
             return ()
-        note = (
-            f"{plural(cone_count, 'cone')} instead of the {spec.count:,} asked for: within the given bounds, more "
-            "cones would not reduce the distortion, or there is no inner vertex for them."
+        reason = (
+            "within the given bounds, more cones would not reduce the distortion, or there is no inner vertex for "
+            "them"
         )
-        return (Unmet(note),)
+        if spec.count > cone_count >= MAX_SEARCHED:
+            reason = f"searches place {MAX_SEARCHED} at most, in addition to required ones"
+        return (Unmet(f"{plural(cone_count, 'cone')} instead of the {spec.count:,} asked for: {reason}."),)
     if distortion <= spec.distortion * (1 + RELATIVE_TOLERANCE):
         return ()
     reason = "no better cones were found within the given bounds"

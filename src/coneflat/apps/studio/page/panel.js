@@ -8,6 +8,7 @@ class Panel {
     this.studio = studio;
     this.part = (id) => document.getElementById(id);
     this.snap = 0;
+    this.isPressed = this.isDue = false; // A button is pressed in the panel, which is to be shown again afterwards.
     this.curve = new ConeCurve(studio);
     this.fill();
     this.connect();
@@ -67,6 +68,19 @@ class Panel {
     for (const id of ["tools", "brushes", "exports"]) rove(this.part(id), "button", true);
     this.part("cone-list").addEventListener("keydown", (event) => this.changeRow(event));
     this.part("snap").addEventListener("change", (event) => (this.snap = Number(event.target.value)));
+    this.holdWhilePressed();
+  }
+
+  /** Change nothing in the panel between the press and the release of a button, which would lose the click. */
+  holdWhilePressed() {
+    const release = () => {
+      this.isPressed = false;
+      setTimeout(() => this.isDue && this.show()); // After the click.
+    };
+    this.part("studio").addEventListener("pointerdown", ({target}) => (this.isPressed = isButton(target)), {capture: true});
+    for (const name of ["pointerup", "pointercancel"]) window.addEventListener(name, release, {capture: true});
+    // The release may be outside the window.
+    window.addEventListener("pointermove", ({buttons}) => this.isPressed && !buttons && release(), {capture: true});
   }
 
   /** Return the control of an option that is made from its declaration. */
@@ -120,11 +134,13 @@ class Panel {
   // Display.
 
   show() {
+    this.isDue = this.isPressed;
+    if (this.isPressed) return;
     const {news, choices, tools} = this.studio, options = {...DEFAULTS, ...choices.options};
     this.part("undo").disabled = !news?.undo;
     this.part("redo").disabled = !news?.redo;
     const {forTexture} = this.studio;
-    this.part("purpose").value = forTexture ? "texture" : "angles";
+    this.value("purpose", forTexture ? "texture" : "angles");
     this.value("max-energy", options.area == null ? options.max_energy : "");
     for (const part of document.querySelectorAll(".for-angles, .for-texture")) part.hidden = forTexture !== part.classList.contains("for-texture");
     for (const [key, , , hint] of [...TOOLS, ...BRUSHES]) {
@@ -132,7 +148,7 @@ class Panel {
       if (tools.mode === key) this.part("hint").textContent = forTexture && key === "look" ? "Drag to rotate the model." : hint;
     }
     const by = choices.by_hand ? "hand" : "cone_count" in choices.options ? "cone_count" : "distortion";
-    this.part("cones-by").value = by;
+    this.value("cones-by", by);
     this.part("distortion").closest("label").hidden = by !== "distortion";
     this.part("cone-count").closest("label").hidden = by !== "cone_count";
     this.value("distortion", Math.log10(options.distortion));
@@ -141,8 +157,8 @@ class Panel {
     this.value("sharp", options.sharp_angle == null ? "" : Number(((options.sharp_angle * 180) / Math.PI).toFixed(2)));
     this.value("hide", options.hide_seams);
     this.part("hide-value").textContent = options.hide_seams;
-    this.part("own-seams").checked = options.seams === "input";
-    this.part("no-more").checked = options.seams === "none";
+    this.check("own-seams", options.seams === "input");
+    this.check("no-more", options.seams === "none");
     for (const {name, kind} of FURTHER_OPTIONS) this.value(`more-${name}`, furtherText(kind, options[name]));
     this.value("boundary", options.boundary);
     this.part("boundary").closest("label").hidden = this.part("tool-corner").hidden = forTexture || !this.studio.hasBoundary();
@@ -151,9 +167,10 @@ class Panel {
     this.value("padding", options.padding);
     this.value("stretch", options.stretch);
     const isNumber = forTexture && typeof options.charts === "number";
-    this.part("charts").value = isNumber ? "number" : typeof options.charts === "number" ? "atlas" : options.charts;
+    this.value("charts", isNumber ? "number" : typeof options.charts === "number" ? "atlas" : options.charts);
     this.value("chart-number", isNumber ? options.charts : "");
     this.part("chart-number").closest("label").hidden = !isNumber;
+    this.showNotesOnControls({cone_count: by === "cone_count", charts: isNumber});
     for (const saving of this.part("exports").children) saving.disabled = !this.studio.hasLayout();
     this.part("save-quads").disabled = !this.studio.hasLayout() || this.studio.making === "quads";
     this.part("save-quads").textContent = this.studio.making === "quads" ? "Computing quads…" : "Quads, OBJ";
@@ -173,8 +190,23 @@ class Panel {
 
   /** Show a value, unless the user is changing it. */
   value(id, value) {
+    if (this.studio.isBehind()) return;
     const field = this.part(id);
     if (document.activeElement !== field || field.tagName === "SELECT" || !this.studio.isBusy()) field.value = value;
+  }
+
+  /** Check a box or not, unless the user has just clicked it. */
+  check(id, isChecked) {
+    if (!this.studio.isBehind()) this.part(id).checked = isChecked;
+  }
+
+  /** Show the notes on values that are not met beside their controls. */
+  showNotesOnControls(isShown) {
+    for (const [name, visible] of Object.entries(isShown)) {
+      const note = this.studio.news?.on_controls?.[name] ?? "";
+      this.part(`on-${name}`).hidden = !note || !visible;
+      this.part(`on-${name}`).textContent = note;
+    }
   }
 
   showWork() {
@@ -230,6 +262,8 @@ class Panel {
   }
 
   showCones() {
+    this.isDue ||= this.isPressed;
+    if (this.isPressed) return; // The rows are replaced.
     const rows = this.studio.coneRows(), picked = this.studio.selectedNumber();
     const key = JSON.stringify([rows, picked]);
     if (key === this.conesShown) return;
@@ -321,6 +355,11 @@ function button(text, title, does, more = {}) {
   if (text.length < 2 && !more.ariaLabel) made.setAttribute("aria-label", title);
   made.addEventListener("click", does);
   return made;
+}
+
+/** Return whether an element is a button, a checkbox, or in one; other fields may be shown again while they are used. */
+function isButton(element) {
+  return Boolean(element.closest("button, summary, label, [type=checkbox]")) && !element.closest("select, input:not([type=checkbox])");
 }
 
 const AXES = ["x", "y", "z"];

@@ -29,11 +29,11 @@ class Server {
     return modelOf(head, block, 4 + size, known);
   }
 
-  /** Perform an action, after the earlier ones. */
-  act(action) {
+  /** Perform an action, after the earlier ones, and return the version of the state with its effect. */
+  async act(action) {
     const sent = this.queue.then(() => this.ask("act", {method: "POST", body: JSON.stringify(action)}));
     this.queue = sent.catch(() => {});
-    return sent;
+    return (await (await sent).json()).version;
   }
 
   /** Return the curve of distortion by number of cones: {counts, distortions, knee}. */

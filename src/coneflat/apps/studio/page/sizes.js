@@ -20,8 +20,8 @@ function sizeText(value, power, [ofFile, shown]) {
 
 function showSizes(studio) {
   const {viewer, choices} = studio, part = (id) => document.getElementById(id), units = choices.units ?? ["", ""];
-  part("unit").value = units[0];
-  part("shown-in").value = units[1] === units[0] ? "" : units[1];
+  studio.panel.value("unit", units[0]);
+  studio.panel.value("shown-in", units[1] === units[0] ? "" : units[1]);
   part("shown-in").closest("label").hidden = !units[0];
   const head = viewer?.model.head;
   if (!head) return;

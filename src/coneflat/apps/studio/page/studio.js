@@ -12,7 +12,8 @@ class Studio {
     this.layout = 0;
     this.turns = 0; // Quarter turns of the view of the layout.
     this.final = null; // The last layout that was not a preview, {model, turns}.
-    this.pending = 0;
+    this.pending = 0; // Actions without an answer.
+    this.answered = 0; // Version of the state with the effect of all answered actions.
     this.took = this.sight = 0; // Milliseconds from the last change to its layout, and to its preview.
     this.selected = null; // The vertex of the picked cone, which does not depend on the index of the cone.
     this.tools = new Tools(this);
@@ -65,6 +66,7 @@ class Studio {
     document.body.classList.toggle("empty", !this.news.mesh);
     document.body.classList.toggle("bare", !this.news.layout || this.news.bare);
     document.body.classList.toggle("alone", this.news.bare);
+    document.body.classList.toggle("computing", Boolean(this.news.busy));
     document.body.classList.toggle("stale", this.news.stale);
     if (!this.viewer) document.getElementById("name").textContent = this.news.mesh ?? "";
     if (model) this.take(model);
@@ -185,12 +187,18 @@ class Studio {
     this.refused = null;
     this.pending++;
     try {
-      await this.server.act(action);
-    } catch (error) {
-      this.refuse(error);
-    } finally {
+      this.answered = Math.max(this.answered, await this.server.act(action));
       this.pending--;
+    } catch (error) {
+      this.pending--;
+      this.refuse(error);
     }
+    this.panel.show();
+  }
+
+  /** Whether the state that is shown lacks the effect of an action: controls show what the user has chosen. */
+  isBehind() {
+    return this.pending > 0 || (this.news?.version ?? 0) < this.answered;
   }
 
   refuse(error) {

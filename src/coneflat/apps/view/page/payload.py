@@ -65,6 +65,11 @@ class PageText:
     squares: float = CHECKER_CELLS
 
 
+def text_of(result: Flattening) -> PageText:
+    """Return the title and the rows of the report of a flattening."""
+    return PageText(title(replace(result, source=None)), shown_rows(result))
+
+
 def as_payload(head: dict[str, Any], block: bytes) -> tuple[str, str]:
     """Return the results of `head_and_block` in the form that is written into a page.
 
@@ -91,8 +96,7 @@ def head_and_block(
     Raises:
         OptionError: `up` is not valid.
     """
-    if text is None:
-        text = PageText(title(replace(result, source=None)), shown_rows(result))
+    text = text_of(result) if text is None else text
     quantity, arrays = content.quantity, _arrays(content)
     if picture is not None:
         arrays["picture"] = np.frombuffer(picture.content, dtype=np.uint8)
