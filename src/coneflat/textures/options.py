@@ -31,8 +31,8 @@ ISOMETRIC, MAX_ENERGY = 4.0, 4.1
 #: The energy above that of an isometry, relative to the squared area distortion, of layouts with the least energy:
 #: 17 to 27 on seven models.
 ENERGY_PER_AREA = 20.0
-#: The default strength of cuts for packing, which are then at most a quarter of the other seams. On 25 models it adds two
-#: fifths of the seams that the strength 1 adds, for three fifths of its gain.
+#: The default strength of cuts for packing, which are then at most a quarter of the other seams. On 25 models it adds
+#: two fifths of the seams that the strength 1 adds, for three fifths of its gain.
 PACKING_CUTS = 0.2
 #: Largest number of texels along a side.
 MAX_RESOLUTION = 2**16
