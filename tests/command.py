@@ -26,6 +26,12 @@ def reset_signals():
 INTERRUPTIBLE = {} if os.name == "nt" else {"preexec_fn": reset_signals}
 
 
+def without_note_on_compilation(stderr: str) -> str:
+    """Return what a process printed without the note on compilation, which depends on the cache of kernels."""
+    lines = stderr.splitlines(keepends=True)
+    return "".join(line for line in lines if not line.startswith("coneflat: compiling"))
+
+
 def command(*words, cwd="."):
     out, err, threshold, before = StringIO(), StringIO(), gc.get_threshold(), os.getcwd()
     argv = patch.object(sys, "argv", ["coneflat", *map(str, words)])
@@ -37,4 +43,5 @@ def command(*words, cwd="."):
         os.chdir(before)
         gc.unfreeze()
         gc.set_threshold(*threshold)
-    return SimpleNamespace(returncode=stopped.value.code, stdout=out.getvalue(), stderr=err.getvalue())
+    stderr = without_note_on_compilation(err.getvalue())
+    return SimpleNamespace(returncode=stopped.value.code, stdout=out.getvalue(), stderr=stderr)

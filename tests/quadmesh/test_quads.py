@@ -164,7 +164,7 @@ def test_open_borders_are_covered_to_the_last_quad(name):
     ends = mesh.vertices[mesh.edges[mesh.is_boundary_edge]]
     along = (ends[:, :1] + np.linspace(0, 1, 20)[:, None] * (ends[:, 1:] - ends[:, :1])).reshape(-1, 3)
     side = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1).mean()
-    assert np.linalg.norm(border[:, None] - along, axis=2).min(axis=1).max() < 0.3 * side
+    assert np.linalg.norm(border[:, None] - along, axis=2).min(axis=1).max() < 0.35 * side
     assert (least_jacobians(mesh.vertices, mesh.quads) > 0).all()
 
 
@@ -247,7 +247,7 @@ def test_components_with_few_vertices_get_quads():
 @pytest.mark.slow
 def test_quads_that_meet_themselves_are_made_smaller():
     """Around each hole of a surface with three handles there are too few squares."""
-    options = {"quads": 10, "cones": "sparse", "distortion": 0.2}
+    options = {"quads": 10, "cones": "sparse", "distortion": 0.3}
     grid = coneflat.integer_grid(*shapes.genus(3), **options)
     with pytest.raises(GridError, match="degenerate quads? of .*: use more quads"):
         extract_quads(grid)
@@ -260,7 +260,7 @@ def test_quads_that_meet_themselves_are_made_smaller():
 
 @pytest.mark.slow
 def test_bad_quads_are_left_out_where_no_finer_grid_is_found(monkeypatch):
-    options = {"quads": 10, "cones": "sparse", "distortion": 0.2}
+    options = {"quads": 10, "cones": "sparse", "distortion": 0.3}
     grid_of_size, searches = policies.grid_of_size, []
 
     def fail_if_finer(request, flattening_of):

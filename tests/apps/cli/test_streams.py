@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from command import without_note_on_compilation
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n"
 FULL = Path("/dev/full")
@@ -17,7 +18,10 @@ def run(folder, *words, stdout=subprocess.PIPE, stderr=subprocess.PIPE):
     """Run a command in its own process, in which open files and warnings are errors."""
     (folder / "a.obj").write_text(SQUARE)
     line = [sys.executable, "-X", "dev", "-W", "error", "-m", "coneflat", *words]
-    return subprocess.run(line, cwd=folder, stdout=stdout, stderr=stderr, text=True, check=False)
+    done = subprocess.run(line, cwd=folder, stdout=stdout, stderr=stderr, text=True, check=False)
+    if done.stderr is not None:
+        done.stderr = without_note_on_compilation(done.stderr)
+    return done
 
 
 @pytest.mark.parametrize(
