@@ -12,7 +12,7 @@ from coneflat.geometry.planar import layout_curvature
 from coneflat.io import as_input
 from coneflat.mesh import find_holes
 from coneflat.options import Options
-from coneflat.source import Source
+from coneflat.source import Source, coarse
 
 
 def with_holes(mesh, centres, radius):
@@ -213,3 +213,16 @@ def test_holes_that_a_seam_opens_are_not_filled():
 def test_a_prescribed_boundary_includes_that_of_holes(boundary):
     component = Source(as_input(*sheet(2))).prepared(Options(boundary=boundary)).components[0]
     assert component.fill is None
+
+
+def test_forbidden_edges_around_a_hole_keep_it_on_a_large_mesh(monkeypatch):
+    """A coarse mesh, on which holes are compared, has no forbidden edges."""
+    monkeypatch.setattr(coarse, "COARSE", 250)
+    vertices, faces = shapes.sphere(3, bumps=0.0)
+    middles = vertices[faces].mean(axis=1)
+    vertex_indices, corners = np.unique(faces[np.abs(middles[:, 2]) < 0.8], return_inverse=True)
+    mesh = coneflat.TriangleMesh(vertices[vertex_indices], corners.reshape(-1, 3))
+    border = mesh.tails[find_holes(mesh)[0]]
+    at_hole = mesh.edges[np.isin(mesh.edges, border).any(axis=1)]
+    result = coneflat.flatten(mesh.vertices, mesh.faces, no_seams=at_hole)
+    assert not result.distortion.flipped

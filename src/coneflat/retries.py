@@ -159,8 +159,12 @@ def with_kept_holes(component: Component, steps: Steps) -> Component:
 
 
 def is_compared_on_coarse(component: Component) -> bool:
-    """Return whether keeping the holes of a component is decided on a coarse mesh, which saves half of the time."""
-    return is_large(component) and not has_vertex_options(component)
+    """Return whether keeping the holes of a component is decided on a coarse mesh, which saves half of the time.
+
+    A coarse mesh has no forbidden edges, which may prevent that holes are opened.
+    """
+    has_forbidden = bool(component.seams.is_forbidden.any())
+    return is_large(component) and not has_forbidden and not has_vertex_options(component)
 
 
 def finish_with_best_holes(

@@ -10,6 +10,7 @@ import coneflat
 from coneflat import check_mesh
 from coneflat.cones import ConeSurface
 from coneflat.cones.sparse.coarse_search import CoarseStarts
+from coneflat.cones.sparse.starts import DenseStarts
 from coneflat.cones.surface import MAX_WITHOUT_COARSE_MESH
 from coneflat.errors import CurvatureError
 from coneflat.geometry import edge_lengths
@@ -106,3 +107,21 @@ def test_a_sheet_keeps_its_boundary():
     assert len(cones.vertices)
     assert cones.distortion <= 0.05
     assert not mesh.is_boundary_vertex[cones.vertices].any()
+
+
+def test_lengths_that_are_not_distances_need_no_coarse_mesh(bumpy):
+    vertices, faces = bumpy
+    mesh = check_mesh(vertices / np.linalg.norm(vertices, axis=1)[:, None], faces).mesh
+    surface = ConeSurface.of(mesh, edge_lengths(vertices, mesh.faces))
+    assert isinstance(surface.search(spec_of(surface)).starts, DenseStarts)
+
+
+def test_a_bound_out_of_reach_costs_few_cones(bumpy):
+    """More cones on one half of a sphere hardly help the other half."""
+    forbidden = np.flatnonzero(bumpy[0][:, 2] > 0)
+    cones = coneflat.find_cones(*bumpy, forbidden_cones=forbidden, distortion=0.1)
+    dense = coneflat.cones.ConeSearch.from_mesh(
+        check_mesh(*bumpy).mesh, allowed=~np.isin(np.arange(len(bumpy[0])), forbidden)
+    ).fewest(0.1)
+    assert len(cones.vertices) <= 1.15 * len(dense.solution.cones)
+    assert cones.distortion <= 1.02 * dense.distortion

@@ -89,6 +89,13 @@ def test_anchors_remain(sphere: TriangleMesh, count):
     assert np.isin(anchors, coarse_mesh(sphere, count, anchors).vertices).all()
 
 
+def test_meshes_of_anchors_stay():
+    """Vertices whose edges cannot collapse are most of those of the cheapest ones."""
+    mesh = TriangleMesh(*shapes.grid(40, 40))
+    anchors = np.arange(0, len(mesh.vertices), 2)
+    assert np.isin(anchors, coarse_mesh(mesh, 10, anchors).vertices).all()
+
+
 @pytest.mark.parametrize("count", [300, 2_000])
 def test_renumbering_and_similarity_change_nothing_on_symmetric_meshes(count):
     vertices, faces = shapes.subdivide(*shapes.subdivide(*shapes.hill(40, 30)))

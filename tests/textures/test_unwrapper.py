@@ -38,6 +38,7 @@ def test_options_of_packing_need_no_search_and_give_the_same_result(searches, ch
     assert len(searches) == 1
     changes = (
         {"padding": 20.0},
+        {"packing_cuts": 1.0},
         {"resolution": 256},
         {"up": (0, 1, 0)},
         {"tiles": 2},

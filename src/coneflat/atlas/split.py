@@ -126,7 +126,8 @@ def filled_disk(disk: TriangleMesh, costs: FloatArray) -> tuple[TriangleMesh, Fl
     if not holes:
         return disk, costs
     filled = with_fans(disk, [disk.tails[hole] for hole in holes])
-    side_costs = np.full(filled.faces.size, NO_COST * costs.mean())
+    finite = costs[np.isfinite(costs)]  # diagonals and forbidden sides have infinite costs
+    side_costs = np.full(filled.faces.size, NO_COST * (finite.mean() if len(finite) else 1.0))
     side_costs[: len(costs)] = costs
     side_costs[np.concatenate(holes)] = side_costs[-1]
     return filled, side_costs

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from ..base.threads import MEMORY_BOUND_TRIANGLES, concurrently
+from ..geometry import edge_lengths
 from ..geometry.operators import weighted_areas
 from ..mesh.ties import mesh_tie_key
 from ..stages import ConeSpec, Surface
@@ -19,6 +20,8 @@ from .sparse.starts import StartsOf
 
 # Number of triangles up to which a search on a coarse mesh first takes no less time.
 MAX_WITHOUT_COARSE_MESH = 20_000
+# Mean difference, relative to the mean, up to which lengths are those of the positions: thin triangles are widened.
+MAX_LENGTH_ERROR = 1e-2
 
 
 @dataclass(eq=False)
@@ -82,9 +85,15 @@ class ConeSurface(Surface):
         return search
 
     def _starts(self, linear: LinearModel, spec: ConeSpec) -> StartsOf | None:
-        """Return what gives the sets of cones on a coarse mesh; None if the mesh is so small that it needs none."""
+        """Return what gives the sets of cones on a coarse mesh; None if the mesh needs none.
+
+        The mesh needs none if it is small. Lengths that are not distances of its vertices do not fit a coarse mesh.
+        """
         count = len(self.mesh.faces)
         if count <= MAX_WITHOUT_COARSE_MESH:
+            return None
+        distances = edge_lengths(self.mesh.vertices, self.mesh.faces)
+        if np.abs(self.lengths - distances).mean() > MAX_LENGTH_ERROR * distances.mean():
             return None
         share, required = (
             weighted_areas(self.areas, spec.weights),

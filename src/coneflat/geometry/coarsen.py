@@ -311,7 +311,7 @@ def collapse_in_rounds(mesh: Collapses, seen: IntArray, left: int, count: int) -
         left: the number of triangles that it has.
         count: the number of triangles.
     """
-    order, heads = np.argsort(mesh.key), np.empty(len(mesh.key), np.int64)
+    order, heads = np.argsort(mesh.key), np.full(len(mesh.key), -1, np.int64)
     changed, before, stamp, turn = np.zeros(len(mesh.key), np.int64), 2 * left, 0, 0
     while left > count and left < MIN_PROGRESS * before:
         before, turn = left, turn + 1
@@ -320,7 +320,12 @@ def collapse_in_rounds(mesh: Collapses, seen: IntArray, left: int, count: int) -
         limit = np.partition(mesh.cost[order], 3 * len(order) // 4)[3 * len(order) // 4]
         for tail in order:
             head = heads[tail]
-            if not mesh.cost[tail] <= limit or changed[tail] == turn or changed[head] == turn:
+            if (
+                not mesh.cost[tail] <= limit
+                or mesh.cost[tail] == np.inf
+                or changed[tail] == turn
+                or changed[head] == turn
+            ):
                 continue
             stamp += 1
             if mesh.first[head] >= 0 and can_collapse(mesh, seen, stamp, tail, head):

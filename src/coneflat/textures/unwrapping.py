@@ -115,7 +115,7 @@ class Unwrapper:
 
 
 #: Options on which the search for cuts does not depend.
-PACKING = ("padding", "resolution", "texel_density", "tiles", "up", "progress")
+PACKING = ("packing_cuts", "padding", "resolution", "texel_density", "tiles", "up", "progress")
 #: Largest number of sets of charts per component whose finished layouts are cached.
 MAX_FINISHED = 4
 

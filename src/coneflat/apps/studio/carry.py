@@ -64,17 +64,17 @@ class Ground:
     Attributes:
         positions: (n, 3) positions of the vertices.
         edges: (e, 2) edges.
-        face_vertices: (u,) vertices of faces, ascending.
+        face_vertices: (u,) vertices of faces, ascending, whose positions are finite.
         reach: largest distance to the nearest vertex.
     """
 
     def __init__(self, mesh: MeshFile) -> None:
         self.positions = np.asarray(mesh.vertices)
         self.edges = file_edges(mesh)
-        self.face_vertices = np.unique(mesh.corners)
-        extent = self.positions[self.face_vertices].max(axis=0) - self.positions[self.face_vertices].min(
-            axis=0
-        )
+        vertices = np.unique(mesh.corners)
+        self.face_vertices = vertices[np.isfinite(self.positions[vertices]).all(axis=1)]
+        places = self.positions[self.face_vertices]
+        extent = np.ptp(places, axis=0) if len(places) else np.zeros(3)
         self.reach = MAX_SHIFT * float(np.linalg.norm(extent))
         self._mesh = mesh
 
@@ -95,6 +95,7 @@ class Ground:
         """Return (k,) the candidate that is nearest to each point; -1 if none is within reach."""
         from scipy.spatial import cKDTree
 
+        candidates = candidates[np.isfinite(self.positions[candidates]).all(axis=1)]
         if not len(candidates) or not len(points):
             return np.full(len(points), -1)
         distance, which = cKDTree(self.positions[candidates]).query(points)
@@ -104,7 +105,7 @@ class Ground:
         """Return the vertices in the area between points, see `COVERED`."""
         from scipy.spatial import cKDTree
 
-        if len(points) < 2:
+        if len(points) < 2 or not len(self.face_vertices):
             return np.empty(0, dtype=np.int64)
         tree = cKDTree(points)
         spacing = COVERED * tree.query(points, k=2)[0][:, 1]

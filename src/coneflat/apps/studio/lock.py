@@ -27,7 +27,7 @@ if sys.platform == "win32":
         os.lseek(descriptor, 0, os.SEEK_SET)
 
     #: The error of a lock that another process has.
-    _Taken = OSError
+    _Taken = PermissionError
 else:
     import fcntl
 
@@ -35,6 +35,10 @@ else:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
     _Taken = BlockingIOError
+
+
+# Number of times that a lock is tried whose file is removed in the meantime.
+MAX_TRIES = 10
 
 
 class ProjectLock:
@@ -67,7 +71,7 @@ class ProjectLock:
             ProjectError: another studio has locked it.
             OSError: the file cannot be created or locked.
         """
-        while True:
+        for _ in range(MAX_TRIES):
             descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o600)
             try:
                 _lock(descriptor)
@@ -80,6 +84,7 @@ class ProjectLock:
             if _is_same(descriptor, self._path):
                 return descriptor
             os.close(descriptor)  # The studio that had it has just removed it.
+        raise OSError("the file of the lock is not the one that is open")  # so on some network file systems
 
     def _write(self, address: str) -> None:
         assert self._descriptor is not None

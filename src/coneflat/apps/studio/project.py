@@ -230,9 +230,13 @@ def _with_changed_mesh(project: Project, file: Path) -> Project:
     how = "keep the numbers of their vertices" if places is None else "are at the nearest vertices"
     note = f"{project.mesh.name} has changed since {file.name} was saved: the choices {how}."
     if carried.lost:
+        note += f" Without a place on it: {', '.join(carried.lost)}."
         copy = unused_name(file)
-        shutil.copyfile(file, copy)
-        note += f" Without a place on it: {', '.join(carried.lost)}. The project as it was is in {copy.name}."
+        try:
+            shutil.copyfile(file, copy)
+            note += f" The project as it was is in {copy.name}."
+        except OSError as error:
+            note += f" The project as it was cannot be copied: {error.strerror or error}."
     return replace(
         project,
         choices=carried.choices,

@@ -21,7 +21,7 @@ from ...geometry import (
 )
 from ...mesh.connectivity import TriangleMesh
 from ...mesh.ties import mesh_tie_key
-from .dense_model import BestSets, ConeSet
+from .dense_model import STALL_FACTOR, BestSets, ConeSet
 from .fine_model import FineModel
 from .linear_model import LinearModel
 from .search import ConeSearch
@@ -127,9 +127,11 @@ class CoarseStarts:
         """Return the unknowns (s,) of the mesh for the best set of a size, required cones first."""
         return self._places[self._search.fine.unknowns[self.best[size].members]]
 
-    def find_fewest(self, goal: float, max_count: int) -> None:
-        """Find sets of all sizes up to slightly more than E^2 <= goal needs."""
+    def find_fewest(self, goal: float, max_count: int) -> ConeSet:
+        """Return the fewest cones with E^2 <= goal, or the fewest that are nearly as good as the best set."""
         self._search.fewest(math.sqrt(goal), max_count)
+        cones = self.best.fewest(goal, max_count)
+        return cones if cones.energy <= goal else self.best.fewest(cones.energy / STALL_FACTOR, max_count)
 
     def find_best(self, count: int) -> None:
         """Find sets of about `count` cones."""

@@ -274,8 +274,7 @@ class ConeSearch:
         fine, best, excess = self.fine, self.fine.best, 0.0
         # On a noisy mesh E^2 exceeds that of the smaller model: a second search allows for it.
         for _ in range(2):
-            self.starts.find_fewest(goal - excess, max_count)
-            cones = self.starts.best.fewest(goal - excess, max_count)
+            cones = self.starts.find_fewest(goal - excess, max_count)
             energy = self._refine(len(cones), goal)
             excess = energy - cones.energy
             if energy <= goal or excess >= goal / 2:

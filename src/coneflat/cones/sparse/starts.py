@@ -34,14 +34,14 @@ class Starts(Protocol):
     def unknowns(self, size: int) -> IntArray:
         """Return the unknowns (s,) of the mesh for the best set of a size, required cones first."""
 
-    def find_fewest(self, goal: float, max_count: int) -> None:
-        """Find sets of all sizes up to slightly more than E^2 <= goal needs."""
+    def find_fewest(self, goal: float, max_count: int) -> ConeSet:
+        """Return the fewest cones with E^2 <= goal, or those of small E^2 if there are none, and find similar sets."""
 
     def find_best(self, count: int) -> None:
-        """Find sets of about `count` cones."""
+        """Find sets of at most about `count` cones."""
 
     def find_all(self, max_count: int) -> None:
-        """Find sets of all sizes up to `max_count`."""
+        """Find sets of sizes up to `max_count`."""
 
 
 #: Returns the sets that the search on a model of the mesh starts from.
@@ -92,11 +92,12 @@ class DenseStarts:
         """Return the unknowns (s,) of the mesh for the best set of a size, required cones first."""
         return self.places[self.best[size].members]
 
-    def find_fewest(self, goal: float, max_count: int) -> None:
-        """Find sets of all sizes up to slightly more than E^2 <= goal needs."""
+    def find_fewest(self, goal: float, max_count: int) -> ConeSet:
+        """Return the fewest cones with E^2 <= goal, or those of smallest E^2; find sets of similar sizes."""
         self._climb(goal / self.error, max_count, max_count)
         count = len(self.best.fewest(goal, max_count))
         self.model.descend(count - 3, count + 1)
+        return self.best.fewest(goal, max_count)
 
     def find_best(self, count: int) -> None:
         """Find sets of about `count` cones."""
