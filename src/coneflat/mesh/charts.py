@@ -11,7 +11,8 @@ from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, Numbers
 from ..base.jit import compiled
 from ..base.text import plural
 from ..errors import MetricError, SeamError
-from .connectivity import TriangleMesh, end_corners, ends_of_side, label_components, split_vertices
+from .connectivity import TriangleMesh, end_corners, label_components, split_vertices
+from .edge_kernels import ends_of_side
 
 # Largest UV distance, relative to the UV edge length, at which the two sides of an edge count as joined.
 JOIN_TOLERANCE = 1e-6

@@ -14,7 +14,7 @@ from ..base.jit import compiled
 from ..errors import MetricError
 from ..geometry.intrinsic import IntrinsicTriangulation
 from ..linalg import factorize
-from ..mesh.connectivity import sort_keys
+from ..mesh.edge_kernels import sort_keys
 from ..stages import LaplacianInverse
 
 # Relative change of a row, in terms of its diagonal, above which the preconditioner is corrected for it, and largest

@@ -17,7 +17,8 @@ from scipy.sparse import csc_matrix
 from ..base.arrays import BoolArray, ComplexArray, FloatArray, IntArray, has_any
 from ..base.jit import compiled
 from ..geometry.planar import map_factors
-from ..mesh.connectivity import label_components, sort_by_counting, sort_keys
+from ..mesh.connectivity import label_components, sort_by_counting
+from ..mesh.edge_kernels import sort_keys
 from .energies import Energy
 from .motions import Motions
 
