@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base import BoolArray, FloatArray, mask_of
+from ..base import BoolArray, FloatArray, IntArray, has_any, mask_of
 from ..cones import ConeSurface
 from ..flattening import Steps, lay_out_component
 from ..geometry import find_overlaps
@@ -39,6 +39,8 @@ class Candidate:
         distortion: an area distortion for which its cones are found.
         is_separated: whether its overlaps are separated, which may add seams.
         keeps_points: whether its points stay where they are if it is cut further.
+        settled: (k,) the seams for which all of its points were relaxed to the smaller tolerance; None if they were
+            not, see `CutModel.settled`.
     """
 
     layout: Layout
@@ -47,6 +49,7 @@ class Candidate:
     distortion: float
     is_separated: bool = False
     keeps_points: bool = False
+    settled: IntArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,17 +107,21 @@ class CutModel:
         """
         return lay_out_component(self.surface, replace(self.component, cones=cones), self.steps)
 
-    def candidate(self, layout: Layout, distortion: float, free: BoolArray | None = None) -> Candidate:
+    def candidate(
+        self, layout: Layout, distortion: float, free: BoolArray | None = None, settles: bool = False
+    ) -> Candidate:
         """Return the candidate that a layout becomes with free seams.
 
         Args:
             layout: the layout.
             distortion: see `Candidate`.
             free: (c,) the points that move; None for all.
+            settles: whether all points are relaxed to the smaller tolerance, see `settled`.
         """
         # Notes on cones and the metric do not apply to layouts with free seams.
-        layout, energy = self.freed(replace(layout, notes=()), free, 5 * TOLERANCE)
-        return Candidate(layout, energy, self.cost_of(layout), distortion)
+        layout, energy = self.freed(replace(layout, notes=()), free, (2 if settles else 5) * TOLERANCE)
+        candidate = Candidate(layout, energy, self.cost_of(layout), distortion)
+        return replace(candidate, settled=seam_edges(layout)) if settles else candidate
 
     def freed(
         self, layout: Layout, free: BoolArray | None = None, tolerance: float = 2 * TOLERANCE
@@ -133,13 +140,22 @@ class CutModel:
         return replace(candidate, layout=layout, cost=self.cost_of(layout), is_separated=True)
 
     def settled(self, candidate: Candidate) -> Candidate:
-        """Return a candidate with the least energy without overlaps: its separating cuts are free, too."""
+        """Return a candidate with the least energy without overlaps: its separating cuts are free, too.
+
+        If it was settled before and is within the bound, only points near edges move that were cut or closed since.
+        """
         is_free = np.ones(len(candidate.layout.points), dtype=bool)
+        if candidate.settled is not None and self.is_within(candidate):
+            is_free = points_near(
+                candidate.layout, np.setxor1d(candidate.settled, seam_edges(candidate.layout))
+            )
+        if not is_free.any():
+            return candidate
         for _ in range(MAX_SETTLINGS):
             layout, energy = self.freed(candidate.layout, is_free)
             pairs = find_overlaps(side_by_side(layout).points[layout.corners]).pairs
             if not (len(pairs) and self.steps.separates):
-                return replace(candidate, layout=layout, energy=energy)
+                return replace(candidate, layout=layout, energy=energy, settled=seam_edges(layout))
             # Points where charts would touch themselves stay.
             corners = candidate.layout.corners
             is_free &= ~nearby(corners, mask_of(len(corners), pairs), RINGS)
@@ -155,3 +171,12 @@ class CutModel:
     def is_within(self, candidate: Candidate) -> bool:
         """Return whether a candidate is within the bound."""
         return candidate.energy <= self.bound.largest
+
+
+def points_near(layout: Layout, edges: IntArray) -> BoolArray:
+    """Return (c,) flags of the points of a layout near edges (k,), which move where those are cut or closed.
+
+    Most of what moves is near: more rings change the seams by less than 1%.
+    """
+    is_changed = mask_of(len(layout.mesh.vertices), layout.mesh.edges[edges])
+    return nearby(layout.corners, has_any(is_changed, layout.mesh.faces), 4 * RINGS)

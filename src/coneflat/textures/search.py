@@ -130,7 +130,7 @@ def _from_coarse(model: CutModel) -> tuple[CutModel, Candidate]:
     cones = vertices[best.layout.cones]
     prescribed = VertexCurvatures(cones, np.full(len(cones), np.nan))
     layout = variant.laid_out(replace(model.component.cones, strategy="prescribed", prescribed=prescribed))
-    candidate = variant.candidate(layout, layout.statistics.area_distortion_linear)
+    candidate = variant.candidate(layout, layout.statistics.area_distortion_linear, settles=True)
     excess = candidate.energy - model.bound.largest
     if 0 < excess <= MAX_EXCESS * model.bound.allowed:
         candidate = shortened(variant, candidate)

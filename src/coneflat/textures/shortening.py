@@ -6,16 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base import IntArray, has_any, mask_of
-from ..mesh import nearby
+from ..base import IntArray
 from ..stages import Layout
-from .candidates import TOLERANCE, Candidate, CutModel
+from .candidates import TOLERANCE, Candidate, CutModel, points_near
 from .free_seams import recut, seam_edges
-from .tips import RINGS, find_tips, moved_tips, moves_for
+from .tips import find_tips, moved_tips, moves_for
 
 # Number of times that tips are moved to meet the bound, half as often if it is met already: as often takes 10% longer,
 # for seams 0.2% shorter.
 MAX_TRIES = 4
+# Energy below the bound, relative to what is allowed above that of an isometry, that is not used for shorter seams.
+ENOUGH_SLACK = 2 * TOLERANCE
 # Tips of larger meshes are moved on their coarse meshes only: a try takes seconds.
 MANY_TRIANGLES = 60_000
 
@@ -45,7 +46,8 @@ def cut_further(model: CutModel, candidate: Candidate, layout: Layout) -> Candid
 
 def _best_of_moved(model: CutModel, start: Candidate) -> Candidate:
     """Return the candidate with moved tips whose seams cost least, or the start if none is better."""
-    if len(model.component.faces) > MANY_TRIANGLES:
+    slack = (model.bound.largest - start.energy) / model.bound.allowed
+    if len(model.component.faces) > MANY_TRIANGLES or 0 <= slack <= ENOUGH_SLACK:
         return start
     candidates = [model.separated(candidate) for candidate in _with_moved_tips(model, start)]
     for candidate in sorted(candidates, key=lambda candidate: candidate.cost):
@@ -62,7 +64,9 @@ def _with_moved_tips(model: CutModel, start: Candidate) -> list[Candidate]:
     tips = find_tips(start.layout, seams, model.costs)
     if not (bound.is_finite and (tips.rates > 0).any()):
         return candidates
-    slack, cuts = bound.largest - start.energy, [seams]
+    # The middle of the energies that are near enough to the bound.
+    goal = bound.largest - ENOUGH_SLACK / 2 * bound.allowed
+    slack, cuts = goal - start.energy, [seams]
     for _ in range(MAX_TRIES // 2 if slack > 0 else MAX_TRIES):
         moved, cones = moved_tips(start.layout, seams, tips, moves_for(start.layout, tips, slack))
         if any(np.array_equal(moved, cut) for cut in cuts):
@@ -77,8 +81,9 @@ def _with_moved_tips(model: CutModel, start: Candidate) -> list[Candidate]:
         if candidate.energy <= model.settled_bound:
             candidates.append(candidate)
         # A start beyond the bound only has to get within it: the tips move again after the cuts for packing.
-        if excess <= 0 and (excess >= -2 * TOLERANCE * bound.allowed or not model.is_within(start)):
+        if excess <= 0 and (excess >= -ENOUGH_SLACK * bound.allowed or not model.is_within(start)):
             break
+        excess = candidate.energy - goal
         slack = slack - excess if (slack - excess) * slack > 0 else slack / 2
     return candidates
 
@@ -91,8 +96,6 @@ def _recut(model: CutModel, start: Candidate, seams: IntArray, moved: IntArray, 
         seams, moved: (k,), (j,) its seams, and the others.
         cones: (s,) vertices at which the others may end.
     """
-    mesh, layout = start.layout.mesh, replace(recut(start.layout, moved), cones=cones)
-    is_changed = mask_of(len(mesh.vertices), mesh.edges[np.setxor1d(seams, moved)])
-    # Most of what moves is near: more rings change the seams by less than 1%.
-    is_free = nearby(layout.corners, has_any(is_changed, mesh.faces), 4 * RINGS)
-    return model.candidate(layout, start.distortion, is_free)
+    layout = replace(recut(start.layout, moved), cones=cones)
+    candidate = model.candidate(layout, start.distortion, points_near(layout, np.setxor1d(seams, moved)))
+    return replace(candidate, settled=start.settled)
