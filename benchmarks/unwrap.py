@@ -1,21 +1,26 @@
-"""Textures compared with other packages: `python benchmarks/unwrap.py` prints two Markdown tables.
+"""Textures compared with other packages: `python benchmarks/unwrap.py` prints Markdown tables.
 
 Models: those of `../shared/meshes`, decimated to 1,000, 5,000 and 20,000 triangles, and generated ones: a noisy surface
-with 50 handles, a noisy figure, 3,000 components, extruded letters, and an assembly of 30 parts. Packages:
-`coneflat.unwrap` with its defaults, xatlas with 2 texels of padding at 1,024 texels, and uvunwrap with its defaults.
-All results are measured by `coneflat.measure` on the UVs that the packages return. Needs the extra `bench`.
+with 50 handles, a noisy figure, 3,000 components, extruded letters, an assembly of 30 parts, and those of
+`brought_models.py`. Packages: `coneflat.unwrap` with its defaults, xatlas with 2 texels of padding at 1,024 texels, and
+uvunwrap with its defaults. All results are measured by `coneflat.measure` on the UVs that the packages return; seconds
+are those of processors. The second table has totals of all models but those brought, the third of these. Needs the
+extra `bench`. For another version of the package, set PYTHONPATH to its folder `src`.
 
-Options: --only NAME,... (models), --largest 120000 (triangles), --sizes 1000,5000,20000, --save FOLDER (the results).
+Options: --only NAME,... (models), --packages coneflat,xatlas,uvunwrap, --largest 120000 (triangles), --sizes
+1000,5000,20000, --brought (only those brought), --save FOLDER (the results).
 """
 
 from __future__ import annotations
 
 import argparse
-import time
+import os
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from brought_models import brought_models
 from common import models, shapes
 
 from coneflat import check_mesh, measure, unwrap
@@ -31,49 +36,81 @@ def main() -> None:
     parser.add_argument("--only", default="")
     parser.add_argument("--largest", type=int, default=120_000)
     parser.add_argument("--sizes", default="1000,5000,20000")
+    parser.add_argument("--packages", default=",".join(PACKAGES))
+    parser.add_argument("--brought", action="store_true")
     parser.add_argument("--save", type=Path)
     arguments = parser.parse_args()
     only, sizes = set(filter(None, arguments.only.split(","))), [int(n) for n in arguments.sizes.split(",")]
+    packages = arguments.packages.split(",")
     print(
-        "| model | triangles | package | energy | area std | flipped | overlaps | charts | seams | covered | s |"
+        "| model | triangles | package | energy | area std | flipped | overlaps | charts | seams | covered | CPU s |"
     )
     print("| --- " * 11 + "|")
     unwrap(*shapes.sphere(2))
-    rows: dict[str, list[tuple[float, ...]]] = {name: [] for name in PACKAGES}
-    for name, mesh in cases(sizes, arguments.largest):
-        if only and name not in only:
-            continue
-        for package, run in PACKAGES.items():
-            start = time.perf_counter()
-            corner_uv = run(mesh)
-            seconds = time.perf_counter() - start
-            measures = measure(mesh, corner_uv)
-            values = *(float(getattr(measures, key)) for key in COLUMNS), covered(corner_uv), seconds
-            rows[package].append(values)
-            energy, std, flipped, overlaps, charts, seams, share, _ = values
-            print(
-                f"| {name} | {len(mesh.faces):,} | {package} | {energy:.3f} | {std:.3f} | {flipped:.0f} | "
-                f"{overlaps:.0f} | {charts:.0f} | {seams:.2f} | {share:.3f} | {seconds:.2f} |",
-                flush=True,
-            )
-            if arguments.save and package == "coneflat":
-                arguments.save.mkdir(parents=True, exist_ok=True)
-                np.savez_compressed(
-                    arguments.save / f"{name}.npz",
-                    vertices=mesh.vertices,
-                    faces=mesh.faces,
-                    corner_uv=corner_uv,
-                )
-    summarize(rows)
+    groups = [brought()] if arguments.brought else [cases(sizes, arguments.largest), brought()]
+    totals = []
+    for group in groups:
+        rows: dict[str, list[tuple[float, ...]]] = {name: [] for name in packages}
+        for case in group:
+            if only and case.name not in only:
+                continue
+            for package in packages:
+                corner_uv, seconds = timed(PACKAGES[package], case)
+                rows[package].append(print_row(case, package, corner_uv, seconds))
+                if arguments.save and package == "coneflat":
+                    save(case, corner_uv, arguments.save)
+        totals.append(rows)
+    for rows in totals:
+        summarize(rows)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A model: its name, the arrays that packages get, and the mesh of their triangles on which UVs are measured."""
+
+    name: str
+    vertices: np.ndarray
+    faces: np.ndarray
+    mesh: TriangleMesh
+
+
+def timed(run: Callable[[Case], np.ndarray], case: Case) -> tuple[np.ndarray, float]:
+    """Return the UVs (m, 3, 2) of a package, and the processor seconds that it took."""
+    start = os.times()
+    corner_uv = run(case)
+    end = os.times()
+    return corner_uv, end.user + end.system - start.user - start.system
+
+
+def print_row(case: Case, package: str, corner_uv: np.ndarray, seconds: float) -> tuple[float, ...]:
+    """Print the measures of UVs as a row of the table, and return them."""
+    measures = measure(case.mesh, corner_uv)
+    values = *(float(getattr(measures, key)) for key in COLUMNS), covered(corner_uv), seconds
+    energy, std, flipped, overlaps, charts, seams, share, _ = values
+    print(
+        f"| {case.name} | {len(case.faces):,} | {package} | {energy:.3f} | {std:.3f} | {flipped:.0f} | "
+        f"{overlaps:.0f} | {charts:.0f} | {seams:.2f} | {share:.3f} | {seconds:.2f} |",
+        flush=True,
+    )
+    return values
+
+
+def save(case: Case, corner_uv: np.ndarray, folder: Path) -> None:
+    """Write a model with its UVs."""
+    folder.mkdir(parents=True, exist_ok=True)
+    np.savez_compressed(
+        folder / f"{case.name}.npz", vertices=case.vertices, faces=case.faces, corner_uv=corner_uv
+    )
 
 
 def summarize(rows: dict[str, list[tuple[float, ...]]]) -> None:
     """Print a row for each package: worst energy, medians, and totals."""
     print(
-        "\n| package | models | energy, worst | area std, worst | flipped | overlaps | charts | seams | covered | s |"
+        "\n| package | models | energy, worst | area std, worst | flipped | overlaps | charts | seams | covered "
+        "| CPU s |"
     )
     print("| --- " * 10 + "|")
-    ours = np.array(rows["coneflat"])
+    ours = np.array(rows.get("coneflat", []))
     for package, values in rows.items():
         if not values:
             continue
@@ -83,7 +120,7 @@ def summarize(rows: dict[str, list[tuple[float, ...]]]) -> None:
             f"{(overlaps > 0).sum()} | {charts.sum():.0f} | {seams.sum():.1f} | {np.median(share):.3f} | "
             f"{seconds.sum():.1f} |"
         )
-        if package != "coneflat":
+        if package != "coneflat" and len(ours):
             times = charts.sum() / ours[:, 4].sum(), seams.sum() / ours[:, 5].sum()
             fewer, slower = (share < ours[:, 6]).sum(), (seconds > ours[:, 7]).sum()
             print(
@@ -91,20 +128,32 @@ def summarize(rows: dict[str, list[tuple[float, ...]]]) -> None:
             )
 
 
-def cases(sizes: list[int], largest: int) -> Iterator[tuple[str, TriangleMesh]]:
-    """Yield the names and meshes of all models."""
+def cases(sizes: list[int], largest: int) -> Iterator[Case]:
+    """Yield all models but those brought."""
     for name, mesh in models(repair=True):
         if len(mesh.faces) <= largest:
-            yield name, mesh
+            yield of_mesh(name, mesh)
         for size in sizes:
             if size < len(mesh.faces):
-                yield f"{name}-{size}", decimated(mesh, size)
+                yield of_mesh(f"{name}-{size}", decimated(mesh, size))
         if name == "human":
-            yield f"{name}-noisy", noisy(decimated(mesh, 10_000))
-    yield "handles", check_mesh(*noisy_handles(), repair=True).mesh
-    yield "crumbs", check_mesh(*crumbs()).mesh
-    yield "letters", check_mesh(*letters(), repair=True).mesh
-    yield "assembly", check_mesh(*assembly()).mesh
+            yield of_mesh(f"{name}-noisy", noisy(decimated(mesh, 10_000)))
+    yield of_mesh("handles", check_mesh(*noisy_handles(), repair=True).mesh)
+    yield of_mesh("crumbs", check_mesh(*crumbs()).mesh)
+    yield of_mesh("letters", check_mesh(*letters(), repair=True).mesh)
+    yield of_mesh("assembly", check_mesh(*assembly()).mesh)
+
+
+def of_mesh(name: str, mesh: TriangleMesh) -> Case:
+    return Case(name, mesh.vertices, mesh.faces, mesh)
+
+
+def brought() -> Iterator[Case]:
+    """Yield the models as people bring them of which no triangle is dropped."""
+    for name, (vertices, faces) in brought_models():
+        mesh = check_mesh(vertices, faces, repair=True).mesh
+        if len(mesh.faces) == len(faces):
+            yield Case(name, np.asarray(vertices, dtype=np.float64), faces, mesh)
 
 
 def decimated(mesh: TriangleMesh, count: int) -> TriangleMesh:
@@ -202,31 +251,31 @@ def covered(corner_uv: np.ndarray) -> float:
     )
 
 
-def by_coneflat(mesh: TriangleMesh) -> np.ndarray:
-    return unwrap(mesh.vertices, mesh.faces, resolution=RESOLUTION, padding=PADDING).corner_uv
+def by_coneflat(case: Case) -> np.ndarray:
+    return unwrap(case.vertices, case.faces, repair=True, resolution=RESOLUTION, padding=PADDING).corner_uv
 
 
-def by_xatlas(mesh: TriangleMesh) -> np.ndarray:
+def by_xatlas(case: Case) -> np.ndarray:
     import xatlas
 
     atlas, pack = xatlas.Atlas(), xatlas.PackOptions()
     pack.padding, pack.resolution = PADDING, RESOLUTION
     # xatlas depends on the unit of length.
-    area = double_areas(edge_lengths(mesh.vertices, mesh.faces)).sum() / 2
-    atlas.add_mesh((mesh.vertices * (100 / np.sqrt(area))).astype(np.float32), mesh.faces.astype(np.uint32))
+    area = double_areas(edge_lengths(case.vertices, case.faces)).sum() / 2
+    atlas.add_mesh((case.vertices * (100 / np.sqrt(area))).astype(np.float32), case.faces.astype(np.uint32))
     atlas.generate(xatlas.ChartOptions(), pack)
     _, indices, uvs = atlas[0]
     return uvs[indices].astype(np.float64) * [atlas.width, atlas.height] / max(atlas.width, atlas.height)
 
 
-def by_uvunwrap(mesh: TriangleMesh) -> np.ndarray:
+def by_uvunwrap(case: Case) -> np.ndarray:
     import uvunwrap
 
-    uv_mesh = uvunwrap.Mesh(mesh.vertices.ravel().tolist(), mesh.faces.ravel().tolist())
+    uv_mesh = uvunwrap.Mesh(case.vertices.ravel().tolist(), case.faces.ravel().tolist())
     return np.array(uvunwrap.generate([uv_mesh]).meshes[0].corner_uvs, dtype=np.float64).reshape(-1, 3, 2)
 
 
-PACKAGES: dict[str, Callable[[TriangleMesh], np.ndarray]] = {
+PACKAGES: dict[str, Callable[[Case], np.ndarray]] = {
     "coneflat": by_coneflat,
     "xatlas": by_xatlas,
     "uvunwrap": by_uvunwrap,
