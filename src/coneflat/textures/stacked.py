@@ -1,4 +1,8 @@
-"""Components that are copies of others, or the other side of the same cloth: they share the texels of the first."""
+"""Components that are copies of others, or the other side of the same cloth: they share the texels of the first.
+
+Mirror images are copies, too. As the other half of a mirrored model, they are flipped in the texture: normal maps are
+baked for the first, and renderers mirror the tangents of the others.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +24,7 @@ SAME_SIZE, SAME_PLACE = 1e-4, 1e-5
 def without_copies(prepared: Prepared) -> tuple[SharedTexels, Prepared]:
     """Return the copies among the components of an input, and the input without them."""
     components = prepared.components
-    corners, partners, copied = list[IntArray](), list[IntArray](), set[int]()
+    corners, partners, copied, mirrored = list[IntArray](), list[IntArray](), set[int](), set[int]()
     places = weld(prepared.checked.mesh.vertices)[1]
     first_side = dict[bytes, int]()
     # For each component, the corners in an order of their own, and the corners whose UV they have.
@@ -33,29 +37,42 @@ def without_copies(prepared: Prepared) -> tuple[SharedTexels, Prepared]:
             matched = np.empty_like(matched)
             matched[order] = shown[side][orders[side]]
         elif copy is not None and abs(copy.scale - 1) <= SAME_SIZE:
-            matched = shown[copy.first]
+            matched = np.empty_like(matched)
+            matched[_order_by_vertex(component)] = shown[copy.first][_order_by_vertex(components[copy.first])]
+            mirrored |= {i} if copy.is_mirrored else set()
         shown.append(matched)
         orders.append(order)
-        if matched[0] != _corners_of(component)[0]:
+        if matched[0] // 3 != component.faces[0]:
             copied.add(i)
             corners.append(_corners_of(component))
             partners.append(matched)
     remaining = tuple(component for i, component in enumerate(components) if i not in copied)
-    note = _note(len(copied))
+    note = _note(len(copied), len(mirrored))
     shared = SharedTexels(_joined(corners), _joined(partners), has_own_points=False, note=note)
     return shared, replace(prepared, components=remaining)
 
 
-def _note(count: int) -> str:
+def _note(count: int, mirrored: int) -> str:
     if not count:
         return "No component shares the texels of another: copies have the same vertices in the same order."
-    verb = "shares" if count == 1 else "share"
-    return f"{plural(count, 'component')} {verb} the texels of others; all measures are those without them."
+    verb, copula = ("shares" if count == 1 else "share"), ("is" if mirrored == 1 else "are")
+    flips = (
+        f" {mirrored:,} of them {copula} mirrored, which flips the triangles in the texture."
+        if mirrored
+        else ""
+    )
+    return f"{plural(count, 'component')} {verb} the texels of others; all measures are those without them.{flips}"
 
 
 def _corners_of(component: Component) -> IntArray:
     """Return (3m,) the corners of a component's faces, as indices into all corners of the mesh."""
     return (3 * component.faces[:, None] + np.arange(3)).ravel()
+
+
+def _order_by_vertex(component: Component) -> IntArray:
+    """Return (3m,) the corners of a component's faces, those of each face by their vertices."""
+    faces = component.mesh.faces
+    return (3 * np.arange(len(faces))[:, None] + np.argsort(faces, axis=1)).ravel()
 
 
 def _joined(arrays: Sequence[IntArray]) -> IntArray:
