@@ -170,3 +170,35 @@ def test_a_component_with_some_reversed_faces_is_no_copy():
     turned[: len(faces) // 2] = turned[: len(faces) // 2, ::-1]
     result = unwrap(*shapes.join((vertices, faces), (vertices + 10, turned)), stack="copies", repair=True)
     assert result.distortion.overlapping_pairs == 0
+
+
+@pytest.mark.parametrize("is_mirrored", [False, True])
+def test_copies_with_other_numbers_share_texels(is_mirrored):
+    vertices, faces = shapes.sphere(2, seed=3)
+    pieces = [(vertices, faces)]
+    for seed in (1, 2):
+        moved, corners, _ = shapes.renumber(vertices, faces, seed=seed)
+        moved = moved * [1, -1 if is_mirrored else 1, 1] @ shapes.rotation(seed).T + [5.0 * seed, 0, 0]
+        pieces.append((moved, corners[:, ::-1] if is_mirrored else corners))
+    result = unwrap(*shapes.join(*pieces), stack="copies")
+    assert len(result.uv) == len(unwrap(vertices, faces).uv)
+    signs = np.sign(signed_double_areas(result.corner_uv)).reshape(3, -1)
+    assert (signs == np.array([[1], [-1], [-1]] if is_mirrored else [[1]] * 3)).all()
+    assert any("2 components share" in note for note in result.notes)
+    in_plane, in_space = (
+        np.linalg.norm(corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]], axis=2).ravel()
+        for corners in (result.corner_uv, result.vertices[result.faces])
+    )
+    count = len(in_plane) // 3
+    for k in (1, 2):
+        parts = slice(count), slice(k * count, (k + 1) * count)
+        stretches = [np.sort((in_plane / in_space)[part]) for part in parts]
+        np.testing.assert_allclose(*stretches, rtol=1e-6)
+
+
+def test_a_mirrored_copy_that_a_rotation_fits_is_not_flipped():
+    vertices, faces = shapes.box()
+    model = shapes.join((vertices, faces), (vertices * [-1, 1, 1] + [9, 0, 0], faces[:, ::-1]))
+    result = unwrap(*model, stack="copies")
+    assert (signed_double_areas(result.corner_uv) > 0).all()
+    assert any("1 component shares" in note and "mirrored" not in note for note in result.notes)
