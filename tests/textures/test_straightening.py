@@ -89,6 +89,14 @@ def test_a_bent_strip_becomes_a_rectangle(seed):
     assert_sound(result, 4.01)
 
 
+def test_rectangles_do_not_depend_on_the_numbering():
+    vertices, faces = strip()
+    result, renumbered = unwrap(vertices, faces), unwrap(*shapes.renumber(vertices, faces)[:2])
+    assert share_along_axes(renumbered) == pytest.approx(1, abs=1e-12)
+    assert renumbered.distortion.energy == pytest.approx(result.distortion.energy, rel=1e-9)
+    np.testing.assert_allclose(np.ptp(renumbered.uv, axis=0), np.ptp(result.uv, axis=0), rtol=1e-6)
+
+
 def test_a_strip_that_bends_too_much_for_a_rectangle_keeps_its_shape():
     result = unwrap(*strip(rise=1.0, width=2.0))
     assert share_along_axes(result) < 0.5
