@@ -156,8 +156,9 @@ def test_written_mirrored_copies_are_not_measured(ending, first):
     assert stored.distortion.energy == pytest.approx(result.distortion.energy, rel=1e-4)
 
 
-def test_flips_of_measured_copies_are_found():
-    result = unwrap(*mirrored_copies(3), stack="copies")
+@pytest.mark.parametrize("count", [2, 3])
+def test_flips_of_measured_copies_are_found(count):
+    result = unwrap(*mirrored_copies(count), stack="copies")
     uv = result.uv.copy()
     corner = result.uv_faces[0]
     uv[corner[0]] += 2 * (uv[corner[1:]].mean(axis=0) - uv[corner[0]])

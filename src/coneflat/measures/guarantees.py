@@ -127,18 +127,17 @@ def first_faces(result: Flattening) -> BoolArray:
 def _is_back(result: Flattening) -> BoolArray:
     """Return (m,) True for the faces that are the back of others, at the same points with the opposite orientation.
 
-    Polygons of the back may be split along other diagonals, so whole charts are compared: half of their area is
-    flipped, or they are a chart of another component as well, of which they are the mirror image.
+    Polygons of the back may be split along other diagonals, so whole components are compared: half of their area in a
+    chart is flipped, or all of it while another component is not.
     """
     count, chart = label_faces(result.uv_faces, len(result.uv))
     component = label_faces(result.faces, len(result.vertices))[1]
-    areas = signed_double_areas(result.corner_uv)
-    sizes, sums = (np.bincount(chart, values, count) for values in (np.abs(areas), areas))
-    is_doubled = np.abs(sums) <= SAME_AREA * sizes
     part = np.unique(component * count + chart, return_inverse=True)[1].ravel()
-    is_mirrored = (np.bincount(part, areas) < 0)[part]
+    areas = signed_double_areas(result.corner_uv)
+    sizes, sums = (np.bincount(part, values) for values in (np.abs(areas), areas))
+    is_doubled, is_mirrored = (np.abs(sums) <= SAME_AREA * sizes)[part], (sums < -SAME_AREA * sizes)[part]
     has_front = np.bincount(chart, ~is_mirrored, count) > 0
-    return np.asarray((is_doubled[chart] & (areas < 0)) | (is_mirrored & has_front[chart]))
+    return np.asarray((is_doubled & (areas < 0)) | (is_mirrored & has_front[chart]))
 
 
 def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:
