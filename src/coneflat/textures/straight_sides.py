@@ -195,7 +195,7 @@ class StraightSides:
 def rectangle_sides(border: Border) -> StraightSides:
     """Return the four sides of a border that becomes a rectangle."""
     turned = [side.vector * (-1j) ** k for k, side in enumerate(border.sides)]
-    first = sum(turned) / abs(sum(turned))
+    first = np.exp(1j * np.angle(sum(turned)))
     return StraightSides(border.sides, np.array([first * 1j**k for k in range(4)]))
 
 
