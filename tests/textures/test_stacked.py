@@ -1,5 +1,7 @@
 """Copies and the two sides of cloth that share texels."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapes
@@ -107,3 +109,97 @@ def test_copies_with_positions_in_single_precision_share_texels():
     vertices, faces = turned_copies(4)
     result = unwrap(vertices.astype(np.float32), faces, stack="copies")
     assert any("3 components share" in note for note in result.notes)
+
+
+def mirrored_copies(count, order=(2, 1, 0)):
+    """Return copies of a hill, turned and moved, every second one mirrored, with its corners in an order."""
+    vertices, faces = shapes.hill(8, 6)
+    images = [(vertices, faces), (vertices * [1, 1, -1], faces[:, order])]
+    pieces = [
+        (images[k % 2][0] @ shapes.rotation(k).T + [5 * k, 0, 0], images[k % 2][1]) for k in range(count)
+    ]
+    return shapes.join(*pieces)
+
+
+@pytest.mark.parametrize("order", [(2, 1, 0), (0, 2, 1), (1, 0, 2)])
+def test_mirrored_copies_share_the_texels_of_the_first(order):
+    vertices, faces = mirrored_copies(4, order)
+    result, single = unwrap(vertices, faces, stack="copies"), unwrap(*shapes.hill(8, 6))
+    assert len(result.uv) == len(single.uv)
+    areas = signed_double_areas(result.corner_uv).reshape(4, -1)
+    assert (areas[::2] > 0).all()
+    np.testing.assert_allclose(areas[1::2], -areas[::2], rtol=1e-12)
+    assert any("3 components share" in note and "2 of them are mirrored" in note for note in result.notes)
+    assert (result.distortion.flipped, result.distortion.overlapping_pairs) == (0, 0)
+
+
+def test_corners_of_mirrored_copies_have_the_uv_of_their_images():
+    """Each side of a copy is stretched as its image in the first."""
+    result = unwrap(*mirrored_copies(3), stack="copies")
+    in_plane, in_space = (
+        np.linalg.norm(corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]], axis=2)
+        for corners in (result.corner_uv, result.vertices[result.faces])
+    )
+    stretch = np.sort(in_plane / in_space, axis=1).reshape(3, -1, 3)
+    np.testing.assert_allclose(stretch[1:], stretch[[0, 0]], rtol=1e-9)
+
+
+@pytest.mark.parametrize("first", [0, 1])
+@pytest.mark.parametrize("ending", [".obj", ".glb", ".ply", ".npz"])
+def test_written_mirrored_copies_are_not_measured(ending, first):
+    vertices, faces = mirrored_copies(4)
+    # The mirror images may come first: then they are those that are unwrapped.
+    model = (vertices, faces) if first == 0 else (vertices * [1, 1, -1], faces[:, ::-1])
+    result = unwrap(*model, stack="copies")
+    stored = result.as_written(ending)
+    assert (stored.distortion.flipped, stored.distortion.overlapping_pairs) == (0, 0)
+    assert stored.distortion.energy == pytest.approx(result.distortion.energy, rel=1e-4)
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_flips_of_measured_copies_are_found(count):
+    result = unwrap(*mirrored_copies(count), stack="copies")
+    uv = result.uv.copy()
+    corner = result.uv_faces[0]
+    uv[corner[0]] += 2 * (uv[corner[1:]].mean(axis=0) - uv[corner[0]])
+    assert replace(result, uv=uv).as_written(".glb").distortion.flipped > 0
+
+
+def test_a_component_with_some_reversed_faces_is_no_copy():
+    vertices, faces = shapes.hill(8, 6)
+    turned = faces.copy()
+    turned[: len(faces) // 2] = turned[: len(faces) // 2, ::-1]
+    result = unwrap(*shapes.join((vertices, faces), (vertices + 10, turned)), stack="copies", repair=True)
+    assert result.distortion.overlapping_pairs == 0
+
+
+@pytest.mark.parametrize("is_mirrored", [False, True])
+def test_copies_with_other_numbers_share_texels(is_mirrored):
+    vertices, faces = shapes.sphere(2, seed=3)
+    pieces = [(vertices, faces)]
+    for seed in (1, 2):
+        moved, corners, _ = shapes.renumber(vertices, faces, seed=seed)
+        moved = moved * [1, -1 if is_mirrored else 1, 1] @ shapes.rotation(seed).T + [5.0 * seed, 0, 0]
+        pieces.append((moved, corners[:, ::-1] if is_mirrored else corners))
+    result = unwrap(*shapes.join(*pieces), stack="copies")
+    assert len(result.uv) == len(unwrap(vertices, faces).uv)
+    signs = np.sign(signed_double_areas(result.corner_uv)).reshape(3, -1)
+    assert (signs == np.array([[1], [-1], [-1]] if is_mirrored else [[1]] * 3)).all()
+    assert any("2 components share" in note for note in result.notes)
+    in_plane, in_space = (
+        np.linalg.norm(corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]], axis=2).ravel()
+        for corners in (result.corner_uv, result.vertices[result.faces])
+    )
+    count = len(in_plane) // 3
+    for k in (1, 2):
+        parts = slice(count), slice(k * count, (k + 1) * count)
+        stretches = [np.sort((in_plane / in_space)[part]) for part in parts]
+        np.testing.assert_allclose(*stretches, rtol=1e-6)
+
+
+def test_a_mirrored_copy_that_a_rotation_fits_is_not_flipped():
+    vertices, faces = shapes.box()
+    model = shapes.join((vertices, faces), (vertices * [-1, 1, 1] + [9, 0, 0], faces[:, ::-1]))
+    result = unwrap(*model, stack="copies")
+    assert (signed_double_areas(result.corner_uv) > 0).all()
+    assert any("1 component shares" in note and "mirrored" not in note for note in result.notes)

@@ -118,22 +118,26 @@ def first_faces(result: Flattening) -> BoolArray:
     if plane is not None:
         is_first = result.vertices[result.faces].mean(axis=1) @ plane[:3] > plane[3]
     elif result.settings.get("stack") == "copies":
-        _, first = np.unique(np.sort(result.uv_faces, axis=1), axis=0, return_index=True)
-        is_first = mask_of(len(is_first), first) & ~_is_back(result)
+        fronts = np.flatnonzero(~_is_back(result))
+        _, first = np.unique(np.sort(result.uv_faces[fronts], axis=1), axis=0, return_index=True)
+        is_first = mask_of(len(is_first), fronts[first])
     return np.asarray(is_first)
 
 
 def _is_back(result: Flattening) -> BoolArray:
     """Return (m,) True for the faces that are the back of others, at the same points with the opposite orientation.
 
-    Polygons of the back may be split along other diagonals, so whole charts are compared: half of their area is
-    flipped.
+    Polygons of the back may be split along other diagonals, so whole components are compared: half of their area in a
+    chart is flipped, or all of it while another component is not.
     """
     count, chart = label_faces(result.uv_faces, len(result.uv))
+    component = label_faces(result.faces, len(result.vertices))[1]
+    part = np.unique(component * count + chart, return_inverse=True)[1].ravel()
     areas = signed_double_areas(result.corner_uv)
-    sizes, sums = (np.bincount(chart, values, count) for values in (np.abs(areas), areas))
-    is_doubled = np.abs(sums) <= SAME_AREA * sizes
-    return np.asarray(is_doubled[chart] & (areas < 0))
+    sizes, sums = (np.bincount(part, values) for values in (np.abs(areas), areas))
+    is_doubled, is_mirrored = (np.abs(sums) <= SAME_AREA * sizes)[part], (sums < -SAME_AREA * sizes)[part]
+    has_front = np.bincount(chart, ~is_mirrored, count) > 0
+    return np.asarray((is_doubled & (areas < 0)) | (is_mirrored & has_front[chart]))
 
 
 def _rotations(result: Flattening, changed: Flattening) -> Rotations | None:

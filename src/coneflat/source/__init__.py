@@ -2,6 +2,7 @@
 
 from .coarse import coarse_component, is_large
 from .components import Component, Prepared
+from .congruent import Congruence, congruence
 from .constraints import vertex_numbers
 from .copies import find_copies, has_vertex_options
 from .fill import Fill
@@ -10,6 +11,7 @@ from .preparation import LatestCache, Source
 from .rounding import rounding_notes
 
 __all__ = [
-    "Component", "Fill", "LatestCache", "Prepared", "Source", "at_unit_size", "coarse_component", "find_copies",
-    "has_vertex_options", "is_large", "result_numbering", "rounding_notes", "vertex_numbers",
+    "Component", "Congruence", "Fill", "LatestCache", "Prepared", "Source", "at_unit_size", "coarse_component",
+    "congruence", "find_copies", "has_vertex_options", "is_large", "result_numbering", "rounding_notes",
+    "vertex_numbers",
 ]  # fmt: skip

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import FloatArray
+from ..base.arrays import BoolArray, FloatArray
 from ..stages import Layout
 from .components import Component
 
@@ -31,10 +31,12 @@ class Copy:
     Attributes:
         first: index of the first component of its kind.
         scale: size of the copy divided by the size of the first.
+        is_mirrored: whether it is a mirror image.
     """
 
     first: int
     scale: float
+    is_mirrored: bool = False
 
 
 def find_copies(
@@ -43,7 +45,8 @@ def find_copies(
     """Return for each component the component of which it is a copy, None for the first of a kind.
 
     Copies have the same connectivity with the same numbering and the same options for vertices and edges; a rotation, a
-    translation and a uniform scaling map one to the other.
+    translation and a uniform scaling map one to the other. With a rounding, corners of a face may be in any order, and
+    mirror images, whose faces have the opposite orientation, are copies, too.
 
     Args:
         components: the components.
@@ -58,12 +61,16 @@ def find_copies(
     for i, component in enumerate(components):
         if i in excluded or has_vertex_options(component):
             continue
-        key = _copy_key(component) if rounding is None else (component.mesh.faces.tobytes(),)
+        key = _copy_key(component) if rounding is None else (np.sort(component.mesh.faces, axis=1).tobytes(),)
         alike = kinds.setdefault(key, [])
         for first in alike[:MAX_COMPARED]:
-            scale = _scale_of_copy(components[first], component, rounding)
+            is_reversed = _reversed_faces(components[first], component)
+            if is_reversed.any() != is_reversed.all():
+                continue
+            is_mirrored = bool(is_reversed.all())
+            scale = _scale_of_copy(components[first], component, rounding, is_mirrored)
             if scale is not None:
-                copies[i] = Copy(first, scale)
+                copies[i] = Copy(first, scale, is_mirrored)
                 break
         else:
             alike.append(i)
@@ -103,10 +110,24 @@ def _copy_key(component: Component) -> tuple[object, ...]:
     return (component.mesh.faces.tobytes(), *(flag.tobytes() for flag in flags), *shape)
 
 
-def _scale_of_copy(first: Component, component: Component, rounding: float | None) -> float | None:
+def _reversed_faces(first: Component, component: Component) -> BoolArray:
+    """Return (m,) the faces that have the opposite orientation in a component with the same vertices of each face."""
+    is_odd = [
+        (rows[:, 0] > rows[:, 1]) ^ (rows[:, 1] > rows[:, 2]) ^ (rows[:, 0] > rows[:, 2])
+        for rows in (first.mesh.faces, component.mesh.faces)
+    ]
+    return is_odd[0] != is_odd[1]
+
+
+def _scale_of_copy(
+    first: Component, component: Component, rounding: float | None, is_mirrored: bool = False
+) -> float | None:
     """Return the size of a component relative to the component of which it is a copy; None if it is not a copy.
 
-    rounding: as of `find_copies`.
+    Args:
+        first, component: the two components.
+        rounding: as of `find_copies`.
+        is_mirrored: whether mirror images are copies, instead of others.
 
     References:
         W. Kabsch, "A solution for the best rotation to relate two sets of vectors", 1976.
@@ -117,7 +138,7 @@ def _scale_of_copy(first: Component, component: Component, rounding: float | Non
         return None
     scale = float(sizes[1] / sizes[0])
     left, _, right = np.linalg.svd(first_centred.T @ centred)
-    handed = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    handed = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right)) * (-1.0 if is_mirrored else 1.0)])
     off: FloatArray = np.abs((first_centred @ ((left * handed) @ right)) * scale - centred).max(axis=1)
     reach = float(np.abs(component.mesh.vertices).max() + scale * np.abs(first.mesh.vertices).max())
     sides = np.abs(scale * first.lengths - component.lengths)

@@ -78,8 +78,8 @@ class TextureOptions:
         texel_density: Texels per unit of length of the model, at least, instead of a resolution, which is then a
             multiple of 4 that suffices, while 4 texels less do not.
         stack: mirrored: the two halves of a model that is mirrored vertex by vertex share their texels. It is cut along
-            the mirror plane, which no face may cross. copies: components that are copies of each other share their
-            texels, as do the two sides of cloth.
+            the mirror plane, which no face may cross. copies: components that are copies of each other, moved, rotated
+            or mirrored, share their texels, as do the two sides of cloth.
     """
 
     max_energy: float = option(MAX_ENERGY, Number(is_positive=True))

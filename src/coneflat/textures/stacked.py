@@ -1,4 +1,8 @@
-"""Components that are copies of others, or the other side of the same cloth: they share the texels of the first."""
+"""Components that are copies of others, or the other side of the same cloth: they share the texels of the first.
+
+Mirror images are copies, too. As the other half of a mirrored model, they are flipped in the texture: normal maps are
+baked for the first, and renderers mirror the tangents of the others.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,8 @@ import numpy as np
 
 from ..base import IntArray, plural
 from ..mesh import weld
-from ..source import Component, Prepared, find_copies
+from ..source import Component, Congruence, Prepared, congruence, find_copies, has_vertex_options
+from ..source.copies import MAX_COMPARED
 from .sharing import SharedTexels
 
 # Largest relative difference of the sizes of copies that share texels: those of other sizes would have another density.
@@ -20,42 +25,89 @@ SAME_SIZE, SAME_PLACE = 1e-4, 1e-5
 def without_copies(prepared: Prepared) -> tuple[SharedTexels, Prepared]:
     """Return the copies among the components of an input, and the input without them."""
     components = prepared.components
-    corners, partners, copied = list[IntArray](), list[IntArray](), set[int]()
+    corners, partners, copied, mirrored = list[IntArray](), list[IntArray](), set[int](), set[int]()
     places = weld(prepared.checked.mesh.vertices)[1]
     first_side = dict[bytes, int]()
     # For each component, the corners in an order of their own, and the corners whose UV they have.
     orders, shown = list[IntArray](), list[IntArray]()
-    copies = find_copies(components, rounding=SAME_PLACE)
-    for i, (component, copy) in enumerate(zip(components, copies, strict=True)):
+    for i, (component, copy) in enumerate(zip(components, _matched_copies(components), strict=True)):
         key, order = _ordered_corners(places[component.vertices][component.mesh.faces])
         side, matched = first_side.setdefault(key, i), _corners_of(component)
         if side != i:
             matched = np.empty_like(matched)
             matched[order] = shown[side][orders[side]]
-        elif copy is not None and abs(copy.scale - 1) <= SAME_SIZE:
-            matched = shown[copy.first]
+        elif copy is not None:
+            first, match = copy
+            matched = shown[first][match.corners]
+            mirrored |= {i} if match.is_mirrored else set()
         shown.append(matched)
         orders.append(order)
-        if matched[0] != _corners_of(component)[0]:
+        if matched[0] // 3 != component.faces[0]:
             copied.add(i)
             corners.append(_corners_of(component))
             partners.append(matched)
     remaining = tuple(component for i, component in enumerate(components) if i not in copied)
-    note = _note(len(copied))
+    note = _note(len(copied), len(mirrored))
     shared = SharedTexels(_joined(corners), _joined(partners), has_own_points=False, note=note)
     return shared, replace(prepared, components=remaining)
 
 
-def _note(count: int) -> str:
+def _matched_copies(components: Sequence[Component]) -> list[tuple[int, Congruence] | None]:
+    """Return for each component the component of which it is a copy, and how they match; None for the first of a kind.
+
+    Where the numbers of the vertices do not match, or only those of a mirror image, positions are compared: a symmetric
+    component is a copy of its mirror image.
+    """
+    matches, kinds = list[tuple[int, Congruence] | None](), dict[tuple[int, int], list[int]]()
+    copies = find_copies(components, rounding=SAME_PLACE)
+    for i, (component, copy) in enumerate(zip(components, copies, strict=True)):
+        if copy is not None and abs(copy.scale - 1) <= SAME_SIZE:
+            corners = np.empty(component.mesh.faces.size, dtype=np.int64)
+            corners[_order_by_vertex(component)] = _order_by_vertex(components[copy.first])
+            by_number = copy.first, Congruence(corners, copy.is_mirrored)
+            mirrored = [copy.first] if copy.is_mirrored else []
+            matches.append(_first_match(components, mirrored, component) or by_number)
+            continue
+        kind = kinds.setdefault((len(component.vertices), len(component.faces)), [])
+        match = _first_match(components, kind[:MAX_COMPARED], component)
+        matches.append(match)
+        if match is None and not has_vertex_options(component):
+            kind.append(i)
+    return matches
+
+
+def _first_match(
+    components: Sequence[Component], kind: Sequence[int], component: Component
+) -> tuple[int, Congruence] | None:
+    """Return the first of some components to which another one is congruent, and how; None if there is none."""
+    for first in kind if not has_vertex_options(component) else ():
+        match = congruence(components[first].mesh, component.mesh, SAME_PLACE)
+        if match is not None:
+            return first, match
+    return None
+
+
+def _note(count: int, mirrored: int) -> str:
     if not count:
-        return "No component shares the texels of another: copies have the same vertices in the same order."
-    verb = "shares" if count == 1 else "share"
-    return f"{plural(count, 'component')} {verb} the texels of others; all measures are those without them."
+        return "No component shares the texels of another: copies have the same shape, size and triangles."
+    verb, copula = ("shares" if count == 1 else "share"), ("is" if mirrored == 1 else "are")
+    flips = (
+        f" {mirrored:,} of them {copula} mirrored, which flips the triangles in the texture."
+        if mirrored
+        else ""
+    )
+    return f"{plural(count, 'component')} {verb} the texels of others; all measures are those without them.{flips}"
 
 
 def _corners_of(component: Component) -> IntArray:
     """Return (3m,) the corners of a component's faces, as indices into all corners of the mesh."""
     return (3 * component.faces[:, None] + np.arange(3)).ravel()
+
+
+def _order_by_vertex(component: Component) -> IntArray:
+    """Return (3m,) the corners of a component's faces, those of each face by their vertices."""
+    faces = component.mesh.faces
+    return (3 * np.arange(len(faces))[:, None] + np.argsort(faces, axis=1)).ravel()
 
 
 def _joined(arrays: Sequence[IntArray]) -> IntArray:

@@ -1,0 +1,134 @@
+"""Congruent meshes whose vertices and faces are numbered differently: which corner of one is which of the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..base.arrays import FloatArray, IntArray
+from ..mesh.connectivity import TriangleMesh
+
+# Largest number of faces of a mesh, for each order of their corners, that are compared with one of the other mesh.
+# More have the same shape and place only on symmetric meshes, where most of them fit.
+MAX_CANDIDATES = 32
+
+
+@dataclass(frozen=True, eq=False)
+class Congruence:
+    """A congruence of two meshes.
+
+    Attributes:
+        corners: (3m,) the corner of the first mesh that each corner of the second one is, as indices into all corners.
+        is_mirrored: whether the second mesh is a mirror image.
+    """
+
+    corners: IntArray
+    is_mirrored: bool
+
+
+def congruence(first: TriangleMesh, second: TriangleMesh, rounding: float) -> Congruence | None:
+    """Return a congruence of two meshes, a mirror image only if there is no other; None if there is none.
+
+    A face of one that is unlike most others is laid onto the faces of the other that it fits.
+
+    Args:
+        first, second: two meshes.
+        rounding: largest distance of the vertices of the second mesh from those of the first, after a rotation or
+            reflection, relative to the largest coordinates.
+    """
+    if first.vertices.shape != second.vertices.shape or first.faces.shape != second.faces.shape:
+        return None
+    reach = max(float(np.abs(mesh.vertices).max()) for mesh in (first, second))
+    tolerance = 2 * rounding * reach
+    points, images = (mesh.vertices - mesh.vertices.mean(axis=0) for mesh in (first, second))
+    radii, image_radii = (np.linalg.norm(centred, axis=1) for centred in (points, images))
+    if not np.allclose(np.sort(radii), np.sort(image_radii), rtol=0, atol=tolerance):
+        return None
+    tree = cKDTree(images)
+    trials = list(_fitting_corners(first.faces, second.faces, points, images, tolerance))
+    for sign in (1.0, -1.0):
+        for corners, image_corners in trials:
+            turn = _orthogonal(points[corners], images[image_corners], sign)
+            vertex = _nearest(points @ turn, tree)
+            if vertex is None:
+                continue
+            turn = _orthogonal(points, images[vertex], sign)
+            if np.abs(points @ turn - images[vertex]).max() <= tolerance:
+                matched = _matched_corners(vertex[first.faces], second.faces, sign < 0)
+                if matched is not None:
+                    return Congruence(matched, sign < 0)
+    return None
+
+
+def _fitting_corners(
+    faces: IntArray, image_faces: IntArray, points: FloatArray, images: FloatArray, tolerance: float
+) -> Iterator[tuple[IntArray, IntArray]]:
+    """Yield the corners (3,) of a face and those of a face of the other mesh with the same sides and place.
+
+    Args:
+        faces, image_faces: (m, 3) the faces of both meshes.
+        points, images: (n, 3) their vertices, relative to the centres.
+        tolerance: largest difference of lengths that are equal.
+    """
+    shapes = _shapes(points[faces])
+    kinds = np.round(np.sort(shapes.reshape(-1, 2, 3), axis=2).reshape(-1, 6) / max(8 * tolerance, 1e-300))
+    _, kind, counts = np.unique(kinds, axis=0, return_inverse=True, return_counts=True)
+    # Among the rarest faces, a large one far from the centre is the most accurate.
+    is_rarest = counts[kind.ravel()] == counts.min()
+    chosen = int(np.where(is_rarest, shapes.sum(axis=1), -1.0).argmax())
+    candidates = list[IntArray]()
+    for order in permutations(range(3)):
+        image_corners = image_faces[:, order]
+        off = np.abs(_shapes(images[image_corners]) - shapes[chosen]).max(axis=1)
+        candidates += list(image_corners[off <= 2 * tolerance][:MAX_CANDIDATES])
+    for image_corners in candidates:
+        yield faces[chosen], image_corners
+
+
+def _shapes(corners: FloatArray) -> FloatArray:
+    """Return (m, 6) the distances of corners (m, 3, 3) from the centre, and the lengths of the opposite sides."""
+    sides = corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]]
+    return np.linalg.norm(np.concatenate([corners, sides], axis=1), axis=2)
+
+
+def _orthogonal(points: FloatArray, images: FloatArray, sign: float) -> FloatArray:
+    """Return the (3, 3) orthogonal matrix with a determinant of a sign that maps points (k, 3) best to their images.
+
+    References:
+        W. Kabsch, "A solution for the best rotation to relate two sets of vectors", 1976.
+    """
+    left, _, right = np.linalg.svd(points.T @ images)
+    handed = np.array([1.0, 1.0, sign * np.sign(np.linalg.det(left @ right))])
+    return np.asarray((left * handed) @ right)
+
+
+def _nearest(points: FloatArray, tree: cKDTree) -> IntArray | None:
+    """Return (n,) the nearest points in a tree, None if two points have the same one."""
+    vertex = np.asarray(tree.query(points)[1], dtype=np.int64)
+    return vertex if len(np.unique(vertex)) == len(vertex) else None
+
+
+def _matched_corners(faces: IntArray, image_faces: IntArray, is_reversed: bool) -> IntArray | None:
+    """Return (3m,) for each corner of faces the same corner of the others; None if the faces are not the same.
+
+    Args:
+        faces, image_faces: (m, 3) faces of the same vertices.
+        is_reversed: whether they have the opposite orientation.
+    """
+    orders, rows = list[IntArray](), list[IntArray]()
+    for corners, step in ((faces, -1 if is_reversed else 1), (image_faces, 1)):
+        # The corners of each face in order, from the one with the smallest vertex.
+        within = (corners.argmin(axis=1)[:, None] + step * np.arange(3)) % 3
+        sorted_corners = np.take_along_axis(corners, within, axis=1)
+        order = np.lexsort(sorted_corners.T[::-1])
+        rows.append(sorted_corners[order])
+        orders.append((3 * order[:, None] + within[order]).ravel())
+    if not np.array_equal(rows[0], rows[1]):
+        return None
+    matched = np.empty_like(orders[0])
+    matched[orders[1]] = orders[0]
+    return matched
