@@ -37,8 +37,8 @@ def drape(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def without(mesh: Arrays, is_dropped: np.ndarray) -> Arrays:
     """Return a mesh without flagged triangles, and without vertices that none uses."""
     vertices, faces = mesh
-    used, corners = np.unique(faces[~is_dropped], return_inverse=True)
-    return vertices[used], corners.reshape(-1, 3)
+    indices, corners = np.unique(faces[~is_dropped], return_inverse=True)
+    return vertices[indices], corners.reshape(-1, 3)
 
 
 def holed_sheet(holes: int, columns: int = 90) -> Arrays:
