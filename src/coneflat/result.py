@@ -118,25 +118,33 @@ class Flattening:
         """Return all measures as plain Python values, ready for JSON."""
         return _REPORT(self)
 
-    def save(self, path: str | PathLike[str], *, texture: str | PathLike[str] | None = None) -> Path:
+    def save(
+        self,
+        path: str | PathLike[str],
+        *,
+        texture: str | PathLike[str] | None = None,
+        uv_set: int | None = None,
+    ) -> Path:
         """Write the mesh with its UVs to a file and return its path.
 
         Args:
             path: the file; its extension selects the format (.obj, .ply, .glb, .npz).
             texture: for a .glb: "checker" for a checkerboard, or an image file to embed.
+            uv_set: 1 for a .glb to have the UVs as a second set, TEXCOORD_1, beside those of the textures; 0 replaces
+                these. By default 1 for a lightmap (see `coneflat.unwrap`) in a .glb, otherwise 0.
 
         Raises:
             UnknownFormatError: the extension is unknown.
             MeshFileError: the file cannot be written, or the texture cannot be read.
-            OptionError: the format cannot contain a texture, or Pillow is not installed.
+            OptionError: the format cannot contain a texture or the UV set, or Pillow is not installed.
         """
-        written, stored = _WRITE(self, path, texture)
+        written, stored = _WRITE(self, path, texture, uv_set)
         # Rounding to the numbers of the format can break guarantees.
         warn_of(new_notes(stored, self), f"result.as_written('{written.suffix.lower()}').notes")
         return written
 
     @warns()
-    def as_written(self, ending: str) -> Flattening:
+    def as_written(self, ending: str, *, uv_set: int | None = None) -> Flattening:
         """Return the result as a file of the given format stores it, measured again.
 
         A .glb stores 32-bit numbers. The polygons of an .obj are measured as fans of triangles, as most programs split
@@ -144,11 +152,13 @@ class Flattening:
 
         Args:
             ending: the file extension: ".obj", ".ply", ".glb" or ".npz".
+            uv_set: as of `save`.
 
         Raises:
             MeshFileError: numbers are too large for the format.
+            OptionError: the format does not have the UV set.
         """
-        return _AS_WRITTEN(self, ending)
+        return _AS_WRITTEN(self, ending, uv_set=uv_set)
 
     def to_trimesh(self) -> trimesh.Trimesh:
         """Return a textured trimesh mesh, whose vertices are split at seams.

@@ -177,8 +177,9 @@ class TestLosses:
         assert bare.startswith("2 primitives without a material got the default material of glTF")
         assert tangents.startswith("Tangents of the old UVs are not in the file")
         assert copies == "Meshes of several nodes were copied, to have UVs for each node: 1 copy."
+        # The normal map of the other material has the second set of UVs, which is as before.
         assert painted.startswith(
-            "The textures of 2 materials are kept, but were made for the old UVs; `coneflat tr"
+            "The textures of 1 material are kept, but were made for the old UVs; `coneflat tr"
         )
         *_, lost = rich[1].as_written(".npz").notes
         assert lost.startswith("These data of the input are not kept in .npz: vertex attributes (")

@@ -24,6 +24,8 @@ class Use(Flag):
     MESHIO = auto()
     #: Integer grids are written to it.
     GRID = auto()
+    #: They may contain a second set of UVs beside those of textures.
+    UV_SETS = auto()
 
 
 #: Names of FreeSurfer's surfaces, which stand in the place of an ending: lh.pial. Others are recognized by content.
@@ -35,7 +37,7 @@ FORMATS = {
     ".stl": Use.MESH,
     ".off": Use.MESH,
     ".gltf": Use.MESH | Use.UV,
-    ".glb": Use.MESH | Use.UV | Use.FLATTENING | Use.QUADS,
+    ".glb": Use.MESH | Use.UV | Use.FLATTENING | Use.QUADS | Use.UV_SETS,
     ".gii": Use.MESH,
     **dict.fromkeys(FREESURFER, Use.MESH),
     ".npz": Use.FLATTENING | Use.QUADS | Use.GRID,
@@ -62,4 +64,4 @@ def _listed(use: Use) -> str:
     """Return the endings of a use as text; FreeSurfer's names are represented by one of them."""
     names = dict.fromkeys("lh.pial" if ending in FREESURFER else ending for ending in endings(use))
     *names_before, last = names
-    return f"{', '.join(names_before)} or {last}"
+    return f"{', '.join(names_before)} or {last}" if names_before else last

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import FloatArray, IntArray
+from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..geometry.triangles import face_normals, sums_at, unit_vectors, vertex_normals
 from ..mesh.check import weld
 from ..mesh.polygons import polygon_of
@@ -20,20 +20,22 @@ from .mesh_file import MeshFile
 _SMOOTHING = re.compile(rb"(?m)^[ \t]*s[ \t]+(\S+)")
 
 
-class CornerNormals(NamedTuple):
-    """Normals of the triangle corners of a surface, which may have creases.
+class CornerValues(NamedTuple):
+    """Values at the triangle corners of a surface, such as normals, which differ along creases, or UVs.
 
     Attributes:
-        normals: (k, 3) distinct unit vectors.
-        corners: (m, 3) index into `normals` of every triangle corner.
+        values: (k, d) distinct values: unit vectors, or UV points.
+        corners: (m, 3) index into `values` of every triangle corner.
+        is_missing: (m, 3) True for corners without a value in the file, which have another one; None if all have one.
     """
 
-    normals: FloatArray
+    values: FloatArray
     corners: IntArray
+    is_missing: BoolArray | None = None
 
 
 class SplitMesh(NamedTuple):
-    """A mesh with one vertex for each combination of vertex, UV point and normal at a triangle corner.
+    """A mesh with one vertex for each combination of vertex, UV point, normal and earlier UV at a triangle corner.
 
     Attributes:
         vertices: (k, 3) positions.
@@ -42,6 +44,7 @@ class SplitMesh(NamedTuple):
         vertex: (k,) the vertex of the result for each vertex.
         origin: (k,) the vertex of the input for each vertex.
         normals: (k, 3) normals, if they were given.
+        texture_uv: (k, 2) UV points of the textures of the input, if they were given.
     """
 
     vertices: FloatArray
@@ -50,25 +53,35 @@ class SplitMesh(NamedTuple):
     vertex: IntArray
     origin: IntArray
     normals: FloatArray | None = None
+    texture_uv: FloatArray | None = None
 
 
-def split_at_seams(result: Flattening, normals: CornerNormals | None = None) -> SplitMesh:
+def split_at_seams(
+    result: Flattening, normals: CornerValues | None = None, texture_uv: CornerValues | None = None
+) -> SplitMesh:
     """Return the mesh of a result split at its UV seams, in the order of its vertices, without unused vertices.
 
     Args:
         result: the flattening.
-        normals: normals of the triangle corners; vertices are also split where these differ.
+        normals, texture_uv: further values at the triangle corners; vertices are also split where these differ.
     """
-    vertex, point, faces = distinct_pairs(
-        result.faces.reshape(-1), result.uv_faces.reshape(-1), len(result.uv)
-    )
-    shading = None
-    if normals is not None:
-        corners = normals.corners.reshape(-1)
-        pair, normal, faces = distinct_pairs(faces, corners, len(normals.normals))
-        vertex, point, shading = vertex[pair], point[pair], normals.normals[normal]
+    layers = (CornerValues(result.uv, result.uv_faces), normals, texture_uv)
+    vertex, faces = np.arange(len(result.vertices)), result.faces.reshape(-1)
+    split_values: list[FloatArray | None] = []
+    for layer in layers:
+        if layer is None:
+            split_values.append(None)
+            continue
+        pair, index, faces = distinct_pairs(faces, layer.corners.reshape(-1), len(layer.values))
+        vertex = vertex[pair]
+        split_values = [None if values is None else values[pair] for values in split_values]
+        split_values.append(layer.values[index])
+    uv, shading, uv_of_textures = split_values
+    assert uv is not None
     origin = input_vertices(result)[vertex]
-    return SplitMesh(result.vertices[vertex], result.uv[point], faces.reshape(-1, 3), vertex, origin, shading)
+    return SplitMesh(
+        result.vertices[vertex], uv, faces.reshape(-1, 3), vertex, origin, shading, uv_of_textures
+    )
 
 
 def input_vertices(result: Flattening) -> IntArray:
@@ -92,7 +105,7 @@ def usable_normals(normals: FloatArray, corners: IntArray) -> IntArray | None:
     return usable if np.any(usable >= 0) else None
 
 
-def source_normals(result: Flattening) -> CornerNormals | None:
+def source_normals(result: Flattening) -> CornerValues | None:
     """Return the corner normals of the file that a result was read from; None if it has neither normals nor groups.
 
     These are the file's normals, or those computed from its smoothing groups; corners without either get the mean
@@ -116,7 +129,25 @@ def source_normals(result: Flattening) -> CornerNormals | None:
     # Many files have a normal for every corner, most of them equal.
     shown = shading_normals(normals[used_normals])
     distinct, merged = weld(shown)
-    return CornerNormals(shown[distinct], merged[numbers.reshape(corners.shape)])
+    return CornerValues(shown[distinct], merged[numbers.reshape(corners.shape)])
+
+
+def source_uv(result: Flattening) -> CornerValues | None:
+    """Return the UVs of the file that a result was read from, (0, 0) at corners without; None if it has none."""
+    source = result.source
+    if source is None or result.face_corners is None or source.uv is None or source.texture is None:
+        return None
+    corners = source.texture[result.face_corners]
+    count = len(source.uv)
+    is_usable = np.append(np.isfinite(source.uv).all(axis=1), False)
+    usable = np.where((corners >= 0) & (corners < count), corners, count)
+    usable = np.where(is_usable[usable], usable, count)
+    if np.all(usable == count):
+        return None
+    points, numbers = np.unique(usable, return_inverse=True)
+    values = np.concatenate([source.uv, [[0.0, 0.0]]])[points]
+    missing = usable == count
+    return CornerValues(values, numbers.reshape(corners.shape), missing if missing.any() else None)
 
 
 def _smoothing_groups(source: MeshFile) -> IntArray | None:

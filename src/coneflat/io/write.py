@@ -22,8 +22,7 @@ from .attributes import ALPHA, VERTEX_COLOURS, Attribute, losses, old_textures
 from .convex_pieces import find_pieces
 from .files import PathName, atomic_write, checked_target
 from .gltf.positions import local_positions
-from .gltf.scene import scene_losses
-from .gltf.write import kept_in_glb, write_glb
+from .gltf.write import glb_changes, kept_in_glb, write_glb
 from .mesh_file import MeshFile
 from .npz import write_npz
 from .obj import kept_in_obj, obj_has_textures, write_obj
@@ -38,47 +37,52 @@ class OutputFormat(NamedTuple):
     """How files of a format are written.
 
     Attributes:
-        write: writes a result to a stream; further arguments are the folder of the file, and a texture or None.
+        write: writes a result to a stream; further arguments are the folder of the file, a texture or None, and the
+            number of the UV set.
         kept_attributes: returns those of a source file that the format keeps.
         stored: returns a result with the numbers and the triangles of the file, measured again.
         is_rounded: the numbers of `stored` are rounded, and are those that `write` gets instead of the result's.
         takes_texture: a texture can be embedded.
         keeps_old_textures: returns whether textures of the old UVs of a source file are kept, scenes not counted.
-        changes: returns notes on further changes of the data of the source, for a result and whether it has a texture.
+        changes: returns notes on further changes of the data of the source, for a result, whether it has a texture, and
+            the number of the UV set.
     """
 
-    write: Callable[[Flattening, IO[bytes], Path, Texture | None], None]
+    write: Callable[[Flattening, IO[bytes], Path, Texture | None, int], None]
     kept_attributes: Callable[[MeshFile], set[Attribute]]
     stored: Callable[[Flattening], Flattening] = lambda result: result
     is_rounded: bool = False
     takes_texture: bool = False
     keeps_old_textures: Callable[[MeshFile], bool] = lambda source: False
-    changes: Callable[[Flattening, bool], tuple[str, ...]] = lambda result, has_texture: ()
+    changes: Callable[[Flattening, bool, int], tuple[str, ...]] = lambda result, has_texture, uv_set: ()
 
 
-def check_output(path: PathName, texture: PathName | None = None) -> Path:
-    """Return the path if `write_flattening` can be expected to succeed with it and a texture.
+def check_output(path: PathName, texture: PathName | None = None, uv_set: int | None = None) -> Path:
+    """Return the path if `write_flattening` can be expected to succeed with it, a texture and a UV set.
 
     This is useful before a long computation.
 
     Args:
         path: the file.
-        texture: as of `write_flattening`.
+        texture, uv_set: as of `write_flattening`.
 
     Raises:
         UnknownFormatError: the ending is not one of `OUTPUT_FORMATS`.
         MeshFileError: the folder is missing, the path is a folder, or writing is not permitted; or the texture is not
             an image that can be read.
-        OptionError: the format does not support textures, or Pillow is not installed.
+        OptionError: the format does not support textures or the UV set, or Pillow is not installed.
     """
     path = checked_target(path, OUTPUT_FORMATS, "results are written as")
     _check_texture(path, path.suffix.lower(), texture)
+    check_uv_set(path, path.suffix.lower(), uv_set)
     if texture is not None:
         find_texture(texture)
     return path
 
 
-def write_flattening(result: Flattening, path: PathName, texture: PathName | None = None) -> Path:
+def write_flattening(
+    result: Flattening, path: PathName, texture: PathName | None = None, uv_set: int | None = None
+) -> Path:
     """Write a flattened mesh, either completely or not at all, and return the path.
 
     The format is given by the path's ending, in upper or lower case. An .obj keeps the polygons, groups, materials and
@@ -91,26 +95,32 @@ def write_flattening(result: Flattening, path: PathName, texture: PathName | Non
         result: the result to write.
         path: the file.
         texture: for a .glb: "checker" for a checkerboard, or an image file to embed.
+        uv_set: 1 for a .glb to have the UVs as a second set, TEXCOORD_1, beside those of the textures; 0 replaces
+            these. By default 1 for a lightmap (see `coneflat.unwrap`) in a .glb, otherwise 0.
 
     Raises:
         UnknownFormatError: the ending is not one of `OUTPUT_FORMATS`.
         MeshFileError: the file cannot be written, or the texture cannot be read.
-        OptionError: the format does not support textures, or Pillow is not installed.
+        OptionError: the format does not support textures or the UV set, or Pillow is not installed.
     """
-    return write_stored(result, path, texture)[0]
+    return write_stored(result, path, texture, uv_set)[0]
 
 
-def write_measured(result: Flattening, path: PathName, texture: PathName | None = None) -> Flattening:
+def write_measured(
+    result: Flattening, path: PathName, texture: PathName | None = None, uv_set: int | None = None
+) -> Flattening:
     """Write a flattened mesh as `write_flattening` does, and return it as the file stores it; see `as_written`."""
-    written, stored = write_stored(result, path, texture)
-    return as_written(stored, written.suffix.lower(), has_texture=texture is not None)
+    written, stored = write_stored(result, path, texture, uv_set)
+    return as_written(stored, written.suffix.lower(), has_texture=texture is not None, uv_set=uv_set)
 
 
-def write_stored(result: Flattening, path: PathName, texture: PathName | None) -> tuple[Path, Flattening]:
+def write_stored(
+    result: Flattening, path: PathName, texture: PathName | None, uv_set: int | None
+) -> tuple[Path, Flattening]:
     """Write a flattened mesh, and return the path and the arrays that were written."""
-    path = check_output(path, texture)
+    path = check_output(path, texture, uv_set)
     with atomic_write(path) as stream:
-        stored = write_stream(result, stream, path.suffix, texture, path.parent)
+        stored = write_stream(result, stream, path.suffix, texture, path.parent, uv_set)
     return path, stored
 
 
@@ -120,6 +130,7 @@ def write_stream(
     ending: str,
     texture: PathName | None = None,
     folder: Path | None = None,
+    uv_set: int | None = None,
 ) -> Flattening:
     """Write a flattened mesh to a binary stream, and return the arrays that were written; see `write_flattening`.
 
@@ -127,7 +138,7 @@ def write_stream(
         result: the result to write.
         stream: a binary stream; it need not be seekable.
         ending: one of `OUTPUT_FORMATS`.
-        texture: as of `write_flattening`.
+        texture, uv_set: as of `write_flattening`.
         folder: folder of the file, for relative paths in it; by default the current one.
 
     Raises:
@@ -135,11 +146,12 @@ def write_stream(
     """
     ending, folder = ending.lower(), Path() if folder is None else folder
     _check_texture(f"a {ending}", ending, texture)
+    check_uv_set(f"a {ending}", ending, uv_set)
     image = None if texture is None else find_texture(texture, result)
     form = _FORMATS[ending]
     # Rounded triangles must also be positively oriented and disjoint.
     stored = as_written(result, ending, has_texture=texture is not None) if form.is_rounded else result
-    form.write(stored, stream, folder, image)
+    form.write(stored, stream, folder, image, _chosen_uv_set(result, ending, uv_set))
     return stored
 
 
@@ -148,7 +160,25 @@ def _check_texture(name: object, ending: str, texture: PathName | None) -> None:
         raise OptionError(f"only .glb files contain a texture, and {name} is not one")
 
 
-def as_written(result: Flattening, ending: str, *, has_texture: bool = False) -> Flattening:
+def check_uv_set(name: object, ending: str, uv_set: int | None) -> None:
+    """Raise OptionError if files of a format do not have a UV set; name: the file, for the message."""
+    if uv_set not in (None, 0, 1):
+        raise OptionError(f"uv_set must be 0 or 1, got {short_repr(uv_set)}")
+    if uv_set and ending not in endings(Use.UV_SETS):
+        formats = ", ".join(endings(Use.UV_SETS))
+        raise OptionError(f"only {formats} files have a second UV set, and {name} is not one")
+
+
+def _chosen_uv_set(result: Flattening, ending: str, uv_set: int | None) -> int:
+    """Return the UV set that is written: by default the second one for lightmaps, where files have it."""
+    if uv_set is not None:
+        return uv_set
+    return int(result.settings.get("lightmap") is not None and ending in endings(Use.UV_SETS))
+
+
+def as_written(
+    result: Flattening, ending: str, *, has_texture: bool = False, uv_set: int | None = None
+) -> Flattening:
     """Return a result as a file of a given format stores it, with measures of the stored numbers.
 
     A .glb has 32-bit numbers and v pointing down; touching triangles that overlap after rounding are separated. An
@@ -159,14 +189,16 @@ def as_written(result: Flattening, ending: str, *, has_texture: bool = False) ->
         result: the result that is written.
         ending: the ending of the format, such as ".glb".
         has_texture: whether it is written with a texture.
+        uv_set: as of `write_flattening`.
 
     Raises:
         MeshFileError: numbers are out of range for the format.
     """
     if not isinstance(ending, str):
         raise OptionError(f"ending must be text such as .glb, got {short_repr(ending)}")
+    check_uv_set(f"a {ending}", ending, uv_set)
     stored = as_stored(result, ending)
-    lost = tuple(note for note in left_out(stored, ending, has_texture) if note not in stored.notes)
+    lost = tuple(note for note in left_out(stored, ending, has_texture, uv_set) if note not in stored.notes)
     return replace(stored, notes=(*stored.notes, *lost)) if lost else stored
 
 
@@ -244,11 +276,16 @@ def _in_fans(result: Flattening) -> Flattening:
     return remeasured(result, fans, DOUBLE, notes)
 
 
-def left_out(result: Flattening, ending: str, has_texture: bool = False) -> tuple[str, ...]:
+def left_out(
+    result: Flattening, ending: str, has_texture: bool = False, uv_set: int | None = None
+) -> tuple[str, ...]:
     """Return notes on data of the source file that a file of another format does not keep, one sentence each."""
     source, form = result.source, _FORMATS.get(ending)
-    if source is None or result.face_corners is None or form is None:
+    if form is None:
         return ()
+    changes = form.changes(result, has_texture, _chosen_uv_set(result, ending, uv_set))
+    if source is None or result.face_corners is None:
+        return changes
     # A texture would be multiplied by colours of vertices.
     hidden = {VERTEX_COLOURS, ALPHA} if has_texture and source.scene is None else set()
     preserved = form.kept_attributes(source) - hidden
@@ -257,7 +294,7 @@ def left_out(result: Flattening, ending: str, has_texture: bool = False) -> tupl
     return (
         *losses(source, ending, preserved, next(complete, "")),
         *([old_textures("the file")] if form.keeps_old_textures(source) else []),
-        *form.changes(result, has_texture),
+        *changes,
     )
 
 
@@ -268,23 +305,25 @@ def kept_attributes(source: MeshFile, ending: str) -> set[Attribute]:
 
 _FORMATS = {
     ".obj": OutputFormat(
-        write=lambda result, stream, folder, _: write_obj(result, stream, folder),
+        write=lambda result, stream, folder, *_: write_obj(result, stream, folder),
         kept_attributes=kept_in_obj,
         stored=_in_fans,
         keeps_old_textures=obj_has_textures,
     ),
     ".ply": OutputFormat(
-        write=lambda result, stream, folder, _: write_ply(result, stream, folder),
+        write=lambda result, stream, folder, *_: write_ply(result, stream, folder),
         kept_attributes=kept_in_ply,
         keeps_old_textures=ply_has_textures,
     ),
     ".glb": OutputFormat(
-        write=lambda result, stream, folder, texture: write_glb(result, stream, texture, folder),
+        write=lambda result, stream, folder, texture, uv_set: write_glb(
+            result, stream, texture, folder, uv_set
+        ),
         kept_attributes=kept_in_glb,
         stored=_in_single_precision,
         is_rounded=True,
         takes_texture=True,
-        changes=scene_losses,
+        changes=glb_changes,
     ),
     ".npz": OutputFormat(
         write=lambda result, stream, *_: write_npz(result, stream), kept_attributes=lambda source: set()

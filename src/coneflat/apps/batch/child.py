@@ -23,7 +23,7 @@ def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
     try:
         source = read_joined(job["mesh"], job["weld"])
         result = (unwrap if "max_energy" in job["options"] else flatten)(source.mesh, **job["options"])
-        result = write_measured(result, job["output"])
+        result = write_measured(result, job["output"], uv_set=job["uv_set"])
         report = result.report()
         unmet = breaches(parse_requirements(job["required"], REPORTED), report)
         row |= {

@@ -25,6 +25,7 @@ class Job:
         weld: merge vertices at the same position; None for the default, see `coneflat.io.read.read_joined`.
         mark: checksum of the size and time of the mesh file, the options and the version; "" if the file is missing.
         required: conditions on measures, such as "flipped=0"; a mesh that does not meet them has failed.
+        uv_set: the UV set that is written, see `coneflat.Flattening.save`.
     """
 
     mesh: str
@@ -33,6 +34,7 @@ class Job:
     weld: bool | None
     mark: str
     required: tuple[str, ...] = ()
+    uv_set: int | None = None
 
     def as_json(self) -> str:
         """Return the job as one line."""
@@ -46,6 +48,7 @@ def find_jobs(
     options: Mapping[str, Any],
     weld: bool | None,
     required: tuple[str, ...] = (),
+    uv_set: int | None = None,
 ) -> list[Job]:
     """Return a job for each mesh that matches the patterns, sorted by path.
 
@@ -53,7 +56,7 @@ def find_jobs(
         patterns: files, folders (every mesh in them), or patterns with *, ? and ** for any depth.
         folder: folder of the results, which are named like the meshes.
         ending: extension of the results, such as ".obj".
-        options, weld, required: see `Job`.
+        options, weld, required, uv_set: see `Job`.
 
     Raises:
         OptionError: a pattern matches nothing, or a result would overwrite a mesh.
@@ -68,8 +71,9 @@ def find_jobs(
             if real == name or real not in names:
                 names[real] = name
     meshes = sorted(names.values())
+    conditions = [dict(options), weld, required, uv_set]
     jobs = [
-        Job(mesh, str(folder / name), options, weld, _mark(mesh, options, weld, required), required)
+        Job(mesh, str(folder / name), options, weld, _mark(mesh, conditions), required, uv_set)
         for mesh, name in zip(meshes, _names(meshes, ending), strict=True)
     ]
     for job in jobs:
@@ -108,14 +112,13 @@ def _extended_name(path: Path, depth: int) -> str:
     return "_".join([*folders[max(len(folders) - depth, 0) :], kind])
 
 
-def _mark(mesh: str, options: Mapping[str, Any], weld: bool | None, required: tuple[str, ...]) -> str:
+def _mark(mesh: str, conditions: list[Any]) -> str:
+    """Return the checksum of a mesh file, of what else its result depends on, and of the version."""
     from ... import __version__
 
     try:
         about = os.stat(mesh)
     except (OSError, ValueError):  # A broken link: reading it reports the error.
         return ""
-    text = json.dumps(
-        [about.st_size, about.st_mtime_ns, dict(options), weld, required, __version__], sort_keys=True
-    )
+    text = json.dumps([about.st_size, about.st_mtime_ns, *conditions, __version__], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]

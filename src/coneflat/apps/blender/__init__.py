@@ -23,7 +23,9 @@ from ..controls import controls_of
 COMMANDS: dict[str, type] = {"unwrap": UnwrapOptions, "flatten": Options, "quads": QuadOptions}
 #: The options of the commands that the extension does not show, by the reason.
 HIDDEN = {
-    "Blender has the mesh and takes the result": ("mesh", "output", "format", "texture", "project", "grid", "view"),
+    "Blender has the mesh and takes the result": (
+        "mesh", "output", "format", "texture", "uv_set", "project", "grid", "view",
+    ),
     "the extension shows the measures and notes": ("report", "required", "verbosity"),
     "meshes are repaired, and objects that touch are not merged": ("repair", "strict", "weld"),
     "cones, method and charts have the same effect": ("paper",),

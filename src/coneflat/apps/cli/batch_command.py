@@ -41,6 +41,7 @@ class BatchFlags:
     Attributes:
         out: Folder for the results, the journal and the summary; created if it does not exist.
         format: File format of the results.
+        uv_set: As of `coneflat unwrap`.
         summary: File for the summary table, .csv.  [default: summary.csv in --out]
         jobs: Number of processes on this machine.  [default: the number of cores]
         time_limit: Time limit per mesh in seconds.
@@ -50,6 +51,7 @@ class BatchFlags:
 
     out: Path = path_flag(required=True)
     format: str = flag("obj", type=FORMAT_CHOICE)
+    uv_set: int | None = flag(type=click.IntRange(0, 1))
     summary: Path | None = path_flag()
     jobs: int | None = flag(type=int)
     time_limit: float = flag(3600.0, type=float)
@@ -88,7 +90,7 @@ def batch(
       coneflat batch "scans/**/*.ply" --out flat --format glb --distortion 0.1 --summary flat.csv
       coneflat batch models --out flat --dask tcp://10.0.0.1:8786
     """
-    from ...io import make_folder
+    from ...io import check_uv_set, make_folder
     from ...measures import REPORTED, parse_requirements
     from ..batch import find_jobs, run_batch
     from .run import Console
@@ -99,7 +101,9 @@ def batch(
         raise click.UsageError("--jobs has no effect with --dask: leave out --jobs", context)
     options = _options(context, params)
     parse_requirements(required, REPORTED)
-    todo = find_jobs(patterns, flags.out.absolute(), f".{flags.format}", options, weld, required)
+    ending = f".{flags.format}"
+    check_uv_set(f"a {ending}", ending, flags.uv_set)
+    todo = find_jobs(patterns, flags.out.absolute(), ending, options, weld, required, flags.uv_set)
     make_folder(flags.out)
     table = flags.summary or flags.out / "summary.csv"
     rows: list[dict[str, Any]] = []

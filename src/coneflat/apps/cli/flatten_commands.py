@@ -43,6 +43,8 @@ class FileFlags:
             .obj; - if MESH is -]
         format: Format for standard output, or if -o is not given.  [default: obj]
         texture: Texture of a .glb: a checkerboard, or an image file.
+        uv_set: 1: write the UVs as a second set, TEXCOORD_1, beside those of the textures, which remain; {UV_SETS}
+            only. 0: replace those of the textures.  [default: 0; with --lightmap 1 if the format has it]
         report: JSON file for all measures.
         project: Project of `coneflat studio` (.json) with the mesh and the options.
     """
@@ -50,6 +52,7 @@ class FileFlags:
     output: Path | None = path_flag()
     format: str | None = flag(type=FORMAT_CHOICE)
     texture: str | None = flag(metavar="checker|IMAGE")
+    uv_set: int | None = flag(type=click.IntRange(0, 1))
     report: Path | None = path_flag()
     project: Path | None = path_flag()
 
@@ -149,14 +152,14 @@ def _flatten_and_save(
     if flags.format is not None and output.suffix.lower() not in ("", ending):
         raise click.UsageError(f"{output} is not a {ending} file: leave out --format", context)
     # Errors that writing would raise are reported before the work starts.
-    check_output(Path(f"stdout{ending}") if output == PIPE else output, flags.texture)
+    check_output(Path(f"stdout{ending}") if output == PIPE else output, flags.texture, flags.uv_set)
     if flags.report is not None:
         check_target(flags.report)
     require_distinct({"input": mesh, "output": output, "report": flags.report})
     with redirect_prints(output) as stdout, Console(verbosity) as console:
         result = flatten_file(mesh, console, options, weld, by)
         result = result if add_notes is None else add_notes(result)
-        result = save(result, console, output, flags.report, flags.texture, stdout, ending)
+        result = save(result, console, output, flags.report, flags.texture, stdout, ending, flags.uv_set)
         written = [path for path in (output, flags.report) if path is not None and path != PIPE]
         console.finish(written, result)
     check_required(requirements, result.report(), str(output))

@@ -270,19 +270,26 @@ def save(
     texture: str | None = None,
     stdout: IO[bytes] | None = None,
     ending: str = ".obj",
+    uv_set: int | None = None,
 ) -> Flattening:
     """Write a result and its report, and return it as it was written, with the times of all stages.
 
-    stdout: stream to write to instead of `output`, in the format given by `ending`.
+    Args:
+        result: the result.
+        console: where the stage is shown.
+        output, report: the files; no report if None.
+        texture, uv_set: as of `write_flattening`.
+        stdout: stream to write to instead of `output`, in the format given by `ending`.
+        ending: the ending of that format.
     """
     with console.stage("write"):
         if stdout is None:
-            result = write_measured(result, output, texture)
+            result = write_measured(result, output, texture, uv_set)
         else:
             # Like files, the result is written completely or not at all.
             content = BytesIO()
-            stored = write_stream(result, content, ending, texture)
-            result = as_written(stored, ending, has_texture=texture is not None)
+            stored = write_stream(result, content, ending, texture, uv_set=uv_set)
+            result = as_written(stored, ending, has_texture=texture is not None, uv_set=uv_set)
             stdout.write(content.getbuffer())
             stdout.flush()
     result = replace(result, seconds=dict(console.seconds))

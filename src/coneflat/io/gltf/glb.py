@@ -83,10 +83,11 @@ class Glb:
         view = self.add_view(content.tobytes(), **properties)
         return self.add("accessors", {"bufferView": view, "componentType": 0, "count": len(rows)} | form)
 
-    def add_material(self, texture: Texture) -> int:
-        """Add a material with an image as its texture, and return its index."""
+    def add_material(self, texture: Texture, uv_set: int = 0) -> int:
+        """Add a material with an image as its texture, by the UVs of a set, and return its index."""
         image = self.add("images", {"bufferView": self.add_view(texture.content), "mimeType": texture.kind})
         colour = {"index": self.add("textures", {"source": image})}
+        colour |= {"texCoord": uv_set} if uv_set else {}
         shown = {"baseColorFactor": [1.0] * 4, "baseColorTexture": colour}
         plain = MATERIAL["pbrMetallicRoughness"]
         return self.add("materials", MATERIAL | {"pbrMetallicRoughness": plain | shown})

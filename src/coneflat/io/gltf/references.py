@@ -112,11 +112,16 @@ def numbers_in_extensions(tree: Any) -> Iterator[int]:
 
 def keys_of(item: Any) -> Iterator[str]:
     """Yield all keys of an object and of nested objects."""
+    return (key for key, _ in entries_of(item))
+
+
+def entries_of(item: Any) -> Iterator[tuple[str, Any]]:
+    """Yield all keys with their values of an object and of nested objects."""
     stack = [item]
     while stack:
         item = stack.pop()
         if isinstance(item, dict):
-            yield from item
+            yield from item.items()
             stack += item.values()
         elif isinstance(item, list):
             stack += item

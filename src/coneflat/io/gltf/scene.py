@@ -6,6 +6,7 @@ stay valid. For this reason the scene is modified and not rebuilt, as libraries 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from copy import deepcopy
 from pathlib import Path
 
@@ -21,26 +22,30 @@ from .data import GltfData, Item
 from .glb import DEFAULT_MATERIAL, FOR_INDICES, FOR_VERTICES, Glb, bounds
 from .images import embed_images, image_notes
 from .read import DRACO, GltfScene, Mode, ScenePart
-from .references import keys_of
+from .references import entries_of
 
-_UV = "TEXCOORD_0"
+#: The UV sets of a file that results are written to: those of textures, and those of a lightmap.
+UV_SETS = ("TEXCOORD_0", "TEXCOORD_1")
 #: Keys of an accessor that are copied to the accessor of a subset of its elements.
 _COPIED_FIELDS = ("componentType", "type", "normalized", "name", "extras")
 
 
-def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: Texture | None) -> Glb:
+def scene_with_uvs(
+    result: Flattening, scene: GltfScene, folder: Path, texture: Texture | None, uv_set: int = 0
+) -> Glb:
     """Return a glTF scene with the UVs of a result.
 
-    In each primitive, TEXCOORD_0 is new, and every vertex is repeated for each of its UVs; all other attributes and
-    morph targets are copied bit for bit, except tangents of the old UVs, which are those of the normal map. A mesh
-    that several nodes show is copied for each node. Image files are embedded in the buffer. All other data is
-    unchanged.
+    In each primitive, one UV set is new, and every vertex is repeated for each of its UVs; all other attributes and
+    morph targets are copied bit for bit, except tangents of the old UVs, which are those of the normal map. The first
+    set is also new where there is none, as sets are numbered without gaps. A mesh that several nodes show is copied
+    for each node. Image files are embedded in the buffer. All other data is unchanged.
 
     Args:
         result: the result for a mesh that was read from the scene, with its `face_corners`.
         scene: the scene that was read.
         folder: folder of the file, for relative paths of images that cannot be read.
         texture: texture of the flattened parts, instead of the file's materials.
+        uv_set: the number of the new UV set, 0 or 1.
     """
     assert result.face_corners is not None
     data, glb = scene.data, Glb(deepcopy(scene.data.tree))
@@ -55,7 +60,7 @@ def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: 
     embed_images(glb, data, folder)
     # Readers such as trimesh return the UVs of primitives that have a material only.
     if texture is not None:
-        material = glb.add_material(texture)
+        material = glb.add_material(texture, uv_set)
     elif not all("material" in target for target in targets):
         material = glb.add("materials", DEFAULT_MATERIAL)
     owned, first = _faces_of_parts(scene.parts, result.face_corners), 0
@@ -65,7 +70,8 @@ def scene_with_uvs(result: Flattening, scene: GltfScene, folder: Path, texture: 
         if part.is_mirrored:
             vertices, points = vertices[:, ::-1], points[:, ::-1]
         if len(vertices):
-            _fill(glb, data, target, before, vertices.reshape(-1), points.reshape(-1), result.uv)
+            corners = vertices.reshape(-1), points.reshape(-1)
+            _fill(glb, data, target, before, *corners, result.uv, uv_set)
         if texture is not None or "material" not in target:
             target["material"] = material
     _drop_empty(glb, targets)
@@ -93,11 +99,18 @@ def _faces_of_parts(parts: tuple[ScenePart, ...], face_corners: IntArray) -> lis
 
 
 def _fill(
-    glb: Glb, data: GltfData, target: Item, before: Item, vertices: IntArray, points: IntArray, uv: FloatArray
+    glb: Glb,
+    data: GltfData,
+    target: Item,
+    before: Item,
+    vertices: IntArray,
+    points: IntArray,
+    uv: FloatArray,
+    uv_set: int,
 ) -> None:
     """Write the triangles of a primitive, with its vertex and the point in the plane of every corner."""
     vertex, point, number = distinct_pairs(vertices, points, len(uv))
-    replaced = _replaced(data, before)
+    replaced = _replaced(data, before, uv_set)
 
     def gathered(arrays: dict[str, int]) -> dict[str, int]:
         copied = ((name, index) for name, index in arrays.items() if name not in replaced)
@@ -106,7 +119,9 @@ def _fill(
     target["attributes"] = gathered(before["attributes"])
     # v points down in glTF.
     flat = (uv[point] * [1, -1] + [0, 1]).astype("<f4")
-    target["attributes"][_UV] = glb.add_array(flat, {"componentType": 5126, "type": "VEC2"}, FOR_VERTICES)
+    array = glb.add_array(flat, {"componentType": 5126, "type": "VEC2"}, FOR_VERTICES)
+    target["attributes"][UV_SETS[uv_set]] = array
+    target["attributes"].setdefault(UV_SETS[0], array)
     corners = number.astype("<u4").reshape(-1, 1)
     target["indices"] = glb.add_array(corners, {"componentType": 5125, "type": "SCALAR"}, FOR_INDICES)
     if "targets" in before:
@@ -115,10 +130,11 @@ def _fill(
         target["mode"] = Mode.TRIANGLES.value
 
 
-def _replaced(data: GltfData, primitive: Item) -> tuple[str, ...]:
+def _replaced(data: GltfData, primitive: Item, uv_set: int) -> tuple[str, ...]:
     """Return the attributes that new UVs replace: also tangents, unless their normal map has other UVs."""
     material = data.item("materials", primitive["material"]) if "material" in primitive else {}
-    return (_UV,) if data.uv_set(data.entry(material, "normalTexture", dict)) else (_UV, "TANGENT")
+    is_of_normal_map = data.uv_set(data.entry(material, "normalTexture", dict)) == uv_set
+    return (UV_SETS[uv_set], "TANGENT") if is_of_normal_map else (UV_SETS[uv_set],)
 
 
 def _gathered(glb: Glb, data: GltfData, index: int, elements: IntArray, has_bounds: bool) -> int:
@@ -149,12 +165,13 @@ def _drop_empty(glb: Glb, targets: list[Item]) -> None:
         mesh["primitives"] = left
 
 
-def scene_losses(result: Flattening, has_texture: bool = False) -> tuple[str, ...]:
+def scene_losses(result: Flattening, has_texture: bool = False, uv_set: int = 0) -> tuple[str, ...]:
     """Return notes on data of the source glTF file that a GLB of a result changes, one sentence each.
 
     Args:
         result: the result.
         has_texture: whether a texture replaces the materials of its triangles.
+        uv_set: the number of the new UV set.
     """
     source = result.source
     if source is None or source.scene is None or result.face_corners is None:
@@ -177,16 +194,35 @@ def scene_losses(result: Flattening, has_texture: bool = False) -> tuple[str, ..
             f"{plural(bare, 'primitive')} without a material got the default material of glTF, because some programs "
             "read no UVs without one."
         )
-    if any("TANGENT" in item["attributes"] and "TANGENT" in _replaced(data, item) for item in primitives):
+    notes += _uv_set_notes(primitives) if uv_set else ()
+    if any("TANGENT" in {*item["attributes"]} & {*_replaced(data, item, uv_set)} for item in primitives):
         notes.append("Tangents of the old UVs are not in the file: viewers compute them from the new ones.")
     notes += image_notes(data)
-    painted = _painted_materials(data.tree, primitives)
+    painted = _painted_materials(data, primitives, uv_set)
     if painted and not has_texture:
-        notes.append(old_textures(plural(painted, "material")))
+        owner = plural(painted, "material")
+        outdated = f"The textures of {owner} are kept, but use {UV_SETS[1]}, which is replaced."
+        notes.append(outdated if uv_set else old_textures(owner))
     return tuple(notes)
 
 
-def _painted_materials(tree: Item, primitives: list[Item]) -> int:
-    """Return the number of materials of primitives that have textures."""
+def _uv_set_notes(primitives: list[Item]) -> Iterator[str]:
+    """Yield notes on a new second UV set of primitives: on the one it replaces, and on first sets that are missing."""
+    replaced = sum(UV_SETS[1] in primitive["attributes"] for primitive in primitives)
+    if replaced:
+        yield f"{UV_SETS[1]} of {plural(replaced, 'primitive')} is replaced."
+    missing = sum(UV_SETS[0] not in primitive["attributes"] for primitive in primitives)
+    if missing:
+        yield f"{plural(missing, 'primitive')} without UVs got the new ones as {UV_SETS[0]}, too."
+
+
+def _painted_materials(data: GltfData, primitives: list[Item], uv_set: int) -> int:
+    """Return the number of materials of primitives that have textures with a UV set."""
     materials = {primitive["material"] for primitive in primitives if "material" in primitive}
-    return sum(any(name.endswith("Texture") for name in keys_of(tree["materials"][i])) for i in materials)
+    return sum(uv_set in _uv_sets_of(data, data.item("materials", i)) for i in materials)
+
+
+def _uv_sets_of(data: GltfData, material: Item) -> set[int]:
+    """Return the numbers of the UV sets of a material's textures, those of its extensions among them."""
+    slots = (value for name, value in entries_of(material) if name.endswith("Texture"))
+    return {data.uv_set(slot) for slot in slots if isinstance(slot, dict)}

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
+
+from numpy.typing import NDArray
 
 from ...base.arrays import FloatArray
 from ...geometry.triangles import vertex_normals
@@ -11,15 +13,17 @@ from ...result import Flattening
 from ..attributes import ALPHA, VERTEX_COLOURS, Attribute
 from ..colours import linear_colours, stored_shades
 from ..mesh_file import MeshFile
-from ..split import input_vertices, shading_normals, source_normals, split_at_seams
+from ..split import SplitMesh, input_vertices, shading_normals, source_normals, source_uv, split_at_seams
 from ..texture import Texture
 from .data import Item
 from .glb import FOR_VERTICES, MATERIAL, Glb, bounds
 from .positions import local_positions
-from .scene import scene_with_uvs
+from .scene import UV_SETS, scene_losses, scene_with_uvs
 
 
-def write_glb(result: Flattening, stream: IO[bytes], texture: Texture | None, folder: Path) -> None:
+def write_glb(
+    result: Flattening, stream: IO[bytes], texture: Texture | None, folder: Path, uv_set: int = 0
+) -> None:
     """Write a result as GLB.
 
     For a mesh that was read from a glTF scene, the scene is written with new UVs. Otherwise the file has one mesh, with
@@ -27,25 +31,30 @@ def write_glb(result: Flattening, stream: IO[bytes], texture: Texture | None, fo
     glTF defines it), the input's normal or else that of the uncut surface, its colour as COLOR_0 if the input has
     colours and there is no texture, and its vertex in the input as _SOURCE_VERTEX. All these except colours are 32-bit
     floats, the only type that glTF has for them: source vertices are exact up to 2^24. Positions of a model far from
-    the origin are relative to its node, whose translation is in doubles.
+    the origin are relative to its node, whose translation is in doubles. With the UV set 1, the UVs are TEXCOORD_1, and
+    TEXCOORD_0 are the UVs of the input, or else the same ones, as sets are numbered without gaps.
 
     Args:
         result: the result to write.
         stream: a binary file.
         texture: the image of the material; None for a light grey, or the scene's own materials.
         folder: folder of the file, for relative paths of images that cannot be read.
+        uv_set: the number of the UV set that is written, 0 or 1.
 
     Raises:
         MeshFileError: the file would be larger than GLB permits.
     """
     scene = None if result.source is None or result.face_corners is None else result.source.scene
-    glb = _one_mesh(result, texture) if scene is None else scene_with_uvs(result, scene, folder, texture)
+    if scene is None:
+        glb = _one_mesh(result, texture, uv_set)
+    else:
+        glb = scene_with_uvs(result, scene, folder, texture, uv_set)
     glb.write(stream)
 
 
-def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
+def _one_mesh(result: Flattening, texture: Texture | None, uv_set: int) -> Glb:
     """Return a scene with one mesh."""
-    split = split_at_seams(result, source_normals(result))
+    split = split_at_seams(result, source_normals(result), source_uv(result) if uv_set else None)
     normals = split.normals
     if normals is None:
         normals = shading_normals(vertex_normals(result.vertices, result.faces))[split.vertex]
@@ -62,12 +71,10 @@ def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
         | {name: [] for name in ("materials", "accessors", "bufferViews", "buffers")}
     )
     glb.add_array(split.faces.reshape(-1, 1).astype("<u4"), {"componentType": 5125, "type": "SCALAR"})
-    for name, kind, values in (
-        ("POSITION", "VEC3", places.local),
-        ("NORMAL", "VEC3", normals),
-        ("TEXCOORD_0", "VEC2", split.uv * [1, -1] + [0, 1]),
-        ("_SOURCE_VERTEX", "SCALAR", split.origin.reshape(-1, 1)),
-    ):
+    arrays: dict[str, NDArray[Any]] = {"POSITION": places.local, "NORMAL": normals}
+    arrays |= _uv_arrays(split, uv_set) | {"_SOURCE_VERTEX": split.origin.reshape(-1, 1)}
+    for name, values in arrays.items():
+        kind = {1: "SCALAR", 2: "VEC2", 3: "VEC3"}[values.shape[1]]
         stored = values.astype("<f4")
         form = {"componentType": 5126, "type": kind} | (bounds(stored) if name == "POSITION" else {})
         primitive["attributes"][name] = glb.add_array(stored, form)
@@ -79,8 +86,35 @@ def _one_mesh(result: Flattening, texture: Texture | None) -> Glb:
     if texture is None:
         glb.add("materials", MATERIAL if colours is None else _white_material())
     else:
-        glb.add_material(texture)
+        glb.add_material(texture, uv_set)
     return glb
+
+
+def _uv_arrays(split: SplitMesh, uv_set: int) -> dict[str, FloatArray]:
+    """Return (k, 2) the UVs of each set that is written, v downwards."""
+    first = split.uv if split.texture_uv is None else split.texture_uv
+    uv_of_sets = [first, split.uv] if uv_set else [split.uv]
+    return {name: uv * [1, -1] + [0, 1] for name, uv in zip(UV_SETS, uv_of_sets, strict=False)}
+
+
+def glb_changes(result: Flattening, has_texture: bool = False, uv_set: int = 0) -> tuple[str, ...]:
+    """Return notes on data of the source file that a GLB of a result changes, one sentence each.
+
+    Args:
+        result: the result.
+        has_texture: whether a texture replaces the materials of its triangles.
+        uv_set: the number of the UV set that is written.
+    """
+    if result.source is not None and result.source.scene is not None:
+        return scene_losses(result, has_texture, uv_set)
+    if not uv_set:
+        return ()
+    of_textures = source_uv(result)
+    if of_textures is None:
+        return ("The input has no UVs: both UV sets of the file are the new ones.",)
+    if of_textures.is_missing is None:
+        return ()
+    return (f"{UV_SETS[0]} is (0, 0) at {int(of_textures.is_missing.sum()):,} triangle corners without UVs.",)
 
 
 def _colours(result: Flattening, texture: Texture | None) -> FloatArray | None:
