@@ -266,6 +266,7 @@ def _pack(layouts: Sequence[Layout], order: IntArray, mesh: TriangleMesh, option
         resolution=options.resolution,
         padding=options.padding,
         tiles=options.tiles,
+        block_size=options.block_size,
         quantum=options.quantise,
         edge_halfedges=mesh.edge_halfedges,
     )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +49,26 @@ class Packing:
     tile: IntArray
 
 
+class Blocks(NamedTuple):
+    """Cells that are aligned with the blocks of a texture, at whose corners charts begin.
+
+    Attributes:
+        across: cells across a tile without its margins; the last one may be a fraction of a cell.
+        step: cells across a block; 1 if a cell is one block or several.
+    """
+
+    across: float
+    step: int
+
+    @classmethod
+    def of(cls, count: int, columns: int) -> Blocks:
+        """Return cells for tiles of `count` blocks across, about `columns` or more cells across."""
+        if count < columns:
+            step = -(-columns // count)
+            return cls(float(count * step), step)
+        return cls(count / (count // columns), 1)
+
+
 class Placed(NamedTuple):
     """Charts placed by a plan; the other fields are what `place_all` returns."""
 
@@ -61,8 +83,13 @@ class Placed(NamedTuple):
 class Grid:
     """Shapes of k charts on a grid, to be placed in tiles of a varying width.
 
+    With blocks, cells have a fixed size in the texture, and charts are rasterized for each width; otherwise cells have
+    the size that they have at first.
+
     Attributes:
-        masks: the shapes.
+        masks: the shapes at the first width.
+        masks_at: returns the shapes for a width with blocks.
+        blocks: cells that are aligned with blocks; None for any cells.
         extent: (k, t) extents of the rotated charts, as complex numbers; infinite for angles that are not allowed.
         group: (k,) group of each chart, see `place_all`.
         gap: minimum distance between charts, relative to the width.
@@ -73,6 +100,8 @@ class Grid:
     """
 
     masks: Masks
+    masks_at: Callable[[int], Masks]
+    blocks: Blocks | None
     extent: NDArray[np.complex128]
     group: IntArray
     gap: float
@@ -83,8 +112,21 @@ class Grid:
 
     def place(self, plan: Plan, width: int, limit: int) -> Placed:
         """Return the charts placed by a plan in tiles of a width, with at most `limit` rows."""
-        reach = reach_of(self.gap * width)
-        return Placed(plan, *place_all(plan, self.group, self.masks, reach, self.tiles, width, limit))
+        if self.blocks is None:
+            reach = reach_of(self.gap * width)
+            return Placed(plan, *place_all(plan, self.group, self.masks, reach, self.tiles, width, limit, 1))
+        columns, reach = int(self.blocks.across), reach_of(self.gap * self.blocks.across)
+        rows, work, chosen, place = place_all(
+            plan,
+            self.group,
+            self.masks_at(width),
+            reach,
+            self.tiles,
+            columns,
+            columns * limit // width,
+            self.blocks.step,
+        )
+        return Placed(plan, -(-rows * width // columns), work, chosen, place)
 
     def first_placed(self, plan: Plan) -> tuple[Placed, int]:
         """Return the charts placed by a plan in the narrowest square tiles that it fits, and their width.
@@ -101,10 +143,12 @@ class Grid:
         return placed, width
 
     def packing(self, placed: Placed, width: int) -> Packing:
-        """Return placed charts as a packing; the tile is cropped to the charts, not to the cells."""
-        masks, chosen = self.masks, placed.chosen
+        """Return placed charts as a packing; without blocks the tile is cropped to the charts, not to the cells."""
+        masks, chosen = self.masks if self.blocks is None else self.masks_at(width), placed.chosen
         tile, column, row = placed.place.T
         shift = (column + 1j * row) * masks.cell - masks.low[chosen]
+        if self.blocks is not None:
+            return Packing(width * self.masks.cell, masks.angle[chosen], shift, tile)
         low, high = masks.low[chosen] + shift, masks.low[chosen] + self.extent.ravel()[chosen] + shift
         corner = complex(low.real.min(), low.imag.min())
         side = max(high.real.max() - corner.real, high.imag.max() - corner.imag)
@@ -119,6 +163,7 @@ def grid_of(
     gap: float,
     tiles: int,
     min_columns: int,
+    block_count: int | None,
 ) -> Grid:
     """Return the shapes of charts on a grid; arguments as of `pack_outlines`, and the minimum number of columns.
 
@@ -146,7 +191,16 @@ def grid_of(
         sizes = np.log(boxes + side / columns) // np.log(GROUP_RATIO)
         group = np.unique(sizes, return_inverse=True)[1].ravel()
     masks = cover_charts(outlines, angles, side / columns)
-    return Grid(masks, extent, group, gap, tiles, columns, widest, int(longest / masks.cell) + 1)
+    blocks = None if block_count is None else Blocks.of(block_count, columns)
+
+    # A search tries many plans for the same width.
+    @lru_cache(maxsize=2)
+    def masks_at(width: int) -> Masks:
+        assert blocks is not None
+        return cover_charts(outlines, angles, width * masks.cell / blocks.across)
+
+    narrowest = int(longest / masks.cell) + 1
+    return Grid(masks, masks_at, blocks, extent, group, gap, tiles, columns, widest, narrowest)
 
 
 def _no_space(gap: float, count: int) -> OptionError:

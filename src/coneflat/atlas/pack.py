@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,6 +53,7 @@ def pack_charts(
     padding: float = PADDING,
     rotate: str | int = "any",
     tiles: int = 1,
+    block_size: int = 1,
 ) -> Packed:
     """Pack charts into a square texture at the largest possible scale, or into several at a common scale (UDIM tiles).
 
@@ -69,6 +71,9 @@ def pack_charts(
             straight border only so that the border is as parallel to the axes as possible. A single chart is rotated
             by "any" by at most an eighth of a turn, and by an integer not at all.
         tiles: number of textures to distribute charts over. Charts are not cut, so the largest chart limits the scale.
+        block_size: texels along a side of a block; the box of each chart begins at the corner of a block, on the left
+            and below. With 4, a padding of 6 texels or more keeps the charts out of each other's blocks of a
+            compressed texture. 1 for any places.
 
     Returns:
         The packed charts.
@@ -83,22 +88,68 @@ def pack_charts(
         where its top is lowest. Orders and angles are changed at random, with a fixed seed, and improvements are kept.
     """
     charts = read_charts(corner_uv, chart_of_triangle)
-    _check(resolution, padding, rotate, tiles)
-    return pack_known(charts, resolution, padding, rotate, tiles)
+    _check(resolution, padding, rotate, tiles, block_size)
+    return pack_known(charts, Frame.of(resolution, padding, block_size), rotate, tiles)
 
 
-def pack_known(charts: Charts, resolution: int, padding: float, rotate: str | int, tiles: int) -> Packed:
+@dataclass(frozen=True)
+class Frame:
+    """The square of a texture in which charts are placed.
+
+    Attributes:
+        low: margin on the left and below, relative to the side of the texture.
+        side: side of the square, relative to that of the texture.
+        gap: minimum distance between charts, relative to the side of the texture.
+        block_count: number of blocks along the side; None if charts may begin anywhere.
+    """
+
+    low: float
+    side: float
+    gap: float
+    block_count: int | None
+
+    @classmethod
+    def of(cls, resolution: int, padding: float, block_size: int) -> Frame:
+        """Return the square for a padding; arguments as of `pack_charts`.
+
+        Raises:
+            OptionError: the padding leaves no space.
+        """
+        gap = padding / resolution
+        if block_size == 1:
+            low, count, side = gap, None, 1.0 - 2.0 * padding / resolution
+        else:
+            margin = block_size * math.ceil(padding / block_size)
+            low, count = margin / resolution, math.floor((resolution - margin - padding) / block_size)
+            side = count * block_size / resolution
+        if side <= 0:
+            raise OptionError(
+                f"{padding:g} texels of padding leave no space in a texture of {resolution} texels"
+            )
+        return cls(low, side, gap, count)
+
+    def snapped(self, packing: Packing, low: complex) -> Packing:
+        """Return the packing of a single chart, moved to the corner of a block; low: that of its box, rotated."""
+        if self.block_count is None:
+            return packing
+        block = (packing.side or 1.0) / self.block_count
+        corner = (packing.shift[0] + low) / block
+        column, row = (max(math.floor(place + RELATIVE_TOLERANCE), 0) for place in (corner.real, corner.imag))
+        shift = (column + 1j * row) * block - low
+        return replace(packing, shift=np.array([shift]))
+
+
+def pack_known(charts: Charts, frame: Frame, rotate: str | int, tiles: int) -> Packed:
     """Pack validated charts; see `pack_charts`."""
     outlines = charts.outlines()
     is_single = charts.count == 1
     as_given = rotate == "none" or isinstance(rotate, int) or (is_single and rotate == "any")
     directions = [np.empty(0)] * charts.count if rotate == "none" else border_directions(outlines)
     straight = np.zeros(charts.count) if as_given else straight_angles(charts, outlines, directions)
-    frame = np.exp(1j * straight)
-    outlines = outlines.times(frame)
-    inner = 1.0 - 2.0 * padding / resolution
+    rotations = np.exp(1j * straight)
+    outlines = outlines.times(rotations)
     if is_single:
-        packing = _pack_single(outlines, directions[0], rotate)
+        packing = _pack_single(outlines, directions[0], rotate, frame)
     else:
         area = float(np.abs(charts.sums(charts.areas)).sum())
         finest = QUARTER_TURNS * min(max(MAX_PLACEMENTS // (QUARTER_TURNS * charts.count), 1), 6)
@@ -106,13 +157,19 @@ def pack_known(charts: Charts, resolution: int, padding: float, rotate: str | in
         turns = rotate if isinstance(rotate, int) else choices[rotate]
         angles = np.tile(np.arange(turns) * (2 * np.pi / turns), (charts.count, 1))
         allowed = along_axes(directions, straight, angles)
-        gap = padding / resolution / inner
-        packing = pack_outlines(outlines, area, angles, allowed, gap, min(tiles, charts.count))
+        packing = pack_outlines(
+            outlines,
+            area,
+            angles,
+            allowed,
+            frame.gap / frame.side,
+            min(tiles, charts.count),
+            block_count=frame.block_count,
+        )
 
-    scale = inner / (packing.side or 1.0)
-    factors = scale * frame * np.exp(1j * packing.angle)
-    border = (1 + 1j) * padding / resolution
-    uv = charts.moved(factors, packing.shift * scale + border)
+    scale = frame.side / (packing.side or 1.0)
+    factors = scale * rotations * np.exp(1j * packing.angle)
+    uv = charts.moved(factors, packing.shift * scale + (1 + 1j) * frame.low)
     np.clip(uv, 0.0, 1.0, out=uv)
     corner = np.stack([packing.tile % TILES_IN_A_ROW, packing.tile // TILES_IN_A_ROW], axis=1)
     uv += corner[charts.chart][:, None] if packing.tile.any() else 0.0  # no -0.0
@@ -125,19 +182,23 @@ def pack_known(charts: Charts, resolution: int, padding: float, rotate: str | in
     )
 
 
-def _pack_single(outlines: Outlines, directions: FloatArray, rotate: str | int) -> Packing:
-    """Return the packing of a single chart, centred in its smallest enclosing square, with the least rotation."""
+def _pack_single(outlines: Outlines, directions: FloatArray, rotate: str | int, frame: Frame) -> Packing:
+    """Return the packing of a single chart, centred in its smallest enclosing square, with the least rotation.
+
+    With blocks, its box is at the nearest corner of a block on the left and below.
+    """
     angle = square_angle(outlines.points(0), directions) if rotate == "any" else 0.0
     angle -= HALF_PI * round(angle / HALF_PI)
     points = outlines.points(0) * np.exp(1j * angle)
     low, high = (complex(pick(points.real), pick(points.imag)) for pick in (np.min, np.max))
     side = max((high - low).real, (high - low).imag)
     shift = (side * (1 + 1j) - low - high) / 2
-    return Packing(side, np.array([angle]), np.array([shift]), np.zeros(1, dtype=np.int64))
+    packing = Packing(side, np.array([angle]), np.array([shift]), np.zeros(1, dtype=np.int64))
+    return frame.snapped(packing, low)
 
 
-def _check(resolution: int, padding: float, rotate: str | int, tiles: int) -> None:
-    for name, count in (("resolution", resolution), ("tiles", tiles)):
+def _check(resolution: int, padding: float, rotate: str | int, tiles: int, block_size: int) -> None:
+    for name, count in (("resolution", resolution), ("tiles", tiles), ("block_size", block_size)):
         if not isinstance(count, (int, np.integer)) or isinstance(count, bool) or count < 1:
             raise OptionError(f"{name} must be a positive integer, got {short_repr(count)}")
     is_number = isinstance(padding, (int, float, np.number)) and not isinstance(padding, bool)
@@ -150,8 +211,6 @@ def _check(resolution: int, padding: float, rotate: str | int, tiles: int) -> No
         raise OptionError(
             f"unknown rotate {short_repr(rotate)}: choose from {', '.join(ROTATIONS)}, or a number of turns"
         )
-    if 2 * padding >= resolution:
-        raise OptionError(f"{padding:g} texels of padding leave no space in a texture of {resolution} texels")
 
 
 def arrange_charts(
@@ -163,6 +222,7 @@ def arrange_charts(
     resolution: int,
     padding: float,
     tiles: int,
+    block_size: int = 1,
     quantum: float | None = None,
     edge_halfedges: IntArray,
 ) -> Packed:
@@ -174,7 +234,7 @@ def arrange_charts(
         component: (k,) the connected component of each chart.
         heights: (m, 3) coordinates of the triangles' corners on the model along the direction that should map to v;
             None to fill the texture best.
-        resolution, padding, tiles: see `pack_charts`.
+        resolution, padding, tiles, block_size: see `pack_charts`.
         quantum: angle in radians; charts of a component are rotated relative to each other only by its multiples, so
             that the rotations between the sides of seams stay such multiples. None for any angle.
         edge_halfedges: (e, 2) the half-edges of each edge of the triangles' mesh, see `TriangleMesh`.
@@ -187,7 +247,8 @@ def arrange_charts(
         charts = _rotated_together(charts, component, rotate, heights)
     elif heights is not None:
         charts = _rotated_together(charts, np.arange(charts.count), QUARTER_TURNS, heights)
-    return pack_known(charts, resolution, padding, rotate if heights is None else "none", tiles)
+    frame = Frame.of(resolution, padding, block_size)
+    return pack_known(charts, frame, rotate if heights is None else "none", tiles)
 
 
 def turns_of_quantum(quantum: float) -> int:

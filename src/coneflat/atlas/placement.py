@@ -41,7 +41,7 @@ def reach_of(gap: float) -> IntArray:
 
 @compiled
 def place_all(
-    plan: Plan, group: IntArray, masks: Masks, reach: IntArray, tiles: int, width: int, limit: int
+    plan: Plan, group: IntArray, masks: Masks, reach: IntArray, tiles: int, width: int, limit: int, step: int
 ) -> tuple[int, int, IntArray, IntArray]:
     """Fill tiles of cells from below: each chart is placed where its top is lowest, and leftmost among these places.
 
@@ -52,6 +52,7 @@ def place_all(
         reach: (d,) two cells of different charts are too close if their distance is less than d rows and at most
             `reach[rows]` columns.
         tiles, width, limit: number of tiles, their columns, and the rows that may be used.
+        step: columns and rows of lower left cells are multiples of it.
 
     Returns:
         The number of rows used, limit + 1 if a chart has no place; the work done, in comparisons of runs of cells; (k,)
@@ -72,7 +73,7 @@ def place_all(
             for t in range(tiles):
                 x, y, steps = find_lowest(
                     taken[t], clear[t], shape_runs, int(plan.offset[c] * right), right, floor[t, group[c]],
-                    best - size[j, 1],
+                    best - size[j, 1], step,
                 )  # fmt: skip
                 work += steps
                 if y >= 0:
@@ -107,14 +108,16 @@ def filled_tiles(tiles: int, rows: int, width: int) -> Cells:
 
 @compiled
 def find_lowest(
-    taken: Cells, clear: Cells, runs: IntArray, left: int, right: int, low: int, above: int
+    taken: Cells, clear: Cells, runs: IntArray, left: int, right: int, low: int, above: int, step: int
 ) -> tuple[int, int, int]:
     """Return the column and row of the lowest place where a shape fits, and the work.
 
-    The column is from `left` to `right`, the row from `low` to below `above`, or -1 if the shape does not fit.
+    The column is from `left` to `right`, the row from `low` to below `above`, or -1 if the shape does not fit; both are
+    multiples of `step`, as is `low`.
     """
     work, k = 0, 0
-    for y in range(low, above):
+    left += -left % step
+    for y in range(low, above, step):
         x, fits = left, 0
         while x <= right and fits < len(runs):
             work += 1
@@ -123,6 +126,8 @@ def find_lowest(
                 # Skip all columns at which this run hits the same occupied cells. The next place is tested with this
                 # run first.
                 x, fits = clear[row, start] - runs[k, 1], 0
+                if step > 1:
+                    x += -x % step
             else:
                 fits += 1
                 k = k + 1 if k + 1 < len(runs) else 0

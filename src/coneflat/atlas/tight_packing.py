@@ -43,6 +43,7 @@ def pack_outlines(
     gap: float,
     tiles: int,
     effort: Effort = Effort(),
+    block_count: int | None = None,
 ) -> Packing:
     """Return a tight packing of charts in square tiles, by rotations and translations alone.
 
@@ -59,6 +60,8 @@ def pack_outlines(
         gap: minimum distance between charts, relative to the side of a tile without its margins.
         tiles: number of tiles.
         effort: what the search may cost.
+        block_count: number of blocks across a tile without its margins; the boxes of charts begin at corners of blocks.
+            None for any places.
 
     Returns:
         The best packing found.
@@ -66,7 +69,7 @@ def pack_outlines(
     Raises:
         OptionError: the gap is too wide for this number of charts.
     """
-    grid = grid_of(outlines, area, angles, allowed, gap, tiles, effort.columns)
+    grid = grid_of(outlines, area, angles, allowed, gap, tiles, effort.columns, block_count)
     boxes = (grid.extent.real + grid.extent.imag).min(axis=1)
     plan = Plan(np.argsort(-boxes, kind="stable"), allowed.ravel(), np.zeros(len(outlines)))
     placed, width = grid.first_placed(plan)

@@ -27,6 +27,7 @@ from .mesh_file import MeshFile
 from .npz import write_npz
 from .obj import kept_in_obj, obj_has_textures, write_obj
 from .ply.write import kept_in_ply, ply_has_textures, write_ply
+from .split import source_uv
 from .texture import Texture, find_texture
 
 #: Endings of the files that `write_flattening` writes, each in `_FORMATS`.
@@ -292,10 +293,19 @@ def left_out(
     lost = set(source.attributes) - preserved
     complete = (name for name, other_form in _FORMATS.items() if lost <= other_form.kept_attributes(source))
     return (
+        *_lightmap_notes(result, ending),
         *losses(source, ending, preserved, next(complete, "")),
         *([old_textures("the file")] if form.keeps_old_textures(source) else []),
         *changes,
     )
+
+
+def _lightmap_notes(result: Flattening, ending: str) -> tuple[str, ...]:
+    """Return a note if the UVs of a lightmap replace those of textures, because the format has one set only."""
+    formats = endings(Use.UV_SETS)
+    if result.settings.get("lightmap") is None or ending in formats or source_uv(result) is None:
+        return ()
+    return (f"The UVs of the lightmap replace those of the textures; {', '.join(formats)} has both.",)
 
 
 def kept_attributes(source: MeshFile, ending: str) -> set[Attribute]:

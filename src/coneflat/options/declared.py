@@ -52,7 +52,8 @@ CONES = ("auto", "sparse", "greedy", "none")
 #: Rarely used options, which helps and panels list at the end.
 RARE = (
     "max_cones", "required_cones", "forbidden_cones", "weights", "min_cone_angle", "max_cone_angle", "quantise",
-    "relax", "no_seams", "hide_seams", "seam_weights", "tiles", "threads",
+    "relax", "no_seams", "hide_seams", "seam_weights", "tiles", "block_size",
+    "threads",
 )  # fmt: skip
 NO_CORNERS = "boundary must have at least one corner; for a round boundary use 'disk'"
 
@@ -261,6 +262,8 @@ class AtlasOptions:
         padding: Smallest distance between charts, and between charts and the border, in texels; at most a quarter of a
             side.
         tiles: Number of textures (UDIM tiles) over which charts are distributed, all at one scale.
+        block_size: Texels along a side of a block; the box of each chart begins at a corner of a block. 4 suits
+            textures whose compression has blocks of 4 by 4 texels, 1 allows any place.
         up: Upward direction of the model; charts are rotated so that it points up in the texture. Without it, charts
             are rotated to fill the texture best.
     """
@@ -269,6 +272,7 @@ class AtlasOptions:
     resolution: int = option(RESOLUTION, integer(2**16))
     padding: float = option(PADDING, Number())
     tiles: int = option(1, integer(1000))
+    block_size: int = option(1, integer(256))
     up: tuple[float, float, float] | None = option(None, Direction())
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..base import short_repr
@@ -34,6 +35,12 @@ ENERGY_PER_AREA = 20.0
 #: The default strength of cuts for packing, which are then at most a quarter of the other seams. On 25 models it adds
 #: two fifths of the seams that the strength 1 adds, for three fifths of its gain.
 PACKING_CUTS = 0.2
+#: Texels between the charts of a lightmap. The four texels that bilinear filtering reads are at most two apart in both
+#: directions, so that two charts never share any if they are 2 sqrt(2) texels apart: twice as many at half the
+#: resolution, the smallest mip level that is expected to be used. They then share no block of 4 by 4 texels either.
+LIGHTMAP_PADDING = 6.0
+#: Texels along a side of a block of a compressed lightmap.
+LIGHTMAP_BLOCK = 4
 #: Largest number of texels along a side.
 MAX_RESOLUTION = 2**16
 #: Bounds of the area distortion allowed. Below, the energy would be that of an isometry up to rounding; above, areas
@@ -80,6 +87,9 @@ class TextureOptions:
         stack: mirrored: the two halves of a model that is mirrored vertex by vertex share their texels. It is cut along
             the mirror plane, which no face may cross. copies: components that are copies of each other, moved, rotated
             or mirrored, share their texels, as do the two sides of cloth.
+        lightmap: Texels along a side of a lightmap, instead of a resolution. Charts are 6 texels apart, enough
+            for half the resolution, and begin at corners of blocks of 4 texels, unless padding or block_size are given.
+            No texels are shared, and a .glb has the UVs as its second set.
     """
 
     max_energy: float = option(MAX_ENERGY, Number(is_positive=True))
@@ -87,6 +97,7 @@ class TextureOptions:
     packing_cuts: float = option(PACKING_CUTS, strength(1.0))
     texel_density: float | None = option(None, Number(is_positive=True, optional=True))
     stack: str = option("none", Choice(("none", "mirrored", "copies")))
+    lightmap: int | None = option(None, Number(1, MAX_RESOLUTION, is_integer=True, optional=True))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,11 +128,33 @@ class UnwrapOptions(TextureOptions, SeamOptions, AtlasOptions, RunOptions):
             ("seams none", "max_energy", not math.isfinite(self.bound) and self._differs("max_energy")),
             ("seams none", "area", not math.isfinite(self.bound) and self._differs("area")),
             (f"stack {self.stack}", "lengths", self._differs("stack") and self.lengths is not None),
+            *(("lightmap", name, self.lightmap is not None) for name in self._unfit_for_lightmaps()),
         ):
             if are_both:
                 raise OptionError(
                     f"{first_option} and {second_option} cannot be combined: leave out one of them"
                 )
+
+    def _unfit_for_lightmaps(self) -> Iterator[str]:
+        """Yield the options that a lightmap excludes: its charts are in one square, and no texels are shared."""
+        if self.resolution != self.lightmap and self._differs("resolution"):
+            yield "resolution"
+        yield from (name for name in ("texel_density", "tiles") if self._differs(name))
+        if self._differs("stack"):
+            yield f"stack {self.stack}"
+        if self.charts == "one":
+            yield "charts one"
+
+    def with_lightmap(self) -> UnwrapOptions:
+        """Return the options with the resolution, the padding and the blocks of a lightmap, if there is one."""
+        if self.lightmap is None:
+            return self
+        return replace(
+            self,
+            resolution=self.lightmap,
+            padding=self.padding if self._differs("padding") else LIGHTMAP_PADDING,
+            block_size=self.block_size if self._differs("block_size") else LIGHTMAP_BLOCK,
+        )
 
     def _differs(self, name: str) -> bool:
         """Return whether an option is not its default."""

@@ -116,7 +116,9 @@ class Unwrapper:
 
 
 #: Options on which the search for cuts does not depend.
-PACKING = ("packing_cuts", "padding", "resolution", "texel_density", "tiles", "up", "progress")
+PACKING = (
+    "packing_cuts", "padding", "resolution", "texel_density", "lightmap", "block_size", "tiles", "up", "progress",
+)  # fmt: skip
 #: Largest number of sets of charts per component whose finished layouts are cached.
 MAX_FINISHED = 4
 
@@ -183,6 +185,7 @@ def pack_searched(searched: Searched, options: UnwrapOptions) -> Flattening:
 
     The ends of seams are moved again to meet the bound.
     """
+    options = options.with_lightmap()
     prepared, components = searched.prepared, searched.components
     stage_options = _with_expected_resolution(
         options_of_stages(options), options, components, prepared.checked.exponent

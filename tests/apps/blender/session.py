@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import subprocess
 import sys
 import time
 import traceback
@@ -169,6 +170,64 @@ def again():
     seams = flags(ring.data)
     run("unwrap")
     assert flags(ring.data)[seams].all()
+
+
+def maps_of(mesh):
+    """Return the UVs of each UV map of a mesh, by name."""
+    return {layer.name: values(layer.data, "uv", 2) for layer in mesh.uv_layers}
+
+
+def lightmaps():
+    """A lightmap is a UV map after that of the textures, which materials still use."""
+    ball, bare = add("uv_sphere", "ball", segments=16, ring_count=8), add("cube", "bare", location=(5, 0, 0))
+    bare.data.uv_layers.remove(bare.data.uv_layers[0])
+    before = maps_of(ball.data)["UVMap"]
+    settings().unwrap.lightmap = 256
+    select(ball, bare)
+    run("unwrap")
+    for mesh in (ball.data, bare.data):
+        assert list(maps_of(mesh)) == ["UVMap", "Lightmap"]
+        assert mesh.uv_layers["UVMap"].active_render
+        assert mesh.uv_layers.active.name == "Lightmap"
+    assert (maps_of(ball.data)["UVMap"] == before).all()
+    assert (maps_of(bare.data)["UVMap"] == maps_of(bare.data)["Lightmap"]).all()
+    low = np.concatenate([maps_of(mesh)["Lightmap"] for mesh in (ball.data, bare.data)]).min(axis=0) * 256
+    assert (np.abs(low - 4 * np.round(low / 4)) < 1e-3).all(), low
+    settings().unwrap.stack = "copies"
+    assert "lightmap and stack copies cannot be combined" in run("unwrap")
+
+
+def second_uv_set():
+    """A GLB with two UV sets has two UV maps, and its image the first one."""
+    folder = Path(os.environ["BLENDER_USER_RESOURCES"])
+    python = os.environ.get("CONEFLAT_PYTHON", sys.executable)
+    ball = add("uv_sphere", "ball", segments=16, ring_count=8)
+    bpy.ops.wm.obj_export(filepath=str(folder / "ball.obj"), export_materials=False)
+    bpy.data.objects.remove(ball)
+    for arguments in (
+        ("ball.obj", "-o", "textured.glb", "--texture", "checker"),
+        ("textured.glb", "-o", "lightmap.glb", "--lightmap", "256"),
+    ):
+        subprocess.run([python, "-m", "coneflat", "unwrap", *arguments], cwd=folder, check=True)
+    maps = []
+    for name in ("textured", "lightmap"):
+        bpy.ops.import_scene.gltf(filepath=str(folder / f"{name}.glb"))
+        (item,) = bpy.context.selected_objects
+        corners = values(item.data.loops, "vertex_index", kind=np.int32)
+        points = values(item.data.vertices, "co", 3)[corners]
+        uvs = maps_of(item.data)
+        maps.append({tuple(np.round([*p, *uv], 5)) for p, uv in zip(points, uvs["UVMap"], strict=True)})
+        (material,) = item.data.materials
+        kinds = [node.type for node in material.node_tree.nodes]
+        assert "TEX_IMAGE" in kinds
+        named = [node.uv_map for node in material.node_tree.nodes if node.type == "UVMAP"]
+        assert set(named) <= {"UVMap"}
+    assert list(uvs) == ["UVMap", "UVMap.001"]
+    assert maps[0] == maps[1]
+    assert item.data.uv_layers["UVMap"].active_render
+    first, second = uvs.values()
+    assert not (first == second).all()
+    assert ((second > 0) & (second < 1)).all()
 
 
 def selected_faces():

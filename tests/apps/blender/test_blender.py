@@ -25,6 +25,7 @@ SESSION = Path(__file__).with_name("session.py")
 SESSIONS = (
     "three_objects", "again", "selected_faces", "sharp_edges", "vertex_groups", "quads", "unapplied", "failures",
     "escape", "disable", "edited_together", "all_or_none", "vertex_lists", "mirrored", "panels",
+    "lightmaps", "second_uv_set",
 )  # fmt: skip
 
 

@@ -38,6 +38,7 @@ NOT_IN_THE_STUDIO = {
         "output",
         "format",
         "texture",
+        "uv_set",
         "report",
         "project",
         "required",
@@ -45,6 +46,7 @@ NOT_IN_THE_STUDIO = {
     "the studio asks before it repairs, and reports in the page": ("weld", "verbosity"),
     "they are for comparisons with the published method": ("method", "paper"),
     "the default gives the same digits on every machine": ("threads",),
+    "a lightmap has blocks": ("block_size",),
 }
 
 

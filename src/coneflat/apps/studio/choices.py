@@ -23,6 +23,7 @@ from .paint import Paint, Region
 #: Options whose controls are made from their declarations, with the labels of these.
 FURTHER_OPTIONS = {
     "area": "Area distortion at most", "packing_cuts": "Cuts for packing", "stack": "Stack halves",
+    "lightmap": "Lightmap, texels",
     "tiles": "Tiles (UDIM)", "up": "Up in the texture",
     "quantise": "Multiples of angle, °", "max_cones": "Cones at most", "min_cone_angle": "Smallest cone angle, °",
     "max_cone_angle": "Largest cone angle, °", "relax": "Relax",
@@ -38,7 +39,7 @@ DECLARED = declarations(Options) | declarations(UnwrapOptions)
 NUMBERS = ("distortion", "cone_count")
 SEARCH = (*NUMBERS, "quantise", "max_cones", "min_cone_angle", "max_cone_angle")
 #: Options of which at most one is set.
-SINGLE = (NUMBERS, ("resolution", "texel_density"), ("max_energy", "area"))
+SINGLE = (NUMBERS, ("resolution", "texel_density", "lightmap"), ("max_energy", "area"))
 #: Shapes of the boundary; the four corners of a rectangle are picked by the user.
 BOUNDARIES = ("free", "lengths", "disk", "straight", "rectangle")
 #: Units of length of a file; "" if unknown. They affect only the lengths that are shown.

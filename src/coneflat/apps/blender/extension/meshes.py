@@ -17,6 +17,8 @@ from .job import Failure
 #: Marks the seams that coneflat has marked, which do not constrain the next cut.
 OWN_SEAMS = "coneflat_seams"
 MAX_UV_MAPS = 8
+#: The UV map of lightmaps, and the one before it, as engines read a lightmap from the second one.
+LIGHTMAP, FIRST_MAP = "Lightmap", "UVMap"
 #: The name of the vertex group that an option takes, and the kind of the option, by the name of the option.
 Groups = dict[str, tuple[str, str]]
 
@@ -196,7 +198,8 @@ def write_map(source: Source, layout: Map, name: str, *, mark: bool, select: str
     Args:
         source: the part as it was read.
         layout: its UVs.
-        name: the UV map, which is added if it does not exist; "" for the active one.
+        name: the UV map, which is added if it does not exist, that of lightmaps after another one; "" for the active
+            one.
         mark: mark the cut edges as seams.
         select: what to select: SEAMS, CONES or NONE.
 
@@ -204,13 +207,9 @@ def write_map(source: Source, layout: Map, name: str, *, mark: bool, select: str
         Failure: the object has been removed or its mesh changed.
     """
     mesh = item_of(source).data
-    layer = mesh.uv_layers.get(name) if name else mesh.uv_layers.active
-    layer = layer or mesh.uv_layers.new(name=name or "UVMap", do_init=False)
-    mesh.uv_layers.active = layer
-    uv = values(layer.data, "uv", np.float64, 2)
-    has_uv = np.isfinite(layout.uv).all(axis=1)
-    uv[source.loops[has_uv]] = layout.uv[has_uv]
-    layer.data.foreach_set("uv", uv.astype(np.float32).ravel())
+    if name == LIGHTMAP and not mesh.uv_layers:
+        _write_uv(mesh, source, layout, FIRST_MAP)
+    _write_uv(mesh, source, layout, name)
     cut = _edges_between(mesh, source, layout.seams)
     if mark:
         _mark(mesh, source, cut)
@@ -219,6 +218,17 @@ def write_map(source: Source, layout: Map, name: str, *, mark: bool, select: str
     elif select == "CONES":
         _select(mesh, source.vertices[layout.cones], [])
     mesh.update()
+
+
+def _write_uv(mesh: Any, source: Source, layout: Map, name: str) -> None:
+    """Write UVs of a part to a UV map of its mesh, which is active then; materials use the same map as before."""
+    layer = mesh.uv_layers.get(name) if name else mesh.uv_layers.active
+    layer = layer or mesh.uv_layers.new(name=name or FIRST_MAP, do_init=False)
+    mesh.uv_layers.active = layer
+    uv = values(layer.data, "uv", np.float64, 2)
+    has_uv = np.isfinite(layout.uv).all(axis=1)
+    uv[source.loops[has_uv]] = layout.uv[has_uv]
+    layer.data.foreach_set("uv", uv.astype(np.float32).ravel())
 
 
 def _edges_between(mesh: Any, source: Source, pairs: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -219,6 +219,12 @@ class Command(Runner):
                 for (_, chosen), result in zip(done, results, strict=True):
                     self.write(context, chosen, result)
 
+    def uv_map(self, context: Any) -> str:
+        """Return the UV map to write: that of the settings, or else one for lightmaps; "" for the active one."""
+        settings = context.scene.coneflat
+        is_lightmap = getattr(getattr(settings, self.command), "lightmap", 0) > 0
+        return str(settings.uv_map or (meshes.LIGHTMAP if is_lightmap else ""))
+
     def arguments(self, context: Any) -> list[str]:
         """Return the options of the command that the settings change."""
         group = getattr(context.scene.coneflat, self.command)
@@ -247,7 +253,7 @@ class Command(Runner):
         sources = []
         for entry in objects:
             if not is_quads:
-                meshes.check_uv_map(entry, settings.uv_map)
+                meshes.check_uv_map(entry, self.uv_map(context))
             self._say(meshes.left_as_is(entry, applied))
             marks = {"marks": settings.marks, "sharp": settings.sharp} if not is_quads else {}
             mesh = entry.data
@@ -269,7 +275,7 @@ class Command(Runner):
             Failure: it cannot be read, or not be written to the objects.
         """
         for source in sources:
-            meshes.check_uv_map(meshes.item_of(source), context.scene.coneflat.uv_map)
+            meshes.check_uv_map(meshes.item_of(source), self.uv_map(context))
         return exchange.read_maps(folder, [source.part for source in sources])
 
     def write(self, context: Any, sources: Sequence[meshes.Source], result: Any) -> None:
@@ -277,7 +283,7 @@ class Command(Runner):
         settings = context.scene.coneflat
         maps, measures = result
         for source, layout in zip(sources, maps, strict=True):
-            meshes.write_map(source, layout, settings.uv_map, mark=settings.mark, select=settings.select)
+            meshes.write_map(source, layout, self.uv_map(context), mark=settings.mark, select=settings.select)
             if layout.torn:
                 said = f"{source.name}: faces that seams divide, so that they need to be triangulated: {layout.torn}"
                 self.report({"WARNING"}, said)

@@ -58,7 +58,9 @@ _SELECTED = [
     ("CONES", "Cones", "Select the cone vertices, which are the irregular vertices of quads"),
 ]
 _ATLAS = "Put all selected objects into one atlas, at one texel density; otherwise each has its own"
-_MAP = "UV map to write, which is added if it does not exist. Empty: the active one"
+_MAP = (
+    "UV map to write, which is added if it does not exist. Empty: the active one, or Lightmap for a lightmap"
+)
 _MARK = "Mark the cut edges as seams, instead of those that coneflat has marked before"
 _APPLY = "Make quads of the mesh with its modifiers and shape keys, in object mode"
 _MAP_SETTINGS = {
