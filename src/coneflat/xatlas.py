@@ -11,7 +11,7 @@ Examples:
     ((4, 3), dtype('float32'), True)
 """
 
-from .apps.xatlas.interface import Atlas, export, parametrize
+from .apps.xatlas.interface import Atlas, Chart, export, parametrize
 from .apps.xatlas.options import ChartOptions, PackOptions
 
-__all__ = ["Atlas", "ChartOptions", "PackOptions", "export", "parametrize"]
+__all__ = ["Atlas", "Chart", "ChartOptions", "PackOptions", "export", "parametrize"]

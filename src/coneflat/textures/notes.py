@@ -26,7 +26,7 @@ def with_notes(result: Flattening, options: UnwrapOptions, energies: Sequence[fl
     notes = (
         *_forbidden_notes(cut),
         *_energy_notes(options, energies, result.distortion.energy),
-        *_chart_notes(options.charts, result.distortion.charts),
+        *chart_notes(options.charts, result.distortion.charts),
     )
     settings = {**result.settings, **_own_settings(options, result.settings["seams"])}
     return replace(result, settings=settings, notes=(*result.notes, *map(Unmet, notes)))
@@ -64,7 +64,7 @@ def _energy_notes(options: UnwrapOptions, energies: Sequence[float], energy: flo
         )
 
 
-def _chart_notes(requested: str | int, count: int) -> Iterator[str]:
+def chart_notes(requested: str | int, count: int) -> Iterator[str]:
     """Yield a note if the number of charts is not the one requested."""
     if not isinstance(requested, int) or count == requested:
         return

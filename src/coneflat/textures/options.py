@@ -41,8 +41,8 @@ PACKING_CUTS = 0.2
 LIGHTMAP_PADDING = 6.0
 #: Texels along a side of a block of a compressed lightmap.
 LIGHTMAP_BLOCK = 4
-#: Largest number of texels along a side.
-MAX_RESOLUTION = 2**16
+#: Largest number of texels along a side, of textures, and of charts.
+MAX_RESOLUTION, MAX_TEXTURES, MAX_CHARTS = 2**16, 1000, 10_000
 #: Bounds of the area distortion allowed. Below, the energy would be that of an isometry up to rounding; above, areas
 #: differ by factors that no number holds.
 MIN_AREA, MAX_AREA = 1e-6, 100.0
@@ -54,7 +54,7 @@ class ChartNumber(Kind):
 
     words: tuple[str, ...] = ("atlas", "one")
     metavar: ClassVar[str] = "atlas|one|NUMBER"
-    limit: int = 10_000
+    limit: int = MAX_CHARTS
 
     def parse(self, name: str, value: Any) -> str | int:
         text = value if isinstance(value, str) else ""

@@ -58,7 +58,7 @@ def cut_for_packing(
     borders = sum(float(chart.border_costs[np.isfinite(chart.border_costs)].sum()) for chart in charts)
     seams = np.array([_seam_cost(layout, costs(i)) for i, layout in enumerate(layouts)])
     search = _BeamSearch(area, max(SHARE * borders, area**0.5), seams, strength, gap)
-    return _with_pieces(layouts, charts, search.best_from(charts).pieces)
+    return with_pieces(layouts, charts, search.best_from(charts).pieces)
 
 
 def _seam_cost(layout: Layout, costs: FloatArray) -> float:
@@ -89,7 +89,7 @@ def cut_into(layouts: Sequence[Layout], costs: Callable[[int], FloatArray], coun
         best = min(cuts, key=lambda cut: cut.score)
         pieces = [piece for piece in pieces if piece is not best.piece] + list(best.pieces)
         missing -= len(best.pieces) - 1
-    return _with_pieces(layouts, charts, pieces)
+    return with_pieces(layouts, charts, pieces)
 
 
 def _largest_charts(
@@ -113,7 +113,7 @@ def _largest_charts(
     return charts
 
 
-def _with_pieces(layouts: Sequence[Layout], charts: Sequence[Piece], pieces: Sequence[Piece]) -> list[Layout]:
+def with_pieces(layouts: Sequence[Layout], charts: Sequence[Piece], pieces: Sequence[Piece]) -> list[Layout]:
     """Return layouts in which pieces replace the charts that they are pieces of."""
     labels = [layout.chart.copy() for layout in layouts]
     for piece in pieces:

@@ -29,6 +29,7 @@ from .candidates import Candidate, CutModel
 from .creases import along_sharp_edges
 from .density import expected_resolution, least_resolution
 from .energy import EnergyBound
+from .fitting import cut_to_fit
 from .free_seams import measured, seam_edges
 from .minor import cuts_together, is_searchable_together
 from .mirror import half_of
@@ -186,15 +187,19 @@ def pack_searched(searched: Searched, options: UnwrapOptions) -> Flattening:
     The ends of seams are moved again to meet the bound.
     """
     options = options.with_lightmap()
-    prepared, components = searched.prepared, searched.components
     stage_options = _with_expected_resolution(
-        options_of_stages(options), options, components, prepared.checked.exponent
+        options_of_stages(options), options, searched.components, searched.prepared.checked.exponent
     )
-    with _threads_for(components, options):
-        with stage("pack"):
-            candidates = _cut_to_pack(searched, options, stage_options)
-        with stage("measure"):
-            layouts = _measured_layouts(candidates, searched.flat, components, searched.copies)
+    return pack_candidates(searched, cut_to_pack(searched, options, stage_options), options, stage_options)
+
+
+def pack_candidates(
+    searched: Searched, candidates: Mapping[int, Candidate], options: UnwrapOptions, stage_options: Options
+) -> Flattening:
+    """Return the UVs of candidates, which are cut for packing, packed; the other arguments as of `cut_to_pack`."""
+    prepared, components = searched.prepared, searched.components
+    with _threads_for(components, options), stage("measure"):
+        layouts = _measured_layouts(candidates, searched.flat, components, searched.copies)
     stage_options = _with_least_resolution(stage_options, options, prepared, layouts)
     result = evaluate(prepared, layouts, replace(stage_options, method=FREE))
     energies = [candidate.energy for candidate in candidates.values()]
@@ -315,37 +320,48 @@ def _groups(minor: IntArray, sizes: IntArray) -> Iterator[list[int]]:
             yield group.tolist()
 
 
-def _cut_to_pack(searched: Searched, options: UnwrapOptions, stage_options: Options) -> dict[int, Candidate]:
-    """Return candidates with charts cut further, into a number of them or for a tighter packing.
+def cut_to_pack(
+    searched: Searched, options: UnwrapOptions, stage_options: Options, chart_side: float | None = None
+) -> dict[int, Candidate]:
+    """Return candidates with charts cut further, into a number of them, for a tighter packing, or to fit in a square.
 
     The bound is met again afterwards: tips of seams move, and small charts are joined to others. Sides of charts become
     straight; not those of minor components, which would each need a relaxation of their own.
+
+    Args:
+        searched: what was found for the mesh.
+        options, stage_options: the options, and those of the flattening.
+        chart_side: side of a square in which each chart should fit, in units of the model; None for any size.
     """
-    models, candidates = searched.models, searched.candidates
-    order = list(models)
+    models, order = searched.models, list(searched.models)
 
     def costs(k: int) -> FloatArray:
         return models[order[k]].costs
 
-    if isinstance(options.charts, int):
-        candidates = {i: _without_slivers(models[i], candidates[i]) for i in order}
-    layouts = [candidates[i].layout for i in order]
-    if isinstance(options.charts, int):
-        layouts = cut_into(layouts, costs, options.charts)
-    elif options.charts == "atlas" and options.up is None and np.isfinite(options.bound):
-        gap = options.padding / stage_options.resolution
-        layouts = cut_for_packing(layouts, costs, gap, options.packing_cuts)
-    areas, finished = _double_areas_of(searched.components), dict[int, Candidate]()
-    is_minor = areas < MINOR_SHARE * areas.sum()
-    for i, layout in zip(order, layouts, strict=True):
-        key = i, layout.chart.tobytes()
-        if len(searched.finished) >= MAX_FINISHED * len(order):
-            searched.finished.clear()
-        if key not in searched.finished:
-            candidate = _finished(models[i], candidates[i], layout, options)
-            searched.finished[key] = candidate if is_minor[i] else straightened(models[i], candidate)
-        finished[i] = searched.finished[key]
-    return finished
+    with _threads_for(searched.components, options), stage("pack"):
+        candidates: Mapping[int, Candidate] = searched.candidates
+        if isinstance(options.charts, int):
+            candidates = {i: _without_slivers(models[i], candidates[i]) for i in order}
+        layouts = [candidates[i].layout for i in order]
+        if isinstance(options.charts, int):
+            layouts = cut_into(layouts, costs, options.charts)
+        elif options.charts == "atlas" and options.up is None and np.isfinite(options.bound):
+            gap = options.padding / stage_options.resolution
+            layouts = cut_for_packing(layouts, costs, gap, options.packing_cuts)
+        if chart_side is not None:
+            exponent = searched.prepared.checked.exponent
+            layouts = cut_to_fit(layouts, costs, float(np.ldexp(chart_side, exponent)))
+        areas, finished = _double_areas_of(searched.components), dict[int, Candidate]()
+        is_minor = areas < MINOR_SHARE * areas.sum()
+        for i, layout in zip(order, layouts, strict=True):
+            key = i, layout.chart.tobytes()
+            if len(searched.finished) >= MAX_FINISHED * len(order):
+                searched.finished.clear()
+            if key not in searched.finished:
+                candidate = _finished(models[i], candidates[i], layout, options)
+                searched.finished[key] = candidate if is_minor[i] else straightened(models[i], candidate)
+            finished[i] = searched.finished[key]
+        return finished
 
 
 def _finished(model: CutModel, candidate: Candidate, layout: Layout, options: UnwrapOptions) -> Candidate:

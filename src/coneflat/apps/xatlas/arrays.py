@@ -1,4 +1,4 @@
-"""What `coneflat.xatlas` computes: arrays of users, UVs of several meshes in one texture, its image, and OBJ files.
+"""What `coneflat.xatlas` computes: arrays of users, UVs of several meshes in textures, images, and OBJ files.
 
 These need NumPy and much more, so they are imported when they are called.
 """
@@ -6,6 +6,8 @@ These need NumPy and much more, so they are imported when they are called.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from os import PathLike
 from typing import TypeAlias
 
@@ -13,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...base import FloatArray, IntArray, as_floats, as_indices
-from ...errors import ArrayShapeError, FaceIndexError, NonFiniteError, OptionError
-from ...geometry import fill_nearest
+from ...errors import ArrayShapeError, FaceIndexError, NonFiniteError, OptionError, TooLargeError
+from ...geometry import fill_nearest, signed_double_areas
 from ...io import atomic_write
 from ...textures import UnwrappedSoup, unwrap_soup
 from .options import PackOptions
@@ -24,6 +26,10 @@ Mapped: TypeAlias = tuple[NDArray[np.uint32], NDArray[np.uint32], NDArray[np.flo
 
 # Texels of an image that are computed at once: these take 16 MB.
 TEXELS_PER_BAND = 2**20
+# Texels along a side of an image, at most: it takes 805 MB.
+MAX_IMAGE_SIDE = 2**14
+# Texels along a side of the blocks of compressed textures.
+BLOCK_SIZE = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,22 +42,48 @@ class MeshArrays:
 
 @dataclass(frozen=True, eq=False)
 class Texture:
-    """Meshes that share a square texture.
+    """Meshes that share square textures.
 
     Attributes:
         soup: the UVs of all faces.
         meshes: what is returned for each mesh.
+        first_faces: the first face of each mesh, and the number of all faces.
         side: texels along a side.
     """
 
     soup: UnwrappedSoup
     meshes: tuple[Mapped, ...]
+    first_faces: IntArray
     side: int
 
     @property
     def chart_count(self) -> int:
         """Number of charts."""
         return int(self.soup.chart.max(initial=-1)) + 1
+
+    @cached_property
+    def coverage(self) -> FloatArray:
+        """(t,) the covered fraction of each texture, of which there is at least one."""
+        texture = self.soup.texture
+        areas = np.abs(signed_double_areas(self.soup.corner_uv)) / 2
+        return np.bincount(texture[texture >= 0], areas[texture >= 0], minlength=1).astype(np.float64)
+
+    def of_vertices(self, index: int) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+        """Return the texture and the chart of each vertex of a mesh, 2^32 - 1 for those of faces without area."""
+        vertices, corners, _ = self.meshes[index]
+        faces = slice(*self.first_faces[index : index + 2])
+        owners = []
+        for of_face in (self.soup.texture[faces], self.soup.chart[faces]):
+            owner = np.full(len(vertices), -1)
+            owner[corners] = of_face[:, None]
+            owners.append(owner.astype(np.uint32))
+        return owners[0], owners[1]
+
+    def charts_of(self, index: int) -> tuple[IntArray, IntArray]:
+        """Return the charts of a mesh, ascending, and (m,) the one of each face among them, -1 for none."""
+        chart = self.soup.chart[slice(*self.first_faces[index : index + 2])]
+        charts = np.unique(chart[chart >= 0])
+        return charts, np.where(chart >= 0, np.searchsorted(charts, chart), -1)
 
 
 def read_arrays(
@@ -100,29 +132,44 @@ def unwrap_meshes(meshes: list[MeshArrays], pack: PackOptions) -> Texture:
     vertices = np.concatenate([np.empty((0, 3)), *(mesh.vertices for mesh in meshes)])
     shifted = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
     faces = np.concatenate([np.empty((0, 3), dtype=np.int64), *shifted])
-    density = 0.0 if pack.resolution else pack.texels_per_unit
-    chosen = {"padding": pack.padding, "resolution": pack.resolution, "texel_density": density}
+    # With a resolution, there are as many textures as the density needs.
+    density = "density" if pack.resolution else "texel_density"
+    chosen = {"padding": pack.padding, "resolution": pack.resolution, density: pack.texels_per_unit}
+    chosen |= {"block_size": BLOCK_SIZE} if pack.blockAlign else {}
     try:
         soup = unwrap_soup(vertices, faces, **{name: value for name, value in chosen.items() if value})
     except OptionError as error:
         raise OptionError(str(error).replace("texel_density", "texels_per_unit")) from None
-    parts = np.split(soup.corner_uv, np.cumsum([len(mesh.faces) for mesh in meshes], dtype=np.int64)[:-1])
-    mapped = [_mapped(mesh.faces, part) for mesh, part in zip(meshes, parts, strict=False)]
-    return Texture(soup, tuple(mapped), soup.resolution)
+    first_faces = np.cumsum([0, *(len(mesh.faces) for mesh in meshes)])
+    mapped = [
+        _mapped(mesh.faces, soup.corner_uv[first:end], soup.chart[first:end])
+        for mesh, (first, end) in zip(meshes, pairwise(first_faces), strict=True)
+    ]
+    return Texture(soup, tuple(mapped), first_faces, soup.resolution)
 
 
-def _mapped(faces: IntArray, corner_uv: FloatArray) -> Mapped:
-    """Return a mesh with one vertex for each pair of an input vertex and a point."""
+def _mapped(faces: IntArray, corner_uv: FloatArray, chart: IntArray) -> Mapped:
+    """Return a mesh with one vertex for each input vertex, point and chart."""
     uv = corner_uv.reshape(-1, 2).astype(np.float32)
-    rows = np.column_stack([faces.ravel(), uv.view(np.int32)])
+    rows = np.column_stack([faces.ravel(), uv.view(np.int32), chart.repeat(3)])
     _, first, label = np.unique(rows, axis=0, return_index=True, return_inverse=True)
     return faces.ravel()[first].astype(np.uint32), label.reshape(faces.shape).astype(np.uint32), uv[first]
 
 
-def draw_charts(texture: Texture) -> NDArray[np.uint8]:
-    """Return (side, side, 3) an image of charts; a texel has the colour of a triangle that contains its centre."""
+def draw_charts(texture: Texture, index: int = 0) -> NDArray[np.uint8]:
+    """Return (side, side, 3) an image of a texture; a texel has the colour of a triangle that contains its centre.
+
+    Raises:
+        TooLargeError: the image would have more than `MAX_IMAGE_SIDE` texels along a side.
+    """
     soup, side = texture.soup, texture.side
-    points = np.pad(soup.corner_uv.reshape(-1, 2) * side, ((0, 0), (0, 1)))
+    if side > MAX_IMAGE_SIDE:
+        raise TooLargeError(
+            f"an image of {side:,} texels along a side takes {3 * side**2 / 1e9:.1f} GB: images are drawn up to "
+            f"{MAX_IMAGE_SIDE:,} texels"
+        )
+    charts = soup.chart[soup.texture == index]
+    points = np.pad(soup.corner_uv[soup.texture == index].reshape(-1, 2) * side, ((0, 0), (0, 1)))
     corners = np.arange(len(points)).reshape(-1, 3)
     random = np.random.default_rng(0)
     colors = random.integers(64, 256, (max(texture.chart_count, 1), 3)).astype(np.uint8)
@@ -132,7 +179,7 @@ def draw_charts(texture: Texture) -> NDArray[np.uint8]:
         face, depth = np.full(band.shape[:2], -1), np.full(band.shape[:2], np.inf)
         fill_nearest(points - [0, start, 0], corners, depth, face)
         is_covered = face >= 0
-        band[is_covered] = colors[soup.chart[face[is_covered]]]
+        band[is_covered] = colors[charts[face[is_covered]]]
     return image
 
 

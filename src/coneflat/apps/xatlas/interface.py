@@ -5,6 +5,7 @@ What needs more than Python is in `arrays.py`, so that `import coneflat.xatlas` 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from operator import index as as_index
 from os import PathLike
@@ -17,27 +18,53 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-    from .arrays import Mapped, MeshArrays
+    from .arrays import Mapped, MeshArrays, Texture
 
 
 class Utilization(float):
-    """The covered fraction of the only texture; it may also be taken by index, as from a list of one for each."""
+    """The covered fraction of the first texture; that of each may be taken by index, as from a list."""
+
+    _fractions: tuple[float, ...] = ()
+
+    @classmethod
+    def of_textures(cls, fractions: Iterable[float]) -> Utilization:
+        """Return the covered fractions of textures, of which there is at least one."""
+        values = tuple(fractions)
+        utilization = cls(values[0])
+        utilization._fractions = values
+        return utilization
 
     def __getitem__(self, index: int) -> float:
         """Return the covered fraction of a texture."""
-        return [float(self)][index]
+        return self._fractions[index]
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """A chart of a mesh.
+
+    Attributes:
+        faces: (k,) its faces.
+        atlas_index: its texture.
+        material: 0, as meshes have one material.
+    """
+
+    faces: NDArray[np.uint32]
+    atlas_index: int
+    material: int = 0
 
 
 @dataclass(eq=False)
 class Atlas:
-    """Meshes that share a square texture.
+    """Meshes that share square textures.
 
     Attributes:
         width, height: texels along a side; 0 before `generate`.
         texels_per_unit: texels per unit of length.
         chart_count: number of charts.
-        utilization: covered fraction of the texture.
-        chart_image: (height, width, 3) colours of the charts.
+        atlas_count: number of textures.
+        utilization: covered fraction of each texture, by its index; as a number that of the first one.
+        chart_image: (height, width, 3) colours of the charts of the first texture.
         notes: what was done to the faces, and unmet guarantees, one sentence each; xatlas has none.
     """
 
@@ -48,8 +75,9 @@ class Atlas:
     utilization: Utilization = field(default_factory=Utilization)
     notes: tuple[str, ...] = ()
     _added: list[MeshArrays] = field(default_factory=list, repr=False)
-    _mapped: tuple[Mapped, ...] = field(default=(), repr=False)
-    _image: NDArray[np.uint8] | None = field(default=None, repr=False)
+    _texture: Texture | None = field(default=None, repr=False)
+    _has_images: bool = field(default=False, repr=False)
+    _image: tuple[int, NDArray[np.uint8]] | None = field(default=None, repr=False)
 
     def add_mesh(
         self,
@@ -80,17 +108,16 @@ class Atlas:
         Raises:
             OptionError: an option for packing is invalid, or leaves no space for charts.
         """
-        from .arrays import draw_charts, unwrap_meshes
+        from .arrays import unwrap_meshes
 
         pack = PackOptions() if pack_options is None else pack_options
         texture = unwrap_meshes(self._added, pack)
         self.notes = texture.soup.notes
         self.width = self.height = texture.side
         self.texels_per_unit = texture.side * texture.soup.scale
-        self.utilization = Utilization(texture.soup.efficiency)
+        self.utilization = Utilization.of_textures(texture.coverage.tolist())
         self.chart_count = texture.chart_count
-        self._mapped = texture.meshes
-        self._image = draw_charts(texture) if pack.create_image else None
+        self._texture, self._has_images, self._image = texture, pack.create_image, None
 
     def get_mesh(self, index: int) -> Mapped:
         """Return a mesh: (k,) the input vertex of each vertex, (m, 3) faces in the given order, and (k, 2) UVs.
@@ -98,11 +125,48 @@ class Atlas:
         Raises:
             IndexError: there is no such mesh.
         """
-        if not 0 <= as_index(index) < len(self._mapped):
-            raise IndexError(f"mesh index {index} is not from 0 to {len(self._mapped) - 1}")
-        return self._mapped[index]
+        return self._texture_of(index).meshes[index]
 
     __getitem__ = get_mesh
+
+    def get_mesh_vertex_assignment(self, index: int) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]:
+        """Return (k,) the texture and (k,) the chart of each vertex of a mesh; 2^32 - 1 at faces without area.
+
+        Charts are numbered from 0 for all meshes together.
+
+        Raises:
+            IndexError: there is no such mesh.
+        """
+        return self._texture_of(index).of_vertices(index)
+
+    def get_mesh_chart_count(self, index: int) -> int:
+        """Return the number of charts of a mesh.
+
+        Raises:
+            IndexError: there is no such mesh.
+        """
+        return len(self._texture_of(index).charts_of(index)[0])
+
+    def get_mesh_chart(self, index: int, chart: int) -> Chart:
+        """Return a chart of a mesh; charts are numbered from 0 for each mesh.
+
+        Raises:
+            IndexError: there is no such mesh or chart.
+        """
+        texture = self._texture_of(index)
+        charts, of_face = texture.charts_of(index)
+        if not 0 <= as_index(chart) < len(charts):
+            raise IndexError(f"chart index {chart} is not from 0 to {len(charts) - 1}")
+        faces = (of_face == chart).nonzero()[0]
+        first = texture.first_faces[index]
+        return Chart(faces.astype("uint32"), int(texture.soup.texture[first + faces[0]]))
+
+    def _texture_of(self, index: int) -> Texture:
+        """Return the textures of all meshes, after an index of a mesh is checked."""
+        count = 0 if self._texture is None else len(self._texture.meshes)
+        if self._texture is None or not 0 <= as_index(index) < count:
+            raise IndexError(f"mesh index {index} is not from 0 to {count - 1}")
+        return self._texture
 
     def __len__(self) -> int:
         """Return the number of meshes."""
@@ -113,26 +177,37 @@ class Atlas:
     @property
     def atlas_count(self) -> int:
         """The number of textures."""
-        return int(self.width > 0)
+        return 0 if self._texture is None else len(self._texture.coverage)
 
     @property
     def chart_image(self) -> NDArray[np.uint8]:
-        """(height, width, 3) an image of the charts in different colours, black elsewhere.
-
-        Raises:
-            RuntimeError: it was not requested by `PackOptions.create_image`.
-        """
-        if self._image is None:
-            raise RuntimeError("the atlas has no image: set create_image of PackOptions")
-        return self._image
+        """(height, width, 3) the image of the first texture, see `get_chart_image`."""
+        return self.get_chart_image(0)
 
     def get_utilization(self, index: int) -> float:
         """Return the covered fraction of a texture."""
         return self.utilization[index]
 
     def get_chart_image(self, index: int) -> NDArray[np.uint8]:
-        """Return the image of a texture, see `chart_image`."""
-        return [self.chart_image][index]
+        """Return (height, width, 3) an image of the charts of a texture in different colours, black elsewhere.
+
+        An image is drawn when it is asked for, and only the last one is cached.
+
+        Raises:
+            RuntimeError: images were not requested by `PackOptions.create_image`.
+            IndexError: there is no such texture.
+            TooLargeError: the texture has more than 16,384 texels along a side.
+        """
+        from .arrays import draw_charts
+
+        if self._texture is None or not self._has_images:
+            raise RuntimeError("the atlas has no image: set create_image of PackOptions")
+        if not 0 <= as_index(index) < self.atlas_count:
+            raise IndexError(f"texture index {index} is not from 0 to {self.atlas_count - 1}")
+        if self._image is None or self._image[0] != index:
+            self._image = None  # before another one needs memory
+            self._image = index, draw_charts(self._texture, index)
+        return self._image[1]
 
 
 def parametrize(

@@ -28,9 +28,11 @@ class PackOptions:
 
     Attributes:
         padding: texels between charts, and between charts and the border, at least; 0 for the default.
-        resolution: texels along a side of the texture; 0 for that of `texels_per_unit`, or else 1024.
-        texels_per_unit: texels per unit of length, at least, without a resolution; there is one texture.
-        create_image: make `Atlas.chart_image`. The other options have no effect.
+        resolution: texels along a side of a texture; 0 for that of `texels_per_unit`, or else 1024.
+        texels_per_unit: texels per unit of length, at least: with a resolution, in as many textures as it needs, and
+            otherwise in one. 0 for one texture of the resolution.
+        blockAlign: charts begin at corners of blocks of 4 texels.
+        create_image: permit `Atlas.chart_image`. The other options have no effect.
     """
 
     max_chart_size: int = 0
