@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from .candidates import TOLERANCE, Candidate, CutModel
 from .free_seams import laid_out
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .search import FIRST_DISTORTION
+from .shortening import MANY_TRIANGLES
 
 # Number of times that cones are added.
 MAX_ROUNDS = 12
@@ -31,6 +32,19 @@ def is_searchable_together(model: CutModel) -> bool:
         and not is_large(model.component)
         and not model.component.seams.is_forbidden.any()
     )
+
+
+def groups_to_search(minor: IntArray, sizes: IntArray) -> Iterator[list[int]]:
+    """Yield groups of at least two minor components, with not many triangles.
+
+    Args:
+        minor: (k,) indices of components.
+        sizes: (c,) numbers of triangles of all components.
+    """
+    total = np.cumsum(sizes[minor]) // MANY_TRIANGLES
+    for group in np.split(minor, np.flatnonzero(np.diff(total)) + 1):
+        if len(group) > 1:
+            yield group.tolist()
 
 
 def cuts_together(models: Sequence[CutModel]) -> list[Candidate | None]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base import FloatArray, IntArray, limit_threads, stage, timing, warns
+from ..base import FloatArray, limit_threads, stage, timing, warns
 from ..base.progress import component_at_work
 from ..errors import ConvergenceError
 from ..evaluate import evaluate, packed_scale
@@ -31,14 +31,14 @@ from .density import expected_resolution, least_resolution
 from .energy import EnergyBound
 from .fitting import cut_to_fit
 from .free_seams import measured, seam_edges
-from .minor import cuts_together, is_searchable_together
+from .minor import cuts_together, groups_to_search, is_searchable_together
 from .mirror import half_of
 from .notes import FREE, with_notes
 from .options import ISOMETRIC, UnwrapOptions, options_of_stages
 from .pack_cuts import cut_for_packing, cut_into
 from .search import best_cut
 from .sharing import SharedTexels, with_shared_texels
-from .shortening import MANY_TRIANGLES, cut_further
+from .shortening import cut_further
 from .small_charts import join_small_charts
 from .stacked import without_copies
 from .straightening import straightened
@@ -291,7 +291,7 @@ def _search(
     minor = [
         i for i, model in models.items() if is_minor[i] and i not in flat and is_searchable_together(model)
     ]
-    for group in _groups(np.array(minor, dtype=np.int64), sizes):
+    for group in groups_to_search(np.array(minor, dtype=np.int64), sizes):
         with component_at_work("", float(work[group].sum())), stage("search"):
             together = cuts_together([models[i] for i in group])
         candidates |= {
@@ -305,19 +305,6 @@ def _search(
         with component_at_work(place, float(work[i])), stage("search"):
             candidates[i] = best_cut(models[i])
     return candidates
-
-
-def _groups(minor: IntArray, sizes: IntArray) -> Iterator[list[int]]:
-    """Yield groups of at least two minor components, with not many triangles.
-
-    Args:
-        minor: (k,) indices of components.
-        sizes: (c,) numbers of triangles of all components.
-    """
-    total = np.cumsum(sizes[minor]) // MANY_TRIANGLES
-    for group in np.split(minor, np.flatnonzero(np.diff(total)) + 1):
-        if len(group) > 1:
-            yield group.tolist()
 
 
 def cut_to_pack(
