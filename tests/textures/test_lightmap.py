@@ -162,6 +162,16 @@ class TestOptions:
         ):
             coneflat.unwrap(*shapes.box(1), lightmap=256, **options)
 
+    @pytest.mark.parametrize(
+        "options", [{"lightmap": 16}, {"lightmap": 24}, {"lightmap": 64, "padding": 16.0}]
+    )
+    def test_a_padding_that_leaves_no_space_is_named(self, options):
+        with pytest.raises(
+            OptionError, match=r"^the padding of a lightmap must be below a quarter of its \d+ texels"
+        ):
+            coneflat.unwrap(*shapes.box(1), **options)
+        assert coneflat.unwrap(*shapes.box(1), **options | {"padding": 3.0}).settings["padding"] == 3.0
+
     def test_the_same_resolution_is_no_contradiction(self):
         assert coneflat.unwrap(*shapes.box(1), lightmap=256, resolution=256).settings["resolution"] == 256
 

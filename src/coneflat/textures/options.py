@@ -135,6 +135,17 @@ class UnwrapOptions(TextureOptions, SeamOptions, AtlasOptions, RunOptions):
                     f"{first_option} and {second_option} cannot be combined: leave out one of them"
                 )
 
+        if self.lightmap is not None and 4 * self._lightmap_padding >= self.lightmap:
+            raise OptionError(
+                f"the padding of a lightmap must be below a quarter of its {self.lightmap:,} texels, got "
+                f"{self._lightmap_padding:g}: give a smaller padding, or a larger lightmap"
+            )
+
+    @property
+    def _lightmap_padding(self) -> float:
+        """The texels between the charts of a lightmap."""
+        return self.padding if self._differs("padding") else LIGHTMAP_PADDING
+
     def _unfit_for_lightmaps(self) -> Iterator[str]:
         """Yield the options that a lightmap excludes: its charts are in one square, and no texels are shared."""
         if self.resolution != self.lightmap and self._differs("resolution"):
@@ -152,7 +163,7 @@ class UnwrapOptions(TextureOptions, SeamOptions, AtlasOptions, RunOptions):
         return replace(
             self,
             resolution=self.lightmap,
-            padding=self.padding if self._differs("padding") else LIGHTMAP_PADDING,
+            padding=self._lightmap_padding,
             block_size=self.block_size if self._differs("block_size") else LIGHTMAP_BLOCK,
         )
 
