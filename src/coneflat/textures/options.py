@@ -80,6 +80,8 @@ class TextureOptions:
         stack: mirrored: the two halves of a model that is mirrored vertex by vertex share their texels. It is cut along
             the mirror plane, which no face may cross. copies: components that are copies of each other, moved, rotated
             or mirrored, share their texels, as do the two sides of cloth.
+        search_time: Seconds after which the search for seams ends: the best layout by then is returned, with a note.
+            One layout of each component is computed in any case.
     """
 
     max_energy: float = option(MAX_ENERGY, Number(is_positive=True))
@@ -87,6 +89,7 @@ class TextureOptions:
     packing_cuts: float = option(PACKING_CUTS, strength(1.0))
     texel_density: float | None = option(None, Number(is_positive=True, optional=True))
     stack: str = option("none", Choice(("none", "mirrored", "copies")))
+    search_time: float | None = option(None, Number(0.0, optional=True))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base import FloatArray, IntArray, limit_threads, stage, timing, warns
+from ..base import (
+    FloatArray,
+    current_time,
+    limit_threads,
+    search_time,
+    stage,
+    timing,
+    warns,
+    within_time,
+)
 from ..base.progress import component_at_work
+from ..base.search_time import SearchTime
 from ..errors import ConvergenceError
 from ..evaluate import evaluate, packed_scale
 from ..flattening import Steps
@@ -37,16 +48,17 @@ from .options import ISOMETRIC, UnwrapOptions, options_of_stages
 from .pack_cuts import cut_for_packing, cut_into
 from .search import best_cut
 from .sharing import SharedTexels, with_shared_texels
-from .shortening import MANY_TRIANGLES, cut_further
+from .shortening import cut_further
 from .small_charts import join_small_charts
 from .stacked import without_copies
 from .straightening import straightened
+from .work import SearchWork, groups_of_minor
 
 # Components with less than this share of the area are cut together: 3,000 take 21 s instead of 140. With 0.05
 # instead, 26 models in one file take 40% less time, and their seams are 10% longer.
 MINOR_SHARE = 0.03
-# Fraction of the work that searches for the cuts; the rest packs and measures.
-SEARCHING = 0.8
+# Fractions of the work: checking, cuts for packing, and measuring the result. The rest searches for the cuts.
+CHECKING, PACKING_CUTS, FINISHING = 0.05, 0.15, 0.1
 # Triangles of a component from which several threads are faster than one.
 PARALLEL = 20_000
 # Newton steps of the exact metric: most meshes take 10, bad ones 100 and more.
@@ -110,7 +122,7 @@ class Unwrapper:
     def unwrap(self, **options: Any) -> Flattening:
         """Return the UVs; options and errors are those of `unwrap`."""
         parsed = read_options(options, UnwrapOptions)
-        with timing(parsed.progress):
+        with timing(parsed.progress), search_time(parsed.search_time):
             searched = self._searched.of(_search_key(parsed), lambda: search_cuts(self._source, parsed))
             return pack_searched(searched, parsed)
 
@@ -141,6 +153,7 @@ class Searched:
         models: the models of components that are no copies.
         candidates: the best candidate of each component that is not a copy.
         finished: candidates that were cut further, by their component and by the chart of each triangle before.
+        time: the time of the search, if it was limited.
     """
 
     prepared: Prepared
@@ -151,11 +164,18 @@ class Searched:
     models: Models
     candidates: Mapping[int, Candidate]
     finished: dict[tuple[int, bytes], Candidate] = field(default_factory=dict)
+    time: SearchTime | None = None
+
+    @property
+    def ended(self) -> SearchTime | None:
+        """The time of the search that was ended because it was up: for packing, or before; None if none was."""
+        return next((limit for limit in (current_time(), self.time) if limit and limit.is_ended), None)
 
 
 def unwrap_source(source: Source, options: UnwrapOptions) -> Flattening:
     """Return the UVs of a mesh by parsed options; see `unwrap`."""
-    return pack_searched(search_cuts(source, options), options)
+    with search_time(options.search_time):
+        return pack_searched(search_cuts(source, options), options)
 
 
 def search_cuts(source: Source, options: UnwrapOptions) -> Searched:
@@ -164,18 +184,19 @@ def search_cuts(source: Source, options: UnwrapOptions) -> Searched:
     The cut of each component is searched for (`search.py`): few cones and short seams for which the layout with free
     seams is within the bound of the energy.
     """
-    with stage("check"):
+    with component_at_work("", CHECKING), stage("check"):
         prepared, shared = _without_shared(source, options_of_stages(options), options.stack)
     components = along_sharp_edges(prepared.components)
     with _threads_for(components, options):
         with stage("layout"):
-            flat = lay_out_flat_components(components)
+            flat = lay_out_flat_components(components, max_triangles=np.inf)
         with stage("check"):
             # Copies cannot have different numbers of charts.
             is_counted = isinstance(options.charts, int)
             copies = [None] * len(components) if is_counted else find_copies(components, flat)
         models = _cut_models(components, copies, options)
-        return Searched(prepared, shared, components, flat, copies, models, _search(models, flat, components))
+        candidates = _search(models, flat, components)
+    return Searched(prepared, shared, components, flat, copies, models, candidates, time=current_time())
 
 
 def pack_searched(searched: Searched, options: UnwrapOptions) -> Flattening:
@@ -188,14 +209,15 @@ def pack_searched(searched: Searched, options: UnwrapOptions) -> Flattening:
         options_of_stages(options), options, components, prepared.checked.exponent
     )
     with _threads_for(components, options):
-        with stage("pack"):
+        with component_at_work("", PACKING_CUTS), stage("pack"):
             candidates = _cut_to_pack(searched, options, stage_options)
         with stage("measure"):
             layouts = _measured_layouts(candidates, searched.flat, components, searched.copies)
     stage_options = _with_least_resolution(stage_options, options, prepared, layouts)
-    result = evaluate(prepared, layouts, replace(stage_options, method=FREE))
+    with component_at_work("", FINISHING):
+        result = evaluate(prepared, layouts, replace(stage_options, method=FREE))
     energies = [candidate.energy for candidate in candidates.values()]
-    result = with_notes(result, options, energies, _count_forbidden(components, layouts))
+    result = with_notes(result, options, energies, _count_forbidden(components, layouts), searched.ended)
     return result if searched.shared is None else with_shared_texels(result, searched.shared, prepared)
 
 
@@ -273,18 +295,17 @@ def _search(
     within the bound, one by one.
     """
     sizes = np.array([len(component.faces) for component in components])
-    work = SEARCHING * sizes / sizes.sum()
     candidates = {
         i: Candidate(layout, ISOMETRIC, 0.0, 0.0, is_separated=True, keeps_points=True)
         for i, layout in flat.items()
     }
+    searched = [i for i in models if i not in flat]
+    work = SearchWork(int(sizes[searched].sum()), 1 - CHECKING - PACKING_CUTS - FINISHING)
     areas = _double_areas_of(components)
     is_minor = areas < MINOR_SHARE * areas.sum()
-    minor = [
-        i for i, model in models.items() if is_minor[i] and i not in flat and is_searchable_together(model)
-    ]
-    for group in _groups(np.array(minor, dtype=np.int64), sizes):
-        with component_at_work("", float(work[group].sum())), stage("search"):
+    minor = [i for i in searched if is_minor[i] and is_searchable_together(models[i])]
+    for group in groups_of_minor(np.array(minor, dtype=np.int64), sizes):
+        with work.at("", int(sizes[group].sum())):
             together = cuts_together([models[i] for i in group])
         candidates |= {
             i: replace(candidate, keeps_points=True)
@@ -294,22 +315,9 @@ def _search(
     alone = [i for i in models if i not in candidates]
     for number, i in enumerate(alone):
         place = f"component {number + 1:,} of {len(alone):,}" if len(alone) > 1 else ""
-        with component_at_work(place, float(work[i])), stage("search"):
+        with work.at(place, int(sizes[i])):
             candidates[i] = best_cut(models[i])
     return candidates
-
-
-def _groups(minor: IntArray, sizes: IntArray) -> Iterator[list[int]]:
-    """Yield groups of at least two minor components, with not many triangles.
-
-    Args:
-        minor: (k,) indices of components.
-        sizes: (c,) numbers of triangles of all components.
-    """
-    total = np.cumsum(sizes[minor]) // MANY_TRIANGLES
-    for group in np.split(minor, np.flatnonzero(np.diff(total)) + 1):
-        if len(group) > 1:
-            yield group.tolist()
 
 
 def _cut_to_pack(searched: Searched, options: UnwrapOptions, stage_options: Options) -> dict[int, Candidate]:
@@ -332,16 +340,21 @@ def _cut_to_pack(searched: Searched, options: UnwrapOptions, stage_options: Opti
     elif options.charts == "atlas" and options.up is None and np.isfinite(options.bound):
         gap = options.padding / stage_options.resolution
         layouts = cut_for_packing(layouts, costs, gap, options.packing_cuts)
-    areas, finished = _double_areas_of(searched.components), dict[int, Candidate]()
+    areas, finished, cache = _double_areas_of(searched.components), dict[int, Candidate](), searched.finished
     is_minor = areas < MINOR_SHARE * areas.sum()
     for i, layout in zip(order, layouts, strict=True):
         key = i, layout.chart.tobytes()
-        if len(searched.finished) >= MAX_FINISHED * len(order):
-            searched.finished.clear()
-        if key not in searched.finished:
+        candidate = cache.get(key)
+        if candidate is None:
             candidate = _finished(models[i], candidates[i], layout, options)
-            searched.finished[key] = candidate if is_minor[i] else straightened(models[i], candidate)
-        finished[i] = searched.finished[key]
+            if not is_minor[i]:
+                candidate = within_time(partial(straightened, models[i], candidate)) or candidate
+        finished[i] = candidate
+        if len(cache) >= MAX_FINISHED * len(order):
+            cache.clear()
+        # What was ended early is not taken again.
+        if searched.ended is None:
+            cache[key] = candidate
     return finished
 
 

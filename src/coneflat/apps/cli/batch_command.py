@@ -43,7 +43,7 @@ class BatchFlags:
         format: File format of the results.
         summary: File for the summary table, .csv.  [default: summary.csv in --out]
         jobs: Number of processes on this machine.  [default: the number of cores]
-        time_limit: Time limit per mesh in seconds.
+        time_limit: Time in seconds after which a mesh fails; --search-time ends its search with a result.
         dask: Address of a Dask scheduler whose cluster is used, for example tcp://host:8786.
         redo: Also flatten meshes that are done.
     """
@@ -98,6 +98,8 @@ def batch(
     if flags.jobs is not None and flags.dask is not None:
         raise click.UsageError("--jobs has no effect with --dask: leave out --jobs", context)
     options = _options(context, params)
+    if options.get("search_time") is not None and options["search_time"] >= flags.time_limit:
+        raise click.UsageError("--search-time must be below --time-limit, after which a mesh fails", context)
     parse_requirements(required, REPORTED)
     todo = find_jobs(patterns, flags.out.absolute(), f".{flags.format}", options, weld, required)
     make_folder(flags.out)
