@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from .base.progress import component_at_work
 from .cones import leaves_flat_disks
 from .errors import CurvatureError, MetricError, SeamError
-from .layout import lay_out_flat_disks
+from .layout import is_flat_inside, lay_out_flat_disks
 from .source.components import Component
 from .source.copies import Copy, copied
 from .stages import Layout, RelaxSpec
@@ -70,15 +70,23 @@ def groups_of_small(components: Mapping[int, Component], relax: RelaxSpec) -> li
     return groups
 
 
-def lay_out_flat_components(components: Sequence[Component]) -> dict[int, Layout]:
-    """Return the finished layouts of the small components that are flat disks and do not overlap themselves.
+def lay_out_flat_components(
+    components: Sequence[Component], max_triangles: float = SMALL_TRIANGLES
+) -> dict[int, Layout]:
+    """Return the finished layouts of components that are flat disks and do not overlap themselves.
 
     An isometry is their only flat metric without cones, so nothing is searched, solved or relaxed.
+
+    Args:
+        components: all components.
+        max_triangles: the number of triangles from which components are not considered.
     """
     candidates = [
         i
         for i, component in enumerate(components)
-        if len(component.faces) <= SMALL_TRIANGLES and _may_be_flat(component)
+        if len(component.faces) <= max_triangles
+        and _may_be_flat(component)
+        and (len(component.faces) <= SMALL_TRIANGLES or is_flat_inside(component.mesh, component.lengths))
     ]
     if not candidates:
         return {}

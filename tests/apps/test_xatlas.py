@@ -171,6 +171,16 @@ def test_invalid_options_are_named(options):
         atlas.generate(pack_options=ours.PackOptions(**options))
 
 
+def test_the_search_may_have_a_time():
+    atlas = ours.Atlas()
+    atlas.add_mesh(*shapes.sphere(2))
+    atlas.generate(ours.ChartOptions(search_time=0))
+    assert any("more than the 0 s for the search" in note for note in atlas.notes)
+    assert not (atlas.get_mesh(0)[2] < 0).any()
+    with pytest.raises(errors.OptionError, match="search_time must be a number, 0 or more, got -1"):
+        atlas.generate(ours.ChartOptions(search_time=-1))
+
+
 def test_the_size_of_a_texture_without_faces_is_checked():
     atlas = ours.Atlas()
     with pytest.raises(errors.OptionError, match="resolution must be an integer from 1"):

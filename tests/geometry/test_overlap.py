@@ -10,7 +10,7 @@ import shapes
 import coneflat
 from coneflat import errors
 from coneflat.atlas import separate_touching
-from coneflat.geometry import coverage
+from coneflat.geometry import coverage, overlap
 from coneflat.geometry.orientation import fill_orientations
 from coneflat.geometry.overlap import bounding_boxes, find_overlaps, has_overlaps
 
@@ -334,8 +334,13 @@ def test_bad_limit_is_refused():
         find_overlaps(np.zeros((1, 3, 2)), limit=0)
 
 
-def test_groups_with_overlaps_are_those_with_pairs():
-    """Groups may overlap one another, touch themselves, and have flipped and degenerate triangles."""
+@pytest.mark.parametrize("limit", [0, 2, 500])
+def test_groups_with_overlaps_are_those_with_pairs(monkeypatch, limit):
+    """Groups may overlap one another, touch themselves, and have flipped and degenerate triangles.
+
+    It makes no difference whether all pairs of a group are compared.
+    """
+    monkeypatch.setattr(overlap, "MAX_COMPARED", limit)
     random = np.random.default_rng(3)
     groups = [random.integers(0, 7, (int(random.integers(1, 5)), 3, 2)).astype(float) for _ in range(300)]
     starts = np.cumsum([0, *map(len, groups)])

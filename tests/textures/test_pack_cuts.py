@@ -17,6 +17,7 @@ from coneflat.mesh import label_faces
 from coneflat.options import Options
 from coneflat.retries import lay_out_with_thick_triangles
 from coneflat.source import Source
+from coneflat.textures import pack_cuts
 from coneflat.textures.pack_cuts import MIN_PIECE, SHARE, cut_for_packing
 
 GAP = 2 / 1024
@@ -204,3 +205,11 @@ def test_scale_motion_and_numbering_change_nothing():
 def test_with_a_gap_that_leaves_no_space_nothing_is_cut():
     layout, costs = layout_of(*grid(plus, 20))
     assert cut_for_packing([layout, layout, layout], lambda _: costs, 0.6, 1.0)[0] is layout
+
+
+def test_layouts_without_seams_are_only_packed(monkeypatch):
+    """With a strength below 1, no cut of them is allowed, so that none is searched for."""
+    monkeypatch.setattr(pack_cuts, "_largest_charts", lambda *_: pytest.fail("cuts are searched for"))
+    assert unwrap(*shapes.grid(6)).distortion.charts == 1
+    with pytest.raises(pytest.fail.Exception):
+        unwrap(*shapes.grid(6), packing_cuts=1.0)

@@ -21,7 +21,18 @@ from .defaults import (
 from .entry_points import EntryPoint
 from .formats import Use, endings, with_formats
 from .notes import Unmet, inner_calls, warn_of, warns
-from .progress import Progress, Stopwatch, cancel_with, check_cancelled, report_detail, stage, timing
+from .progress import (
+    Progress,
+    Stopwatch,
+    begin_step,
+    cancel_with,
+    check_cancelled,
+    part_of_work,
+    report_detail,
+    stage,
+    timing,
+)
+from .search_time import current_time, each_within_time, is_time_up, portion_of_time, search_time, within_time
 from .text import MAX_LISTED, exit_text, list_some, plural, printable, short_repr
 from .threads import THREADS, limit_threads
 
@@ -44,10 +55,11 @@ if TYPE_CHECKING:
 __all__ = [
     "BAKED_RESOLUTION", "BoolArray", "CHECKER_CELLS", "ComplexArray", "DISTORTION", "DOTS_PER_INCH", "EntryPoint",
     "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE", "MAX_LISTED", "MIN_CONE_ANGLE", "Progress", "Stopwatch",
-    "THREADS", "TYPED_TOLERANCE", "Unmet", "Use", "as_floats", "as_indices", "cache_folder", "cancel_with",
-    "check_cancelled", "compilation", "compiled", "dots", "endings", "exit_text", "has_any", "inner_calls",
-    "limit_threads", "list_some", "mask_of", "plural", "printable", "report_detail", "short_repr", "stage", "timing",
-    "unit_exponent", "warn_of", "warns", "with_formats",
+    "THREADS", "TYPED_TOLERANCE", "Unmet", "Use", "as_floats", "as_indices", "begin_step", "cache_folder",
+    "cancel_with", "check_cancelled", "compilation", "compiled", "current_time", "dots", "each_within_time", "endings",
+    "exit_text", "has_any", "inner_calls", "is_time_up", "limit_threads", "list_some", "mask_of", "part_of_work",
+    "plural", "portion_of_time", "printable", "report_detail", "search_time", "short_repr", "stage", "timing",
+    "unit_exponent", "warn_of", "warns", "with_formats", "within_time",
 ]  # fmt: skip
 
 

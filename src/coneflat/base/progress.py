@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
 from ..errors import OptionError
+from .search_time import check_time
 
 #: Called with a text on the current step and the fraction of the total work that is done.
 Progress = Callable[[str, float], None]
@@ -15,6 +17,10 @@ Progress = Callable[[str, float], None]
 # Approximate fraction of the work on a component that is done when a stage ends. Layouts of all components are computed
 # first ("layout" ends this work), then finished ("atlas" ends that).
 DONE_AFTER = {"cones": 0.5, "metric": 0.8, "cut": 0.9, "layout": 1.0, "relax": 0.2, "atlas": 1.0}
+
+# Fraction of what is left of a part of the work that counts as done after a step of an iteration, and the seconds
+# between reports of steps.
+STEP_SHARE, STEP_INTERVAL = 0.1, 0.1
 
 _ask: ContextVar[Callable[[], None] | None] = ContextVar("coneflat_ask", default=None)
 _stopwatch: ContextVar[Stopwatch | None] = ContextVar("coneflat_stopwatch", default=None)
@@ -34,10 +40,22 @@ def cancel_with(ask: Callable[[], None]) -> Iterator[None]:
 
 
 def check_cancelled() -> None:
-    """Call the function that `cancel_with` has set, if any; it raises an exception to cancel the computation."""
+    """Call the function that `cancel_with` has set, if any; it raises an exception to cancel the computation.
+
+    Work within `within_time` is also ended here.
+    """
     ask = _ask.get()
     if ask is not None:
         ask()
+    check_time()
+
+
+def begin_step() -> None:
+    """Begin a step of an iteration of unknown length: progress moves, and the computation may be cancelled."""
+    check_cancelled()
+    stopwatch = _stopwatch.get()
+    if stopwatch is not None:
+        stopwatch.step()
 
 
 @contextmanager
@@ -79,6 +97,22 @@ def report_detail(detail: str) -> None:
 
 
 @contextmanager
+def part_of_work(share: float, detail: str = "") -> Iterator[None]:
+    """Report the progress of the block as that of a part of the enclosing block, or of the stage that is running.
+
+    Args:
+        share: fraction of the work that is left in the enclosing block.
+        detail: what is done, for the progress.
+    """
+    stopwatch = _stopwatch.get()
+    if stopwatch is None:
+        yield
+        return
+    with stopwatch.part(share, detail):
+        yield
+
+
+@contextmanager
 def component_at_work(place: str, share: float) -> Iterator[None]:
     """Report the progress of the stages in the block as that of a component.
 
@@ -115,10 +149,12 @@ class Stopwatch:
                 f"progress must be a function of a text and a fraction, got {type(progress).__name__}"
             )
         self.seconds: dict[str, float] = {}
-        self.done = self.share = self._within = 0.0
-        self.component = self._name = ""
+        self.done = self.share = self._within = self._reported = 0.0
+        self.component = self._name = self._detail = ""
         self.is_running = False
         self._progress = progress
+        # Where the part that is running ends, as a fraction of the work of the component, and its last report.
+        self._end, self._last_report, self._thread = 1.0, 0.0, threading.get_ident()
 
     @contextmanager
     def __call__(self, name: str, until: float = 0.0) -> Iterator[None]:
@@ -126,8 +162,9 @@ class Stopwatch:
 
         until: approximate fraction of the current component that is done when the stage ends.
         """
-        self._name = name
+        self._name, self._detail = name, ""
         self.report()
+        self._end = max(until or 1.0, self._within)
         start = time.perf_counter()
         token = _stopwatch.set(self)
         self.is_running = True
@@ -137,11 +174,40 @@ class Stopwatch:
             self.is_running = False
             _stopwatch.reset(token)
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
-        self._within = until
+        self._within = max(self._within, until)
+
+    @contextmanager
+    def part(self, share: float, detail: str = "") -> Iterator[None]:
+        """Report the block as a part of the work; arguments as of `part_of_work`."""
+        if not self._is_reporting:
+            yield
+            return
+        end, outer_detail = self._end, self._detail
+        self._end = self._within + share * (end - self._within)
+        self._detail = detail or outer_detail
+        if detail:
+            self.report(detail)
+        try:
+            yield
+        finally:
+            self._within, self._end, self._detail = self._end, end, outer_detail
+
+    def step(self) -> None:
+        """Count a step of an iteration as done, and report it unless another was reported just now."""
+        if not self._is_reporting:
+            return
+        self._within += STEP_SHARE * (self._end - self._within)
+        if time.perf_counter() - self._last_report > STEP_INTERVAL:
+            self.report(self._detail)
+
+    @property
+    def _is_reporting(self) -> bool:
+        """Whether progress is reported at all, in this thread, for a stage that is running."""
+        return self._progress is not None and self.is_running and threading.get_ident() == self._thread
 
     def begin_component(self, place: str, share: float) -> None:
         """Report what follows as work on a component; arguments as of `component_at_work`."""
-        self._within, self.component, self.share = 0.0, place, share
+        self._within, self._end, self.component, self.share = 0.0, 1.0, place, share
 
     def end_component(self) -> None:
         """Count the current component as done."""
@@ -152,9 +218,9 @@ class Stopwatch:
         """Report the current stage and the fraction done to the callback, with an optional detail."""
         if self._progress is not None:
             place = ", ".join(filter(None, [self._name, self.component]))
-            self._progress(
-                f"{place}: {detail}" if detail else place, min(self.done + self.share * self._within, 1.0)
-            )
+            self._last_report = time.perf_counter()
+            self._reported = max(self._reported, min(self.done + self.share * self._within, 1.0))
+            self._progress(f"{place}: {detail}" if detail else place, self._reported)
 
 
 def stage_seconds() -> dict[str, float]:

@@ -29,6 +29,8 @@ from .orientation import counterclockwise, orientation
 
 # Relative to the largest coordinate: smaller coordinates count as 0, so that products do not underflow.
 MIN_COORDINATE = 2.0**-420
+# Largest number of triangles of a group all pairs of which are compared.
+MAX_COMPARED = 500
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +112,8 @@ def overlaps_of_mesh(edge_halfedges: IntArray, corners: FloatArray) -> Overlaps:
 def has_overlaps(corners: FloatArray, starts: IntArray) -> BoolArray:
     """Return (k,) whether triangles of the same group overlap; for many small groups, which may overlap each other.
 
+    All pairs of a small group are compared, those of a large one as by `find_overlaps`.
+
     Args:
         corners: (m, 3, 2) corners of the triangles in the plane.
         starts: (k + 1,) the first triangle of each group, and m.
@@ -119,7 +123,13 @@ def has_overlaps(corners: FloatArray, starts: IntArray) -> BoolArray:
     flat = np.ascontiguousarray(oriented).reshape(-1, 6)
     boxes = np.empty((len(flat), 4))
     fill_boxes(flat, 1.0, 0.0, 0.0, boxes)
-    return find_overlapping_groups(flat, signs != 0, boxes, starts, np.empty(12))
+    first, end = starts[:-1], starts[1:]
+    is_large = end - first > MAX_COMPARED
+    compared = first, np.where(is_large, first, end)
+    is_overlapping = find_overlapping_groups(flat, signs != 0, boxes, *compared, np.empty(12))
+    for group in np.flatnonzero(is_large).tolist():
+        is_overlapping[group] = len(find_overlaps(corners[first[group] : end[group]], limit=1).pairs) > 0
+    return is_overlapping
 
 
 def _overlaps(oriented: FloatArray, exponent: int, chosen: IntArray, limit: int | None) -> Overlaps:
@@ -306,7 +316,12 @@ def _lies_outside(corners: FloatArray, first: int, second: int, parts: FloatArra
 
 @compiled
 def find_overlapping_groups(
-    corners: FloatArray, has_area: BoolArray, boxes: FloatArray, starts: IntArray, parts: FloatArray
+    corners: FloatArray,
+    has_area: BoolArray,
+    boxes: FloatArray,
+    starts: IntArray,
+    ends: IntArray,
+    parts: FloatArray,
 ) -> BoolArray:
     """Return (k,) whether two triangles of the same group overlap, by comparing all pairs of each group.
 
@@ -314,13 +329,13 @@ def find_overlapping_groups(
         corners: (m, 6) corners of the triangles, counterclockwise.
         has_area: (m,) False for triangles that cover nothing.
         boxes: (m, 4) their boxes x0, y0, -x1, -y1.
-        starts: (k + 1,) the first triangle of each group.
+        starts, ends: (k,) the first triangle of each group, and the first after it.
         parts: (12,) buffer for exact sums.
     """
-    is_overlapping = np.zeros(len(starts) - 1, np.bool_)
+    is_overlapping = np.zeros(len(starts), np.bool_)
     for group in range(len(is_overlapping)):
-        for first in range(starts[group], starts[group + 1]):
-            for second in range(first + 1, starts[group + 1]):
+        for first in range(starts[group], ends[group]):
+            for second in range(first + 1, ends[group]):
                 if (
                     not is_overlapping[group]
                     and has_area[first]

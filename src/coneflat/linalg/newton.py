@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from ..base.arrays import FloatArray
-from ..base.progress import check_cancelled
+from ..base.progress import begin_step
 from ..errors import MetricError
 
 # Relative size of a step that does not change the variables in floating point.
@@ -140,7 +140,7 @@ def _search_line(
         variables = point.variables + length * step
         if np.array_equal(variables, point.variables):  # shorter than rounding
             return None
-        check_cancelled()
+        begin_step()
         trial = function.evaluate(variables)
         is_short = float(trial.residual @ step) >= 0
         if (is_short or trial.largest <= best_gradient / 2) and trial.is_admissible:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base import BoolArray, ComplexArray, FloatArray, check_cancelled
+from ..base import BoolArray, ComplexArray, FloatArray, begin_step
 from ..errors import MetricError
 from ..linalg import Factor, factorize
 from ..linalg.newton import ARMIJO, HALVINGS
@@ -136,7 +136,7 @@ def reach_constraints(
     before = after = float(elements.energies(energy, maps).sum())
     factor: Factor | None = None
     while taken < steps and remaining:
-        check_cancelled()
+        begin_step()
         _, step, factor = newton_step(problem, maps, factor, _size(points, steps), remaining)
         taken += 1
         change = elements.change(step)
@@ -186,7 +186,7 @@ def minimise_energy(
             elements, energies = elements.of_parts(active), energies[active]
             problem = replace(problem, elements=elements)
             maps, active, factor = elements.maps(places), np.ones(elements.parts, dtype=bool), None
-        check_cancelled()
+        begin_step()
         ceiling = np.where(active, RELATIVE_ROUNDING * energies, np.inf)
         step, slope, factor = falling_step(problem, maps, factor, _size(points, steps), ceiling)
         is_last = -slope <= tolerance * (energies - energy.minimum * elements.sums(elements.weight))

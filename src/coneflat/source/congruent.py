@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import permutations
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..base.arrays import FloatArray, IntArray
 from ..mesh.connectivity import TriangleMesh
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 # Largest number of faces of a mesh, for each order of their corners, that are compared with one of the other mesh.
 # More have the same shape and place only on symmetric meshes, where most of them fit.
@@ -48,6 +51,8 @@ def congruence(first: TriangleMesh, second: TriangleMesh, rounding: float) -> Co
     radii, image_radii = (np.linalg.norm(centred, axis=1) for centred in (points, images))
     if not np.allclose(np.sort(radii), np.sort(image_radii), rtol=0, atol=tolerance):
         return None
+    from scipy.spatial import cKDTree
+
     tree = cKDTree(images)
     trials = list(_fitting_corners(first.faces, second.faces, points, images, tolerance))
     for sign in (1.0, -1.0):

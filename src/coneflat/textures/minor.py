@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from ..base import BoolArray, FloatArray, IntArray, check_cancelled
+from ..base import BoolArray, FloatArray, IntArray, check_cancelled, is_time_up, part_of_work, within_time
 from ..geometry import double_areas, find_overlaps, signed_double_areas
 from ..linalg import factorize
 from ..mesh import open_along, tie_key
@@ -19,10 +21,11 @@ from .candidates import TOLERANCE, Candidate, CutModel
 from .free_seams import laid_out
 from .options import ENERGY_PER_AREA, ISOMETRIC
 from .search import FIRST_DISTORTION
-from .shortening import MANY_TRIANGLES
 
 # Number of times that cones are added.
 MAX_ROUNDS = 12
+# Fraction of the work that is left, for the progress, that a round is.
+ROUND_SHARE = 0.3
 
 
 def is_searchable_together(model: CutModel) -> bool:
@@ -32,19 +35,6 @@ def is_searchable_together(model: CutModel) -> bool:
         and not is_large(model.component)
         and not model.component.seams.is_forbidden.any()
     )
-
-
-def groups_to_search(minor: IntArray, sizes: IntArray) -> Iterator[list[int]]:
-    """Yield groups of at least two minor components, with not many triangles.
-
-    Args:
-        minor: (k,) indices of components.
-        sizes: (c,) numbers of triangles of all components.
-    """
-    total = np.cumsum(sizes[minor]) // MANY_TRIANGLES
-    for group in np.split(minor, np.flatnonzero(np.diff(total)) + 1):
-        if len(group) > 1:
-            yield group.tolist()
 
 
 def cuts_together(models: Sequence[CutModel]) -> list[Candidate | None]:
@@ -58,6 +48,21 @@ def cuts_together(models: Sequence[CutModel]) -> list[Candidate | None]:
     """
     group = _MinorComponents(models)
     return group.candidates_from(group.first_cones())
+
+
+@dataclass(frozen=True, eq=False)
+class _Cut:
+    """A cut of all components with n vertices and m faces, and their layout.
+
+    Attributes:
+        cones: (n,) the flagged cones.
+        seams: (k,) the edges that are cut.
+        places: (m, 3, 2) the corners in the plane.
+    """
+
+    cones: BoolArray
+    seams: IntArray
+    places: FloatArray
 
 
 class _MinorComponents:
@@ -97,42 +102,45 @@ class _MinorComponents:
         """Return a candidate for each component whose cones include flagged ones (n,); None if above the bound."""
         bound, count = self._bound, len(self._models)
         first = max(FIRST_DISTORTION, (bound.allowed / ENERGY_PER_AREA) ** 0.5)
-        distortion, energies = np.full(count, first), np.full(count, np.inf)
-        places = np.zeros((len(self._component_of_face), 3, 2))
-        for _ in range(MAX_ROUNDS):
+        cut = _Cut(cones, np.empty(0, dtype=np.int64), np.zeros((len(self._component_of_face), 3, 2)))
+        energies, distortion = np.full(count, np.inf), np.full(count, first)
+        for number in range(MAX_ROUNDS):
             is_open = energies > bound.largest
             if not is_open.any():
                 break
-            cones, distortion = self._with_more_cones(cones, is_open, distortion)
-            seams = find_seams(
-                self._mesh,
-                np.flatnonzero(cones),
-                self._costs,
-                self._is_avoided,
-                kept_holes=self._kept_holes,
-            )
-            places = self._with_laid_out(open_along(self._mesh, seams).mesh, places, is_open)
-            energies = self._energies(places)
+            with part_of_work(ROUND_SHARE, f"round {number + 1}"):
+                search = partial(self._cut_further, cut, is_open, distortion)
+                result = within_time(search) if number else search()
+            if result is None:
+                break
+            cut, distortion = result
+            energies = self._energies(cut.places)
             # The energy above that of an isometry is about a multiple of the square of the distortion.
             above = np.maximum(energies, bound.largest) - ISOMETRIC
             distortion *= np.sqrt(np.clip(bound.allowed / above, 0.5, 0.98))
-        return self._separate_candidates(places, seams, np.flatnonzero(cones), energies, distortion)
+        return self._separate_candidates(cut, energies, distortion)
+
+    def _cut_further(self, cut: _Cut, is_open: BoolArray, distortion: FloatArray) -> tuple[_Cut, FloatArray]:
+        """Return a cut with more cones in open components (c,), and the distortions (c,) for given ones."""
+        cones, distortion = self._with_more_cones(cut.cones, is_open, distortion)
+        seams = find_seams(
+            self._mesh, np.flatnonzero(cones), self._costs, self._is_avoided, kept_holes=self._kept_holes
+        )
+        disk = open_along(self._mesh, seams).mesh
+        return _Cut(cones, seams, self._with_laid_out(disk, cut.places, is_open)), distortion
 
     def _separate_candidates(
-        self,
-        places: FloatArray,
-        seams: IntArray,
-        cones: IntArray,
-        energies: FloatArray,
-        distortion: FloatArray,
+        self, cut: _Cut, energies: FloatArray, distortion: FloatArray
     ) -> list[Candidate | None]:
         """Return the candidate of each component without overlaps; None if its energy is above the bound.
 
+        If the time of the search is up, candidates above the bound are returned as well, unless they are flipped.
+
         Args:
-            places: (m, 3, 2) the corners in the plane.
-            seams, cones: (k,), (s,) those of all components.
+            cut: the cut of all components.
             energies, distortion: (c,) of each component.
         """
+        places, seams, cones = cut.places, cut.seams, np.flatnonzero(cut.cones)
         width = 2 * np.abs(places).max() * self._component_of_face
         pairs = find_overlaps(places + np.stack([width, 0 * width], axis=1)[:, None]).pairs
         overlapping = set(self._component_of_face[pairs[:, 0]].tolist())
@@ -141,13 +149,15 @@ class _MinorComponents:
         cones_of = np.split(cones, np.searchsorted(cones, self._first_vertex[1:-1]))
         candidates = list[Candidate | None]()
         for i, model in enumerate(self._models):
-            cut = seams_of[i] - self._first_edge[i], cones_of[i] - self._first_vertex[i]
-            layout = laid_out(model.component.mesh, model.component.lengths, places_of[i], *cut)
+            marks = seams_of[i] - self._first_edge[i], cones_of[i] - self._first_vertex[i]
+            layout = laid_out(model.component.mesh, model.component.lengths, places_of[i], *marks)
             cost, is_separated = model.cost_of(layout), i not in overlapping
             candidate = Candidate(layout, float(energies[i]), cost, float(distortion[i]), is_separated)
             if not is_separated:
-                candidate = model.settled(model.separated(candidate))
-            candidates.append(candidate if model.is_within(candidate) else None)
+                separated = model.separated(candidate)
+                candidate = within_time(partial(model.settled, separated)) or separated
+            suffices = model.is_within(candidate) or (np.isfinite(energies[i]) and is_time_up())
+            candidates.append(candidate if suffices else None)
         return candidates
 
     def _with_laid_out(self, disk: TriangleMesh, places: FloatArray, is_open: BoolArray) -> FloatArray:

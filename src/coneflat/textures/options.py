@@ -90,6 +90,8 @@ class TextureOptions:
         lightmap: Texels along a side of a lightmap, instead of a resolution. Charts are 6 texels apart, enough
             for half the resolution, and begin at corners of blocks of 4 texels, unless padding or block_size are given.
             No texels are shared, and a .glb has the UVs as its second set.
+        search_time: Seconds after which the search for seams ends: the best layout by then is returned, with a note.
+            One layout of each component is computed in any case.
     """
 
     max_energy: float = option(MAX_ENERGY, Number(is_positive=True))
@@ -98,6 +100,7 @@ class TextureOptions:
     texel_density: float | None = option(None, Number(is_positive=True, optional=True))
     stack: str = option("none", Choice(("none", "mirrored", "copies")))
     lightmap: int | None = option(None, Number(1, MAX_RESOLUTION, is_integer=True, optional=True))
+    search_time: float | None = option(None, Number(0.0, optional=True))
 
 
 @dataclass(frozen=True, kw_only=True)

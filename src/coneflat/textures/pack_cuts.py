@@ -11,11 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ..atlas import ChartLayout, Effort, Outlines, as_disk, pack_outlines, square_angle, with_charts
-from ..base import FloatArray, check_cancelled
+from ..base import FloatArray, check_cancelled, part_of_work, within_time
 from ..errors import OptionError
 from ..stages import Layout
 from .chart_pieces import MAX_CUTS, Cut, Outline, Piece
@@ -31,6 +32,8 @@ PRICE, SHARE = 0.1, 0.15
 MIN_PIECE, MAX_CHARTS = 0.02, 32
 # Sets of charts that are continued per step of the beam search, and steps without a gain after which it ends.
 CONTINUED, PATIENCE = 2, 2
+# Fraction of the work that is left, for the progress, that a step is.
+STEP_SHARE = 0.25
 QUICK = Effort(columns=128, tries=12)
 
 
@@ -49,14 +52,15 @@ def cut_for_packing(
         gap: minimum distance between charts, relative to the side of the square.
         strength: from 0, for no cuts, to 1.
     """
-    if strength == 0:
+    is_cut = [len(layout.seams) > 0 for layout in layouts]
+    seams = np.array([_seam_cost(layout, costs(i)) if is_cut[i] else 0.0 for i, layout in enumerate(layouts)])
+    if strength == 0 or not (seams.any() or strength == 1):
         return list(layouts)
     charts = _largest_charts(layouts, costs)
     area = sum(chart.area for chart in charts)
     if not area > 0:
         return list(layouts)
     borders = sum(float(chart.border_costs[np.isfinite(chart.border_costs)].sum()) for chart in charts)
-    seams = np.array([_seam_cost(layout, costs(i)) for i, layout in enumerate(layouts)])
     search = _BeamSearch(area, max(SHARE * borders, area**0.5), seams, strength, gap)
     return with_pieces(layouts, charts, search.best_from(charts).pieces)
 
@@ -83,13 +87,18 @@ def cut_into(layouts: Sequence[Layout], costs: Callable[[int], FloatArray], coun
     pieces, missing = list(charts), count - sum(count_charts(layout, min_chart) for layout in layouts)
     while missing > 0:
         check_cancelled()
-        cuts = [min(piece.cuts, key=lambda cut: cut.score) for piece in pieces if piece.cuts]
+        cuts = within_time(partial(_shortest_cuts, pieces))
         if not cuts:
             break
         best = min(cuts, key=lambda cut: cut.score)
         pieces = [piece for piece in pieces if piece is not best.piece] + list(best.pieces)
         missing -= len(best.pieces) - 1
     return with_pieces(layouts, charts, pieces)
+
+
+def _shortest_cuts(pieces: Sequence[Piece]) -> list[Cut]:
+    """Return the shortest cut of each piece that has any, relative to the root of the area that it separates."""
+    return [min(piece.cuts, key=lambda cut: cut.score) for piece in pieces if piece.cuts]
 
 
 def _largest_charts(
@@ -197,11 +206,16 @@ class _BeamSearch:
         states, without_gain = [best], 0
         while states and without_gain < PATIENCE:
             check_cancelled()
-            states = [trial.state_after() for trial in self._best_trials(states)]
+            with part_of_work(STEP_SHARE, "cuts for packing"):
+                states = within_time(partial(self._states_after, states)) or []
             without_gain += 1
             if states and states[0].value > best.value:
                 best, without_gain = states[0], 0
         return best
+
+    def _states_after(self, states: Sequence[_State]) -> list[_State]:
+        """Return the best states after one further cut of given ones."""
+        return [trial.state_after() for trial in self._best_trials(states)]
 
     def _best_trials(self, states: Sequence[_State]) -> list[_Trial]:
         """Return the trials with the largest values of one further cut of each state."""

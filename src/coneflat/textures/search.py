@@ -11,12 +11,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from ..base import mask_of
+from ..base import mask_of, part_of_work, within_time
 from ..cones import MAX_POLYHEDRON_CORNERS, MAX_SEARCHED, with_corners
 from ..errors import CurvatureError, MetricError, SeamError
+from ..geometry import triangle_energies
+from ..layout import NEARLY_FLAT, is_flat_inside, lay_out_flat_disks
 from ..seams import NO_EDGES, find_seams, without_loose_ends
 from ..source import coarse_component, is_large
 from ..stages import VertexCurvatures
@@ -38,6 +41,11 @@ COARSE_EXCESS = 0.15
 # Energy above the bound, relative to what is allowed above that of an isometry, from which a candidate is given up.
 # Moving the tips of those hardly ever succeeds: trying it takes a tenth more time for seams shorter by 0.5%.
 MAX_EXCESS = 0.2
+# Fractions of the work that is left, for the progress: of the search on a coarse mesh, of the layout with its cones, of
+# the search for cones, and of a further candidate.
+COARSE_SHARE, LAYOUT_SHARE, SEARCH_SHARE, CANDIDATE_SHARE = 0.15, 0.5, 0.8, 0.35
+# Energy above that of an isometry that is due to rounding.
+ISOMETRIC_ROUNDING = 1e-9
 #: Errors of a candidate, after which others are tried: with opened holes, or without a coarse mesh.
 FAILURES = CurvatureError, MetricError, SeamError
 
@@ -50,6 +58,9 @@ def best_cut(model: CutModel) -> Candidate:
     Raises:
         CurvatureError, MetricError, SeamError: a candidate could not be laid out.
     """
+    isometric = _without_distortion(model)
+    if isometric is not None:
+        return isometric
     if not model.bound.is_finite:
         return _best_of_variants(model, _with_fewest_seams)[1]
     if not is_large(model.component) or model.component.seams.is_forbidden.any():
@@ -62,10 +73,25 @@ def best_cut(model: CutModel) -> Candidate:
         # The bound is too low, or the surface too noisy, for the cones of a coarse mesh.
         candidate = _best_of_searched(variant, [candidate])
         if variant.component.keeps_holes and not model.is_within(candidate):
-            candidate = _best_within(model, candidate, _best_of_searched(model.with_holes(False)))
+            opened_candidate = within_time(lambda: _best_of_searched(model.with_holes(False)))
+            candidate = _best_within(model, candidate, opened_candidate or candidate)
         return candidate
     variant.surface.close_search()
     return model.separated(candidate)
+
+
+def _without_distortion(model: CutModel) -> Candidate | None:
+    """Return the candidate that is isometric without seams, if there is one: none is better."""
+    mesh, lengths = model.component.mesh, model.component.lengths
+    if not is_flat_inside(mesh, lengths, NEARLY_FLAT):
+        return None
+    (layout,) = lay_out_flat_disks([mesh], [lengths], [model.component.metric.keeps_length], NEARLY_FLAT)
+    if layout is None:
+        return None
+    energy = float(triangle_energies(lengths, layout.points[layout.corners]).sum() / layout.area)
+    if energy > ISOMETRIC + ISOMETRIC_ROUNDING:
+        return None
+    return Candidate(layout, energy, 0.0, 0.0, is_separated=True, keeps_points=True)
 
 
 def _best_of_variants(model: CutModel, search: Callable[[CutModel], Candidate]) -> tuple[CutModel, Candidate]:
@@ -83,8 +109,8 @@ def _best_of_variants(model: CutModel, search: Callable[[CutModel], Candidate]) 
     if model.is_within(candidate) and _is_cheapest(model, candidate):
         return variant, candidate
     with suppress(*FAILURES):
-        opened_candidate = search(opened)
-        if _best_within(model, candidate, opened_candidate) is opened_candidate:
+        opened_candidate = within_time(lambda: search(opened))
+        if opened_candidate and _best_within(model, candidate, opened_candidate) is opened_candidate:
             return opened, opened_candidate
     return variant, candidate
 
@@ -125,12 +151,17 @@ def _from_coarse(model: CutModel) -> tuple[CutModel, Candidate]:
     """Return the variant of a component that is better on a coarse mesh, and a candidate with the best cones there."""
     coarse, vertices = coarse_component(model.component)
     bound = EnergyBound(model.bound.plus(COARSE_EXCESS), model.bound.by_area)
-    coarse_variant, best = _best_of_variants(CutModel(coarse, bound, model.steps), _best_of_searched)
+    with part_of_work(COARSE_SHARE, "on a coarse mesh"):
+        coarse_variant, best = _best_of_variants(CutModel(coarse, bound, model.steps), _best_of_searched)
     variant = model.with_holes(coarse_variant.component.keeps_holes)
     cones = vertices[best.layout.cones]
     prescribed = VertexCurvatures(cones, np.full(len(cones), np.nan))
-    layout = variant.laid_out(replace(model.component.cones, strategy="prescribed", prescribed=prescribed))
-    candidate = variant.candidate(layout, layout.statistics.area_distortion_linear, settles=True)
+    with part_of_work(LAYOUT_SHARE, "layout"):
+        layout = variant.laid_out(
+            replace(model.component.cones, strategy="prescribed", prescribed=prescribed)
+        )
+    with part_of_work(SEARCH_SHARE, "relaxing"):
+        candidate = variant.candidate(layout, layout.statistics.area_distortion_linear, settles=True)
     excess = candidate.energy - model.bound.largest
     if 0 < excess <= MAX_EXCESS * model.bound.allowed:
         candidate = shortened(variant, candidate)
@@ -139,11 +170,12 @@ def _from_coarse(model: CutModel) -> tuple[CutModel, Candidate]:
 
 def _best_of_searched(model: CutModel, earlier: Sequence[Candidate] = ()) -> Candidate:
     """Return the best of the candidates that searches for an area distortion give, and of earlier ones."""
-    candidates = _by_distortion(model, earlier)
+    with part_of_work(SEARCH_SHARE):
+        candidates = _by_distortion(model, earlier)
     if all(len(candidate.layout.seams) or not model.is_within(candidate) for candidate in candidates):
-        candidates += _at_corners(model)
+        candidates += within_time(lambda: _at_corners(model)) or []
     promising = [
-        model.separated(candidate)
+        within_time(partial(model.separated, candidate)) or candidate
         for candidate in candidates
         if candidate.energy <= model.bound.plus(MAX_EXCESS)
     ]
@@ -163,18 +195,34 @@ def _by_distortion(model: CutModel, earlier: Sequence[Candidate]) -> list[Candid
         distortion = _next_distortion(model.bound, candidates, tries)
         if distortion is None:
             break
-        layout = model.laid_out(replace(model.component.cones, distortion=distortion))
-        reached = layout.statistics.area_distortion_linear
-        repeated = [i for i, old in enumerate(candidates) if np.array_equal(old.layout.cones, layout.cones)]
-        candidate = candidates.pop(repeated[0]) if repeated else model.candidate(layout, distortion)
-        is_within = model.is_within(candidate)
-        if repeated and not is_within:
-            distortion = min(distortion, reached)
+        with part_of_work(CANDIDATE_SHARE, f"candidate {tries + 1}"):
+            search = partial(_for_distortion, model, distortion, candidates)
+            result = within_time(search) if candidates else search()
+        if result is None:
+            break
+        candidate, reached = result
+        is_within, is_repeated = model.is_within(candidate), candidate in candidates
+        if is_repeated:
+            candidates.remove(candidate)
+            distortion = distortion if is_within else min(distortion, reached)
         candidates.append(replace(candidate, distortion=distortion))
-        has_all_cones = not is_within and distortion < reached and len(layout.cones) >= MAX_SEARCHED
-        if has_all_cones or (repeated and (is_within or distortion < reached)):
+        has_all_cones = not is_within and distortion < reached and len(candidate.layout.cones) >= MAX_SEARCHED
+        if has_all_cones or (is_repeated and (is_within or distortion < reached)):
             break  # The search finds no others.
     return candidates
+
+
+def _for_distortion(
+    model: CutModel, distortion: float, candidates: Sequence[Candidate]
+) -> tuple[Candidate, float]:
+    """Return the candidate with the cones for an area distortion, and the area distortion that they reach.
+
+    If one of the given candidates has the same cones, it is returned itself.
+    """
+    layout = model.laid_out(replace(model.component.cones, distortion=distortion))
+    repeated = (old for old in candidates if np.array_equal(old.layout.cones, layout.cones))
+    candidate = next(repeated, None) or model.candidate(layout, distortion)
+    return candidate, layout.statistics.area_distortion_linear
 
 
 def _next_distortion(bound: EnergyBound, candidates: Sequence[Candidate], tries: int) -> float | None:

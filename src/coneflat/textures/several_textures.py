@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base import Unmet, timing, warns
+from ..base import Unmet, search_time, timing, warns
 from ..errors import OptionError
 from ..geometry import double_areas
 from ..io import as_input
@@ -51,7 +51,7 @@ def unwrap_in_textures(mesh: Any, faces: ArrayLike | None, density: float, **opt
             charts.
     """
     parsed = read_options(options, UnwrapOptions)
-    with timing(parsed.progress):
+    with timing(parsed.progress), search_time(parsed.search_time):
         packing = _Packing(search_cuts(Source(as_input(mesh, faces)), parsed), parsed)
         permitted = dict[float, float]()
         for share in CHART_SIDES:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from ..base import IntArray
+from ..base import IntArray, each_within_time, part_of_work, within_time
 from ..stages import Layout
 from .candidates import TOLERANCE, Candidate, CutModel, points_near
 from .free_seams import recut, seam_edges
@@ -17,6 +18,8 @@ from .tips import find_tips, moved_tips, moves_for
 MAX_TRIES = 4
 # Energy below the bound, relative to what is allowed above that of an isometry, that is not used for shorter seams.
 ENOUGH_SLACK = 2 * TOLERANCE
+# Fraction of the work that is left, for the progress, that a try is.
+TRY_SHARE = 0.4
 # Tips of larger meshes are moved on their coarse meshes only: a try takes seconds.
 MANY_TRIANGLES = 60_000
 
@@ -30,7 +33,7 @@ def shortened(model: CutModel, start: Candidate) -> Candidate:
     """
     start = model.separated(start)
     if model.bound.largest < start.energy <= model.settled_bound:
-        start = model.settled(start)
+        start = within_time(lambda: model.settled(start)) or start
     return _best_of_moved(model, start)
 
 
@@ -40,7 +43,7 @@ def cut_further(model: CutModel, candidate: Candidate, layout: Layout) -> Candid
     candidate = replace(candidate, layout=layout, cost=model.cost_of(layout))
     is_large = len(model.component.faces) > MANY_TRIANGLES
     if not is_large or model.bound.largest < candidate.energy <= model.settled_bound:
-        candidate = model.settled(candidate)
+        candidate = within_time(lambda: model.settled(candidate)) or candidate
     return _best_of_moved(model, candidate)
 
 
@@ -49,9 +52,11 @@ def _best_of_moved(model: CutModel, start: Candidate) -> Candidate:
     slack = (model.bound.largest - start.energy) / model.bound.allowed
     if len(model.component.faces) > MANY_TRIANGLES or 0 <= slack <= ENOUGH_SLACK:
         return start
-    candidates = [model.separated(candidate) for candidate in _with_moved_tips(model, start)]
+    candidates = [c for c in each_within_time(model.separated, _with_moved_tips(model, start)) if c]
     for candidate in sorted(candidates, key=lambda candidate: candidate.cost):
-        settled = candidate if model.is_within(candidate) else model.settled(candidate)
+        settled = candidate if model.is_within(candidate) else within_time(partial(model.settled, candidate))
+        if settled is None:
+            break
         is_better = settled.cost < start.cost or not model.is_within(start)
         if model.is_within(settled) and is_better:
             return settled
@@ -61,8 +66,8 @@ def _best_of_moved(model: CutModel, start: Candidate) -> Candidate:
 def _with_moved_tips(model: CutModel, start: Candidate) -> list[Candidate]:
     """Return candidates with the tips of the seams moved, so that the energy is about the largest allowed."""
     seams, bound, candidates = seam_edges(start.layout), model.bound, list[Candidate]()
-    tips = find_tips(start.layout, seams, model.costs)
-    if not (bound.is_finite and (tips.rates > 0).any()):
+    tips = within_time(lambda: find_tips(start.layout, seams, model.costs))
+    if tips is None or not (bound.is_finite and (tips.rates > 0).any()):
         return candidates
     # The middle of the energies that are near enough to the bound.
     goal = bound.largest - ENOUGH_SLACK / 2 * bound.allowed
@@ -76,7 +81,10 @@ def _with_moved_tips(model: CutModel, start: Candidate) -> list[Candidate]:
         if not (len(moved) or model.component.mesh.is_boundary_edge.any()):
             break  # not a disk
         cuts.append(moved)
-        candidate = _recut(model, start, seams, moved, cones)
+        with part_of_work(TRY_SHARE, "moving the ends of seams"):
+            candidate = within_time(partial(_recut, model, start, seams, moved, cones))
+        if candidate is None:
+            break
         excess = candidate.energy - bound.largest
         if candidate.energy <= model.settled_bound:
             candidates.append(candidate)

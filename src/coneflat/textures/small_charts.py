@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from ..atlas import ChartLayout, Seams, with_charts
-from ..base import BoolArray, FloatArray, IntArray, has_any, mask_of
+from ..base import BoolArray, FloatArray, IntArray, has_any, mask_of, within_time
 from ..errors import MetricError, SeamError
 from ..geometry import as_pairs, find_overlaps, signed_double_areas
 from ..mesh import nearby
@@ -45,7 +46,8 @@ def join_small_charts(model: CutModel, candidate: Candidate) -> Candidate:
     order = np.argsort(-costs, kind="stable")[: min(MAX_JOINS, np.count_nonzero(costs))]
     for edges in [seams.edges[stretch == label] for label in order]:
         with suppress(MetricError, SeamError):
-            joined = _joined(model, candidate, seams, np.isin(seams.edges, edges))
+            is_closed = np.isin(seams.edges, edges)
+            joined = within_time(partial(_joined, model, candidate, seams, is_closed))
             if joined is not None:
                 candidate, seams = joined, _chart_seams(joined.layout)
     return candidate

@@ -60,6 +60,11 @@ class Border:
     is_rectangle: bool
     sides: list[Side]
 
+    @property
+    def bend(self) -> float:
+        """The largest bend of its sides."""
+        return max((side.bend for side in self.sides), default=0.0)
+
 
 def find_border(layout: Layout, chart: Layout, faces: IntArray, is_sharp: BoolArray) -> Border:
     """Return the border of a chart with its long sides.

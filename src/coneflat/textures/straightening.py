@@ -58,8 +58,11 @@ def _with_straight_chart(
     """
     layout = candidate.layout
     chart = as_one_chart(layout, faces)
+    border = find_border(layout, chart, faces, is_sharp)
+    if candidate.keeps_points and border.bend <= EXACT:
+        return candidate  # Flat charts with straight sides, such as leaf cards, remain isometric.
     before = model.bound.energies(chart.lengths, chart.points[chart.corners]).sum()
-    for sides, largest_rise in _trials(find_border(layout, chart, faces, is_sharp)):
+    for sides, largest_rise in _trials(border):
         if sides.largest_stray(chart.points) <= EXACT:
             break
         points = _points_with(sides, chart)

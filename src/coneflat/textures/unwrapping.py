@@ -6,13 +6,24 @@ import pickle
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base import FloatArray, limit_threads, stage, timing, warns
+from ..base import (
+    FloatArray,
+    current_time,
+    limit_threads,
+    search_time,
+    stage,
+    timing,
+    warns,
+    within_time,
+)
 from ..base.progress import component_at_work
+from ..base.search_time import SearchTime
 from ..errors import ConvergenceError
 from ..evaluate import evaluate, packed_scale
 from ..flattening import Steps
@@ -31,7 +42,7 @@ from .density import expected_resolution, least_resolution
 from .energy import EnergyBound
 from .fitting import cut_to_fit
 from .free_seams import measured, seam_edges
-from .minor import cuts_together, groups_to_search, is_searchable_together
+from .minor import cuts_together, is_searchable_together
 from .mirror import half_of
 from .notes import FREE, with_notes
 from .options import ISOMETRIC, UnwrapOptions, options_of_stages
@@ -42,12 +53,13 @@ from .shortening import cut_further
 from .small_charts import join_small_charts
 from .stacked import without_copies
 from .straightening import straightened
+from .work import SearchWork, groups_of_minor
 
 # Components with less than this share of the area are cut together: 3,000 take 21 s instead of 140. With 0.05
 # instead, 26 models in one file take 40% less time, and their seams are 10% longer.
 MINOR_SHARE = 0.03
-# Fraction of the work that searches for the cuts; the rest packs and measures.
-SEARCHING = 0.8
+# Fractions of the work: checking, cuts for packing, and measuring the result. The rest searches for the cuts.
+CHECKING, PACKING_CUTS, FINISHING = 0.05, 0.15, 0.1
 # Triangles of a component from which several threads are faster than one.
 PARALLEL = 20_000
 # Newton steps of the exact metric: most meshes take 10, bad ones 100 and more.
@@ -111,7 +123,7 @@ class Unwrapper:
     def unwrap(self, **options: Any) -> Flattening:
         """Return the UVs; options and errors are those of `unwrap`."""
         parsed = read_options(options, UnwrapOptions)
-        with timing(parsed.progress):
+        with timing(parsed.progress), search_time(parsed.search_time):
             searched = self._searched.of(_search_key(parsed), lambda: search_cuts(self._source, parsed))
             return pack_searched(searched, parsed)
 
@@ -144,6 +156,7 @@ class Searched:
         models: the models of components that are no copies.
         candidates: the best candidate of each component that is not a copy.
         finished: candidates that were cut further, by their component and by the chart of each triangle before.
+        time: the time of the search, if it was limited.
     """
 
     prepared: Prepared
@@ -154,11 +167,18 @@ class Searched:
     models: Models
     candidates: Mapping[int, Candidate]
     finished: dict[tuple[int, bytes], Candidate] = field(default_factory=dict)
+    time: SearchTime | None = None
+
+    @property
+    def ended(self) -> SearchTime | None:
+        """The time of the search that was ended because it was up: for packing, or before; None if none was."""
+        return next((limit for limit in (current_time(), self.time) if limit and limit.is_ended), None)
 
 
 def unwrap_source(source: Source, options: UnwrapOptions) -> Flattening:
     """Return the UVs of a mesh by parsed options; see `unwrap`."""
-    return pack_searched(search_cuts(source, options), options)
+    with search_time(options.search_time):
+        return pack_searched(search_cuts(source, options), options)
 
 
 def search_cuts(source: Source, options: UnwrapOptions) -> Searched:
@@ -167,18 +187,19 @@ def search_cuts(source: Source, options: UnwrapOptions) -> Searched:
     The cut of each component is searched for (`search.py`): few cones and short seams for which the layout with free
     seams is within the bound of the energy.
     """
-    with stage("check"):
+    with component_at_work("", CHECKING), stage("check"):
         prepared, shared = _without_shared(source, options_of_stages(options), options.stack)
     components = along_sharp_edges(prepared.components)
     with _threads_for(components, options):
         with stage("layout"):
-            flat = lay_out_flat_components(components)
+            flat = lay_out_flat_components(components, max_triangles=np.inf)
         with stage("check"):
             # Copies cannot have different numbers of charts.
             is_counted = isinstance(options.charts, int)
             copies = [None] * len(components) if is_counted else find_copies(components, flat)
         models = _cut_models(components, copies, options)
-        return Searched(prepared, shared, components, flat, copies, models, _search(models, flat, components))
+        candidates = _search(models, flat, components)
+    return Searched(prepared, shared, components, flat, copies, models, candidates, time=current_time())
 
 
 def pack_searched(searched: Searched, options: UnwrapOptions) -> Flattening:
@@ -201,9 +222,10 @@ def pack_candidates(
     with _threads_for(components, options), stage("measure"):
         layouts = _measured_layouts(candidates, searched.flat, components, searched.copies)
     stage_options = _with_least_resolution(stage_options, options, prepared, layouts)
-    result = evaluate(prepared, layouts, replace(stage_options, method=FREE))
+    with component_at_work("", FINISHING):
+        result = evaluate(prepared, layouts, replace(stage_options, method=FREE))
     energies = [candidate.energy for candidate in candidates.values()]
-    result = with_notes(result, options, energies, _count_forbidden(components, layouts))
+    result = with_notes(result, options, energies, _count_forbidden(components, layouts), searched.ended)
     return result if searched.shared is None else with_shared_texels(result, searched.shared, prepared)
 
 
@@ -281,18 +303,17 @@ def _search(
     within the bound, one by one.
     """
     sizes = np.array([len(component.faces) for component in components])
-    work = SEARCHING * sizes / sizes.sum()
     candidates = {
         i: Candidate(layout, ISOMETRIC, 0.0, 0.0, is_separated=True, keeps_points=True)
         for i, layout in flat.items()
     }
+    searched = [i for i in models if i not in flat]
+    work = SearchWork(int(sizes[searched].sum()), 1 - CHECKING - PACKING_CUTS - FINISHING)
     areas = _double_areas_of(components)
     is_minor = areas < MINOR_SHARE * areas.sum()
-    minor = [
-        i for i, model in models.items() if is_minor[i] and i not in flat and is_searchable_together(model)
-    ]
-    for group in groups_to_search(np.array(minor, dtype=np.int64), sizes):
-        with component_at_work("", float(work[group].sum())), stage("search"):
+    minor = [i for i in searched if is_minor[i] and is_searchable_together(models[i])]
+    for group in groups_of_minor(np.array(minor, dtype=np.int64), sizes):
+        with work.at("", int(sizes[group].sum())):
             together = cuts_together([models[i] for i in group])
         candidates |= {
             i: replace(candidate, keeps_points=True)
@@ -302,7 +323,7 @@ def _search(
     alone = [i for i in models if i not in candidates]
     for number, i in enumerate(alone):
         place = f"component {number + 1:,} of {len(alone):,}" if len(alone) > 1 else ""
-        with component_at_work(place, float(work[i])), stage("search"):
+        with work.at(place, int(sizes[i])):
             candidates[i] = best_cut(models[i])
     return candidates
 
@@ -325,7 +346,7 @@ def cut_to_pack(
     def costs(k: int) -> FloatArray:
         return models[order[k]].costs
 
-    with _threads_for(searched.components, options), stage("pack"):
+    with _threads_for(searched.components, options), component_at_work("", PACKING_CUTS), stage("pack"):
         candidates: Mapping[int, Candidate] = searched.candidates
         if isinstance(options.charts, int):
             candidates = {i: _without_slivers(models[i], candidates[i]) for i in order}
@@ -338,17 +359,32 @@ def cut_to_pack(
         if chart_side is not None:
             exponent = searched.prepared.checked.exponent
             layouts = cut_to_fit(layouts, costs, float(np.ldexp(chart_side, exponent)))
-        areas, finished = _double_areas_of(searched.components), dict[int, Candidate]()
-        is_minor = areas < MINOR_SHARE * areas.sum()
-        for i, layout in zip(order, layouts, strict=True):
-            key = i, layout.chart.tobytes()
-            if len(searched.finished) >= MAX_FINISHED * len(order):
-                searched.finished.clear()
-            if key not in searched.finished:
-                candidate = _finished(models[i], candidates[i], layout, options)
-                searched.finished[key] = candidate if is_minor[i] else straightened(models[i], candidate)
-            finished[i] = searched.finished[key]
-        return finished
+        return _finished_candidates(searched, candidates, dict(zip(order, layouts, strict=True)), options)
+
+
+def _finished_candidates(
+    searched: Searched,
+    candidates: Mapping[int, Candidate],
+    layouts: Mapping[int, Layout],
+    options: UnwrapOptions,
+) -> dict[int, Candidate]:
+    """Return candidates with the given layouts, which were cut further, within the bound of the energy."""
+    areas, finished, cache = _double_areas_of(searched.components), dict[int, Candidate](), searched.finished
+    is_minor = areas < MINOR_SHARE * areas.sum()
+    for i, layout in layouts.items():
+        key = i, layout.chart.tobytes()
+        candidate = cache.get(key)
+        if candidate is None:
+            candidate = _finished(searched.models[i], candidates[i], layout, options)
+            if not is_minor[i]:
+                candidate = within_time(partial(straightened, searched.models[i], candidate)) or candidate
+        finished[i] = candidate
+        if len(cache) >= MAX_FINISHED * len(layouts):
+            cache.clear()
+        # What was ended early is not taken again.
+        if searched.ended is None:
+            cache[key] = candidate
+    return finished
 
 
 def _finished(model: CutModel, candidate: Candidate, layout: Layout, options: UnwrapOptions) -> Candidate:

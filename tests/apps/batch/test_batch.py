@@ -283,3 +283,30 @@ if job["mesh"].endswith("ball.obj"):
         os.kill(os.getpid(), signal.SIGKILL)
 os.write(1, (json.dumps(child.flatten_file(job)) + chr(10)).encode())
 """
+
+
+@pytest.mark.slow
+def test_a_search_time_gives_a_result(models, tmp_path):
+    """The search ends at once, long before the time limit, after which a mesh fails."""
+    result = invoke("batch", models / "ball.obj", "--out", tmp_path / "out", "--jobs", 1, "--search-time", 0)
+    assert result.exit_code == 0
+    (row,) = rows_of(tmp_path / "out" / "summary.csv").values()
+    assert row["status"] == "done"
+    assert "The layout alone took" in row["notes"]
+
+
+@pytest.mark.parametrize(
+    ("times", "message"),
+    [
+        (("--search-time", "-1"), "search_time must be a number, 0 or more, got -1"),
+        (("--search-time", "nan"), "search_time must be a number, 0 or more, got nan"),
+        (("--search-time", "soon"), "'soon' is not a"),
+        (("--search-time", "9", "--time-limit", "8"), "--search-time must be below --time-limit"),
+    ],
+)
+def test_bad_search_times_are_refused(models, tmp_path, times, message):
+    done = command("batch", models, "--out", tmp_path / "out", *times)
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert message in line
+    assert not (tmp_path / "out").exists()

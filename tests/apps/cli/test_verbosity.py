@@ -9,7 +9,7 @@ import shapes
 from click.testing import CliRunner
 
 from coneflat.apps.cli.main import cli
-from coneflat.apps.cli.run import Console
+from coneflat.apps.cli.run import Console, time_left
 
 COMMANDS = {
     "flatten": ("flatten", "model.obj", "-o", "out.obj"),
@@ -74,3 +74,34 @@ def test_progress_lines_are_a_second_apart(capsys, monkeypatch):
         for now[0] in (5.0, 5.5):
             console.progress(f"step {now[0]}", now[0] / 6)
     assert re.findall(r"step (\S+)", capsys.readouterr().err) == ["1.9", "3.1", "4.3", "5.5"]
+
+
+@pytest.mark.parametrize(
+    ("elapsed", "fraction", "text"),
+    [
+        (10, 0.5, "about 10 s left"),
+        (12, 0.5, "about 10 s left"),
+        (10, 0.99, "about 5 s left"),
+        (57, 0.5, "about 1 min left"),
+        (60, 0.25, "about 3 min left"),
+        (1000, 0.1, "about 2 h left"),
+        (1, 0.5, ""),  # too early to tell
+        (10, 0.01, ""),
+        (10, 0.0, ""),
+        (10, 1.0, ""),
+    ],
+)
+def test_the_rest_of_the_time_is_estimated(elapsed, fraction, text):
+    assert time_left(elapsed, fraction) == text
+
+
+def test_lines_of_progress_say_what_is_left(capsys, monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr("coneflat.apps.cli.run.time.perf_counter", lambda: now[0])
+    with Console() as console:
+        for now[0] in (20.0, 30.0):
+            console.progress("search: candidate 2", now[0] / 100)
+    assert [line.partition("%")[2].strip() for line in capsys.readouterr().err.splitlines()] == [
+        "search: candidate 2 (about 1 min left)",
+        "search: candidate 2 (about 1 min left)",
+    ]

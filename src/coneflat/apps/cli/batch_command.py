@@ -44,7 +44,7 @@ class BatchFlags:
         uv_set: As of `coneflat unwrap`.
         summary: File for the summary table, .csv.  [default: summary.csv in --out]
         jobs: Number of processes on this machine.  [default: the number of cores]
-        time_limit: Time limit per mesh in seconds.
+        time_limit: Time in seconds after which a mesh fails; --search-time ends its search with a result.
         dask: Address of a Dask scheduler whose cluster is used, for example tcp://host:8786.
         redo: Also flatten meshes that are done.
     """
@@ -100,6 +100,8 @@ def batch(
     if flags.jobs is not None and flags.dask is not None:
         raise click.UsageError("--jobs has no effect with --dask: leave out --jobs", context)
     options = _options(context, params)
+    if options.get("search_time") is not None and options["search_time"] >= flags.time_limit:
+        raise click.UsageError("--search-time must be below --time-limit, after which a mesh fails", context)
     parse_requirements(required, REPORTED)
     ending = f".{flags.format}"
     check_uv_set(f"a {ending}", ending, flags.uv_set)

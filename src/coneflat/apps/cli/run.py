@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
 LOG = logging.getLogger("coneflat")
+# Seconds, and fraction of all work, after which the rest of the time is estimated.
+MIN_ELAPSED, MIN_FRACTION = 3.0, 0.05
 AGAIN = "--again flattens the mesh again"
 
 
@@ -60,7 +62,7 @@ class Console:
         self._bar: Progress | None = None
         if verbosity is None and sys.stderr.isatty():
             self._bar = _bar()
-            self._task = self._bar.add_task("", total=1.0)
+            self._task = self._bar.add_task("", total=1.0, left="")
 
     def __enter__(self) -> Console:
         self._level = LOG.level
@@ -87,7 +89,8 @@ class Console:
     def progress(self, stage: str, fraction: float) -> None:
         """Show the current stage and the completed fraction of all work."""
         if self._bar:
-            self._bar.update(self._task, description=stage, completed=fraction)
+            left = time_left(self.elapsed, fraction)
+            self._bar.update(self._task, description=stage, completed=fraction, left=left)
             return
         with self._lock:
             self._current = (stage, fraction)
@@ -98,7 +101,9 @@ class Console:
         stage, fraction = self._current
         self._last_line = self.elapsed
         with suppress(OSError):  # A full stderr does not stop the work, nor a reader that has closed it.
-            click.echo(f"{self.elapsed:6.1f} s  {fraction:4.0%}  {stage}", err=True)
+            left = time_left(self.elapsed, fraction)
+            ending = f" ({left})" if left else ""
+            click.echo(f"{self.elapsed:6.1f} s  {fraction:4.0%}  {stage}{ending}", err=True)
 
     def _repeat_progress(self) -> None:
         """Print the progress again if nothing has been printed for a while."""
@@ -174,11 +179,28 @@ class Console:
         self.say(_lines_of_table(list(rows)))
 
 
+def time_left(elapsed: float, fraction: float) -> str:
+    """Return about how long the rest of the work takes; "" while too little is done to tell.
+
+    Args:
+        elapsed: seconds since the start.
+        fraction: the fraction of all work that is done.
+    """
+    if elapsed < MIN_ELAPSED or not MIN_FRACTION <= fraction < 1:
+        return ""
+    seconds = elapsed * (1 / fraction - 1)
+    for unit, size in (("h", 3600), ("min", 60)):
+        if seconds >= 0.95 * size:
+            return f"about {max(round(seconds / size), 1)} {unit} left"
+    return f"about {max(5 * round(seconds / 5), 5)} s left"
+
+
 def _bar() -> Progress:
     from rich.console import Console as RichConsole
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    columns = SpinnerColumn(), TextColumn("{task.description:28}"), BarColumn(), TimeElapsedColumn()
+    left = TextColumn("{task.fields[left]}")
+    columns = SpinnerColumn(), TextColumn("{task.description:28}"), BarColumn(), TimeElapsedColumn(), left
     return Progress(*columns, console=RichConsole(stderr=True), transient=True)
 
 

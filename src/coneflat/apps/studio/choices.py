@@ -24,6 +24,7 @@ from .paint import Paint, Region
 FURTHER_OPTIONS = {
     "area": "Area distortion at most", "packing_cuts": "Cuts for packing", "stack": "Stack halves",
     "lightmap": "Lightmap, texels",
+    "search_time": "Search time, s",
     "tiles": "Tiles (UDIM)", "up": "Up in the texture",
     "quantise": "Multiples of angle, °", "max_cones": "Cones at most", "min_cone_angle": "Smallest cone angle, °",
     "max_cone_angle": "Largest cone angle, °", "relax": "Relax",

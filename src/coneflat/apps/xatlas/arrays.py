@@ -122,11 +122,16 @@ def _read_faces(indices: ArrayLike, count: int) -> IntArray:
     return faces
 
 
-def unwrap_meshes(meshes: list[MeshArrays], pack: PackOptions) -> Texture:
+def unwrap_meshes(meshes: list[MeshArrays], pack: PackOptions, search_time: float | None = None) -> Texture:
     """Return the UVs of all meshes in one texture.
 
+    Args:
+        meshes: the meshes.
+        pack: the options for packing.
+        search_time: see `coneflat.unwrap`.
+
     Raises:
-        OptionError: an option for packing is invalid, or leaves no space for charts.
+        OptionError: an option for packing is invalid or leaves no space for charts, or the search time is invalid.
     """
     starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     vertices = np.concatenate([np.empty((0, 3)), *(mesh.vertices for mesh in meshes)])
@@ -137,7 +142,8 @@ def unwrap_meshes(meshes: list[MeshArrays], pack: PackOptions) -> Texture:
     chosen = {"padding": pack.padding, "resolution": pack.resolution, density: pack.texels_per_unit}
     chosen |= {"block_size": BLOCK_SIZE} if pack.blockAlign else {}
     try:
-        soup = unwrap_soup(vertices, faces, **{name: value for name, value in chosen.items() if value})
+        options = {name: value for name, value in chosen.items() if value}
+        soup = unwrap_soup(vertices, faces, **options, search_time=search_time)
     except OptionError as error:
         raise OptionError(str(error).replace("texel_density", "texels_per_unit")) from None
     first_faces = np.cumsum([0, *(len(mesh.faces) for mesh in meshes)])

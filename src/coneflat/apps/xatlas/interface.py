@@ -106,12 +106,13 @@ class Atlas:
         """Compute the UVs of all meshes; unmet guarantees are a `GuaranteeWarning`.
 
         Raises:
-            OptionError: an option for packing is invalid, or leaves no space for charts.
+            OptionError: an option for packing is invalid or leaves no space for charts, or the search time is invalid.
         """
         from .arrays import unwrap_meshes
 
         pack = PackOptions() if pack_options is None else pack_options
-        texture = unwrap_meshes(self._added, pack)
+        chart = ChartOptions() if chart_options is None else chart_options
+        texture = unwrap_meshes(self._added, pack, chart.search_time)
         self.notes = texture.soup.notes
         self.width = self.height = texture.side
         self.texels_per_unit = texture.side * texture.soup.scale

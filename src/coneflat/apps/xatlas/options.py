@@ -7,7 +7,11 @@ from dataclasses import dataclass
 
 @dataclass
 class ChartOptions:
-    """The options for charts of xatlas, which have no effect here."""
+    """The options for charts of xatlas, which have no effect here, and one that xatlas does not have.
+
+    Attributes:
+        search_time: seconds after which the search for seams ends, see `coneflat.unwrap`; None for no limit.
+    """
 
     max_chart_area: float = 0.0
     max_boundary_length: float = 0.0
@@ -20,6 +24,7 @@ class ChartOptions:
     max_iterations: int = 1
     use_input_mesh_uvs: bool = False
     fix_winding: bool = False
+    search_time: float | None = None
 
 
 @dataclass
