@@ -17,6 +17,7 @@ from ..source import Component
 from ..stages import ConeSpec, Layout
 from .energy import EnergyBound
 from .free_seams import freed, seam_edges, separate_charts, side_by_side
+from .moving_apart import moved_apart
 from .tips import RINGS
 
 # Cost of seams that lowers the energy to that of an isometry, relative to the square root of the area.
@@ -136,8 +137,22 @@ class CutModel:
         """Return a candidate whose overlaps are separated."""
         if candidate.is_separated or not self.steps.separates:
             return candidate
+        apart = self._moved_apart(candidate)
+        if apart is not None:
+            return apart
         layout = separate_charts(candidate.layout, self.seam_costs, self.component.seams)
         return replace(candidate, layout=layout, cost=self.cost_of(layout), is_separated=True)
+
+    def _moved_apart(self, candidate: Candidate) -> Candidate | None:
+        """Return a candidate in one chart whose overlaps are moved apart within the bound, if they are small."""
+        if candidate.layout.chart.any() or not self.bound.is_finite:
+            return None
+        layout = moved_apart(candidate.layout, 2 * TOLERANCE)
+        if layout is None:
+            return None
+        energy = self.bound.energy(layout)
+        is_allowed = energy <= max(self.bound.largest, candidate.energy)
+        return replace(candidate, layout=layout, energy=energy, is_separated=True) if is_allowed else None
 
     def settled(self, candidate: Candidate) -> Candidate:
         """Return a candidate with the least energy without overlaps: its separating cuts are free, too.
