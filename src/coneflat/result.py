@@ -195,7 +195,7 @@ class Flattening:
         path: str | PathLike[str] | None = None,
         *,
         texture: str | PathLike[str] | None = None,
-        up: str = "y",
+        up: str = "auto",
         show: str | None = None,
         most_triangles: int | None = None,
         color: str | None = None,
@@ -208,7 +208,7 @@ class Flattening:
         Args:
             path: the page, .html; by default a new temporary file, which is opened in the browser.
             texture: a PNG, JPEG, GIF or WebP file to map onto the model.
-            up: the model's upward axis in the first view, "x", "y" or "z".
+            up: the model's upward axis in the first view, "x", "y" or "z"; "auto" is that of its format or shape.
             show: what the colours show first: "checker", "picture", "charts", "qc", "area", "curvature" (of the
                 model), "flat" (the remaining curvature) or "plain".
             most_triangles: a mesh with more triangles is simplified for display; by default half a million.

@@ -99,6 +99,21 @@ def test_report_help_and_theme(visit, viewed):
     assert (visit.picture("layout")[-3, 3] < 60).all()
 
 
+def test_another_axis_points_up(visit):
+    from coneflat.apps.view.figures.camera import fit_camera
+
+    places = np.array(visit.run("Array.from(coneflat.model.arrays.places)")).reshape(-1, 3)
+    shown = []
+    for turn_up in (lambda: visit.page.keyboard.press("z"), lambda: visit.page.click("#turn-up")) * 2:
+        turn_up()
+        axis = visit.state("up")
+        assert visit.page.inner_text("#turn-up") == f"{axis} up"
+        turn = np.array(visit.run("coneflat.panes[0].camera.turn")).reshape(3, 3)
+        np.testing.assert_allclose(turn, fit_camera(places, (1, 1), up=axis).axes, atol=1e-9)
+        shown.append(axis)
+    assert sorted(shown[:3]) == ["x", "y", "z"]
+
+
 def test_everything_that_can_be_shown_looks_different(visit):
     seen = []
     for show in SHOWS:

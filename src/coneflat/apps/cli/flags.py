@@ -259,10 +259,10 @@ paper_option = click.option(
 
 up_option = click.option(
     "--up",
-    type=click.Choice(["x", "y", "z"]),
-    default="y",
+    type=click.Choice(["auto", "x", "y", "z"]),
+    default="auto",
     show_default=True,
-    help="Upward axis of the model in pictures.",
+    help="Upward axis of the model in pictures: by default that of its format, or of its shape.",
 )
 
 _INPUT = (

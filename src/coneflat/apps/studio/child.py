@@ -35,6 +35,7 @@ from ..view import (
     pack,
     shown_rows,
     text_of,
+    upward_axis,
 )
 from .choices import Choices
 from .layouts import LatestLayouts, MadeLayout
@@ -121,6 +122,7 @@ class JobRunner:
         self._opened: Opened | None = None
         self._layouts = LatestLayouts()
         self._model: Model | None = None
+        self._up = "y"
         self._max_triangles: int | None = None
         self._own_texture: tuple[Texture, FloatArray] | None = None
         # Path and hash of the mesh that was read, and of the one whose shape the session has got.
@@ -254,10 +256,11 @@ class JobRunner:
 
         if self._model is None or not self._model.is_of(result):
             self._model = Model.of(result)
+            self._up = upward_axis(result.vertices, result.faces, Path(name).suffix)
         content = content_of(result, self._max_triangles or MAX_SHOWN_TRIANGLES, self._model, quantity)
         show = "checker" if quantity is None else "own"
         picture, uv = self._own_texture or (None, None)
-        head, block = head_and_block(result, content, picture, name, "y", show, text)
+        head, block = head_and_block(result, content, picture, name, self._up, show, text)
         if uv is not None and result.face_corners is not None:
             own_uv = uv[result.face_corners[content.face_numbers]].astype(np.float32)
             head, block = with_arrays(head, block, {"own_uv": own_uv})

@@ -23,6 +23,7 @@ from .page.webpage import (
 )
 from .quad_page import page_of_quads
 from .quantity import Quantity, conformal_distortion, own_quantity
+from .upward import upward_axis
 
 __all__ = [
     "Barycentrics", "DOT_REACH", "Eye", "Look", "Model", "PageText", "Panel", "Quantity", "Row",
@@ -30,5 +31,6 @@ __all__ = [
     "draw_cones", "draw_layout", "draw_quantity", "eye_direction", "fill_layout", "head_and_block", "layout_aspect",
     "make_figure", "mark_handles", "mark_scale", "new_figure", "notebook_html", "open_address", "open_page",
     "outline_halfedges", "own_flattening", "own_quantity", "pack", "page_around", "page_html", "page_of_quads",
-    "save_figure", "show_mesh", "shown_rows", "text_of", "uv_flattening", "view_aspect", "write_figure", "write_page",
+    "save_figure", "show_mesh", "shown_rows", "text_of", "upward_axis", "uv_flattening", "view_aspect",
+    "write_figure", "write_page",
 ]  # fmt: skip

@@ -133,6 +133,10 @@ class Panel {
 
   // Display.
 
+  showUp() {
+    this.part("up").value = this.studio.viewer.state.get("up");
+  }
+
   show() {
     this.isDue = this.isPressed;
     if (this.isPressed) return;
@@ -362,7 +366,6 @@ function isButton(element) {
   return Boolean(element.closest("button, summary, label, [type=checkbox]")) && !element.closest("select, input:not([type=checkbox])");
 }
 
-const AXES = ["x", "y", "z"];
 
 /** Return the value of an option for the text of its control; angles are in degrees there, and axes directions. */
 function furtherValue(name, kind, text) {

@@ -110,6 +110,8 @@ class Studio {
       this.viewer.state.set({marked: FAINT});
       this.viewer.marks.overlay = (pen, pane) => this.overlay.draw(pen, pane);
       this.viewer.state.listen((names) => names.has("picked") && this.notePick());
+      this.viewer.state.listen((names) => names.has("up") && this.panel.showUp());
+      this.panel.showUp();
     }
     if (!isSame) this.selected = selected === null ? null : (this.verticesOf([selected])[0] ?? null);
     this.repicking = false;
@@ -151,11 +153,7 @@ class Studio {
 
   /** Choose the axis of the model that points up in its view. */
   setUp(axis) {
-    const {camera} = this.viewer.panes[0], {turn} = this.viewer.model.head;
-    const cycle = {x: [0, 0, 1, 1, 0, 0, 0, 1, 0], y: [1, 0, 0, 0, 1, 0, 0, 0, 1], z: [0, 1, 0, 0, 0, 1, 1, 0, 0]}[axis];
-    camera.home = product(turn.flat(), cycle);
-    camera.measure(this.viewer.model.arrays.places);
-    camera.fit();
+    this.viewer.state.set({up: axis});
   }
 
   /** Turn the view of the layout, and number the charts, like those of the last layout that was not a preview. */

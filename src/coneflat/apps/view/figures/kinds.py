@@ -15,6 +15,7 @@ from ....errors import OptionError
 from ....io import check_cells
 from ..from_uv import is_from_file
 from ..quantity import Quantity, check_color_map, conformal_distortion, curvature, stretch
+from ..upward import axis_of, check_up
 from .camera import Eye, eye_direction, view_aspect
 from .compose import Panel, Row, check_pixels, compose
 from .cone_marks import mark_handles
@@ -35,7 +36,7 @@ class Look:
         size: width and height in inches; None to fit the pictures.
         dpi: resolution of the pictures in dots per inch.
         eyes: directions from the model to the eye, one for each view, see `draw_checker`.
-        up: the model's upward axis, "x", "y" or "z".
+        up: the model's upward axis, "x", "y" or "z"; "auto" is that of its format or shape, see `upward_axis`.
         colors: a colour map of matplotlib for quality, color and curvature; None for the defaults.
         cells: number of checkerboard cells along the square root of the surface area.
         color_charts: give the charts of the layout different colours.
@@ -50,7 +51,7 @@ class Look:
     size: tuple[float, float] | None = None
     dpi: float = DOTS_PER_INCH
     eyes: Sequence[Eye] = ("front-right",)
-    up: str = "y"
+    up: str = "auto"
     colors: str | None = None
     cells: float = CHECKER_CELLS
     color_charts: bool = False
@@ -63,8 +64,9 @@ class Look:
             object.__setattr__(self, "eyes", (self.eyes,))
         if not len(self.eyes):
             raise OptionError("eyes must name at least one direction")
+        check_up(self.up)
         for eye in self.eyes:
-            eye_direction(eye, self.up)
+            eye_direction(eye)
         check_pixels((1.0, 1.0) if self.size is None else self.size, self.dpi)
         check_cells(self.cells)
         if self.colors is not None:
@@ -79,10 +81,11 @@ class Look:
         **options: Any,
     ) -> list[Panel]:
         """Return a panel for each eye, in which `draw` draws the model; faces: its faces if not `result.faces`."""
-        draw = partial(draw, result, up=self.up, dpi=self.dpi, **options)
+        up = axis_of(self.up, result)
+        draw = partial(draw, result, up=up, dpi=self.dpi, **options)
         vertices = result.vertices[np.unique(result.faces if faces is None else faces)]
         return [
-            Panel(view_aspect(vertices, eye, self.up), partial(draw, eye=eye), label * (k == 0))
+            Panel(view_aspect(vertices, eye, up), partial(draw, eye=eye), label * (k == 0))
             for k, eye in enumerate(self.eyes)
         ]
 

@@ -9,6 +9,7 @@ from .... import ConeCurve
 from ....base import CHECKER_CELLS, DISTORTION, DOTS_PER_INCH, FloatArray, IntArray
 from ....io import cell_side
 from ..quantity import Quantity, curvature
+from ..upward import axis_of
 from .camera import Eye
 from .cone_marks import draw_cones_on_model, draw_seams_on_model, pixels_of
 from .render import MeshPicture, render_mesh
@@ -26,7 +27,7 @@ def draw_checker(
     axes: Axes,
     *,
     eye: Eye = "front-right",
-    up: str = "y",
+    up: str = "auto",
     cells: float = CHECKER_CELLS,
     seams: bool = True,
     cones: bool = False,
@@ -39,7 +40,7 @@ def draw_checker(
         axes: matplotlib axes to draw in; their own lines and ticks are hidden.
         eye: direction from the model to the eye: (3,), or "front", "back", "left", "right", "top", "bottom", or two
             of them such as "back-left" for a three-quarter view.
-        up: the model's upward axis, "x", "y" or "z".
+        up: the model's upward axis, "x", "y" or "z"; "auto" is that of its format or shape.
         cells: number of cells along the square root of the surface area.
         seams, cones: whether to draw the visible ones.
         dpi: resolution in dots per inch.
@@ -49,7 +50,7 @@ def draw_checker(
     """
     side = cell_side(result.uv, result.uv_faces, cells)
     paint = {"corner_uv": result.corner_uv, "cell": side}
-    picture = show_mesh(axes, result.vertices, result.faces, eye, up, dpi, **paint)
+    picture = show_mesh(axes, result.vertices, result.faces, eye, axis_of(up, result), dpi, **paint)
     if seams:
         draw_seams_on_model(axes, picture, result)
     if cones:
@@ -57,14 +58,14 @@ def draw_checker(
 
 
 def draw_cones(
-    result: Flattening, axes: Axes, *, eye: Eye = "front-right", up: str = "y", dpi: float = DOTS_PER_INCH
+    result: Flattening, axes: Axes, *, eye: Eye = "front-right", up: str = "auto", dpi: float = DOTS_PER_INCH
 ) -> None:
     """Draw the model with its cones and seams; hidden ones are drawn in faint colours.
 
     Cones of positive curvature are red, those of negative curvature black. The area of a dot grows with the curvature.
     Arguments and errors are those of `draw_checker`.
     """
-    picture = show_mesh(axes, result.vertices, result.faces, eye, up, dpi)
+    picture = show_mesh(axes, result.vertices, result.faces, eye, axis_of(up, result), dpi)
     draw_seams_on_model(axes, picture, result, through=True)
     draw_cones_on_model(axes, picture, result, through=True)
 
@@ -75,7 +76,7 @@ def draw_curvature(
     *,
     flat: bool = False,
     eye: Eye = "front-right",
-    up: str = "y",
+    up: str = "auto",
     colors: str | None = None,
     dpi: float = DOTS_PER_INCH,
 ) -> None:
@@ -100,7 +101,7 @@ def draw_quantity(
 ) -> MeshPicture:
     """Draw the model coloured by a quantity; shading is reduced by half so that colours remain readable."""
     paint = {"colors": quantity.colors(), "contrast": 0.5}
-    return show_mesh(axes, result.vertices, result.faces, eye, up, dpi, **paint)
+    return show_mesh(axes, result.vertices, result.faces, eye, axis_of(up, result), dpi, **paint)
 
 
 def show_mesh(

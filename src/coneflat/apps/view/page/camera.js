@@ -50,6 +50,15 @@ function tilted(direction) {
   );
 }
 
+const AXES = ["x", "y", "z"];
+// Rotations that turn the upward axis of a model to y and its front to z, as in figures.
+const TO_Y = {x: [0, 1, 0, 1, 0, 0, 0, 0, -1], y: [1, 0, 0, 0, 1, 0, 0, 0, 1], z: [1, 0, 0, 0, 0, 1, 0, -1, 0]};
+
+/** Return the rotation of the first view of a model, {turn}, if an axis points up. */
+function firstTurn({turn}, axis) {
+  return product(turn.flat(), TO_Y[axis]);
+}
+
 class Camera {
   /** points: coordinates, three per point, to be shown; turns: whether the camera can rotate. */
   constructor(points, turn, turns) {

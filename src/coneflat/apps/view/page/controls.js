@@ -54,6 +54,7 @@ class Controls {
       this.part(name).addEventListener("click", () => state.toggle(name));
     }
     this.part("theme").addEventListener("click", () => state.toggle("dark"));
+    this.part("turn-up").addEventListener("click", () => this.turnUp());
     this.part("help").addEventListener("click", () => this.part("keys").showModal());
     document.addEventListener("keydown", (event) => this.key(event));
     document.addEventListener("dragover", (event) => event.preventDefault());
@@ -73,10 +74,17 @@ class Controls {
     for (const name of ["seams", "cones", "edges", "report"]) {
       this.part(name).setAttribute("aria-pressed", String(state.get(name)));
     }
+    this.part("turn-up").textContent = `${state.get("up")} up`;
     this.part("table").hidden = !state.get("report");
     const thing = state.get("hovered") ?? state.get("picked");
     this.showFacts(thing ? factsOf(model, thing, state.get("show")) : null);
     this.showScale(model.head.scales[state.get("show")], placeOfThing(model, thing, state.get("show")));
+  }
+
+  /** Choose the next axis to point up. */
+  turnUp() {
+    const {state} = this.viewer;
+    state.set({up: AXES[(AXES.indexOf(state.get("up")) + 1) % AXES.length]});
   }
 
   showFacts(facts) {
@@ -123,6 +131,7 @@ class Controls {
       "[": () => squares(-0.5), "]": () => squares(0.5),
       s: () => state.toggle("seams"), c: () => state.toggle("cones"), t: () => state.toggle("edges"),
       r: () => state.toggle("report"), d: () => state.toggle("dark"), "?": () => this.part("keys").showModal(),
+      z: () => this.turnUp(),
       w: () => this.viewer.find({kind: "triangle", index: this.viewer.model.worstTriangle()}),
       Escape: () => state.set({picked: null, hovered: null, report: false}),
     };

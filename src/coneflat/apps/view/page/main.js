@@ -38,11 +38,11 @@ class Viewer {
   constructor(model, picture) {
     this.model = model;
     this.state = new State({
-      show: model.head.show, squares: model.head.squares, seams: true, cones: true, edges: false, report: false,
+      show: model.head.show, squares: model.head.squares, seams: true, cones: true, edges: false, report: false, up: model.head.up,
       dark: matchMedia("(prefers-color-scheme: dark)").matches, hovered: null, picked: null,
     });
     this.panes = [
-      new Pane("model", new Camera(model.arrays.places, model.head.turn.flat(), true), false, this),
+      new Pane("model", new Camera(model.arrays.places, firstTurn(model.head, model.head.up), true), false, this),
       new Pane("layout", new Camera(this.flatPlaces(), [1, 0, 0, 0, 1, 0, 0, 0, 1], false), true, this),
     ];
     this.used = this.panes[0];
@@ -93,13 +93,20 @@ class Viewer {
     this.marks.seen.clear();
     plane.showOthers(this.flatPlaces());
     if (!stays) {
-      space.home = model.head.turn.flat();
-      space.measure(model.arrays.places);
-      space.fit();
+      this.state.set({up: model.head.up});
+      this.setUp();
     }
     this.controls.fill();
     this.controls.show();
     this.redraw();
+  }
+
+  /** Show the model from its first side, with the chosen axis up. */
+  setUp() {
+    const {camera} = this.panes[0];
+    camera.home = firstTurn(this.model.head, this.state.get("up"));
+    camera.measure(this.model.arrays.places);
+    camera.fit();
   }
 
   flatPlaces() {
@@ -113,6 +120,7 @@ class Viewer {
   /** Handle a change of the state. */
   note(names) {
     if (names.has("dark")) this.readColours();
+    if (names.has("up")) this.setUp();
     if (names.has("hovered") || names.has("picked")) this.remark();
     if (["show", "squares", "seams", "cones", "edges", "dark", "marked"].some((name) => names.has(name))) this.redraw();
   }

@@ -21,6 +21,7 @@ from ..figures.kinds import title
 from ..figures.uv_layout import CHART_COLORS
 from ..from_uv import shown_rows
 from ..quantity import ColorScale
+from ..upward import axis_of
 from .content import Content
 
 if TYPE_CHECKING:
@@ -112,7 +113,8 @@ def head_and_block(
         "seams": content.seams,
         "cone_curvatures": content.cone_curvatures.tolist(),
         "outward": content.model.outward,
-        "turn": fit_camera(content.places, (1, 1), up=up).axes.tolist(),
+        "turn": fit_camera(content.places, (1, 1), up="y").axes.tolist(),
+        "up": axis_of(up, result),
         "uv_low": content.uv.min(axis=0).tolist(),
         "uv_high": content.uv.max(axis=0).tolist(),
         "uv_side": content.uv_side,

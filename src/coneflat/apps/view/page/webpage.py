@@ -38,7 +38,7 @@ def page_html(
     *,
     name: str | None = None,
     texture: str | PathLike[str] | None = None,
-    up: str = "y",
+    up: str = "auto",
     show: str | None = None,
     most_triangles: int = MAX_SHOWN_TRIANGLES,
     text: PageText | None = None,
@@ -50,7 +50,7 @@ def page_html(
         result: the flattening.
         name: title of the page; by default the name of the file of the mesh.
         texture: image file for the model: PNG, JPEG, GIF or WebP.
-        up: the model's upward axis in the first view, "x", "y" or "z".
+        up: the model's upward axis in the first view, "x", "y" or "z"; "auto" is that of its format or shape.
         show: display mode at the start: "checker", "picture", "charts", "qc", "area", "curvature" (of the model),
             "flat" (curvature of the flat metric), "plain" or, with `color`, "own"; by default the values of `color`,
             else the picture, else the checkerboard.
