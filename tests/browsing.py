@@ -24,7 +24,7 @@ document.querySelectorAll("dialog[open]").forEach((dialog) => dialog.close());
 document.activeElement?.blur();
 coneflat.state.set({
   show: coneflat.model.head.show, squares: coneflat.model.head.squares, seams: true, cones: true, edges: false,
-  report: false, dark: false, up: coneflat.model.head.up, hovered: null, picked: null,
+  report: false, dark: false, up: coneflat.model.head.up, hovered: null, picked: null, fault: null,
 });
 coneflat.panes.forEach((pane) => pane.camera.fit());
 """

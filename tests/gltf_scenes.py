@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from io import BytesIO
 from typing import Any
 
 import numpy as np
@@ -198,3 +199,38 @@ def corners_of(tree, accessor, primitive):
         return order.astype(int)
     assert primitive["mode"] == 5
     return np.concatenate([order[[i, i + 1 + i % 2, i + 2 - i % 2]] for i in range(len(order) - 2)])
+
+
+def coloured_ball(size=(4, 2), image=None, slot=None):
+    """Return a GLB of a ball whose texture is red where x > 0 and green elsewhere, and of a plain triangle."""
+    from PIL import Image
+    from shapes import sphere
+
+    vertices, faces = sphere(3)
+    corners = vertices[faces].reshape(-1, 3)
+    is_red = np.repeat(vertices[faces].mean(axis=1)[:, 0] > 0, 3)
+    uv = np.stack([np.where(is_red, 0.25, 0.75), np.full(len(corners), 0.5)], axis=1)
+    stream, pixels = BytesIO(), np.zeros((size[1], size[0], 3), np.uint8)
+    pixels[:, : size[0] // 2, 0] = pixels[:, size[0] // 2 :, 1] = 255
+    Image.fromarray(pixels).save(stream, format="PNG")
+    make = SceneMaker()
+    content = stream.getvalue() if image is None else image
+    make.tree |= {
+        "images": [{"bufferView": make.view(content), "mimeType": "image/png"}],
+        "textures": [{"source": 0}],
+        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": slot or {"index": 0}}}, {}],
+    }
+    ball = {
+        "attributes": {
+            "POSITION": make.accessor(corners),
+            "TEXCOORD_0": make.accessor(uv + np.array([1, 0])),
+        },
+        "material": 0,
+    }
+    plain = {"attributes": {"POSITION": make.accessor([[3.0, 0, 0], [4, 0, 0], [3, 1, 0]])}, "material": 1}
+    make.tree |= {
+        "meshes": [{"primitives": [plain, ball]}],
+        "nodes": [{"mesh": 0}],
+        "scenes": [{"nodes": [0]}],
+    }
+    return make.glb()

@@ -199,6 +199,8 @@ class Flattening:
         show: str | None = None,
         most_triangles: int | None = None,
         color: str | None = None,
+        qc_max: float | None = None,
+        scale_max: float | None = None,
     ) -> Path:
         """Write an interactive page, one self-contained HTML file, and return its path.
 
@@ -209,11 +211,13 @@ class Flattening:
             path: the page, .html; by default a new temporary file, which is opened in the browser.
             texture: a PNG, JPEG, GIF or WebP file to map onto the model.
             up: the model's upward axis in the first view, "x", "y" or "z"; "auto" is that of its format or shape.
-            show: what the colours show first: "checker", "picture", "charts", "qc", "area", "curvature" (of the
-                model), "flat" (the remaining curvature) or "plain".
+            show: what the colours show first: "checker", "picture", "charts", "qc", "area", "faults" (of the
+                UVs), "curvature" (of the model), "flat" (the remaining curvature) or "plain".
             most_triangles: a mesh with more triangles is simplified for display; by default half a million.
             color: values to show first: the name of a vertex property in the mesh's file, or a file .npy or
                 FILE.npz:NAME with one number per vertex or triangle.
+            qc_max: QC distortion at the end of its colour scale, so that pages can be compared; by default it fits.
+            scale_max: area scale at the end of its colour scale, which begins at the reciprocal.
 
         Raises:
             OptionError: `up` or `show` is not one of these; `color` is not found.
@@ -221,7 +225,15 @@ class Flattening:
             UnknownFormatError, MeshFileError: a file cannot be read or written.
         """
         return _SHOW_PAGE(
-            self, path, texture=texture, up=up, show=show, most_triangles=most_triangles, color=color
+            self,
+            path,
+            texture=texture,
+            up=up,
+            show=show,
+            most_triangles=most_triangles,
+            color=color,
+            qc_max=qc_max,
+            scale_max=scale_max,
         )
 
     def _repr_html_(self) -> str:

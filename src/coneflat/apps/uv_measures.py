@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +18,8 @@ from ..io import UVMesh, as_uv_mesh
 from ..measures import MAP_MEASURES, measure_map, path_text, sum_angles, undefined_measures
 from ..mesh import CheckedMesh, corner_fans, end_corners, joined_edges, label_faces, left_out
 from ..source import at_unit_size, rounding_notes
+
+Values = TypeVar("Values", FloatArray, IntArray)
 
 #: Limit of overlapping pairs, per triangle and at least. With more pairs, areas are counted in pixels, because the
 #: number of pairs can be quadratic.
@@ -56,6 +58,7 @@ class UVMeasures:
         counts: the other measures by name; see `report`.
         notes: what the measures leave out, and repairs of the mesh, one sentence each.
         path: path of the file, if there is one.
+        face_corners: (m, 3) the polygon corner of the file at each triangle corner, if there is one.
 
     Examples:
         >>> vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
@@ -71,6 +74,7 @@ class UVMeasures:
     counts: Mapping[str, float]
     notes: tuple[str, ...]
     path: Path | None = None
+    face_corners: IntArray | None = None
 
     def report(self) -> dict[str, Any]:
         """Return all measures as plain Python values, ready for JSON; unknown values are None.
@@ -186,6 +190,9 @@ def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:
         counts=counts,
         notes=(*mapped.notes, *_notes(mapped, checked), *mapped.texture_notes, *cover.notes),
         path=None if mapped.source is None else mapped.source.path,
+        face_corners=None
+        if mapped.face_corners is None
+        else _reordered(mapped.face_corners[has_uv], checked),
     )
     notes = [*measures.notes, *undefined_measures(measures.values(), distortion.qc)]
     if distortion.degenerate_input or len(checked.mesh.faces) < len(all_uv):
@@ -221,9 +228,14 @@ def surface_of(mapped: UVMesh, *, strict: bool = False) -> tuple[CheckedMesh, Fl
             f"none of {plural(len(mapped.faces), 'triangle')} has finite UVs at all its corners"
         )
     checked = check_mesh(mapped.vertices, mapped.faces[mapped_faces], repair=not strict)
-    corner_uv = mapped.corner_uv[mapped_faces][checked.face_origin]
-    corner_uv[checked.is_flipped] = corner_uv[checked.is_flipped][:, [0, 2, 1]]
-    return checked, corner_uv
+    return checked, _reordered(mapped.corner_uv[mapped_faces], checked)
+
+
+def _reordered(per_corner: Values, checked: CheckedMesh) -> Values:
+    """Return values (m, 3, ...) at triangle corners of the input, rearranged for the faces of the checked mesh."""
+    values = per_corner[checked.face_origin]
+    values[checked.is_flipped] = values[checked.is_flipped][:, [0, 2, 1]]
+    return values
 
 
 def uv_points(mesh: TriangleMesh, corner_uv: FloatArray) -> tuple[FloatArray, IntArray]:

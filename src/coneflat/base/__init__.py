@@ -54,12 +54,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "BAKED_RESOLUTION", "BoolArray", "CHECKER_CELLS", "ComplexArray", "DISTORTION", "DOTS_PER_INCH", "EntryPoint",
-    "FREESURFER", "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE", "MAX_LISTED", "MIN_CONE_ANGLE", "Progress",
-    "Stopwatch", "THREADS", "TYPED_TOLERANCE", "Unmet", "Use", "as_floats", "as_indices", "begin_step",
-    "cache_folder", "cancel_with", "check_cancelled", "compilation", "compiled", "current_time", "dots", "each_within_time",
-    "endings", "exit_text", "has_any", "inner_calls", "is_time_up", "limit_threads", "list_some", "mask_of", "part_of_work",
-    "plural", "portion_of_time", "printable", "report_detail", "search_time", "short_repr", "stage", "timing",
-    "unit_exponent", "warn_of", "warns", "with_formats", "within_time",
+    "FREESURFER", "FloatArray", "IntArray", "MAX_CONES", "MAX_CONE_ANGLE", "MAX_LISTED", "MIN_CONE_ANGLE",
+    "Progress", "Stopwatch", "THREADS", "TYPED_TOLERANCE", "Unmet", "Use", "as_floats", "as_indices", "begin_step",
+    "cache_folder", "cancel_with", "check_cancelled", "compilation", "compiled", "current_time", "dots",
+    "each_within_time", "endings", "exit_text", "has_any", "inner_calls", "is_time_up", "limit_threads", "list_some",
+    "mask_of", "part_of_work", "plural", "portion_of_time", "printable", "report_detail", "search_time",
+    "short_repr", "stage", "timing", "unit_exponent", "warn_of", "warns", "with_formats", "within_time",
 ]  # fmt: skip
 
 

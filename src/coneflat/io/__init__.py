@@ -30,6 +30,7 @@ from .materials import (
     TRANSFORM,
     ImageTexture,
     Materials,
+    image_numbers,
     read_materials,
     slot_of,
 )
@@ -63,16 +64,16 @@ from .write import (
 )
 
 __all__ = [
-    "ALPHA", "as_bytes", "as_input", "as_path", "as_stored", "as_uv_mesh", "as_written", "atomic_write",
-    "Attribute", "bounds", "cell_side", "check_cells", "check_output", "check_target", "check_uv_set",
-    "checked_target", "CheckedArrays", "CLAMP", "DARK_CELL", "decode_image", "encode_png", "export_advice",
-    "find_meshes", "FOR_INDICES", "FOR_VERTICES", "Glb", "GROUPS", "has_uv", "ImageTexture", "imported",
+    "ALPHA", "as_bytes", "as_input", "as_path", "as_stored", "as_uv_mesh", "as_written", "atomic_write", "Attribute",
+    "bounds", "cell_side", "check_cells", "check_output", "check_target", "check_uv_set", "checked_target",
+    "CheckedArrays", "CLAMP", "DARK_CELL", "decode_image", "encode_png", "export_advice", "find_meshes",
+    "FOR_INDICES", "FOR_VERTICES", "Glb", "GROUPS", "has_uv", "image_numbers", "ImageTexture", "imported",
     "INPUT_FORMATS", "Joined", "kept_attributes", "keys_of", "known_ending", "LIGHT_CELL", "linear_colours",
     "lines_of", "local_positions", "losses", "make_folder", "MATERIAL", "MATERIALS", "Materials", "MIRRORED",
     "nibabel", "number", "OBJECTS", "OUTPUT_FORMATS", "PIPE", "read_archive", "read_bytes", "read_flattening",
     "read_joined", "read_label", "read_materials", "read_mesh", "read_mesh_from", "read_picture", "read_structure",
     "read_vertex_values", "readable", "relocated", "remove_unfinished", "REPEAT", "shading_normals", "slot_of",
     "SLOTS", "SPECULAR", "split_at_seams", "SplitMesh", "stored_in_glb", "Texture", "texture_files", "to_linear",
-    "to_srgb", "TRANSFORM", "uv_mesh_of", "UVMesh", "VALUES", "VERTEX_COLOURS", "write_flattening",
-    "write_measured", "write_parts", "write_stream",
+    "to_srgb", "TRANSFORM", "uv_mesh_of", "UVMesh", "VALUES", "VERTEX_COLOURS", "write_flattening", "write_measured",
+    "write_parts", "write_stream",
 ]  # fmt: skip

@@ -37,6 +37,7 @@ class UVMesh:
         source: the file, if any.
         texture: (m,) the number of the image that each triangle's material has; None if it is the same for all.
         texture_notes: notes on materials whose image is not known.
+        face_corners: (m, 3) the polygon corner of `source` at each triangle corner, if it was read from a file.
     """
 
     vertices: FloatArray
@@ -49,6 +50,7 @@ class UVMesh:
     source: MeshFile | None = None
     texture: IntArray | None = None
     texture_notes: tuple[str, ...] = ()
+    face_corners: IntArray | None = None
 
     @property
     def has_uv(self) -> BoolArray:
@@ -115,6 +117,7 @@ def uv_mesh_of(joined: Joined) -> UVMesh:
         source=mesh,
         texture=images[polygon_of(fans, mesh.offsets)] if images.any() else None,
         texture_notes=texture_notes,
+        face_corners=fans,
     )
 
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import shapes
 from browsing import PATIENCE, need_browser
+from gltf_scenes import coloured_ball
 from studio_browsing import Studio, StudioVisit, sample, studio, visit  # noqa: F401
-from test_studio_own_picture import coloured_ball
 
 import coneflat
 

@@ -14,6 +14,7 @@ pytest.importorskip("matplotlib")
 from coneflat.apps.view import draw_cones, draw_layout, quantity
 from coneflat.apps.view.figures import uv_layout as layout
 from coneflat.apps.view.figures.model import draw_cone_curve
+from coneflat.apps.view.palettes import color_table
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +43,8 @@ class TestLayout:
         mesh = coneflat.TriangleMesh(result.uv, result.uv_faces)
         lines = "".join(part.get("d") for part in groups_by_name["edges"].iter(f"{SVG}path"))
         assert lines.count("M") == np.count_nonzero(~mesh.is_boundary_edge)
-        assert count_dots(groups_by_name.get("cones")) == len(layout.layout_cones(result)[0])
+        counts = [count_dots(groups_by_name.get(f"{sign}-cones")) for sign in ("positive", "negative")]
+        assert sum(counts) == len(layout.layout_cones(result)[0])
 
     def test_cones_are_red_and_black_at_their_points(self):
         tube = shapes.tube()
@@ -56,13 +58,11 @@ class TestLayout:
 class TestQuality:
     @pytest.mark.slow
     def test_the_layout_has_the_colours_of_its_triangles(self, result):
-        from matplotlib import colormaps
-
         axes = axes_of(size=8.0)
         shown = quantity.conformal_distortion(result)
         layout.fill_layout(axes, result, shown, dpi=100)
         share = np.clip((result.distortion.qc - 1) / (shown.scale.high - 1), 0, 1)
-        expected = 255 * np.asarray(colormaps["viridis_r"](share))[:, :3]
+        expected = 255 * color_table("sequential")[np.minimum((256 * share).astype(int), 255)]
         shades = shown_at(axes, result.corner_uv.mean(axis=1))
         close = np.abs(shades - expected).max(axis=1) < 12
         # The rest is beside outlines and other triangles.
@@ -87,9 +87,11 @@ class TestConesAndCurvature:
                 for collection in axes.collections
                 if "cones" in collection.get_gid()
             }
-            assert list(dots) == ["hidden-cones" if hidden else "cones"]
-            (marks,) = dots.values()
-            positive, negative = shown_at(axes, marks.get_offsets())
+            assert list(dots) == [f"{'hidden-' * hidden}{sign}-cones" for sign in ("positive", "negative")]
+            positive, negative = (shown_at(axes, marks.get_offsets())[0] for marks in dots.values())
+            disc, square = (marks.get_paths()[0] for marks in dots.values())
+            assert len(square.vertices) == 5  # Closed.
+            assert len(disc.vertices) > 5
             assert np.abs(positive - RED).max() > 60 if hidden else positive.tolist() == list(RED)
             assert np.abs(negative - BLACK).max() > 100 if hidden else negative.tolist() == list(BLACK)
             lines = {

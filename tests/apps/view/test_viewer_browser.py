@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from browsing import NARROW, WIDE, Visit, need_browser, thing
+from gltf_scenes import coloured_ball
 
+import coneflat
 from coneflat.apps.view.page.content import content_of
 from coneflat.options.declared import SHOWS
 
@@ -112,6 +116,108 @@ def test_another_axis_points_up(visit):
         np.testing.assert_allclose(turn, fit_camera(places, (1, 1), up=axis).axes, atol=1e-9)
         shown.append(axis)
     assert sorted(shown[:3]) == ["x", "y", "z"]
+
+
+@pytest.fixture(scope="module")
+def damaged_page(viewed, tmp_path_factory):
+    """A page whose layout has overlaps, a fold, and parts outside the unit square."""
+    uv = viewed.uv.copy()
+    uv[viewed.uv_faces[300, 0]] += [0.1, 0.05]
+    uv[np.unique(viewed.uv_faces[chart_of(viewed) == 1])] += [0.35, 0.2]
+    distortion = coneflat.measure_uv(viewed.vertices, viewed.faces, uv[viewed.uv_faces]).distortion
+    damaged = dataclasses.replace(viewed, uv=uv, distortion=distortion)
+    return damaged, damaged.view(tmp_path_factory.mktemp("damaged") / "page.html", show="faults")
+
+
+def chart_of(result):
+    from coneflat.mesh import label_faces
+
+    return np.unique(label_faces(result.uv_faces, len(result.uv))[1], return_inverse=True)[1].reshape(-1)
+
+
+def test_faults_are_coloured_counted_and_visited(browser, damaged_page):
+    from coneflat.apps.view import uv_faults
+
+    damaged, path = damaged_page
+    visit = Visit(browser, path)
+    bits = uv_faults(damaged).bits
+    counts = uv_faults(damaged).counts()
+    assert min(counts.values()) > 0
+    np.testing.assert_array_equal(visit.run("Array.from(coneflat.model.arrays.faults)"), bits)
+    legend = visit.page.inner_text("#legend")
+    assert all(f"{count:,}" in legend for count in counts.values())
+    visit.run("coneflat.state.set({seams: false, cones: false})")
+    places = damaged.vertices[damaged.faces]
+    red, purple = [0xD6, 0x22, 0x22], [0x7A, 0x35, 0xB8]
+    for bit, colour in ((1, purple), (2, red)):
+        # The largest triangle of the kind has its colour on the model, which shading makes darker at most.
+        areas = np.linalg.norm(np.cross(*(places[:, k] - places[:, 0] for k in (1, 2))), axis=1)
+        shown = np.flatnonzero((bits & bit > 0) & ((bits & 1 > 0) == (bit == 1)))
+        index = int(shown[np.argmax(areas[shown])])
+        visit.run(f"coneflat.find({thing('triangle', index)})")
+        visit.run("coneflat.state.set({picked: null})")
+        (x, y), box = visit.at("model", thing("triangle", index))[0], visit.box("model")
+        seen = visit.picture("model")[int(y - box["y"]), int(x - box["x"])]
+        assert np.abs(seen / seen.max() - np.array(colour) / max(colour)).max() < 0.12, (bit, seen)
+    visited = []
+    for press in (lambda: visit.page.keyboard.press("j"), lambda: visit.page.click("#next-fault")) * 2:
+        press()
+        visit.wait_until_drawn()
+        index = visit.state("picked")["index"]
+        visited.append(index)
+        assert bits[index]
+        assert "Fault" in visit.page.inner_text("#facts")
+        for pane in ("model", "layout"):
+            (x, y), box = visit.at(pane, thing("triangle", index))[0], visit.box(pane)
+            assert 0 < x - box["x"] < box["width"]
+            assert 0 < y - box["y"] < box["height"]
+    assert len({*visited}) == min(4, visit.run("coneflat.model.faultCount"))
+    visit.close()
+
+
+def test_a_good_layout_has_no_fault_to_visit(visit):
+    visit.page.keyboard.press("j")
+    assert visit.state("show") == "faults"
+    assert visit.state("picked") is None
+    assert visit.page.is_disabled("#next-fault")
+
+
+def test_the_unit_square_is_in_the_view_of_the_layout(visit):
+    box = visit.box("layout")
+    picture = visit.picture("layout")
+    for side in ([0.5, 0], [1, 0.5], [0.5, 1], [0, 0.5]):
+        x, y, _ = visit.run(
+            f"coneflat.panes[1].camera.project(coneflat.model.planePlace({side[0]}, {side[1]}))"
+        )
+        assert 0 < x < box["width"]
+        assert 0 < y < box["height"]
+        # The line is dashed, grey on white.
+        surroundings = picture[max(int(y) - 9, 0) : int(y) + 9, max(int(x) - 9, 0) : int(x) + 9].reshape(
+            -1, 3
+        )
+        assert (np.abs(surroundings - [0x80, 0x88, 0x90]).max(axis=1) < 40).any(), side
+
+
+def test_the_texture_of_a_file_is_shown_first(browser, tmp_path):
+    from click.testing import CliRunner
+
+    from coneflat.apps.cli.main import cli
+
+    pytest.importorskip("PIL")
+    (tmp_path / "ball.glb").write_bytes(coloured_ball())
+    for words in ([], ["--again"]):
+        page = tmp_path / "page.html"
+        done = CliRunner().invoke(cli, ["view", str(tmp_path / "ball.glb"), *words, "-o", str(page)])
+        assert done.exit_code == 0, done.output
+        visit = Visit(browser, page)
+        assert visit.state("show") == "picture"
+        visit.run("coneflat.state.set({seams: false, cones: false})")
+        picture = visit.picture("model").reshape(-1, 3)
+        is_red, is_green = picture[:, 0] > 2 * picture[:, 1] + 40, picture[:, 1] > 2 * picture[:, 0] + 40
+        assert min(is_red.mean(), is_green.mean()) > 0.02
+        visit.close()
+    done = CliRunner().invoke(cli, ["view", str(tmp_path / "ball.glb"), "--show", "qc", "-o", str(page)])
+    assert '"show":"qc"' in page.read_text()
 
 
 def test_everything_that_can_be_shown_looks_different(visit):

@@ -40,6 +40,8 @@ _KINDS_OF_OPTION = {
     "colors": ("quality", "color", "curvature"),
     "color": ("color",),
     "cells": ("checker",),
+    "qc_max": ("quality",),
+    "scale_max": ("quality",),
     "color_charts": ("layout",),
     "most": ("curve",),
     "again": ("layout", *_VIEWS),
@@ -59,7 +61,9 @@ class FigureFlags:
             three-quarter view, or a vector X,Y,Z; repeat for several views.  [default: front-right]
         size: Size in inches.  [default: depends on the content]
         dpi: Resolution in dots per inch.
-        colors: Colour map of matplotlib, for quality, color and curvature.
+        colors: sequential, diverging or a colour map of matplotlib, for quality, color and curvature.
+        qc_max: QC distortion at the end of its colour scale.  [default: fits the values]
+        scale_max: Scale at the end of its colour scale, which begins at the reciprocal.  [default: fits the values]
         cells: Number of checkerboard squares along the square root of the surface area.
         color_charts: Give each chart of the layout its own colour.
         most: Largest number of cones of the curve.
@@ -72,6 +76,8 @@ class FigureFlags:
     size: tuple[float, float] | None = flag(type=float, nargs=2, metavar="WIDTH HEIGHT")
     dpi: float = flag(DOTS_PER_INCH, type=float)
     colors: str | None = flag(metavar="NAME")
+    qc_max: float | None = flag(type=float)
+    scale_max: float | None = flag(type=float)
     cells: float = flag(float(CHECKER_CELLS), type=float)
     color_charts: bool = flag(False, is_flag=True)
     most: int = flag(MAX_CONES, type=int)
@@ -123,7 +129,8 @@ def figure(
     output = check_figure(flags.output or Path(f"{mesh.stem}_{kind}.png"))
     look: dict[str, Any] = {"up": up, "eyes": flags.eye or ("front-right",)}
     look |= {
-        name: getattr(flags, name) for name in ("size", "dpi", "colors", "cells", "color_charts", "title")
+        name: getattr(flags, name)
+        for name in ("size", "dpi", "colors", "qc_max", "scale_max", "cells", "color_charts", "title")
     }
     Look(**look)
     with Console(verbosity) as console:

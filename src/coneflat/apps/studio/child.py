@@ -25,6 +25,7 @@ from ...errors import DegenerateFaceError, NonManifoldError, NonOrientableError
 from ...io import Joined, Texture, read_joined
 from ...options import MAX_SHOWN_TRIANGLES
 from ...textures import Unwrapper
+from ..transfer import own_picture
 from ..view import (
     Model,
     PageText,
@@ -37,7 +38,7 @@ from ..view import (
     text_of,
     upward_axis,
 )
-from .choices import Choices
+from .choices import DECLARED, Choices
 from .layouts import LatestLayouts, MadeLayout
 from .messages import misplaced_warning, notes_on_controls, page_message, with_warnings
 from .outputs import (
@@ -45,7 +46,6 @@ from .outputs import (
     as_shown,
     bad_places,
     curve_data,
-    own_picture,
     quads_file,
     repaired,
     result_file,
@@ -282,7 +282,11 @@ class JobRunner:
             source = read_joined(Path(mesh))
             self._opened = Opened(source, Flattener(source.mesh), Unwrapper(source.mesh))
             self._read = mesh, sha256
-            self._own_texture = None if source.mesh.scene is None else own_picture(source.mesh)
+            self._own_texture = (
+                None
+                if source.mesh.scene is None
+                else own_picture(source.mesh, DECLARED["resolution"].default)
+            )
         return self._opened
 
 

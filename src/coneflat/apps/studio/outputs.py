@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from io import BytesIO
@@ -13,14 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from ... import ConeflatError, Flattening, MeshFile, TriangleMesh, check_mesh
-from ...base import MAX_CONES, FloatArray
+from ... import Flattening, TriangleMesh, check_mesh
+from ...base import MAX_CONES
 from ...errors import MeshError, StudioError
-from ...io import Joined, Texture, as_input, as_stored, as_written, encode_png, write_stream
+from ...io import Joined, as_input, as_stored, as_written, write_stream
 from ...mesh import REPAIR_ADVICE, CheckedMesh, end_corners
-from ..transfer.materials import BASE, Painted
 from ..view import outline_halfedges, shown_rows
-from .choices import DECLARED, Choices
+from .choices import Choices
 
 #: The format whose measures are shown.
 SHOWN_FORMAT = ".obj"
@@ -249,34 +247,13 @@ def bad_places(checked: CheckedMesh) -> list[list[int]]:
     return [*edges.tolist(), *split[:, None].tolist()][:2000]
 
 
-def own_picture(mesh: MeshFile) -> tuple[Texture, FloatArray] | None:
-    """Return the base colours of the material of most triangles of a file, and its UVs; None if it has no image.
-
-    The UVs (3 m, 2) are those of the corners in the file, v upwards, and -1e6 at triangles of other materials, by
-    which the page knows them. The image is reduced to the default resolution of textures.
-    """
-    with suppress(ConeflatError, AttributeError, TypeError):  # Materials that are not valid are not shown.
-        painted = Painted(mesh.path, None)
-        layers = {i: layer for i in painted.shown if (layer := painted.layer(BASE, i)) is not None}
-        material = max(layers, key=np.bincount(painted.material).item, default=None)
-        if material is not None:
-            places = np.where(
-                (painted.material == material)[:, None, None], painted.placed(layers[material]), np.nan
-            )
-            uv = np.where(np.isfinite(places), places * [1, -1] + [0, 1], -1e6)
-            image = painted.pixels(layers[material])
-            step = -(-max(image.shape) // DECLARED["resolution"].default)
-            return encode_png(np.ascontiguousarray(image[::step, ::step])), uv.reshape(-1, 2)
-    return None
-
-
 def without_layout(checked: CheckedMesh) -> Flattening:
     """Return a mesh in the form of a flattening without cones; its UVs are a projection, which must not be shown."""
     mesh, zeros, none = checked.mesh, np.zeros(len(checked.mesh.vertices)), np.empty(0, dtype=np.int64)
     # In a skew projection the triangles of boxes have areas, too, which a simplification for display needs.
     uv = mesh.vertices @ np.array([[0.92, 0.13], [0.31, 0.84], [0.23, 0.51]])
     ones = np.ones(len(mesh.faces))
-    unknown: Any = SimpleNamespace(qc=ones, log_area_scale=0 * ones)
+    unknown: Any = SimpleNamespace(qc=ones, log_area_scale=0 * ones, overlapping_pairs=0)
     return Flattening(
         mesh.vertices, mesh.faces, uv, mesh.faces, 1.0, none, zeros[:0], zeros, zeros, zeros, mesh.edges[:0], 0.0,
         unknown, {}, vertex_origin=checked.vertex_origin,

@@ -3,5 +3,6 @@
 from __future__ import annotations
 
 from .baking import ENDINGS, Baked, transfer
+from .own_picture import own_picture
 
-__all__ = ["ENDINGS", "Baked", "transfer"]
+__all__ = ["ENDINGS", "Baked", "own_picture", "transfer"]

@@ -88,6 +88,7 @@ class Painted:
 
     Attributes:
         vertices, faces: (n, 3), (m, 3) the mesh.
+        corners: (m, 3) the polygon corner of the file at each triangle corner.
         material: (m,) the material of each triangle.
         shown: the materials that triangles have.
         items: all materials as in glTF.
@@ -98,14 +99,14 @@ class Painted:
         self.mesh = read_mesh(path, weld=False)
         surface = as_input(self.mesh)
         self.vertices, self.faces = self.mesh.vertices, np.asarray(surface.faces)
-        self._corners = np.asarray(surface.face_corners)
+        self.corners = np.asarray(surface.face_corners)
         if not np.isfinite(self.vertices[self.faces]).all():
             raise NonFiniteError(f"{path} has positions that are NaN or infinite")
         with readable(path, "model with materials"):
             polygons = len(self.mesh.offsets) - 1
             self._materials = read_materials(self.mesh) if picture is None else _picture(picture, polygons)
             self.items = self._materials.items
-            self.material = self._materials.polygon[polygon_of(self._corners, self.mesh.offsets)]
+            self.material = self._materials.polygon[polygon_of(self.corners, self.mesh.offsets)]
             self.shown: list[int] = np.unique(self.material).tolist()
             self._layers = self._read_layers()
             self._factors = {
@@ -173,7 +174,7 @@ class Painted:
         if self.mesh.uv is None or self.mesh.texture is None:
             return np.full((len(self.faces), 3, 2), np.nan)
         points = np.append(self.mesh.uv, [[np.nan, np.nan]], axis=0)
-        return points[self.mesh.texture[self._corners]] * [1, -1] + [0, 1]
+        return points[self.mesh.texture[self.corners]] * [1, -1] + [0, 1]
 
     def _missing_uvs(self) -> tuple[str, ...]:
         """Return a note on triangles whose material has an image for which they have no UVs.
@@ -245,7 +246,7 @@ class Painted:
             if name in attributes:
                 width = min(data.accessor(attributes[name]).rows, columns)
                 rows[-1][:, :width] = data.values(attributes[name], width)[part.corners]
-        return np.concatenate(rows)[self._corners]
+        return np.concatenate(rows)[self.corners]
 
     def _has_attribute(self, name: str) -> bool:
         """Return True if a primitive of the glTF scene has an attribute."""

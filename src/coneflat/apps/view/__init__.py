@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from .comparison import common_ranges, comparison_html
+from .faults import UVFaults, uv_faults
 from .figures.camera import Eye, eye_direction, view_aspect
 from .figures.compose import Panel, Row, check_figure, compose, new_figure, save_figure, write_figure
 from .figures.cone_marks import DOT_REACH, mark_handles, mark_scale
@@ -22,15 +24,15 @@ from .page.webpage import (
     write_page,
 )
 from .quad_page import page_of_quads
-from .quantity import Quantity, conformal_distortion, own_quantity
+from .quantity import Quantity, Ranges, conformal_distortion, own_quantity
 from .upward import upward_axis
 
 __all__ = [
-    "Barycentrics", "DOT_REACH", "Eye", "Look", "Model", "PageText", "Panel", "Quantity", "Row",
-    "check_figure", "check_page", "compose", "conformal_distortion", "content_of", "demo_figure", "draw_checker",
-    "draw_cones", "draw_layout", "draw_quantity", "eye_direction", "fill_layout", "head_and_block", "layout_aspect",
-    "make_figure", "mark_handles", "mark_scale", "new_figure", "notebook_html", "open_address", "open_page",
-    "outline_halfedges", "own_flattening", "own_quantity", "pack", "page_around", "page_html", "page_of_quads",
-    "save_figure", "show_mesh", "shown_rows", "text_of", "upward_axis", "uv_flattening", "view_aspect",
-    "write_figure", "write_page",
+    "Barycentrics", "DOT_REACH", "Eye", "Look", "Model", "PageText", "Panel", "Quantity", "Ranges", "Row", "UVFaults",
+    "check_figure", "check_page", "common_ranges", "comparison_html", "compose", "conformal_distortion", "content_of",
+    "demo_figure", "draw_checker", "draw_cones", "draw_layout", "draw_quantity", "eye_direction", "fill_layout",
+    "head_and_block", "layout_aspect", "make_figure", "mark_handles", "mark_scale", "new_figure", "notebook_html",
+    "open_address", "open_page", "outline_halfedges", "own_flattening", "own_quantity", "pack", "page_around",
+    "page_html", "page_of_quads", "save_figure", "show_mesh", "shown_rows", "text_of", "upward_axis", "uv_faults",
+    "uv_flattening", "view_aspect", "write_figure", "write_page",
 ]  # fmt: skip

@@ -76,6 +76,7 @@ def uv_flattening(mapped: UVMesh, *, strict: bool = False) -> Flattening:
         settings={"method": FILE_UVS},
         solve=SolveStatistics(),
         source=mapped.source,
+        face_corners=measured.face_corners,
     )
 
 

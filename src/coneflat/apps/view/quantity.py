@@ -15,6 +15,8 @@ from ...errors import MeshFileError, OptionError
 from ...geometry import angle_defect, corner_angles, double_areas, edge_lengths
 from ...io import VALUES, read_vertex_values
 from ...measures import quantile
+from ...options import as_number
+from .palettes import check_color_map, color_table
 
 if TYPE_CHECKING:
     from ... import Flattening
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
 
 #: Least range of a colour scale of factors; a shorter one would show noise as distortion.
 MIN_RANGE = 0.05
+#: Largest end of a colour scale; 32-bit numbers of pages have room for its square.
+MAX_END = 1e15
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,7 @@ class ColorScale:
     Attributes:
         low, high: numbers of the first and the last colour; numbers outside are clamped. For a signed logarithm, the
             smallest and the largest absolute value.
-        colors: name of a colour map of matplotlib; in a page, "sequential" or "diverging".
+        colors: "sequential", "diverging" or, in figures, a colour map of matplotlib; see `color_table`.
         kind: "linear", "log", or "signed log": logarithmic in the absolute value, with opposite signs to both sides of
             the middle, where absolute values below `low` are mapped.
         ticks: numbers to be marked, with their labels.
@@ -56,12 +60,11 @@ class ColorScale:
 
     def rgb(self, values: FloatArray) -> FloatArray:
         """Return the (..., 3) colours of numbers; grey for NaN: triangles without area, boundary vertices."""
-        from matplotlib import colormaps
-
         position = self.position(values)
-        colors = np.asarray(colormaps[self.colors](np.nan_to_num(position)))[..., :3]
-        colors[np.isnan(position)] = 0.6
-        return colors
+        table = color_table(self.colors)
+        # As in matplotlib, each colour of the table has an equal part of the scale.
+        rows = np.minimum((np.nan_to_num(position) * len(table)).astype(np.int64), len(table) - 1)
+        return np.where(np.isnan(position)[..., None], 0.6, table[rows])
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,21 +118,45 @@ class Quantity:
         return replace(self, scale=replace(self.scale, colors=colors))
 
 
-def conformal_distortion(result: Flattening) -> Quantity:
-    """Return the quasi-conformal distortion of every triangle."""
+@dataclass(frozen=True)
+class Ranges:
+    """Ends of colour scales; None for ends that fit the values.
+
+    Attributes:
+        qc_max: QC distortion at the end of the scale, above 1.
+        scale_max: scale at the end of the scale, above 1; at its beginning is the reciprocal.
+
+    Raises:
+        OptionError: an end is not above 1.
+    """
+
+    qc_max: float | None = None
+    scale_max: float | None = None
+
+    def __post_init__(self) -> None:
+        for name, value in (("qc_max", self.qc_max), ("scale_max", self.scale_max)):
+            if value is not None and not 1.0 < as_number(name, value) <= MAX_END:
+                raise OptionError(f"{name} must be above 1 and at most {MAX_END:g}, got {value:g}")
+
+
+def conformal_distortion(result: Flattening, qc_max: float | None = None) -> Quantity:
+    """Return the quasi-conformal distortion of every triangle; qc_max: the end of the scale, if it is given."""
     qc, areas = result.distortion.qc, _areas(result)
     finite = np.isfinite(qc)
     excess = quantile(qc[finite], areas[finite], 0.95) - 1.0 if finite.any() else 0.0
     step = MIN_RANGE if excess < 0.5 else 0.5
     # The percentile is rounded up, with a tolerance for percentiles at a step.
-    top = 1.0 + max(float(np.ceil(excess / step - 1e-9)) * step, MIN_RANGE)
+    top = 1.0 + max(float(np.ceil(excess / step - 1e-9)) * step, MIN_RANGE) if qc_max is None else qc_max
     ticks = [(float(x), f"{x:.4g}") for x in np.linspace(1.0, top, 3)]
-    scale = ColorScale(1.0, top, "viridis_r", "linear", tuple(ticks))
+    scale = ColorScale(1.0, top, "sequential", "linear", tuple(ticks))
     return Quantity("QC distortion", qc, areas, scale, ".3f")
 
 
-def stretch(result: Flattening) -> Quantity:
-    """Return the scale factor of lengths in every triangle, divided by the mean."""
+def stretch(result: Flattening, scale_max: float | None = None) -> Quantity:
+    """Return the scale factor of lengths in every triangle, divided by the mean.
+
+    scale_max: the end of the scale, if it is given.
+    """
     log_scale, areas = result.distortion.log_area_scale, _areas(result)
     is_known = np.isfinite(log_scale)
     mean = np.average(log_scale[is_known], weights=areas[is_known]) if is_known.any() else 0.0
@@ -137,9 +164,9 @@ def stretch(result: Flattening) -> Quantity:
     extreme = quantile(np.abs(log_scale[is_known] - mean), areas[is_known], 0.95) if is_known.any() else 0.0
     reached = max(float(np.exp(extreme)), 1 + MIN_RANGE) * (1 - 1e-9)
     rounded = (1.05, 1.1, 1.2, 1.5, 2.0, 3.0, 5.0, 10.0, 100.0)
-    top = next((limit for limit in rounded if limit >= reached), reached)
+    top = next((limit for limit in rounded if limit >= reached), reached) if scale_max is None else scale_max
     ticks = ((1 / top, f"{1 / top:.3g}"), (1.0, "1"), (top, f"{top:.3g}"))
-    return Quantity("Scale", factor, areas, ColorScale(1 / top, top, "PuOr_r", "log", ticks), ".3f")
+    return Quantity("Scale", factor, areas, ColorScale(1 / top, top, "diverging", "log", ticks), ".3f")
 
 
 def curvature(result: Flattening, flat: bool) -> Quantity:
@@ -152,7 +179,7 @@ def curvature(result: Flattening, flat: bool) -> Quantity:
     if flat:
         counts[result.cones] = 0.0
     ticks = tuple((10.0**k, f"$10^{{{k}}}$") for k in (-15, -10, -5, 0))
-    scale = ColorScale(1e-16, 1.0, "YlGnBu", "log", ticks)
+    scale = ColorScale(1e-16, 1.0, "sequential", "log", ticks)
     label = "|K| after, without cones" if flat else "|K| before"
     return Quantity(label, np.abs(values), counts, scale, ".1e", result.faces)
 
@@ -179,14 +206,6 @@ def angle_defects(result: Flattening, flat: bool, mesh: TriangleMesh | None = No
 
 def _areas(result: Flattening) -> FloatArray:
     return double_areas(edge_lengths(result.vertices, result.faces)) / 2
-
-
-def check_color_map(name: str) -> None:
-    """Raise OptionError if matplotlib has no such colour map."""
-    from matplotlib import colormaps
-
-    if name not in colormaps:
-        raise OptionError(f"matplotlib has no colour map {name!r}; try viridis, cividis or magma")
 
 
 def own_quantity(result: Flattening, name: str, archive: Path | None = None) -> Quantity:
@@ -282,4 +301,4 @@ def _scale(values: FloatArray, weights: FloatArray) -> ColorScale:
         low, high = low - reach, high + reach
     # Each is halved first, so that the sum of large numbers does not overflow.
     ticks = tuple((x, f"{x:.3g}") for x in (low, low / 2 + high / 2, high))
-    return ColorScale(low, high, "PuOr_r" if is_signed else "viridis_r", "linear", ticks)
+    return ColorScale(low, high, "diverging" if is_signed else "sequential", "linear", ticks)

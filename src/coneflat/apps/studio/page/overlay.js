@@ -10,7 +10,7 @@ class Overlay {
   draw(pen, pane) {
     const {tools, choices} = this.studio;
     pen.lineJoin = pen.lineCap = "round";
-    if (pane.inPlane && this.studio.hasLayout()) this.square(pen, pane);
+    if (pane.inPlane && this.studio.hasLayout()) this.studio.viewer.marks.drawSquare(pen, pane);
     for (const path of choices.cuts) this.path(pen, pane, this.studio.verticesOf(path), PATH_COLOURS.cut, [1, 6]);
     for (const path of choices.kept) this.path(pen, pane, this.studio.verticesOf(path), PATH_COLOURS.keep, [1, 6]);
     if (tools.draws) {
@@ -40,22 +40,6 @@ class Overlay {
     const [x, y] = [pane.width / 2, pane.height / 2];
     const path = new Path2D(`M${x - 14} ${y}H${x - 4}M${x + 4} ${y}H${x + 14}M${x} ${y - 14}V${y - 4}M${x} ${y + 4}V${y + 14}`);
     this.stroke(pen, path, this.studio.viewer.accent, 2);
-  }
-
-  /** Draw the unit square of the texture. */
-  square(pen, pane) {
-    const path = new Path2D();
-    [[0, 0], [1, 0], [1, 1], [0, 1]].forEach(([u, v], i) => {
-      const [x, y] = pane.camera.project(this.studio.viewer.model.planePlace(u, v));
-      if (i) path.lineTo(x, y);
-      else path.moveTo(x, y);
-    });
-    path.closePath();
-    pen.strokeStyle = "#808890";
-    pen.lineWidth = 1;
-    pen.setLineDash([5, 4]);
-    pen.stroke(path);
-    pen.setLineDash([]);
   }
 
   /** Return the screen positions of a vertex; in the layout it may have several. */

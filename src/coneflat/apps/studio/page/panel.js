@@ -366,7 +366,6 @@ function isButton(element) {
   return Boolean(element.closest("button, summary, label, [type=checkbox]")) && !element.closest("select, input:not([type=checkbox])");
 }
 
-
 /** Return the value of an option for the text of its control; angles are in degrees there, and axes directions. */
 function furtherValue(name, kind, text) {
   if (kind === "choice" && DEFAULTS[name] !== null) return text;

@@ -17,6 +17,7 @@ import numpy as np
 from ....base import DOTS_PER_INCH
 from ....errors import OptionError
 from ....io import atomic_write, checked_target, imported
+from ..palettes import color_table
 from ..quantity import Quantity
 from .cone_marks import check_dpi
 
@@ -202,13 +203,11 @@ def _draw_card(figure: Figure, quantity: Quantity, left: float, floor: float, he
 
 def draw_histogram(axes: Axes, quantity: Quantity) -> None:
     """Draw the histogram of a quantity above its colour bar; values outside the bar are counted at its ends."""
-    from matplotlib import colormaps
-
     values, weights = quantity.counted()
     position = quantity.scale.position(values)
     place = np.minimum((position * 36).astype(np.int64), 35)
     share = np.bincount(place, weights, 36)
-    colors = colormaps[quantity.scale.colors](np.linspace(0.0, 1.0, 256))
+    colors = color_table(quantity.scale.colors)
     heights = share / (share.max() or 1.0)
     axes.bar(np.arange(36) / 36, heights, 1.0 / 36, align="edge", color="#8d95a1", zorder=1)
     axes.imshow(colors[None], extent=(0.0, 1.0, -0.22, -0.04), aspect="auto", zorder=2)

@@ -23,6 +23,9 @@ NEGATIVE_COLOR = "#000000"
 HIDDEN_COLORS = {POSITIVE_COLOR: "#e6b3b4", NEGATIVE_COLOR: "#a3a5a9"}
 """Colours of cones that are hidden by the model."""
 
+MARKER_SHARES = {"o": 1.0, "s": np.pi / 4}
+"""Factors of the areas of matplotlib's markers, which are those of the squares around them, for equal areas."""
+
 DOT_REACH = 0.01
 """Approximate radius of a dot, as a fraction of the longer side of the picture."""
 
@@ -45,7 +48,7 @@ def cone_area(curvatures: FloatArray) -> FloatArray:
 def draw_dots(
     axes: Axes, points: FloatArray, curvatures: FloatArray, *, hidden: bool = False, share: float = 1.0
 ) -> None:
-    """Draw cones as dots, red for positive and black for negative curvature, with an area that grows with it.
+    """Draw cones: red discs of positive, black squares of negative curvature, with an area that grows with it.
 
     Args:
         axes: matplotlib axes to draw in.
@@ -56,19 +59,24 @@ def draw_dots(
     """
     if not len(points):
         return
-    colors = [POSITIVE_COLOR if curvature > 0.0 else NEGATIVE_COLOR for curvature in curvatures.tolist()]
     factor = share * mark_scale(axes)
-    axes.scatter(
-        points[:, 0],
-        points[:, 1],
-        s=factor * cone_area(curvatures),
-        c=[HIDDEN_COLORS[color] for color in colors] if hidden else colors,
-        edgecolors="none" if hidden else "white",
-        linewidths=0.7 * np.sqrt(factor),
-        zorder=3 if hidden else 6,
-        clip_on=False,
-        gid="hidden-cones" if hidden else "cones",
-    )
+    is_positive = curvatures > 0.0
+    signs = (("positive", POSITIVE_COLOR, "o", is_positive), ("negative", NEGATIVE_COLOR, "s", ~is_positive))
+    for sign, color, marker, chosen in signs:
+        if not chosen.any():
+            continue
+        axes.scatter(
+            points[chosen, 0],
+            points[chosen, 1],
+            s=factor * MARKER_SHARES[marker] * cone_area(curvatures[chosen]),
+            c=HIDDEN_COLORS[color] if hidden else color,
+            marker=marker,
+            edgecolors="none" if hidden else "white",
+            linewidths=0.7 * np.sqrt(factor),
+            zorder=3 if hidden else 6,
+            clip_on=False,
+            gid=f"{'hidden-' * hidden}{sign}-cones",
+        )
 
 
 def draw_seams_on_model(
@@ -106,14 +114,23 @@ def mark_handles(result: Flattening, *, cones: bool = True, seams: bool = True) 
     from matplotlib.lines import Line2D
 
     diameter = float(np.sqrt(cone_area(np.array([np.pi / 2]))[0]))
-    dot: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": diameter, "markeredgecolor": "white"}
     marks: list[Any] = []
     if seams and len(result.seams):
         marks.append(Line2D([], [], color=SEAM_COLOR, linewidth=SEAM_WIDTH, label="seam"))
-    if cones and np.any(result.curvatures > 0.0):
-        marks.append(Line2D([], [], color=POSITIVE_COLOR, label="positive cone", **dot))
-    if cones and np.any(result.curvatures < 0.0):
-        marks.append(Line2D([], [], color=NEGATIVE_COLOR, label="negative cone", **dot))
+    cone_signs = (
+        ("positive cone", POSITIVE_COLOR, "o", result.curvatures > 0.0),
+        ("negative cone", NEGATIVE_COLOR, "s", result.curvatures < 0.0),
+    )
+    for label, color, marker, has_sign in cone_signs:
+        if cones and np.any(has_sign):
+            size = diameter * np.sqrt(MARKER_SHARES[marker])
+            look: dict[str, Any] = {
+                "linestyle": "",
+                "marker": marker,
+                "markersize": size,
+                "markeredgecolor": "white",
+            }
+            marks.append(Line2D([], [], color=color, label=label, **look))
     return marks
 
 

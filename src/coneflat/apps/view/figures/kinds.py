@@ -14,7 +14,8 @@ from ....base import CHECKER_CELLS, DISTORTION, DOTS_PER_INCH, IntArray, plural,
 from ....errors import OptionError
 from ....io import check_cells
 from ..from_uv import is_from_file
-from ..quantity import Quantity, check_color_map, conformal_distortion, curvature, stretch
+from ..palettes import check_color_map
+from ..quantity import Quantity, Ranges, conformal_distortion, curvature, stretch
 from ..upward import axis_of, check_up
 from .camera import Eye, eye_direction, view_aspect
 from .compose import Panel, Row, check_pixels, compose
@@ -37,9 +38,11 @@ class Look:
         dpi: resolution of the pictures in dots per inch.
         eyes: directions from the model to the eye, one for each view, see `draw_checker`.
         up: the model's upward axis, "x", "y" or "z"; "auto" is that of its format or shape, see `upward_axis`.
-        colors: a colour map of matplotlib for quality, color and curvature; None for the defaults.
+        colors: "sequential", "diverging" or a colour map of matplotlib, for quality, color and curvature; None for
+            the defaults.
         cells: number of checkerboard cells along the square root of the surface area.
         color_charts: give the charts of the layout different colours.
+        qc_max, scale_max: ends of the colour scales of the kind "quality", see `Ranges`.
         own: quantity to be shown as colours, for the kind "color".
         distortion: target area distortion of the curve.
         title: title above the figure.
@@ -55,6 +58,8 @@ class Look:
     colors: str | None = None
     cells: float = CHECKER_CELLS
     color_charts: bool = False
+    qc_max: float | None = None
+    scale_max: float | None = None
     own: Quantity | None = None
     distortion: float = DISTORTION
     title: str = ""
@@ -69,6 +74,7 @@ class Look:
             eye_direction(eye)
         check_pixels((1.0, 1.0) if self.size is None else self.size, self.dpi)
         check_cells(self.cells)
+        Ranges(self.qc_max, self.scale_max)
         if self.colors is not None:
             check_color_map(self.colors)
 
@@ -141,7 +147,8 @@ def _cones(result: Flattening, look: Look) -> _Rows:
 
 
 def _quality(result: Flattening, look: Look) -> _Rows:
-    return [_coloured(result, look, find(result)) for find in (conformal_distortion, stretch)], []
+    quantities = (conformal_distortion(result, look.qc_max), stretch(result, look.scale_max))
+    return [_coloured(result, look, quantity) for quantity in quantities], []
 
 
 def _color(result: Flattening, look: Look) -> _Rows:

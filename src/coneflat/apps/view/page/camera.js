@@ -148,9 +148,9 @@ class Camera {
   }
 }
 
-/** Animate a camera to another rotation and pan. */
-function glide(camera, turn, pan) {
-  const from = {turn: camera.turn, pan: camera.pan};
+/** Animate a camera to another rotation, pan and zoom. */
+function glide(camera, turn, pan, zoom = camera.zoom) {
+  const from = {turn: camera.turn, pan: camera.pan, zoom: camera.zoom};
   const relative = product(turn, [0, 3, 6, 1, 4, 7, 2, 5, 8].map((i) => from.turn[i]));
   const cosine = Math.min(Math.max((relative[0] + relative[4] + relative[8] - 1) / 2, -1), 1);
   const angle = Math.acos(cosine);
@@ -165,6 +165,7 @@ function glide(camera, turn, pan) {
     const part = Math.min((performance.now() - start) / last, 1), eased = part * part * (3 - 2 * part);
     camera.turn = part < 1 ? straightened(product(rotation(axis, angle * eased), from.turn)) : turn;
     camera.pan = [0, 1].map((k) => from.pan[k] + eased * (pan[k] - from.pan[k]));
+    camera.zoom = part < 1 ? from.zoom * (zoom / from.zoom) ** eased : zoom;
     camera.note();
     version.now = camera.version;
     if (part < 1) requestAnimationFrame(step);

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .... import TriangleMesh
 from ....base import BoolArray, FloatArray, IntArray, mask_of
@@ -13,10 +14,13 @@ from ....errors import ArrayShapeError, MeshError, OptionError
 from ....geometry import signed_double_areas
 from ....io import SplitMesh, cell_side, split_at_seams
 from ....mesh import end_corners, label_faces, point_seams
-from ..quantity import ColorScale, Quantity, angle_defects, conformal_distortion, stretch
+from ..faults import fault_places, uv_faults
+from ..quantity import ColorScale, Quantity, Ranges, angle_defects, conformal_distortion, stretch
 
 if TYPE_CHECKING:
     from .... import Flattening
+
+FITTING = Ranges()
 
 GRID_CELLS = 4095
 """Largest number of cells along an axis, so that the five indices of a cell fit into 60 bits."""
@@ -128,6 +132,9 @@ class Content:
         left_out: number of triangles that are not shown.
         scales: the colour scale of each quantity.
         quantity: quantity given by the user, at the vertices or triangles that are shown.
+        faults: (m,) the faults of the UVs of each triangle, see `UVFaults.bits`.
+        fault_places: (k, 2) a triangle and its fault at each place with one, see `fault_places`.
+        fault_counts: number of all triangles with each fault.
     """
 
     model: Model
@@ -150,6 +157,9 @@ class Content:
     left_out: int
     scales: dict[str, ColorScale]
     quantity: Quantity | None
+    faults: NDArray[np.uint8]
+    fault_places: IntArray
+    fault_counts: dict[str, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +206,11 @@ class Model:
 
 
 def content_of(
-    result: Flattening, max_triangles: int, model: Model | None = None, quantity: Quantity | None = None
+    result: Flattening,
+    max_triangles: int,
+    model: Model | None = None,
+    quantity: Quantity | None = None,
+    ranges: Ranges = FITTING,
 ) -> Content:
     """Return the content of a page of a result.
 
@@ -205,6 +219,7 @@ def content_of(
         max_triangles: largest number of triangles.
         model: its surface, if it has been computed already.
         quantity: quantity given by the user.
+        ranges: ends of the colour scales.
 
     Raises:
         ArrayShapeError: the result has no UVs, or no triangles.
@@ -224,7 +239,9 @@ def content_of(
     outline, seams = outline_halfedges(model.mesh, split.faces)
     drawn = _drawn(split, model.places[vertex], vertex, cone, outline, max_triangles)
     chart = _charts(split.faces, split.uv)
-    qc, scale = conformal_distortion(result), stretch(result)
+    qc, scale = conformal_distortion(result, ranges.qc_max), stretch(result, ranges.scale_max)
+    faults = uv_faults(result)
+    faults_drawn, uv = faults.bits[drawn.triangles], split.uv[drawn.points]
     flat_curvature = angle_defects(result, True, model.mesh)[model.vertices] / np.pi
     numbers = np.arange(len(result.vertices)) if result.vertex_origin is None else result.vertex_origin
     scales = _scales(qc, scale, model.curvature)
@@ -237,7 +254,7 @@ def content_of(
         model=model,
         places=model.places[drawn.vertices],
         point_vertex=drawn.point_vertex,
-        uv=split.uv[drawn.points],
+        uv=uv,
         uv_side=cell_side(split.uv, split.faces, 1.0),
         faces=drawn.faces,
         outline=drawn.outline,
@@ -254,6 +271,9 @@ def content_of(
         left_out=len(split.faces) - len(drawn.triangles),
         scales=scales,
         quantity=quantity,
+        faults=faults_drawn,
+        fault_places=fault_places(faults_drawn, uv, drawn.faces),
+        fault_counts=faults.counts(),
     )
 
 

@@ -1,5 +1,6 @@
 // Buttons, keys, the scale and the report, which show and change the state.
 
+const HAS_MOUSE = matchMedia("(hover: hover)");
 const MIN_LOG2_SQUARES = 3, MAX_LOG2_SQUARES = 9; // Logarithm to base 2 of the number of squares along the square root of the area.
 
 class Controls {
@@ -21,8 +22,9 @@ class Controls {
     const thinned = head.left_out ? `  ·  drawn with ${grouped(shown)} of ${grouped(head.triangles)} triangles` : "";
     this.part("title").textContent = this.part("title").title = head.title + thinned;
     this.part("show").replaceChildren(...showsOf(this.viewer.model).map(([key, name]) => new Option(name, key)));
-    this.part("key-shows").textContent = `show: ${showsOf(this.viewer.model).map(([key, name], i) => `${i + 1} ${key === "own" ? name : name.toLowerCase()}`).join(", ")}`;
+    this.part("key-shows").textContent = `show: ${showsOf(this.viewer.model).slice(0, 9).map(([key, name], i) => `${i + 1} ${key === "own" ? name : name.toLowerCase()}`).join(", ")}`;
     this.part("table").replaceChildren(...this.reportParts(head, shown));
+    this.part("legend").replaceChildren(...this.legendParts(head));
   }
 
   reportParts(head, shown) {
@@ -39,7 +41,8 @@ class Controls {
           "the measures are those of all triangles.",
       );
     }
-    return [table, ...notes.map((note) => Object.assign(document.createElement("p"), {className: "note", textContent: note}))];
+    const heading = Object.assign(document.createElement("h2"), {textContent: "Report"});
+    return [heading, table, ...notes.map((note) => Object.assign(document.createElement("p"), {className: "note", textContent: note}))];
   }
 
   connect() {
@@ -54,8 +57,9 @@ class Controls {
       this.part(name).addEventListener("click", () => state.toggle(name));
     }
     this.part("theme").addEventListener("click", () => state.toggle("dark"));
+    this.part("next-fault").addEventListener("click", () => this.viewer.showNextFault());
     this.part("turn-up").addEventListener("click", () => this.turnUp());
-    this.part("help").addEventListener("click", () => this.part("keys").showModal());
+    this.part("help").addEventListener("click", () => this.showHelp());
     document.addEventListener("keydown", (event) => this.key(event));
     document.addEventListener("dragover", (event) => event.preventDefault());
     document.addEventListener("drop", (event) => {
@@ -74,11 +78,18 @@ class Controls {
     for (const name of ["seams", "cones", "edges", "report"]) {
       this.part(name).setAttribute("aria-pressed", String(state.get(name)));
     }
+    this.part("next-fault").hidden = this.part("legend").hidden = state.get("show") !== "faults";
+    this.part("next-fault").disabled = !model.faultCount;
     this.part("turn-up").textContent = `${state.get("up")} up`;
     this.part("table").hidden = !state.get("report");
     const thing = state.get("hovered") ?? state.get("picked");
-    this.showFacts(thing ? factsOf(model, thing, state.get("show")) : null);
+    this.showFacts(thing ? this.factsOf(thing) : null);
     this.showScale(model.head.scales[state.get("show")], placeOfThing(model, thing, state.get("show")));
+  }
+
+  showHelp() {
+    this.part("keys").showModal();
+    this.part("keys").scrollTop = 0;
   }
 
   /** Choose the next axis to point up. */
@@ -87,8 +98,29 @@ class Controls {
     state.set({up: AXES[(AXES.indexOf(state.get("up")) + 1) % AXES.length]});
   }
 
+  factsOf(thing) {
+    const {state, model} = this.viewer, fault = state.get("fault");
+    const facts = factsOf(model, thing, state.get("show"));
+    if (fault !== null && sameThing(thing, state.get("picked"))) facts.unshift(`Fault ${fault + 1} of ${model.faultCount}`);
+    return facts;
+  }
+
+  /** Return the names of the faults of UVs, with their colours and numbers of triangles. */
+  legendParts({fault_counts}) {
+    return Object.entries(FAULT_NAMES).map(([fault, name], i) => {
+      const item = Object.assign(document.createElement("li"), {textContent: `${name}: ${grouped(fault_counts[fault])}`});
+      const colour = document.createElement("i");
+      colour.style.background = FAULT_COLOURS[i + 1];
+      item.prepend(colour);
+      return item;
+    });
+  }
+
   showFacts(facts) {
-    const spans = (facts ?? ["Point at a triangle, a seam or a cone to show it in both views; ? shows the keys."]).map(
+    const hint = HAS_MOUSE.matches
+      ? "Point at a triangle, a seam or a cone to show it in both views; ? shows the keys."
+      : "Tap a triangle, a seam or a cone to show it in both views; ? shows the gestures.";
+    const spans = (facts ?? [hint]).map(
       (text) => Object.assign(document.createElement("span"), {textContent: text, className: facts ? "" : "faint"}),
     );
     this.part("facts").replaceChildren(...spans);
@@ -130,14 +162,16 @@ class Controls {
       "+": () => zoom(1.25), "=": () => zoom(1.25), "-": () => zoom(0.8), "0": () => camera.fit(),
       "[": () => squares(-0.5), "]": () => squares(0.5),
       s: () => state.toggle("seams"), c: () => state.toggle("cones"), t: () => state.toggle("edges"),
-      r: () => state.toggle("report"), d: () => state.toggle("dark"), "?": () => this.part("keys").showModal(),
+      r: () => state.toggle("report"), d: () => state.toggle("dark"), "?": () => this.showHelp(),
       z: () => this.turnUp(),
+      j: () => this.viewer.showNextFault(),
       w: () => this.viewer.find({kind: "triangle", index: this.viewer.model.worstTriangle()}),
       Escape: () => state.set({picked: null, hovered: null, report: false}),
     };
     // On a button, Enter and space press it.
     if (!event.target.closest?.("button")) keys.Enter = () => this.viewer.pickMiddle();
     let does = keys[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (arrows[event.key] && event.target.closest?.("aside")) return; // Reports and panels scroll.
     if (arrows[event.key]) {
       const [right, down] = arrows[event.key];
       does = () => (camera.turns && !event.shiftKey ? camera.rotate(0.1 * right, 0.1 * down) : camera.move(far * right, far * down));

@@ -79,6 +79,8 @@ function cornerValues(model, show) {
   if (show === "charts") {
     const tints = model.arrays.tints.length / 3;
     for (let c = 0; c < out.length; c++) out[c] = ((chart[(c / 3) | 0] % tints) + 0.5) / tints;
+  } else if (show === "faults") {
+    for (let c = 0; c < out.length; c++) out[c] = (model.faultRank((c / 3) | 0) + 0.5) / FAULT_COLOURS.length;
   } else if (model.head.scales[show]) {
     const tones = model.tones(show), byFace = model.isByFace(show);
     for (let c = 0; c < out.length; c++) out[c] = tones[byFace ? (c / 3) | 0 : point_vertex[faces[c]]];

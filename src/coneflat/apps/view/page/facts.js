@@ -2,6 +2,10 @@
 
 const SIGNS = ["−", "", "+"];
 
+// Faults of UVs, and their colours; the first one is that of triangles without a fault.
+const FAULT_NAMES = {flipped: "flipped", overlapping: "overlapping", outside: "outside the unit square"};
+const FAULT_COLOURS = ["#dde2e9", "#7a35b8", "#d62222", "#e8a200"];
+
 /** Return the text of a number with its sign: "+0.500", "−1.2e-4". */
 function signed(value, digits = 3) {
   if (!Number.isFinite(value)) return "undefined";
@@ -35,6 +39,8 @@ function triangleFacts(model, index, show) {
   } else if (show === "curvature" || show === "flat") {
     const values = model.arrays[show];
     facts.push(`curvature at its corners ${vertices.map((v) => signed(values[v])).join(", ")}, in π`);
+  } else if (show === "faults") {
+    facts.push(model.faultsOf(index).map((name) => FAULT_NAMES[name]).join(", ") || "no fault");
   } else {
     facts.push(`QC ${measured(qc[index])}`, `scale ${measured(area[index], "×", 3)}`);
   }

@@ -1,6 +1,8 @@
 // The viewer: a model, its two views, and their connection.
 
 const REST = 160; // Milliseconds without motion after which the view counts as settled.
+const SPANS = [30, 240]; // Sizes in pixels between which a thing is shown that is visited.
+const MAX_UV = 10; // Largest UV for which the view of the layout contains the unit square.
 const SLOW = 45; // Milliseconds per frame above which a machine counts as slow.
 
 /** One of the two views. */
@@ -39,7 +41,7 @@ class Viewer {
     this.model = model;
     this.state = new State({
       show: model.head.show, squares: model.head.squares, seams: true, cones: true, edges: false, report: false, up: model.head.up,
-      dark: matchMedia("(prefers-color-scheme: dark)").matches, hovered: null, picked: null,
+      dark: matchMedia("(prefers-color-scheme: dark)").matches, hovered: null, picked: null, fault: null,
     });
     this.panes = [
       new Pane("model", new Camera(model.arrays.places, firstTurn(model.head, model.head.up), true), false, this),
@@ -50,7 +52,7 @@ class Viewer {
     this.tool = null; // Alternative handler of clicks and drags: {hover(pane, x, y), pick(pane, x, y, reach), grab(pane, x, y, reach)}.
     this.moving = this.slowFrames = 0;
     this.renderer = new Renderer(document.getElementById("scene"), model);
-    if (picture) this.renderer.setPicture(picture);
+    if (picture) this.renderer.setPicture(picture, Boolean(model.arrays.own_uv));
     this.marks = new Marks(document.getElementById("marks"), model, this.renderer);
     this.controls = new Controls(this);
     this.panes.forEach((pane) => new Gestures(pane, this));
@@ -99,6 +101,14 @@ class Viewer {
     this.controls.fill();
     this.controls.show();
     this.redraw();
+  }
+
+  /** Draw the unit square in the view of the layout, with the picture behind it. */
+  showUnitSquare() {
+    this.marks.showsSquare = this.renderer.look.behind = true;
+    const {uv_low, uv_high} = this.model.head;
+    this.showsSquare = Math.max(...uv_low.map(Math.abs), ...uv_high.map(Math.abs)) <= MAX_UV;
+    this.panes[1].camera.showOthers(this.flatPlaces());
   }
 
   /** Show the model from its first side, with the chosen axis up. */
@@ -221,19 +231,36 @@ class Viewer {
 
   /** Pick a thing, and make it visible in all views except the one in which it was picked. */
   find(thing, except = null) {
-    this.state.set({picked: thing});
+    this.state.set({picked: thing, fault: null});
     if (thing) this.panes.filter((pane) => pane !== except).forEach((pane) => this.bringIntoSight(pane, thing));
   }
 
-  bringIntoSight(pane, thing) {
+  /** Show the next place with a fault of the UVs: its largest triangle is picked, and is not small. */
+  showNextFault() {
+    const {faultCount, arrays} = this.model;
+    const fault = faultCount ? ((this.state.get("fault") ?? -1) + 1) % faultCount : null;
+    const picked = faultCount ? {kind: "triangle", index: arrays.fault_places[2 * fault]} : null;
+    this.state.set({show: "faults", picked, fault});
+    if (picked) this.panes.forEach((pane) => this.bringIntoSight(pane, picked, this.zoomTo(pane, picked)));
+  }
+
+  /** Return the zoom at which a thing is neither small nor large. */
+  zoomTo(pane, thing) {
+    const places = this.model.shapeOf(thing, pane.inPlane)[0];
+    const size = Math.max(...places.map((place) => Math.hypot(...place.map((x, k) => x - places[0][k]))));
+    const span = Math.max(size * pane.camera.scale, 1e-6);
+    return Math.min(pane.camera.zoom * (Math.min(Math.max(span, SPANS[0]), SPANS[1]) / span), MAX_ZOOM);
+  }
+
+  bringIntoSight(pane, thing, zoom = pane.camera.zoom) {
     const middles = this.model.shapeOf(thing, pane.inPlane).map(middleOf);
     const within = middles.some((middle) => pane.sees(pane.camera.project(middle)));
-    if (within && this.marks.isSeen(pane, thing, this.state)) return;
+    if (zoom === pane.camera.zoom && within && this.marks.isSeen(pane, thing, this.state)) return;
     const turn = pane.inPlane ? pane.camera.turn : this.turnTowards(thing, pane.camera.turn);
     const place = rotated(turn, middles[0]), {pan, scale} = pane.camera;
     const off = [0, 1].map((k) => Math.abs(place[k] - pan[k]) * scale);
     const near = off[0] < 0.4 * pane.width && off[1] < 0.4 * pane.height;
-    glide(pane.camera, turn, near ? pan : place.slice(0, 2));
+    glide(pane.camera, turn, near && zoom === pane.camera.zoom ? pan : place.slice(0, 2), zoom);
   }
 
   /** Return the rotation nearest to the current one in which the triangle of a thing faces the viewer; tilted if others hide it. */

@@ -11,6 +11,7 @@ class Marks {
     this.model = model;
     this.renderer = renderer;
     this.seen = new Map();
+    this.showsSquare = false; // Whether the unit square is drawn in the layout.
     this.overlay = null; // A function (pen, pane) that draws further things over a pane.
   }
 
@@ -34,11 +35,28 @@ class Marks {
       pen.rect(pane.left, pane.top, pane.width, pane.height);
       pen.clip();
       pen.translate(pane.left, pane.top);
+      if (pane.inPlane && this.showsSquare) this.drawSquare(pen, pane);
       if (picked) this.drawThing(pen, pane, state, picked, ink, true, settled);
       if (hovered && !sameThing(hovered, picked)) this.drawThing(pen, pane, state, hovered, ink, false, settled);
       this.overlay?.(pen, pane);
       pen.restore();
     }
+  }
+
+  /** Draw the outline of the unit square of the texture. */
+  drawSquare(pen, pane) {
+    const path = new Path2D();
+    [[0, 0], [1, 0], [1, 1], [0, 1]].forEach(([u, v], i) => {
+      const [x, y] = pane.camera.project(this.model.planePlace(u, v));
+      if (i) path.lineTo(x, y);
+      else path.moveTo(x, y);
+    });
+    path.closePath();
+    pen.strokeStyle = "#808890";
+    pen.lineWidth = 1;
+    pen.setLineDash([5, 4]);
+    pen.stroke(path);
+    pen.setLineDash([]);
   }
 
   drawThing(pen, pane, state, thing, ink, strong, settled) {

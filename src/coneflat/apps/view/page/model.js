@@ -114,6 +114,22 @@ class Model {
     return false;
   }
 
+  /** Return the worst fault of the UVs of a triangle: 1 for the first of `fault_bits`, 2 for the second, …; 0 for none. */
+  faultRank(triangle) {
+    const bits = this.arrays.faults[triangle];
+    return bits && Object.values(this.head.fault_bits).findIndex((bit) => bits & bit) + 1;
+  }
+
+  /** Return the names of the faults of a triangle. */
+  faultsOf(triangle) {
+    return Object.entries(this.head.fault_bits).filter(([, bit]) => this.arrays.faults[triangle] & bit).map(([name]) => name);
+  }
+
+  /** Return the number of places with a fault. */
+  get faultCount() {
+    return this.arrays.fault_places.length / 2;
+  }
+
   /** Return the triangle with the largest finite QC distortion. */
   worstTriangle() {
     const qc = this.arrays.qc;

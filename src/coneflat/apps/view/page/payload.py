@@ -12,14 +12,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ....base import CHECKER_CELLS
+from ....base import CHECKER_CELLS, FloatArray
 from ....geometry import CREASE_COSINE, double_areas, edge_lengths
 from ....io import Texture
 from ....mesh import end_corners
+from ..faults import FAULTS
 from ..figures.camera import fit_camera
 from ..figures.kinds import title
 from ..figures.uv_layout import CHART_COLORS
-from ..from_uv import shown_rows
+from ..from_uv import is_from_file, shown_rows
+from ..palettes import PALETTES, color_table
 from ..quantity import ColorScale
 from ..upward import axis_of
 from .content import Content
@@ -27,18 +29,6 @@ from .content import Content
 if TYPE_CHECKING:
     from .... import Flattening
 
-# Colour tables that do not need matplotlib, which is an extra. They have no very dark or bright ends, which shading
-# would make unreadable. Equal steps in value are about equal steps in CIE L*a*b*. Lightness is monotonic (sequential),
-# or monotonic from the middle to both ends (diverging), so the tables can also be read without hue.
-#: Hexadecimal colours at equal steps: from light to dark, and from blue over near white to red.
-SEQUENTIAL = (
-    "f6eec8 dee6b5 c5dea3 add595 95ca97 7cbf9a 5fb49c 48a89d 3f9a9c "
-    "348d9b 26809b 1b7398 2b6491 345689 394882 3a3974 34285a 2c1841"
-)
-DIVERGING = (
-    "124987 255f99 3476ab 538dbc 72a4cb 90bcda b2cde1 d2dfe8 f1f1ef "
-    "f3ddce f2c8ac efb48b e89c6e db7f54 ce613b aa492d 873220"
-)
 TITLES = {
     "qc": "QC distortion",
     "area": "Scale, relative to its mean",
@@ -89,10 +79,13 @@ def head_and_block(
     up: str,
     show: str,
     text: PageText | None = None,
+    *,
+    own_uv: FloatArray | None = None,
 ) -> tuple[dict[str, Any], bytes]:
     """Return the numbers and texts of a page, and its arrays as a block of bytes.
 
-    text: title and rows; by default those of a flattening.
+    text: title and rows; by default those of a flattening. own_uv: (k, 2) UVs of the picture at the polygon corners of
+    the file; None if they are those of the layout.
 
     Raises:
         OptionError: `up` is not valid.
@@ -101,6 +94,8 @@ def head_and_block(
     quantity, arrays = content.quantity, _arrays(content)
     if picture is not None:
         arrays["picture"] = np.frombuffer(picture.content, dtype=np.uint8)
+    if own_uv is not None and result.face_corners is not None:
+        arrays["own_uv"] = own_uv[result.face_corners[content.face_numbers]].astype("f4")
     titles = TITLES if quantity is None else {**TITLES, "own": quantity.label}
     listed, block = pack(arrays)
     head = {
@@ -121,11 +116,14 @@ def head_and_block(
         "radius": content.model.radius,
         "sizes": _sizes(result, content),
         "squares": text.squares,
+        "fault_bits": FAULTS,
+        "fault_counts": content.fault_counts,
         "crease_cosine": CREASE_COSINE,
         "scales": {key: _plain_scale(titles[key], scale) for key, scale in content.scales.items()},
         "own": None if quantity is None else "faces" if quantity.corners is None else "vertices",
         "picture": None if picture is None else picture.kind,
         "show": show,
+        "from_file": is_from_file(result),
         "arrays": listed,
     }
     return head, block
@@ -143,16 +141,6 @@ def _plain_scale(title: str, scale: ColorScale) -> dict[str, Any]:
         "table": scale.colors,
         "ticks": ticks,
     }
-
-
-def _color_table(colors: str) -> NDArray[np.uint8]:
-    """Return (256, 3) colours interpolated between the given ones."""
-    table_colors = np.array([list(bytes.fromhex(color)) for color in colors.split()])
-    place = np.linspace(0, len(table_colors) - 1, 256)
-    table = np.stack(
-        [np.interp(place, np.arange(len(table_colors)), column) for column in table_colors.T], axis=1
-    )
-    return np.round(table).astype(np.uint8)
 
 
 def _sizes(result: Flattening, content: Content) -> dict[str, float]:
@@ -175,7 +163,9 @@ def _arrays(content: Content) -> dict[str, NDArray[Any]]:
         name: np.asarray(getattr(content, name)).astype(kind) for name, kind in _KINDS.items()
     }
     arrays["chart"] = content.chart.astype("u2" if content.chart.max() < 2**16 else "u4")
-    arrays |= {"sequential": _color_table(SEQUENTIAL), "diverging": _color_table(DIVERGING)}
+    arrays |= {name: np.round(255 * color_table(name)).astype(np.uint8) for name in PALETTES}
+    arrays["faults"] = content.faults.astype("u1")
+    arrays["fault_places"] = content.fault_places.reshape(-1).astype("u4")
     arrays["tints"] = np.array([list(bytes.fromhex(colour[1:])) for colour in CHART_COLORS], dtype=np.uint8)
     if not np.array_equal(content.vertex_numbers, np.arange(len(content.places))):
         arrays["vertex_numbers"] = content.vertex_numbers.astype("i4")

@@ -6,6 +6,7 @@ const PICK_RADII = [5, 1.5]; // Things under the pointer have priority over thin
 const SAMPLES = 4; // Samples per pixel, for smooth outlines.
 const ROUGH = 0.5; // Fraction of the pixels along a side while the view moves on a slow machine.
 const BEHIND = 0.35; // Opacity of the picture behind the layout.
+const UNIT_SQUARE = new Float32Array([0, 0, 1, 0, 1, 1, 0, 0, 1, 1, 0, 1]); // Two triangles.
 const MAP_CONTRAST = 0.55; // Shading is reduced on colour maps, so that a shadow is not read as a value.
 
 /** Set the size of a canvas only if it changes, because this is slow and clears the canvas. */
@@ -43,13 +44,15 @@ class Renderer {
     this.prepareLayout();
     this.square = new Shape(gl, [
       {array: new Float32Array(18), size: 3},
-      {array: new Float32Array([0, 0, 1, 0, 1, 1, 0, 0, 1, 1, 0, 1]), size: 2},
+      {array: UNIT_SQUARE, size: 2},
     ]);
+    this.square.put(5, {array: UNIT_SQUARE, size: 2});
     const {sequential, diverging, tints} = model.arrays;
     this.tables = {
       sequential: tableTexture(gl, sequential, true),
       diverging: tableTexture(gl, diverging, true),
       charts: tableTexture(gl, tints, false),
+      faults: tableTexture(gl, new Uint8Array(FAULT_COLOURS.flatMap((colour) => rgb(colour).map((x) => 255 * x))), false),
     };
     for (const programs of [this.programs, this.pickPrograms]) Object.values(programs).forEach((one) => one.finish());
     this.picture = null;
@@ -171,7 +174,7 @@ class Renderer {
     }
     const view = this.viewOf(pane, pixel);
     const scale = this.model.head.scales[show];
-    const table = scale ? scale.table : "charts";
+    const table = scale ? scale.table : show === "faults" ? "faults" : "charts";
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, this.tables[table]);
     gl.activeTexture(gl.TEXTURE1);
@@ -183,7 +186,7 @@ class Renderer {
       board: show === "checker" || show === "charts",
       pictured: show === "picture" && this.picture !== null,
       asInFile: show === "picture" && Boolean(this.look.asInFile),
-      tinted: Boolean(scale) || show === "charts",
+      tinted: Boolean(scale) || show === "charts" || show === "faults",
       table: 0,
       picture: 1,
       paint: show === "checker" ? [0.97, 0.97, 0.98] : colours.paint,
@@ -196,7 +199,7 @@ class Renderer {
       marked: this.look.marks ? (state.get("marked") ?? 1) : 0,
       hatch: pixel,
     });
-    if (pane.inPlane && this.look.behind && show === "picture" && this.picture && !this.look.asInFile) this.drawBehind();
+    if (pane.inPlane && this.look.behind && show === "picture" && this.picture && (!this.look.asInFile || this.model.head.from_file)) this.drawBehind();
     this.surface.draw();
     gl.enable(gl.BLEND);
     gl.depthMask(false); // Overlays do not hide anything.

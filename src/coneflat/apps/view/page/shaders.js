@@ -97,16 +97,22 @@ float edgeShare() {
   return edges * (1.0 - crowded) * (1.0 - min(off.x, min(off.y, off.z)));
 }
 
-// Layers of paint differ in colour and, for colour-blind users, in pattern: rising lines, falling lines, uniform.
+// Layers of paint differ in colour and, for colour-blind users, in pattern: rising lines, falling lines, dots that grow
+// with the strength. Each has a dark tone on a light one with a contrast of 3:1, so that it is seen on every ground.
 vec3 withMarks(vec3 base) {
   vec3 width = max(fwidth(mark), vec3(1e-4));
   vec3 on = smoothstep(0.5 - width, 0.5 + width, mark) * marked;
   vec2 p = gl_FragCoord.xy / hatch;
   vec2 line = abs(fract(vec2(p.x - p.y, p.x + p.y) / 11.0) - 0.5) * 11.0;
-  vec2 hatched = 0.22 + 0.7 * (1.0 - smoothstep(1.0, 2.0, line));
-  base = mix(base, vec3(0.73, 0.36, 0.62), on.b * (0.3 + 0.5 * clamp(2.0 * mark.b - 1.0, 0.0, 1.0)));
-  base = mix(base, vec3(0.90, 0.56, 0.0), on.r * hatched.x);
-  return mix(base, vec3(0.0, 0.40, 0.72), on.g * hatched.y);
+  vec2 lines = 1.0 - smoothstep(1.5, 2.2, line);
+  float radius = mix(1.8, 3.2, clamp(2.0 * mark.b - 1.0, 0.0, 1.0));
+  float dots = 1.0 - smoothstep(radius - 0.5, radius + 0.5, length(fract(p / 9.0) - 0.5) * 9.0);
+  base = mix(base, vec3(0.97, 0.86, 0.94), 0.85 * on.b);
+  base = mix(base, vec3(1.0, 0.91, 0.78), 0.85 * on.r);
+  base = mix(base, vec3(0.88, 0.94, 0.98), 0.85 * on.g);
+  base = mix(base, vec3(0.50, 0.16, 0.42), 0.95 * on.b * dots);
+  base = mix(base, vec3(0.58, 0.30, 0.0), 0.95 * on.r * lines.x);
+  return mix(base, vec3(0.0, 0.40, 0.72), 0.95 * on.g * lines.y);
 }
 
 void main() {

@@ -7,10 +7,11 @@ const SHOWS = [
   ["charts", "Charts"],
   ["qc", "QC distortion"],
   ["area", "Area scale"],
+  ["faults", "UV faults"],
   ["curvature", "Curvature before"],
   ["flat", "Curvature after"],
-  ["plain", "Plain"],
   ["own", "Own values"],
+  ["plain", "Plain"],
 ];
 
 /** Return the display modes of a model; values given by the user have their own name. */

@@ -11,14 +11,14 @@ from functools import cache
 from importlib.resources import files
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from ....base import short_repr
+from ....base import FloatArray, short_repr
 from ....errors import OptionError
-from ....io import atomic_write, checked_target, read_picture
+from ....io import Texture, atomic_write, checked_target, read_picture
 from ....options import MAX_SHOWN_TRIANGLES, SHOWS, as_integer
-from ..quantity import Quantity, own_quantity
-from .content import content_of
+from ..quantity import Quantity, Ranges, own_quantity
+from .content import FITTING, content_of
 from .payload import PageText, as_payload, head_and_block
 
 if TYPE_CHECKING:
@@ -29,6 +29,8 @@ _SCRIPTS = (
     "state", "model", "corners", "camera", "shaders", "graphics", "renderer", "marks", "gestures", "facts",
     "picture", "controls", "main",
 )  # fmt: skip
+#: An image, and (k, 2) its UVs at the polygon corners of a file.
+OwnPicture: TypeAlias = "tuple[Texture, FloatArray]"
 #: Content security policy of a page that contains its data: nothing may be loaded.
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 
@@ -43,6 +45,8 @@ def page_html(
     most_triangles: int = MAX_SHOWN_TRIANGLES,
     text: PageText | None = None,
     color: Quantity | str | None = None,
+    ranges: Ranges = FITTING,
+    own_picture: OwnPicture | None = None,
 ) -> str:
     """Return the HTML page of a flattening as text.
 
@@ -51,12 +55,15 @@ def page_html(
         name: title of the page; by default the name of the file of the mesh.
         texture: image file for the model: PNG, JPEG, GIF or WebP.
         up: the model's upward axis in the first view, "x", "y" or "z"; "auto" is that of its format or shape.
-        show: display mode at the start: "checker", "picture", "charts", "qc", "area", "curvature" (of the model),
-            "flat" (curvature of the flat metric), "plain" or, with `color`, "own"; by default the values of `color`,
-            else the picture, else the checkerboard.
+        show: display mode at the start: "checker", "picture", "charts", "qc", "area", "faults" (of the UVs),
+            "curvature" (of the model), "flat" (curvature of the flat metric), "plain" or, with `color`, "own"; by
+            default the values of `color`, else the picture, else the checkerboard.
         color: quantity given by the user, or its name, see `own_quantity`.
         most_triangles: a mesh with more triangles is simplified for display.
         text: title and rows of the page; by default the main measures and the report.
+        ranges: ends of the colour scales of QC distortion and of scale.
+        own_picture: the image of the file that was read and (k, 2) its UVs at all polygon corners; shown first, unless
+            another image, colours or a display mode are given.
 
     Raises:
         OptionError: `up` or `show` is not valid, or `most_triangles` is not an integer.
@@ -65,16 +72,20 @@ def page_html(
         MeshFileError: the texture cannot be read.
     """
     if show is None:
-        show = "own" if color is not None else "checker" if texture is None else "picture"
+        has_picture = texture is not None or own_picture is not None
+        show = "own" if color is not None else "picture" if has_picture else "checker"
     if not isinstance(show, str) or (show not in SHOWS and (show != "own" or color is None)):
         raise OptionError(f"unknown show {short_repr(show)}: choose from {', '.join(SHOWS)}")
-    picture = None if texture is None else read_picture(texture)
+    picture, own_uv = (None if texture is None else read_picture(texture)), None
+    if picture is None and own_picture is not None and result.face_corners is not None:
+        picture, own_uv = own_picture
     max_triangles = as_integer("most_triangles", most_triangles)
     quantity = color if color is None or isinstance(color, Quantity) else own_quantity(result, color)
-    content = content_of(result, max_triangles, quantity=quantity)
+    content = content_of(result, max_triangles, quantity=quantity, ranges=ranges)
     if name is None:
         name = "Flattening" if result.source is None else result.source.path.name
-    head, arrays = as_payload(*head_and_block(result, content, picture, name, up, show, text))
+    data = head_and_block(result, content, picture, name, up, show, text, own_uv=own_uv)
+    head, arrays = as_payload(*data)
     before, between, after = _template()
     return "".join((before, head, between, arrays, after))
 
@@ -106,7 +117,13 @@ def write_page(page: str, path: str | PathLike[str] | None) -> Path:
 
 
 def show_page(
-    result: Flattening, path: str | PathLike[str] | None, *, most_triangles: int | None, **look: Any
+    result: Flattening,
+    path: str | PathLike[str] | None,
+    *,
+    most_triangles: int | None,
+    qc_max: float | None = None,
+    scale_max: float | None = None,
+    **look: Any,
 ) -> Path:
     """Write the page of a flattening, and open it in the browser if no path is given; see `Flattening.view`.
 
@@ -115,7 +132,8 @@ def show_page(
     if path is not None:
         check_page(path)
     max_triangles = MAX_SHOWN_TRIANGLES if most_triangles is None else most_triangles
-    page = write_page(page_html(result, most_triangles=max_triangles, **look), path)
+    ranges = Ranges(qc_max, scale_max)
+    page = write_page(page_html(result, most_triangles=max_triangles, ranges=ranges, **look), path)
     if path is None:
         open_page(page)
     return page
@@ -153,7 +171,7 @@ def _template() -> tuple[str, str, str]:
     """Return the parts of the page before, between and after its two blocks of data."""
     data = """<script type="application/json" id="head">{{head}}</script>
 <script type="text/plain" id="arrays">{{arrays}}</script>"""
-    page = page_around(POLICY, data, script=_read("from_page.js"))
+    page = page_around(POLICY, data, script=read_part("from_page.js"))
     before, body = page.split("{{head}}")
     between, after = body.split("{{arrays}}")
     return before, between, after
@@ -172,18 +190,19 @@ def page_around(
         panel: elements next to the panes.
         keys: rows of the help on keys.
     """
-    page = _read("page.html")
+    page = read_part("page.html")
     for mark, content in (
         ("{{policy}}", policy),
-        ("{{style}}", _read("page.css") + style),
+        ("{{style}}", read_part("page.css") + style),
         ("{{panel}}", panel),
         ("{{keys}}", keys),
         ("{{data}}", data),
-        ("{{script}}", "\n".join([*(_read(f"{name}.js") for name in _SCRIPTS), script])),
+        ("{{script}}", "\n".join([*(read_part(f"{name}.js") for name in _SCRIPTS), script])),
     ):
         page = page.replace(mark, content)
     return page
 
 
-def _read(name: str) -> str:
+def read_part(name: str) -> str:
+    """Return the text of a file beside this one, which is a part of the page."""
     return (files(__package__) / name).read_text(encoding="utf-8")
