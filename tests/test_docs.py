@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import lzma
 import re
+import shlex
+from pathlib import Path
 
 import click
 import pytest
+from click.testing import CliRunner
 from markers import ROOT
 from structure import PACKAGE
 
@@ -37,6 +41,21 @@ def test_examples_run(page, tmp_path, monkeypatch):
     names: dict = {}
     for block in re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
         exec(compile(block, str(page), "exec"), names)
+
+
+@pytest.mark.slow
+def test_commands_for_game_engines_run_as_printed(tmp_path, monkeypatch):
+    pytest.importorskip("PIL")
+    monkeypatch.chdir(tmp_path)
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    Path("spot.obj").write_bytes(lzma.decompress((ROOT / "tests" / "data" / "spot.obj.xz").read_bytes()))
+    text = (ROOT / "docs" / "how-to" / "game-engine.md").read_text(encoding="utf-8")
+    lines = [line for block in re.findall(r"```sh\n(.*?)```", text, re.DOTALL) for line in block.splitlines()]
+    assert any(line.startswith("coneflat transfer") for line in lines)
+    for line in lines:
+        done = CliRunner().invoke(cli, shlex.split(line)[1:])
+        assert done.exit_code == 0, (line, done.output)
 
 
 @pytest.mark.parametrize("page", [*PAGES, ROOT / "CHANGELOG.md"], ids=lambda page: page.name)
