@@ -159,6 +159,9 @@ def test_faults_are_coloured_counted_and_visited(browser, damaged_page):
         (x, y), box = visit.at("model", thing("triangle", index))[0], visit.box("model")
         seen = visit.picture("model")[int(y - box["y"]), int(x - box["x"])]
         assert np.abs(seen / seen.max() - np.array(colour) / max(colour)).max() < 0.12, (bit, seen)
+    # In the layout, flipped triangles are not hidden by those that they overlap.
+    visit.run("coneflat.panes.forEach((pane) => pane.camera.fit())")
+    assert (np.abs(visit.picture("layout") - purple).max(axis=2) < 8).sum() > 20
     visited = []
     for press in (lambda: visit.page.keyboard.press("j"), lambda: visit.page.click("#next-fault")) * 2:
         press()

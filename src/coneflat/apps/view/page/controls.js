@@ -38,7 +38,7 @@ class Controls {
     if (head.left_out) {
       notes.unshift(
         `Drawn with ${grouped(shown)} of ${grouped(head.triangles)} triangles, to reduce the size of the page; ` +
-          "the measures are those of all triangles.",
+          "the measures are those of all triangles. Faults of UVs are coloured only on triangles that are drawn.",
       );
     }
     const heading = Object.assign(document.createElement("h2"), {textContent: "Report"});

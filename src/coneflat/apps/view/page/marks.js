@@ -1,6 +1,6 @@
 // The hovered and the picked thing, drawn over both views; dashed if hidden.
 
-const RING = 11; // pixels
+const RING = 11, CONE_RING = 15; // Radii in pixels; that of cones leaves the corners of their squares free.
 const RING_SIZE = 14; // Pixels; smaller things are marked by a ring.
 const IN_FRONT = 0.03; // Model radii; a triangle hides a thing if it is nearer by at least this distance.
 const UNSEEN = "rgba(0, 0, 0, 0.01)";
@@ -71,8 +71,9 @@ class Marks {
       if (thing.kind === "triangle") path.closePath();
       if (span < RING_SIZE) {
         const [x, y] = middleOf(places);
-        path.moveTo(x + RING, y);
-        path.arc(x, y, RING, 0, 2 * Math.PI);
+        const radius = thing.kind === "cone" ? CONE_RING : RING;
+        path.moveTo(x + radius, y);
+        path.arc(x, y, radius, 0, 2 * Math.PI);
       }
       pen.lineJoin = pen.lineCap = "round";
       pen.setLineDash(seen ? [] : [4, 5]);

@@ -182,6 +182,7 @@ class Renderer {
     this.programs.surface.use({
       ...view,
       inPlane: pane.inPlane,
+      layered: show === "faults",
       plane: [...this.model.uvCentre, this.model.uvUnit],
       board: show === "checker" || show === "charts",
       pictured: show === "picture" && this.picture !== null,
@@ -273,12 +274,12 @@ class Renderer {
     const gl = this.gl, model = this.model;
     const size = [pane.width, pane.height].map((side) => Math.max(1, Math.round(side)));
     const target = this.targetOf(`${pane.name} numbers`, ...size, 0);
-    const key = [pane.camera.version, state.get("seams"), state.get("cones")].join();
+    const key = [pane.camera.version, state.get("seams"), state.get("cones"), this.shown === "faults"].join();
     if (target.key === key) return target;
     target.key = key;
     target.begin([0, 0, 0, 0], [0, 0, ...size]);
     const view = this.viewOf(pane, 1), side = Number(pane.inPlane);
-    this.pickPrograms.surface.use({...view, inPlane: pane.inPlane, plane: [...model.uvCentre, model.uvUnit]});
+    this.pickPrograms.surface.use({...view, inPlane: pane.inPlane, layered: this.shown === "faults", plane: [...model.uvCentre, model.uvUnit]});
     this.surface.draw();
     if (state.get("seams")) {
       const numbers = {first: model.triangleCount + 1, sides: 1 + side};

@@ -34,6 +34,7 @@ layout(location = 3) in float value;
 layout(location = 4) in vec4 marks;
 layout(location = 5) in vec2 own;  // UVs of the file.
 uniform bool inPlane, asInFile;
+uniform bool layered;  // In the layout, triangles with a fault are over those without: the smaller their tone, the higher.
 uniform vec3 plane;  // The centre of the layout, and its unit.
 ${VIEW_UNIFORMS}
 #ifdef PICK
@@ -46,7 +47,8 @@ out vec2 at;
 out float tone;
 #endif
 void main() {
-  gl_Position = clip(inPlane ? vec3((uv - plane.xy) * plane.z, 0.0) : place);
+  float height = layered && value > 0.25 ? 1e-5 * (1.0 - value) : 0.0;
+  gl_Position = clip(inPlane ? vec3((uv - plane.xy) * plane.z, height) : place);
 #ifdef PICK
   id = uint(gl_VertexID / 3) + 1u;
 #else
