@@ -6,6 +6,9 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+from ... import ConeflatError
+from ...base import short_repr
+from ...errors import StudioError
 from ...options import as_number
 from .choices import Choices, as_vertex
 from .paint import Region
@@ -48,6 +51,43 @@ STEPS: dict[str, Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]]
 
 #: Steps on the cones of a search, which must have found them.
 STEPS_ON_CONES = ("hand", "add", "move", "remove", "angle")
+
+
+def step_taken(chosen: Choices, action: Mapping[str, Any], cones: Iterable[int]) -> Choices:
+    """Return the choices after a step.
+
+    Args:
+        chosen: the choices before.
+        action: its key `do` is "set" for an option (`name`, `value`); "hand" to place the cones by hand; "add", "move",
+            "remove", "angle" or "lock" for a cone (`vertex`; `to`, `degrees`, `locked`); "cut" or "keep" for a `path`;
+            "erase" for an `edge`; "paint" for a `layer` (`where`; `weight`); "corner" to add or remove a corner
+            (`vertex`); "units" for units of length (`of_file`, `shown`); "texture" for a map for a texture or for a
+            conformal one (`value`).
+        cones: the vertices of the cones that a search has found.
+
+    Raises:
+        StudioError: the action is not valid, or is not possible.
+        OptionError: an option is not valid.
+    """
+    try:
+        return STEPS[str(action.get("do"))](chosen, action, cones)
+    except (KeyError, TypeError) as error:
+        raise StudioError(f"the action {short_repr(dict(action))} is not valid") from error
+
+
+def choices_given(plain: Mapping[str, Any]) -> Choices:
+    """Return the choices in values from JSON, as of `Choices.as_plain`; what is missing has its default.
+
+    Raises:
+        StudioError: they are not choices, or one is not valid.
+        OptionError: an option is not valid, or cannot be combined with others.
+    """
+    try:
+        return Choices.from_plain({**Choices().as_plain(), **plain})
+    except ConeflatError:
+        raise
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise StudioError(f"expected choices, got {short_repr(dict(plain))}") from error
 
 
 class History:
