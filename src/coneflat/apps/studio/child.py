@@ -24,6 +24,7 @@ from ...base import FloatArray, cancel_with, inner_calls
 from ...errors import DegenerateFaceError, NonManifoldError, NonOrientableError
 from ...io import Joined, Texture, read_joined
 from ...options import MAX_SHOWN_TRIANGLES
+from ...quadmesh import QuadMesh
 from ...textures import Unwrapper
 from ..transfer import own_picture
 from ..view import (
@@ -34,6 +35,7 @@ from ..view import (
     head_and_block,
     own_quantity,
     pack,
+    page_of_quads,
     shown_rows,
     text_of,
     upward_axis,
@@ -46,7 +48,9 @@ from .outputs import (
     as_shown,
     bad_places,
     curve_data,
+    quad_notes,
     quads_file,
+    quads_of,
     repaired,
     result_file,
     without_layout,
@@ -62,7 +66,7 @@ FIRST_TITLE = "Preview: distortion is not yet reduced, and overlaps are not yet 
 
 
 class Superseded(Exception):
-    """A newer flattening has been requested."""
+    """A newer flattening has been requested, or the user has cancelled the job."""
 
 
 class Jobs:
@@ -73,6 +77,7 @@ class Jobs:
         self._waiting: deque[Head] = deque()
         self._changed = threading.Condition()
         self._newest = -1
+        self._cancelled: set[int] = set()
         self._is_closed = False
         threading.Thread(target=self._listen, daemon=True).start()
 
@@ -80,6 +85,9 @@ class Jobs:
         while (frame := read_frame(self._stream)) is not None:
             job = frame[0]
             with self._changed:
+                if job["do"] == "cancel":
+                    self._cancelled.add(job["job"])
+                    continue
                 if job["do"] == "flatten":
                     self._newest = job["job"]
                     self._waiting = deque(waiting for waiting in self._waiting if waiting["do"] != "flatten")
@@ -95,9 +103,15 @@ class Jobs:
             self._changed.wait_for(lambda: self._waiting or self._is_closed)
             return None if self._is_closed else self._waiting.popleft()
 
-    def is_stale(self, job: int) -> bool:
-        """Return whether a flattening is obsolete."""
-        return self._is_closed or job != self._newest
+    def is_cancelled(self, job: Head) -> bool:
+        """Return whether the user has cancelled a job."""
+        return job["job"] in self._cancelled
+
+    def is_stale(self, job: Head) -> bool:
+        """Return whether a job is obsolete: cancelled, or followed by a flattening of other choices."""
+        number = job["job"]
+        newest = job.get("after", number if job["do"] == "flatten" else self._newest)
+        return self._is_closed or self.is_cancelled(job) or newest != self._newest
 
 
 class Opened(NamedTuple):
@@ -113,11 +127,13 @@ class JobRunner:
 
     Attributes:
         result: result of the last flattening; None if it has failed.
+        quads: the quads that were computed last; None if there are none.
     """
 
     def __init__(self, early_from: int = 20_000) -> None:
         """early_from: number of polygons from which on a preview is shown; for fewer the final layout is as fast."""
         self.result: Flattening | None = None
+        self.quads: QuadMesh | None = None
         self._early_from = early_from
         self._opened: Opened | None = None
         self._layouts = LatestLayouts()
@@ -232,14 +248,19 @@ class JobRunner:
         return {}, b""
 
     def make(self, job: Head, report: Callable[[str, float], None]) -> tuple[Head, bytes]:
-        """Return the output of another job: a file of the result, quads, or a curve."""
+        """Return the output of another job: a file of the result, the page of quads or their file, or a curve."""
 
         if job["do"] == "export":
             return _answer(result_file(self.result, job["ending"]))
+        if job["do"] == "quads file":
+            return _answer(quads_file(self.quads, job["ending"]))
         source, *_ = self._open(job["mesh"], job["sha256"], report)
         chosen = Choices.from_plain(job["choices"])
         if job["do"] == "quads":
-            return _answer(quads_file(source, chosen, job["count"], job["ending"], report))
+            self.quads = None
+            self.quads = quads_of(source, chosen, job["count"], report)
+            page = page_of_quads(self.quads, name=Path(job["mesh"]).name, show="checker")
+            return _answer(SavedFile(page.encode("utf-8"), quad_notes(self.quads)))
         return curve_data(source, chosen, report), b""
 
     def _picture(
@@ -276,7 +297,7 @@ class JobRunner:
         """Return the mesh of a job, which is read if it is another one than before."""
         if self._opened is None or self._read != (mesh, sha256):
             report("read", 0.0)
-            self._opened = self._model = None  # The memory may not suffice for both.
+            self._opened = self._model = self.quads = None  # The memory may not suffice for both.
             self._layouts = LatestLayouts()
             repaired.cache_clear()
             source = read_joined(Path(mesh))
@@ -327,8 +348,8 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
     while (job := jobs.next()) is not None:
         number = job["job"]
 
-        def check_current(current: int = job.get("after") or number) -> None:
-            if jobs.is_stale(current):
+        def check_current(job: Head = job) -> None:
+            if jobs.is_stale(job):
                 raise Superseded
 
         def report(stage: str, fraction: float, number: int = number) -> None:
@@ -351,7 +372,8 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
                 )
             write_frame(answers, {"job": number, "done": head}, body)
         except Superseded:
-            write_frame(answers, {"job": number, "given_up": True})
+            reason = "cancelled" if jobs.is_cancelled(job) else "superseded"
+            write_frame(answers, {"job": number, "given_up": reason})
         except ConeflatError as error:
             # The page offers a button for errors that a repair can fix.
             mends = isinstance(error, (DegenerateFaceError, NonManifoldError, NonOrientableError))

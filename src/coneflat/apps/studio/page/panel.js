@@ -10,6 +10,7 @@ class Panel {
     this.snap = 0;
     this.isPressed = this.isDue = false; // A button is pressed in the panel, which is to be shown again afterwards.
     this.curve = new ConeCurve(studio);
+    this.quads = new Quads(studio);
     this.fill();
     this.connect();
   }
@@ -56,7 +57,7 @@ class Panel {
     for (const name of ["resolution", "padding"]) this.part(name).addEventListener("change", (event) => set(name, Number(event.target.value)));
     for (const [id, word] of [["own-seams", "input"], ["no-more", "none"]]) this.part(id).addEventListener("change", (event) => set("seams", event.target.checked ? word : null));
     this.part("follow").addEventListener("change", (event) => studio.setFollowing(event.target.checked));
-    this.part("save-quads").addEventListener("click", () => studio.saveQuads(this.part("quad-count").value));
+    this.part("cancel").addEventListener("click", () => studio.server.cancel().catch((error) => studio.refuse(error)));
     this.part("brush-size").addEventListener("input", (event) => studio.growBrush(Number(event.target.value) / studio.brush.radius));
     this.part("brush-weight").addEventListener("change", (event) => (studio.brush.weight = Number(event.target.value)));
     for (const id of ["unit", "shown-in"]) this.part(id).addEventListener("change", () => this.measureIn(id));
@@ -65,7 +66,7 @@ class Panel {
     });
     this.part("up").addEventListener("change", (event) => studio.viewer && studio.setUp(event.target.value));
     this.part("sample").addEventListener("click", () => studio.openSample());
-    for (const id of ["tools", "brushes", "exports"]) rove(this.part(id), "button", true);
+    for (const id of ["tools", "brushes", "exports", "quad-files"]) rove(this.part(id), "button", true);
     this.part("cone-list").addEventListener("keydown", (event) => this.changeRow(event));
     this.part("snap").addEventListener("change", (event) => (this.snap = Number(event.target.value)));
     this.holdWhilePressed();
@@ -176,9 +177,8 @@ class Panel {
     this.part("chart-number").closest("label").hidden = !isNumber;
     this.showNotesOnControls({cone_count: by === "cone_count", charts: isNumber});
     for (const saving of this.part("exports").children) saving.disabled = !this.studio.hasLayout();
-    this.part("save-quads").disabled = !this.studio.hasLayout() || this.studio.making === "quads";
-    this.part("save-quads").textContent = this.studio.making === "quads" ? "Computing quads…" : "Quads, OBJ";
     this.curve.show();
+    this.quads.show();
     this.part("command").textContent = news?.command ?? "";
     this.part("python").textContent = news?.python ?? "";
     this.part("kept-in").textContent = news?.project ? `Saved in ${news.project}.` : "";
@@ -214,10 +214,12 @@ class Panel {
   }
 
   showWork() {
-    const {news, took} = this.studio, busy = news?.busy;
+    const {news, took} = this.studio, busy = news?.busy ?? news?.making;
+    this.part("cancel").hidden = !busy;
     this.part("work").classList.toggle("idle", !busy);
     this.part("busy").value = busy?.fraction ?? 0;
-    this.part("stage-name").textContent = busy ? stageText(busy.stage) : took ? `shown ${(took / 1000).toFixed(2)} s after the change` : "";
+    const told = busy?.kind ? `${MAKING[busy.kind]}: ` : "";
+    this.part("stage-name").textContent = busy ? told + stageText(busy.stage) : took ? `shown ${(took / 1000).toFixed(2)} s after the change` : "";
   }
 
   showRefusal() {
@@ -407,7 +409,10 @@ function useOf(tool) {
   return CONE_TOOLS.includes(tool) ? "for-angles" : "";
 }
 
+/** Outputs other than layouts that report progress. */
+const MAKING = {quads: "quads", curve: "numbers of cones"};
+
 /** Return the text of a stage of the computation. */
 function stageText(stage) {
-  return stage.startsWith("atlas") ? "separating overlaps; a change cancels this" : stage || "…";
+  return stage.startsWith("atlas") ? "separating overlaps" : stage || "…";
 }

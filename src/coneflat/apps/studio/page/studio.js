@@ -19,7 +19,6 @@ class Studio {
     this.tools = new Tools(this);
     this.paint = new Paint(this);
     this.brush = new Brush(this);
-    this.making = ""; // The output that is being computed, other than layouts.
     this.keyed = false; // The keyboard was used last, not the mouse.
     this.shownForTexture = false;
     this.follows = true; // Paths follow sharp edges.
@@ -73,6 +72,7 @@ class Studio {
     if (model) this.layout = news.layout;
     this.paint.hear();
     this.showPurpose();
+    this.panel.quads.hear(news);
     this.panel.show();
     this.viewer?.remark();
     if (!this.news.busy) document.documentElement.dataset.ready ??= String(Math.round(performance.now()));
@@ -200,7 +200,8 @@ class Studio {
   }
 
   refuse(error) {
-    this.refused = {text: error instanceof Refusal ? error.message : "the studio does not respond"};
+    const text = error instanceof Refusal ? error.message : "the studio does not respond";
+    this.refused = text ? {text} : null; // What the user has cancelled needs no text.
     this.paint.forget();
     this.panel.show();
   }
@@ -216,16 +217,6 @@ class Studio {
   async save(ending) {
     const {stem} = RESULT_FILES.find((file) => file.ending === ending);
     await this.server.save(`export/${ending}`, `${this.stem}_${stem}.${ending}`).catch((error) => this.refuse(error));
-  }
-
-  /** Compute quads of the mesh, approximately the chosen number, and download them. */
-  async saveQuads(count) {
-    this.refused = null;
-    this.making = "quads";
-    this.panel.show();
-    await this.server.save(`quads/obj?count=${encodeURIComponent(count)}`, `${this.stem}_quads.obj`).catch((error) => this.refuse(error));
-    this.making = "";
-    this.panel.show();
   }
 
   setCount(count) {
