@@ -6,13 +6,14 @@ from __future__ import annotations
 import functools
 import http.server
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
 import shapes
 from browsing import PATIENCE, need_browser
 from gltf_scenes import coloured_ball
-from studio_browsing import Studio, StudioVisit, sample, studio, visit  # noqa: F401
+from studio_browsing import Studio, StudioVisit, open_page, sample, studio, visit  # noqa: F401
 
 import coneflat
 
@@ -159,9 +160,17 @@ def test_the_page_switches_between_the_maps(visit, studio):
     assert page.text_content("#command") == "coneflat unwrap sample.obj --max-energy 4.4"
     assert studio.session.state()["choices"]["options"] == {"max_energy": 4.4}
 
+    # No cones are shown in any way.
+    page.locator("#model").focus()
+    page.keyboard.press("c")
+    assert not visit.run("coneflat.state.get('cones')")
+    assert page.is_hidden("#cones")
+    assert "cone" not in page.inner_text("#title")
+
     page.select_option("#purpose", "angles")
     visit.settle()
     assert page.is_visible("#cones-by")
+    assert page.is_visible("#cones")
     assert visit.cones() == cones
     assert visit.run("coneflat.state.get('cones')")
 
@@ -213,3 +222,55 @@ def test_less_common_options_are_set_by_the_page(visit):
     page.select_option("#purpose", "angles")
     visit.settle()
     assert page.text_content("#command") == "coneflat flatten sample.obj --up 0.0,0.0,-1.0"
+
+
+def test_a_slider_leads_from_less_stretch_to_shorter_seams(visit, studio):
+    page = visit.page
+    page.select_option("#purpose", "texture")
+    visit.settle()
+    assert float(page.input_value("#energy")) == -1  # 4.1
+    page.locator("#energy").focus()
+    measures = []
+    for key, energy in (("Home", "4.01"), ("End", "14")):
+        page.keyboard.press(key)
+        visit.settle()
+        assert page.input_value("#max-energy") == energy
+        assert studio.session.state()["choices"]["options"] == {"max_energy": float(energy)}
+        rows = dict(row[:2] for row in visit.run("coneflat.model.head.rows"))
+        measures.append((float(rows["energy"]), visit.run("coneflat.model.head.sizes.seams")))
+    (low_energy, long_seams), (high_energy, short_seams) = measures
+    assert 4 < low_energy <= 4.01
+    assert low_energy < high_energy
+    assert long_seams > short_seams
+    page.fill("#max-energy", "4.4")
+    page.keyboard.press("Enter")
+    visit.settle()
+    assert float(page.input_value("#energy")) == pytest.approx(np.log10(0.4), abs=0.026)
+
+
+def test_six_cones_and_save_are_in_sight(open_page, tmp_path):
+    mesh = tmp_path / "sample.obj"
+    mesh.write_bytes(Path(coneflat.sample_path()).read_bytes())
+    visit = open_page(mesh)
+    visit.page.set_viewport_size({"width": 1200, "height": 800})
+    rows = visit.page.locator("#cone-list .cone")
+    top = visit.page.locator("#save").bounding_box()["y"]
+    boxes = [rows.nth(index).bounding_box() for index in range(rows.count())]
+    assert len(boxes) >= 6
+    assert all(box["y"] + box["height"] <= top for box in boxes[:6])
+    buttons = visit.page.locator("#exports button")
+    for index in range(buttons.count()):
+        box = buttons.nth(index).bounding_box()
+        assert top <= box["y"]
+        assert box["y"] + box["height"] <= 800
+
+
+def test_angles_have_one_unit(visit):
+    """Degrees, in the panel as in the text on a picked cone; the panel's tooltips have multiples of pi."""
+    row = visit.run("studio.coneRows()[0]")
+    visit.run(f"studio.find({row['vertex']})")
+    told = visit.page.inner_text("#facts")
+    assert f"cone angle {row['degrees']:.1f}°" in told
+    assert "π" not in told
+    field = visit.page.locator(f'#cone-list .cone[data-vertex="{row["vertex"]}"] input')
+    assert f"{row['degrees'] / 180:.3f} π" in field.get_attribute("title")

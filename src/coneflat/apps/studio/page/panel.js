@@ -1,6 +1,7 @@
 // The panel next to the panes, which shows and changes the choices.
 
 const WIDEST = 720; // degrees, as in `choices.py`
+const ISOMETRIC = 4; // The energy of a map without stretch.
 const DEFAULT_STEP = 5; // Step in degrees by which keys change an angle without snapping.
 
 class Panel {
@@ -52,6 +53,8 @@ class Panel {
     this.part("chart-number").addEventListener("change", (event) => set("charts", Math.round(Number(event.target.value))));
     this.part("boundary").addEventListener("change", (event) => event.target.value === "rectangle" && studio.setTool("corner"));
     this.part("purpose").addEventListener("change", (event) => act({do: "texture", value: event.target.value === "texture"}));
+    this.slider("energy", (value) => ({do: "set", name: "max_energy", value: energyAt(value)}));
+    this.part("energy").addEventListener("input", (event) => (this.part("max-energy").value = energyAt(Number(event.target.value))));
     this.part("max-energy").addEventListener("change", (event) => set("max_energy", Number(event.target.value)));
     this.part("texel-density").addEventListener("change", (event) => set("texel_density", event.target.value === "" ? null : Number(event.target.value)));
     for (const name of ["resolution", "padding"]) this.part(name).addEventListener("change", (event) => set(name, Number(event.target.value)));
@@ -147,6 +150,7 @@ class Panel {
     const {forTexture} = this.studio;
     this.value("purpose", forTexture ? "texture" : "angles");
     this.value("max-energy", options.area == null ? options.max_energy : "");
+    this.value("energy", Math.log10((options.area == null ? options.max_energy : energyOfArea(options.area)) - ISOMETRIC));
     for (const part of document.querySelectorAll(".for-angles, .for-texture")) part.hidden = forTexture !== part.classList.contains("for-texture");
     for (const [key, , , hint] of [...TOOLS, ...BRUSHES]) {
       this.part(`tool-${key}`).setAttribute("aria-pressed", String(tools.mode === key));
@@ -316,7 +320,7 @@ class Panel {
     if (isPicked) row.setAttribute("aria-current", "true");
     const angle = Object.assign(document.createElement("input"), {
       type: "number", step: this.step(), min: 1, max: WIDEST, value: degrees === null ? "" : Number(degrees.toFixed(1)), className: chosen ? "" : "computed",
-      title: "Cone angle in degrees; empty: computed",
+      title: degrees === null ? "Cone angle in degrees; empty: computed" : `Cone angle in degrees: ${(degrees / 180).toFixed(3)} π; empty: computed`,
     });
     angle.setAttribute("aria-label", `Angle of cone ${vertex}, degrees`);
     angle.addEventListener("change", () => studio.setAngle(vertex, angle.value === "" ? null : this.snapped(Number(angle.value))));
@@ -366,6 +370,16 @@ function button(text, title, does, more = {}) {
 /** Return whether an element is a button, a checkbox, or in one; other fields may be shown again while they are used. */
 function isButton(element) {
   return Boolean(element.closest("button, summary, label, [type=checkbox]")) && !element.closest("select, input:not([type=checkbox])");
+}
+
+/** Return the bound of the energy at a position of its slider. */
+function energyAt(position) {
+  return ISOMETRIC + Number((10 ** position).toPrecision(2));
+}
+
+/** Return the bound of the energy that belongs to one of the area distortion, as in `textures/options.py`. */
+function energyOfArea(area) {
+  return ISOMETRIC + 20 * area ** 2;
 }
 
 /** Return the value of an option for the text of its control; angles are in degrees there, and axes directions. */

@@ -81,6 +81,7 @@ class Studio {
 
   /** After a change of the kind of map, show cones on conformal maps only, and end tools without effect. */
   showPurpose() {
+    document.body.classList.toggle("texture", this.forTexture);
     if (!this.viewer || this.shownForTexture === this.forTexture) return;
     this.shownForTexture = this.forTexture;
     this.viewer.state.set({cones: !this.forTexture});
@@ -139,9 +140,10 @@ class Studio {
     const values = new Map(rows.map(([name, value]) => [name, value])), charts = values.get("charts");
     if (!(Number(charts?.replaceAll(",", "")) > 0)) return;
     const more = [`${charts} ${charts === "1" ? "chart" : "charts"}`, `packing ${values.get("packing")}`, `overlap ${values.get("overlap")}`];
-    if (this.forTexture) more.unshift(`energy ${values.get("energy")}`);
     const place = document.getElementById("title");
-    place.textContent = place.title = [place.textContent, ...more].join("  ·  ");
+    // On maps for textures the energy is shown instead of the cones.
+    const shown = place.textContent.split("  ·  ").flatMap((text) => (this.forTexture && / cones?$/.test(text) ? `energy ${values.get("energy")}` : text));
+    place.textContent = place.title = [...shown, ...more].join("  ·  ");
   }
 
   /** Return a sentence on narrow charts beside drawn cuts, or nothing. */
@@ -263,6 +265,7 @@ class Studio {
     const name = event.key.length === 1 ? event.key.toLowerCase() : event.key;
     const control = event.ctrlKey || event.metaKey;
     if (event.altKey || (control && !["z", "y"].includes(name))) return;
+    if (name === "c" && this.forTexture) return this.obey(event, () => {}); // The key that shows cones.
     if (control) return this.obey(event, () => this.act({do: name === "z" && !event.shiftKey ? "undo" : "redo"}));
     const tool = [...TOOLS, ...BRUSHES].find(([, , letter]) => letter === name);
     const vertex = this.selectedNumber(), row = this.coneRows().find((one) => one.vertex === vertex);
