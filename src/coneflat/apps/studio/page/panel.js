@@ -12,6 +12,7 @@ class Panel {
     this.isPressed = this.isDue = false; // A button is pressed in the panel, which is to be shown again afterwards.
     this.curve = new ConeCurve(studio);
     this.quads = new Quads(studio);
+    this.work = new Work(studio);
     this.fill();
     this.connect();
   }
@@ -60,7 +61,6 @@ class Panel {
     for (const name of ["resolution", "padding"]) this.part(name).addEventListener("change", (event) => set(name, Number(event.target.value)));
     for (const [id, word] of [["own-seams", "input"], ["no-more", "none"]]) this.part(id).addEventListener("change", (event) => set("seams", event.target.checked ? word : null));
     this.part("follow").addEventListener("change", (event) => studio.setFollowing(event.target.checked));
-    this.part("cancel").addEventListener("click", () => studio.server.cancel().catch((error) => studio.refuse(error)));
     this.part("brush-size").addEventListener("input", (event) => studio.growBrush(Number(event.target.value) / studio.brush.radius));
     this.part("brush-weight").addEventListener("change", (event) => (studio.brush.weight = Number(event.target.value)));
     for (const id of ["unit", "shown-in"]) this.part(id).addEventListener("change", () => this.measureIn(id));
@@ -186,7 +186,7 @@ class Panel {
     this.part("command").textContent = news?.command ?? "";
     this.part("python").textContent = news?.python ?? "";
     this.part("kept-in").textContent = news?.project ? `Saved in ${news.project}.` : "";
-    this.showWork();
+    this.work.show();
     this.showRefusal();
     this.showWarnings();
     this.showTool();
@@ -215,15 +215,6 @@ class Panel {
       this.part(`on-${name}`).hidden = !note || !visible;
       this.part(`on-${name}`).textContent = note;
     }
-  }
-
-  showWork() {
-    const {news, took} = this.studio, busy = news?.busy ?? news?.making;
-    this.part("cancel").hidden = !busy;
-    this.part("work").classList.toggle("idle", !busy);
-    this.part("busy").value = busy?.fraction ?? 0;
-    const told = busy?.kind ? `${MAKING[busy.kind]}: ` : "";
-    this.part("stage-name").textContent = busy ? told + stageText(busy.stage) : took ? `shown ${(took / 1000).toFixed(2)} s after the change` : "";
   }
 
   showRefusal() {
@@ -421,12 +412,4 @@ function rove(bar, selector, vertical = false) {
 /** Return the class of the button of a tool: some tools have no effect on maps for textures. */
 function useOf(tool) {
   return CONE_TOOLS.includes(tool) ? "for-angles" : "";
-}
-
-/** Outputs other than layouts that report progress. */
-const MAKING = {quads: "quads", curve: "numbers of cones"};
-
-/** Return the text of a stage of the computation. */
-function stageText(stage) {
-  return stage.startsWith("atlas") ? "separating overlaps" : stage || "…";
 }

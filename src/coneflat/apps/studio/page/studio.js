@@ -176,7 +176,7 @@ class Studio {
     if (isEarly) return;
     this.took = performance.now() - asked;
     this.asked = 0;
-    this.panel.showWork();
+    this.panel.work.show();
   }
 
   // Actions of the user.
