@@ -274,3 +274,72 @@ def test_angles_have_one_unit(visit):
     assert "π" not in told
     field = visit.page.locator(f'#cone-list .cone[data-vertex="{row["vertex"]}"] input')
     assert f"{row['degrees'] / 180:.3f} π" in field.get_attribute("title")
+
+
+MIDDLE_OF_CHART = """(() => {
+  const {arrays} = coneflat.model, pane = coneflat.panes[1];
+  const triangles = [...arrays.chart.keys()].filter((i) => arrays.chart[i] === arrays.chart[0]);
+  const size = (i) => { const [p, q, r] = [0, 1, 2].map((k) => coneflat.model.flatPlace(arrays.faces[3 * i + k]));
+    return Math.abs((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])); };
+  const widest = triangles.reduce((one, other) => (size(other) > size(one) ? other : one));
+  const places = [0, 1, 2].map((k) => coneflat.model.flatPlace(arrays.faces[3 * widest + k]));
+  return pane.camera.project([0, 1, 2].map((k) => places.reduce((sum, place) => sum + place[k] / 3, 0))).slice(0, 2);
+})()"""
+
+
+def test_charts_are_moved_rotated_pinned_and_packed(visit, studio):
+    page = visit.page
+    assert page.is_hidden("#tool-chart")
+    page.select_option("#purpose", "texture")
+    visit.settle()
+    page.select_option("#charts", "number")
+    visit.settle()
+    page.fill("#chart-number", "5")
+    page.keyboard.press("Enter")
+    visit.settle()
+    first = visit.run("Array.from(coneflat.model.arrays.uv)")
+    page.locator("#model").focus()
+    page.keyboard.press("j")
+    assert page.is_disabled("#chart-rotate")
+
+    # A chart is dragged, and is pinned where it is dropped.
+    box, (x, y) = visit.box("layout"), visit.run(MIDDLE_OF_CHART)
+    page.mouse.move(box["x"] + x, box["y"] + y)
+    page.mouse.down()
+    page.mouse.move(box["x"] + x + 25, box["y"] + y + 10, steps=4)
+    assert visit.run("studio.panel.charts.offset") is not None
+    page.mouse.up()
+    visit.settle()
+    (pin,) = visit.choices()["charts"]["pins"]
+    assert pin[1:3] == [1, 0]
+    assert np.hypot(*pin[3:]) > 0.01
+    assert page.get_attribute("#chart-pin", "aria-pressed") == "true"
+    assert visit.run("Array.from(coneflat.model.arrays.uv)") != first
+    assert visit.run("coneflat.model.head.places.filter((place) => place[6]).length") == 1
+
+    # It is rotated about its middle, and the others are packed around it.
+    page.click("#chart-rotate")
+    visit.settle()
+    (turned,) = visit.choices()["charts"]["pins"]
+    np.testing.assert_allclose(turned[1:3], [0, 1], atol=1e-12)
+    page.check("#chart-pack")
+    visit.settle()
+    assert "overlap none" in page.inner_text("#title")
+    assert visit.choices()["charts"] == {"pins": [turned], "packed": True}
+    assert studio.session.state()["trouble"] is None
+
+    # It is freed, and everything is undone.
+    page.click("#chart-pin")
+    visit.settle()
+    assert visit.choices()["charts"]["pins"] == []
+    np.testing.assert_allclose(visit.run("Array.from(coneflat.model.arrays.uv)"), first, atol=1e-6)
+    page.click("#undo")
+    visit.settle()
+    assert visit.choices()["charts"]["pins"] == [turned]
+    page.click("#chart-free")
+    visit.settle()
+    assert "charts" not in visit.choices()
+    page.select_option("#purpose", "angles")
+    visit.settle()
+    assert visit.run("studio.tools.mode") == "look"
+    assert page.is_hidden("#charts-tools")

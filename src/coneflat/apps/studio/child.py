@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import os
 import sys
-import threading
-from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -25,6 +23,7 @@ from ...errors import DegenerateFaceError, NonManifoldError, NonOrientableError
 from ...io import Joined, Texture, read_joined
 from ...options import MAX_SHOWN_TRIANGLES
 from ...quadmesh import QuadMesh
+from ...source import LatestCache
 from ...textures import Unwrapper
 from ..transfer import own_picture
 from ..view import (
@@ -41,6 +40,7 @@ from ..view import (
     upward_axis,
 )
 from .choices import DECLARED, Choices
+from .jobs import Jobs, Superseded
 from .layouts import LatestLayouts, MadeLayout
 from .messages import misplaced_warning, notes_on_controls, page_message, with_warnings
 from .outputs import (
@@ -55,63 +55,15 @@ from .outputs import (
     result_file,
     without_layout,
 )
+from .pins import NO_PINS, Pins, places_of_charts
 from .places import shape_message, shape_of
-from .worker import Head, read_frame, with_hashes, write_frame
+from .worker import Head, with_hashes, write_frame
 
 #: The text that stands for unknown numbers, and the titles of pages without a final layout.
 PLACEHOLDER = "…"
 BARE_TITLE = "No layout"
 COMPUTING_TITLE = "Computing the first layout"
 FIRST_TITLE = "Preview: distortion is not yet reduced, and overlaps are not yet removed  ·  …"
-
-
-class Superseded(Exception):
-    """A newer flattening has been requested, or the user has cancelled the job."""
-
-
-class Jobs:
-    """The queue of jobs; of several flattenings, only the newest is kept."""
-
-    def __init__(self, stream: IO[bytes]) -> None:
-        self._stream = stream
-        self._waiting: deque[Head] = deque()
-        self._changed = threading.Condition()
-        self._newest = -1
-        self._cancelled: set[int] = set()
-        self._is_closed = False
-        threading.Thread(target=self._listen, daemon=True).start()
-
-    def _listen(self) -> None:
-        while (frame := read_frame(self._stream)) is not None:
-            job = frame[0]
-            with self._changed:
-                if job["do"] == "cancel":
-                    self._cancelled.add(job["job"])
-                    continue
-                if job["do"] == "flatten":
-                    self._newest = job["job"]
-                    self._waiting = deque(waiting for waiting in self._waiting if waiting["do"] != "flatten")
-                self._waiting.append(job)
-                self._changed.notify()
-        with self._changed:
-            self._is_closed = True
-            self._changed.notify()
-
-    def next(self) -> Head | None:
-        """Return the next job; None after the last one."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._waiting or self._is_closed)
-            return None if self._is_closed else self._waiting.popleft()
-
-    def is_cancelled(self, job: Head) -> bool:
-        """Return whether the user has cancelled a job."""
-        return job["job"] in self._cancelled
-
-    def is_stale(self, job: Head) -> bool:
-        """Return whether a job is obsolete: cancelled, or followed by a flattening of other choices."""
-        number = job["job"]
-        newest = job.get("after", number if job["do"] == "flatten" else self._newest)
-        return self._is_closed or self.is_cancelled(job) or newest != self._newest
 
 
 class Opened(NamedTuple):
@@ -137,6 +89,9 @@ class JobRunner:
         self._early_from = early_from
         self._opened: Opened | None = None
         self._layouts = LatestLayouts()
+        # The map for a texture without pins, whose key is the choices.
+        self._unpinned: LatestCache[Flattening] = LatestCache()
+        self._base: Flattening | None = None  # The one that was used last.
         self._model: Model | None = None
         self._up = "y"
         self._max_triangles: int | None = None
@@ -194,7 +149,7 @@ class JobRunner:
             except ConeflatError as error:
                 missing = {"missing": page_message(str(error))}
         shown = as_shown(result)
-        head, body = self._picture(result, Path(job["mesh"]).name, text_of(shown), quantity=quantity)
+        head, body = self._picture(result, Path(job["mesh"]).name, text_of(shown), quantity, chosen.used_pins)
         notes = head["head"]["notes"] = [page_message(note) for note in shown.notes]
         # The session warns of choices itself, as soon as they are made.
         warned = {page_message(note) for note in misplaced_warning(chosen)}
@@ -229,7 +184,10 @@ class JobRunner:
 
         words = source.map_options(chosen.keywords())
         if chosen.for_texture:
-            result = unwrapper.unwrap(progress=report_max, **words)
+            key = replace(chosen, pins=Pins(), units=("", ""))
+            unpinned = self._unpinned.of(key, lambda: unwrapper.unwrap(progress=report_max, **words))
+            self._base = unpinned
+            result = chosen.pins.applied(unpinned)
         else:
             on_preview = show_first if len(source.mesh.offsets) - 1 >= self._early_from else None
             result = flattener.flatten(on_preview=on_preview, progress=report_max, **words)
@@ -264,7 +222,12 @@ class JobRunner:
         return curve_data(source, chosen, report), b""
 
     def _picture(
-        self, result: Flattening, name: str, text: PageText, quantity: Quantity | None = None
+        self,
+        result: Flattening,
+        name: str,
+        text: PageText,
+        quantity: Quantity | None = None,
+        pins: Pins = NO_PINS,
     ) -> tuple[Head, bytes]:
         """Return the page data of a result, without notes.
 
@@ -273,6 +236,7 @@ class JobRunner:
             name: name of the mesh.
             text: title and rows of the page.
             quantity: quantity that is shown as colours.
+            pins: the charts that are pinned, in the map for a texture that was computed last.
         """
 
         if self._model is None or not self._model.is_of(result):
@@ -289,6 +253,10 @@ class JobRunner:
         if content.left_out and len(result.faces) <= 4_000_000:
             head, block = with_all_triangles(head, block, self._model, result)
         head["notes"] = []
+        if pins.pins:
+            assert self._base is not None
+            unpinned = self._base
+            head["places"] = list(places_of_charts(unpinned, result, pins, content.face_numbers))
         cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
         data = {"head": with_hashes(head, block), "found": cones.tolist(), "seconds": result.seconds}
         return data, block
@@ -298,7 +266,7 @@ class JobRunner:
         if self._opened is None or self._read != (mesh, sha256):
             report("read", 0.0)
             self._opened = self._model = self.quads = None  # The memory may not suffice for both.
-            self._layouts = LatestLayouts()
+            self._layouts, self._unpinned, self._base = LatestLayouts(), LatestCache(), None
             repaired.cache_clear()
             source = read_joined(Path(mesh))
             self._opened = Opened(source, Flattener(source.mesh), Unwrapper(source.mesh))

@@ -102,8 +102,8 @@ def with_warnings(result: Flattening, chosen: Choices) -> Flattening:
 
 
 def command_line(mesh: str, project: str, choices: Choices) -> str:
-    """Return a command that maps a mesh with these choices; drawn paths and paint need the project file."""
-    if choices.cuts or choices.uncut or choices.paint:
+    """Return a command that maps a mesh with these choices; drawn paths, paint and pins need the project file."""
+    if choices.cuts or choices.uncut or choices.paint or choices.used_pins.pins:
         return shlex.join(["coneflat", choices.command, "--project", project])
     parts = ["coneflat", choices.command, mesh]
     for name, value in choices.keywords().items():
@@ -124,7 +124,8 @@ def python_lines(mesh: str, choices: Choices) -> str:
     if sum(map(len, arguments)) > 20_000:  # Characters in the panel.
         return "# The drawn paths and the paint are too large to be shown here; they are in the project file."
     start = f"import coneflat\n\nresult = coneflat.{choices.command}(\n    {mesh!r},"
-    return "\n".join([start, *arguments, ")"])
+    pins = [choices.used_pins.code()] if choices.used_pins.pins else []
+    return "\n".join([start, *arguments, ")", *pins])
 
 
 def _written(value: Any) -> str:

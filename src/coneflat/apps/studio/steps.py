@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from ... import ConeflatError
 from ...base import short_repr
 from ...errors import StudioError
 from ...options import as_number
-from .choices import Choices, as_vertex
+from .choices import Choices
 from .paint import Region
+from .paths import as_vertex
+from .pins import Pin, Pins
 
 
 def _step(change: Callable[..., Choices]) -> Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]:
@@ -45,6 +48,16 @@ STEPS: dict[str, Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]]
     ),
     "corner": lambda chosen, action, cones: chosen.with_corner(_vertex(action)),
     "texture": lambda chosen, action, cones: chosen.with_texture(action["value"] is True),
+    "pin": lambda chosen, action, cones: replace(
+        chosen, pins=chosen.pins.with_pin(Pin.from_plain(action["place"]))
+    ),
+    "unpin": lambda chosen, action, cones: replace(
+        chosen, pins=chosen.pins.without(as_vertex("a triangle", action["face"]))
+    ),
+    "unpin all": lambda chosen, action, cones: replace(chosen, pins=Pins()),
+    "pack": lambda chosen, action, cones: replace(
+        chosen, pins=replace(chosen.pins, is_packed=action["value"] is True)
+    ),
     "units": lambda chosen, action, cones: chosen.with_units(action["of_file"], action["shown"]),
 }
 
@@ -61,8 +74,9 @@ def step_taken(chosen: Choices, action: Mapping[str, Any], cones: Iterable[int])
         action: its key `do` is "set" for an option (`name`, `value`); "hand" to place the cones by hand; "add", "move",
             "remove", "angle" or "lock" for a cone (`vertex`; `to`, `degrees`, `locked`); "cut" or "keep" for a `path`;
             "erase" for an `edge`; "paint" for a `layer` (`where`; `weight`); "corner" to add or remove a corner
-            (`vertex`); "units" for units of length (`of_file`, `shown`); "texture" for a map for a texture or for a
-            conformal one (`value`).
+            (`vertex`); "pin" for the `place` of a chart, as of `Pin.from_plain`; "unpin" for that of a triangle
+            (`face`), or "unpin all"; "pack" to pack the other charts around pinned ones or not (`value`); "units" for
+            units of length (`of_file`, `shown`); "texture" for a map for a texture or for a conformal one (`value`).
         cones: the vertices of the cones that a search has found.
 
     Raises:
@@ -71,7 +85,9 @@ def step_taken(chosen: Choices, action: Mapping[str, Any], cones: Iterable[int])
     """
     try:
         return STEPS[str(action.get("do"))](chosen, action, cones)
-    except (KeyError, TypeError) as error:
+    except (KeyError, TypeError, ValueError) as error:
+        if isinstance(error, ConeflatError):
+            raise
         raise StudioError(f"the action {short_repr(dict(action))} is not valid") from error
 
 

@@ -12,6 +12,7 @@ class Panel {
     this.isPressed = this.isDue = false; // A button is pressed in the panel, which is to be shown again afterwards.
     this.curve = new ConeCurve(studio);
     this.quads = new Quads(studio);
+    this.charts = new Charts(studio);
     this.work = new Work(studio);
     this.fill();
     this.connect();
@@ -183,6 +184,7 @@ class Panel {
     for (const saving of this.part("exports").children) saving.disabled = !this.studio.hasLayout();
     this.curve.show();
     this.quads.show();
+    this.charts.show();
     this.part("command").textContent = news?.command ?? "";
     this.part("python").textContent = news?.python ?? "";
     this.part("kept-in").textContent = news?.project ? `Saved in ${news.project}.` : "";
@@ -411,5 +413,5 @@ function rove(bar, selector, vertical = false) {
 
 /** Return the class of the button of a tool: some tools have no effect on maps for textures. */
 function useOf(tool) {
-  return CONE_TOOLS.includes(tool) ? "for-angles" : "";
+  return CONE_TOOLS.includes(tool) ? "for-angles" : CHART_TOOLS.includes(tool) ? "for-texture" : "";
 }

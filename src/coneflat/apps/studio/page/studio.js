@@ -85,7 +85,7 @@ class Studio {
     if (!this.viewer || this.shownForTexture === this.forTexture) return;
     this.shownForTexture = this.forTexture;
     this.viewer.state.set({cones: !this.forTexture});
-    if (this.forTexture && CONE_TOOLS.includes(this.tools.mode)) this.setTool("look");
+    if ((this.forTexture ? CONE_TOOLS : CHART_TOOLS).includes(this.tools.mode)) this.setTool("look");
   }
 
   /** Show a layout. */
@@ -244,9 +244,9 @@ class Studio {
   }
 
   setTool(mode) {
-    if (this.forTexture && CONE_TOOLS.includes(mode)) return;
+    if ((this.forTexture ? CONE_TOOLS : CHART_TOOLS).includes(mode)) return;
     const {head, arrays} = this.viewer?.model ?? {};
-    if (!["look", "cone"].includes(mode) && head?.left_out && !arrays.whole_faces) {
+    if (!["look", "cone", "chart"].includes(mode) && head?.left_out && !arrays.whole_faces) {
       this.refuse(new Refusal(`a mesh of ${grouped(head.triangles)} triangles is too large to draw or paint on here`));
       return;
     }
