@@ -43,7 +43,8 @@ class Quads {
     if (!quads) return;
     const page = await this.studio.server.quadsPage().catch(orNone);
     if (!page || this.loaded !== quads) return;
-    this.part("quads-view").srcdoc = page;
+    // Browsers complain of an element of a frame that asks for the focus.
+    this.part("quads-view").srcdoc = page.replace(" autofocus", "");
     this.part("of-quads").scrollIntoView({block: "nearest"}); // What they can be used for.
   }
 
