@@ -45,6 +45,7 @@ HOLDS = {
     "bounds": "which of two layouts is better",
     "retries": "what is laid out again, why",
     "flattener": "flatten: from input to result",
+    "repacking": "charts moved, packed around others",
     "curves": "distortion by number of cones",
     "apps.uv_measures": "measures of any mesh's UVs",
     "from_uv": "a file's own UVs as a flattening",

@@ -125,7 +125,7 @@ def _pick_and_paint(studio: StudioPage) -> None:
         )
         studio.settle()
     page.wait_for_timeout(1500)
-    page.evaluate("studio.took = 0; studio.panel.showWork()")
+    page.evaluate("studio.took = 0; studio.panel.work.show()")
 
 
 def take_session(mesh: Path) -> None:
@@ -142,7 +142,7 @@ def take_session(mesh: Path) -> None:
         def shoot(milliseconds: int, settles: bool = True) -> None:
             if settles:
                 studio.settle()
-            page.evaluate("studio.took = 0; studio.panel.showWork(); coneflat.state.set({hovered: null})")
+            page.evaluate("studio.took = 0; studio.panel.work.show(); coneflat.state.set({hovered: null})")
             page.wait_for_timeout(250)
             frames.append((studio.picture(), milliseconds))
 

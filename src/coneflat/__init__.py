@@ -52,6 +52,7 @@ _HOMES = {
     "measure": "measures.distortion",
     "measure_uv": "apps.uv_measures",
     "quads": "quadmesh.quad_meshing",
+    "repack": "repacking",
     "unwrap": "textures.unwrapping",
     "QuadMesh": "quadmesh.quad_mesh",
     "measure_quads": "quadmesh.quality",
@@ -98,6 +99,7 @@ __all__ = [
     "quads",
     "read_flattening",
     "read_mesh",
+    "repack",
     "sample_path",
     "save_figure",
     "studio",
@@ -137,6 +139,7 @@ if TYPE_CHECKING:
     from .quadmesh.quad_mesh import QuadMesh
     from .quadmesh.quad_meshing import integer_grid, quads
     from .quadmesh.quality import measure_quads
+    from .repacking import repack
     from .result import Flattening
     from .sample import sample_path
     from .textures.unwrapping import unwrap

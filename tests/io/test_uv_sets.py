@@ -13,7 +13,7 @@ from shapes import sphere
 
 import coneflat
 from coneflat.apps.batch import find_jobs
-from coneflat.errors import OptionError
+from coneflat.errors import MissingUVError, OptionError
 from coneflat.io import read_mesh_from
 
 # The corners of the ball, whose two materials are parts of it, are compared in the numbers of the file.
@@ -240,3 +240,54 @@ def test_batches_write_the_set(tmp_path):
         for job in find_jobs([str(tmp_path / "a.obj")], tmp_path / "flat", ".glb", {}, None, (), uv_set)
     }
     assert len(marks) == 3
+
+
+class TestReading:
+    """UV sets that files have, read by number."""
+
+    FIRST = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
+    SECOND = np.array([[0.25, 0.25], [0.5, 0.25], [0.5, 0.5], [0.25, 0.5]])
+
+    @pytest.fixture
+    def square(self, tmp_path):
+        path = tmp_path / "square.glb"
+        path.write_bytes(
+            textured_square({"TEXCOORD_0": self.FIRST, "TEXCOORD_1": self.SECOND}, material=False)
+        )
+        return path
+
+    def test_each_set_is_read(self, square):
+        for number, uv in enumerate((self.FIRST, self.SECOND)):
+            mesh = coneflat.read_mesh(square, uv_set=number)
+            expected = uv[[0, 1, 2, 0, 2, 3]] * [1, -1] + [0, 1]  # v points down in glTF.
+            np.testing.assert_allclose(mesh.uv[mesh.texture], expected)
+
+    def test_each_set_is_measured(self, square):
+        covered = [
+            coneflat.measure_uv(square, uv_set=number).report()["packing_efficiency"] for number in (0, 1)
+        ]
+        assert covered == pytest.approx([1, 1 / 16])
+        done = command("measure", square, "--uv-set", 1, "--json")
+        assert json.loads(done.stdout)["packing_efficiency"] == pytest.approx(1 / 16)
+
+    def test_a_lightmap_that_was_written_is_that_of_the_result(self, rich, tmp_path):
+        content, _ = rich
+        result = coneflat.unwrap(read_mesh_from(content, "rich.glb"), lightmap=256)
+        measured = coneflat.measure_uv(result.save(tmp_path / "lightmap.glb"), uv_set=1)
+        assert (measured.distortion.overlapping_pairs, measured.distortion.flipped) == (0, 0)
+        assert measured.report()["packing_efficiency"] == pytest.approx(result.packing_efficiency, rel=1e-3)
+        assert measured.report()["textures"] == 1  # Two materials share the lightmap.
+
+    def test_a_missing_set_is_an_error(self, square, tmp_path):
+        with pytest.raises(MissingUVError, match="has no UV set 2"):
+            coneflat.measure_uv(square, uv_set=2)
+        with pytest.raises(MissingUVError, match="has no UV set 1"):
+            coneflat.read_mesh(coneflat.sample_path(), uv_set=1)
+        for number in (-1, "1", True, 0.5):
+            with pytest.raises(OptionError, match="uv_set must be an integer"):
+                coneflat.read_mesh(square, uv_set=number)
+        with pytest.raises(OptionError, match="applies to mesh files only"):
+            coneflat.measure_uv(coneflat.read_mesh(square), uv_set=1)
+        done = command("measure", square, "--uv-set", 7)
+        assert done.returncode == 2
+        assert "has no UV set 7" in done.stderr

@@ -100,9 +100,10 @@ class UVMeasures:
 
     def __repr__(self) -> str:
         d = self.distortion
+        overlap = f"{d.overlap:.3g}" if d.overlapping_pairs else "none"
         return (
             f"<UVMeasures: {plural(len(self.mesh.faces), 'triangle')}, {plural(d.charts, 'chart')}, "
-            f"QC {d.qc_mean:.4f}, {d.flipped:,} flipped, overlap {d.overlap:.3g}>"
+            f"QC {d.qc_mean:.4f}, {d.flipped:,} flipped, overlap {overlap}>"
         )
 
 
@@ -114,6 +115,7 @@ def measure_uv(
     *,
     weld: bool | None = None,
     strict: bool = False,
+    uv_set: int = 0,
 ) -> UVMeasures:
     """Measure the existing UVs of a mesh, made by any program.
 
@@ -128,12 +130,15 @@ def measure_uv(
         weld: of a path: True merges all vertices at the same position, False none; None merges them in formats that
             cannot share vertices, and joins coinciding borders in the others.
         strict: raise an error for a mesh that is not manifold.
+        uv_set: of a path of a glTF: 0 for TEXCOORD_0, 1 for TEXCOORD_1, as of lightmaps, and so on. The charts of a set
+            other than the first are in one texture, whatever the images of the materials are.
 
     Returns:
         The measures.
 
     Raises:
         MissingUVError: there are no UVs, or no finite ones.
+        OptionError: `uv_set` is not an integer from 0 on, or is given without a path.
         MeshError: the input is not a mesh.
         MeshFileError: the file cannot be read.
 
@@ -141,9 +146,9 @@ def measure_uv(
         >>> vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
         >>> faces = np.array([[0, 1, 2], [0, 2, 3]])
         >>> coneflat.measure_uv(vertices, faces, vertices[faces][:, :, :2])
-        <UVMeasures: 2 triangles, 1 chart, QC 1.0000, 0 flipped, overlap 0>
+        <UVMeasures: 2 triangles, 1 chart, QC 1.0000, 0 flipped, overlap none>
     """
-    return measure_mapped(as_uv_mesh(mesh, faces, corner_uv, weld), strict=strict)
+    return measure_mapped(as_uv_mesh(mesh, faces, corner_uv, weld, uv_set), strict=strict)
 
 
 def measure_mapped(mapped: UVMesh, *, strict: bool = False) -> UVMeasures:

@@ -32,6 +32,10 @@ ROUNDED_CELLS = 2.0
 GRID_MARGIN = 1.2347
 
 
+#: No cells that other charts have, see `place_all`.
+NO_OBSTACLES = np.empty((0, 3), np.int64)
+
+
 @dataclass(frozen=True, eq=False)
 class Packing:
     """Placement of k charts in square tiles.
@@ -114,7 +118,10 @@ class Grid:
         """Return the charts placed by a plan in tiles of a width, with at most `limit` rows."""
         if self.blocks is None:
             reach = reach_of(self.gap * width)
-            return Placed(plan, *place_all(plan, self.group, self.masks, reach, self.tiles, width, limit, 1))
+            return Placed(
+                plan,
+                *place_all(plan, self.group, self.masks, reach, self.tiles, width, limit, 1, NO_OBSTACLES),
+            )
         columns, reach = int(self.blocks.across), reach_of(self.gap * self.blocks.across)
         rows, work, chosen, place = place_all(
             plan,
@@ -125,6 +132,7 @@ class Grid:
             columns,
             columns * limit // width,
             self.blocks.step,
+            NO_OBSTACLES,
         )
         return Placed(plan, -(-rows * width // columns), work, chosen, place)
 

@@ -41,7 +41,15 @@ def reach_of(gap: float) -> IntArray:
 
 @compiled
 def place_all(
-    plan: Plan, group: IntArray, masks: Masks, reach: IntArray, tiles: int, width: int, limit: int, step: int
+    plan: Plan,
+    group: IntArray,
+    masks: Masks,
+    reach: IntArray,
+    tiles: int,
+    width: int,
+    limit: int,
+    step: int,
+    obstacles: IntArray,
 ) -> tuple[int, int, IntArray, IntArray]:
     """Fill tiles of cells from below: each chart is placed where its top is lowest, and leftmost among these places.
 
@@ -53,6 +61,7 @@ def place_all(
             `reach[rows]` columns.
         tiles, width, limit: number of tiles, their columns, and the rows that may be used.
         step: columns and rows of lower left cells are multiples of it.
+        obstacles: (r, 3) runs of cells of the first tile that other charts have: row, first and last column.
 
     Returns:
         The number of rows used, limit + 1 if a chart has no place; the work done, in comparisons of runs of cells; (k,)
@@ -62,6 +71,9 @@ def place_all(
     chosen, place = np.empty(len(plan.order), np.int64), np.empty((len(plan.order), 3), np.int64)
     # For each cell, the next occupied cell in its row, itself included, and the first free cell after that.
     taken, clear = filled_tiles(tiles, limit, width), filled_tiles(tiles, limit, width)
+    if len(obstacles):
+        occupy(taken[0], obstacles, 0, 0, reach)
+        link_cells(taken[0], clear[0], 0, width, 0, limit)
     floor = np.zeros((tiles, group.max() + 1), np.int64)
     top, work, reach_rows, widest = 0, tiles * limit, len(reach) - 1, reach.max()
     for c in plan.order:

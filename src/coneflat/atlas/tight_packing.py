@@ -98,7 +98,7 @@ def _improved(grid: Grid, placed: Placed, width: int, effort: Effort) -> tuple[P
             break
         begin_step()
         limit = goal + goal // 4 if last is best else min(last.height, goal + goal // 4)
-        plan = best.plan if last is best else _changed(last.plan, permitted, rng)
+        plan = best.plan if last is best else changed_plan(last.plan, permitted, rng)
         candidate = grid.place(plan, goal, limit)
         work += candidate.work
         if candidate.height <= goal:
@@ -111,7 +111,7 @@ def _improved(grid: Grid, placed: Placed, width: int, effort: Effort) -> tuple[P
     return best, width
 
 
-def _changed(plan: Plan, permitted: BoolArray, rng: np.random.Generator) -> Plan:
+def changed_plan(plan: Plan, permitted: BoolArray, rng: np.random.Generator) -> Plan:
     """Return a randomly changed plan: some charts swapped in the order, and other angles allowed for one or two.
 
     With few charts, the offset of a chart may change too. permitted: (j,) the shapes that may be allowed.

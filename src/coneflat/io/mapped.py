@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.arrays import BoolArray, FloatArray, IntArray, as_faces, as_floats
-from ..errors import ArrayShapeError, MissingUVError
+from ..base.text import short_repr
+from ..errors import ArrayShapeError, MissingUVError, OptionError
 from ..mesh.check import short_faces_note
 from ..mesh.polygons import fan_corners, polygon_of
 from ..result import Flattening
@@ -59,7 +60,11 @@ class UVMesh:
 
 
 def as_uv_mesh(
-    mesh: Any, faces: ArrayLike | None = None, corner_uv: ArrayLike | None = None, weld: bool | None = None
+    mesh: Any,
+    faces: ArrayLike | None = None,
+    corner_uv: ArrayLike | None = None,
+    weld: bool | None = None,
+    uv_set: int = 0,
 ) -> UVMesh:
     """Return the triangles and UVs of a mesh in any of the forms that `measure_uv` accepts.
 
@@ -68,17 +73,25 @@ def as_uv_mesh(
         faces: (m, 3) vertex indices.
         corner_uv: (m, 3, 2) UVs; needed with `faces`.
         weld: as of `read_joined`, for a path.
+        uv_set: the number of the UVs, for the path of a glTF. All charts of a set other than the first are taken to be
+            in one texture, as those of a lightmap.
 
     Raises:
+        OptionError: `uv_set` is given without a path, or is not an integer from 0 on.
         ArrayShapeError: `mesh` has another type, or an array has the wrong shape.
         MissingUVError: there are no UVs.
     """
+    is_path = faces is None and isinstance(mesh, (str, PathLike))
+    is_result = is_path and Path(mesh).suffix.lower() == ".npz"
+    if uv_set and (is_result or not is_path):
+        raise OptionError(f"uv_set {short_repr(uv_set)} applies to mesh files only: leave it out")
     if faces is not None:
         return _of_arrays(mesh, faces, corner_uv)
-    if isinstance(mesh, (str, PathLike)):
-        if Path(mesh).suffix.lower() == ".npz":
+    if is_path:
+        if is_result:
             return _of_result(read_flattening(mesh))
-        return uv_mesh_of(read_joined(mesh, weld))
+        mapped = uv_mesh_of(read_joined(mesh, weld, uv_set))
+        return replace(mapped, texture=None, texture_notes=()) if uv_set else mapped
     if isinstance(mesh, MeshFile):
         return uv_mesh_of(Joined(mesh, np.arange(len(mesh.vertices))))
     if hasattr(mesh, "uv_faces") and hasattr(mesh, "uv"):

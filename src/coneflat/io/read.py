@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base.formats import FREESURFER, Use, endings
 from ..base.text import short_repr
-from ..errors import EmptyMeshError, MeshFileError, OptionError, UnknownFormatError
+from ..errors import EmptyMeshError, MeshFileError, MissingUVError, OptionError, UnknownFormatError
 from ..mesh.check import weld as weld_vertices
 from .brains import is_freesurfer, is_gifti, parse_freesurfer, parse_gifti
 from .files import PIPE, PathName, as_path, known_ending, read_bytes, read_input, readable
@@ -37,12 +37,14 @@ class InputFormat(NamedTuple):
         is_text: the files are text, or begin with text.
         shares_vertices: faces share vertices. STL repeats every vertex for each triangle, glTF wherever a normal or a
             UV differs; these are merged by default.
+        has_uv_sets: files may have several sets of UVs, whose number `parse` takes as well.
     """
 
-    parse: Callable[[Path, bytes], MeshFile]
+    parse: Callable[..., MeshFile]
     is_content: Callable[[bytes], bool]
     is_text: bool = False
     shares_vertices: bool = True
+    has_uv_sets: bool = False
 
 
 #: How each format of `base/formats.py` is read, in the order in which a content is compared with them; any other
@@ -52,8 +54,8 @@ _FORMATS = {
     ".ply": InputFormat(parse_ply, lambda content: content.startswith(b"ply"), is_text=True),
     ".stl": InputFormat(parse_stl, is_stl, shares_vertices=False),
     ".off": InputFormat(parse_off, is_off, is_text=True),
-    ".gltf": InputFormat(parse_gltf, is_gltf, is_text=True, shares_vertices=False),
-    ".glb": InputFormat(parse_gltf, is_glb, shares_vertices=False),
+    ".gltf": InputFormat(parse_gltf, is_gltf, is_text=True, shares_vertices=False, has_uv_sets=True),
+    ".glb": InputFormat(parse_gltf, is_glb, shares_vertices=False, has_uv_sets=True),
     ".gii": InputFormat(parse_gifti, is_gifti),
     **dict.fromkeys(FREESURFER, InputFormat(parse_freesurfer, is_freesurfer)),
 }
@@ -77,7 +79,7 @@ def export_advice(ending: str) -> str:
     return "" if advice is None else f" ({advice})"
 
 
-def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
+def read_mesh(path: PathName, weld: bool | None = None, uv_set: int = 0) -> MeshFile:
     """Return the mesh of a file, with its polygons, in the file's own order of vertices and faces.
 
     The format is given by the path's ending, in upper or lower case: one of `INPUT_FORMATS`, or of FreeSurfer's names
@@ -93,6 +95,7 @@ def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
         path: the file; "-" for standard input, whose format is recognized by its content.
         weld: whether to merge vertices at exactly the same position; by default only for formats that
             cannot share vertices, which are STL and glTF.
+        uv_set: the number of the UVs, of glTF: 0 for TEXCOORD_0, 1 for TEXCOORD_1, as of lightmaps.
 
     Returns:
         The mesh.
@@ -102,6 +105,7 @@ def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
         MeshFileError: the file does not exist, cannot be read, or is not of the format of its ending.
         EmptyMeshError: it has no vertex or no face.
         FaceIndexError: a face refers to a vertex that does not exist.
+        MissingUVError: `uv_set` is not 0, and the file has no such UVs.
 
     Examples:
         >>> mesh = coneflat.read_mesh(coneflat.sample_path())
@@ -114,7 +118,7 @@ def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
     """
     path = as_path(path)
     if path == PIPE:
-        return read_mesh_from(read_input(), path, weld)
+        return read_mesh_from(read_input(), path, weld, uv_set=uv_set)
     if os.path.isdir(path):  # unlike the method, no error if the name is too long
         raise MeshFileError(
             f"{path} is a folder, not a file; `coneflat batch` flattens all meshes in a folder"
@@ -123,13 +127,17 @@ def read_mesh(path: PathName, weld: bool | None = None) -> MeshFile:
         # The names of FreeSurfer's surfaces are not a fixed set: lh.graymid, lh.pial.T1.
         content = read_bytes(path)
         if is_freesurfer(content):
-            return read_mesh_from(content, path, weld)
+            return read_mesh_from(content, path, weld, uv_set=uv_set)
     ending = known_ending(path, INPUT_FORMATS, "meshes are read from", export_advice(path.suffix))
-    return read_mesh_from(read_bytes(path), path, weld, ending)
+    return read_mesh_from(read_bytes(path), path, weld, ending, uv_set)
 
 
 def read_mesh_from(
-    content: bytes, name: PathName, weld: bool | None = None, ending: str | None = None
+    content: bytes,
+    name: PathName,
+    weld: bool | None = None,
+    ending: str | None = None,
+    uv_set: int = 0,
 ) -> MeshFile:
     """Return the mesh in the content of a file; see `read_mesh`.
 
@@ -139,15 +147,18 @@ def read_mesh_from(
             to it.
         weld: as of `read_mesh`.
         ending: the format, one of `INPUT_FORMATS`; by default it is recognized by the content.
+        uv_set: as of `read_mesh`.
 
     Raises:
         UnknownFormatError: the ending is not one of `INPUT_FORMATS`.
-        MeshFileError, EmptyMeshError, FaceIndexError: as of `read_mesh`.
-        OptionError: `weld` is not True, False or None.
+        MeshFileError, EmptyMeshError, FaceIndexError, MissingUVError: as of `read_mesh`.
+        OptionError: `weld` is not True, False or None, or `uv_set` is not an integer from 0 on.
     """
     path = Path(name)
     if weld is not None and not isinstance(weld, (bool, np.bool_)):
         raise OptionError(f"weld must be True, False or None, got {short_repr(weld)}")
+    if isinstance(uv_set, bool) or not isinstance(uv_set, (int, np.integer)) or uv_set < 0:
+        raise OptionError(f"uv_set must be an integer, 0 or more, got {short_repr(uv_set)}")
     if not content or content.isspace():
         raise EmptyMeshError(f"{path} is empty")
     ending = format_of(content) if ending is None else ending.lower()
@@ -160,8 +171,13 @@ def read_mesh_from(
         raise MeshFileError(f"{path}, line 1: this is text in UTF-16: save the file as UTF-8 or ASCII")
     with readable(path, f"{ending[1:].upper()} file"):
         with np.errstate(invalid="ignore"):  # NaN coordinates are not rejected here
-            mesh = without_short_faces(form.parse(path, content))
+            sets = {"uv_set": int(uv_set)} if form.has_uv_sets else {}
+            mesh = without_short_faces(form.parse(path, content, **sets))
         check_corners(path, mesh)
+    if uv_set and not (form.has_uv_sets and mesh.uv is not None):
+        raise MissingUVError(
+            f"{path} has no UV set {uv_set}: `coneflat unwrap --uv-set 1` writes one to a .glb"
+        )
     normal = None
     if mesh.normals is not None and mesh.normal is not None:
         normal = usable_normals(mesh.normals, mesh.normal)
@@ -226,18 +242,19 @@ def find_meshes(pattern: str) -> list[str]:
     return matches
 
 
-def read_joined(path: PathName, weld: bool | None = None) -> Joined:
+def read_joined(path: PathName, weld: bool | None = None, uv_set: int = 0) -> Joined:
     """Return the mesh of a file with duplicated border edges joined.
 
     Args:
         path: the file.
         weld: True merges all vertices at the same position and False none; None merges them in the formats that
             cannot share vertices, and joins coinciding borders in the others.
+        uv_set: as of `read_mesh`.
 
     Raises:
-        MeshError, MeshFileError: as of `read_mesh`.
+        MeshError, MeshFileError, MissingUVError, OptionError: as of `read_mesh`.
     """
-    mesh = read_mesh(path, weld)
+    mesh = read_mesh(path, weld, uv_set)
     # Different nodes of a scene stay separate.
     if weld is not None or mesh.unwelded is not None or mesh.scene is not None:
         return Joined(mesh, np.arange(len(mesh.vertices)))

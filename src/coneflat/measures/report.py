@@ -197,7 +197,9 @@ def map_rows(d: Distortion) -> dict[str, Row]:
         (
             "overlap",
             f"{number_text(100 * d.overlap, '.3g')} %" if d.overlapping_pairs else "none",
-            f"of the covered area is in several triangles; {plural(d.overlapping_pairs, 'pair')} of triangles overlap",
+            f"of the covered area is in several triangles; {plural(d.overlapping_pairs, 'pair')} of triangles overlap"
+            if d.overlapping_pairs
+            else "no two triangles overlap",
         ),
         ("charts", f"{d.charts:,}", f"UV islands; {d.mirrored_charts:,} mirrored"),
         (

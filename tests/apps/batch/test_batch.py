@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import io
+import json
 import os
 import signal
 import sys
@@ -16,7 +18,8 @@ from command import command
 
 from coneflat import errors, measure_uv
 from coneflat.apps.batch import find_jobs, run_batch
-from coneflat.apps.batch.process import Child
+from coneflat.apps.batch.child import ProgressLines
+from coneflat.apps.batch.process import Child, Running
 from coneflat.apps.cli.main import cli
 
 
@@ -103,6 +106,61 @@ def test_a_mesh_that_hangs_is_ended(models, tmp_path):
         assert child.flatten(jobs[1], 60)["status"] == "done"
     finally:
         child.end()
+
+
+def test_progress_is_written_between_the_rows_at_intervals(monkeypatch):
+    now, written = [0.0], io.StringIO()
+    monkeypatch.setattr("coneflat.apps.batch.child.time.perf_counter", lambda: now[0])
+    lines = ProgressLines(written)
+    for step in range(20):
+        now[0] = step / 10
+        lines("search", step / 20)
+    told = [json.loads(line) for line in written.getvalue().splitlines()]
+    assert [message["fraction"] for message in told] == [0.25, 0.5, 0.75]
+    assert {message["stage"] for message in told} == {"search"}
+
+
+def test_the_progress_of_a_batch_counts_meshes_in_work(models, tmp_path):
+    jobs = find_jobs([str(models / "ball.obj"), str(models / "hill.obj")], tmp_path, ".npz", {}, None)
+    told = []
+    running = Running(4, lambda text, fraction: told.append((text, fraction)))
+    running.report(jobs[0], "search", 0.5)
+    running.report(jobs[1], "read", 0.2)
+    running.end(jobs[0])
+    running.report(jobs[1], "pack", 0.6)
+    assert [fraction for _, fraction in told] == pytest.approx([0.125, 0.175, 0.4])
+    assert told[0][0] == "0 of 4 meshes; ball.obj: search"
+    assert told[-1][0] == "1 of 4 meshes; hill.obj: pack"
+
+
+@pytest.mark.slow
+def test_a_batch_moves_before_its_first_mesh_ends(tmp_path):
+    mesh = shapes.write_obj(tmp_path / "ball.obj", *shapes.sphere(5))
+    events = []
+    run_batch(
+        find_jobs([str(mesh)], tmp_path / "out", ".npz", {"max_energy": 4.05}, None),
+        tmp_path / "out",
+        processes=1,
+        listener=lambda row, done, count: events.append(1.0),
+        progress=lambda text, fraction: events.append(fraction),
+    )
+    assert len(events) > 2
+    assert events == sorted(events)
+    assert len({fraction for fraction in events if 0 < fraction < 1}) > 1
+    assert events[-1] == 1.0
+
+
+def test_progress_does_not_extend_the_time_limit(models, tmp_path, monkeypatch):
+    """A process that reports progress for ever."""
+    monkeypatch.setattr("coneflat.apps.batch.process.COMMAND", [sys.executable, "-c", ENDLESS])
+    (job,) = find_jobs([str(models / "ball.obj")], tmp_path, ".npz", {}, None)
+    child, told = Child(), []
+    try:
+        row = child.flatten(job, 1.5, lambda stage, fraction: told.append(fraction))
+    finally:
+        child.end()
+    assert "longer than 1.5 s" in row["error"]
+    assert set(told) == {0.1}
 
 
 @pytest.mark.parametrize(
@@ -268,6 +326,14 @@ def test_a_worker_that_crashes_fails_its_mesh_alone_and_leaves_nothing_half_writ
     assert "SIGKILL" in summary.rows[0]["error"]
     assert not list(tmp_path.glob(".*.tmp"))
     assert not (tmp_path / "ball.obj").exists()
+
+
+ENDLESS = """
+import json, time
+while True:
+    print(json.dumps({"stage": "search", "fraction": 0.1}), flush=True)
+    time.sleep(0.05)
+"""
 
 
 CRASHING = """

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 import re
+import subprocess
+import sys
 
 import pytest
 import shapes
 from click.testing import CliRunner
 
+from coneflat.apps.cli import run as command_run
 from coneflat.apps.cli.main import cli
 from coneflat.apps.cli.run import Console, time_left
 
@@ -105,3 +110,58 @@ def test_lines_of_progress_say_what_is_left(capsys, monkeypatch):
         "search: candidate 2 (about 1 min left)",
         "search: candidate 2 (about 1 min left)",
     ]
+
+
+NOTE = "Merged 12 vertices at the same positions; of vertices that differ in colour the first one is used."
+ROWS = [
+    ("overlap", "none", "no two triangles overlap"),
+    ("cones", "17 (-0.109 to +1.003 pi)", "singular vertices and their curvatures"),
+]
+
+
+@pytest.mark.parametrize("width", [24, 40, 80, 120])
+def test_notes_and_tables_fit_the_terminal_without_broken_words(monkeypatch, capsys, width):
+    monkeypatch.setattr(command_run, "_terminal_width", lambda: width)
+    console = Console("-v")
+    console.notes([NOTE])
+    notes = capsys.readouterr().out.splitlines()
+    assert " ".join(line.strip() for line in notes) == f"note: {NOTE}"
+    console.table(ROWS)
+    table = [re.sub(r"\x1b\[\d*m", "", line) for line in capsys.readouterr().out.splitlines()]
+    assert " ".join(" ".join(table).split()) == " ".join(" ".join(row) for row in ROWS)
+    lines = notes + (table if width >= 40 else [])  # Names and values are not broken.
+    assert all(len(line) <= width for line in lines)
+
+
+def test_a_narrow_table_has_blocks_and_a_wide_one_columns(monkeypatch, capsys):
+    tables = []
+    for width in (60, 100):
+        monkeypatch.setattr(command_run, "_terminal_width", lambda width=width: width)
+        Console("-v").table(ROWS)
+        tables.append(re.sub(r"\x1b\[\d*m", "", capsys.readouterr().out).splitlines())
+    assert tables[0][:2] == ["overlap  none", "    no two triangles overlap"]
+    assert len(tables[1]) == len(ROWS)
+
+
+def test_notes_are_single_lines_for_programs(capsys):
+    Console("-v").notes([NOTE])
+    assert capsys.readouterr().out == f"note: {NOTE}\n"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there are no pseudo-terminals")
+def test_a_terminal_gets_no_traceback_at_the_end(folder):
+    """In a terminal, with a library that takes stdout for itself while a bar is shown."""
+    import pty
+
+    words = [sys.executable, "-m", "coneflat", *COMMANDS["flatten"]]
+    parent, child = pty.openpty()
+    process = subprocess.Popen(words, stdin=child, stdout=child, stderr=child)
+    os.close(child)
+    content = b""
+    with contextlib.suppress(OSError):  # The end of the process ends the terminal.
+        while part := os.read(parent, 4096):
+            content += part
+    os.close(parent)
+    assert process.wait() == 0
+    assert b"wrote out.obj" in content
+    assert b"Traceback" not in content

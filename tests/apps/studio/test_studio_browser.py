@@ -349,7 +349,7 @@ def test_sizes_are_shown_in_a_unit(hill, tmp_path):
     assert hill.run("studio.layout") == layout
 
 
-def test_a_picture_a_report_and_quads_are_saved(hill, tmp_path):
+def test_a_picture_and_a_report_are_saved(hill, tmp_path):
     page = hill.page
     for kind, begins in (("png", b"\x89PNG"), ("json", b"{")):
         with page.expect_download() as download:
@@ -357,14 +357,53 @@ def test_a_picture_a_report_and_quads_are_saved(hill, tmp_path):
         download.value.save_as(tmp_path / f"x.{kind}")
         assert (tmp_path / f"x.{kind}").read_bytes().startswith(begins)
     assert json.loads((tmp_path / "x.json").read_text())["flipped"] == 0
+
+
+def test_quads_are_shown_over_the_views_and_saved_from_there(hill, tmp_path):
+    page = hill.page
     page.fill("#quad-count", "300")
+    page.click("#make-quads")
+    hill.wait("studio.news.quads === 1 && !document.getElementById('quads-view').hidden")
+    inside = page.frame_locator("#quads-view")
+    inside.locator("html[data-ready]").wait_for(timeout=60_000)
+    assert "irregular" in inside.locator("#title").inner_text()
+    frame, model, layout = (
+        page.locator(f"#{name}").bounding_box() for name in ("quads-view", "model", "layout")
+    )
+    assert (frame["x"], frame["x"] + frame["width"]) == (model["x"], layout["x"] + layout["width"])
+    assert page.locator("#save-quads-obj").is_visible()
     with page.expect_download() as download:
-        page.click("#save-quads")
+        page.click("#save-quads-obj")
     assert download.value.suggested_filename == "hill_quads.obj"
     download.value.save_as(tmp_path / "quads.obj")
     mesh = coneflat.read_mesh(tmp_path / "quads.obj")
     assert set(np.diff(mesh.offsets)) == {4}
     assert 100 < len(mesh.offsets) - 1 < 600
+
+    page.click("#show-quads")
+    assert not page.locator("#quads-view").is_visible()
+    page.click("#show-quads")
+    assert page.locator("#quads-view").is_visible()
+    page.fill("#padding", "3")
+    page.keyboard.press("Tab")
+    hill.settle()
+    hill.wait("studio.news.quads === 0")
+    assert not page.locator("#quads-view").is_visible()
+    assert not page.locator("#save-quads-obj").is_visible()
+
+
+def test_the_user_cancels_quads(hill):
+    page = hill.page
+    page.fill("#quad-count", "200000")
+    page.click("#make-quads")
+    page.locator("#cancel").wait_for(timeout=60_000)
+    assert "quads" in page.inner_text("#stage-name")
+    page.click("#cancel")
+    hill.wait("!studio.news.making")
+    page.locator("#cancel").wait_for(state="hidden")
+    assert page.locator("#make-quads").is_enabled()
+    assert page.locator("#refusal").is_hidden()
+    assert hill.run("studio.news.quads") == 0
 
 
 TURN, ZOOM = "coneflat.panes[0].camera.turn.join()", "coneflat.panes[0].camera.zoom"

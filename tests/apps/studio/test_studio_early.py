@@ -184,7 +184,7 @@ def test_a_change_cancels_the_separation_of_overlaps(tmp_path, monkeypatch):
         write_frame(asking, {**job, "job": 2})
         while not (heard[-1]["job"] == 2 and "done" in heard[-1]):
             heard.append(read_frame(hearing)[0])
-    assert {"job": 1, "given_up": True} in heard
+    assert {"job": 1, "given_up": "superseded"} in heard
     assert not any(message["job"] == 1 and "done" in message for message in heard)
 
 

@@ -6,13 +6,14 @@ from __future__ import annotations
 import functools
 import http.server
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
 import shapes
 from browsing import PATIENCE, need_browser
 from gltf_scenes import coloured_ball
-from studio_browsing import Studio, StudioVisit, sample, studio, visit  # noqa: F401
+from studio_browsing import Studio, StudioVisit, open_page, sample, studio, visit  # noqa: F401
 
 import coneflat
 
@@ -159,9 +160,17 @@ def test_the_page_switches_between_the_maps(visit, studio):
     assert page.text_content("#command") == "coneflat unwrap sample.obj --max-energy 4.4"
     assert studio.session.state()["choices"]["options"] == {"max_energy": 4.4}
 
+    # No cones are shown in any way.
+    page.locator("#model").focus()
+    page.keyboard.press("c")
+    assert not visit.run("coneflat.state.get('cones')")
+    assert page.is_hidden("#cones")
+    assert "cone" not in page.inner_text("#title")
+
     page.select_option("#purpose", "angles")
     visit.settle()
     assert page.is_visible("#cones-by")
+    assert page.is_visible("#cones")
     assert visit.cones() == cones
     assert visit.run("coneflat.state.get('cones')")
 
@@ -213,3 +222,124 @@ def test_less_common_options_are_set_by_the_page(visit):
     page.select_option("#purpose", "angles")
     visit.settle()
     assert page.text_content("#command") == "coneflat flatten sample.obj --up 0.0,0.0,-1.0"
+
+
+def test_a_slider_leads_from_less_stretch_to_shorter_seams(visit, studio):
+    page = visit.page
+    page.select_option("#purpose", "texture")
+    visit.settle()
+    assert float(page.input_value("#energy")) == -1  # 4.1
+    page.locator("#energy").focus()
+    measures = []
+    for key, energy in (("Home", "4.01"), ("End", "14")):
+        page.keyboard.press(key)
+        visit.settle()
+        assert page.input_value("#max-energy") == energy
+        assert studio.session.state()["choices"]["options"] == {"max_energy": float(energy)}
+        rows = dict(row[:2] for row in visit.run("coneflat.model.head.rows"))
+        measures.append((float(rows["energy"]), visit.run("coneflat.model.head.sizes.seams")))
+    (low_energy, long_seams), (high_energy, short_seams) = measures
+    assert 4 < low_energy <= 4.01
+    assert low_energy < high_energy
+    assert long_seams > short_seams
+    page.fill("#max-energy", "4.4")
+    page.keyboard.press("Enter")
+    visit.settle()
+    assert float(page.input_value("#energy")) == pytest.approx(np.log10(0.4), abs=0.026)
+
+
+def test_six_cones_and_save_are_in_sight(open_page, tmp_path):
+    mesh = tmp_path / "sample.obj"
+    mesh.write_bytes(Path(coneflat.sample_path()).read_bytes())
+    visit = open_page(mesh)
+    visit.page.set_viewport_size({"width": 1200, "height": 800})
+    rows = visit.page.locator("#cone-list .cone")
+    top = visit.page.locator("#save").bounding_box()["y"]
+    boxes = [rows.nth(index).bounding_box() for index in range(rows.count())]
+    assert len(boxes) >= 6
+    assert all(box["y"] + box["height"] <= top for box in boxes[:6])
+    buttons = visit.page.locator("#exports button")
+    for index in range(buttons.count()):
+        box = buttons.nth(index).bounding_box()
+        assert top <= box["y"]
+        assert box["y"] + box["height"] <= 800
+
+
+def test_angles_have_one_unit(visit):
+    """Degrees, in the panel as in the text on a picked cone; the panel's tooltips have multiples of pi."""
+    row = visit.run("studio.coneRows()[0]")
+    visit.run(f"studio.find({row['vertex']})")
+    told = visit.page.inner_text("#facts")
+    assert f"cone angle {row['degrees']:.1f}°" in told
+    assert "π" not in told
+    field = visit.page.locator(f'#cone-list .cone[data-vertex="{row["vertex"]}"] input')
+    assert f"{row['degrees'] / 180:.3f} π" in field.get_attribute("title")
+
+
+MIDDLE_OF_CHART = """(() => {
+  const {arrays} = coneflat.model, pane = coneflat.panes[1];
+  const triangles = [...arrays.chart.keys()].filter((i) => arrays.chart[i] === arrays.chart[0]);
+  const size = (i) => { const [p, q, r] = [0, 1, 2].map((k) => coneflat.model.flatPlace(arrays.faces[3 * i + k]));
+    return Math.abs((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])); };
+  const widest = triangles.reduce((one, other) => (size(other) > size(one) ? other : one));
+  const places = [0, 1, 2].map((k) => coneflat.model.flatPlace(arrays.faces[3 * widest + k]));
+  return pane.camera.project([0, 1, 2].map((k) => places.reduce((sum, place) => sum + place[k] / 3, 0))).slice(0, 2);
+})()"""
+
+
+def test_charts_are_moved_rotated_pinned_and_packed(visit, studio):
+    page = visit.page
+    assert page.is_hidden("#tool-chart")
+    page.select_option("#purpose", "texture")
+    visit.settle()
+    page.select_option("#charts", "number")
+    visit.settle()
+    page.fill("#chart-number", "5")
+    page.keyboard.press("Enter")
+    visit.settle()
+    first = visit.run("Array.from(coneflat.model.arrays.uv)")
+    page.locator("#model").focus()
+    page.keyboard.press("j")
+    assert page.is_disabled("#chart-rotate")
+
+    # A chart is dragged, and is pinned where it is dropped.
+    box, (x, y) = visit.box("layout"), visit.run(MIDDLE_OF_CHART)
+    page.mouse.move(box["x"] + x, box["y"] + y)
+    page.mouse.down()
+    page.mouse.move(box["x"] + x + 25, box["y"] + y + 10, steps=4)
+    assert visit.run("studio.panel.charts.offset") is not None
+    page.mouse.up()
+    visit.settle()
+    (pin,) = visit.choices()["charts"]["pins"]
+    assert pin[1:3] == [1, 0]
+    assert np.hypot(*pin[3:]) > 0.01
+    assert page.get_attribute("#chart-pin", "aria-pressed") == "true"
+    assert visit.run("Array.from(coneflat.model.arrays.uv)") != first
+    assert visit.run("coneflat.model.head.places.filter((place) => place[6]).length") == 1
+
+    # It is rotated about its middle, and the others are packed around it.
+    page.click("#chart-rotate")
+    visit.settle()
+    (turned,) = visit.choices()["charts"]["pins"]
+    np.testing.assert_allclose(turned[1:3], [0, 1], atol=1e-12)
+    page.check("#chart-pack")
+    visit.settle()
+    assert "overlap none" in page.inner_text("#title")
+    assert visit.choices()["charts"] == {"pins": [turned], "packed": True}
+    assert studio.session.state()["trouble"] is None
+
+    # It is freed, and everything is undone.
+    page.click("#chart-pin")
+    visit.settle()
+    assert visit.choices()["charts"]["pins"] == []
+    np.testing.assert_allclose(visit.run("Array.from(coneflat.model.arrays.uv)"), first, atol=1e-6)
+    page.click("#undo")
+    visit.settle()
+    assert visit.choices()["charts"]["pins"] == [turned]
+    page.click("#chart-free")
+    visit.settle()
+    assert "charts" not in visit.choices()
+    page.select_option("#purpose", "angles")
+    visit.settle()
+    assert visit.run("studio.tools.mode") == "look"
+    assert page.is_hidden("#charts-tools")

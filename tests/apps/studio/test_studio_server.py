@@ -28,6 +28,9 @@ ASKED = (
     ("GET", "/layout"),
     ("POST", "/act"),
     ("POST", "/export/obj"),
+    ("POST", "/quads"),
+    ("GET", "/quads"),
+    ("POST", "/cancel"),
     ("POST", "/mesh"),
 )
 MAX_UPLOAD = 200_000

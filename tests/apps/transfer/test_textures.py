@@ -7,7 +7,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 from command import command
-from gltf_scenes import SceneMaker
+from gltf_scenes import SceneMaker, opened
 
 import coneflat
 from coneflat import errors
@@ -124,6 +124,24 @@ class TestWrapModes:
             resolution=2,
         )
         assert colours(baked).any()
+
+
+def test_colours_are_baked_into_the_second_set(tmp_path):
+    """NEW has its square in the lower left quarter of the second set, v upwards."""
+    old = scene(tmp_path, base(), uv=SQUARE[:, :2] * [1, -1] + [0, 1], sampler={"magFilter": NEAREST})
+    make = SceneMaker()
+    sets = {"TEXCOORD_0": SQUARE[:, :2], "TEXCOORD_1": SQUARE[:, :2] * [0.5, -0.5] + [0, 1]}
+    attributes = {"POSITION": make.accessor(SQUARE)}
+    attributes |= {name: make.accessor(np.array(uv, float)) for name, uv in sets.items()}
+    primitive = {"attributes": attributes, "indices": make.accessor([0, 1, 2, 0, 2, 3], 5125)}
+    make.tree |= {"nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}], "meshes": [{"primitives": [primitive]}]}
+    target = tmp_path / "new.glb"
+    target.write_bytes(make.glb())
+    baked = transfer(old, target, resolution=8, uv_set=1)
+    assert np.array_equal(colours(baked)[4:, :4], np.kron(PIXELS, np.ones((2, 2, 1), np.uint8)))
+    tree = opened(baked.save(tmp_path / "baked.glb").read_bytes())[0]
+    assert tree["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["texCoord"] == 1
+    assert {*sets} <= {*tree["meshes"][0]["primitives"][0]["attributes"]}
 
 
 class TestScenes:

@@ -288,7 +288,7 @@ def test_a_click_keeps_a_cone_and_turns_the_model_to_it(visit, viewed):
         assert 0 < x - box["x"] < box["width"]
         assert 0 < y - box["y"] < box["height"]
         assert is_marked(visit, "model", x, y)
-        assert f"{abs(viewed.curvatures[index]) / np.pi:.3f} π" in visit.page.inner_text("#facts")
+        assert f"{np.degrees(abs(viewed.curvatures[index])):.1f}°" in visit.page.inner_text("#facts")
     visit.page.keyboard.press("Escape")
     assert visit.state("picked") is None
 

@@ -9,11 +9,14 @@ import sys
 import time
 from typing import IO, Any
 
-from ...base import inner_calls
+from ...base import Progress, inner_calls
 
 
-def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
-    """Flatten a mesh file, write the result, and return its row of the summary; errors give a row, too."""
+def flatten_file(job: dict[str, Any], progress: Progress | None = None) -> dict[str, Any]:
+    """Flatten a mesh file, write the result, and return its row of the summary; errors give a row, too.
+
+    progress: as of `coneflat.flatten`.
+    """
     from ... import ConeflatError, flatten, unwrap
     from ...io import read_joined, write_measured
     from ...measures import REPORTED, SUMMARY_MEASURES, breaches, parse_requirements
@@ -22,7 +25,8 @@ def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
     row: dict[str, Any] = {"mesh": job["mesh"], "output": job["output"]}
     try:
         source = read_joined(job["mesh"], job["weld"])
-        result = (unwrap if "max_energy" in job["options"] else flatten)(source.mesh, **job["options"])
+        flattening = unwrap if "max_energy" in job["options"] else flatten
+        result = flattening(source.mesh, progress=progress, **job["options"])
         result = write_measured(result, job["output"], uv_set=job["uv_set"])
         report = result.report()
         unmet = breaches(parse_requirements(job["required"], REPORTED), report)
@@ -43,8 +47,28 @@ def flatten_file(job: dict[str, Any]) -> dict[str, Any]:
 def serve(requests: IO[str], answers: IO[str]) -> None:
     """Read jobs until the end of the input, and write the row of each."""
     for line in requests:
-        answers.write(json.dumps(flatten_file(json.loads(line))) + "\n")
+        row = flatten_file(json.loads(line), ProgressLines(answers))
+        answers.write(json.dumps(row) + "\n")
         answers.flush()
+
+
+class ProgressLines:
+    """Writes the progress between the rows, at most a few lines per second."""
+
+    #: Seconds between lines.
+    INTERVAL = 0.5
+
+    def __init__(self, answers: IO[str]) -> None:
+        self._answers = answers
+        self._last_line = time.perf_counter()
+
+    def __call__(self, stage: str, fraction: float) -> None:
+        """Write the stage and the fraction of the work on the mesh that is done."""
+        now = time.perf_counter()
+        if now - self._last_line >= self.INTERVAL:
+            self._last_line = now
+            self._answers.write(json.dumps({"stage": stage, "fraction": fraction}) + "\n")
+            self._answers.flush()
 
 
 class LogLines(logging.Handler):

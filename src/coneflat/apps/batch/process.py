@@ -16,11 +16,12 @@ import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
+from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
-from ...base import exit_text
+from ...base import Progress, exit_text, plural, printable
 from ...errors import OptionError
 from ...io import imported, remove_unfinished
 from .jobs import Job
@@ -30,13 +31,23 @@ ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
 )
 
+
+def unreported(stage: str, fraction: float) -> None:
+    """Report no progress."""
+
+
 COMMAND = [sys.executable, "-m", "coneflat.apps.batch.child"]
 
 
 def rows_of_processes(
-    jobs: Sequence[Job], processes: int, limit: float | None
+    jobs: Sequence[Job], processes: int, limit: float | None, progress: Progress = unreported
 ) -> Iterator[tuple[Job, dict[str, Any]]]:
-    """Yield jobs with their rows, in the order in which they end."""
+    """Yield jobs with their rows, in the order in which they end.
+
+    progress: called with a text and the fraction of the meshes that is done, those in work counted by their progress;
+        from several threads, one at a time.
+    """
+    running = Running(len(jobs), progress)
     children = [Child() for _ in range(processes)]
     idle: SimpleQueue[Child] = SimpleQueue()
     for child in children:
@@ -45,11 +56,12 @@ def rows_of_processes(
     def work(job: Job) -> dict[str, Any]:
         child = idle.get()
         try:
-            return child.flatten(job, limit)
+            return child.flatten(job, limit, partial(running.report, job))
         except Exception as error:  # Only this mesh has failed, not the batch.
             child.end()
             return failed(job, f"internal error: {type(error).__name__}: {error}")
         finally:
+            running.end(job)
             idle.put(child)
 
     with ThreadPoolExecutor(processes) as pool:
@@ -79,14 +91,42 @@ def failed(job: Job, error: str, seconds: float | None = None) -> dict[str, Any]
     }
 
 
+class Running:
+    """The progress of a batch, from that of the meshes in work."""
+
+    def __init__(self, count: int, progress: Progress) -> None:
+        """count: number of meshes. progress: called as by `rows_of_processes`."""
+        self._count, self._progress = count, progress
+        self._lock = threading.Lock()
+        self._done = 0
+        self._fractions: dict[str, float] = {}
+
+    def report(self, job: Job, stage: str, fraction: float) -> None:
+        """Note the progress of a mesh."""
+        with self._lock:
+            self._fractions[job.output] = fraction
+            name = printable(Path(job.mesh).name)
+            text = f"{self._done} of {plural(self._count, 'mesh', 'meshes')}; {name}: {stage}"
+            self._progress(text, (self._done + sum(self._fractions.values())) / self._count)
+
+    def end(self, job: Job) -> None:
+        """Note that a mesh is done, or has failed."""
+        with self._lock:
+            self._fractions.pop(job.output, None)
+            self._done += 1
+
+
 class Child:
     """A worker process that is started for its first job, and again after it was ended or has died."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[str] | None = None
 
-    def flatten(self, job: Job, limit: float | None) -> dict[str, Any]:
-        """Return the row of a job; the process is ended if it takes longer than the limit in seconds."""
+    def flatten(self, job: Job, limit: float | None, progress: Progress = unreported) -> dict[str, Any]:
+        """Return the row of a job; the process is ended if it takes longer than the limit in seconds.
+
+        progress: called with the stage and the fraction of the work on the mesh that is done.
+        """
         start = time.perf_counter()
         try:
             process = self._started()
@@ -98,12 +138,13 @@ class Child:
         with suppress(OSError, ValueError):  # It may die before it reads the job, or while it writes.
             process.stdin.write(job.as_json() + "\n")
             process.stdin.flush()
-            answer = _answer(process, limit)
-            while "message" in answer:
-                # The compilation of a kernel begins, which happens once for all meshes: the time starts again.
-                start = time.perf_counter()
-                log_once(answer["level"], answer["message"])
-                answer = _answer(process, limit)
+            while "status" not in (answer := _answer(process, limit, start)):
+                if "message" in answer:
+                    # The compilation of a kernel begins, which happens once for all meshes: the time starts again.
+                    start = time.perf_counter()
+                    log_once(answer["level"], answer["message"])
+                else:
+                    progress(answer["stage"], answer["fraction"])
             row = answer
         seconds = time.perf_counter() - start
         if row:
@@ -145,14 +186,17 @@ class Child:
         return self._process
 
 
-def _answer(process: subprocess.Popen[str], limit: float | None) -> dict[str, Any]:
-    """Return the next line of a worker process, which is ended if it takes longer than the limit in seconds.
+def _answer(process: subprocess.Popen[str], limit: float | None, start: float) -> dict[str, Any]:
+    """Return the next line of a worker process, which is ended at its time limit.
+
+    limit, start: seconds for the job, and when it began, as of `time.perf_counter`.
 
     Raises:
         ValueError: the line is not complete.
     """
     assert process.stdout is not None
-    timer = threading.Timer(threading.TIMEOUT_MAX if limit is None else limit, process.kill)
+    left = threading.TIMEOUT_MAX if limit is None else max(start + limit - time.perf_counter(), 0.0)
+    timer = threading.Timer(left, process.kill)
     timer.start()
     try:
         return json.loads(process.stdout.readline())

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...base import plural, printable
+from ...base import Progress, plural, printable
 from ...errors import MeshFileError, OptionError
 from ...io import atomic_write, check_target, checked_target, make_folder
 from ...measures import SUMMARY_MEASURES
@@ -51,6 +51,7 @@ def run_batch(
     redo: bool = False,
     summary: Path | None = None,
     listener: Listener | None = None,
+    progress: Progress | None = None,
 ) -> BatchSummary:
     """Flatten many meshes and return a summary; a mesh that fails does not stop the others.
 
@@ -66,6 +67,8 @@ def run_batch(
         redo: also flatten meshes that are done.
         summary: path of a .csv file; None for summary.csv in the folder.
         listener: called with each result.
+        progress: called with a text and the fraction of all work that is done, also while meshes are in work; from
+            several threads, one at a time. A cluster reports only meshes that are done, to `listener`.
 
     Raises:
         OptionError: an argument is not valid.
@@ -83,7 +86,7 @@ def run_batch(
     journal = Journal(folder)
     open_jobs = [job for job in jobs if redo or not journal.is_done(job)]
     try:
-        for done, (job, row) in enumerate(_rows(open_jobs, processes, limit, dask), start=1):
+        for done, (job, row) in enumerate(_rows(open_jobs, processes, limit, dask, progress), start=1):
             journal.add(job, row)
             if listener is not None:
                 listener(row, done, len(open_jobs))
@@ -97,16 +100,21 @@ def run_batch(
 
 
 def _rows(
-    jobs: Sequence[Job], processes: int | None, limit: float | None, dask: str | None
+    jobs: Sequence[Job],
+    processes: int | None,
+    limit: float | None,
+    dask: str | None,
+    progress: Progress | None,
 ) -> Iterator[tuple[Job, dict[str, Any]]]:
     if dask is not None:
         from .process import rows_of_cluster
 
         return rows_of_cluster(jobs, dask, limit)
-    from .process import rows_of_processes
+    from .process import rows_of_processes, unreported
 
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return rows_of_processes(jobs, min(processes or cores, max(len(jobs), 1)), limit)
+    processes = min(processes or cores, max(len(jobs), 1))
+    return rows_of_processes(jobs, processes, limit, progress or unreported)
 
 
 HEADINGS = ("mesh", "status", "error", "output", "seconds", *SUMMARY_MEASURES, "notes")

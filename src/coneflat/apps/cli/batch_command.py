@@ -122,6 +122,7 @@ def batch(
                 redo=flags.redo,
                 summary=flags.summary,
                 listener=_listener(console, rows),
+                progress=console.progress,
             )
         except KeyboardInterrupt as error:
             again = "with --redo, all are flattened again" if flags.redo else "it continues with the others"

@@ -96,6 +96,6 @@ def brain(context: click.Context, /, surface: Path, verbosity: str | None, **par
                 notes += losses(cortex.surface, ending, kept_in_flat(cortex.surface, ending))
             else:
                 notes += as_written(cortex.result, ending).notes
-        console.say(f"note: {note}" for note in dict.fromkeys(notes))
+        console.notes(dict.fromkeys(notes))
         console.finish([*outputs, *([] if flags.report is None else [flags.report])])
         console.table(rows_of_measures(measured.uv, measured))

@@ -80,7 +80,7 @@ def cones(
             found_cones = find_cones(
                 source, progress=console.part(end=0.5 if flags.curve else console.FLATTENED), **options
             )
-        console.say(f"note: {note}" for note in joined.notes())
+        console.notes(joined.notes())
         distortion = options.pop("distortion", DISTORTION)
         options.pop("cone_count", None)
         if flags.curve:
@@ -90,7 +90,7 @@ def cones(
             console.say(_curve_lines(curve, distortion))
         else:
             console.say(_cone_lines(found_cones))
-            console.say(f"note: {note}" for note in found_cones.notes)
+            console.notes(found_cones.notes)
         if picture is not None:
             with console.stage("draw"):
                 save_figure(make_figure(curve, "curve", distortion=distortion, title=mesh.name), picture)

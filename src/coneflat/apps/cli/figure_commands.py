@@ -141,7 +141,7 @@ def figure(
             shown = open_result(mesh, console, again=again, repair=repair, weld=weld)
             if color is not None:
                 look["own"] = own_quantity(shown, color, archive_path(mesh))
-            console.say(f"note: {note}" for note in shown.notes)
+            console.notes(shown.notes)
         with console.stage("draw"):
             save_figure(make_figure(shown, kind, **look), output)
         console.finish([output])
@@ -153,7 +153,7 @@ def _curve(mesh: Path, console: Console, max_cones: int, weld: bool | None, repa
 
     with console.stage("read", 0.0):
         surface, notes = _surface(mesh, weld)
-    console.say(f"note: {note}" for note in notes)
+    console.notes(notes)
     with console.stage("cones", console.READ):
         return cone_curve(surface, most=max_cones, progress=console.part(), **repair_keywords(repair))
 

@@ -293,6 +293,14 @@ def input_options(command: Command) -> Command:
     return command
 
 
+uv_set_option = click.option(
+    "--uv-set",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    help="Number of the UVs of a glTF: 1 for TEXCOORD_1, as of lightmaps.",
+)
+
 color_option = click.option(
     "--color",
     metavar="NAME|FILE",

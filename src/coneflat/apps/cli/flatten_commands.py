@@ -179,4 +179,8 @@ def _project_arguments(
     opened = read_project(project)
     opened.check_mesh()
     choices = opened.choices.with_texture(group is UnwrapOptions)
-    return opened.mesh, choices.keywords(), lambda result: with_warnings(result, choices)
+    return (
+        opened.mesh,
+        choices.keywords(),
+        lambda result: with_warnings(choices.used_pins.applied(result), choices),
+    )

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .flags import QUIET, check_required, input_options, names_formats, require_option, verbosity_options
+from .flags import (
+    QUIET,
+    check_required,
+    input_options,
+    names_formats,
+    require_option,
+    uv_set_option,
+    verbosity_options,
+)
 
 if TYPE_CHECKING:
     from ...measures import Row
@@ -21,6 +29,7 @@ if TYPE_CHECKING:
 @click.option("--report", type=click.Path(path_type=Path), help="JSON file for all measures.")
 @click.option("--json", "as_json", is_flag=True, help="Print all measures as JSON instead of a table.")
 @click.option("--surface", type=click.Path(path_type=Path), help="Brain surface of which FILE is a flat map.")
+@uv_set_option
 @require_option
 @input_options
 @verbosity_options
@@ -30,6 +39,7 @@ def measure(
     surface: Path | None,
     report: Path | None,
     as_json: bool,
+    uv_set: int,
     required: tuple[str, ...],
     repair: bool,
     weld: bool | None,
@@ -41,6 +51,7 @@ def measure(
     Examples:
       coneflat measure horse_uv.obj
       coneflat measure asset.glb --json
+      coneflat measure lightmapped.glb --uv-set 1
       coneflat measure asset.glb --require flipped=0,overlap=0 --require "qc_mean<=1.1"
     """
     from ...io import as_uv_mesh, check_target
@@ -51,13 +62,17 @@ def measure(
 
     if surface is not None and weld:
         raise click.UsageError("--weld would change the numbers that --surface and FILE share: leave it out")
+    if surface is not None and uv_set:
+        raise click.UsageError("--uv-set has no effect with --surface: leave out one of them")
     requirements = parse_requirements(required, MEASURED if surface is None else (*MEASURED, *FLAT_MEASURES))
     if report is not None:
         check_target(report)
     require_distinct({"input": file, "report": report})
     with Console(verbosity) as console:
         with console.stage("read", 0.0):
-            mapped = as_uv_mesh(file, weld=weld) if surface is None else read_flat(file, surface)
+            mapped = (
+                as_uv_mesh(file, weld=weld, uv_set=uv_set) if surface is None else read_flat(file, surface)
+            )
         with console.stage("measure", 0.3):
             flat = None if surface is None else measure_flat(mapped, strict=not repair)
             measured = measure_mapped(mapped, strict=not repair) if flat is None else flat.uv
@@ -67,7 +82,7 @@ def measure(
         if as_json and verbosity != QUIET:
             click.echo(json.dumps(measures, indent=2))
         elif not as_json:
-            console.say(f"note: {note}" for note in measured.notes)
+            console.notes(measured.notes)
             console.table(rows_of_measures(measured, flat))
             console.finish([] if report is None else [report])
     check_required(requirements, measures)

@@ -105,7 +105,7 @@ def quads(
             measured = {} if measures is None else measures.report()
             run = {"grid": {"size": grid_map.size}, "seconds": dict(console.seconds), "notes": notes}
             write_report(flags.report, {**measured, **run})
-        console.say(f"note: {note}" for note in notes)
+        console.notes(notes)
         console.finish([path for path in files.values() if path is not None])
         square = "square", f"{grid_map.size:.4g}", "side of a grid square in model units"
         console.table([square, *(() if measures is None else measures.rows())])

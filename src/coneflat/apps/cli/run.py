@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 LOG = logging.getLogger("coneflat")
 # Seconds, and fraction of all work, after which the rest of the time is estimated.
 MIN_ELAPSED, MIN_FRACTION = 3.0, 0.05
+# Columns of tables that are not printed in a terminal, and least number of columns for the meanings of measures.
+WIDTH, MIN_MEANING = 110, 30
 AGAIN = "--again flattens the mesh again"
 
 
@@ -144,7 +146,7 @@ class Console:
             self._bar.stop()
             self._bar = None
         if result is not None:
-            self.say(f"note: {note}" for note in result.notes)
+            self.notes(result.notes)
         self.say(f"wrote {printable(path)}" for path in written)
         if result is not None:
             self.table(self._result_rows(result))
@@ -174,6 +176,15 @@ class Console:
             *((name.replace("_", " "), f"{value:.3g}", "") for name, value in statistics.items()),
         ]
 
+    def notes(self, notes: Iterable[str]) -> None:
+        """Print notes, in a terminal wrapped at words; elsewhere each is one line, for programs that search for it."""
+        width = _terminal_width()
+        for note in notes:
+            text = f"note: {note}"
+            self.say(
+                [text] if width is None else textwrap.wrap(text, width, subsequent_indent="  ") or [text]
+            )
+
     def table(self, rows: Iterable[tuple[str, str, str]]) -> None:
         """Print a table of (measure, value, meaning)."""
         self.say(_lines_of_table(list(rows)))
@@ -201,22 +212,41 @@ def _bar() -> Progress:
 
     left = TextColumn("{task.fields[left]}")
     columns = SpinnerColumn(), TextColumn("{task.description:28}"), BarColumn(), TimeElapsedColumn(), left
-    return Progress(*columns, console=RichConsole(stderr=True), transient=True)
+    # Lines are printed while no bar is shown. A library that takes stdout for itself would otherwise keep a replacement
+    # of it, which no longer exists when the process ends.
+    return Progress(*columns, console=RichConsole(stderr=True), transient=True, redirect_stdout=False)
 
 
 def _lines_of_table(rows: Sequence[tuple[str, str, str]]) -> Iterator[str]:
     """Yield the lines of a table as wide as the terminal, or 110; its last column is wrapped.
 
-    click removes the styles if stdout is not a terminal.
+    In a narrow terminal, each row is a block: the last column is below the others. click removes the styles if stdout
+    is not a terminal.
     """
-    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 110
+    width = _terminal_width() or WIDTH
     names, values = (max((len(row[column]) for row in rows), default=0) for column in (0, 1))
-    available = max(width - names - values - 4, 20)
+    available = width - names - values - 4
+    if available < MIN_MEANING:
+        yield from _lines_of_blocks(rows, width)
+        return
     for name, value, meaning in rows:
         first, *continued = textwrap.wrap(meaning, available) or [""]
         cells = click.style(f"{name:{names}}", bold=True), f"{value:{values}}", click.style(first, dim=True)
         yield "  ".join(cells if first else cells[:2]).rstrip()
         yield from (" " * (names + values + 4) + click.style(line, dim=True) for line in continued)
+
+
+def _lines_of_blocks(rows: Sequence[tuple[str, str, str]], width: int) -> Iterator[str]:
+    """Yield the lines of a table as blocks: names and values, and the meanings below, indented."""
+    for name, value, meaning in rows:
+        yield f"{click.style(name, bold=True)}  {value}".rstrip()
+        for line in textwrap.wrap(meaning, max(width - 4, 20)):
+            yield "    " + click.style(line, dim=True)
+
+
+def _terminal_width() -> int | None:
+    """Return the number of columns of the terminal; None if stdout is none."""
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
 
 
 @contextmanager

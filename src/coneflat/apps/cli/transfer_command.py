@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ...base import BAKED_RESOLUTION
-from .flags import verbosity_options
+from .flags import uv_set_option, verbosity_options
 
 if TYPE_CHECKING:
     from ..transfer import Baked
@@ -26,6 +26,7 @@ _PATH = click.Path(path_type=Path)
     "--resolution", type=int, default=BAKED_RESOLUTION, show_default=True, help="Texels along a side."
 )
 @click.option("--texture", type=_PATH, help="Image of the UVs of OLD, instead of its materials.")
+@uv_set_option
 @verbosity_options
 def transfer(
     source: Path,
@@ -33,6 +34,7 @@ def transfer(
     output: Path | None,
     resolution: int,
     texture: Path | None,
+    uv_set: int,
     verbosity: str | None,
 ) -> None:
     """Bake the textures or vertex colours of OLD into the UVs of NEW, a model of the same shape.
@@ -54,11 +56,11 @@ def transfer(
     require_distinct({"old model": source, "new model": target, "texture": texture, "output": output})
     with Console(verbosity) as console:
         with console.stage("bake", 0.0):
-            baked = bake(source, target, resolution=resolution, texture=texture)
+            baked = bake(source, target, resolution=resolution, texture=texture, uv_set=uv_set)
         with console.stage("write"):
             baked.save(output)
         losses = (*baked.losses(output), *_not_baked(baked, output))
-        console.say(f"note: {note}" for note in (*baked.notes, *losses))
+        console.notes((*baked.notes, *losses))
         console.finish([output])
 
 

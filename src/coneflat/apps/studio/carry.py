@@ -16,8 +16,10 @@ import numpy as np
 from ... import MeshFile
 from ...base import FloatArray, IntArray, list_some, plural
 from ...linalg import MultiGraph
-from .choices import Choices, Cone, Path
+from .choices import Choices, Cone
 from .paint import FLAGS, Paint, Region
+from .paths import Path
+from .pins import Pins
 from .places import Places, file_edges
 
 #: Largest distance to the nearest vertex, relative to the diagonal of the bounding box: farther away, a choice would
@@ -189,9 +191,10 @@ def _carried(choices: Choices, transfer: Transfer) -> Carried:
         *([f"{plural(lost_uncut, 'path')} to keep whole"] if lost_uncut else []),
         *([f"paint at {plural(unpainted, 'vertex', 'vertices')}"] if unpainted else []),
         *([plural(n, "corner")] if (n := len(choices.corners) - len(corners)) else []),
+        *([plural(n, "pinned chart")] if (n := len(choices.pins.pins)) else []),
     )
     carried = replace(
-        choices, cones=cones, cuts=cuts, uncut=uncut, paint=paint, corners=tuple(sorted(corners))
+        choices, cones=cones, cuts=cuts, uncut=uncut, paint=paint, corners=tuple(sorted(corners)), pins=Pins()
     )
     return Carried(carried, lost)
 

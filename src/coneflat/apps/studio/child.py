@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import os
 import sys
-import threading
-from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -24,6 +22,8 @@ from ...base import FloatArray, cancel_with, inner_calls
 from ...errors import DegenerateFaceError, NonManifoldError, NonOrientableError
 from ...io import Joined, Texture, read_joined
 from ...options import MAX_SHOWN_TRIANGLES
+from ...quadmesh import QuadMesh
+from ...source import LatestCache
 from ...textures import Unwrapper
 from ..transfer import own_picture
 from ..view import (
@@ -34,11 +34,13 @@ from ..view import (
     head_and_block,
     own_quantity,
     pack,
+    page_of_quads,
     shown_rows,
     text_of,
     upward_axis,
 )
 from .choices import DECLARED, Choices
+from .jobs import Jobs, Superseded
 from .layouts import LatestLayouts, MadeLayout
 from .messages import misplaced_warning, notes_on_controls, page_message, with_warnings
 from .outputs import (
@@ -46,58 +48,22 @@ from .outputs import (
     as_shown,
     bad_places,
     curve_data,
+    quad_notes,
     quads_file,
+    quads_of,
     repaired,
     result_file,
     without_layout,
 )
+from .pins import NO_PINS, Pins, places_of_charts
 from .places import shape_message, shape_of
-from .worker import Head, read_frame, with_hashes, write_frame
+from .worker import Head, with_hashes, write_frame
 
 #: The text that stands for unknown numbers, and the titles of pages without a final layout.
 PLACEHOLDER = "…"
 BARE_TITLE = "No layout"
 COMPUTING_TITLE = "Computing the first layout"
 FIRST_TITLE = "Preview: distortion is not yet reduced, and overlaps are not yet removed  ·  …"
-
-
-class Superseded(Exception):
-    """A newer flattening has been requested."""
-
-
-class Jobs:
-    """The queue of jobs; of several flattenings, only the newest is kept."""
-
-    def __init__(self, stream: IO[bytes]) -> None:
-        self._stream = stream
-        self._waiting: deque[Head] = deque()
-        self._changed = threading.Condition()
-        self._newest = -1
-        self._is_closed = False
-        threading.Thread(target=self._listen, daemon=True).start()
-
-    def _listen(self) -> None:
-        while (frame := read_frame(self._stream)) is not None:
-            job = frame[0]
-            with self._changed:
-                if job["do"] == "flatten":
-                    self._newest = job["job"]
-                    self._waiting = deque(waiting for waiting in self._waiting if waiting["do"] != "flatten")
-                self._waiting.append(job)
-                self._changed.notify()
-        with self._changed:
-            self._is_closed = True
-            self._changed.notify()
-
-    def next(self) -> Head | None:
-        """Return the next job; None after the last one."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._waiting or self._is_closed)
-            return None if self._is_closed else self._waiting.popleft()
-
-    def is_stale(self, job: int) -> bool:
-        """Return whether a flattening is obsolete."""
-        return self._is_closed or job != self._newest
 
 
 class Opened(NamedTuple):
@@ -113,14 +79,19 @@ class JobRunner:
 
     Attributes:
         result: result of the last flattening; None if it has failed.
+        quads: the quads that were computed last; None if there are none.
     """
 
     def __init__(self, early_from: int = 20_000) -> None:
         """early_from: number of polygons from which on a preview is shown; for fewer the final layout is as fast."""
         self.result: Flattening | None = None
+        self.quads: QuadMesh | None = None
         self._early_from = early_from
         self._opened: Opened | None = None
         self._layouts = LatestLayouts()
+        # The map for a texture without pins, whose key is the choices.
+        self._unpinned: LatestCache[Flattening] = LatestCache()
+        self._base: Flattening | None = None  # The one that was used last.
         self._model: Model | None = None
         self._up = "y"
         self._max_triangles: int | None = None
@@ -178,7 +149,7 @@ class JobRunner:
             except ConeflatError as error:
                 missing = {"missing": page_message(str(error))}
         shown = as_shown(result)
-        head, body = self._picture(result, Path(job["mesh"]).name, text_of(shown), quantity=quantity)
+        head, body = self._picture(result, Path(job["mesh"]).name, text_of(shown), quantity, chosen.used_pins)
         notes = head["head"]["notes"] = [page_message(note) for note in shown.notes]
         # The session warns of choices itself, as soon as they are made.
         warned = {page_message(note) for note in misplaced_warning(chosen)}
@@ -213,7 +184,10 @@ class JobRunner:
 
         words = source.map_options(chosen.keywords())
         if chosen.for_texture:
-            result = unwrapper.unwrap(progress=report_max, **words)
+            key = replace(chosen, pins=Pins(), units=("", ""))
+            unpinned = self._unpinned.of(key, lambda: unwrapper.unwrap(progress=report_max, **words))
+            self._base = unpinned
+            result = chosen.pins.applied(unpinned)
         else:
             on_preview = show_first if len(source.mesh.offsets) - 1 >= self._early_from else None
             result = flattener.flatten(on_preview=on_preview, progress=report_max, **words)
@@ -232,18 +206,28 @@ class JobRunner:
         return {}, b""
 
     def make(self, job: Head, report: Callable[[str, float], None]) -> tuple[Head, bytes]:
-        """Return the output of another job: a file of the result, quads, or a curve."""
+        """Return the output of another job: a file of the result, the page of quads or their file, or a curve."""
 
         if job["do"] == "export":
             return _answer(result_file(self.result, job["ending"]))
+        if job["do"] == "quads file":
+            return _answer(quads_file(self.quads, job["ending"]))
         source, *_ = self._open(job["mesh"], job["sha256"], report)
         chosen = Choices.from_plain(job["choices"])
         if job["do"] == "quads":
-            return _answer(quads_file(source, chosen, job["count"], job["ending"], report))
+            self.quads = None
+            self.quads = quads_of(source, chosen, job["count"], report)
+            page = page_of_quads(self.quads, name=Path(job["mesh"]).name, show="checker")
+            return _answer(SavedFile(page.encode("utf-8"), quad_notes(self.quads)))
         return curve_data(source, chosen, report), b""
 
     def _picture(
-        self, result: Flattening, name: str, text: PageText, quantity: Quantity | None = None
+        self,
+        result: Flattening,
+        name: str,
+        text: PageText,
+        quantity: Quantity | None = None,
+        pins: Pins = NO_PINS,
     ) -> tuple[Head, bytes]:
         """Return the page data of a result, without notes.
 
@@ -252,6 +236,7 @@ class JobRunner:
             name: name of the mesh.
             text: title and rows of the page.
             quantity: quantity that is shown as colours.
+            pins: the charts that are pinned, in the map for a texture that was computed last.
         """
 
         if self._model is None or not self._model.is_of(result):
@@ -268,6 +253,10 @@ class JobRunner:
         if content.left_out and len(result.faces) <= 4_000_000:
             head, block = with_all_triangles(head, block, self._model, result)
         head["notes"] = []
+        if pins.pins:
+            assert self._base is not None
+            unpinned = self._base
+            head["places"] = list(places_of_charts(unpinned, result, pins, content.face_numbers))
         cones = result.cones if result.vertex_origin is None else result.vertex_origin[result.cones]
         data = {"head": with_hashes(head, block), "found": cones.tolist(), "seconds": result.seconds}
         return data, block
@@ -276,8 +265,8 @@ class JobRunner:
         """Return the mesh of a job, which is read if it is another one than before."""
         if self._opened is None or self._read != (mesh, sha256):
             report("read", 0.0)
-            self._opened = self._model = None  # The memory may not suffice for both.
-            self._layouts = LatestLayouts()
+            self._opened = self._model = self.quads = None  # The memory may not suffice for both.
+            self._layouts, self._unpinned, self._base = LatestLayouts(), LatestCache(), None
             repaired.cache_clear()
             source = read_joined(Path(mesh))
             self._opened = Opened(source, Flattener(source.mesh), Unwrapper(source.mesh))
@@ -327,8 +316,8 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
     while (job := jobs.next()) is not None:
         number = job["job"]
 
-        def check_current(current: int = job.get("after") or number) -> None:
-            if jobs.is_stale(current):
+        def check_current(job: Head = job) -> None:
+            if jobs.is_stale(job):
                 raise Superseded
 
         def report(stage: str, fraction: float, number: int = number) -> None:
@@ -351,7 +340,8 @@ def serve(jobs: Jobs, answers: IO[bytes]) -> None:
                 )
             write_frame(answers, {"job": number, "done": head}, body)
         except Superseded:
-            write_frame(answers, {"job": number, "given_up": True})
+            reason = "cancelled" if jobs.is_cancelled(job) else "superseded"
+            write_frame(answers, {"job": number, "given_up": reason})
         except ConeflatError as error:
             # The page offers a button for errors that a repair can fix.
             mends = isinstance(error, (DegenerateFaceError, NonManifoldError, NonOrientableError))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
-from itertools import chain, pairwise
+from itertools import chain
 from types import MappingProxyType
 from typing import Any
 
@@ -16,9 +16,11 @@ import numpy as np
 
 from ...base import MAX_CONE_ANGLE, IntArray, short_repr
 from ...errors import OptionError, StudioError
-from ...options import Flag, Options, as_integer, as_number, declarations, read_options
+from ...options import Flag, Options, as_number, declarations, read_options
 from ...textures import UnwrapOptions
 from .paint import Paint, Region
+from .paths import Path, as_vertex, checked_path, edge_pairs, edges_of
+from .pins import Pins
 
 #: Options whose controls are made from their declarations, with the labels of these.
 FURTHER_OPTIONS = {
@@ -45,8 +47,6 @@ SINGLE = (NUMBERS, ("resolution", "texel_density", "lightmap"), ("max_energy", "
 BOUNDARIES = ("free", "lengths", "disk", "straight", "rectangle")
 #: Units of length of a file; "" if unknown. They affect only the lengths that are shown.
 UNITS = ("", "mm", "cm", "m", "inch")
-
-Path = tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -83,6 +83,7 @@ class Choices:
         corners: corners of a rectangle, vertices on the boundary, ascending.
         units: unit of length of the file, and the one in which lengths are shown, of `UNITS`.
         for_texture: whether the map is that of `coneflat.unwrap`, which uses neither cones nor a boundary.
+        pins: charts of a map for a texture that are moved or pinned.
     """
 
     options: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
@@ -94,6 +95,7 @@ class Choices:
     corners: Path = ()
     units: tuple[str, str] = ("", "")
     for_texture: bool = False
+    pins: Pins = field(default_factory=Pins)
 
     # Options.
 
@@ -189,11 +191,11 @@ class Choices:
 
     def cut(self, path: Path) -> Choices:
         """Return choices with a further path that is cut."""
-        return replace(self, cuts=(*self.cuts, _checked(path)))
+        return replace(self, cuts=(*self.cuts, checked_path(path)))
 
     def with_uncut(self, path: Path) -> Choices:
         """Return choices with a further path that must not be cut."""
-        return replace(self, uncut=(*self.uncut, _checked(path)))
+        return replace(self, uncut=(*self.uncut, checked_path(path)))
 
     def erased(self, start: int, end: int) -> Choices:
         """Return choices without the paths that contain the edge between two vertices.
@@ -276,13 +278,13 @@ class Choices:
             if len(self.corners) == 4:
                 words["boundary"] = dict.fromkeys(self.corners)
         if self.cuts:
-            cut = _pairs(self.cuts)
+            cut = edge_pairs(self.cuts)
             words["seams"] = (words["seams"], cut) if "seams" in words else cut
         paint = self.paint
         if paint.no_seam:
             words["no_seams"] = np.array([*paint.no_seam.vertices(), *chain(*self.uncut)])
         elif self.uncut:
-            words["no_seams"] = _pairs(self.uncut)
+            words["no_seams"] = edge_pairs(self.uncut)
         # Painted regions only restrict searches, not cones that are placed by hand or locked.
         if paint.no_cone and not self.by_hand:
             locked = {cone.vertex for cone in self.cones}
@@ -294,6 +296,11 @@ class Choices:
         words = {name: value for name, value in words.items() if name in declarations(group)}
         read_options(words, group)
         return words
+
+    @property
+    def used_pins(self) -> Pins:
+        """Return the pins of a map for a texture; none of another map."""
+        return self.pins if self.for_texture else Pins()
 
     @property
     def command(self) -> str:
@@ -312,6 +319,7 @@ class Choices:
             **({"corners": list(self.corners)} if self.corners else {}),
             **({"units": list(self.units)} if any(self.units) else {}),
             **({"for_texture": True} if self.for_texture else {}),
+            **({"charts": self.pins.as_plain()} if self.pins != Pins() else {}),
         }
 
     @classmethod
@@ -333,12 +341,14 @@ class Choices:
                 raise StudioError(f"vertex {vertex} is given as a cone twice")
             cones[vertex] = Cone(vertex, _checked_angle(angle), record["locked"] is True)
         chosen = replace(chosen, by_hand=plain["by_hand"] is True)._with_cones(cones)
-        cuts, uncut = (tuple(map(_checked, plain[name])) for name in ("cuts", "kept"))
+        cuts, uncut = (tuple(map(checked_path, plain[name])) for name in ("cuts", "kept"))
         chosen = replace(chosen, cuts=cuts, uncut=uncut, paint=Paint.from_plain(plain.get("paint", {})))
         for vertex in dict.fromkeys(plain.get("corners", ())):
             chosen = chosen.with_corner(as_vertex("a corner", vertex))
         units, for_texture = plain.get("units", ("", "")), plain.get("for_texture") is True
         chosen = chosen.with_units(*units).with_texture(for_texture)
+        if "charts" in plain:
+            chosen = replace(chosen, pins=Pins.from_plain(plain["charts"]))
         chosen.keywords()
         return chosen
 
@@ -358,19 +368,6 @@ class Choices:
         return replace(self, cones=tuple(cones[v] for v in sorted(cones)))
 
 
-def as_vertex(name: str, value: object) -> int:
-    """Return a vertex index from a value of JSON.
-
-    Raises:
-        OptionError: it is not an integer.
-        StudioError: it is negative.
-    """
-    vertex = as_integer(name, value)
-    if vertex < 0:
-        raise StudioError(f"{name} must be an index, 0 or more, got {vertex}")
-    return vertex
-
-
 def _checked_angle(angle: float | None) -> float | None:
     if angle is not None and not 0 < angle <= MAX_CONE_ANGLE * (1 + 1e-12):
         raise StudioError(
@@ -378,22 +375,3 @@ def _checked_angle(angle: float | None) -> float | None:
             f"{math.degrees(angle):,g}"
         )
     return angle
-
-
-def _checked(path: Iterable[Any]) -> Path:
-    vertices = tuple(as_vertex("a path's vertex", vertex) for vertex in path)
-    if len(vertices) < 2 or any(a == b for a, b in pairwise(vertices)):
-        raise StudioError(
-            f"a path must be two or more vertices, no two equal in a row: {short_repr(list(vertices))}"
-        )
-    return vertices
-
-
-def _pairs(paths: Iterable[tuple[int, ...]]) -> Any:
-    edges = {tuple(sorted(edge)) for path in paths for edge in edges_of(path)}
-    return np.array(sorted(edges), dtype=np.int64)
-
-
-def edges_of(path: tuple[int, ...]) -> set[frozenset[int]]:
-    """Return the edges of a path."""
-    return {frozenset(edge) for edge in pairwise(path)}

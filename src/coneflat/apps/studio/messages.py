@@ -10,6 +10,7 @@ import re
 import shlex
 from collections.abc import Iterable
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...base import MAX_CONE_ANGLE, MAX_LISTED, MIN_CONE_ANGLE, list_some, plural
@@ -101,8 +102,8 @@ def with_warnings(result: Flattening, chosen: Choices) -> Flattening:
 
 
 def command_line(mesh: str, project: str, choices: Choices) -> str:
-    """Return a command that maps a mesh with these choices; drawn paths and paint need the project file."""
-    if choices.cuts or choices.uncut or choices.paint:
+    """Return a command that maps a mesh with these choices; drawn paths, paint and pins need the project file."""
+    if choices.cuts or choices.uncut or choices.paint or choices.used_pins.pins:
         return shlex.join(["coneflat", choices.command, "--project", project])
     parts = ["coneflat", choices.command, mesh]
     for name, value in choices.keywords().items():
@@ -123,7 +124,8 @@ def python_lines(mesh: str, choices: Choices) -> str:
     if sum(map(len, arguments)) > 20_000:  # Characters in the panel.
         return "# The drawn paths and the paint are too large to be shown here; they are in the project file."
     start = f"import coneflat\n\nresult = coneflat.{choices.command}(\n    {mesh!r},"
-    return "\n".join([start, *arguments, ")"])
+    pins = [choices.used_pins.code()] if choices.used_pins.pins else []
+    return "\n".join([start, *arguments, ")", *pins])
 
 
 def _written(value: Any) -> str:
@@ -150,3 +152,31 @@ def _ranges(vertices: list[int]) -> str:
     """Return ascending vertices as the content of a Python list, with consecutive vertices as ranges."""
     runs = Region.of_vertices(vertices).runs
     return ", ".join(str(a) if a == b else f"*range({a}, {b + 1})" for a, b in runs)
+
+
+class CachedTexts:
+    """The warnings on choices, the command line and the Python code, cached until the next change of the choices."""
+
+    def __init__(self) -> None:
+        self._cached: tuple[int, tuple[str, ...], dict[str, str]] = 0, (), {}
+
+    def of(
+        self, number: int, mesh: Path | None, project: str, chosen: Choices
+    ) -> tuple[tuple[str, ...], dict[str, str]]:
+        """Return the warnings, and the texts by their names: `command` and `python`.
+
+        Args:
+            number: number of the choices, from 1 on.
+            mesh: path of the mesh; None if there is none, and the texts are empty.
+            project: name of the project file.
+            chosen: the choices.
+        """
+        if self._cached[0] != number:
+            texts = {"command": "", "python": ""}
+            if mesh is not None:
+                texts = {
+                    "command": command_line(mesh.name, project, chosen),
+                    "python": python_lines(mesh.name, chosen),
+                }
+            self._cached = number, misplaced_warning(chosen), texts
+        return self._cached[1:]

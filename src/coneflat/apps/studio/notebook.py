@@ -18,8 +18,9 @@ from numpy.typing import ArrayLike
 from ...base import short_repr
 from ...errors import ArrayShapeError, OptionError, StudioError
 from ...io import as_input, atomic_write, lines_of
+from .editing import PATIENCE
 from .serve import open_listener, page_address, studio_server
-from .session import PATIENCE, Session
+from .session import Session
 
 if TYPE_CHECKING:
     from ... import Flattening

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from io import BytesIO
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,8 +17,12 @@ from ...base import MAX_CONES
 from ...errors import MeshError, StudioError
 from ...io import Joined, as_input, as_stored, as_written, write_stream
 from ...mesh import REPAIR_ADVICE, CheckedMesh, end_corners
+from ...options import as_integer
 from ..view import outline_halfedges, shown_rows
 from .choices import Choices
+
+if TYPE_CHECKING:
+    from ...quadmesh import QuadMesh
 
 #: The format whose measures are shown.
 SHOWN_FORMAT = ".obj"
@@ -108,8 +112,21 @@ def _report(result: Flattening, _: str) -> SavedFile:
     return SavedFile((json.dumps(as_shown(result).report(), indent=2) + "\n").encode("utf-8"))
 
 
-def quads_file(source: Joined, choices: Choices, count: int, ending: str, report: Progress) -> SavedFile:
-    """Return a file of quads of a mesh.
+def quads_job(count: object) -> dict[str, Any]:
+    """Return a job of the worker that computes approximately `count` quads.
+
+    Raises:
+        OptionError: the number is not an integer.
+        StudioError: it is not within the bounds.
+    """
+    number = as_integer("the number of quads", count)
+    if not 1 <= number <= MAX_QUADS:
+        raise StudioError(f"the number of quads must be from 1 to {MAX_QUADS:,}, got {number:,}")
+    return {"do": "quads", "count": number}
+
+
+def quads_of(source: Joined, choices: Choices, count: int, report: Progress) -> QuadMesh:
+    """Return quads of a mesh.
 
     Quads have their own cones, with curvatures that are multiples of 90 degrees. The choices that apply are forbidden
     cones, importance, sharp edges, the trade-off between angles and areas, and a straight boundary.
@@ -118,20 +135,36 @@ def quads_file(source: Joined, choices: Choices, count: int, ending: str, report
         source: the mesh.
         choices: the choices of the user.
         count: approximate number of quads.
-        ending: one of `QUAD_FORMATS`.
         report: called like `progress` of `coneflat.flatten`.
     """
     from ... import quads
-    from ...quadmesh import write_quads_stream
 
     words = choices.with_search().keywords()
     options = {name: words[name] for name in QUAD_OPTIONS if name in words}
     if words.get("boundary") == "straight":
         options["boundary"] = "straight"
     quad_mesh = quads(source.mesh, quads=count, progress=report, **source.map_options(options))
+    return replace(quad_mesh, notes=source.all_notes(quad_mesh.notes))
+
+
+def quad_notes(quad_mesh: QuadMesh) -> tuple[str, ...]:
+    """Return the notes on quads as sentences among those on the result."""
+    return tuple(f"Quads: {note}" for note in quad_mesh.notes)
+
+
+def quads_file(quad_mesh: QuadMesh | None, ending: str) -> SavedFile:
+    """Return a file of quads; ending: one of `QUAD_FORMATS`.
+
+    Raises:
+        StudioError: there are no quads.
+    """
+    from ...quadmesh import write_quads_stream
+
+    if quad_mesh is None:
+        raise StudioError("there are no quads to save: compute them first")
     stream = BytesIO()
     write_quads_stream(quad_mesh, stream, ending)
-    return SavedFile(stream.getvalue(), tuple(f"Quads: {note}" for note in source.all_notes(quad_mesh.notes)))
+    return SavedFile(stream.getvalue(), quad_notes(quad_mesh))
 
 
 def curve_data(source: Joined, choices: Choices, report: Progress) -> dict[str, Any]:

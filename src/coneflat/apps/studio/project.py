@@ -220,7 +220,7 @@ def _with_changed_mesh(project: Project, file: Path) -> Project:
     They keep their vertices if the connectivity is the same. If choices have no place on the mesh, the project as it
     was is copied to another file.
     """
-    if not len(project.choices.vertices()):
+    if not len(project.choices.vertices()) and not project.choices.pins.pins:
         return project
     mesh = read_joined(project.mesh).mesh
     shape, places = shape_of(mesh), project.places

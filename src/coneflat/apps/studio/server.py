@@ -28,6 +28,7 @@ from .guard import MAX_REQUEST_BYTES, Guard
 from .messages import page_message
 from .page import studio_page
 from .project import file_within, safe_name
+from .requests import Cancelled
 from .session import Session
 
 MAX_UPLOAD_BYTES = 512 * 1024 * 1024  # Bytes of an uploaded mesh.
@@ -113,7 +114,10 @@ def studio_app(session: Session, token: str, port: int, **access: bool) -> ASGIA
             Route("/layout", routes.layout),
             Route("/act", routes.act, methods=["POST"]),
             Route("/export/{ending}", routes.export, methods=["POST"]),
-            Route("/quads/{ending}", routes.quads, methods=["POST"]),
+            Route("/quads", routes.quads, methods=["POST"]),
+            Route("/quads", routes.quads_page),
+            Route("/quads/{ending}", routes.save_quads, methods=["POST"]),
+            Route("/cancel", routes.cancel, methods=["POST"]),
             Route("/curve", routes.curve, methods=["POST"]),
             Route("/mesh", routes.upload, methods=["POST"]),
             Route("/sample", routes.sample, methods=["POST"]),
@@ -167,9 +171,22 @@ class Routes:
         return _file(await run_sync(self._session.export, ending), ending)
 
     async def quads(self, request: Request) -> Response:
-        """Answer with a file of quads."""
+        """Compute quads, and answer when they are computed."""
+        return await self._changed(self._session.make_quads, _number(request, "count"))
+
+    async def quads_page(self, request: Request) -> Response:
+        """Answer with the page of the quads."""
+        return HTMLResponse(await run_sync(self._session.quads_page))
+
+    async def save_quads(self, request: Request) -> Response:
+        """Answer with a file of the quads."""
         ending = _ending(request)
-        return _file(await run_sync(self._session.quads, ending, _number(request, "count")), ending)
+        return _file(await run_sync(self._session.save_quads, ending), ending)
+
+    async def cancel(self, request: Request) -> Response:
+        """Cancel what is being computed."""
+        await run_sync(self._session.cancel)
+        return JSONResponse({})
 
     async def curve(self, request: Request) -> Response:
         """Answer with the distortion for each number of cones."""
@@ -221,6 +238,8 @@ def _number(request: Request, name: str) -> int | str:
 async def _refused(request: Request, error: Exception) -> Response:
     if isinstance(error, TooLarge):
         return PlainTextResponse(str(error), 413)
+    if isinstance(error, Cancelled):
+        return Response(status_code=204)  # Not an error for browsers.
     message = page_message(str(error)) if isinstance(error, ConeflatError) else "the request cannot be read"
     return PlainTextResponse(message, 400)
 

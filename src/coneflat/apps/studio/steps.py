@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
+from ... import ConeflatError
+from ...base import short_repr
+from ...errors import StudioError
 from ...options import as_number
-from .choices import Choices, as_vertex
+from .choices import Choices
 from .paint import Region
+from .paths import as_vertex
+from .pins import Pin, Pins
 
 
 def _step(change: Callable[..., Choices]) -> Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]:
@@ -42,12 +48,62 @@ STEPS: dict[str, Callable[[Choices, Mapping[str, Any], Iterable[int]], Choices]]
     ),
     "corner": lambda chosen, action, cones: chosen.with_corner(_vertex(action)),
     "texture": lambda chosen, action, cones: chosen.with_texture(action["value"] is True),
+    "pin": lambda chosen, action, cones: replace(
+        chosen, pins=chosen.pins.with_pin(Pin.from_plain(action["place"]))
+    ),
+    "unpin": lambda chosen, action, cones: replace(
+        chosen, pins=chosen.pins.without(as_vertex("a triangle", action["face"]))
+    ),
+    "unpin all": lambda chosen, action, cones: replace(chosen, pins=Pins()),
+    "pack": lambda chosen, action, cones: replace(
+        chosen, pins=replace(chosen.pins, is_packed=action["value"] is True)
+    ),
     "units": lambda chosen, action, cones: chosen.with_units(action["of_file"], action["shown"]),
 }
 
 
 #: Steps on the cones of a search, which must have found them.
 STEPS_ON_CONES = ("hand", "add", "move", "remove", "angle")
+
+
+def step_taken(chosen: Choices, action: Mapping[str, Any], cones: Iterable[int]) -> Choices:
+    """Return the choices after a step.
+
+    Args:
+        chosen: the choices before.
+        action: its key `do` is "set" for an option (`name`, `value`); "hand" to place the cones by hand; "add", "move",
+            "remove", "angle" or "lock" for a cone (`vertex`; `to`, `degrees`, `locked`); "cut" or "keep" for a `path`;
+            "erase" for an `edge`; "paint" for a `layer` (`where`; `weight`); "corner" to add or remove a corner
+            (`vertex`); "pin" for the `place` of a chart, as of `Pin.from_plain`; "unpin" for that of a triangle
+            (`face`), or "unpin all"; "pack" to pack the other charts around pinned ones or not (`value`); "units" for
+            units of length (`of_file`, `shown`); "texture" for a map for a texture or for a conformal one (`value`).
+        cones: the vertices of the cones that a search has found.
+
+    Raises:
+        StudioError: the action is not valid, or is not possible.
+        OptionError: an option is not valid.
+    """
+    try:
+        return STEPS[str(action.get("do"))](chosen, action, cones)
+    except (KeyError, TypeError, ValueError) as error:
+        if isinstance(error, ConeflatError):
+            raise
+        raise StudioError(f"the action {short_repr(dict(action))} is not valid") from error
+
+
+def choices_given(plain: Mapping[str, Any]) -> Choices:
+    """Return the choices in values from JSON, as of `Choices.as_plain`; what is missing has its default.
+
+    Raises:
+        StudioError: they are not choices, or one is not valid.
+        OptionError: an option is not valid, or cannot be combined with others.
+    """
+    try:
+        return Choices.from_plain({**Choices().as_plain(), **plain})
+    except ConeflatError:
+        raise
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise StudioError(f"expected choices, got {short_repr(dict(plain))}") from error
 
 
 class History:

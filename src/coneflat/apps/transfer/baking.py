@@ -50,6 +50,7 @@ class Baked:
         notes: what the user should know, one sentence each.
         model: the file of the model.
         uv_mesh: its triangles and UVs.
+        uv_set: the number of these UVs in the file, which the material refers to.
     """
 
     images: dict[str, NDArray[np.uint8]]
@@ -57,6 +58,7 @@ class Baked:
     notes: tuple[str, ...]
     model: Path
     uv_mesh: UVMesh
+    uv_set: int = 0
 
     def losses(self, path: str | PathLike[str]) -> tuple[str, ...]:
         """Return a note on what a file with the ending of a path does not keep, if anything."""
@@ -87,6 +89,7 @@ def transfer(
     *,
     resolution: int = BAKED_RESOLUTION,
     texture: str | PathLike[str] | None = None,
+    uv_set: int = 0,
 ) -> Baked:
     """Bake the colours of a model into the UVs of another model of the same shape.
 
@@ -98,9 +101,12 @@ def transfer(
         new: a file with UVs, in the same position and scale.
         resolution: texels along a side of the new textures.
         texture: the image of the UVs of `old`, instead of its materials.
+        uv_set: the number of the UVs of `new` in a glTF: 1 for TEXCOORD_1, as of lightmaps. The materials of `old` say
+            which of its UVs they use.
 
     Raises:
-        OptionError: Pillow is not installed; `old` has no colours or no size; UVs of `new` are outside the unit square.
+        OptionError: Pillow is not installed; `uv_set` is not an integer from 0 on; `old` has no colours or no size; UVs
+            of `new` are outside the unit square.
         MissingUVError: `new` has no UVs.
         NonFiniteError: a position is not finite.
         MeshFileError: a file, a material or an image cannot be read.
@@ -112,7 +118,7 @@ def transfer(
     side = int(Number(1, MAX_RESOLUTION, is_integer=True).parse("resolution", resolution) or 1)
     painted = Painted(as_path(old), None if texture is None else as_path(texture))
     new = as_path(new)
-    target = io.as_uv_mesh(new, weld=False)
+    target = io.as_uv_mesh(new, weld=False, uv_set=uv_set)
     measured = np.flatnonzero(target.has_uv & (signed_double_areas(target.corner_uv) != 0))
     corner_uv, corners = target.corner_uv[measured], target.vertices[target.faces[measured]]
     if not np.isfinite(corners).all():
@@ -138,7 +144,7 @@ def transfer(
             Unmet(f"The models differ: points are up to {farthest:.1%} of the size from the old surface.")
         )
     filled = {channel.name: image[tuple(source)] for channel, image in images.items()}
-    return Baked(filled, _material(painted, filled), tuple(notes), new, target)
+    return Baked(filled, _material(painted, filled), tuple(notes), new, target, int(uv_set))
 
 
 def _replaced(source: MeshFile, target: MeshFile | None) -> list[str]:
@@ -261,7 +267,8 @@ def _with_material(baked: Baked) -> io.Glb:
         texture = io.encode_png(image)
         number = glb.add("images", {"bufferView": glb.add_view(texture.content), "mimeType": texture.kind})
         place = item["pbrMetallicRoughness"] if name in SURFACE else item
-        place[name] = {"index": glb.add("textures", {"source": number})}
+        chosen_set = {"texCoord": baked.uv_set} if baked.uv_set else {}
+        place[name] = {"index": glb.add("textures", {"source": number})} | chosen_set
     glb.add("materials", item)
     _declare_extensions(glb.tree, {name: data.tree[name] for name in MATERIAL_LISTS if name in data.tree})
     return glb

@@ -80,17 +80,17 @@ def is_gltf(content: bytes) -> bool:
     return content[:512].removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"{")
 
 
-def parse_gltf(path: Path, content: bytes) -> MeshFile:
+def parse_gltf(path: Path, content: bytes, uv_set: int = 0) -> MeshFile:
     """Return all triangle meshes of the scene as one, in scene coordinates.
 
     A mesh is repeated for each node that shows it. Lines and points are left out. Skeletons and morph targets are not
-    applied.
+    applied. uv_set: the number of the UVs, TEXCOORD_0 for 0.
 
     Raises:
         EmptyMeshError: the scene shows no triangle.
         MeshFileError: the file is invalid, or its data are compressed in a way that cannot be decoded.
     """
-    reading = _Reading(GltfData(path, content))
+    reading = _Reading(GltfData(path, content), uv_set)
     # NaN coordinates, in the file or after a transform, are not rejected here.
     with np.errstate(all="ignore"):
         for node, matrix in shown_nodes(reading.data):
@@ -104,8 +104,9 @@ def parse_gltf(path: Path, content: bytes) -> MeshFile:
 class _Reading:
     """The state of reading a scene, whose parts are added one after the other."""
 
-    def __init__(self, data: GltfData) -> None:
+    def __init__(self, data: GltfData, uv_set: int) -> None:
         self.data = data
+        self._uv_name = f"TEXCOORD_{uv_set}"
         self._max_corners = max(MAX_CORNERS, MAX_CORNERS_PER_BYTE * data.total_bytes)
         self._parts: list[ScenePart] = []
         self._vertices: list[FloatArray] = [np.empty((0, 3))]
@@ -148,7 +149,7 @@ class _Reading:
                 corners = corners.reshape(-1, 3)[:, ::-1].reshape(-1)
             self._parts.append(ScenePart(node, mesh, index, corners, is_mirrored))
             self._corners.append(corners + first)
-            self._uvs.add(data, attributes.get("TEXCOORD_0"), node, corners)
+            self._uvs.add(data, attributes.get(self._uv_name), node, corners)
             self._normals.add(data, attributes.get("NORMAL"), node, corners, _cofactors(linear))
         if self._count > self._blocks[-1]:
             self._blocks.append(self._count)

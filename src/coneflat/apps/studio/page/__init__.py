@@ -19,7 +19,8 @@ POLICY = (
 )
 # In the order in which they must run; they share one scope.
 _SCRIPTS = (
-    "server", "surface", "graph", "paint", "tools", "overlay", "align", "sizes", "curve", "panel", "studio",
+    "server", "surface", "graph", "paint", "tools", "overlay", "align", "sizes", "curve", "quads", "charts", "work",
+    "panel", "studio",
 )  # fmt: skip
 
 

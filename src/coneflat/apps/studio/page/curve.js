@@ -33,6 +33,7 @@ class ConeCurve {
     }
     this.waiting = false;
     studio.panel.show();
+    this.part("curve-of").scrollIntoView({block: "nearest"}); // The curve above it, too.
   }
 
   show() {

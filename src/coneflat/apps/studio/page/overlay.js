@@ -18,6 +18,7 @@ class Overlay {
       if (tools.from !== null) this.ring(pen, pane, tools.from, PATH_COLOURS[tools.mode], 6);
     }
     this.studio.brush.draw(pen, pane);
+    this.studio.panel.charts.draw(pen, pane);
     for (const place of this.studio.viewer.model.head.bad ?? []) this.bad(pen, pane, this.studio.verticesOf(place));
     for (const vertex of this.studio.verticesOf(this.studio.cornersShown())) this.diamond(pen, pane, vertex);
     for (const cone of this.studio.forTexture ? [] : choices.cones) {

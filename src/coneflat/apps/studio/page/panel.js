@@ -1,6 +1,7 @@
 // The panel next to the panes, which shows and changes the choices.
 
 const WIDEST = 720; // degrees, as in `choices.py`
+const ISOMETRIC = 4; // The energy of a map without stretch.
 const DEFAULT_STEP = 5; // Step in degrees by which keys change an angle without snapping.
 
 class Panel {
@@ -10,6 +11,9 @@ class Panel {
     this.snap = 0;
     this.isPressed = this.isDue = false; // A button is pressed in the panel, which is to be shown again afterwards.
     this.curve = new ConeCurve(studio);
+    this.quads = new Quads(studio);
+    this.charts = new Charts(studio);
+    this.work = new Work(studio);
     this.fill();
     this.connect();
   }
@@ -51,12 +55,13 @@ class Panel {
     this.part("chart-number").addEventListener("change", (event) => set("charts", Math.round(Number(event.target.value))));
     this.part("boundary").addEventListener("change", (event) => event.target.value === "rectangle" && studio.setTool("corner"));
     this.part("purpose").addEventListener("change", (event) => act({do: "texture", value: event.target.value === "texture"}));
+    this.slider("energy", (value) => ({do: "set", name: "max_energy", value: energyAt(value)}));
+    this.part("energy").addEventListener("input", (event) => (this.part("max-energy").value = energyAt(Number(event.target.value))));
     this.part("max-energy").addEventListener("change", (event) => set("max_energy", Number(event.target.value)));
     this.part("texel-density").addEventListener("change", (event) => set("texel_density", event.target.value === "" ? null : Number(event.target.value)));
     for (const name of ["resolution", "padding"]) this.part(name).addEventListener("change", (event) => set(name, Number(event.target.value)));
     for (const [id, word] of [["own-seams", "input"], ["no-more", "none"]]) this.part(id).addEventListener("change", (event) => set("seams", event.target.checked ? word : null));
     this.part("follow").addEventListener("change", (event) => studio.setFollowing(event.target.checked));
-    this.part("save-quads").addEventListener("click", () => studio.saveQuads(this.part("quad-count").value));
     this.part("brush-size").addEventListener("input", (event) => studio.growBrush(Number(event.target.value) / studio.brush.radius));
     this.part("brush-weight").addEventListener("change", (event) => (studio.brush.weight = Number(event.target.value)));
     for (const id of ["unit", "shown-in"]) this.part(id).addEventListener("change", () => this.measureIn(id));
@@ -65,7 +70,7 @@ class Panel {
     });
     this.part("up").addEventListener("change", (event) => studio.viewer && studio.setUp(event.target.value));
     this.part("sample").addEventListener("click", () => studio.openSample());
-    for (const id of ["tools", "brushes", "exports"]) rove(this.part(id), "button", true);
+    for (const id of ["tools", "brushes", "exports", "quad-files"]) rove(this.part(id), "button", true);
     this.part("cone-list").addEventListener("keydown", (event) => this.changeRow(event));
     this.part("snap").addEventListener("change", (event) => (this.snap = Number(event.target.value)));
     this.holdWhilePressed();
@@ -146,6 +151,7 @@ class Panel {
     const {forTexture} = this.studio;
     this.value("purpose", forTexture ? "texture" : "angles");
     this.value("max-energy", options.area == null ? options.max_energy : "");
+    this.value("energy", Math.log10((options.area == null ? options.max_energy : energyOfArea(options.area)) - ISOMETRIC));
     for (const part of document.querySelectorAll(".for-angles, .for-texture")) part.hidden = forTexture !== part.classList.contains("for-texture");
     for (const [key, , , hint] of [...TOOLS, ...BRUSHES]) {
       this.part(`tool-${key}`).setAttribute("aria-pressed", String(tools.mode === key));
@@ -176,13 +182,13 @@ class Panel {
     this.part("chart-number").closest("label").hidden = !isNumber;
     this.showNotesOnControls({cone_count: by === "cone_count", charts: isNumber});
     for (const saving of this.part("exports").children) saving.disabled = !this.studio.hasLayout();
-    this.part("save-quads").disabled = !this.studio.hasLayout() || this.studio.making === "quads";
-    this.part("save-quads").textContent = this.studio.making === "quads" ? "Computing quads…" : "Quads, OBJ";
     this.curve.show();
+    this.quads.show();
+    this.charts.show();
     this.part("command").textContent = news?.command ?? "";
     this.part("python").textContent = news?.python ?? "";
     this.part("kept-in").textContent = news?.project ? `Saved in ${news.project}.` : "";
-    this.showWork();
+    this.work.show();
     this.showRefusal();
     this.showWarnings();
     this.showTool();
@@ -211,13 +217,6 @@ class Panel {
       this.part(`on-${name}`).hidden = !note || !visible;
       this.part(`on-${name}`).textContent = note;
     }
-  }
-
-  showWork() {
-    const {news, took} = this.studio, busy = news?.busy;
-    this.part("work").classList.toggle("idle", !busy);
-    this.part("busy").value = busy?.fraction ?? 0;
-    this.part("stage-name").textContent = busy ? stageText(busy.stage) : took ? `shown ${(took / 1000).toFixed(2)} s after the change` : "";
   }
 
   showRefusal() {
@@ -314,7 +313,7 @@ class Panel {
     if (isPicked) row.setAttribute("aria-current", "true");
     const angle = Object.assign(document.createElement("input"), {
       type: "number", step: this.step(), min: 1, max: WIDEST, value: degrees === null ? "" : Number(degrees.toFixed(1)), className: chosen ? "" : "computed",
-      title: "Cone angle in degrees; empty: computed",
+      title: degrees === null ? "Cone angle in degrees; empty: computed" : `Cone angle in degrees: ${(degrees / 180).toFixed(3)} π; empty: computed`,
     });
     angle.setAttribute("aria-label", `Angle of cone ${vertex}, degrees`);
     angle.addEventListener("change", () => studio.setAngle(vertex, angle.value === "" ? null : this.snapped(Number(angle.value))));
@@ -366,6 +365,16 @@ function isButton(element) {
   return Boolean(element.closest("button, summary, label, [type=checkbox]")) && !element.closest("select, input:not([type=checkbox])");
 }
 
+/** Return the bound of the energy at a position of its slider. */
+function energyAt(position) {
+  return ISOMETRIC + Number((10 ** position).toPrecision(2));
+}
+
+/** Return the bound of the energy that belongs to one of the area distortion, as in `textures/options.py`. */
+function energyOfArea(area) {
+  return ISOMETRIC + 20 * area ** 2;
+}
+
 /** Return the value of an option for the text of its control; angles are in degrees there, and axes directions. */
 function furtherValue(name, kind, text) {
   if (kind === "choice" && DEFAULTS[name] !== null) return text;
@@ -404,10 +413,5 @@ function rove(bar, selector, vertical = false) {
 
 /** Return the class of the button of a tool: some tools have no effect on maps for textures. */
 function useOf(tool) {
-  return CONE_TOOLS.includes(tool) ? "for-angles" : "";
-}
-
-/** Return the text of a stage of the computation. */
-function stageText(stage) {
-  return stage.startsWith("atlas") ? "separating overlaps; a change cancels this" : stage || "…";
+  return CONE_TOOLS.includes(tool) ? "for-angles" : CHART_TOOLS.includes(tool) ? "for-texture" : "";
 }

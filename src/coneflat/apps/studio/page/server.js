@@ -6,10 +6,10 @@ class Server {
     this.queue = Promise.resolve();
   }
 
-  /** Return the response; a rejected request raises an error with the message of the server. */
+  /** Return the response; a rejected request raises an error with the message of the server, a cancelled one with "". */
   async ask(path, options = {}) {
     const answer = await fetch(path, {...options, headers: {"x-coneflat-token": this.token}, cache: "no-store"});
-    if (!answer.ok) throw new Refusal(await answer.text());
+    if (!answer.ok || answer.status === 204) throw new Refusal(await answer.text());
     return answer;
   }
 
@@ -40,6 +40,21 @@ class Server {
   async curve() {
     await this.queue;
     return (await this.ask("curve", {method: "POST"})).json();
+  }
+
+  /** Compute quads, approximately the given number; the page of these is `quadsPage`. */
+  async quads(count) {
+    await this.queue;
+    return this.ask(`quads?count=${encodeURIComponent(count)}`, {method: "POST"});
+  }
+
+  async quadsPage() {
+    return (await this.ask("quads")).text();
+  }
+
+  /** Cancel what is being computed. */
+  cancel() {
+    return this.ask("cancel", {method: "POST"});
   }
 
   /** Download the file at a path: the result or quads. */

@@ -19,7 +19,6 @@ class Studio {
     this.tools = new Tools(this);
     this.paint = new Paint(this);
     this.brush = new Brush(this);
-    this.making = ""; // The output that is being computed, other than layouts.
     this.keyed = false; // The keyboard was used last, not the mouse.
     this.shownForTexture = false;
     this.follows = true; // Paths follow sharp edges.
@@ -73,6 +72,7 @@ class Studio {
     if (model) this.layout = news.layout;
     this.paint.hear();
     this.showPurpose();
+    this.panel.quads.hear(news);
     this.panel.show();
     this.viewer?.remark();
     if (!this.news.busy) document.documentElement.dataset.ready ??= String(Math.round(performance.now()));
@@ -81,10 +81,11 @@ class Studio {
 
   /** After a change of the kind of map, show cones on conformal maps only, and end tools without effect. */
   showPurpose() {
+    document.body.classList.toggle("texture", this.forTexture);
     if (!this.viewer || this.shownForTexture === this.forTexture) return;
     this.shownForTexture = this.forTexture;
     this.viewer.state.set({cones: !this.forTexture});
-    if (this.forTexture && CONE_TOOLS.includes(this.tools.mode)) this.setTool("look");
+    if ((this.forTexture ? CONE_TOOLS : CHART_TOOLS).includes(this.tools.mode)) this.setTool("look");
   }
 
   /** Show a layout. */
@@ -139,9 +140,10 @@ class Studio {
     const values = new Map(rows.map(([name, value]) => [name, value])), charts = values.get("charts");
     if (!(Number(charts?.replaceAll(",", "")) > 0)) return;
     const more = [`${charts} ${charts === "1" ? "chart" : "charts"}`, `packing ${values.get("packing")}`, `overlap ${values.get("overlap")}`];
-    if (this.forTexture) more.unshift(`energy ${values.get("energy")}`);
     const place = document.getElementById("title");
-    place.textContent = place.title = [place.textContent, ...more].join("  ·  ");
+    // On maps for textures the energy is shown instead of the cones.
+    const shown = place.textContent.split("  ·  ").flatMap((text) => (this.forTexture && / cones?$/.test(text) ? `energy ${values.get("energy")}` : text));
+    place.textContent = place.title = [...shown, ...more].join("  ·  ");
   }
 
   /** Return a sentence on narrow charts beside drawn cuts, or nothing. */
@@ -174,7 +176,7 @@ class Studio {
     if (isEarly) return;
     this.took = performance.now() - asked;
     this.asked = 0;
-    this.panel.showWork();
+    this.panel.work.show();
   }
 
   // Actions of the user.
@@ -200,7 +202,8 @@ class Studio {
   }
 
   refuse(error) {
-    this.refused = {text: error instanceof Refusal ? error.message : "the studio does not respond"};
+    const text = error instanceof Refusal ? error.message : "the studio does not respond";
+    this.refused = text ? {text} : null; // What the user has cancelled needs no text.
     this.paint.forget();
     this.panel.show();
   }
@@ -216,16 +219,6 @@ class Studio {
   async save(ending) {
     const {stem} = RESULT_FILES.find((file) => file.ending === ending);
     await this.server.save(`export/${ending}`, `${this.stem}_${stem}.${ending}`).catch((error) => this.refuse(error));
-  }
-
-  /** Compute quads of the mesh, approximately the chosen number, and download them. */
-  async saveQuads(count) {
-    this.refused = null;
-    this.making = "quads";
-    this.panel.show();
-    await this.server.save(`quads/obj?count=${encodeURIComponent(count)}`, `${this.stem}_quads.obj`).catch((error) => this.refuse(error));
-    this.making = "";
-    this.panel.show();
   }
 
   setCount(count) {
@@ -251,9 +244,9 @@ class Studio {
   }
 
   setTool(mode) {
-    if (this.forTexture && CONE_TOOLS.includes(mode)) return;
+    if ((this.forTexture ? CONE_TOOLS : CHART_TOOLS).includes(mode)) return;
     const {head, arrays} = this.viewer?.model ?? {};
-    if (!["look", "cone"].includes(mode) && head?.left_out && !arrays.whole_faces) {
+    if (!["look", "cone", "chart"].includes(mode) && head?.left_out && !arrays.whole_faces) {
       this.refuse(new Refusal(`a mesh of ${grouped(head.triangles)} triangles is too large to draw or paint on here`));
       return;
     }
@@ -272,6 +265,7 @@ class Studio {
     const name = event.key.length === 1 ? event.key.toLowerCase() : event.key;
     const control = event.ctrlKey || event.metaKey;
     if (event.altKey || (control && !["z", "y"].includes(name))) return;
+    if (name === "c" && this.forTexture) return this.obey(event, () => {}); // The key that shows cones.
     if (control) return this.obey(event, () => this.act({do: name === "z" && !event.shiftKey ? "undo" : "redo"}));
     const tool = [...TOOLS, ...BRUSHES].find(([, , letter]) => letter === name);
     const vertex = this.selectedNumber(), row = this.coneRows().find((one) => one.vertex === vertex);

@@ -6,8 +6,10 @@ const TOOLS = [
   ["cone", "Cone", "a", "Click to add a cone; drag a cone to move it."],
   ["cut", "Cut", "x", "Click points: the shortest paths between them are cut. Esc, or Cut again, ends the path."],
   ["keep", "Keep whole", "k", "Click points: the shortest paths between them are not cut. Esc, or Keep whole again, ends the path."],
+  ["chart", "Chart", "j", "Drag a chart in the layout to move it; click one to rotate or pin it."],
   ["corner", "Corner", "o", "Click four points of the boundary: the corners of a rectangle. Click a corner to remove it."],
 ];
+const CHART_TOOLS = ["chart"]; // Without effect on conformal maps.
 const CONE_TOOLS = ["cone", "corner", "no_cone", "importance"]; // Without effect on maps for textures.
 const PICK_RADIUS = 12; // Pick radius of a click in pixels.
 const CONE_RADIUS = 5; // That of a cone, which a seam in front may cover.
@@ -112,6 +114,7 @@ class Tools {
     const cone = ["look", "cone"].includes(this.mode) ? this.coneAt(pane, x, y, reach) : null;
     if (cone) this.studio.viewer.find(cone, pane);
     if (cone || this.mode === "look") return Boolean(cone);
+    if (this.mode === "chart") return this.studio.panel.charts.select(pane, x, y) >= 0;
     const vertex = this.vertexAt(pane, x, y);
     if (vertex !== null && this.draws) this.drawTo(vertex);
     if (vertex !== null && this.paints) this.studio.brush.dab(pane, x, y);
@@ -140,6 +143,10 @@ class Tools {
   grab(pane, x, y, reach) {
     if (this.paints) return this.vertexAt(pane, x, y) === null ? null : new Stroke(this.studio.brush, pane, x, y);
     if (this.draws || this.mode === "corner") return null;
+    if (this.mode === "chart") {
+      const {charts} = this.studio.panel, triangle = pane.inPlane ? charts.select(pane, x, y) : -1;
+      return triangle < 0 ? null : new ChartDrag(charts, pane, triangle, x, y);
+    }
     const cone = this.coneAt(pane, x, y, reach);
     return cone && new Drag(this, pane, this.studio.viewer.model.arrays.cones[cone.index]);
   }

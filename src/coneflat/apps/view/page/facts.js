@@ -60,12 +60,12 @@ function seamFacts(model, index) {
 }
 
 function coneFacts(model, index) {
-  const curvature = model.head.cone_curvatures[index] / Math.PI;
+  const curvature = (180 / Math.PI) * model.head.cone_curvatures[index];
   const points = model.conePoints[index].length;
   return [
     `Cone at vertex ${grouped(model.vertexNumber(model.arrays.cones[index]))}`,
-    `curvature ${signed(curvature)} π`,
-    `cone angle ${(2 - curvature).toFixed(3)} π`,
+    `curvature ${signed(curvature, 1)}°`,
+    `cone angle ${(360 - curvature).toFixed(1)}°`,
     points === 1 ? "one point of the layout" : `${points} points of the layout`,
   ];
 }
