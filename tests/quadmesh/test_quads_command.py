@@ -117,7 +117,7 @@ def test_requirements_set_the_exit_code(tmp_path, ball):
 
 def test_too_few_quads_end_the_command_with_an_error_and_the_number_to_use(tmp_path):
     cube = shapes.box(1, (1.0, 1.0, 1.0))
-    cubes = shapes.join(*((cube[0] + [3.0 * i, 0, 0], cube[1]) for i in range(12)))
+    cubes = shapes.join(*((cube[0] + [3.0 * i, 0, 0], cube[1]) for i in range(18)))
     path, output = write_obj(tmp_path / "cubes.obj", *cubes), tmp_path / "quads.obj"
     with pytest.raises(CoarseGridError, match="use at least"):  # the exit code of which is 2
         run(path, "--quads", 5, "-o", output)

@@ -13,7 +13,7 @@ import coneflat
 from coneflat import TriangleMesh
 from coneflat.errors import CoarseGridError, GuaranteeWarning
 from coneflat.quadmesh.borders import MAX_LAYER_WIDTH
-from coneflat.quadmesh.limits import NOTED_TIMES
+from coneflat.quadmesh.limits import FEWEST_SQUARES, NOTED_TIMES
 from coneflat.quadmesh.quad_mesh import QuadMesh
 from coneflat.quadmesh.surface_fit import fit_to_surface
 
@@ -139,9 +139,9 @@ def test_a_layer_along_a_boundary_does_not_leap_across_gaps(maze, count):
 
 
 def test_many_more_quads_than_requested_are_a_warning_and_too_many_an_error():
-    """Each of twelve cubes needs six quads."""
+    """Each of eighteen cubes needs six quads."""
     cube = shapes.box(1, (1.0, 1.0, 1.0))
-    cubes = shapes.join(*((cube[0] + [3.0 * i, 0, 0], cube[1]) for i in range(12)))
+    cubes = shapes.join(*((cube[0] + [3.0 * i, 0, 0], cube[1]) for i in range(18)))
     with pytest.warns(GuaranteeWarning):
         quads = coneflat.quads(*cubes, quads=40)
     assert len(quads.quads) > NOTED_TIMES * 40
@@ -149,7 +149,7 @@ def test_many_more_quads_than_requested_are_a_warning_and_too_many_an_error():
     with pytest.raises(CoarseGridError, match=r"use at least [\d,]+ quads") as caught:
         coneflat.quads(*cubes, quads=5)
     fewest = caught.value.quads
-    assert len(coneflat.quads(*cubes, quads=fewest).quads) <= max(32, 4 * fewest)
+    assert len(coneflat.quads(*cubes, quads=fewest).quads) <= max(FEWEST_SQUARES, 4 * fewest)
 
 
 def test_measures_count_inverted_and_leaping_quads():

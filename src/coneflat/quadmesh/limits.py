@@ -14,9 +14,9 @@ from ..linalg import require_memory
 
 #: Number of triangles of a coarse mesh, on which the cones, or the grid, of larger meshes are searched.
 COARSE_TRIANGLES = 25_000
-#: Largest number of squares of a grid, relative to the number requested; of few, so many squares are possible, as each
-#: closed component needs six.
-MAX_TIMES, FEWEST_SQUARES = 4, 32
+#: Largest number of squares of a grid, relative to the number requested; of few, so many squares are possible, as a
+#: closed component needs six, and ones with handles or spikes up to ninety.
+MAX_TIMES, FEWEST_SQUARES = 4, 100
 #: Number of quads, relative to the number requested, above which there is a note.
 NOTED_TIMES = 1.5
 #: Largest number of squares requested of any mesh, of one of few triangles, and for each triangle of larger meshes.

@@ -59,9 +59,6 @@ MAX_REFINEMENT = 100
 # How many sizes are tried. Each has GROWTH times the squares of the last grid, and MIN_SQUARES at least; if the limit
 # leaves less than MIN_GROWTH times as many, none is tried.
 MAX_SIZES, GROWTH, MIN_GROWTH, MIN_SQUARES = 3, 1.6, 1.2, 32.0
-# A grid of more than FINE_SQUARES is not refined if sides would be shorter than MIN_SIDE times the requested ones,
-# since each attempt repeats the search.
-FINE_SQUARES, MIN_SIDE = 1000, 0.4
 # Closed surfaces have so many squares at least, unless they have a handle.
 SQUARES_OF_CUBE = 6
 # With fewer quads, a cone costs more than 1, in proportion.
@@ -222,8 +219,7 @@ def _with_more_squares(request: GridRequest, grid: IntegerGrid) -> GridRequest |
     squares = grid.squares
     more_squares = min(max(GROWTH * squares, MIN_SQUARES), request.limit.squares)
     size = request.extent / float(np.sqrt(more_squares))
-    is_fine = squares > FINE_SQUARES and size < MIN_SIDE * request.size
-    return None if more_squares < MIN_GROWTH * squares or is_fine else replace(request, size=size)
+    return None if more_squares < MIN_GROWTH * squares else replace(request, size=size)
 
 
 def grid_of_size(request: GridRequest, flattening_of: AlignedFlattenings) -> Outcome:
@@ -255,12 +251,11 @@ def components_apart(request: GridRequest) -> Outcome:
     of_face = scales[mesh.faces].mean(axis=1)
     # Nothing of a component without area can be seen.
     components = [split for split in mesh.split_components() if areas[split[2]].any()]
-    expected = (
-        (request.extent / request.size) ** 2
-        / areas.sum()
-        * np.array([areas[faces].sum() for *_, faces in components])
+    shares = np.array([areas[faces].sum() for *_, faces in components]) / max(
+        areas.sum(), np.finfo(float).tiny
     )
-    expected = np.maximum(expected, [_fewest_squares(part) for part, *_ in components])
+    fewest = [_fewest_squares(part) for part, *_ in components]
+    expected = np.maximum(shares * (request.extent / request.size) ** 2, fewest)
     for k, (part, vertices, faces) in enumerate(components):
         if excess := request.limit.error(sum(grid.squares for grid in grids) + float(expected[k:].sum())):
             return NoGrid(excess)

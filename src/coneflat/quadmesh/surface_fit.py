@@ -101,8 +101,13 @@ def fit_to_surface(quads: QuadMesh, filled_area: float = 0.0) -> SurfaceFit:
         distance_to=float(off.max()),
         distance_from=float(missed.max()),
         leaps=int(((off > MAX_DISTANCE) | _leaping_quads(quads, edge)).sum()),
-        share_left_out=quads.area_left_out / max(quads.area_left_out + len(quads.quads), 1e-9),
+        share_left_out=_share_left_out(quads),
     )
+
+
+def _share_left_out(quads: QuadMesh) -> float:
+    """Return the share of the area of the grid that boundaries cut; of degenerate quads there is a note."""
+    return quads.area_left_out / (quads.area_left_out + len(quads.quads)) if quads.left_out else 0.0
 
 
 def _area(vertices: FloatArray, triangles: IntArray) -> float:
