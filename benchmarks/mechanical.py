@@ -75,12 +75,100 @@ def wedge() -> Mesh:
     return extruded([polygon([(0, 0), (2, 0), (2, 0.5), (1.2, 1.3), (0, 1.3)])], 1.0)
 
 
+def maze(cells: int = 12, corridor: float = 0.3, wall: float = 0.04) -> Mesh:
+    """Return the floor of a maze: a flat sheet with narrow gaps between its corridors, and one long boundary."""
+    is_corridor = corridors(cells)
+    places = np.concatenate([[0.0], np.cumsum(np.where(np.arange(len(is_corridor)) % 2, corridor, wall))])
+    lines, marks = zip(*(_finer(places) for _ in range(2)), strict=True)
+    i, j = np.nonzero(is_corridor[np.ix_(*marks)])
+    count = len(lines[1])
+    quads = np.stack([i * count + j, (i + 1) * count + j, (i + 1) * count + j + 1, i * count + j + 1], axis=1)
+    corners, quads = np.unique(quads, return_inverse=True)
+    quads = quads.reshape(-1, 4)
+    flat = [lines[0][corners // count], lines[1][corners % count], np.zeros(len(corners))]
+    vertices = np.stack(flat, axis=1)
+    return vertices, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def cut_maze(cells: int = 10, corridor: float = 0.3, wall: float = 0.04, depth: float = 0.5) -> Mesh:
+    """Return a plate into which the corridors of a maze are cut, with thin walls between them."""
+    is_corridor = corridors(cells)
+    places = np.concatenate([[0.0], np.cumsum(np.where(np.arange(len(is_corridor)) % 2, corridor, wall))])
+    is_solid = np.stack([np.ones_like(is_corridor), ~is_corridor], axis=2)
+    return blocks(is_solid, (places, places, np.array([0.0, 0.1, 0.1 + depth])))
+
+
+def corridors(cells: int) -> np.ndarray:
+    """Return (2 cells + 1, 2 cells + 1) whether each block of a maze without closed ways is a part of a corridor."""
+    size, rng = 2 * cells + 1, np.random.default_rng(1)
+    is_corridor, way = np.zeros((size, size), dtype=bool), [(1, 1)]
+    is_corridor[1, 1] = True
+    while way:
+        i, j = way[-1]
+        steps = [(i + a, j + b) for a, b in ((2, 0), (-2, 0), (0, 2), (0, -2))]
+        steps = [(a, b) for a, b in steps if 0 < a < size and 0 < b < size and not is_corridor[a, b]]
+        if not steps:
+            way.pop()
+            continue
+        a, b = steps[rng.integers(len(steps))]
+        is_corridor[a, b] = is_corridor[(a + i) // 2, (b + j) // 2] = True
+        way.append((a, b))
+    return is_corridor
+
+
+def thin_box(thickness: float = 0.02) -> Mesh:
+    """Return a box of unit size with a closed hollow, which thin walls surround."""
+    places = np.array([0.0, thickness, 1.0 - thickness, 1.0])
+    is_solid = np.ones((3, 3, 3), dtype=bool)
+    is_solid[1, 1, 1] = False
+    return blocks(is_solid, (places, places, places))
+
+
+def open_box(thickness: float = 0.02) -> Mesh:
+    """Return a box of unit size with thin walls, which is open at the top."""
+    places = np.array([0.0, thickness, 1.0 - thickness, 1.0])
+    is_solid = np.ones((3, 3, 2), dtype=bool)
+    is_solid[1, 1, 1] = False
+    return blocks(is_solid, (places, places, places[:3]))
+
+
+def pierced_shell(thickness: float = 0.04) -> Mesh:
+    """Return a hollow box with thirteen windows in its walls, a surface with a dozen handles."""
+    middles = np.linspace(thickness, 1.0 - thickness, 8)
+    places = np.concatenate([[0.0], middles, [1.0]])
+    is_solid = np.ones((9, 9, 9), dtype=bool)
+    is_solid[1:-1, 1:-1, 1:-1] = False
+    for i, j in [(2, 2), (2, 5), (5, 2), (5, 5)]:
+        is_solid[i, j, 0] = is_solid[i, 0, j] = is_solid[0, i, j] = False
+    is_solid[4, 4, -1] = False
+    return blocks(is_solid, (places, places, places))
+
+
+def small_blocks(count: int = 60) -> Mesh:
+    """Return separate blocks of different sizes."""
+    rng, parts = np.random.default_rng(1), []
+    for k in range(count):
+        sides = rng.uniform(0.1, 0.5, 3)
+        corner = np.array([k % 8, k // 8 % 8, 0.0])
+        places = [corner[x] + np.array([0.0, sides[x]]) for x in range(3)]
+        parts.append(blocks(np.ones((1, 1, 1), dtype=bool), (places[0], places[1], places[2])))
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in parts)])
+    faces = [first + faces for first, (_, faces) in zip(starts, parts, strict=False)]
+    return np.concatenate([vertices for vertices, _ in parts]), np.concatenate(faces)
+
+
 SHAPES: dict[str, Callable[[], Mesh]] = {
     maker.__name__: maker for maker in (bracket, gear, plate, ribs, shaft, wedge)
+}
+#: Shapes that need many quads: thin walls, narrow corridors, handles, components.
+NARROW_SHAPES: dict[str, Callable[[], Mesh]] = {
+    maker.__name__: maker for maker in (cut_maze, maze, open_box, pierced_shell, small_blocks, thin_box)
 }
 CORNERS = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
 #: Edge length of the meshes.
 SPACING = 0.05
+#: Edge length of the meshes of blocks.
+BLOCK_SPACING = 0.1
 
 
 def arc(
@@ -191,3 +279,42 @@ def turned(profile: list, around: int = 96) -> Mesh:
         np.stack([np.full(around, count + 1), last + at, last + after], 1),
     ]
     return np.concatenate([*vertices, poles]), np.concatenate(faces)
+
+
+def blocks(is_solid: np.ndarray, places: tuple[np.ndarray, np.ndarray, np.ndarray]) -> Mesh:
+    """Return the surface of the solid cells of a grid of blocks, in triangles with sides of about `BLOCK_SPACING`.
+
+    Args:
+        is_solid: (a, b, c) whether each cell is solid.
+        places: coordinates of the a + 1, b + 1 and c + 1 planes between the cells.
+    """
+    lines, cells = zip(*(_finer(line) for line in places), strict=True)
+    padded = np.pad(is_solid[np.ix_(*cells)], 1)
+    shape = np.array(padded.shape) - 1
+    sides = []
+    for axis in range(3):
+        ahead = np.moveaxis(padded, axis, 0)
+        for is_out, turns in ((ahead[:-1] & ~ahead[1:], 1), (ahead[1:] & ~ahead[:-1], -1)):
+            place, *across = np.nonzero(is_out)
+            square = np.empty((len(place), 4, 3), dtype=np.int64)
+            first, second = (axis + 1) % 3, (axis + 2) % 3
+            of_axis = dict(zip([k for k in range(3) if k != axis], across, strict=True))
+            for corner, (a, b) in enumerate(((0, 0), (1, 0), (1, 1), (0, 1))[::turns]):
+                square[:, corner, axis] = place
+                square[:, corner, first] = of_axis[first] - 1 + a
+                square[:, corner, second] = of_axis[second] - 1 + b
+            sides.append(square)
+    corners = np.concatenate(sides)
+    numbers = np.ravel_multi_index(tuple(np.moveaxis(corners, 2, 0)), tuple(shape))
+    corners_of_grid, numbers = np.unique(numbers, return_inverse=True)
+    quads = numbers.reshape(-1, 4)
+    grid = np.unravel_index(corners_of_grid, tuple(shape))
+    vertices = np.stack([line[at] for line, at in zip(lines, grid, strict=True)], axis=1)
+    return vertices, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def _finer(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return coordinates at most `BLOCK_SPACING` apart, and the cell of the given ones that each gap is in."""
+    counts = np.maximum(np.ceil(np.diff(line) / BLOCK_SPACING - 1e-9), 1).astype(np.int64)
+    parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(line, line[1:], counts, strict=False)]
+    return np.concatenate([*parts, line[-1:]]), np.repeat(np.arange(len(counts)), counts)

@@ -97,6 +97,20 @@ class GridError(MetricError):
     """No integer grid was found."""
 
 
+class CoarseGridError(GridError):
+    """The number of quads is too small for the surface; the message has a number that is large enough, if known.
+
+    Attributes:
+        quads: the number of quads that is large enough, or None.
+    """
+
+    quads: int | None = None
+
+    def __init__(self, text: str, quads: int | None = None) -> None:
+        super().__init__(text)
+        self.quads = quads
+
+
 class MeshFileError(ConeflatError, OSError):
     """A file cannot be read or written, or its content does not match its format."""
 

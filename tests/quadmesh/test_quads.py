@@ -338,7 +338,7 @@ def test_a_large_grid_that_is_much_finer_than_requested_is_not_refined(monkeypat
     assert coneflat.quads(*shapes.sphere(3), **options).left_out == 0
     assert len(grids) == 3
     grids.clear()
-    monkeypatch.setattr(policies, "aligned", lambda result, size, angle: aligned(result, size / 3, angle))
+    monkeypatch.setattr(policies, "aligned", lambda result, size, angle: aligned(result, size / 1.9, angle))
     coneflat.quads(*shapes.sphere(3), **options)
     assert len(grids) == 1
 

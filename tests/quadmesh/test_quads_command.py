@@ -15,7 +15,7 @@ from shapes import sphere, write_obj
 import coneflat
 from coneflat import IntegerGrid, QuadMesh, measure_quads
 from coneflat.apps.cli.quads_command import quads as command
-from coneflat.errors import ConeflatError, OptionError
+from coneflat.errors import CoarseGridError, ConeflatError, OptionError
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +101,27 @@ def test_command_refuses_before_the_work(tmp_path, ball):
     ):
         with pytest.raises(ConeflatError, match=message):
             run(path, *words)
+
+
+def test_requirements_set_the_exit_code(tmp_path, ball):
+    path = write_obj(tmp_path / "ball.obj", *ball)
+    words = (path, "--quads", 300, "-o", tmp_path / "quads.obj")
+    assert run(*words, "--require", "inverted=0,leaps=0,area_ratio>0.9").exit_code == 0
+    done = run(*words, "--require", "quads<=10")
+    assert done.exit_code == 3
+    assert "requirement failed: quads is" in done.output
+    assert "quads.obj is written anyway" in done.output
+    with pytest.raises(OptionError, match="unknown measure 'flipped': choose from angle_max"):
+        run(*words, "--require", "flipped=0")
+
+
+def test_too_few_quads_end_the_command_with_an_error_and_the_number_to_use(tmp_path):
+    cube = shapes.box(1, (1.0, 1.0, 1.0))
+    cubes = shapes.join(*((cube[0] + [3.0 * i, 0, 0], cube[1]) for i in range(18)))
+    path, output = write_obj(tmp_path / "cubes.obj", *cubes), tmp_path / "quads.obj"
+    with pytest.raises(CoarseGridError, match="use at least"):  # the exit code of which is 2
+        run(path, "--quads", 5, "-o", output)
+    assert not output.exists()
 
 
 def run(*words):

@@ -8,6 +8,7 @@ _HOMES = {
     "Domains": "domains",
     "IntegerGrid": "integer_map",
     "QUADS": "options",
+    "QUAD_MEASURES": "quality",
     "QuadMeasures": "quality",
     "QuadMesh": "quad_mesh",
     "QuadOptions": "options",
@@ -28,6 +29,7 @@ _HOMES = {
 
 __all__ = [
     "QUADS",
+    "QUAD_MEASURES",
     "Domains",
     "IntegerGrid",
     "QuadMeasures",
@@ -64,7 +66,7 @@ if TYPE_CHECKING:
     from .options import QUADS, QuadOptions, Sizes
     from .quad_mesh import QuadMesh
     from .quad_meshing import integer_grid, quads
-    from .quality import QuadMeasures, measure_quads
+    from .quality import QUAD_MEASURES, QuadMeasures, measure_quads
 
 
 def __getattr__(name: str) -> Any:

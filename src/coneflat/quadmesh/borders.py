@@ -20,6 +20,11 @@ TOUCHING = 1e-9
 MAX_EDGES_TO_COMPARE = 64
 # Rounds of spreading points along a boundary, and the least gap at which it ends, relative to the mean gap.
 MAX_SPREADING, MIN_GAP = 60, 0.3
+# Points move along a boundary by at most so many mean gaps to be spread or to be at a corner: where no quads fit into a
+# narrow part of the surface, they would be drawn into it.
+MAX_SHIFT = 1.5
+# A quad of the layer is left out if one of its points is farther from the quads than so many of their mean edges.
+MAX_LAYER_WIDTH = 3.0
 
 
 def with_borders(quads: QuadMesh) -> QuadMesh:
@@ -27,7 +32,7 @@ def with_borders(quads: QuadMesh) -> QuadMesh:
 
     Each vertex on a boundary of the quads is joined to the nearest point of the boundary of the surface. These points
     are smoothed along the boundary, and its corners are among them. There is no layer where two boundaries do not
-    correspond, because quads are missing at thin parts or cover a hole.
+    correspond, because quads are missing at thin parts or cover a hole. Quads of the layer that leap are left out.
     """
     mesh, count = quads.surface, len(quads.vertices)
     nearest_loop, longest_edge = _loop_finder(quads), vertex_graph(mesh).max()
@@ -56,8 +61,29 @@ def with_borders(quads: QuadMesh) -> QuadMesh:
     bordered = replace(
         quads, vertices=points, quads=np.concatenate(layers), faces=on, barycentric=barycentric
     )
-    if missing:
+    return _without_leaps(bordered, quads, is_complete=not missing)
+
+
+def _without_leaps(bordered: QuadMesh, quads: QuadMesh, is_complete: bool) -> QuadMesh:
+    """Return quads with a layer, without its quads that leap, and with a note.
+
+    Args:
+        bordered: the quads with the layer.
+        quads: the quads without it.
+        is_complete: there is a layer along each boundary.
+    """
+    layer = bordered.vertices[bordered.quads[len(quads.quads) :]]
+    inner = bordered.vertices[quads.quads]
+    edge = np.linalg.norm(inner - np.roll(inner, 1, axis=1), axis=2).mean()
+    widths = np.linalg.norm(layer - layer[:, [3, 2, 1, 0]], axis=2).max(axis=1)
+    is_leap = np.append(np.zeros(len(quads.quads), dtype=bool), widths > MAX_LAYER_WIDTH * edge)
+    leaps = int(is_leap.sum())
+    bordered = bordered.without(is_leap) if leaps else bordered
+    if not is_complete:
         return bordered
+    if leaps:
+        share = leaps / len(layer)
+        return replace(bordered, left_out=leaps, area_left_out=share * quads.area_left_out)
     note = f"A layer of quads along the boundary replaces {plural(quads.left_out, 'square')} that it cuts."
     return replace(bordered, left_out=0, area_left_out=0.0, notes=(*quads.notes, note))
 
@@ -131,7 +157,9 @@ def _places_along(
     gaps = (np.roll(at, -1) - at + total / 2) % total - total / 2
     if abs(gaps.sum() - total) > total / 2:
         return None, distances
-    at = _spread(_increasing(at[0] + np.cumsum(gaps) - gaps, total), total)
+    increasing = _increasing(at[0] + np.cumsum(gaps) - gaps, total)
+    reach = MAX_SHIFT * total / len(at)
+    at = np.clip(_spread(increasing, total), increasing - reach, increasing + reach)
     return _moved_to_corners(at, steps, lengths) % total, distances
 
 
@@ -169,12 +197,14 @@ def _spread(at: FloatArray, total: float) -> FloatArray:
 
 
 def _moved_to_corners(at: FloatArray, steps: FloatArray, lengths: FloatArray) -> FloatArray:
-    """Return positions along a closed polyline, the nearest one to each of its corners moved there."""
+    """Return positions along a closed polyline, the nearest one to each of its corners moved there if it is near."""
     ends, total = np.cumsum(lengths), lengths.sum()
+    reach = MAX_SHIFT * total / len(at)
     cosines = dots(steps, np.roll(steps, 1, axis=0)) / np.maximum(lengths * np.roll(lengths, 1), 1e-300)
     bends = np.flatnonzero(cosines < np.cos(SHARP_ANGLE))
     for corner in (ends - lengths)[bends[np.argsort(-cosines[bends], kind="stable")]]:  # the sharpest last
         away = (corner - at + total / 2) % total - total / 2
         nearest = np.argmin(np.abs(away))
-        at[nearest] += away[nearest]
+        if abs(away[nearest]) <= reach:
+            at[nearest] += away[nearest]
     return at

@@ -8,14 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base import FloatArray, IntArray, plural
-from ..errors import GridError
+from ..errors import CoarseGridError, GridError
 from ..geometry import signed_double_areas
 from ..linalg import require_memory
 
 #: Number of triangles of a coarse mesh, on which the cones, or the grid, of larger meshes are searched.
 COARSE_TRIANGLES = 25_000
-#: Largest number of squares of a grid, relative to the number requested.
-MAX_TIMES = 16
+#: Largest number of squares of a grid, relative to the number requested; of few, so many squares are possible, as a
+#: closed component needs six, and ones with handles or spikes up to ninety.
+MAX_TIMES, FEWEST_SQUARES = 4, 100
+#: Number of quads, relative to the number requested, above which there is a note.
+NOTED_TIMES = 1.5
 #: Largest number of squares requested of any mesh, of one of few triangles, and for each triangle of larger meshes.
 #: Beyond, quads are those of single flat triangles, and smoothing takes over ten seconds.
 MAX_SQUARES, FEW_SQUARES, SQUARES_PER_TRIANGLE = 20_000_000, 100_000, 1_000
@@ -72,7 +75,7 @@ class SquareLimit:
     @property
     def squares(self) -> float:
         """The limit itself."""
-        return min(MAX_TIMES * self.requested, 2 * most_squares(self.triangles))
+        return min(max(MAX_TIMES * self.requested, FEWEST_SQUARES), 2 * most_squares(self.triangles))
 
     def violation(self, squares: float) -> str:
         """Return what is wrong with a number of squares above the limit; "" if nothing.
@@ -93,8 +96,23 @@ class SquareLimit:
                 else "subdivide the mesh"
             )
             return f"{text}{plural(self.triangles, 'triangle')}: {advice}"
-        fewest = math.ceil(squares / MAX_TIMES)
-        return f"{text}{plural(round(self.requested), 'quad')}: use at least {fewest:,} quads"
+        return (
+            f"{text}{plural(round(self.requested), 'quad')}: use at least {self.fewest(squares):,} quads "
+            "(estimated from this grid)"
+        )
+
+    @staticmethod
+    def fewest(squares: float) -> int:
+        """Return the smallest number of quads for which a grid with a number of squares is within the limit."""
+        return math.ceil(squares / MAX_TIMES)
+
+    def error(self, squares: float) -> GridError | None:
+        """Return the error for a number of squares above the limit; None if it is not."""
+        text = self.violation(squares)
+        if not text:
+            return None
+        is_coarse = math.isfinite(squares) and squares <= 2 * most_squares(self.triangles)
+        return CoarseGridError(text, self.fewest(squares)) if is_coarse else GridError(text)
 
     def check_cones(self, quarters: IntArray) -> None:
         """Raise GridError if a grid with some cones and corners has more squares than the limit.
@@ -103,8 +121,12 @@ class SquareLimit:
 
         quarters: (k,) the angles in quarter turns.
         """
-        if text := self.violation(float(quarters.sum()) / 4):
-            raise GridError(f"{plural(len(quarters), 'cone')} of the surface: {text}")
+        squares = float(quarters.sum()) / 4
+        if error := self.error(squares):
+            text = f"{plural(len(quarters), 'cone')} of the surface: {error}"
+            raise (
+                CoarseGridError(text, error.quads) if isinstance(error, CoarseGridError) else GridError(text)
+            )
 
 
 #: The limit of a grid for which no number of squares is requested.

@@ -24,7 +24,7 @@ from typing import TypeAlias
 import numpy as np
 
 from ..base import THREADS, IntArray, Unmet, limit_threads, plural
-from ..errors import ConvergenceError, GridError, OptionError
+from ..errors import CoarseGridError, ConvergenceError, GridError, OptionError
 from ..flattener import flatten_source
 from ..geometry import coarse_mesh, double_areas, edge_lengths
 from ..io import as_input
@@ -59,9 +59,8 @@ MAX_REFINEMENT = 100
 # How many sizes are tried. Each has GROWTH times the squares of the last grid, and MIN_SQUARES at least; if the limit
 # leaves less than MIN_GROWTH times as many, none is tried.
 MAX_SIZES, GROWTH, MIN_GROWTH, MIN_SQUARES = 3, 1.6, 1.2, 32.0
-# A grid of more than FINE_SQUARES is not refined if sides would be shorter than MIN_SIDE times the requested ones,
-# since each attempt repeats the search.
-FINE_SQUARES, MIN_SIDE = 1000, 0.4
+# Closed surfaces have so many squares at least, unless they have a handle.
+SQUARES_OF_CUBE = 6
 # With fewer quads, a cone costs more than 1, in proportion.
 QUADS_AT_UNIT_PRICE = 2_000
 # Factors of the price of cones that are tried, the latter on meshes of few triangles, which are split for it.
@@ -220,8 +219,7 @@ def _with_more_squares(request: GridRequest, grid: IntegerGrid) -> GridRequest |
     squares = grid.squares
     more_squares = min(max(GROWTH * squares, MIN_SQUARES), request.limit.squares)
     size = request.extent / float(np.sqrt(more_squares))
-    is_fine = squares > FINE_SQUARES and size < MIN_SIDE * request.size
-    return None if more_squares < MIN_GROWTH * squares or is_fine else replace(request, size=size)
+    return None if more_squares < MIN_GROWTH * squares else replace(request, size=size)
 
 
 def grid_of_size(request: GridRequest, flattening_of: AlignedFlattenings) -> Outcome:
@@ -251,9 +249,16 @@ def components_apart(request: GridRequest) -> Outcome:
     scales = np.zeros(len(mesh.vertices)) if request.scales is None else request.scales
     areas = double_areas(edge_lengths(mesh.vertices, mesh.faces))
     of_face = scales[mesh.faces].mean(axis=1)
-    for part, vertices, faces in mesh.split_components():
-        if not areas[faces].any():  # nothing of a component without area can be seen
-            continue
+    # Nothing of a component without area can be seen.
+    components = [split for split in mesh.split_components() if areas[split[2]].any()]
+    shares = np.array([areas[faces].sum() for *_, faces in components]) / max(
+        areas.sum(), np.finfo(float).tiny
+    )
+    fewest = [_fewest_squares(part) for part, *_ in components]
+    expected = np.maximum(shares * (request.extent / request.size) ** 2, fewest)
+    for k, (part, vertices, faces) in enumerate(components):
+        if excess := request.limit.error(sum(grid.squares for grid in grids) + float(expected[k:].sum())):
+            return NoGrid(excess)
         # The mean of the log conformal factor on the component, relative to that on all components.
         mean = np.average(of_face[faces], weights=areas[faces]) - np.average(of_face, weights=areas)
         outcome = find_grid(
@@ -271,12 +276,17 @@ def components_apart(request: GridRequest) -> Outcome:
         else:
             count = plural(len(part.faces), "triangle")
             reasons.append(Unmet(f"No grid for a component of {count}: {outcome.reason}."))
-        if excess := request.limit.violation(sum(grid.squares for grid in grids)):
-            return NoGrid(GridError(excess))
+    if excess := request.limit.error(sum(grid.squares for grid in grids)):
+        return NoGrid(excess)
     if not grids:
         reason = reasons[0] if reasons else "they have no area."
         return NoGrid(GridError(f"no grid was found for any of {mesh.components[0]} components: {reason}"))
     return GridWithQuads(joined_grids(grids, (*checked.notes, *reasons)))
+
+
+def _fewest_squares(component: TriangleMesh) -> int:
+    """Return the fewest squares of a connected mesh."""
+    return SQUARES_OF_CUBE if component.euler_characteristic == 2 else 1
 
 
 # -- 4. other cones
@@ -310,7 +320,19 @@ def other_cones(request: GridRequest, flattening_of: AlignedFlattenings) -> Outc
     outcome = grid_of_map(request, flattened_map(request, note=note))
     if isinstance(outcome, GridWithQuads):
         return outcome
-    return next((failure for failure in failures if failure.coarse_grid is not None), outcome)
+    return _most_helpful([*failures, outcome])
+
+
+def _most_helpful(failures: list[NoGrid]) -> NoGrid:
+    """Return the first reason with a coarse grid, or that with the fewest quads that are possible, or the last."""
+    if with_grid := [failure for failure in failures if failure.coarse_grid is not None]:
+        return with_grid[0]
+    counts = {
+        failure.error.quads: failure
+        for failure in failures
+        if isinstance(failure.error, CoarseGridError) and failure.error.quads is not None
+    }
+    return counts[min(counts)] if counts else failures[-1]
 
 
 # -- 5. a free boundary

@@ -7,6 +7,7 @@ from it and smoothed. Each step is a function of the previous result, and return
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -15,23 +16,25 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base import Stopwatch, Unmet, plural, warns
-from ..errors import GridError, OptionError
+from ..errors import CoarseGridError, GridError, OptionError
 from ..options import read_options
 from .borders import with_borders
 from .cross_field import sharp_ends
 from .extract import DegenerateQuads, extract_quads, find_quads
 from .integer_map import IntegerGrid
-from .limits import NO_LIMIT, SquareLimit
-from .no_grid import NoGrid
+from .limits import NO_LIMIT, NOTED_TIMES, SquareLimit
+from .no_grid import REASONS, NoGrid
 from .options import QuadOptions
 from .policies import GridWithQuads, Outcome, find_grid, on_coarse_mesh
-from .quad_mesh import QuadMesh, least_jacobians
+from .quad_mesh import QuadMesh
+from .quality import inverted_count
 from .request import GridRequest
 from .simpler_mesh import SimplerMesh
 from .smooth import smooth_quads
+from .surface_fit import fit_to_surface
 
-# Least scaled Jacobian without a note: an angle of 180 degrees has 0, up to rounding.
-MIN_SOUND_JACOBIAN = 1e-9
+# Numbers of quads, relative to the requested one, that are tried to find one for which quads follow the surface.
+TRIED_FACTORS = (2, 4, 8)
 
 
 @warns()
@@ -63,8 +66,11 @@ def quads(
         The quad mesh, with the position of its vertices on the surface.
 
     Raises:
+        CoarseGridError: the quads would be more than four times as many as requested, or would not follow the surface:
+            some leap to another part of it, or their area or distance is far off. The message has a number of quads
+            that works, if one is found.
         GridError: no grid of this size, or somewhat finer, without flipped triangles was found; or there would be more
-            than 16 times as many quads, or more than the triangles of the mesh can carry.
+            quads than the triangles of the mesh can carry.
         TooLargeError: the quads do not fit into the free memory.
         OptionError: an option is unknown or invalid.
         MeshError, CurvatureError, SeamError, MetricError: as for `coneflat.flatten`.
@@ -105,12 +111,46 @@ def _quads_of_grid(grid: IntegerGrid, rounds: int, stages: Stopwatch) -> QuadMes
     with stages("smooth"):
         quad_mesh = smooth_quads(quad_mesh, rounds, grid.features)
     _require_sound(quad_mesh, NO_LIMIT)
+    if problems := fit_to_surface(quad_mesh).problems:
+        text = "; ".join(problems)
+        raise CoarseGridError(
+            f"the quads of the grid cannot follow the surface: {text}: use a grid of more squares"
+        )
     notes = (*grid.notes, *quad_mesh.notes, *map(Unmet, _notes(quad_mesh, fills_holes=False)))
     return replace(quad_mesh, notes=notes, seconds={**grid.seconds, **stages.seconds}, grid=grid)
 
 
 def _quads_of_request(request: GridRequest, rounds: int) -> QuadMesh:
-    """Return the smoothed quads that are asked for: of a simpler mesh if this is needed, moved to the given one."""
+    """Return the smoothed quads that are asked for.
+
+    Raises:
+        CoarseGridError: they do not follow the surface; the message has a number of quads that do, if one is found.
+    """
+    quad_mesh, problems = _attempt(request, rounds)
+    if not problems:
+        return quad_mesh
+    requested = round(request.limit.requested)
+    text = f"{plural(requested, 'quad')} cannot follow the surface: {'; '.join(problems)}"
+    largest = requested
+    for count in [factor * requested for factor in TRIED_FACTORS]:
+        try:
+            finer, failures = _attempt(request.with_quads(count), rounds)
+        except REASONS:
+            break
+        if not failures:
+            advice = f"use {count:,} quads, which was tried and gives {len(finer.quads):,}"
+            raise CoarseGridError(f"{text}: {advice}", count)
+        largest = count
+    raise CoarseGridError(
+        f"{text}: nor can {largest:,}, the most that were tried; check the mesh for narrow gaps"
+    )
+
+
+def _attempt(request: GridRequest, rounds: int) -> tuple[QuadMesh, tuple[str, ...]]:
+    """Return smoothed quads and how they fail to follow the surface.
+
+    They are those of a simpler mesh if this is needed, moved to the given one.
+    """
     stages = request.stages
     source = request.flattening.source if request.flattening else request.source.input_mesh.source
     with stages("coarsen"):
@@ -131,15 +171,17 @@ def _quads_of_request(request: GridRequest, rounds: int) -> QuadMesh:
             moved = simpler.moved(quad_mesh)
             quad_mesh = simpler.completed(smooth_quads(moved, rounds, sharp_ends(simpler.surface)))
     _require_sound(quad_mesh, request.limit)
+    with stages("check"):
+        problems = fit_to_surface(quad_mesh, 0.0 if simpler is None else simpler.filled_area).problems
+    fills_holes = simpler is not None and bool(simpler.is_filling.any())
     notes = (
         *(() if simpler is None else simpler.notes),
         *grid.notes,
         *quad_mesh.notes,
-        *map(Unmet, _notes(quad_mesh, fills_holes=simpler is not None and bool(simpler.is_filling.any()))),
+        *map(Unmet, _notes(quad_mesh, fills_holes, request.limit.requested)),
     )
-    return replace(
-        quad_mesh, notes=notes, seconds={**grid.seconds, **stages.seconds}, grid=grid, source=source
-    )
+    seconds = {**grid.seconds, **stages.seconds}
+    return replace(quad_mesh, notes=notes, seconds=seconds, grid=grid, source=source), problems
 
 
 def _with_coarse_grid(outcome: Outcome) -> GridWithQuads:
@@ -195,8 +237,8 @@ def integer_grid(
         The map, with its cones and measures.
 
     Raises:
-        GridError: no grid of this size without flipped triangles was found; or there would be more than 16 times as
-            many squares, or more than the triangles of the mesh can carry.
+        GridError: no grid of this size without flipped triangles was found; or there would be more than four
+            times as many squares, or more than the triangles of the mesh can carry.
         TooLargeError: the grid does not fit into the free memory.
         MeshError, CurvatureError, OptionError, SeamError, MetricError: as for `coneflat.flatten`.
 
@@ -229,14 +271,25 @@ def integer_grid(
 
 def _require_sound(quad_mesh: QuadMesh, limit: SquareLimit) -> None:
     """Raise GridError for more quads than a limit, or coordinates that are not finite."""
-    if text := limit.violation(len(quad_mesh.quads)):
-        raise GridError(text)
+    if error := limit.error(len(quad_mesh.quads)):
+        raise error
     if bad := int((~np.isfinite(quad_mesh.vertices).all(axis=1)).sum()):
         raise GridError(f"{plural(bad, 'vertex', 'vertices')} of quads without a place: use fewer quads")
 
 
-def _notes(quad_mesh: QuadMesh, fills_holes: bool) -> Iterator[str]:
-    """Yield a note for each problem of a quad mesh; `fills_holes` if it may cover filled holes."""
+def _notes(quad_mesh: QuadMesh, fills_holes: bool, requested: float = math.inf) -> Iterator[str]:
+    """Yield a note for each problem of a quad mesh.
+
+    Args:
+        quad_mesh: the mesh.
+        fills_holes: it may cover filled holes.
+        requested: number of quads that is requested.
+    """
+    if len(quad_mesh.quads) > NOTED_TIMES * requested:
+        yield (
+            f"{len(quad_mesh.quads):,} quads instead of {requested:,.0f}: narrow parts, handles or components of the "
+            "surface need them."
+        )
     if quad_mesh.left_out:
         share = 100 * quad_mesh.area_left_out / (quad_mesh.area_left_out + len(quad_mesh.quads))
         yield (
@@ -251,6 +304,5 @@ def _notes(quad_mesh: QuadMesh, fills_holes: bool) -> Iterator[str]:
             f"The Euler characteristic of the quads is {quad_mesh.euler_characteristic}, that of the "
             f"surface {quad_mesh.surface_euler}: leaving out squares has opened or split the mesh."
         )
-    flipped = int((least_jacobians(quad_mesh.vertices, quad_mesh.quads) <= MIN_SOUND_JACOBIAN).sum())
-    if flipped:
-        yield f"{plural(flipped, 'quad')} with an angle of 180 degrees or more: use more quads."
+    if inverted := inverted_count(quad_mesh):
+        yield f"{plural(inverted, 'quad')} with an angle of 180 degrees or more: use more quads."

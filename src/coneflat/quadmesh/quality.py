@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from ..base import FloatArray, dots, short_repr
 from ..errors import ArrayShapeError
-from ..geometry import edge_lengths
 from ..geometry.nearest import surface_distances
-from ..mesh.connectivity import TriangleMesh
 from .quad_mesh import QuadMesh, least_jacobians
+from .surface_fit import fit_to_surface, surface_samples
+
+# Least scaled Jacobian of a quad that is not inverted: an angle of 180 degrees has 0, up to rounding.
+MIN_SOUND_JACOBIAN = 1e-9
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,10 @@ class QuadMeasures:
         edge_mean, edge_cv: mean edge length, and the standard deviation of edge lengths divided by the mean.
         jacobian_mean, jacobian_min: mean and minimum of the least scaled Jacobian of each quad, 1 for rectangles,
             negative if a quad is flipped at a corner.
+        inverted: number of quads with an angle of 180 degrees or more.
         hausdorff: largest distance between quads and surface, model units; see `hausdorff_distance`.
+        area_ratio: area of the quads over that of the surface.
+        leaps: number of quads that leap to another part of the surface; see `SurfaceFit`.
         left_out, area_left_out: see `QuadMesh`.
     """
 
@@ -47,7 +52,10 @@ class QuadMeasures:
     edge_cv: float
     jacobian_mean: float
     jacobian_min: float
+    inverted: int
     hausdorff: float
+    area_ratio: float
+    leaps: int
     left_out: int
     area_left_out: float
 
@@ -69,9 +77,16 @@ class QuadMeasures:
         yield "edge cv", f"{self.edge_cv:.3f}", spread
         jacobian = f"scaled, mean of each quad's minimum; minimum {self.jacobian_min:.3f}"
         yield "Jacobian", f"{self.jacobian_mean:.3f}", jacobian
+        yield "inverted", f"{self.inverted:,}", "quads with an angle of 180 degrees or more"
+        yield "area", f"{self.area_ratio:.3f}", "area of the quads over that of the surface"
+        yield "leaps", f"{self.leaps:,}", "quads that leap to another part of the surface"
         edges = self.hausdorff / self.edge_mean
         distance = f"largest between quads and surface, at samples; {edges:.2f} edges"
         yield "distance", f"{self.hausdorff:.3g}", distance
+
+
+#: Names of the numbers in the report of a quad mesh.
+QUAD_MEASURES = tuple(field.name for field in fields(QuadMeasures) if field.name != "irregular_valences")
 
 
 def measure_quads(quads: QuadMesh) -> QuadMeasures:
@@ -106,6 +121,7 @@ def measure_quads(quads: QuadMesh) -> QuadMeasures:
     off = np.abs(corner_angles_of(quads) - 90.0)
     length = np.linalg.norm(points[quads.edges[:, 0]] - points[quads.edges[:, 1]], axis=1)
     jacobians = least_jacobians(points, quads.quads)
+    fit = fit_to_surface(quads)
     valences, counts = np.unique(quads.valences[quads.irregular], return_counts=True)
     return QuadMeasures(
         vertices=len(points),
@@ -121,10 +137,18 @@ def measure_quads(quads: QuadMesh) -> QuadMeasures:
         edge_cv=float(length.std() / length.mean()),
         jacobian_mean=float(jacobians.mean()),
         jacobian_min=float(jacobians.min()),
+        inverted=inverted_count(quads),
         hausdorff=hausdorff_distance(quads),
+        area_ratio=fit.area_ratio,
+        leaps=fit.leaps,
         left_out=quads.left_out,
         area_left_out=quads.area_left_out,
     )
+
+
+def inverted_count(quads: QuadMesh) -> int:
+    """Return the number of quads with an angle of 180 degrees or more."""
+    return int((least_jacobians(quads.vertices, quads.quads) <= MIN_SOUND_JACOBIAN).sum())
 
 
 def corner_angles_of(quads: QuadMesh) -> FloatArray:
@@ -149,19 +173,6 @@ def hausdorff_distance(quads: QuadMesh) -> float:
     inner = np.einsum("si,pix->psx", patch[patch.max(axis=1) < 1], corners).reshape(-1, 3)
     to_surface = surface_distances(mesh.vertices, mesh.faces, np.concatenate([quads.vertices, inner]))
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    from_surface = surface_distances(quads.vertices, quads.triangles, _samples(mesh, float(sides.mean()) / 2))
+    samples = surface_samples(mesh.vertices, mesh.faces, float(sides.mean()) / 2)
+    from_surface = surface_distances(quads.vertices, quads.triangles, samples)
     return float(max(to_surface.max(), from_surface.max()))
-
-
-def _samples(mesh: TriangleMesh, spacing: float) -> FloatArray:
-    """Return (s, 3) sample points of triangles: their vertices, and rows with a given spacing, at most 64 rows each."""
-    parts = [mesh.vertices[np.unique(mesh.faces)]]
-    longest = edge_lengths(mesh.vertices, mesh.faces).max(axis=1)
-    rows = np.minimum(np.ceil(longest / spacing), 64).astype(np.int64)
-    for count in np.unique(rows[rows > 1]):
-        i, j = np.indices((count, count)).reshape(2, -1)
-        # Centroids of the small triangles with the orientation of the large one.
-        u, v = ((x[i + j < count] + 1 / 3) / count for x in (i, j))
-        corners = mesh.vertices[mesh.faces[rows == count]]
-        parts.append(np.einsum("si,fix->fsx", np.stack([1 - u - v, u, v], axis=1), corners).reshape(-1, 3))
-    return np.concatenate(parts)

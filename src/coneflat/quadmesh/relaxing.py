@@ -67,8 +67,8 @@ def relaxed_grid(
                 continue
             break
         snapped = replace(layout, points=_snapped(relaxed, transitions, values))
-        if reason := goal.limit.violation(snapped.area):
-            break
+        if excess := goal.limit.error(snapped.area):
+            return NoGrid(excess)
         if _folds_sides(layout, transitions, snapped.points):
             reason = "sides of triangles on grid lines change their direction"
         elif (snapped.double_areas() > 0).all():

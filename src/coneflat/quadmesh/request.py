@@ -114,6 +114,10 @@ class GridRequest:
         squares = quads or (extent / size) ** 2
         return replace(self, size=size, limit=SquareLimit.of(squares, len(self.mesh.faces), extent))
 
+    def with_quads(self, quads: int) -> GridRequest:
+        """Return the request for another number of quads."""
+        return self._with_size(None, quads)
+
     @property
     def checked(self) -> CheckedMesh:
         """The checked mesh, at about unit size."""

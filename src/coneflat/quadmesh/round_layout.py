@@ -13,7 +13,7 @@ from itertools import count
 import numpy as np
 
 from ..base import FloatArray, IntArray, Unmet, plural
-from ..errors import GridError
+from ..errors import CoarseGridError, GridError
 from .cross_field import sharp_ends
 from .features import edge_indices, lengths_along, sharp_edges
 from .grid_layout import GridLayout, with_sides
@@ -29,7 +29,7 @@ NOTED_SHARE = 0.1
 # How often the size is corrected for the number of squares.
 MAX_CORRECTIONS = 4
 # How often the number of squares is doubled to find a grid: with cones that may be replaced by others, and otherwise.
-DOUBLINGS_BEFORE_OTHER_CONES, MAX_DOUBLINGS = 1, 4
+DOUBLINGS_BEFORE_OTHER_CONES, MAX_DOUBLINGS = 1, 2
 # Preferred edges are put on a line if their direction differs from an axis by less, radians.
 MAX_TURN = np.deg2rad(20.0)
 # Largest cost of a preferred chain: the energy of the triangles near it, over its length and the root of the area.
@@ -120,6 +120,8 @@ def grid_about(rounding: Rounding, goal: GridGoal, doublings: int) -> IntegerGri
         grid = _nearest_grid(rounding.scaled(2.0**doubling), goal)
         if isinstance(grid, IntegerGrid):
             return _with_note_on_size(_corrected(rounding, grid, goal) if doubling == 0 else grid, requested)
+        if isinstance(grid.error, CoarseGridError):  # a finer one has even more squares
+            return grid
         reason = grid.reason
     finer = f", or of up to {2**doublings} times as many," if doublings else ""
     return NoGrid(GridError(f"no grid of about {requested:,.0f} quads{finer} was found: {reason}"))

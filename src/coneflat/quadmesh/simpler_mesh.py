@@ -55,6 +55,12 @@ class SimplerMesh:
         every, none = np.arange(len(mesh.vertices)), np.zeros(len(mesh.faces), dtype=bool)
         return cls(mesh, every, mesh, none, side, limit)
 
+    @property
+    def filled_area(self) -> float:
+        """The area of the filled holes, in model units."""
+        filled = self.mesh.faces[self.is_filling]
+        return float(double_areas(edge_lengths(self.mesh.vertices, filled)).sum()) / 2
+
     def moved(self, quads: QuadMesh) -> QuadMesh:
         """Return quads of the simpler mesh, or of a refinement of it, on the given mesh.
 

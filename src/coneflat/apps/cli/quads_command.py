@@ -12,6 +12,7 @@ from ...options import ConeBounds, ConeNumber, declarations, read_options
 from ...quadmesh import QuadOptions
 from .flags import (
     GroupedCommand,
+    check_required,
     input_options,
     is_given,
     keywords,
@@ -20,6 +21,7 @@ from .flags import (
     path_flag,
     pop_flags,
     refuse,
+    require_option,
     verbosity_options,
 )
 
@@ -52,11 +54,18 @@ class QuadFlags:
 @option_flags(QuadOptions)
 @option_flags(QuadFlags)
 @input_options
+@require_option
 @verbosity_options
 @click.pass_context
 @names_formats
 def quads(
-    context: click.Context, /, mesh: Path, weld: bool | None, verbosity: str | None, **params: Any
+    context: click.Context,
+    /,
+    mesh: Path,
+    weld: bool | None,
+    required: tuple[str, ...],
+    verbosity: str | None,
+    **params: Any,
 ) -> None:
     """Convert MESH to a mesh of quads only, with few irregular vertices.
 
@@ -70,11 +79,13 @@ def quads(
       coneflat quads sheet.obj --boundary straight -o sheet_quads.glb
       coneflat quads bunny.obj --grid bunny_grid.obj
       coneflat quads hand.obj -o hand.npz --view hand.html
+      coneflat quads hand.obj --require inverted=0 --require "quads<=12000"
     """
     from ... import integer_grid, measure_quads
     from ... import quads as find_quads
     from ...io import read_joined
-    from ...quadmesh import read_grid
+    from ...measures import parse_requirements
+    from ...quadmesh import QUAD_MEASURES, read_grid
     from .run import Console, require_distinct, write_report
 
     _check_combinations(context, mesh)
@@ -82,6 +93,7 @@ def quads(
     if flags.output is None and flags.grid is None and flags.view is None:
         flags = replace(flags, output=Path(f"{mesh.stem}_quads.obj"))
     files = _checked_files(flags)
+    requirements = parse_requirements(required, QUAD_MEASURES)
     require_distinct({"input": mesh, **files})
     rounds = {"smooth": options.pop("smooth")} if "smooth" in options else {}
     with Console(verbosity) as console:
@@ -90,7 +102,7 @@ def quads(
             source: Any = read_grid(mesh) if joined is None else joined.mesh
         options = {**({} if joined is None else joined.map_options(options)), "progress": console.part()}
         quad_mesh = measures = None
-        if flags.output is None and flags.view is None:
+        if flags.output is None and flags.view is None and not requirements:
             done = grid_map = source if joined is None else integer_grid(source, **options)
         else:
             done = quad_mesh = find_quads(source, **options, **rounds)
@@ -109,6 +121,8 @@ def quads(
         console.finish([path for path in files.values() if path is not None])
         square = "square", f"{grid_map.size:.4g}", "side of a grid square in model units"
         console.table([square, *(() if measures is None else measures.rows())])
+    written = next((path for path in files.values() if path is not None), "")
+    check_required(requirements, {} if measures is None else measures.report(), str(written))
 
 
 def _options(params: dict[str, Any]) -> dict[str, Any]:
@@ -169,6 +183,6 @@ def _check_combinations(context: click.Context, mesh: Path) -> None:
     if mesh.suffix.lower() != ".npz":
         return
     for parameter in context.command.params:
-        allowed = ("mesh", "output", "grid", "view", "smooth", "report", "verbosity")
+        allowed = ("mesh", "output", "grid", "view", "smooth", "report", "required", "verbosity")
         if parameter.name not in allowed and parameter.name is not None and is_given(context, parameter.name):
             raise click.UsageError(f"{mesh} is a grid: leave out {parameter.opts[0]}", context)
