@@ -10,6 +10,7 @@ from stored_meshes import find_model
 
 import coneflat
 from coneflat import unwrap
+from coneflat.geometry import edge_lengths
 from coneflat.textures import unwrapping
 
 # Directions and distances of exactly straight sides, relative.
@@ -115,13 +116,28 @@ def test_a_tighter_bound_is_kept():
     assert_sound(result, 4.05)
 
 
-def test_curved_sides_of_a_flat_sheet_stay_curved():
+@pytest.mark.parametrize("arch", [0.01, 0.03, 0.3])
+def test_curved_sides_of_a_flat_sheet_stay_curved(arch):
     vertices, faces = shapes.grid(40, 8)
     x, y = (values - values.min() for values in vertices.T[:2])
-    arched = np.stack([x, y + 0.3 * x * (x.max() - x) / x.max(), np.zeros_like(x)], axis=1)
+    arched = np.stack([x, y + arch * 4 * x * (x.max() - x) / x.max() ** 2, np.zeros_like(x)], axis=1)
     flat = unwrap(arched, faces)
-    assert share_along_axes(flat, 1e-6) < 0.5
+    assert share_along_axes(flat, 1e-6) < 0.6
     assert flat.distortion.energy == pytest.approx(4, abs=1e-9)
+
+
+@pytest.mark.parametrize("taper", [0.02, 0.05, 0.1])
+def test_flat_faces_that_taper_are_not_stretched_into_rectangles(taper):
+    """A draft angle of a part is not lost in its texture."""
+    vertices, faces = shapes.box(6, (1.0, 1.0, 2.0))
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    middle, height = (low + high) / 2, (vertices[:, 2:] - low[2]) / (high - low)[2]
+    tapered = np.array(vertices, dtype=float)
+    tapered[:, :2] = middle[:2] + (tapered[:, :2] - middle[:2]) * (1 - taper * height)
+    result = unwrap(tapered, faces)
+    lengths = edge_lengths(tapered, result.faces)
+    flat_lengths = edge_lengths(np.pad(result.uv, ((0, 0), (0, 1))), result.uv_faces) / result.uv_scale
+    np.testing.assert_allclose(flat_lengths, lengths, rtol=0.025)
 
 
 def test_free_forms_keep_their_layouts(monkeypatch):

@@ -210,3 +210,24 @@ def test_cancelling_anywhere_changes_no_later_result(how, step):
         np.testing.assert_array_equal(unwrapper.unwrap().uv, expected.uv)
         unwrapper = Unwrapper(*shape)
     assert stops > 5
+
+
+def test_a_search_that_was_complete_is_not_said_to_be_ended_later(reads):
+    """The time may be up while charts are packed; later packings of the same cuts are told nothing of it."""
+    unwrapper, limit = Unwrapper(*bracelet()), None
+    for seconds in range(20, 2000, 20):
+        reads.clear()
+        searched = Unwrapper(*bracelet())
+        first = searched.unwrap(search_time=seconds, packing_cuts=1.0)
+        complete = searched._searched._entry[1].ended is None
+        if time_notes(first) and complete:
+            unwrapper, limit = searched, seconds
+            break
+    assert limit is not None
+    assert not time_notes(unwrapper.unwrap(search_time=limit, packing_cuts=0))
+
+
+def test_texel_density_is_reached_whenever_the_time_is_up(reads):
+    for seconds in (0, 50, 100, 150, 200):
+        result = unwrap(*bracelet(), search_time=seconds, texel_density=50.0)
+        assert result.uv_scale * result.settings["resolution"] >= 50

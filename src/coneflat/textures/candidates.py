@@ -145,7 +145,7 @@ class CutModel:
 
     def _moved_apart(self, candidate: Candidate) -> Candidate | None:
         """Return a candidate in one chart whose overlaps are moved apart within the bound, if they are small."""
-        if candidate.layout.chart.any() or not self.bound.is_finite:
+        if candidate.layout.chart.any():
             return None
         layout = moved_apart(candidate.layout, 2 * TOLERANCE)
         if layout is None:

@@ -10,12 +10,13 @@ import numpy as np
 
 from ..base import BoolArray, FloatArray, IntArray
 from ..errors import ConvergenceError, MetricError, OptionError
-from ..geometry import dihedral_angles, find_overlaps
+from ..geometry import dihedral_angles, double_areas, find_overlaps, triangle_energies
 from ..optimise import PointConstraints, StretchEnergy, relax
 from ..stages import Layout
 from .candidates import TOLERANCE, Candidate, CutModel
 from .creases import SHARP
 from .free_seams import as_one_chart
+from .options import ISOMETRIC
 from .shortening import MANY_TRIANGLES
 from .straight_sides import Border, StraightSides, find_border, hard_sides, parallel_sides, rectangle_sides
 
@@ -23,6 +24,9 @@ from .straight_sides import Border, StraightSides, find_border, hard_sides, para
 MIN_CHART = 0.01
 # By how much the mean energy of a chart may rise if it becomes a rectangle, and if its sides become straight.
 RECTANGLE_RISE, STRAIGHT_RISE = 0.01, 0.03
+# By how much the energy of any triangle of a nearly isometric chart may exceed that of an isometry: none is stretched
+# by more than 2%. And what counts as an isometry.
+LOCAL_RISE, ROUNDING = 0.002, 1e-6
 # Largest distance of points from their line, relative to its length, if the line is exactly straight.
 EXACT = 1e-10
 
@@ -58,24 +62,35 @@ def _with_straight_chart(
     """
     layout = candidate.layout
     chart = as_one_chart(layout, faces)
+    before = model.bound.energies(chart.lengths, chart.points[chart.corners])
+    largest, isometric = _largest_energy(chart, chart.points), ISOMETRIC + LOCAL_RISE
     border = find_border(layout, chart, faces, is_sharp)
-    if candidate.keeps_points and border.bend <= EXACT:
-        return candidate  # Flat charts with straight sides, such as leaf cards, remain isometric.
-    before = model.bound.energies(chart.lengths, chart.points[chart.corners]).sum()
+    if border.bend <= EXACT and largest <= ISOMETRIC + ROUNDING:
+        return candidate  # Leaf cards and the faces of tapered boxes remain isometric.
     for sides, largest_rise in _trials(border):
         if sides.largest_stray(chart.points) <= EXACT:
             break
         points = _points_with(sides, chart)
         if points is None:
             continue
-        rise = float(model.bound.energies(chart.lengths, points[chart.corners]).sum() - before)
+        rise = float((model.bound.energies(chart.lengths, points[chart.corners]) - before).sum())
         energy = candidate.energy + rise / layout.area
-        is_within = energy <= max(model.bound.largest, candidate.energy) and rise <= largest_rise * chart.area
+        is_within = (
+            energy <= max(model.bound.largest, candidate.energy)
+            and rise <= largest_rise * chart.area
+            and (largest > isometric or _largest_energy(chart, points) <= isometric)
+        )
         if is_within and not len(find_overlaps(points[chart.corners], limit=1).pairs):
             moved = layout.points.copy()
             moved[layout.corners[faces]] = points[chart.corners]
             return replace(candidate, layout=replace(layout, points=moved), energy=energy)
     return candidate
+
+
+def _largest_energy(chart: Layout, points: FloatArray) -> float:
+    """Return the largest symmetric Dirichlet energy of a triangle of a chart with given points (c, 2)."""
+    energies = triangle_energies(chart.lengths, points[chart.corners])
+    return float((energies / (double_areas(chart.lengths) / 2)).max())
 
 
 def _trials(border: Border) -> Iterator[tuple[StraightSides, float]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, TypeAlias
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from ..base import (
     FloatArray,
     current_time,
+    is_time_up,
     limit_threads,
     search_time,
     stage,
@@ -156,7 +157,7 @@ class Searched:
         models: the models of components that are no copies.
         candidates: the best candidate of each component that is not a copy.
         finished: candidates that were cut further, by their component and by the chart of each triangle before.
-        time: the time of the search, if it was limited.
+        ended: the time of the search, if it was up before the search was complete.
     """
 
     prepared: Prepared
@@ -167,12 +168,13 @@ class Searched:
     models: Models
     candidates: Mapping[int, Candidate]
     finished: dict[tuple[int, bytes], Candidate] = field(default_factory=dict)
-    time: SearchTime | None = None
+    ended: SearchTime | None = None
 
     @property
-    def ended(self) -> SearchTime | None:
-        """The time of the search that was ended because it was up: for packing, or before; None if none was."""
-        return next((limit for limit in (current_time(), self.time) if limit and limit.is_ended), None)
+    def ended_by_now(self) -> SearchTime | None:
+        """The time that was up before the search for cuts was complete, or that for packing; None if neither was."""
+        limit = current_time()
+        return limit if limit and limit.is_ended else self.ended
 
 
 def unwrap_source(source: Source, options: UnwrapOptions) -> Flattening:
@@ -199,7 +201,10 @@ def search_cuts(source: Source, options: UnwrapOptions) -> Searched:
             copies = [None] * len(components) if is_counted else find_copies(components, flat)
         models = _cut_models(components, copies, options)
         candidates = _search(models, flat, components)
-    return Searched(prepared, shared, components, flat, copies, models, candidates, time=current_time())
+    limit = current_time()
+    # A copy: the time may be up later, while charts are packed.
+    ended = replace(limit) if limit and limit.is_ended else None
+    return Searched(prepared, shared, components, flat, copies, models, candidates, ended=ended)
 
 
 def pack_searched(searched: Searched, options: UnwrapOptions) -> Flattening:
@@ -221,11 +226,16 @@ def pack_candidates(
     prepared, components = searched.prepared, searched.components
     with _threads_for(components, options), stage("measure"):
         layouts = _measured_layouts(candidates, searched.flat, components, searched.copies)
-    stage_options = _with_least_resolution(stage_options, options, prepared, layouts)
-    with component_at_work("", FINISHING):
-        result = evaluate(prepared, layouts, replace(stage_options, method=FREE))
+    # With a density, the charts must be packed as tightly as they were when the resolution was found.
+    has_density = options.texel_density is not None
+    with search_time(0.0 if is_time_up() else None) if has_density else nullcontext():
+        stage_options = _with_least_resolution(stage_options, options, prepared, layouts)
+        with component_at_work("", FINISHING):
+            result = evaluate(prepared, layouts, replace(stage_options, method=FREE))
     energies = [candidate.energy for candidate in candidates.values()]
-    result = with_notes(result, options, energies, _count_forbidden(components, layouts), searched.ended)
+    result = with_notes(
+        result, options, energies, _count_forbidden(components, layouts), searched.ended_by_now
+    )
     return result if searched.shared is None else with_shared_texels(result, searched.shared, prepared)
 
 
@@ -382,7 +392,7 @@ def _finished_candidates(
         if len(cache) >= MAX_FINISHED * len(layouts):
             cache.clear()
         # What was ended early is not taken again.
-        if searched.ended is None:
+        if searched.ended_by_now is None:
             cache[key] = candidate
     return finished
 
