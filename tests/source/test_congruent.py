@@ -75,3 +75,29 @@ def test_other_meshes_are_not_congruent(change):
         c, d = (first.faces[side // 3][side % 3] for side in pair)
         faces[pair // 3] = [[a, d, c], [b, c, d]]
     assert congruence(first, copied((vertices, faces), 1), ROUNDING) is None
+
+
+@pytest.mark.parametrize("distance", [0.0, 1e3, 1e5])
+@pytest.mark.parametrize("stretch", [(1.0, 1.0, 1.01), (1.01, 1.01, 1.01), (1.0, 1.0, 1.4)])
+@pytest.mark.parametrize("sizes", [(1.0, 1.0, 1.0), (0.01, 0.01, 10.0), (0.01, 10.0, 10.0)])
+def test_meshes_of_another_shape_are_not_congruent_however_far_they_are(distance, stretch, sizes):
+    """The rounding of positions far from the origin is larger than these meshes differ."""
+    vertices, faces = shapes.box()
+    vertices = vertices * np.array(sizes)
+    first, second = TriangleMesh(vertices, faces), copied((vertices * np.array(stretch), faces), 1)
+    moved = TriangleMesh(second.vertices + np.array([distance, 0, 0]), second.faces)
+    assert congruence(first, moved, ROUNDING) is None
+
+
+def test_the_section_of_a_long_mesh_matters():
+    """The section has the same perimeter: the area differs little."""
+    vertices, faces = shapes.box()
+    first = TriangleMesh(vertices * [0.01, 0.01, 10.0], faces)
+    flatter = TriangleMesh(vertices * [0.012, 0.008, 10.0] + [200, 0, 0], faces)
+    assert congruence(first, flatter, ROUNDING) is None
+
+
+def test_rounded_copies_are_congruent():
+    vertices, faces = MESHES["sphere"]
+    moved = (vertices @ shapes.rotation(1).T + [100.0, 0, 0]).astype(np.float32).astype(float)
+    assert congruence(TriangleMesh(vertices, faces), TriangleMesh(moved, faces), ROUNDING) is not None

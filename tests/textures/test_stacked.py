@@ -203,3 +203,15 @@ def test_a_mirrored_copy_that_a_rotation_fits_is_not_flipped():
     result = unwrap(*model, stack="copies")
     assert (signed_double_areas(result.corner_uv) > 0).all()
     assert any("1 component shares" in note and "mirrored" not in note for note in result.notes)
+
+
+@pytest.mark.parametrize("is_renumbered", [False, True])
+@pytest.mark.parametrize("height", [1.01, 1.1, 1.4])
+def test_components_of_another_shape_far_from_the_origin_share_no_texels(height, is_renumbered):
+    vertices, faces = shapes.hill(8, 6)
+    stretched = vertices * [1, 1, height] + [1e4, 0, 0], faces
+    if is_renumbered:
+        stretched = shapes.renumber(*stretched, seed=1)[:2]
+    model = shapes.join((vertices, faces), stretched)
+    result = unwrap(*model, stack="copies")
+    assert any("No component shares" in note for note in result.notes)

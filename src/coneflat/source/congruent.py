@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..base.arrays import FloatArray, IntArray
+from ..geometry import double_areas, edge_lengths
 from ..mesh.connectivity import TriangleMesh
 
 if TYPE_CHECKING:
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
 # Largest number of faces of a mesh, for each order of their corners, that are compared with one of the other mesh.
 # More have the same shape and place only on symmetric meshes, where most of them fit.
 MAX_CANDIDATES = 32
+# Largest difference of congruent meshes, however much their positions are rounded: of positions, relative to the
+# largest distance from the centre; of sides, the root mean square of the relative differences.
+SAME_SHAPE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,13 +44,11 @@ def congruence(first: TriangleMesh, second: TriangleMesh, rounding: float) -> Co
 
     Args:
         first, second: two meshes.
-        rounding: largest distance of the vertices of the second mesh from those of the first, after a rotation or
-            reflection, relative to the largest coordinates.
+        rounding: rounding errors of both meshes, relative to the largest coordinates; see `position_tolerance`.
     """
     if first.vertices.shape != second.vertices.shape or first.faces.shape != second.faces.shape:
         return None
-    reach = max(float(np.abs(mesh.vertices).max()) for mesh in (first, second))
-    tolerance = 2 * rounding * reach
+    tolerance = position_tolerance(first, second, rounding)
     points, images = (mesh.vertices - mesh.vertices.mean(axis=0) for mesh in (first, second))
     radii, image_radii = (np.linalg.norm(centred, axis=1) for centred in (points, images))
     if not np.allclose(np.sort(radii), np.sort(image_radii), rtol=0, atol=tolerance):
@@ -64,9 +66,40 @@ def congruence(first: TriangleMesh, second: TriangleMesh, rounding: float) -> Co
             turn = _orthogonal(points, images[vertex], sign)
             if np.abs(points @ turn - images[vertex]).max() <= tolerance:
                 matched = _matched_corners(vertex[first.faces], second.faces, sign < 0)
-                if matched is not None:
+                if matched is not None and has_same_sides(first, second, matched):
                     return Congruence(matched, sign < 0)
     return None
+
+
+def position_tolerance(first: TriangleMesh, second: TriangleMesh, rounding: float) -> float:
+    """Return the largest distance of the vertices of a mesh from those of a congruent one, after a rotation.
+
+    It is that of the rounding errors of both; a small mesh far from the origin, of which rounding leaves no shape, is
+    congruent to no other.
+
+    Args:
+        first, second: two meshes.
+        rounding: rounding errors of their positions, relative to the largest coordinates.
+    """
+    reach = max(float(np.abs(mesh.vertices).max()) for mesh in (first, second))
+    centred = first.vertices - first.vertices.mean(axis=0)
+    radius = float(np.linalg.norm(centred, axis=1).max())
+    return min(2 * rounding * reach, SAME_SHAPE * radius)
+
+
+def has_same_sides(first: TriangleMesh, second: TriangleMesh, corners: IntArray) -> bool:
+    """Return whether the sides of two meshes have the same lengths, in the mean over the area.
+
+    Args:
+        first, second: two meshes.
+        corners: (3m,) the corner of the first mesh that each corner of the second one is.
+    """
+    lengths = edge_lengths(second.vertices, second.faces)
+    partners = edge_lengths(first.vertices, first.faces).ravel()[corners].reshape(-1, 3)
+    longer = np.maximum(np.maximum(lengths, partners), np.finfo(float).tiny)
+    squares = (((lengths - partners) / longer) ** 2).mean(axis=1)
+    areas = double_areas(lengths)
+    return bool((areas * squares).sum() <= SAME_SHAPE**2 * areas.sum())
 
 
 def _fitting_corners(

@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import BoolArray, FloatArray
+from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..stages import Layout
 from .components import Component
+from .congruent import has_same_sides, position_tolerance
 
 # Largest distance of the vertices of a copy from the transformed vertices of the first, relative to the largest
 # coordinates: rounding errors. And largest relative difference of side lengths: a tenth of the accuracy of metrics.
@@ -51,8 +52,8 @@ def find_copies(
     Args:
         components: the components.
         excluded: indices of components that are not compared.
-        rounding: largest distance of the vertices of a copy from those of the first, relative to the largest
-            coordinates; None for copies that are exact up to the rounding of doubles.
+        rounding: rounding errors of positions, relative to the largest coordinates, see `position_tolerance`; copies
+            then have the same size. None for copies of any size that are exact up to the rounding of doubles.
     """
     copies: list[Copy | None] = [None] * len(components)
     if len(components) == 1:
@@ -75,6 +76,22 @@ def find_copies(
         else:
             alike.append(i)
     return copies
+
+
+def numbered_corners(first: Component, component: Component) -> IntArray:
+    """Return (3m,) the corners of the first component that those of another one with the same numbering are.
+
+    The corners of a face may be in another order.
+    """
+    orders = [_order_by_vertex(part.mesh.faces) for part in (first, component)]
+    corners = np.empty_like(orders[0])
+    corners[orders[1]] = orders[0]
+    return corners
+
+
+def _order_by_vertex(faces: IntArray) -> IntArray:
+    """Return (3m,) the corners of faces (m, 3), those of each face by their vertices."""
+    return (3 * np.arange(len(faces))[:, None] + np.argsort(faces, axis=1)).ravel()
 
 
 def copied(first: Layout, component: Component, scale: float) -> Layout:
@@ -143,6 +160,8 @@ def _scale_of_copy(
     reach = float(np.abs(component.mesh.vertices).max() + scale * np.abs(first.mesh.vertices).max())
     sides = np.abs(scale * first.lengths - component.lengths)
     if rounding is not None:
-        return scale if off.max() <= rounding * reach else None
+        is_close = off.max() <= position_tolerance(first.mesh, component.mesh, rounding)
+        corners = numbered_corners(first, component)
+        return scale if is_close and has_same_sides(first.mesh, component.mesh, corners) else None
     is_copy = off.max() <= COPY_ROUNDING * reach and (sides <= SIDE_TOLERANCE * component.lengths).all()
     return scale if is_copy else None

@@ -14,7 +14,7 @@ import numpy as np
 from ..base import IntArray, plural
 from ..mesh import weld
 from ..source import Component, Congruence, Prepared, congruence, find_copies, has_vertex_options
-from ..source.copies import MAX_COMPARED
+from ..source.copies import MAX_COMPARED, numbered_corners
 from .sharing import SharedTexels
 
 # Largest relative difference of the sizes of copies that share texels: those of other sizes would have another density.
@@ -62,8 +62,7 @@ def _matched_copies(components: Sequence[Component]) -> list[tuple[int, Congruen
     copies = find_copies(components, rounding=SAME_PLACE)
     for i, (component, copy) in enumerate(zip(components, copies, strict=True)):
         if copy is not None and abs(copy.scale - 1) <= SAME_SIZE:
-            corners = np.empty(component.mesh.faces.size, dtype=np.int64)
-            corners[_order_by_vertex(component)] = _order_by_vertex(components[copy.first])
+            corners = numbered_corners(components[copy.first], component)
             by_number = copy.first, Congruence(corners, copy.is_mirrored)
             mirrored = [copy.first] if copy.is_mirrored else []
             matches.append(_first_match(components, mirrored, component) or by_number)
@@ -102,12 +101,6 @@ def _note(count: int, mirrored: int) -> str:
 def _corners_of(component: Component) -> IntArray:
     """Return (3m,) the corners of a component's faces, as indices into all corners of the mesh."""
     return (3 * component.faces[:, None] + np.arange(3)).ravel()
-
-
-def _order_by_vertex(component: Component) -> IntArray:
-    """Return (3m,) the corners of a component's faces, those of each face by their vertices."""
-    faces = component.mesh.faces
-    return (3 * np.arange(len(faces))[:, None] + np.argsort(faces, axis=1)).ravel()
 
 
 def _joined(arrays: Sequence[IntArray]) -> IntArray:
