@@ -92,8 +92,8 @@ def test_meshes_of_another_shape_are_not_congruent_however_far_they_are(distance
 def test_the_section_of_a_long_mesh_matters():
     """The section has the same perimeter: the area differs little."""
     vertices, faces = shapes.box()
-    first = TriangleMesh(vertices * [0.01, 0.01, 10.0], faces)
-    flatter = TriangleMesh(vertices * [0.012, 0.008, 10.0] + [200, 0, 0], faces)
+    first = TriangleMesh(vertices * [1, 1, 10.0], faces)
+    flatter = TriangleMesh(vertices * [1.02, 0.98, 10.0] + [1e4, 0, 0], faces)
     assert congruence(first, flatter, ROUNDING) is None
 
 
@@ -101,3 +101,20 @@ def test_rounded_copies_are_congruent():
     vertices, faces = MESHES["sphere"]
     moved = (vertices @ shapes.rotation(1).T + [100.0, 0, 0]).astype(np.float32).astype(float)
     assert congruence(TriangleMesh(vertices, faces), TriangleMesh(moved, faces), ROUNDING) is not None
+
+
+def test_labels_choose_among_the_congruences_of_a_symmetric_mesh():
+    vertices, faces = shapes.box()
+    first, second = TriangleMesh(vertices, faces), copied((vertices, faces), 3)
+    labels = (np.arange(3 * len(faces)) == 0).astype(int)
+    images = [congruence(first, second, ROUNDING, (labels, np.roll(labels, k))) for k in range(labels.size)]
+    matched = [(k, match.corners) for k, match in enumerate(images) if match is not None]
+    assert len(matched) > 1
+    assert all(corners[k] == 0 for k, corners in matched)
+
+
+def test_meshes_with_other_labels_are_not_congruent():
+    first, second = TriangleMesh(*MESHES["sphere"]), copied(MESHES["sphere"], 1)
+    labels = np.zeros(first.faces.size, dtype=int)
+    assert congruence(first, second, ROUNDING, (labels, labels)) is not None
+    assert congruence(first, second, ROUNDING, (labels, np.eye(1, labels.size, dtype=int)[0])) is None

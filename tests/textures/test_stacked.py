@@ -215,3 +215,50 @@ def test_components_of_another_shape_far_from_the_origin_share_no_texels(height,
     model = shapes.join((vertices, faces), stretched)
     result = unwrap(*model, stack="copies")
     assert any("No component shares" in note for note in result.notes)
+
+
+def copies_of_sphere(kind):
+    """Return the vertices and faces of a sphere, and those of a copy of it."""
+    vertices, faces = shapes.sphere(1, seed=3)
+    if kind == "back":
+        return (vertices, faces), (vertices, faces[:, ::-1])
+    if kind == "mirrored":
+        return (vertices, faces), (vertices * [-1, 1, 1] + [5, 0, 0], faces[:, ::-1])
+    moved = vertices + np.array([5, 0, 0]), faces
+    return (vertices, faces), shapes.renumber(*moved, seed=1)[:2] if kind == "renumbered" else moved
+
+
+@pytest.mark.parametrize("kind", ["moved", "renumbered", "mirrored", "back"])
+def test_edges_that_are_forbidden_in_a_copy_are_not_cut(kind):
+    first, second = copies_of_sphere(kind)
+    model = shapes.join(first, second)
+    stacked = unwrap(*model, stack="copies")
+    assert any("1 component shares" in note for note in stacked.notes)
+    in_copy = stacked.seams[(stacked.seams >= len(first[0])).all(axis=1)]
+    assert len(in_copy)
+    result = unwrap(*model, stack="copies", no_seams=in_copy)
+    cut, forbidden = ({tuple(sorted(edge)) for edge in edges.tolist()} for edges in (result.seams, in_copy))
+    assert not cut & forbidden
+    assert any("No component shares" in note for note in result.notes)
+
+
+@pytest.mark.parametrize("is_mirrored", [False, True])
+def test_copies_with_the_same_forbidden_edges_share_texels(is_mirrored):
+    first, second = copies_of_sphere("mirrored" if is_mirrored else "moved")
+    forbidden = unwrap(*first).seams[:3]
+    pairs = np.concatenate([forbidden, forbidden + len(first[0])])
+    result = unwrap(*shapes.join(first, second), stack="copies", no_seams=pairs)
+    assert any("1 component shares" in note for note in result.notes)
+
+
+@pytest.mark.parametrize(("is_third_mirrored", "count"), [(False, 2), (True, 1)])
+def test_the_number_of_mirrored_copies_is_that_of_flipped_ones(is_third_mirrored, count):
+    """A renumbered mirror image, and a copy or mirror image of that with its numbers."""
+    vertices, faces = shapes.hill(8, 6)
+    image, corners, _ = shapes.renumber(vertices * [-1, 1, 1] + [5, 0, 0], faces[:, ::-1], seed=3)
+    third = (image * [-1, 1, 1], corners[:, ::-1]) if is_third_mirrored else (image, corners)
+    model = shapes.join((vertices, faces), (image, corners), (third[0] + [20, 0, 0], third[1]))
+    result = unwrap(*model, stack="copies")
+    areas = signed_double_areas(result.corner_uv).reshape(3, -1)
+    assert ((areas < 0).all(axis=1)).sum() == count
+    assert any(f"{count} of them {'is' if count == 1 else 'are'} mirrored" in note for note in result.notes)

@@ -37,7 +37,12 @@ class Congruence:
     is_mirrored: bool
 
 
-def congruence(first: TriangleMesh, second: TriangleMesh, rounding: float) -> Congruence | None:
+def congruence(
+    first: TriangleMesh,
+    second: TriangleMesh,
+    rounding: float,
+    labels: tuple[IntArray, IntArray] | None = None,
+) -> Congruence | None:
     """Return a congruence of two meshes, a mirror image only if there is no other; None if there is none.
 
     A face of one that is unlike most others is laid onto the faces of the other that it fits.
@@ -45,6 +50,7 @@ def congruence(first: TriangleMesh, second: TriangleMesh, rounding: float) -> Co
     Args:
         first, second: two meshes.
         rounding: rounding errors of both meshes, relative to the largest coordinates; see `position_tolerance`.
+        labels: (3m,) for each mesh, values of the corners that are the same for corresponding ones; None for no such.
     """
     if first.vertices.shape != second.vertices.shape or first.faces.shape != second.faces.shape:
         return None
@@ -66,7 +72,9 @@ def congruence(first: TriangleMesh, second: TriangleMesh, rounding: float) -> Co
             turn = _orthogonal(points, images[vertex], sign)
             if np.abs(points @ turn - images[vertex]).max() <= tolerance:
                 matched = _matched_corners(vertex[first.faces], second.faces, sign < 0)
-                if matched is not None and has_same_sides(first, second, matched):
+                if matched is None or (labels is not None and (labels[0][matched] != labels[1]).any()):
+                    continue
+                if has_same_sides(first, second, matched):
                     return Congruence(matched, sign < 0)
     return None
 

@@ -62,7 +62,7 @@ def find_copies(
     for i, component in enumerate(components):
         if i in excluded or has_vertex_options(component):
             continue
-        key = _copy_key(component) if rounding is None else (np.sort(component.mesh.faces, axis=1).tobytes(),)
+        key = _copy_key(component) if rounding is None else _numbered_key(component)
         alike = kinds.setdefault(key, [])
         for first in alike[:MAX_COMPARED]:
             is_reversed = _reversed_faces(components[first], component)
@@ -111,6 +111,25 @@ def has_vertex_options(component: Component) -> bool:
     )
 
 
+def option_labels(component: Component) -> IntArray:
+    """Return (3m,) the options for the vertex and the opposite side of each corner, as bits: equal for copies."""
+    vertices, edges = component.mesh.faces.ravel(), component.mesh.halfedge_edges
+    flags = (
+        component.seams.is_avoided[edges],
+        component.seams.is_forbidden[edges],
+        component.cones.is_allowed[vertices],
+        component.metric.keeps_length[vertices],
+    )
+    return sum((flag.astype(np.int64) << bit for bit, flag in enumerate(flags)), np.zeros_like(vertices))
+
+
+def _numbered_key(component: Component) -> tuple[object, ...]:
+    """Return a hash key that is equal for the same faces with the same options, with their corners in any order."""
+    faces = component.mesh.faces
+    labels = option_labels(component)[_order_by_vertex(faces)]
+    return np.sort(faces, axis=1).tobytes(), labels.tobytes()
+
+
 def _copy_key(component: Component) -> tuple[object, ...]:
     """Return a hash key that is equal for copies, and differs for most other components."""
     lengths = component.lengths
@@ -118,13 +137,7 @@ def _copy_key(component: Component) -> tuple[object, ...]:
     shape = [
         float(f"{value / size:.{MATCHED_DIGITS}g}") for value in (lengths[0, 0], lengths.sum(), lengths.max())
     ]
-    flags = (
-        component.seams.is_avoided,
-        component.seams.is_forbidden,
-        component.cones.is_allowed,
-        component.metric.keeps_length,
-    )
-    return (component.mesh.faces.tobytes(), *(flag.tobytes() for flag in flags), *shape)
+    return (component.mesh.faces.tobytes(), option_labels(component).tobytes(), *shape)
 
 
 def _reversed_faces(first: Component, component: Component) -> BoolArray:

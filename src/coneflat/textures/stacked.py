@@ -14,7 +14,7 @@ import numpy as np
 from ..base import IntArray, plural
 from ..mesh import weld
 from ..source import Component, Congruence, Prepared, congruence, find_copies, has_vertex_options
-from ..source.copies import MAX_COMPARED, numbered_corners
+from ..source.copies import MAX_COMPARED, numbered_corners, option_labels
 from .sharing import SharedTexels
 
 # Largest relative difference of the sizes of copies that share texels: those of other sizes would have another density.
@@ -25,21 +25,29 @@ SAME_SIZE, SAME_PLACE = 1e-4, 1e-5
 def without_copies(prepared: Prepared) -> tuple[SharedTexels, Prepared]:
     """Return the copies among the components of an input, and the input without them."""
     components = prepared.components
-    corners, partners, copied, mirrored = list[IntArray](), list[IntArray](), set[int](), set[int]()
+    corners, partners, copied = list[IntArray](), list[IntArray](), set[int]()
     places = weld(prepared.checked.mesh.vertices)[1]
     first_side = dict[bytes, int]()
     # For each component, the corners in an order of their own, and the corners whose UV they have.
     orders, shown = list[IntArray](), list[IntArray]()
+    # Whether each component is a mirror image of that whose texels it shares; the back of cloth is if its front is.
+    is_mirrored = list[bool]()
+    mirrored_count = 0
     for i, (component, copy) in enumerate(zip(components, _matched_copies(components), strict=True)):
-        key, order = _ordered_corners(places[component.vertices][component.mesh.faces])
-        side, matched = first_side.setdefault(key, i), _corners_of(component)
+        key, order = _ordered_corners(
+            places[component.vertices][component.mesh.faces], option_labels(component)
+        )
+        side, matched, mirrors = first_side.setdefault(key, i), _corners_of(component), False
         if side != i:
             matched = np.empty_like(matched)
             matched[order] = shown[side][orders[side]]
+            mirrors = is_mirrored[side]
         elif copy is not None:
             first, match = copy
             matched = shown[first][match.corners]
-            mirrored |= {i} if match.is_mirrored else set()
+            mirrors = match.is_mirrored != is_mirrored[first]
+            mirrored_count += mirrors
+        is_mirrored.append(mirrors)
         shown.append(matched)
         orders.append(order)
         if matched[0] // 3 != component.faces[0]:
@@ -47,7 +55,7 @@ def without_copies(prepared: Prepared) -> tuple[SharedTexels, Prepared]:
             corners.append(_corners_of(component))
             partners.append(matched)
     remaining = tuple(component for i, component in enumerate(components) if i not in copied)
-    note = _note(len(copied), len(mirrored))
+    note = _note(len(copied), mirrored_count)
     shared = SharedTexels(_joined(corners), _joined(partners), has_own_points=False, note=note)
     return shared, replace(prepared, components=remaining)
 
@@ -80,7 +88,9 @@ def _first_match(
 ) -> tuple[int, Congruence] | None:
     """Return the first of some components to which another one is congruent, and how; None if there is none."""
     for first in kind if not has_vertex_options(component) else ():
-        match = congruence(components[first].mesh, component.mesh, SAME_PLACE)
+        candidate = components[first]
+        labels = option_labels(candidate), option_labels(component)
+        match = congruence(candidate.mesh, component.mesh, SAME_PLACE, labels)
         if match is not None:
             return first, match
     return None
@@ -88,7 +98,7 @@ def _first_match(
 
 def _note(count: int, mirrored: int) -> str:
     if not count:
-        return "No component shares the texels of another: copies have the same shape, size and triangles."
+        return "No component shares the texels of another: copies have the same shape, size, triangles and options."
     verb, copula = ("shares" if count == 1 else "share"), ("is" if mirrored == 1 else "are")
     flips = (
         f" {mirrored:,} of them {copula} mirrored, which flips the triangles in the texture."
@@ -107,12 +117,15 @@ def _joined(arrays: Sequence[IntArray]) -> IntArray:
     return np.concatenate(arrays) if arrays else np.empty(0, dtype=np.int64)
 
 
-def _ordered_corners(places: IntArray) -> tuple[bytes, IntArray]:
+def _ordered_corners(places: IntArray, labels: IntArray) -> tuple[bytes, IntArray]:
     """Return a key that is equal for faces at the same places, of any orientation, and (3m,) the corners in its order.
 
-    places: (m, 3) the place of each corner.
+    Args:
+        places: (m, 3) the place of each corner.
+        labels: (3m,) further values of the corners that are equal, too.
     """
     within = np.argsort(places, axis=1, kind="stable")
     rows = np.take_along_axis(places, within, axis=1)
-    order = np.lexsort(rows.T[::-1])
-    return rows[order].tobytes(), (3 * order[:, None] + within[order]).ravel()
+    rank = np.lexsort(rows.T[::-1])
+    order = (3 * rank[:, None] + within[rank]).ravel()
+    return rows[rank].tobytes() + labels[order].tobytes(), order
