@@ -262,3 +262,32 @@ def test_the_number_of_mirrored_copies_is_that_of_flipped_ones(is_third_mirrored
     areas = signed_double_areas(result.corner_uv).reshape(3, -1)
     assert ((areas < 0).all(axis=1)).sum() == count
     assert any(f"{count} of them {'is' if count == 1 else 'are'} mirrored" in note for note in result.notes)
+
+
+def quad_patch(start, is_mirrored=False):
+    """Return the vertices and quads of a curved patch; each quad begins with its corner `start`."""
+    number = np.arange(36).reshape(6, 6)
+    corners = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
+    quads = np.roll(np.stack(corners, axis=2).reshape(-1, 4), -start, axis=1)
+    x, y = (values.ravel() / 5 for values in np.meshgrid(np.arange(6), np.arange(6), indexing="ij"))
+    vertices = np.stack([x * (1 + 0.5 * y), y + 0.2 * x * x, 0.3 * np.sin(4 * x + y)], axis=1)
+    return (vertices * [-1, 1, 1], quads[:, ::-1]) if is_mirrored else (vertices, quads)
+
+
+@pytest.mark.parametrize("ending", [".obj", ".glb", ".ply"])
+@pytest.mark.parametrize("is_mirrored", [False, True])
+@pytest.mark.parametrize("start", [0, 1, 2])
+def test_written_quads_of_copies_do_not_overlap_however_they_begin(tmp_path, start, is_mirrored, ending):
+    """Readers split the quads of the copy along other diagonals than those of the first."""
+    patches = [quad_patch(0), quad_patch(start), quad_patch(start, is_mirrored)]
+    path = tmp_path / "quads.obj"
+    with path.open("w") as file:
+        for k, (vertices, quads) in enumerate(patches):
+            vertices = vertices + np.array([3 * k, 0, 0])
+            file.writelines(f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in vertices)
+            file.writelines("f " + " ".join(map(str, quad)) + "\n" for quad in quads + 1 + 36 * k)
+    result = unwrap(path, stack="copies")
+    assert any("2 components share" in note for note in result.notes)
+    stored = result.as_written(ending)
+    assert (stored.distortion.flipped, stored.distortion.overlapping_pairs) == (0, 0)
+    assert stored.distortion.charts == result.distortion.charts

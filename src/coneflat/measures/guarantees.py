@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..base.arrays import BoolArray, FloatArray, mask_of, unit_exponent
+from ..base.arrays import BoolArray, FloatArray, IntArray, mask_of, unit_exponent
 from ..base.notes import Unmet
 from ..base.text import list_some, plural
 from ..geometry.overlap import Overlaps
 from ..geometry.planar import sides_between, signed_double_areas
 from ..mesh.connectivity import TriangleMesh, are_among, label_faces
+from ..mesh.polygons import polygon_of
 from .distortion import angle_sum_errors, measure, measure_map
 from .report import MAP_MEASURES
 from .seam_data import Rotations, seam_rotations
@@ -110,7 +111,7 @@ def remeasured(
 
 
 def first_faces(result: Flattening) -> BoolArray:
-    """Return (m,) True for the faces that are measured: of several that share their texels, the first.
+    """Return (m,) True for the faces that are measured: of several polygons that share their texels, the first.
 
     Halves and copies of a model that share texels by choice do not overlap each other.
     """
@@ -118,10 +119,36 @@ def first_faces(result: Flattening) -> BoolArray:
     if plane is not None:
         is_first = result.vertices[result.faces].mean(axis=1) @ plane[:3] > plane[3]
     elif result.settings.get("stack") == "copies":
+        polygons = _polygons_of(result)
         fronts = np.flatnonzero(~_is_back(result))
-        _, first = np.unique(np.sort(result.uv_faces[fronts], axis=1), axis=0, return_index=True)
-        is_first = mask_of(len(is_first), fronts[first])
+        first = _first_polygons(polygons[fronts], result.uv_faces[fronts])
+        is_first = mask_of(len(is_first), fronts[np.isin(polygons[fronts], first)])
     return np.asarray(is_first)
+
+
+def _polygons_of(result: Flattening) -> IntArray:
+    """Return (m,) the polygon of the file that each triangle belongs to; without a file, each is a polygon."""
+    if result.source is None or result.face_corners is None:
+        return np.arange(len(result.faces))
+    return polygon_of(result.face_corners, result.source.offsets)
+
+
+def _first_polygons(polygons: IntArray, uv_faces: IntArray) -> IntArray:
+    """Return the polygons at points of the plane that no polygon before has, in whichever triangles they are split.
+
+    Args:
+        polygons: (m,) the polygon of each triangle.
+        uv_faces: (m, 3) the points of the triangles.
+    """
+    count = int(uv_faces.max(initial=-1)) + 1
+    polygon, point = np.divmod(np.unique(np.repeat(polygons, 3) * count + uv_faces.ravel()), max(count, 1))
+    names, starts, sizes = np.unique(polygon, return_index=True, return_counts=True)
+    first = list[IntArray]()
+    for size in np.unique(sizes):
+        of_size = np.flatnonzero(sizes == size)
+        points = point[starts[of_size, None] + np.arange(size)]
+        first.append(names[of_size[np.unique(points, axis=0, return_index=True)[1]]])
+    return np.concatenate(first) if first else np.empty(0, dtype=np.int64)
 
 
 def _is_back(result: Flattening) -> BoolArray:
