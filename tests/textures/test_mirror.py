@@ -270,3 +270,26 @@ def test_both_sides_of_mirrored_cloth_have_their_images(turned):
     # The two halves of each sheet share their texels.
     texels = [np.sort(np.round(uv, 9), axis=0).tobytes() for uv in result.uv[result.uv_faces]]
     assert len(set(texels)) == count
+
+
+def test_edges_that_are_forbidden_in_either_half_are_not_cut():
+    vertices, faces = SHAPES["ball"]
+    seams = unwrap(vertices, faces, stack="mirrored", max_energy=4.05).seams
+    places = vertices[seams].mean(axis=1)[:, 0]
+    for in_half in (places > 1e-9, places < -1e-9):
+        forbidden = seams[in_half]
+        assert len(forbidden)
+        result = unwrap(vertices, faces, stack="mirrored", max_energy=4.05, no_seams=forbidden)
+        cut, kept_edges = (
+            set(map(tuple, np.sort(edges, axis=1).tolist())) for edges in (result.seams, forbidden)
+        )
+        assert not cut & kept_edges
+
+
+def test_a_forbidden_edge_whose_image_is_marked_is_noted():
+    vertices, faces = SHAPES["ball"]
+    seams = unwrap(vertices, faces, stack="mirrored", max_energy=4.05).seams
+    places = vertices[seams].mean(axis=1)[:, 0]
+    marks, forbidden = (seams[in_half] for in_half in (places > 1e-9, places < -1e-9))
+    result = unwrap(vertices, faces, stack="mirrored", seams=marks, no_seams=forbidden)
+    assert any("that must not be cut are cut" in note for note in result.notes)

@@ -56,7 +56,8 @@ class NoMirror:
 def half_of(prepared: Prepared, source: Source, options: Options) -> tuple[SharedTexels, Prepared]:
     """Return which half of an input shares the texels of the other, and the other half, cut along the mirror plane.
 
-    An edge is cut if it or its mirror image is marked, unless its half forbids it.
+    An edge is cut if it or its mirror image is marked, unless its half forbids it. Others are not cut if they or their
+    mirror images are forbidden.
 
     Args:
         prepared: the input.
@@ -69,6 +70,7 @@ def half_of(prepared: Prepared, source: Source, options: Options) -> tuple[Share
     checked = prepared.checked
     mirror = find_mirror(checked.mesh)
     ends = checked.mesh.edges[mirror.middle]
+    options, notes = _with_images_of_forbidden(mirror, prepared, options)
     cut = _with_images_of_marks(mirror, ends, source, options)
     half = [_with_free(component, ends) for component in cut.components if mirror.is_half[component.faces[0]]]
     plane = [*mirror.plane[:3].tolist(), float(np.ldexp(mirror.plane[3], -checked.exponent))]
@@ -79,7 +81,43 @@ def half_of(prepared: Prepared, source: Source, options: Options) -> tuple[Share
         note="The two halves share their texels; all measures are those of one half.",
         settings={"mirror_plane": plane},
     )
-    return shared, replace(cut, components=tuple(half))
+    return shared, replace(cut, components=tuple(half), notes=(*cut.notes, *notes))
+
+
+def _with_images_of_forbidden(
+    mirror: Mirror, prepared: Prepared, options: Options
+) -> tuple[Options, tuple[Unmet, ...]]:
+    """Return options that forbid the mirror images of forbidden edges, too, and a note on those that are marked."""
+    pairs = _forbidden_in(prepared)
+    images = np.sort(_images_of(mirror, prepared.checked.mesh)[pairs], axis=1)
+    is_marked = are_among(images, prepared.seams)
+    if not len(pairs):
+        return options, ()
+    ends = np.unique(np.concatenate([pairs, images[~is_marked]]), axis=0)
+    options = replace(options, no_seams=prepared.checked.vertex_origin[ends])
+    if not is_marked.any():
+        return options, ()
+    count, verb = plural(int(is_marked.sum()), "edge"), "is" if is_marked.sum() == 1 else "are"
+    note = f"{count} that must not be cut {verb} cut: in the half that is unwrapped, the mirror images are marked."
+    return options, (Unmet(note),)
+
+
+def _forbidden_in(prepared: Prepared) -> IntArray:
+    """Return (k, 2) the vertices of the edges that must not be cut."""
+    return np.concatenate(
+        [
+            np.sort(component.vertices[component.mesh.edges[component.seams.is_forbidden]], axis=1)
+            for component in prepared.components
+        ]
+    )
+
+
+def _images_of(mirror: Mirror, mesh: TriangleMesh) -> IntArray:
+    """Return (n,) the mirror images of vertices in the half that is unwrapped; for those of this half, themselves."""
+    corners = mesh.faces.ravel()
+    image = np.arange(len(mesh.vertices))
+    image[corners[mirror.images.ravel()]] = corners[mirror.corners.ravel()]
+    return image
 
 
 def _with_images_of_marks(mirror: Mirror, ends: IntArray, source: Source, options: Options) -> Prepared:
@@ -90,14 +128,8 @@ def _with_images_of_marks(mirror: Mirror, ends: IntArray, source: Source, option
         source, options: the input, and the options for it.
     """
     cut = _with_seams(source, options, ends)
-    corners = cut.checked.mesh.faces.ravel()
-    image = np.arange(len(cut.checked.mesh.vertices))
-    image[corners[mirror.images.ravel()]] = corners[mirror.corners.ravel()]
-    forbidden = [
-        component.vertices[component.mesh.edges[component.seams.is_forbidden]] for component in cut.components
-    ]
-    images = image[cut.seams]
-    is_blocked = are_among(images, np.concatenate(forbidden))
+    images = _images_of(mirror, cut.checked.mesh)[cut.seams]
+    is_blocked = are_among(images, _forbidden_in(cut))
     is_missing = ~are_among(images, cut.seams) & ~is_blocked
     if is_missing.any():
         cut = _with_seams(source, options, np.concatenate([ends, images[is_missing]]))
