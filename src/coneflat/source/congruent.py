@@ -72,9 +72,7 @@ def congruence(
             turn = _orthogonal(points, images[vertex], sign)
             if np.abs(points @ turn - images[vertex]).max() <= tolerance:
                 matched = _matched_corners(vertex[first.faces], second.faces, sign < 0)
-                if matched is None or (labels is not None and (labels[0][matched] != labels[1]).any()):
-                    continue
-                if has_same_sides(first, second, matched):
+                if matched is not None and _is_same(first, second, matched, labels):
                     return Congruence(matched, sign < 0)
     return None
 
@@ -93,6 +91,14 @@ def position_tolerance(first: TriangleMesh, second: TriangleMesh, rounding: floa
     centred = first.vertices - first.vertices.mean(axis=0)
     radius = float(np.linalg.norm(centred, axis=1).max())
     return min(2 * rounding * reach, SAME_SHAPE * radius)
+
+
+def _is_same(
+    first: TriangleMesh, second: TriangleMesh, corners: IntArray, labels: tuple[IntArray, IntArray] | None
+) -> bool:
+    """Return whether corresponding corners have the same labels and opposite sides; arguments as of `congruence`."""
+    is_labelled = labels is None or np.array_equal(labels[0][corners], labels[1])
+    return is_labelled and has_same_sides(first, second, corners)
 
 
 def has_same_sides(first: TriangleMesh, second: TriangleMesh, corners: IntArray) -> bool:
