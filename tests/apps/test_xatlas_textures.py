@@ -170,6 +170,19 @@ class TestLimits:
         # The triangle fills the texture.
         assert 120 <= atlas.texels_per_unit < 180
 
+    def test_faces_that_are_packed_separately_begin_at_corners_of_blocks(self, monkeypatch):
+        def fails(*arguments, **options):
+            raise errors.ConvergenceError("no metric")
+
+        for name in ("unwrap", "unwrap_in_textures"):
+            monkeypatch.setattr(soup, name, fails)
+        for density in (0.0, 5.0, 40.0):
+            with pytest.warns(coneflat.GuaranteeWarning, match="Each face is a chart of its own"):
+                atlas = generated([scattered(20)], resolution=128, blockAlign=True, texels_per_unit=density)
+            _, faces, uv = atlas[0]
+            blocks = (uv[faces] * 128).min(axis=1) / 4
+            assert np.abs(blocks - np.round(blocks)).max() < 1e-4
+
     @pytest.mark.parametrize("density", [5.0, 40.0])
     def test_faces_that_are_packed_separately(self, monkeypatch, density):
         def fails(*arguments, **options):
