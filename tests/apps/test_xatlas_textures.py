@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
@@ -169,6 +170,37 @@ class TestLimits:
         assert atlas.atlas_count == 1
         # The triangle fills the texture.
         assert 120 <= atlas.texels_per_unit < 180
+
+    @pytest.mark.parametrize(
+        ("density", "has_blocks"),
+        [(59.0, False), (200.0, False), (55.0, True), pytest.param(58.0, True, marks=pytest.mark.slow)],
+    )
+    def test_charts_are_not_cut_where_this_permits_no_larger_density(self, density, has_blocks):
+        # A side of the cube fills a texture of 64 texels without its padding, and in whole blocks.
+        largest = 14 * 4 if has_blocks else 60
+        with pytest.warns(coneflat.GuaranteeWarning) if density > largest else nullcontext():
+            atlas = generated(
+                [shapes.box(1, (1.0, 1.0, 1.0))],
+                resolution=64,
+                padding=2,
+                texels_per_unit=density,
+                blockAlign=has_blocks,
+            )
+        assert (atlas.atlas_count, atlas.chart_count) == (6, 6)
+        assert 0.99 * min(density, largest) <= atlas.texels_per_unit <= largest * (1 + 1e-9)
+
+    def test_faces_that_are_packed_separately_begin_at_corners_of_blocks(self, monkeypatch):
+        def fails(*arguments, **options):
+            raise errors.ConvergenceError("no metric")
+
+        for name in ("unwrap", "unwrap_in_textures"):
+            monkeypatch.setattr(soup, name, fails)
+        for density in (0.0, 5.0, 40.0):
+            with pytest.warns(coneflat.GuaranteeWarning, match="Each face is a chart of its own"):
+                atlas = generated([scattered(20)], resolution=128, blockAlign=True, texels_per_unit=density)
+            _, faces, uv = atlas[0]
+            blocks = (uv[faces] * 128).min(axis=1) / 4
+            assert np.abs(blocks - np.round(blocks)).max() < 1e-4
 
     @pytest.mark.parametrize("density", [5.0, 40.0])
     def test_faces_that_are_packed_separately(self, monkeypatch, density):

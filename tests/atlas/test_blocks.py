@@ -112,3 +112,25 @@ def test_invalid_blocks_are_refused(block_size, message):
 def test_blocks_larger_than_the_texture_leave_no_space():
     with pytest.raises(OptionError, match="leave no space"):
         pack_charts(triangles(2), np.arange(2), resolution=32, padding=2, block_size=64)
+
+
+@pytest.mark.parametrize(
+    ("options", "count"),
+    [
+        ({"resolution": 100, "padding": 2, "block_size": 256}, 1),
+        ({"resolution": 16, "padding": 3.9, "block_size": 8}, 3),
+        ({"resolution": 256, "padding": 0, "block_size": 256}, 3),
+        ({"resolution": 256, "padding": 0, "block_size": 200}, 3),
+    ],
+)
+def test_errors_name_the_blocks_that_leave_no_space(options, count):
+    charts = triangles(count), np.arange(count)
+    with pytest.raises(OptionError, match=r"blocks.* space .*use a smaller block_size"):
+        pack_charts(*charts, **options)
+    pack_charts(*charts, **options | {"block_size": 1})
+
+
+def test_errors_do_not_name_blocks_where_the_padding_alone_leaves_no_space():
+    with pytest.raises(OptionError, match="leave no space") as caught:
+        pack_charts(triangles(2), np.arange(2), resolution=32, padding=16, block_size=4)
+    assert "block" not in str(caught.value)

@@ -14,7 +14,7 @@ from shapes import sphere
 import coneflat
 from coneflat.apps.batch import find_jobs
 from coneflat.errors import MissingUVError, OptionError
-from coneflat.io import read_mesh_from
+from coneflat.io import read_mesh_from, write_measured
 
 # The corners of the ball, whose two materials are parts of it, are compared in the numbers of the file.
 SETS = ("TEXCOORD_0", "TEXCOORD_1")
@@ -132,6 +132,14 @@ class TestScene:
         notes = result.as_written(".glb", uv_set=uv_set).notes
         assert any("old UVs" in note or "replaced" in note for note in notes) == is_outdated
 
+    @pytest.mark.parametrize("uv_set", [None, 0, 1])
+    @pytest.mark.parametrize("options", [{}, {"lightmap": 128}])
+    def test_the_notes_of_a_written_file_are_those_of_its_set_alone(self, tmp_path, options, uv_set):
+        for content in (rich_scene(), textured_square({})):
+            result = coneflat.unwrap(read_mesh_from(content, "a.glb"), **options)
+            written = write_measured(result, tmp_path / "out.glb", uv_set=uv_set)
+            assert written.notes == result.as_written(".glb", uv_set=uv_set).notes
+
     def test_writing_again_changes_nothing(self, tmp_path):
         square = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
         result = coneflat.unwrap(read_mesh_from(textured_square({"TEXCOORD_0": square}), "a.glb"))
@@ -173,6 +181,24 @@ class TestOneMesh:
             "The input has no UVs: both UV sets of the file are the new ones.",
         )
 
+    @pytest.mark.parametrize("uv_set", [None, 0, 1])
+    def test_the_notes_of_a_written_file_are_those_of_its_set_alone(self, tmp_path, uv_set):
+        result = coneflat.unwrap(*sphere(1), lightmap=128)
+        written = write_measured(result, tmp_path / "out.glb", uv_set=uv_set)
+        is_second = uv_set != 0
+        assert any("both UV sets" in note for note in written.notes) == is_second
+
+    def test_a_command_names_textures_of_the_old_uvs_only_if_these_are_replaced(self, tmp_path):
+        (tmp_path / "a.glb").write_bytes(
+            textured_square({"TEXCOORD_0": np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)})
+        )
+        for uv_set in ("0", "1"):
+            done = command("unwrap", "a.glb", "-o", "b.glb", "--uv-set", uv_set, cwd=tmp_path)
+            assert done.returncode == 0
+            assert ("made for the old UVs" in " ".join((done.stdout + done.stderr).split())) == (
+                uv_set == "0"
+            )
+
     def test_corners_without_uvs_are_counted(self, tmp_path):
         (tmp_path / "a.obj").write_text(
             "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0.5 0.5\nf 1/1 2/1 3/1\nf 1 3 4\n"
@@ -202,10 +228,27 @@ class TestErrors:
         assert not list(tmp_path.iterdir())
         result.save(tmp_path / f"a{ending}", uv_set=0)
 
-    @pytest.mark.parametrize("uv_set", [2, -1, "1", 1.5])
+    @pytest.mark.parametrize(
+        "uv_set", [2, -1, "1", 1.0, 1.5, True, np.array([0, 1]), np.array(1.0), [1], "0"]
+    )
     def test_other_sets(self, uv_set, tmp_path):
-        with pytest.raises(OptionError, match="uv_set must be 0 or 1"):
-            coneflat.unwrap(*sphere(1)).save(tmp_path / "a.glb", uv_set=uv_set)
+        for result in (
+            coneflat.unwrap(*sphere(1)),
+            coneflat.unwrap(read_mesh_from(textured_square({}), "a.glb")),
+        ):
+            for call in (
+                lambda result=result: result.save(tmp_path / "a.glb", uv_set=uv_set),
+                lambda result=result: result.as_written(".glb", uv_set=uv_set),
+            ):
+                with pytest.raises(OptionError, match="uv_set must be 0 or 1"):
+                    call()
+
+    def test_integers_of_numpy_are_sets(self, rich, tmp_path):
+        written = [
+            rich[1].save(tmp_path / f"{i}.glb", texture="checker", uv_set=uv_set)
+            for i, uv_set in enumerate((1, np.int64(1)))
+        ]
+        assert written[0].read_bytes() == written[1].read_bytes()
 
     def test_commands_say_so_in_a_line_before_they_start(self, tmp_path):
         (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n")

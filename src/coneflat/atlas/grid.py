@@ -101,6 +101,7 @@ class Grid:
         columns: width to begin with.
         widest: largest width.
         narrowest: width that the longest chart needs.
+        block_count: as of `grid_of`.
     """
 
     masks: Masks
@@ -113,6 +114,7 @@ class Grid:
     columns: int
     widest: int
     narrowest: int
+    block_count: int | None
 
     def place(self, plan: Plan, width: int, limit: int) -> Placed:
         """Return the charts placed by a plan in tiles of a width, with at most `limit` rows."""
@@ -147,7 +149,7 @@ class Grid:
             failures += 1
             width += width // (12 if failures < MANY_FAILURES else 4) + 1
             if width > self.widest:
-                raise _no_space(self.gap, len(plan.order))
+                raise _no_space(self.gap, len(plan.order), self.block_count)
         return placed, width
 
     def packing(self, placed: Placed, width: int) -> Packing:
@@ -193,7 +195,7 @@ def grid_of(
         size = float(np.sqrt(extent.real * extent.imag).min(axis=1).mean())
         columns = int(min(columns, max(cells, 0.0) * side / size if size > 0 else columns))
     if columns < 1:
-        raise _no_space(gap, len(outlines))
+        raise _no_space(gap, len(outlines), block_count)
     if len(outlines) > GROUPED_CHARTS:
         boxes = (extent.real + extent.imag).min(axis=1)
         sizes = np.log(boxes + side / columns) // np.log(GROUP_RATIO)
@@ -208,11 +210,16 @@ def grid_of(
         return cover_charts(outlines, angles, width * masks.cell / blocks.across)
 
     narrowest = int(longest / masks.cell) + 1
-    return Grid(masks, masks_at, blocks, extent, group, gap, tiles, columns, widest, narrowest)
+    return Grid(masks, masks_at, blocks, extent, group, gap, tiles, columns, widest, narrowest, block_count)
 
 
-def _no_space(gap: float, count: int) -> OptionError:
+def _no_space(gap: float, count: int, block_count: int | None) -> OptionError:
+    cause = f"a gap of {100 * gap:.3g} % of the texture's width between {count:,} charts"
+    if block_count is None:
+        return OptionError(
+            f"{cause} leaves no space for them: use less padding, a higher resolution or more tiles"
+        )
     return OptionError(
-        f"a gap of {100 * gap:.3g} % of the texture's width between {count:,} charts leaves no space for them: use "
-        "less padding, a higher resolution or more tiles"
+        f"{cause} that begin at corners of {block_count:,} by {block_count:,} blocks leaves no space for them: use "
+        "a smaller block_size, less padding, a higher resolution or more tiles"
     )

@@ -123,8 +123,11 @@ class Frame:
             low, count = margin / resolution, math.floor((resolution - margin - padding) / block_size)
             side = count * block_size / resolution
         if side <= 0:
+            is_padding = block_size == 1 or 2 * padding >= resolution
+            blocks = "" if is_padding else f" and blocks of {block_size} texels"
+            advice = "" if is_padding else ": use a smaller block_size, or a higher resolution"
             raise OptionError(
-                f"{padding:g} texels of padding leave no space in a texture of {resolution} texels"
+                f"{padding:g} texels of padding{blocks} leave no space in a texture of {resolution} texels{advice}"
             )
         return cls(low, side, gap, count)
 

@@ -151,7 +151,7 @@ def write_stream(
     image = None if texture is None else find_texture(texture, result)
     form = _FORMATS[ending]
     # Rounded triangles must also be positively oriented and disjoint.
-    stored = as_written(result, ending, has_texture=texture is not None) if form.is_rounded else result
+    stored = as_stored(result, ending) if form.is_rounded else result
     form.write(stored, stream, folder, image, _chosen_uv_set(result, ending, uv_set))
     return stored
 
@@ -163,7 +163,8 @@ def _check_texture(name: object, ending: str, texture: PathName | None) -> None:
 
 def check_uv_set(name: object, ending: str, uv_set: int | None) -> None:
     """Raise OptionError if files of a format do not have a UV set; name: the file, for the message."""
-    if uv_set not in (None, 0, 1):
+    is_integer = isinstance(uv_set, (int, np.integer)) and not isinstance(uv_set, bool)
+    if uv_set is not None and not (is_integer and uv_set in (0, 1)):
         raise OptionError(f"uv_set must be 0 or 1, got {short_repr(uv_set)}")
     if uv_set and ending not in endings(Use.UV_SETS):
         formats = ", ".join(endings(Use.UV_SETS))
@@ -173,7 +174,7 @@ def check_uv_set(name: object, ending: str, uv_set: int | None) -> None:
 def _chosen_uv_set(result: Flattening, ending: str, uv_set: int | None) -> int:
     """Return the UV set that is written: by default the second one for lightmaps, where files have it."""
     if uv_set is not None:
-        return uv_set
+        return int(uv_set)
     return int(result.settings.get("lightmap") is not None and ending in endings(Use.UV_SETS))
 
 

@@ -88,8 +88,9 @@ class TextureOptions:
             the mirror plane, which no face may cross. copies: components that are copies of each other, moved, rotated
             or mirrored, share their texels, as do the two sides of cloth.
         lightmap: Texels along a side of a lightmap, instead of a resolution. Charts are 6 texels apart, enough
-            for half the resolution, and begin at corners of blocks of 4 texels, unless padding or block_size are given.
-            No texels are shared, and a .glb has the UVs as its second set.
+            for half the resolution, and begin at corners of blocks of 4 texels, unless padding or block_size are
+            given with other values than their defaults. No texels are shared, and a .glb has the UVs as its second
+            set.
         search_time: Seconds after which the search for seams ends: the best layout by then is returned, with a note.
             One layout of each component is computed in any case.
     """

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..atlas import Frame
 from ..base import Unmet, search_time, timing, warns
 from ..errors import OptionError
 from ..geometry import double_areas
@@ -23,7 +25,9 @@ from .unwrapping import Searched, cut_to_pack, pack_candidates, search_cuts
 
 #: Sides of charts that are tried, relative to that of a texture without its padding: charts may grow when seams move
 #: after cuts, and small charts are joined to them.
-CHART_SIDES = (0.98, 0.9, 0.8)
+CHART_SIDES = (0.99, 0.9, 0.8)
+#: The same for the largest density that charts permit, if it is smaller than the requested one.
+LOOSER_SIDES = (1.0, *CHART_SIDES)
 #: Share of the density that the largest chart permits, at which charts are packed if it is smaller than the requested
 #: one: the last percent would need a texture for each chart.
 PERMITTED = 0.99
@@ -53,15 +57,13 @@ def unwrap_in_textures(mesh: Any, faces: ArrayLike | None, density: float, **opt
     parsed = read_options(options, UnwrapOptions)
     with timing(parsed.progress), search_time(parsed.search_time):
         packing = _Packing(search_cuts(Source(as_input(mesh, faces)), parsed), parsed)
-        permitted = dict[float, float]()
-        for share in CHART_SIDES:
-            side = share * packing.side / density
-            result = packing.at_least(density, side)
-            permitted[side] = packing.permitted_density(result)
-            if density_of(result) >= density:
-                return result
-        side = max(permitted, key=lambda side: permitted[side])
-        result = packing.at_least(PERMITTED * permitted[side], side)
+        result, side, permitted = packing.densest(density, CHART_SIDES)
+        if density_of(result) >= density:
+            return result
+        # Charts need not be smaller than those that cannot be cut and permit no more.
+        possible = PERMITTED * permitted
+        looser = packing.densest(possible, LOOSER_SIDES)[0]
+        result = looser if density_of(looser) >= possible else packing.at_least(possible, side)
     return replace(result, notes=(*result.notes, too_large_charts(density_of(result), density)))
 
 
@@ -79,8 +81,32 @@ class _Packing:
 
     @property
     def side(self) -> float:
-        """The texels along a side of a texture, without its padding."""
-        return self.options.resolution - 2 * self.options.padding
+        """The texels along a side of a texture, without its padding, and in whole blocks.
+
+        Raises:
+            OptionError: the padding leaves no space for charts.
+        """
+        options = self.options
+        return options.resolution * Frame.of(options.resolution, options.padding, options.block_size).side
+
+    def densest(self, density: float, chart_sides: Sequence[float]) -> tuple[Flattening, float, float]:
+        """Return the first result with a density, or else the one whose largest chart permits the largest density.
+
+        Args:
+            density: texels per unit of length.
+            chart_sides: the sides of charts to try, relative to that of a texture.
+
+        Returns:
+            The result, the side to which its charts are cut, in units of length, and the density that they permit.
+        """
+        results = list[tuple[Flattening, float, float]]()
+        for share in chart_sides:
+            side = share * self.side / density
+            result = self.at_least(density, side)
+            results.append((result, side, self.permitted_density(result)))
+            if density_of(result) >= density:
+                return results[-1]
+        return max(results, key=lambda candidate: candidate[2])
 
     def at_least(self, density: float, chart_side: float) -> Flattening:
         """Return charts that are cut to a side, in few textures with a density; any number if charts do not permit it.
@@ -96,7 +122,7 @@ class _Packing:
             try:
                 result = pack_candidates(self.searched, candidates, options, options_of_stages(options))
             except OptionError:  # Maybe there is no space for so many charts in so few textures.
-                if textures == MAX_TEXTURES or 2 * self.options.padding >= self.options.resolution:
+                if textures == MAX_TEXTURES:
                     raise
                 textures = min(2 * textures, MAX_TEXTURES)
                 continue

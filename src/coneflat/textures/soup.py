@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -144,7 +145,8 @@ def _packed_separately(
     flat = np.stack([np.zeros(len(sides)), sides[:, 2], -sides[:, 1]], axis=1)
     charts = as_pairs(flat.ravel()).reshape(-1, 3, 2), np.arange(len(corners))
     resolution, density = options.resolution, options.texel_density
-    packed = pack_charts(*charts, resolution=resolution, padding=options.padding)
+    pack = partial(pack_charts, *charts, padding=options.padding, block_size=options.block_size)
+    packed = pack(resolution=resolution)
     while density is not None and resolution * packed.scale < density:
         # The padding, and with it the scale, depends on the resolution.
         resolution = max(2 * resolution, int(np.ceil(min(density / packed.scale, 2.0**62))))
@@ -152,7 +154,7 @@ def _packed_separately(
             raise OptionError(
                 f"texel_density is too large: {density:g} texels per unit need {resolution:,} texels per side"
             )
-        packed = pack_charts(*charts, resolution=resolution, padding=options.padding)
+        packed = pack(resolution=resolution)
     textures = 1
     while (
         needed is not None
@@ -162,7 +164,7 @@ def _packed_separately(
         # A chart needs one texture at most, where it limits the scale.
         ratio = min(needed / (resolution * packed.scale), float(MAX_TEXTURES))
         textures = min(max(math.ceil(textures * ratio**2), textures + 1), len(corners), MAX_TEXTURES)
-        packed = pack_charts(*charts, resolution=resolution, padding=options.padding, tiles=textures)
+        packed = pack(resolution=resolution, tiles=textures)
     notes: tuple[str, ...] = ()
     if needed is not None and resolution * packed.scale < needed:
         notes = (too_large_charts(resolution * packed.scale, needed),)
