@@ -67,12 +67,14 @@ def largest_chart(result):
     return int(first[np.bincount(chart).argmax()])
 
 
-class TestPacking:
-    @pytest.fixture(scope="class", params=[1, 1j, -1], ids=["pinned", "quarter turn", "half turn"])
-    def packed(self, request, result):
-        face = largest_chart(result)
-        return face, coneflat.repack(result, moves={face: about(result, face, request.param)})
+@pytest.fixture(scope="module", params=[1, 1j, -1], ids=["pinned", "quarter turn", "half turn"])
+def packed(request, result):
+    """The largest chart, and a layout in which it is turned and the others are packed around it."""
+    face = largest_chart(result)
+    return face, coneflat.repack(result, moves={face: about(result, face, request.param)})
 
+
+class TestPacking:
     def test_nothing_overlaps(self, packed):
         _, changed = packed
         assert changed.distortion.overlapping_pairs == 0

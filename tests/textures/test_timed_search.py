@@ -147,8 +147,10 @@ def test_an_ended_search_is_noted_again_when_packed_again():
 def test_the_packer_ends_early_once_the_time_is_up(reads, monkeypatch):
     monkeypatch.setattr(tight_packing, "MAX_LATE_WORK", 0)
     tries = []
-    original = tight_packing._changed
-    monkeypatch.setattr(tight_packing, "_changed", lambda *arguments: tries.append(1) or original(*arguments))
+    original = tight_packing.changed_plan
+    monkeypatch.setattr(
+        tight_packing, "changed_plan", lambda *arguments: tries.append(1) or original(*arguments)
+    )
     parts = crumbs([shapes.box()], 8)
     unwrap(*parts)
     assert len(tries) > 20
