@@ -65,6 +65,7 @@ def test_a_frame_of_a_notebook_shows_it_and_of_no_other_page(browser, page, tmp_
 #: The pixel of a pane, as bytes, at the middle of a triangle that is nearest to a place.
 PIXELS = """
 (() => { const {renderer, panes, model} = coneflat, {canvas, gl} = renderer, out = [];
+coneflat.redraw(); coneflat.drawStale();  // pixels can be read only in the task that draws them
 const bytes = new Uint8Array(4 * canvas.width * canvas.height);
 gl.bindFramebuffer(gl.FRAMEBUFFER, null);
 gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, bytes);

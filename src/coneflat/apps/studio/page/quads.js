@@ -38,9 +38,11 @@ class Quads {
   async hear({quads}) {
     if (quads === this.loaded) return;
     this.loaded = this.shown = quads;
-    this.part("quads-view").srcdoc = "";
     this.show();
-    if (!quads) return;
+    if (!quads) {
+      this.part("quads-view").srcdoc = ""; // Not before another page: of two navigations at a time, either may win.
+      return;
+    }
     const page = await this.studio.server.quadsPage().catch(orNone);
     if (!page || this.loaded !== quads) return;
     // Browsers complain of an element of a frame that asks for the focus.
