@@ -34,13 +34,6 @@ def drape(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return 0.05 * np.sin(5 * x) + 0.04 * np.cos(4 * x + 3 * y)
 
 
-def without(mesh: Arrays, is_dropped: np.ndarray) -> Arrays:
-    """Return a mesh without flagged triangles, and without vertices that none uses."""
-    vertices, faces = mesh
-    indices, corners = np.unique(faces[~is_dropped], return_inverse=True)
-    return vertices[indices], corners.reshape(-1, 3)
-
-
 def holed_sheet(holes: int, columns: int = 90) -> Arrays:
     """Return a gently curved sheet with round holes at places in rows."""
     vertices, faces = shapes.grid(columns, columns, drape)
@@ -49,7 +42,7 @@ def holed_sheet(holes: int, columns: int = 90) -> Arrays:
     row, column = np.divmod(np.arange(holes), rows)
     places = (np.stack([column, row], axis=1) + 0.5) / rows
     distance = np.linalg.norm(centres[:, None] - places, axis=2).min(axis=1)
-    return without((vertices, faces), distance < 0.25 / rows)
+    return shapes.without(vertices, faces, distance < 0.25 / rows)
 
 
 def noisy(mesh: Arrays, share: float = 0.2) -> Arrays:
@@ -74,7 +67,7 @@ def tower() -> Arrays:
     in_row = np.abs((3 * places[:, 2]) % 1 - 0.5) < 0.25
     is_window = (side < 2) & in_column & in_row
     is_roof_hole = (side == 2) & (places[:, 2] > 0.99) & (np.hypot(*(places[:, :2] - 0.5).T) < 0.2)
-    return without((vertices, faces), is_floor | is_window | is_roof_hole)
+    return shapes.without(vertices, faces, is_floor | is_window | is_roof_hole)
 
 
 def doubled(mesh: Arrays) -> Arrays:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
+from common import shapes as common_shapes
 from scipy.spatial import Delaunay
 
 Mesh = tuple[np.ndarray, np.ndarray]
@@ -77,7 +78,7 @@ def wedge() -> Mesh:
 
 def maze(cells: int = 12, corridor: float = 0.3, wall: float = 0.04) -> Mesh:
     """Return the floor of a maze: a flat sheet with narrow gaps between its corridors, and one long boundary."""
-    is_corridor = corridors(cells)
+    is_corridor = common_shapes.corridors(cells)
     places = np.concatenate([[0.0], np.cumsum(np.where(np.arange(len(is_corridor)) % 2, corridor, wall))])
     lines, marks = zip(*(_finer(places) for _ in range(2)), strict=True)
     i, j = np.nonzero(is_corridor[np.ix_(*marks)])
@@ -92,28 +93,10 @@ def maze(cells: int = 12, corridor: float = 0.3, wall: float = 0.04) -> Mesh:
 
 def cut_maze(cells: int = 10, corridor: float = 0.3, wall: float = 0.04, depth: float = 0.5) -> Mesh:
     """Return a plate into which the corridors of a maze are cut, with thin walls between them."""
-    is_corridor = corridors(cells)
+    is_corridor = common_shapes.corridors(cells)
     places = np.concatenate([[0.0], np.cumsum(np.where(np.arange(len(is_corridor)) % 2, corridor, wall))])
     is_solid = np.stack([np.ones_like(is_corridor), ~is_corridor], axis=2)
     return blocks(is_solid, (places, places, np.array([0.0, 0.1, 0.1 + depth])))
-
-
-def corridors(cells: int) -> np.ndarray:
-    """Return (2 cells + 1, 2 cells + 1) whether each block of a maze without closed ways is a part of a corridor."""
-    size, rng = 2 * cells + 1, np.random.default_rng(1)
-    is_corridor, way = np.zeros((size, size), dtype=bool), [(1, 1)]
-    is_corridor[1, 1] = True
-    while way:
-        i, j = way[-1]
-        steps = [(i + a, j + b) for a, b in ((2, 0), (-2, 0), (0, 2), (0, -2))]
-        steps = [(a, b) for a, b in steps if 0 < a < size and 0 < b < size and not is_corridor[a, b]]
-        if not steps:
-            way.pop()
-            continue
-        a, b = steps[rng.integers(len(steps))]
-        is_corridor[a, b] = is_corridor[(a + i) // 2, (b + j) // 2] = True
-        way.append((a, b))
-    return is_corridor
 
 
 def thin_box(thickness: float = 0.02) -> Mesh:

@@ -121,6 +121,30 @@ def blocks(pattern: list[str], size: int = 3):
     return points + 0.05 * np.sin(3 * points[:, [1, 2, 0]]), faces
 
 
+def corridors(cells: int, seed: int = 1) -> np.ndarray:
+    """Which of (2 cells + 1) x (2 cells + 1) blocks are the corridors of a maze without closed ways."""
+    size, rng = 2 * cells + 1, np.random.default_rng(seed)
+    is_corridor, way = np.zeros((size, size), dtype=bool), [(1, 1)]
+    is_corridor[1, 1] = True
+    while way:
+        i, j = way[-1]
+        steps = [(i + a, j + b) for a, b in ((2, 0), (-2, 0), (0, 2), (0, -2))]
+        steps = [(a, b) for a, b in steps if 0 < a < size and 0 < b < size and not is_corridor[a, b]]
+        if not steps:
+            way.pop()
+            continue
+        a, b = steps[rng.integers(len(steps))]
+        is_corridor[a, b] = is_corridor[(a + i) // 2, (b + j) // 2] = True
+        way.append((a, b))
+    return is_corridor
+
+
+def without(vertices: np.ndarray, faces: np.ndarray, is_dropped: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The mesh without flagged triangles, and without vertices that none uses."""
+    indices, corners = np.unique(faces[~is_dropped], return_inverse=True)
+    return vertices[indices], corners.reshape(-1, 3)
+
+
 def genus(handles: int):
     """A closed surface with so many handles."""
     return blocks(["#" * (2 * handles + 1), "#" + ".#" * handles, "#" * (2 * handles + 1)])

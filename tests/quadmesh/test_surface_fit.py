@@ -21,18 +21,7 @@ from coneflat.quadmesh.surface_fit import fit_to_surface
 def rough_maze(cells=8, corridor=3, seed=0):
     """A flat maze with narrow gaps between its corridors, turned and with an uneven boundary."""
     rng, size = np.random.default_rng(seed), 2 * cells + 1
-    is_corridor, way = np.zeros((size, size), dtype=bool), [(1, 1)]
-    is_corridor[1, 1] = True
-    while way:
-        i, j = way[-1]
-        steps = [(i + a, j + b) for a, b in ((2, 0), (-2, 0), (0, 2), (0, -2))]
-        steps = [(a, b) for a, b in steps if 0 < a < size and 0 < b < size and not is_corridor[a, b]]
-        if not steps:
-            way.pop()
-            continue
-        a, b = steps[rng.integers(len(steps))]
-        is_corridor[a, b] = is_corridor[(a + i) // 2, (b + j) // 2] = True
-        way.append((a, b))
+    is_corridor = shapes.corridors(cells, seed)
     widths = np.where(np.arange(size) % 2, corridor, 1)
     places = np.concatenate([[0.0], np.cumsum(np.repeat(np.where(np.arange(size) % 2, 0.1, 0.06), widths))])
     block = np.repeat(np.arange(size), widths)

@@ -23,8 +23,7 @@ def forked(bend):
     vertices, faces = shapes.grid(24, 24)
     centres = vertices[faces].mean(axis=1)
     is_slit = (np.abs(centres[:, 0] - 0.5) < 0.05) & (centres[:, 1] > 0.4)
-    indices, corners = np.unique(faces[~is_slit], return_inverse=True)
-    vertices, faces = vertices[indices], corners.reshape(-1, 3)
+    vertices, faces = shapes.without(vertices, faces, is_slit)
     height = np.clip(vertices[:, 1] - 0.4, 0, None)
     bent = vertices[:, :2].copy()
     bent[:, 0] -= np.sign(bent[:, 0] - 0.5) * bend * height**1.5
@@ -71,6 +70,5 @@ def noisy_sheet(columns=200):
     places = (np.stack(np.divmod(np.arange(60), 8), axis=1) + 0.5) / 8
     centres = vertices[faces].mean(axis=1)[:, :2]
     is_hole = (np.linalg.norm(centres[:, None] - places, axis=2) < 1 / 32).any(axis=1)
-    indices, corners = np.unique(faces[~is_hole], return_inverse=True)
-    noise = np.random.default_rng(0).standard_normal((len(indices), 3))
-    return vertices[indices] + 0.2 / columns * noise, corners.reshape(-1, 3)
+    vertices, faces = shapes.without(vertices, faces, is_hole)
+    return vertices + 0.2 / columns * np.random.default_rng(0).standard_normal(vertices.shape), faces

@@ -42,6 +42,19 @@ def reads(monkeypatch):
     return read
 
 
+@pytest.fixture
+def laid_out(monkeypatch):
+    """The components of the candidates that were laid out, in order."""
+    components = []
+    original = CutModel.candidate
+    monkeypatch.setattr(
+        CutModel,
+        "candidate",
+        lambda model, *arguments: components.append(model.component) or original(model, *arguments),
+    )
+    return components
+
+
 def check_note(result, taken, seconds) -> None:
     """Check that a note says that the time was up if it was; a part of it is reserved for packing."""
     notes = time_notes(result)
@@ -84,14 +97,7 @@ def test_after_the_time_hardly_any_work_is_left(reads):
     assert max(refused) <= 60
 
 
-def test_without_time_each_component_is_laid_out_once(reads, monkeypatch):
-    laid_out = []
-    original = CutModel.candidate
-    monkeypatch.setattr(
-        CutModel,
-        "candidate",
-        lambda model, *arguments: laid_out.append(model) or original(model, *arguments),
-    )
+def test_without_time_each_component_is_laid_out_once(reads, laid_out):
     two = shapes.join(shapes.sphere(3), shapes.genus(2))
     (note, *_) = time_notes(unwrap(*two, search_time=0))
     assert len(laid_out) == 2
@@ -107,15 +113,8 @@ def test_without_time_small_components_are_laid_out_together(reads, monkeypatch)
     assert time_notes(result)
 
 
-def test_components_share_the_time(reads, monkeypatch):
+def test_components_share_the_time(reads, laid_out):
     """Of two equal components, the second is searched as long as the first."""
-    laid_out = []
-    original = CutModel.candidate
-    monkeypatch.setattr(
-        CutModel,
-        "candidate",
-        lambda model, *arguments: laid_out.append(model.component) or original(model, *arguments),
-    )
     first, second = shapes.genus(2), shapes.genus(2)
     stretched = (np.asarray(second[0]) * [1, 1, 1.1] + 100, second[1])
     unwrap(*shapes.join(first, stretched), search_time=200)

@@ -65,11 +65,11 @@ def congruence(
     trials = list(_fitting_corners(first.faces, second.faces, points, images, tolerance))
     for sign in (1.0, -1.0):
         for corners, image_corners in trials:
-            turn = _orthogonal(points[corners], images[image_corners], sign)
+            turn = best_orthogonal(points[corners], images[image_corners], sign)
             vertex = _nearest(points @ turn, tree)
             if vertex is None:
                 continue
-            turn = _orthogonal(points, images[vertex], sign)
+            turn = best_orthogonal(points, images[vertex], sign)
             if np.abs(points @ turn - images[vertex]).max() <= tolerance:
                 matched = _matched_corners(vertex[first.faces], second.faces, sign < 0)
                 if matched is not None and _is_same(first, second, matched, labels):
@@ -147,7 +147,7 @@ def _shapes(corners: FloatArray) -> FloatArray:
     return np.linalg.norm(np.concatenate([corners, sides], axis=1), axis=2)
 
 
-def _orthogonal(points: FloatArray, images: FloatArray, sign: float) -> FloatArray:
+def best_orthogonal(points: FloatArray, images: FloatArray, sign: float) -> FloatArray:
     """Return the (3, 3) orthogonal matrix with a determinant of a sign that maps points (k, 3) best to their images.
 
     References:

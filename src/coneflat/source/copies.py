@@ -13,7 +13,7 @@ import numpy as np
 from ..base.arrays import BoolArray, FloatArray, IntArray
 from ..stages import Layout
 from .components import Component
-from .congruent import has_same_sides, position_tolerance
+from .congruent import best_orthogonal, has_same_sides, position_tolerance
 
 # Largest distance of the vertices of a copy from the transformed vertices of the first, relative to the largest
 # coordinates: rounding errors. And largest relative difference of side lengths: a tenth of the accuracy of metrics.
@@ -158,18 +158,14 @@ def _scale_of_copy(
         first, component: the two components.
         rounding: as of `find_copies`.
         is_mirrored: whether mirror images are copies, instead of others.
-
-    References:
-        W. Kabsch, "A solution for the best rotation to relate two sets of vectors", 1976.
     """
     first_centred, centred = (p.mesh.vertices - p.mesh.vertices.mean(axis=0) for p in (first, component))
     sizes = np.sqrt((first_centred * first_centred).sum()), np.sqrt((centred * centred).sum())
     if not (sizes[0] > 0 and sizes[1] > 0):
         return None
     scale = float(sizes[1] / sizes[0])
-    left, _, right = np.linalg.svd(first_centred.T @ centred)
-    handed = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right)) * (-1.0 if is_mirrored else 1.0)])
-    off: FloatArray = np.abs((first_centred @ ((left * handed) @ right)) * scale - centred).max(axis=1)
+    motion = best_orthogonal(first_centred, centred, -1.0 if is_mirrored else 1.0)
+    off: FloatArray = np.abs((first_centred @ motion) * scale - centred).max(axis=1)
     reach = float(np.abs(component.mesh.vertices).max() + scale * np.abs(first.mesh.vertices).max())
     sides = np.abs(scale * first.lengths - component.lengths)
     if rounding is not None:
