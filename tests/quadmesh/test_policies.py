@@ -8,7 +8,7 @@ import shapes
 
 import coneflat
 from coneflat.errors import ConvergenceError, GridError, OptionError
-from coneflat.quadmesh import policies
+from coneflat.quadmesh import attempt, policies
 from coneflat.quadmesh.extract import DegenerateQuads
 from coneflat.quadmesh.no_grid import REASONS, NoGrid, or_reason
 from coneflat.quadmesh.request import GridRequest
@@ -49,7 +49,7 @@ def test_the_first_coarse_grid_is_the_reason(monkeypatch):
         sizes.append(grid.size)
         return DegenerateQuads("too coarse")
 
-    monkeypatch.setattr(policies, "find_quads", always_degenerate)
+    monkeypatch.setattr(attempt, "find_quads", always_degenerate)
     monkeypatch.setattr(policies, "PRICE_FACTORS", (1.0,))
     request = GridRequest.of(*shapes.sphere(2), {"quads": 60}, {"cones": "sparse"})
     quads_request = replace(request, for_quads=True)

@@ -27,7 +27,7 @@ from shapes import grid as rectangle
 import coneflat
 from coneflat.errors import DegenerateFaceError, GridError
 from coneflat.geometry.nearest import surface_distances
-from coneflat.quadmesh import policies
+from coneflat.quadmesh import attempt, policies
 from coneflat.quadmesh.alignment import aligned
 from coneflat.quadmesh.extract import DegenerateQuads, extract_quads, find_quads
 from coneflat.quadmesh.no_grid import NoGrid
@@ -303,14 +303,14 @@ def test_cones_are_chosen_once_for_all_sizes_of_one_price(monkeypatch):
         return find_quads(grid)
 
     monkeypatch.setattr(policies, "aligned_flattening", count)
-    monkeypatch.setattr(policies, "find_quads", fail_twice)
-    monkeypatch.setattr(policies, "QUADS_AT_UNIT_PRICE", 1)
+    monkeypatch.setattr(attempt, "find_quads", fail_twice)
+    monkeypatch.setattr(attempt, "QUADS_AT_UNIT_PRICE", 1)
     monkeypatch.setattr(policies, "MAX_SPLIT_TRIANGLES", 0)
     mesh = coneflat.quads(*shapes.sphere(3), quads=200)
     assert len(chosen) == 1
     # The second grid is that of the fewest cones.
     assert sizes[0] == sizes[1] > sizes[2] == mesh.grid.size
-    monkeypatch.setattr(policies, "QUADS_AT_UNIT_PRICE", 1e6)
+    monkeypatch.setattr(attempt, "QUADS_AT_UNIT_PRICE", 1e6)
     sizes.clear()
     coneflat.quads(*shapes.sphere(3), quads=200)
     assert len(chosen) == 3
@@ -333,12 +333,12 @@ def test_a_large_grid_that_is_much_finer_than_requested_is_not_refined(monkeypat
             return DegenerateQuads("too coarse")
         return find_quads(grid)
 
-    monkeypatch.setattr(policies, "find_quads", fail_at_first)
+    monkeypatch.setattr(attempt, "find_quads", fail_at_first)
     options = {"cones": "sparse", "quads": 2000}
     assert coneflat.quads(*shapes.sphere(3), **options).left_out == 0
     assert len(grids) == 3
     grids.clear()
-    monkeypatch.setattr(policies, "aligned", lambda result, size, angle: aligned(result, size / 1.9, angle))
+    monkeypatch.setattr(attempt, "aligned", lambda result, size, angle: aligned(result, size / 1.9, angle))
     coneflat.quads(*shapes.sphere(3), **options)
     assert len(grids) == 1
 
@@ -347,7 +347,7 @@ def test_a_large_grid_that_is_much_finer_than_requested_is_not_refined(monkeypat
 def test_grids_whose_bad_quads_are_left_out_keep_all_notes(monkeypatch):
     """The first grid, of aligned cones, is taken, not that of the fewest cones."""
 
-    monkeypatch.setattr(policies, "find_quads", lambda grid: DegenerateQuads("too coarse"))
+    monkeypatch.setattr(attempt, "find_quads", lambda grid: DegenerateQuads("too coarse"))
     sizes = np.linspace(1, 2, len(shapes.sphere(3)[0]))
     even, graded = (coneflat.quads(*shapes.sphere(3), quads=200, size=size) for size in (None, sizes))
     assert not any("Cones are not chosen" in note for note in even.notes)
@@ -366,7 +366,7 @@ def test_a_thin_component_does_not_make_the_others_finer(monkeypatch):
             return DegenerateQuads("as thin as a square")
         return find_quads(grid)
 
-    monkeypatch.setattr(policies, "find_quads", fail_for_few)
+    monkeypatch.setattr(attempt, "find_quads", fail_for_few)
     small, triangles = shapes.sphere(2)
     mesh = coneflat.quads(*shapes.join(shapes.sphere(3), (small / 3 + 3, triangles)), quads=500)
     assert max(sizes) == pytest.approx(450, rel=0.1)

@@ -8,47 +8,45 @@
 
 `find_grid` calls the others: around each attempt `finer_grid`; for several components `components_apart`; for one,
 `other_cones` if the options leave the cones open, else `boundary_free`. Each returns a grid, or the reason why there is
-none, except `on_coarse_mesh`, which returns the request for a simpler mesh. A single attempt is `grid_of_map`: from a
-seamless map by rounding (which may leave out lines, or double the number of squares, see `round_layout`), then
-extraction.
+none, except `on_coarse_mesh`, which returns the request for a simpler mesh. A single attempt is in `attempt.py`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from numbers import Real
-from typing import TypeAlias
 
 import numpy as np
 
-from ..base import THREADS, IntArray, Unmet, limit_threads, plural
+from ..base import IntArray, Unmet, plural
 from ..errors import CoarseGridError, ConvergenceError, GridError, OptionError
-from ..flattener import flatten_source
 from ..geometry import coarse_mesh, double_areas, edge_lengths
 from ..io import as_input
-from ..measures import unmet_guarantees
 from ..mesh import with_fans
 from ..mesh.connectivity import TriangleMesh
-from ..options import Options, declarations, read_options
+from ..options import declarations
 from ..result import Flattening
 from ..source import Source
 from .aligned_cones import aligned_flattening
-from .alignment import aligned
-from .extract import DegenerateQuads, find_quads
+from .attempt import (
+    AlignedFlattenings,
+    GridWithQuads,
+    Outcome,
+    SeamlessMap,
+    aligned_map,
+    flattened_map,
+    grid_of_map,
+)
 from .features import without_pillows
-from .integer_map import IntegerGrid, joined_grids, with_note
+from .integer_map import IntegerGrid, joined_grids
 from .limits import COARSE_TRIANGLES
-from .no_grid import NoGrid, or_reason
-from .options import QUADS, QuadOptions, flattening_defaults
-from .quad_mesh import QuadMesh
-from .relaxing import GridGoal
+from .no_grid import NoGrid
+from .options import QUADS, QuadOptions
 from .remesh import MAX_CORNERS, MAX_HOLES, area_of, is_thin, manageable_parts, part_of, remeshed
 from .request import GridRequest
-from .round_layout import DOUBLINGS_BEFORE_OTHER_CONES, MAX_DOUBLINGS, RoundingRules, rounded_grid
 from .simpler_mesh import SimplerMesh
-from .sizes import extended, note_on_sizes
+from .sizes import extended
 
 # A surface is remeshed if more than this share of its triangles is thin, as in files of CAD programs: few grids are
 # found for such meshes.
@@ -61,47 +59,10 @@ MAX_REFINEMENT = 100
 MAX_SIZES, GROWTH, MIN_GROWTH, MIN_SQUARES = 3, 1.6, 1.2, 32.0
 # Closed surfaces have so many squares at least, unless they have a handle.
 SQUARES_OF_CUBE = 6
-# With fewer quads, a cone costs more than 1, in proportion.
-QUADS_AT_UNIT_PRICE = 2_000
 # Factors of the price of cones that are tried, the latter on meshes of few triangles, which are split for it.
 PRICE_FACTORS, MAX_SPLIT_TRIANGLES = (1.0, 4.0), COARSE_TRIANGLES // 6
 # With a lower Euler characteristic, so many holes and handles, costlier cones hardly ever help.
 MIN_EULER_FOR_OTHER_CONES = -24
-
-
-@dataclass(frozen=True, eq=False)
-class GridWithQuads:
-    """An integer grid, and its quads if they are asked for and the mesh is connected."""
-
-    grid: IntegerGrid
-    quad_mesh: QuadMesh | None = None
-
-    def with_note(self, note: str) -> GridWithQuads:
-        """Return the grid with one more note."""
-        return replace(self, grid=with_note(self.grid, note))
-
-
-@dataclass(frozen=True, eq=False)
-class SeamlessMap:
-    """A flattening with cones quantised to quarter turns, to be made into a grid.
-
-    Attributes:
-        flattening: the flattening.
-        requires_sides: all straight sides must be on grid lines.
-        is_aligned: its cones are chosen for its directions: sharp edges that are nearly along the axes are put on grid
-            lines, if possible.
-        note: a note on the choice of cones or of the boundary, or "".
-    """
-
-    flattening: Flattening
-    requires_sides: bool = False
-    is_aligned: bool = False
-    note: str = ""
-
-
-Outcome: TypeAlias = GridWithQuads | NoGrid
-#: Returns a flattening with aligned cones for a price of cones, and whether the mesh is split for them.
-AlignedFlattenings: TypeAlias = Callable[[float, bool], Flattening]
 
 
 def find_grid(request: GridRequest) -> Outcome:
@@ -350,89 +311,3 @@ def boundary_free(request: GridRequest) -> Outcome:
         f"The boundary cuts squares, because no grid with the boundary on grid lines was found: {outcome.reason}."
     )
     return grid_of_map(request, flattened_map(request, note=note))
-
-
-# -- one attempt: cones, seamless map, rounding, extraction
-
-
-@or_reason
-def aligned_map(request: GridRequest, price_factor: float, flattening_of: AlignedFlattenings) -> SeamlessMap:
-    """Return the map of a connected mesh whose cones are chosen for even sizes and its directions.
-
-    price_factor: factor of the price of cones.
-    """
-    price = price_factor * max(1.0, QUADS_AT_UNIT_PRICE * (request.size / request.extent) ** 2)
-    # With costlier cones the mesh is split, for more places for them.
-    return SeamlessMap(flattening_of(price, price_factor > 1), requires_sides=True, is_aligned=True)
-
-
-@or_reason
-def flattened_map(
-    request: GridRequest, boundary: str = "", requires_sides: bool = False, note: str = ""
-) -> SeamlessMap:
-    """Return the map with the fewest cones, or given ones.
-
-    Args:
-        request: the grid that is asked for.
-        boundary: the boundary; "" for that of the options, by default free.
-        requires_sides: all straight sides must be on grid lines.
-        note: a further note, or "".
-    """
-    requested = "free" if request.boundary == "auto" else request.boundary
-    options = {**request.options, "boundary": boundary or requested}
-    request.stages.done = 0.0
-    with request.stages("flatten"):
-        parsed: Options = read_options({**flattening_defaults(options), **options})
-        # With kept holes, an aeroplane with 27 borders gets 156 irregular vertices instead of 97.
-        flattening = flatten_source(request.source, parsed, keeps_holes=False)
-    return SeamlessMap(flattening, requires_sides, note=note)
-
-
-def grid_of_map(request: GridRequest, seamless: SeamlessMap | NoGrid) -> Outcome:
-    """Return the grid of a seamless map, with its quads if they are asked for."""
-    grid = seamless if isinstance(seamless, NoGrid) else rounded_map(request, seamless)
-    if isinstance(grid, NoGrid):
-        return grid
-    return extracted(request, grid) if request.for_quads else GridWithQuads(grid)
-
-
-@or_reason
-def rounded_map(request: GridRequest, seamless: SeamlessMap) -> IntegerGrid | NoGrid:
-    """Return the grid of a seamless map, with all notes."""
-    flattening = seamless.flattening
-    request.stages.done = 1.0
-    with request.stages("grid"), limit_threads(flattening.settings.get("threads", THREADS)):
-        layout = aligned(flattening, request.size, request.angle)
-        request.limit.check_cones(layout.node_quarters)
-        follows_lines = seamless.is_aligned or request.sharp_angle is not None
-        # Rather than many more squares than requested, a grid with other cones is searched.
-        may_change_cones = seamless.is_aligned and request.sharp_angle is None
-        rules = RoundingRules(
-            goal=GridGoal(request.energy, request.limit),
-            has_sides=flattening.settings.get("boundary") == "straight",
-            requires_sides=seamless.requires_sides,
-            sharp_angle=request.angle if follows_lines else None,
-            requires_lines=request.sharp_angle is not None,
-            doublings=DOUBLINGS_BEFORE_OTHER_CONES if may_change_cones else MAX_DOUBLINGS,
-        )
-        grid = rounded_grid(layout, rules)
-    if isinstance(grid, NoGrid):
-        return grid
-    if flattening is not request.flattening:
-        # Unmet guarantees of the map do not apply to the grid.
-        unmet = unmet_guarantees(flattening)
-        notes = (note for note in flattening.notes if note not in unmet)
-        grid = with_note(replace(grid, notes=(*notes, *grid.notes)), seamless.note)
-    if seamless.is_aligned and request.scales is not None:
-        grid = with_note(grid, note_on_sizes(grid, request.scales))
-    return grid
-
-
-@or_reason
-def extracted(request: GridRequest, grid: IntegerGrid) -> Outcome:
-    """Return a grid with its quads; if these are degenerate, it is the coarse grid of the reason."""
-    with request.stages("extract"):
-        quads = find_quads(grid)
-    if isinstance(quads, DegenerateQuads):
-        return NoGrid(GridError(quads.reason), coarse_grid=grid)
-    return GridWithQuads(grid, quads)

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from ..base import Stopwatch, Unmet, plural, warns
 from ..errors import CoarseGridError, GridError, OptionError
 from ..options import read_options
+from .attempt import GridWithQuads, Outcome
 from .borders import with_borders
 from .cross_field import sharp_ends
 from .extract import DegenerateQuads, extract_quads, find_quads
@@ -25,7 +26,7 @@ from .integer_map import IntegerGrid
 from .limits import NO_LIMIT, NOTED_TIMES, SquareLimit
 from .no_grid import REASONS, NoGrid
 from .options import QuadOptions
-from .policies import GridWithQuads, Outcome, find_grid, on_coarse_mesh
+from .policies import find_grid, on_coarse_mesh
 from .quad_mesh import QuadMesh
 from .quality import inverted_count
 from .request import GridRequest
