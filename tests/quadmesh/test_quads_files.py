@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -65,6 +65,50 @@ class TestObj:
         assert low > 50
 
 
+class TestPly:
+    def test_trimesh_reads_the_uvs(self, cube, tmp_path):
+        """It divides each quad, and each vertex where its UVs differ."""
+        trimesh = pytest.importorskip("trimesh")
+        mesh = trimesh.load(cube.save(tmp_path / "quads.ply"), process=False)
+        read = np.concatenate([mesh.vertices, mesh.visual.uv], axis=1)
+        written = np.concatenate([cube.vertices[cube.quads], cube.uv], axis=2).reshape(-1, 5)
+        gaps = np.linalg.norm(read[:, None] - written, axis=2)
+        assert max(gaps.min(axis=0).max(), gaps.min(axis=1).max()) < 1e-6
+        assert len(mesh.faces) == 2 * len(cube.quads)
+        assert mesh.area == pytest.approx(14)
+
+    def test_is_read_back(self, cube, tmp_path):
+        mesh = read_mesh(cube.save(tmp_path / "quads.ply"))
+        np.testing.assert_array_equal(mesh.vertices, cube.vertices)
+        np.testing.assert_array_equal(mesh.corners.reshape(-1, 4), cube.quads)
+        uv = mesh.uv[mesh.texture].reshape(-1, 4, 2)
+        np.testing.assert_array_equal(uv, cube.uv.astype(np.float32))
+
+
+class TestStl:
+    def test_trimesh_reads_a_solid(self, cube, tmp_path):
+        trimesh = pytest.importorskip("trimesh")
+        mesh = trimesh.load(cube.save(tmp_path / "quads.stl"))  # merges equal corners
+        assert len(mesh.faces) == 2 * len(cube.quads)
+        assert mesh.is_watertight
+        assert mesh.is_winding_consistent
+        assert mesh.volume == pytest.approx(3, rel=1e-6)
+
+    def test_meshio_reads_the_triangles(self, cube, tmp_path):
+        meshio = pytest.importorskip("meshio")
+        mesh = meshio.read(cube.save(tmp_path / "quads.stl"))
+        (block,) = mesh.cells
+        np.testing.assert_array_equal(
+            mesh.points[block.data], cube.vertices[cube.triangles].astype(np.float32)
+        )
+
+    @pytest.mark.parametrize(("factor", "shift"), [(1e39, 0.0), (1.0, 1e9)])
+    def test_coordinates_beyond_32_bits(self, cube, tmp_path, factor, shift):
+        with pytest.raises(MeshFileError, match=r"32-bit numbers of \.stl.* or write \.ply"):
+            replace(cube, vertices=factor * cube.vertices + shift).save(tmp_path / "quads.stl")
+        assert not list(tmp_path.iterdir())
+
+
 class TestGlb:
     @pytest.fixture
     def saved(self, cube, tmp_path):
@@ -104,6 +148,18 @@ class TestGlb:
         assert sorted(map(sorted, mesh.triangles.tolist())) == [[0, 1, 2], [0, 2, 3]]
         mesh = QuadMesh(quad, np.array([[1, 2, 3, 0]]), *[None] * 5)
         assert sorted(map(sorted, mesh.triangles.tolist())) == [[0, 1, 2], [0, 2, 3]]
+
+    @pytest.mark.parametrize("first", range(4))
+    def test_the_diagonal_inside_a_reflex_angle(self, first):
+        dart = np.array([[0.0, 0, 0], [5, -1, 0], [1, 0, 0], [5, 1, 0]])
+        mesh = QuadMesh(dart, np.roll([[0, 1, 2, 3]], first, axis=1), *[None] * 5)
+        # The other diagonal, of length 2 instead of 1 where the angle is 194 degrees, would flip a triangle.
+        sides = np.diff(dart[mesh.triangles], axis=1)
+        assert (np.cross(sides[:, 0], sides[:, 1])[:, 2] > 0).all()
+        far = dart * [1, 5, 1]
+        mesh = QuadMesh(far, mesh.quads, *[None] * 5)
+        sides = np.diff(far[mesh.triangles], axis=1)
+        assert (np.cross(sides[:, 0], sides[:, 1])[:, 2] > 0).all()
 
 
 class TestNpz:

@@ -34,7 +34,7 @@ FREESURFER = (".pial", ".white", ".inflated", ".sphere", ".orig", ".smoothwm")
 FORMATS = {
     ".obj": Use.MESH | Use.UV | Use.FLATTENING | Use.QUADS | Use.GRID,
     ".ply": Use.MESH | Use.UV | Use.FLATTENING | Use.QUADS,
-    ".stl": Use.MESH,
+    ".stl": Use.MESH | Use.QUADS,
     ".off": Use.MESH,
     ".gltf": Use.MESH | Use.UV,
     ".glb": Use.MESH | Use.UV | Use.FLATTENING | Use.QUADS | Use.UV_SETS,

@@ -40,6 +40,7 @@ from .packages import as_input
 from .ply.write import write_parts
 from .read import INPUT_FORMATS, export_advice, find_meshes, read_joined, read_mesh, read_mesh_from
 from .split import SplitMesh, shading_normals, split_at_seams
+from .stl import write_stl
 from .texture import (
     DARK_CELL,
     LIGHT_CELL,
@@ -75,5 +76,5 @@ __all__ = [
     "read_vertex_values", "readable", "relocated", "remove_unfinished", "REPEAT", "shading_normals", "slot_of",
     "SLOTS", "SPECULAR", "split_at_seams", "SplitMesh", "stored_in_glb", "Texture", "texture_files", "to_linear",
     "to_srgb", "TRANSFORM", "uv_mesh_of", "UVMesh", "VALUES", "VERTEX_COLOURS", "write_flattening", "write_measured",
-    "write_parts", "write_stream",
+    "write_parts", "write_stl", "write_stream",
 ]  # fmt: skip

@@ -1,13 +1,15 @@
-"""Reader for STL files, binary and text, in which triangles share no vertices."""
+"""STL files, in which triangles share no vertices: reading, binary and text, and writing, binary."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
-from ..base.arrays import FloatArray
+from ..base.arrays import FloatArray, IntArray
+from ..base.text import plural
 from ..errors import EmptyMeshError, MeshFileError
 from .attributes import Attribute
 from .mesh_file import MeshFile
@@ -17,6 +19,8 @@ from .text import Growing, text_blocks
 SOLIDS = Attribute("solids")
 _SOLID = re.compile(rb"(?im)^[ \t]*solid[ \t]*([^\r\n]*?)[ \t]*$")
 _HEADER = np.dtype([("comment", "S80"), ("count", "<u4")])
+#: The first bytes of written files; text files begin with "solid".
+_COMMENT = b"triangles by coneflat"
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -51,6 +55,33 @@ def parse_stl(path: Path, content: bytes) -> MeshFile:
         raise EmptyMeshError(f"{path} has no faces")
     count = len(points)
     return MeshFile(path, points, np.arange(count), np.arange(0, count + 1, 3), attributes=attributes)
+
+
+def write_stl(stream: IO[bytes], vertices: FloatArray, triangles: IntArray) -> None:
+    """Write triangles (m, 3) of vertices (n, 3) as binary STL, with 32-bit coordinates.
+
+    Raises:
+        MeshFileError: 32-bit numbers cannot represent the coordinates, or corners of a triangle coincide in them.
+    """
+    largest = float(np.abs(vertices).max(initial=0.0))
+    if largest > float(np.finfo(np.float32).max):
+        raise MeshFileError(
+            f"positions of up to {largest:.3g} are beyond the 32-bit numbers of .stl: scale the mesh, or write .ply"
+        )
+    corners = vertices.astype(np.float32)[triangles]
+    is_same = (corners == np.roll(corners, -1, axis=1)).all(axis=2)
+    if collapsed := int(np.count_nonzero(is_same.any(axis=1))):
+        raise MeshFileError(
+            f"corners of {plural(collapsed, 'triangle')} coincide in the 32-bit numbers of .stl, at positions of up to "
+            f"{largest:.3g}: move the mesh to the origin, or write .ply"
+        )
+    places = vertices[triangles]
+    normals = np.cross(places[:, 1] - places[:, 0], places[:, 2] - places[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+    rows = np.zeros(len(triangles), _TRIANGLE)
+    rows["normal"], rows["corners"] = normals, corners
+    stream.write(np.array([(_COMMENT, len(rows))], _HEADER).data)
+    stream.write(rows.data)
 
 
 def _has_names(content: bytes) -> bool:

@@ -41,6 +41,7 @@ from ..io import (
     relocated,
     shading_normals,
     write_parts,
+    write_stl,
 )
 from ..io.mesh_file import MeshFile
 from ..mesh.check import check_mesh
@@ -84,11 +85,12 @@ def write_quads(path: str | PathLike[str], mesh: QuadMesh) -> Path:
     """Write a quad mesh atomically and return the path.
 
     An .obj has as many digits as are needed to read the same numbers, the UVs of `QuadMesh.uv`, and the materials and
-    groups of the .obj that the mesh was read from, by which quads are sorted; a .ply is binary with double coordinates.
-    A .glb, which has no quads, has two triangles for each and their edges as lines; see `_write_glb`. An .npz has all
-    arrays of the `QuadMesh`, from which `read_quads` restores it, and the irregular vertices with their valences. VTK
-    (.vtk, .vtu), Abaqus (.inp) and Gmsh (.msh) are written by meshio; all but Abaqus have the valences of vertices, and
-    the least scaled Jacobians of quads. Errors are those of `QuadMesh.save`.
+    groups of the .obj that the mesh was read from, by which quads are sorted. A .ply is binary, with double coordinates
+    and the UVs as the list `texcoord` of each face. An .stl, for printing, has the two triangles of each quad of
+    `QuadMesh.triangles`. A .glb, which has no quads, has the same triangles and the edges of quads as lines; see
+    `_write_glb`. An .npz has all arrays of the `QuadMesh`, from which `read_quads` restores it, and the irregular
+    vertices with their valences. VTK (.vtk, .vtu), Abaqus (.inp) and Gmsh (.msh) are written by meshio; all but Abaqus
+    have the valences of vertices, and the least scaled Jacobians of quads. Errors are those of `QuadMesh.save`.
     """
     path = check_quads_output(path)
     with atomic_write(path) as stream:
@@ -108,9 +110,11 @@ def write_quads_stream(mesh: QuadMesh, stream: IO[bytes], ending: str, path: Pat
         _write_obj(mesh, stream, path)
     elif ending == ".ply":
         places = np.ascontiguousarray(mesh.vertices, "<f8")
-        write_parts(
-            stream, ["comment quads by coneflat"], [f"double {axis}" for axis in "xyz"], places, mesh.quads
-        )
+        texcoord = mesh.uv.reshape(-1, 8).astype(np.float32)
+        axes = [f"double {axis}" for axis in "xyz"]
+        write_parts(stream, ["comment quads by coneflat"], axes, places, mesh.quads, {"texcoord": texcoord})
+    elif ending == ".stl":
+        write_stl(stream, mesh.vertices, mesh.triangles)
     elif ending == ".glb":
         _write_glb(mesh, stream)
     elif ending in _MESHIO:
@@ -232,7 +236,7 @@ _LINE_MATERIAL: dict[str, Any] = {
 def _write_glb(mesh: QuadMesh, stream: IO[bytes]) -> None:
     """Write a quad mesh as GLB: two triangles for each quad, and the edges of quads as visible lines.
 
-    The first primitive has the vertices in their order, and for each quad the two triangles at its shorter diagonal.
+    The first primitive has the vertices in their order, and for each quad its triangles of `QuadMesh.triangles`.
     The second has the edges, raised above the quads by a hundredth of the mean edge length; closer lines
     appear dashed in viewers. Coordinates are 32-bit floats, relative to the node if the mesh is far from the origin.
 

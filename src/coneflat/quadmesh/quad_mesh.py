@@ -89,10 +89,17 @@ class QuadMesh:
 
     @cached_property
     def triangle_corners(self) -> IntArray:
-        """(2p, 3) corners of quads, 4 q + i, of the two triangles on both sides of each quad's shorter diagonal."""
+        """(2p, 3) corners of quads, 4 q + i, of the two triangles on both sides of a diagonal of each quad.
+
+        It is the shorter one, but that inside the quad if an angle is more than 180 degrees.
+        """
         corners = self.vertices[self.quads]
         first_diagonal, second_diagonal = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
-        turn = np.where(dots(first_diagonal, first_diagonal) <= dots(second_diagonal, second_diagonal), 0, 1)
+        is_shorter = dots(first_diagonal, first_diagonal) <= dots(second_diagonal, second_diagonal)
+        is_reflex = corner_jacobians(self.vertices, self.quads) < 0
+        # A diagonal from a corner with such an angle is inside, the other one outside.
+        first_inside, second_inside = ~is_reflex[:, 1::2].any(axis=1), ~is_reflex[:, ::2].any(axis=1)
+        turn = np.where(np.where(first_inside == second_inside, is_shorter, first_inside), 0, 1)
         rolled = 4 * np.arange(len(self.quads))[:, None] + (np.arange(4) + turn[:, None]) % 4
         return rolled[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
 
@@ -146,7 +153,9 @@ class QuadMesh:
         return self.surface.euler_characteristic - unused
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Write the mesh as .obj, .ply, .glb, .npz, .vtk, .vtu, .inp or .msh, and return the path; see `write_quads`.
+        """Write the mesh and return the path; see `write_quads`.
+
+        The extension is .obj, .ply, .stl, .glb, .npz, .vtk, .vtu, .inp or .msh.
 
         Raises:
             UnknownFormatError: the extension is another one.
@@ -204,7 +213,12 @@ def degenerate_quads(quads: IntArray, edges: IntArray) -> BoolArray:
 
 
 def least_jacobians(points: FloatArray, quads: IntArray) -> FloatArray:
-    """Return (p,) the least scaled Jacobian of each quad: the signed sines of its angles, projected along its normal.
+    """Return (p,) the least of the scaled Jacobians of each quad; see `corner_jacobians`."""
+    return corner_jacobians(points, quads).min(axis=1)
+
+
+def corner_jacobians(points: FloatArray, quads: IntArray) -> FloatArray:
+    """Return (p, 4) the scaled Jacobians of quads: the signed sines of their angles, projected along their normals.
 
     The normal is the cross product of the diagonals. The value is 1 for a rectangle, and negative if a corner is
     flipped.
@@ -212,9 +226,9 @@ def least_jacobians(points: FloatArray, quads: IntArray) -> FloatArray:
     corners = points[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normal /= np.maximum(np.sqrt(dots(normal, normal)), np.finfo(float).tiny)[:, None]
-    jacobians = np.full(len(quads), np.inf)
+    jacobians = np.empty((len(quads), 4))
     for i in range(4):
         a, b = corners[:, i - 1] - corners[:, i], corners[:, (i + 1) % 4] - corners[:, i]
         scale = np.maximum(np.sqrt(dots(a, a) * dots(b, b)), np.finfo(float).tiny)
-        jacobians = np.minimum(jacobians, dots(np.cross(b, a), normal) / scale)
+        jacobians[:, i] = dots(np.cross(b, a), normal) / scale
     return jacobians

@@ -112,16 +112,20 @@ def write_parts(
         properties: declarations of the vertex properties, such as "double x".
         vertices: (n, ...) structured array with these properties in the layout of the file.
         faces: (m, k) vertex indices.
-        face_properties: (m,) further properties of faces by name.
+        face_properties: further properties of faces by name: (m,) numbers, or (m, l) lists.
     """
     face_columns = {} if face_properties is None else face_properties
     kind: list[tuple[Any, ...]] = [("count", "u1"), ("corners", "<i4", faces.shape[1])]
-    kind += [(f"p{i}", values.dtype.newbyteorder("<")) for i, values in enumerate(face_columns.values())]
+    for i, values in enumerate(face_columns.values()):
+        kind += [(f"n{i}", "u1")] * (values.ndim - 1)
+        kind.append((f"p{i}", values.dtype.newbyteorder("<"), values.shape[1:]))
     rows = np.empty(len(faces), kind)
     rows["count"] = faces.shape[1]
     rows["corners"] = faces
     for i, values in enumerate(face_columns.values()):
         rows[f"p{i}"] = values
+        if values.ndim > 1:
+            rows[f"n{i}"] = values.shape[1]
     header = [
         "ply",
         "format binary_little_endian 1.0",
@@ -130,7 +134,10 @@ def write_parts(
         *(f"property {declared}" for declared in properties),
         f"element face {len(faces)}",
         "property list uchar int vertex_indices",
-        *(f"property {WORDS[values.dtype.str[1:]]} {name}" for name, values in face_columns.items()),
+        *(
+            f"property {'list uchar ' * (values.ndim - 1)}{WORDS[values.dtype.str[1:]]} {name}"
+            for name, values in face_columns.items()
+        ),
         "end_header",
     ]
     stream.write(("\n".join(header) + "\n").encode("latin-1"))
