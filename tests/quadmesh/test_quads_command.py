@@ -91,7 +91,7 @@ def test_command_refuses_before_the_work(tmp_path, ball):
     assert done.exit_code == 2
     assert "leave out one" in done.output
     for words, message in (
-        (("-o", tmp_path / "quads.stl"), "quads are written as .obj, .ply, .glb, .npz"),
+        (("-o", tmp_path / "quads.off"), "quads are written as .obj, .ply, .stl, .glb, .npz"),
         (("-o", path), "the input and the output"),
         (("--grid", tmp_path / "grid.ply"), "integer grids are written as .obj, .npz"),
         (("--grid", path), "the input and the grid"),
