@@ -28,6 +28,7 @@ from .cross_field import SHARP_ANGLE, directions_and_indices, sharp_ends
 from .features import split_around, split_chords, vertex_graph
 from .limits import COARSE_TRIANGLES, NO_LIMIT, SquareLimit
 from .map_model import SAMPLES, MapModel
+from .mirror_planes import MirrorPlane, on_seam
 from .options import FLATTENING_OPTIONS, GRID_TOLERANCE, QuadOptions, flattening_defaults
 from .sizes import extended
 
@@ -60,6 +61,7 @@ def aligned_flattening(
     sharp_angle: float | None,
     log_scale: FloatArray | None,
     limit: SquareLimit,
+    mirror: MirrorPlane | None = None,
 ) -> Flattening:
     """Return a flattening with cones quantised to quarter turns, and straight boundaries.
 
@@ -72,6 +74,7 @@ def aligned_flattening(
         sharp_angle: dihedral angle of edges that are required on grid lines, or None.
         log_scale: (n,) the target log conformal factor at the vertices, or None for equal sizes.
         limit: largest number of squares of a grid.
+        mirror: the plane at which a half of a symmetric surface continues, in model units; or None.
 
     Raises:
         GridError: a grid with cones at all corners of the surface has more squares.
@@ -85,9 +88,10 @@ def aligned_flattening(
     ]
     bounds = int(np.ceil(turns[0] - GRID_TOLERANCE)), int(np.floor(turns[1] + GRID_TOLERANCE))
     target_scale = None if log_scale is None else extended(log_scale, mesh)
+    plane = None if mirror is None else mirror.scaled(checked.exponent)
     with stages("cones"), limit_threads(cone_options.threads):
         quarters_at = aligned_cones(
-            mesh, cone_options.distortion, *bounds, price, sharp_angle, target_scale, limit
+            mesh, cone_options.distortion, *bounds, price, sharp_angle, target_scale, limit, plane
         )
     cones = {vertex: quarters * np.pi / 2 for vertex, quarters in quarters_at.items()}
     flattening_options = {name: choice for name, choice in options.items() if name not in FLATTENING_OPTIONS}
@@ -125,6 +129,7 @@ def aligned_cones(
     sharp_angle: float | None = None,
     log_scale: FloatArray | None = None,
     limit: SquareLimit = NO_LIMIT,
+    mirror: MirrorPlane | None = None,
 ) -> dict[int, int]:
     """Return cones of a connected mesh, and corners of its boundary, with their curvature in quarter turns.
 
@@ -137,6 +142,7 @@ def aligned_cones(
             to, and other directions count as much.
         log_scale: (n,) the log conformal factor from which the distortion is measured, up to a constant; None for 0.
         limit: largest number of squares of a grid.
+        mirror: the plane at which a half of a symmetric surface continues; or None.
 
     Raises:
         GridError: a grid with cones at all corners of the surface has more squares.
@@ -150,7 +156,8 @@ def aligned_cones(
         mesh, origin = coarse.mesh, coarse.vertices
     directions, start = directions_and_indices(mesh, angle)
     scale = None if log_scale is None else log_scale[origin]
-    model = MapModel(mesh, directions.combined, min_quarters, max_quarters, degrees[origin], scale)
+    is_seam = None if mirror is None else on_seam(mesh, mirror)
+    model = MapModel(mesh, directions.combined, min_quarters, max_quarters, degrees[origin], scale, is_seam)
     search = _Search(mesh, model, start, price, angle)
     limit.check_cones(search.fixed_quarters)
     along = COST_OF_DIRECTIONS * (1.0 if sharp_angle is None else TIMES_REQUIRED)

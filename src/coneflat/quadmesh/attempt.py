@@ -28,7 +28,7 @@ from .request import GridRequest
 from .round_layout import DOUBLINGS_BEFORE_OTHER_CONES, MAX_DOUBLINGS, RoundingRules, rounded_grid
 from .sizes import note_on_sizes
 
-# With fewer quads, a cone costs more than 1, in proportion.
+# With fewer quads, a cone costs more than 1, in proportion. Of a half, each stands for two.
 QUADS_AT_UNIT_PRICE = 2_000
 
 
@@ -73,7 +73,8 @@ def aligned_map(request: GridRequest, price_factor: float, flattening_of: Aligne
 
     price_factor: factor of the price of cones.
     """
-    price = price_factor * max(1.0, QUADS_AT_UNIT_PRICE * (request.size / request.extent) ** 2)
+    least_price = 1.0 if request.mirror is None else 2.0
+    price = price_factor * max(least_price, QUADS_AT_UNIT_PRICE * (request.size / request.extent) ** 2)
     # With costlier cones the mesh is split, for more places for them.
     return SeamlessMap(flattening_of(price, price_factor > 1), requires_sides=True, is_aligned=True)
 

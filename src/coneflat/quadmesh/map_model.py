@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from ..base import ComplexArray, FloatArray, IntArray
+from ..base import BoolArray, ComplexArray, FloatArray, IntArray
 from ..cones import CONE_ANGLE_PER_TRIANGLE
 from ..geometry import (
     angle_defect,
@@ -57,6 +57,7 @@ class MapModel:
         max_quarters: int,
         triangles: IntArray,
         log_scale: FloatArray | None = None,
+        is_seam: BoolArray | None = None,
     ) -> None:
         """Set up the model.
 
@@ -66,6 +67,8 @@ class MapModel:
             min_quarters, max_quarters: bounds of the curvature of cones, in quarter turns.
             triangles: (n,) the number of triangles at each vertex in the mesh that gets the cones.
             log_scale: (n,) the target log conformal factor, up to a constant; None for 0.
+            is_seam: (n,) boundary vertices at which the mesh continues as its mirror image, with twice their curvature;
+                None for none.
         """
         lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces), mesh)
         angles, count = corner_angles(lengths), len(mesh.vertices)
@@ -97,8 +100,12 @@ class MapModel:
         straight = np.where(border, 2, 4)
         widest = np.floor(CONE_ANGLE_PER_TRIANGLE * triangles / (np.pi / 2)).astype(np.int64)
         low = np.minimum(np.maximum(np.where(border, -1, min_quarters), straight - widest), 0)
-        self.min_quarters = np.append(low, -(10**9))
-        self.max_quarters = np.append(np.where(border, 1, np.where(triangles > 2, max_quarters, 0)), 10**9)
+        high = np.where(border, 1, np.where(triangles > 2, max_quarters, 0))
+        if is_seam is not None:
+            # Where a corner of one quad meets its image, a vertex would have two.
+            low = np.where(is_seam[self.places], np.maximum(low, -(-min_quarters // 2)), low)
+            high = np.where(is_seam[self.places], 0, high)
+        self.min_quarters, self.max_quarters = np.append(low, -(10**9)), np.append(high, 10**9)
 
     def _functional(self, rows: csr_matrix) -> FloatArray:
         return np.pad(self._poisson.functional(rows, self.places), ((0, 0), (0, 1)))

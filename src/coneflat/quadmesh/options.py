@@ -62,6 +62,7 @@ class QuadOptions(ConeNumber, ConeBounds, RunOptions):
             curvature makes quads smaller where the surface is more curved.
         stretch: Trade-off between equal angles (0) and also equal sizes (1) of quads.
         smooth: Rounds of smoothing on the surface; 0 for none.
+        symmetry: auto: quads of a surface with a plane of symmetry are symmetric, too. none: they need not be.
         sharp_angle: Put edges with a larger dihedral angle, and the boundary, on grid lines, so that edges of quads
             follow them.
         cones: auto: cones for which quads have even sizes and follow sharp edges, the boundary and directions of
@@ -84,6 +85,7 @@ class QuadOptions(ConeNumber, ConeBounds, RunOptions):
     stretch: float = option(0.3, strength(1))
     # Further rounds change little.
     smooth: int = option(10, Number(0, is_integer=True))
+    symmetry: str = option("auto", Choice(("auto", "none")))
     sharp_angle: float | None = option(None, ANGLE_OR_NONE)
     cones: str | Mapping[int, float] = option(
         "auto", WordOrVertices(("auto", "sparse"), "cone"), one_mesh=True

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
-from numbers import Real
 
 import numpy as np
 
@@ -25,7 +24,6 @@ from ..geometry import coarse_mesh, double_areas, edge_lengths
 from ..io import as_input
 from ..mesh import with_fans
 from ..mesh.connectivity import TriangleMesh
-from ..options import declarations
 from ..result import Flattening
 from ..source import Source
 from .aligned_cones import aligned_flattening
@@ -42,9 +40,9 @@ from .features import without_pillows
 from .integer_map import IntegerGrid, joined_grids
 from .limits import COARSE_TRIANGLES
 from .no_grid import NoGrid
-from .options import QUADS, QuadOptions
+from .options import QUADS
 from .remesh import MAX_CORNERS, MAX_HOLES, area_of, is_thin, manageable_parts, part_of, remeshed
-from .request import GridRequest
+from .request import GridRequest, names_vertices
 from .simpler_mesh import SimplerMesh
 from .sizes import extended
 
@@ -72,7 +70,7 @@ def find_grid(request: GridRequest) -> Outcome:
     def flattening_of(price: float, is_split: bool) -> Flattening:
         return aligned_flattening(
             request.checked, price, is_split, request.options, request.stages, request.sharp_angle,
-            request.scales, request.limit,
+            request.scales, request.limit, request.mirror,
         )  # fmt: skip
 
     # Sizes with the same price of cones share a flattening.
@@ -91,7 +89,7 @@ def on_coarse_mesh(request: GridRequest) -> tuple[GridRequest, SimplerMesh | Non
         MeshError: the mesh cannot be flattened.
         OptionError: sizes are not positive numbers.
     """
-    if _names_vertices(request) or request.sharp_angle is not None or request.flattening:
+    if names_vertices(request) or request.sharp_angle is not None or request.flattening:
         return request, None
     checked, mesh = request.checked, request.mesh
     side = float(np.ldexp(request.size, checked.exponent))
@@ -121,15 +119,6 @@ def on_coarse_mesh(request: GridRequest) -> tuple[GridRequest, SimplerMesh | Non
         notes=tuple(notes),
     )
     return replace(request, source=Source(as_input(simple)), sizes=sizes), simpler
-
-
-def _names_vertices(request: GridRequest) -> bool:
-    """Return whether options may name vertices: weights, and those that are not simple values."""
-    options = {**request.options, "boundary": request.boundary}
-    is_simple = all(
-        value is None or isinstance(value, (str, Real)) or callable(value) for value in options.values()
-    )
-    return not (is_simple and options.keys() <= declarations(QuadOptions).keys() - {"weights"})
 
 
 def _with_few_triangles(mesh: TriangleMesh, side: float) -> tuple[TriangleMesh, IntArray, IntArray]:
@@ -272,6 +261,8 @@ def other_cones(request: GridRequest, flattening_of: AlignedFlattenings) -> Outc
         failures.append(outcome)
         if is_far:
             break
+    if request.mirror is not None:
+        return _most_helpful(failures)
     directions = "the boundary, sharp edges or curvature"
     if request.sizes is not None:
         directions += ", nor for requested sizes"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,8 @@ from .cross_field import sharp_ends
 from .extract import DegenerateQuads, extract_quads, find_quads
 from .integer_map import IntegerGrid
 from .limits import NO_LIMIT, NOTED_TIMES, SquareLimit
-from .no_grid import REASONS, NoGrid
+from .mirrored import asymmetry_note, doubled_grid, doubled_quads, half_request, smoothed_symmetrically
+from .no_grid import REASONS, NoGrid, or_reason
 from .options import QuadOptions
 from .policies import find_grid, on_coarse_mesh
 from .quad_mesh import QuadMesh
@@ -47,6 +48,7 @@ def quads(
     size: ArrayLike | None = None,
     stretch: float = QuadOptions.stretch,
     sharp_angle: float | str | None = None,
+    symmetry: str = QuadOptions.symmetry,
     smooth: int = QuadOptions.smooth,
     **options: Any,
 ) -> QuadMesh:
@@ -60,6 +62,7 @@ def quads(
             `integer_grid`.
         stretch: trade-off between equal angles (0) and also equal areas (1); see `integer_grid`.
         sharp_angle: radians; edges of quads follow edges with a larger dihedral angle; None for none.
+        symmetry: "auto": quads of a surface with a plane of symmetry are symmetric about it; "none": they need not be.
         smooth: rounds of smoothing on the surface, see `smooth_quads`; 0 for none.
         options: those of `coneflat.flatten`; by default cones have three, five or six quads.
 
@@ -90,11 +93,13 @@ def quads(
         "size": size,
         "stretch": stretch,
         "sharp_angle": sharp_angle,
+        "symmetry": symmetry,
         "smooth": smooth,
     }
     if isinstance(mesh, IntegerGrid):
         has_options = any(value is not None for value in (faces, quads, size, sharp_angle))
-        if has_options or stretch != QuadOptions.stretch or options.keys() - {"progress"}:
+        is_default = stretch == QuadOptions.stretch and symmetry == QuadOptions.symmetry
+        if has_options or not is_default or options.keys() - {"progress"}:
             raise OptionError("a grid already has faces, size, stretch and options: no others can be given")
         read_options(quad_options, QuadOptions)
         return _quads_of_grid(mesh, smooth, Stopwatch(options.get("progress")))
@@ -148,10 +153,54 @@ def _quads_of_request(request: GridRequest, rounds: int) -> QuadMesh:
 
 
 def _attempt(request: GridRequest, rounds: int) -> tuple[QuadMesh, tuple[str, ...]]:
-    """Return smoothed quads and how they fail to follow the surface.
+    """Return smoothed quads and how they fail to follow the surface; symmetric ones if the surface is symmetric."""
+    with request.stages("symmetry"):
+        half = half_request(request)
+    if half is None:
+        return _checked(request, _meshed(request, rounds))
+    outcome = _mirrored(request, half, rounds)
+    if not isinstance(outcome, NoGrid):
+        return outcome, ()
+    quad_mesh, problems = _checked(request, _meshed(request, rounds))
+    return replace(quad_mesh, notes=(*quad_mesh.notes, asymmetry_note(half, outcome.reason))), problems
 
-    They are those of a simpler mesh if this is needed, moved to the given one.
+
+@or_reason
+def _mirrored(request: GridRequest, half: GridRequest, rounds: int) -> QuadMesh | NoGrid:
+    """Return symmetric quads that follow the surface, or the reason why there are none."""
+    assert half.mirror is not None
+    meshed = _meshed(half, rounds)
+    doubled = doubled_quads(meshed.quad_mesh, half.mirror, request.angle)
+    features = (
+        np.empty((0, 2), np.int64) if meshed.is_moved or doubled.grid is None else doubled.grid.features
+    )
+    with request.stages("smooth"):
+        symmetric = smoothed_symmetrically(doubled, half.mirror, rounds, features)
+    notes = *request.checked.notes, *symmetric.notes, f"The quads are symmetric about {half.mirror}."
+    whole = replace(meshed, quad_mesh=replace(symmetric, notes=notes), filled_area=2 * meshed.filled_area)
+    quad_mesh, problems = _checked(request, whole)
+    return NoGrid(CoarseGridError("; ".join(problems))) if problems else quad_mesh
+
+
+@dataclass(frozen=True, eq=False)
+class _Meshed:
+    """Smoothed quads of a request, and what a check of them needs to know.
+
+    Attributes:
+        quad_mesh: the quads, with the notes on the mesh, the grid and the extraction.
+        is_moved: they are those of a simpler mesh, moved to the given one.
+        filled_area: area of filled holes that they may cover.
+        fills_holes: whether there are such holes.
     """
+
+    quad_mesh: QuadMesh
+    is_moved: bool = False
+    filled_area: float = 0.0
+    fills_holes: bool = False
+
+
+def _meshed(request: GridRequest, rounds: int) -> _Meshed:
+    """Return smoothed quads; those of a simpler mesh if this is needed, moved to the given one."""
     stages = request.stages
     source = request.flattening.source if request.flattening else request.source.input_mesh.source
     with stages("coarsen"):
@@ -171,18 +220,26 @@ def _attempt(request: GridRequest, rounds: int) -> tuple[QuadMesh, tuple[str, ..
         else:
             moved = simpler.moved(quad_mesh)
             quad_mesh = simpler.completed(smooth_quads(moved, rounds, sharp_ends(simpler.surface)))
+    notes = *(() if simpler is None else simpler.notes), *grid.notes, *quad_mesh.notes
+    quad_mesh = replace(quad_mesh, notes=notes, grid=grid, source=source)
+    if simpler is None:
+        return _Meshed(quad_mesh)
+    return _Meshed(quad_mesh, True, simpler.filled_area, bool(simpler.is_filling.any()))
+
+
+def _checked(request: GridRequest, meshed: _Meshed) -> tuple[QuadMesh, tuple[str, ...]]:
+    """Return quads with all notes, and how they fail to follow the surface."""
+    quad_mesh, stages = meshed.quad_mesh, request.stages
     _require_sound(quad_mesh, request.limit)
     with stages("check"):
-        problems = fit_to_surface(quad_mesh, 0.0 if simpler is None else simpler.filled_area).problems
-    fills_holes = simpler is not None and bool(simpler.is_filling.any())
-    notes = (
-        *(() if simpler is None else simpler.notes),
-        *grid.notes,
-        *quad_mesh.notes,
-        *map(Unmet, _notes(quad_mesh, fills_holes, request.limit.requested)),
+        problems = fit_to_surface(quad_mesh, meshed.filled_area).problems
+    notes = map(Unmet, _notes(quad_mesh, meshed.fills_holes, request.limit.requested))
+    seconds = {} if quad_mesh.grid is None else quad_mesh.grid.seconds
+    source = quad_mesh.source or request.source.input_mesh.source
+    quad_mesh = replace(
+        quad_mesh, notes=(*quad_mesh.notes, *notes), seconds={**seconds, **stages.seconds}, source=source
     )
-    seconds = {**grid.seconds, **stages.seconds}
-    return replace(quad_mesh, notes=notes, seconds=seconds, grid=grid, source=source), problems
+    return quad_mesh, problems
 
 
 def _with_coarse_grid(outcome: Outcome) -> GridWithQuads:
@@ -216,6 +273,7 @@ def integer_grid(
     size: ArrayLike | None = None,
     stretch: float = QuadOptions.stretch,
     sharp_angle: float | str | None = None,
+    symmetry: str = QuadOptions.symmetry,
     **options: Any,
 ) -> IntegerGrid:
     """Return a seamless map of a surface to the integer grid: unit squares become quads that match across seams.
@@ -229,6 +287,7 @@ def integer_grid(
         stretch: trade-off between angles (0) and areas (1); see `StretchEnergy`.
         sharp_angle: radians; edges with a larger dihedral angle, and the boundary, are put on grid lines; None for
             none.
+        symmetry: "auto": the grid of a surface with a plane of symmetry is symmetric about it; "none": it need not be.
         options: those of `coneflat.flatten`; by default cones have three, five or six quads. Given cones need
             curvatures, multiples of pi/2; on surfaces with handles or several boundaries, a grid rarely exists for
             them. boundary may also be "auto", the default: "straight" if such a grid is found and cones are not given,
@@ -261,13 +320,40 @@ def integer_grid(
         >>> grid.corners, grid.corner_quarters
         (array([0, 1, 2, 3]), array([1, 1, 1, 1]))
     """
-    quad_options = {"quads": quads, "size": size, "stretch": stretch, "sharp_angle": sharp_angle}
+    quad_options = {
+        "quads": quads,
+        "size": size,
+        "stretch": stretch,
+        "sharp_angle": sharp_angle,
+        "symmetry": symmetry,
+    }
     request = GridRequest.of(mesh, faces, quad_options, options)
     request.stages.done = 0.0
-    outcome = find_grid(request)
+    half = half_request(request)
+    outcome = find_grid(request) if half is None else _symmetric_grid(request, half)
     if isinstance(outcome, NoGrid):
         raise outcome.error
     return replace(outcome.grid, seconds=dict(request.stages.seconds))
+
+
+def _symmetric_grid(request: GridRequest, half: GridRequest) -> Outcome:
+    """Return the grid of a symmetric surface: a symmetric one, if there is one."""
+
+    @or_reason
+    def doubled() -> Outcome:
+        assert half.mirror is not None
+        outcome = find_grid(half)
+        if isinstance(outcome, NoGrid):
+            return outcome
+        notes = *request.checked.notes, *outcome.grid.notes, f"The grid is symmetric about {half.mirror}."
+        return GridWithQuads(doubled_grid(replace(outcome.grid, notes=notes), half.mirror, request.angle))
+
+    symmetric = doubled()
+    if isinstance(symmetric, GridWithQuads):
+        return symmetric
+    outcome = find_grid(request)
+    note = asymmetry_note(half, symmetric.reason)
+    return outcome.with_note(note) if isinstance(outcome, GridWithQuads) else outcome
 
 
 def _require_sound(quad_mesh: QuadMesh, limit: SquareLimit) -> None:

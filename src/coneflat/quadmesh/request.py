@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,12 @@ from ..io import as_input
 from ..mesh import CheckedMesh
 from ..mesh.connectivity import TriangleMesh
 from ..optimise import StretchEnergy
-from ..options import SEARCH_OPTIONS, Options, read_options
+from ..options import SEARCH_OPTIONS, Options, declarations, read_options
 from ..result import Flattening
 from ..source import Source
 from .cross_field import SHARP_ANGLE
 from .limits import NO_LIMIT, SquareLimit
+from .mirror_planes import MirrorPlane
 from .options import QUADS, QuadOptions, flattening_defaults
 from .sizes import target_scales
 
@@ -49,6 +51,8 @@ class GridRequest:
         options: the other options, those of the flattening.
         stages: the stopwatch.
         for_quads: a grid is searched until quads can be extracted from it.
+        symmetry: the option of that name of `integer_grid`.
+        mirror: the plane at which the mesh, a half of a symmetric surface, continues, in model units; or None.
     """
 
     source: Source
@@ -62,6 +66,8 @@ class GridRequest:
     options: Mapping[str, Any]
     stages: Stopwatch
     for_quads: bool = False
+    symmetry: str = "auto"
+    mirror: MirrorPlane | None = None
 
     @classmethod
     def of(
@@ -102,6 +108,7 @@ class GridRequest:
             boundary="auto" if is_auto else boundary,
             options=free_options,
             stages=stages,
+            symmetry=chosen.symmetry,
         )
         return request._with_size(length, chosen.quads)
 
@@ -161,3 +168,12 @@ class GridRequest:
         if any(name in self.options for name in SPARSE_OPTIONS):
             return False
         return self.boundary in ("auto", "straight") or not self.mesh.is_boundary_edge.any()
+
+
+def names_vertices(request: GridRequest) -> bool:
+    """Return whether options may name vertices: weights, and those that are not simple values."""
+    options = {**request.options, "boundary": request.boundary}
+    is_simple = all(
+        value is None or isinstance(value, (str, Real)) or callable(value) for value in options.values()
+    )
+    return not (is_simple and options.keys() <= declarations(QuadOptions).keys() - {"weights"})

@@ -1,0 +1,244 @@
+"""Halves of symmetric surfaces: the half beside a plane, and grids and quads of it, mirrored and joined."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base import BoolArray, IntArray, Unmet, mask_of
+from ..errors import GridError
+from ..geometry import quarters_around, sides_between
+from ..io import as_input
+from ..mesh.connectivity import TriangleMesh, are_among
+from ..source import Source
+from .features import lengths_along, sharp_edges, split_edges
+from .integer_map import IntegerGrid, grid_of_corners, on_lines
+from .mirror_planes import SAME_PLACE, MirrorPlane, mirror_planes, on_seam, seam_edges
+from .quad_mesh import QuadMesh
+from .quality import inverted_count
+from .remesh import part_of
+from .request import GridRequest, names_vertices
+from .smooth import smooth_quads
+
+
+@dataclass(frozen=True, eq=False)
+class Half:
+    """The half of a symmetric surface on the side of the normal of its plane.
+
+    Attributes:
+        plane: the plane.
+        mesh: the half; triangles that cross the plane are cut, and vertices near it are on it.
+        origins: (n, 2) the ends of the edge of the surface that each vertex is on; twice the same for its vertices.
+        length: the length of the curve along which both halves meet.
+    """
+
+    plane: MirrorPlane
+    mesh: TriangleMesh
+    origins: IntArray
+    length: float
+
+
+def half_of(mesh: TriangleMesh) -> Half | None:
+    """Return the half of a surface with planes of symmetry, None if it has none.
+
+    Of several planes it is that of the shortest cut, along which a grid must have lines.
+    """
+    halves = [half for plane in mirror_planes(mesh) if (half := _half_beside(mesh, plane)) is not None]
+    return min(halves, key=lambda half: round(half.length / half.plane.size, 6), default=None)
+
+
+def _half_beside(mesh: TriangleMesh, plane: MirrorPlane) -> Half | None:
+    """Return the half of a surface beside a plane, None if the plane does not divide it along a curve.
+
+    This is so if triangles lie in the plane, or edges of the boundary.
+    """
+    heights = plane.heights(mesh.vertices)
+    is_on = np.abs(heights) <= SAME_PLACE * plane.size
+    heights[is_on] = 0.0
+    points = np.where(is_on[:, None], plane.projected(mesh.vertices), mesh.vertices)
+    tails, heads = mesh.edges.T
+    crosses = heights[tails] * heights[heads] < 0
+    if is_on[mesh.faces].all(axis=1).any() or is_on[mesh.edges[mesh.is_boundary_edge]].all(axis=1).any():
+        return None
+    cut = split_edges(mesh.moved_to(points), crosses)[0]
+    ends = mesh.edges[crosses]
+    share = (heights[ends[:, 0]] / (heights[ends[:, 0]] - heights[ends[:, 1]]))[:, None]
+    middles = plane.projected((1 - share) * points[ends[:, 0]] + share * points[ends[:, 1]])
+    heights = np.append(heights, np.zeros(len(ends)))
+    is_half = heights[cut.faces].max(axis=1) > 0
+    # Faces are numbered as before, but for the new vertices on the plane.
+    half, vertices = part_of(cut.moved_to(np.concatenate([points, middles])), is_half)
+    seam = seam_edges(half, plane)
+    if not len(seam):
+        return None
+    every = np.arange(len(mesh.vertices))
+    origins = np.concatenate([np.stack([every, every], axis=1), ends])[vertices]
+    return Half(plane, half, origins, float(lengths_along(half, seam).sum()))
+
+
+def half_request(request: GridRequest) -> GridRequest | None:
+    """Return the request for the grid of a half of a symmetric surface, None if it has none or options prevent it.
+
+    Its boundary is straight. Options may not name vertices, nor fix cones.
+    """
+    is_simple = request.sizes is None or request.sizes == "curvature"
+    if request.symmetry == "none" or request.flattening or not (is_simple and request.leaves_cones_open):
+        return None
+    if names_vertices(request):
+        return None
+    checked = request.checked
+    half = half_of(checked.mesh)
+    if half is None:
+        return None
+    scales = None if request.scales is None else request.scales[half.origins].mean(axis=1)
+    model = half.mesh.moved_to(np.ldexp(half.mesh.vertices, -checked.exponent))
+    limit = replace(request.limit, requested=request.limit.requested / 2, triangles=len(model.faces))
+    return replace(
+        request,
+        source=Source(as_input(model)),
+        sizes=None if scales is None else np.exp(-scales),
+        limit=limit,
+        boundary="straight",
+        mirror=half.plane.scaled(-checked.exponent),
+    )
+
+
+def asymmetry_note(half: GridRequest, reason: str) -> Unmet:
+    """Return a note that a grid is not symmetric about the plane of a half of a surface, and why."""
+    return Unmet(f"The quads are not symmetric about {half.mirror}, as the surface is: {reason}.")
+
+
+@dataclass(frozen=True, eq=False)
+class _Doubled:
+    """A half surface with its mirror image: vertices of the half come first, and all triangles of the half.
+
+    Attributes:
+        mesh: the whole surface.
+        image: (n,) the mirror image of each vertex of the half; itself on the plane.
+    """
+
+    mesh: TriangleMesh
+    image: IntArray
+
+    @classmethod
+    def of(cls, half: TriangleMesh, plane: MirrorPlane) -> _Doubled:
+        is_shared = mask_of(len(half.vertices), half.edges[seam_edges(half, plane)])
+        image = images_of(is_shared)
+        vertices = np.concatenate([half.vertices, plane.reflected(half.vertices[~is_shared])])
+        faces = np.concatenate([half.faces, image[half.faces[:, [0, 2, 1]]]])
+        return cls(TriangleMesh(vertices, faces), image)
+
+
+def images_of(is_shared: BoolArray) -> IntArray:
+    """Return (n,) the numbers of the images of vertices: their own if shared, else the next after n in order."""
+    image = np.arange(len(is_shared))
+    image[~is_shared] = len(is_shared) + np.arange(int((~is_shared).sum()))
+    return image
+
+
+def doubled_grid(grid: IntegerGrid, plane: MirrorPlane, sharp_angle: float) -> IntegerGrid:
+    """Return the grid of a whole surface from one of its half, whose seam is on grid lines.
+
+    Args:
+        grid: the grid of the half.
+        plane: the plane.
+        sharp_angle: dihedral angle above which edges of the seam are features, radians.
+
+    Raises:
+        GridError: the seam is not on grid lines, or not straight.
+    """
+    half = TriangleMesh(grid.vertices, grid.faces)
+    doubled = _Doubled.of(half, plane)
+    mesh, image = doubled.mesh, doubled.image
+    _require_straight(half, plane, grid)
+    ends = half.edges[seam_edges(half, plane)]
+    sharp = mesh.edges[sharp_edges(mesh, sharp_angle)]
+    whole = grid_of_corners(
+        mesh.vertices,
+        mesh.faces,
+        np.concatenate([grid.corner_grid, grid.corner_grid[:, [0, 2, 1]] * [-1, 1]]),
+        size=grid.size,
+        notes=grid.notes,
+        features=np.unique(
+            np.sort(
+                np.concatenate([grid.features, image[grid.features], ends[are_among(ends, sharp)]]), axis=1
+            ),
+            axis=0,
+        ),
+        corners=_corners_of(grid, mesh, image),
+    )
+    return replace(whole, seconds=grid.seconds)
+
+
+def _corners_of(grid: IntegerGrid, mesh: TriangleMesh, image: IntArray) -> IntArray:
+    """Return the corners of a doubled grid: those of the half, except those on the plane inside the whole surface."""
+    corners = grid.corners
+    is_inside = (image[corners] == corners) & ~mesh.is_boundary_vertex[corners]
+    return np.unique([corners[~is_inside], image[corners[~is_inside]]])
+
+
+def _require_straight(half: TriangleMesh, plane: MirrorPlane, grid: IntegerGrid) -> None:
+    """Raise GridError unless the seam is on grid lines and has no corner of a single quad."""
+    quarters = quarters_around(half, sides_between(grid.corner_grid))
+    is_bent = on_seam(half, plane) & (quarters < 2)
+    is_off = ~on_lines(half, grid.corner_grid)[seam_edges(half, plane)]
+    if is_off.any() or is_bent.any():
+        raise GridError(f"grid lines do not follow {plane}")
+
+
+def doubled_quads(quads: QuadMesh, plane: MirrorPlane, sharp_angle: float) -> QuadMesh:
+    """Return the quads of a whole surface from those of its half.
+
+    Raises:
+        GridError: the boundary of the quads does not follow the plane.
+    """
+    grid = None if quads.grid is None else doubled_grid(quads.grid, plane, sharp_angle)
+    surface = _Doubled.of(quads.surface, plane)
+    is_shared = mask_of(
+        len(quads.vertices),
+        quads.edges[quads.is_boundary_edge & plane.contains(quads.vertices)[quads.edges].all(axis=1)],
+    )
+    image, points = images_of(is_shared), quads.vertices.copy()
+    points[is_shared] = plane.projected(points[is_shared])
+    count = len(quads.surface.faces)
+    whole = replace(
+        quads,
+        vertices=np.concatenate([points, plane.reflected(points[~is_shared])]),
+        quads=np.concatenate([quads.quads, image[quads.quads[:, [0, 3, 2, 1]]]]),
+        faces=np.concatenate([quads.faces, count + quads.faces[~is_shared]]),
+        barycentric=np.concatenate([quads.barycentric, quads.barycentric[~is_shared][:, [0, 2, 1]]]),
+        left_out=2 * quads.left_out,
+        area_left_out=2 * quads.area_left_out,
+        surface=surface.mesh,
+        grid=grid,
+    )
+    if whole.euler_characteristic != whole.surface_euler and not quads.left_out:
+        raise GridError(f"quads do not follow {plane}")
+    return whole
+
+
+def smoothed_symmetrically(quads: QuadMesh, plane: MirrorPlane, rounds: int, features: IntArray) -> QuadMesh:
+    """Return smoothed quads of a whole surface whose halves remain mirror images.
+
+    The half is smoothed as part of the whole; then the other one is its image. Vertices of the seam stay on the plane.
+
+    Args:
+        quads: those of `doubled_quads`.
+        plane: the plane.
+        rounds: rounds of smoothing.
+        features: (f, 2) vertices of edges of the surface, along which vertices do not move.
+    """
+    smooth = smooth_quads(quads, rounds, features)
+    half, count = len(quads.quads) // 2, len(quads.surface.faces) // 2
+    pairs = np.stack([quads.quads[:half], quads.quads[half:][:, [0, 3, 2, 1]]], axis=2).reshape(-1, 2)
+    original, image = np.unique(pairs, axis=0).T
+    is_shared = original == image
+    points, faces, weights = smooth.vertices.copy(), smooth.faces.copy(), smooth.barycentric.copy()
+    points[original[is_shared]] = plane.projected(points[original[is_shared]])
+    copies, sources = image[~is_shared], original[~is_shared]
+    points[copies] = plane.reflected(points[sources])
+    faces[copies] = (faces[sources] + count) % (2 * count)
+    weights[copies] = weights[sources][:, [0, 2, 1]]
+    symmetric = replace(smooth, vertices=points, faces=faces, barycentric=weights)
+    return symmetric if inverted_count(symmetric) <= inverted_count(quads) else quads
