@@ -169,7 +169,7 @@ class _Images:
         self.mesh, self.size = mesh, size
         self._vertices, self._triangles = cKDTree(mesh.vertices), TriangleTree(mesh.vertices, mesh.faces)
         self._edge = float(lengths_along(mesh, np.arange(len(mesh.edges))).mean())
-        self._near = NEAR_EDGES * self._edge
+        self._reach = NEAR_EDGES * self._edge
         order = np.argsort(tie_key(mesh.vertices), kind="stable")
         self._samples = mesh.vertices[order[:: -(-len(order) // MAX_SAMPLES)]]
 
@@ -184,15 +184,15 @@ class _Images:
 
     def share_near(self, plane: MirrorPlane) -> float:
         """Return the share of samples whose images are near the surface."""
-        return float((self._distances(plane.reflected(self._samples)) <= self._near).mean())
+        return float((self._distances(plane.reflected(self._samples)) <= self._reach).mean())
 
     def refined(self, plane: MirrorPlane) -> MirrorPlane:
         """Return the plane that fits pairs of vertices, of which one is near the image of the other, best."""
         vertices = self.mesh.vertices
-        gaps, images = self._vertices.query(plane.reflected(vertices), distance_upper_bound=self._near)
+        gaps, images = self._vertices.query(plane.reflected(vertices), distance_upper_bound=self._reach)
         paired = np.flatnonzero(np.isfinite(gaps))
         across = vertices[paired] - vertices[images[paired]]
-        if not (np.linalg.norm(across, axis=1) > self._near).any():
+        if not (np.linalg.norm(across, axis=1) > self._reach).any():
             return plane
         normal = np.linalg.eigh(across.T @ across)[1][:, -1]
         normal = normal * np.sign(normal @ plane.normal)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from ..base import BoolArray, IntArray, Unmet, mask_of
+from ..base import BoolArray, IntArray, Unmet, mask_of, plural
 from ..errors import GridError
 from ..geometry import quarters_around, sides_between
 from ..io import as_input
@@ -20,6 +21,10 @@ from .quality import inverted_count
 from .remesh import part_of
 from .request import GridRequest, names_vertices
 from .smooth import smooth_quads
+
+# Largest ratio of the number of irregular vertices of symmetric quads to that of others, and of the factors by which
+# the numbers of quads differ from the requested one.
+MAX_WORSE = 1.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +87,7 @@ def half_request(request: GridRequest) -> GridRequest | None:
 
     Its boundary is straight. Options may not name vertices, nor fix cones.
     """
-    is_simple = request.sizes is None or request.sizes == "curvature"
+    is_simple = request.sizes is None or (isinstance(request.sizes, str) and request.sizes == "curvature")
     if request.symmetry == "none" or request.flattening or not (is_simple and request.leaves_cones_open):
         return None
     if names_vertices(request):
@@ -104,9 +109,32 @@ def half_request(request: GridRequest) -> GridRequest | None:
     )
 
 
-def asymmetry_note(half: GridRequest, reason: str) -> Unmet:
-    """Return a note that a grid is not symmetric about the plane of a half of a surface, and why."""
-    return Unmet(f"The quads are not symmetric about {half.mirror}, as the surface is: {reason}.")
+def are_symmetric(quads: QuadMesh, plane: MirrorPlane) -> bool:
+    """Return whether the mirror images of all vertices of quads are vertices, up to rounding."""
+    gaps, images = cKDTree(quads.vertices).query(plane.reflected(quads.vertices))
+    return bool((gaps <= SAME_PLACE * plane.size).all()) and len(np.unique(images)) == len(images)
+
+
+def fault(symmetric: QuadMesh, quads: QuadMesh, requested: float) -> str:
+    """Return why symmetric quads of a surface are worse than those without symmetry, "" if they are not.
+
+    requested: number of quads that is requested.
+    """
+    counts, numbers = (
+        [len(mesh.irregular) for mesh in (symmetric, quads)],
+        [len(symmetric.quads), len(quads.quads)],
+    )
+    if counts[0] > MAX_WORSE * counts[1]:
+        return f"they would have {plural(counts[0], 'irregular vertex', 'irregular vertices')} instead of {counts[1]:,}"
+    ratios = [max(number / requested, requested / number) for number in numbers]
+    if ratios[0] > MAX_WORSE * ratios[1]:
+        return f"they would be {numbers[0]:,} instead of {numbers[1]:,}"
+    return ""
+
+
+def asymmetry_note(plane: MirrorPlane, reason: str) -> Unmet:
+    """Return a note that a grid is not symmetric about a plane of its surface, and why."""
+    return Unmet(f"The quads are not symmetric about {plane}, as the surface is: {reason}.")
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +182,7 @@ def doubled_grid(grid: IntegerGrid, plane: MirrorPlane, sharp_angle: float) -> I
     _require_straight(half, plane, grid)
     ends = half.edges[seam_edges(half, plane)]
     sharp = mesh.edges[sharp_edges(mesh, sharp_angle)]
-    whole = grid_of_corners(
+    joined_grid = grid_of_corners(
         mesh.vertices,
         mesh.faces,
         np.concatenate([grid.corner_grid, grid.corner_grid[:, [0, 2, 1]] * [-1, 1]]),
@@ -168,7 +196,7 @@ def doubled_grid(grid: IntegerGrid, plane: MirrorPlane, sharp_angle: float) -> I
         ),
         corners=_corners_of(grid, mesh, image),
     )
-    return replace(whole, seconds=grid.seconds)
+    return replace(joined_grid, seconds=grid.seconds)
 
 
 def _corners_of(grid: IntegerGrid, mesh: TriangleMesh, image: IntArray) -> IntArray:
@@ -202,7 +230,7 @@ def doubled_quads(quads: QuadMesh, plane: MirrorPlane, sharp_angle: float) -> Qu
     image, points = images_of(is_shared), quads.vertices.copy()
     points[is_shared] = plane.projected(points[is_shared])
     count = len(quads.surface.faces)
-    whole = replace(
+    joined_quads = replace(
         quads,
         vertices=np.concatenate([points, plane.reflected(points[~is_shared])]),
         quads=np.concatenate([quads.quads, image[quads.quads[:, [0, 3, 2, 1]]]]),
@@ -213,9 +241,9 @@ def doubled_quads(quads: QuadMesh, plane: MirrorPlane, sharp_angle: float) -> Qu
         surface=surface.mesh,
         grid=grid,
     )
-    if whole.euler_characteristic != whole.surface_euler and not quads.left_out:
+    if joined_quads.euler_characteristic != joined_quads.surface_euler and not quads.left_out:
         raise GridError(f"quads do not follow {plane}")
-    return whole
+    return joined_quads
 
 
 def smoothed_symmetrically(quads: QuadMesh, plane: MirrorPlane, rounds: int, features: IntArray) -> QuadMesh:

@@ -24,7 +24,15 @@ from .cross_field import sharp_ends
 from .extract import DegenerateQuads, extract_quads, find_quads
 from .integer_map import IntegerGrid
 from .limits import NO_LIMIT, NOTED_TIMES, SquareLimit
-from .mirrored import asymmetry_note, doubled_grid, doubled_quads, half_request, smoothed_symmetrically
+from .mirrored import (
+    are_symmetric,
+    asymmetry_note,
+    doubled_grid,
+    doubled_quads,
+    fault,
+    half_request,
+    smoothed_symmetrically,
+)
 from .no_grid import REASONS, NoGrid, or_reason
 from .options import QuadOptions
 from .policies import find_grid, on_coarse_mesh
@@ -156,13 +164,28 @@ def _attempt(request: GridRequest, rounds: int) -> tuple[QuadMesh, tuple[str, ..
     """Return smoothed quads and how they fail to follow the surface; symmetric ones if the surface is symmetric."""
     with request.stages("symmetry"):
         half = half_request(request)
-    if half is None:
-        return _checked(request, _meshed(request, rounds))
-    outcome = _mirrored(request, half, rounds)
-    if not isinstance(outcome, NoGrid):
-        return outcome, ()
-    quad_mesh, problems = _checked(request, _meshed(request, rounds))
-    return replace(quad_mesh, notes=(*quad_mesh.notes, asymmetry_note(half, outcome.reason))), problems
+    if half is None or half.mirror is None:
+        return _attempt_without_symmetry(request, rounds)
+    plain = or_reason(_attempt_without_symmetry)(request, rounds)
+    if not isinstance(plain, NoGrid) and not plain[1] and are_symmetric(plain[0], half.mirror):
+        return plain
+    symmetric = _mirrored(request, half, rounds)
+    if isinstance(plain, NoGrid):
+        if isinstance(symmetric, NoGrid):
+            raise plain.error
+        return symmetric, ()
+    quad_mesh, problems = plain
+    if isinstance(symmetric, NoGrid):
+        reason = symmetric.reason
+    else:
+        reason = "" if problems else fault(symmetric, quad_mesh, request.limit.requested)
+        if not reason:
+            return symmetric, ()
+    return replace(quad_mesh, notes=(*quad_mesh.notes, asymmetry_note(half.mirror, reason))), problems
+
+
+def _attempt_without_symmetry(request: GridRequest, rounds: int) -> tuple[QuadMesh, tuple[str, ...]]:
+    return _checked(request, _meshed(request, rounds))
 
 
 @or_reason
@@ -177,8 +200,8 @@ def _mirrored(request: GridRequest, half: GridRequest, rounds: int) -> QuadMesh 
     with request.stages("smooth"):
         symmetric = smoothed_symmetrically(doubled, half.mirror, rounds, features)
     notes = *request.checked.notes, *symmetric.notes, f"The quads are symmetric about {half.mirror}."
-    whole = replace(meshed, quad_mesh=replace(symmetric, notes=notes), filled_area=2 * meshed.filled_area)
-    quad_mesh, problems = _checked(request, whole)
+    meshed = replace(meshed, quad_mesh=replace(symmetric, notes=notes), filled_area=2 * meshed.filled_area)
+    quad_mesh, problems = _checked(request, meshed)
     return NoGrid(CoarseGridError("; ".join(problems))) if problems else quad_mesh
 
 
@@ -337,23 +360,30 @@ def integer_grid(
 
 
 def _symmetric_grid(request: GridRequest, half: GridRequest) -> Outcome:
-    """Return the grid of a symmetric surface: a symmetric one, if there is one."""
+    """Return the grid of a symmetric surface: a symmetric one, unless it is worse than another."""
+    assert half.mirror is not None
+    plain, symmetric = find_grid(request), _mirrored_grid(request, half)
+    if isinstance(plain, NoGrid):
+        return plain if isinstance(symmetric, NoGrid) else symmetric
+    if isinstance(symmetric, NoGrid):
+        return plain.with_note(asymmetry_note(half.mirror, symmetric.reason))
+    quads = [find_quads(outcome.grid, leave_out=True) for outcome in (plain, symmetric)]
+    meshes = [mesh for mesh in quads if isinstance(mesh, QuadMesh)]
+    if len(meshes) < len(quads) or are_symmetric(meshes[0], half.mirror):
+        return plain
+    reason = fault(meshes[1], meshes[0], request.limit.requested)
+    return plain.with_note(asymmetry_note(half.mirror, reason)) if reason else symmetric
 
-    @or_reason
-    def doubled() -> Outcome:
-        assert half.mirror is not None
-        outcome = find_grid(half)
-        if isinstance(outcome, NoGrid):
-            return outcome
-        notes = *request.checked.notes, *outcome.grid.notes, f"The grid is symmetric about {half.mirror}."
-        return GridWithQuads(doubled_grid(replace(outcome.grid, notes=notes), half.mirror, request.angle))
 
-    symmetric = doubled()
-    if isinstance(symmetric, GridWithQuads):
-        return symmetric
-    outcome = find_grid(request)
-    note = asymmetry_note(half, symmetric.reason)
-    return outcome.with_note(note) if isinstance(outcome, GridWithQuads) else outcome
+@or_reason
+def _mirrored_grid(request: GridRequest, half: GridRequest) -> Outcome:
+    """Return the grid of a surface from one of its half, or the reason why there is none."""
+    assert half.mirror is not None
+    outcome = find_grid(half)
+    if isinstance(outcome, NoGrid):
+        return outcome
+    notes = *request.checked.notes, *outcome.grid.notes, f"The grid is symmetric about {half.mirror}."
+    return GridWithQuads(doubled_grid(replace(outcome.grid, notes=notes), half.mirror, request.angle))
 
 
 def _require_sound(quad_mesh: QuadMesh, limit: SquareLimit) -> None:
