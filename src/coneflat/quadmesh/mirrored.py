@@ -17,14 +17,16 @@ from .features import lengths_along, sharp_edges, split_edges
 from .integer_map import IntegerGrid, grid_of_corners, on_lines
 from .mirror_planes import SAME_PLACE, MirrorPlane, mirror_planes, on_seam, seam_edges
 from .quad_mesh import QuadMesh
-from .quality import inverted_count
 from .remesh import part_of
 from .request import GridRequest, names_vertices
-from .smooth import smooth_quads
+from .simpler_mesh import nearest_on_edges
+from .smooth import blocked, is_on_feature, smooth_quads, square_corners
 
 # Largest ratio of the number of irregular vertices of symmetric quads to that of others, and of the factors by which
 # the numbers of quads differ from the requested one.
 MAX_WORSE = 1.1
+# Rounds of smoothing between those of the vertices on the plane.
+ROUNDS_AT_ONCE = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,27 +248,36 @@ def doubled_quads(quads: QuadMesh, plane: MirrorPlane, sharp_angle: float) -> Qu
     return joined_quads
 
 
-def smoothed_symmetrically(quads: QuadMesh, plane: MirrorPlane, rounds: int, features: IntArray) -> QuadMesh:
-    """Return smoothed quads of a whole surface whose halves remain mirror images.
+def smoothed_beside(quads: QuadMesh, plane: MirrorPlane, rounds: int, features: IntArray) -> QuadMesh:
+    """Return smoothed quads of a half, as parts of those of the whole surface.
 
-    The half is smoothed as part of the whole; then the other one is its image. Vertices of the seam stay on the plane.
+    Vertices of the seam slide along it, to the nearest point to the mean of their positions in the nearest squares of
+    both halves. Those at its ends and on features do not move.
 
     Args:
-        quads: those of `doubled_quads`.
+        quads: quads of the half, smoothed, with all boundaries in place.
         plane: the plane.
-        rounds: rounds of smoothing.
+        rounds: rounds of smoothing, in which the vertices of the seam and the others move in turn.
         features: (f, 2) vertices of edges of the surface, along which vertices do not move.
     """
-    smooth = smooth_quads(quads, rounds, features)
-    half, count = len(quads.quads) // 2, len(quads.surface.faces) // 2
-    pairs = np.stack([quads.quads[:half], quads.quads[half:][:, [0, 3, 2, 1]]], axis=2).reshape(-1, 2)
-    original, image = np.unique(pairs, axis=0).T
-    is_shared = original == image
-    points, faces, weights = smooth.vertices.copy(), smooth.faces.copy(), smooth.barycentric.copy()
-    points[original[is_shared]] = plane.projected(points[original[is_shared]])
-    copies, sources = image[~is_shared], original[~is_shared]
-    points[copies] = plane.reflected(points[sources])
-    faces[copies] = (faces[sources] + count) % (2 * count)
-    weights[copies] = weights[sources][:, [0, 2, 1]]
-    symmetric = replace(smooth, vertices=points, faces=faces, barycentric=weights)
-    return symmetric if inverted_count(symmetric) <= inverted_count(quads) else quads
+    surface, seam = quads.surface, seam_edges(quads.surface, plane)
+    border = quads.edges[quads.is_boundary_edge]
+    is_on = plane.contains(quads.vertices)
+    ends = border[~is_on[border].all(axis=1)]
+    movable = is_on & quads.is_boundary_vertex & ~mask_of(len(is_on), ends) & ~is_on_feature(quads, features)
+    for _ in range(0, rounds, ROUNDS_AT_ONCE):
+        targets = plane.projected(square_corners(quads.vertices, quads.quads)[movable])
+        points, faces, weights = quads.vertices.copy(), quads.faces.copy(), quads.barycentric.copy()
+        reach = np.full(len(targets), np.inf)
+        _, faces[movable], weights[movable] = nearest_on_edges(
+            surface, seam, surface.vertices, targets, reach
+        )
+        corners = surface.vertices[surface.faces[faces[movable]]]
+        points[movable] = np.einsum("qi,qix->qx", weights[movable], corners)
+        stays = blocked(quads.vertices, points, quads.quads)
+        points[stays], faces[stays], weights[stays] = (
+            quads.vertices[stays], quads.faces[stays], quads.barycentric[stays],
+        )  # fmt: skip
+        quads = replace(quads, vertices=points, faces=faces, barycentric=weights)
+        quads = smooth_quads(quads, ROUNDS_AT_ONCE, features)
+    return quads

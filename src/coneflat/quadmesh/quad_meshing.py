@@ -31,7 +31,7 @@ from .mirrored import (
     doubled_quads,
     fault,
     half_request,
-    smoothed_symmetrically,
+    smoothed_beside,
 )
 from .no_grid import REASONS, NoGrid, or_reason
 from .options import QuadOptions
@@ -193,12 +193,12 @@ def _mirrored(request: GridRequest, half: GridRequest, rounds: int) -> QuadMesh 
     """Return symmetric quads that follow the surface, or the reason why there are none."""
     assert half.mirror is not None
     meshed = _meshed(half, rounds)
-    doubled = doubled_quads(meshed.quad_mesh, half.mirror, request.angle)
-    features = (
-        np.empty((0, 2), np.int64) if meshed.is_moved or doubled.grid is None else doubled.grid.features
-    )
+    quad_mesh = meshed.quad_mesh
+    grid = None if meshed.is_moved else quad_mesh.grid
+    features = np.empty((0, 2), np.int64) if grid is None else grid.features
     with request.stages("smooth"):
-        symmetric = smoothed_symmetrically(doubled, half.mirror, rounds, features)
+        quad_mesh = smoothed_beside(quad_mesh, half.mirror, rounds, features)
+    symmetric = doubled_quads(quad_mesh, half.mirror, request.angle)
     notes = *request.checked.notes, *symmetric.notes, f"The quads are symmetric about {half.mirror}."
     meshed = replace(meshed, quad_mesh=replace(symmetric, notes=notes), filled_area=2 * meshed.filled_area)
     quad_mesh, problems = _checked(request, meshed)

@@ -98,7 +98,7 @@ class SimplerMesh:
         is_on = is_on_feature(quads, sharp_ends(simple)), quads.is_boundary_vertex
         for moves, (edges, reach) in zip(is_on, (sharp, border), strict=True):
             if len(edges) and moves.any():
-                on_edges, faces_there, weights_there = _nearest_on_edges(
+                on_edges, faces_there, weights_there = nearest_on_edges(
                     mesh, edges, places, targets[moves], reach[moves]
                 )
                 at = np.flatnonzero(moves)[on_edges]
@@ -151,7 +151,7 @@ class SimplerMesh:
         )
 
 
-def _nearest_on_edges(
+def nearest_on_edges(
     mesh: TriangleMesh, edges: IntArray, places: FloatArray, targets: FloatArray, reach: FloatArray
 ) -> tuple[BoolArray, IntArray, FloatArray]:
     """Return (k,) which targets have a point on edges within reach, and for these the triangles and the coordinates.

@@ -151,11 +151,11 @@ def smooth_quads(quads: QuadMesh, rounds: int = QuadOptions.smooth, features: Ar
     points, faces, barycentric = mesh.vertices, mesh.faces, mesh.barycentric
     movable = ~(quads.is_boundary_vertex | is_on_feature(quads, ends))
     for _ in range(rounds):
-        targets = _squared(points, quads.quads)[movable]
+        targets = square_corners(points, quads.quads)[movable]
         on, weights, moved = faces[movable], barycentric[movable], points.copy()
         slide_near(stars, targets, on, weights)
         moved[movable] = stars.at(on, weights)
-        gone = movable & ~_blocked(points, moved, quads.quads)
+        gone = movable & ~blocked(points, moved, quads.quads)
         points[gone], faces[gone], barycentric[gone] = moved[gone], on[gone[movable]], weights[gone[movable]]
     if rounds:
         moving.improve_worst(movable)
@@ -163,7 +163,7 @@ def smooth_quads(quads: QuadMesh, rounds: int = QuadOptions.smooth, features: Ar
     return mesh
 
 
-def _squared(points: FloatArray, quads: IntArray) -> FloatArray:
+def square_corners(points: FloatArray, quads: IntArray) -> FloatArray:
     """Return (q, 3) the mean position of each vertex in the squares nearest to its quads.
 
     Corner k of a square with centre c is c + J^k z, where J is the quarter turn in the plane of the quad. The nearest
@@ -182,7 +182,7 @@ def _squared(points: FloatArray, quads: IntArray) -> FloatArray:
     return np.stack(sums, axis=1) / np.maximum(np.bincount(at, minlength=len(points)), 1)[:, None]
 
 
-def _blocked(before: FloatArray, moved: FloatArray, quads: IntArray) -> BoolArray:
+def blocked(before: FloatArray, moved: FloatArray, quads: IntArray) -> BoolArray:
     """Return (q,) whether each vertex must not move, so that no quad gets worse than MIN_JACOBIAN and than before."""
     stays = np.zeros(len(before), dtype=bool)
     bound = np.minimum(least_jacobians(before, quads), MIN_JACOBIAN)
