@@ -1,10 +1,10 @@
 """Quad meshes compared with those of other packages: `python benchmarks/quads.py` prints a Markdown table.
 
-Every model of `../shared/meshes` that is a manifold, some also decimated, and mechanical shapes with fillets, holes and
-ribs, by coneflat and by what can be installed with pip: QuadriFlow (`pyquadriflow`) and Instant Meshes
-(`pynanoinstantmeshes`), each also with its options for boundaries and sharp edges. Everybody's meshes are written as
-OBJ and measured on the file by the same program, `--tool`, which is not ours. Each runs in a process of its own;
-seconds are CPU time of the call alone, without start-up. The medians over closed models come last.
+Every model of `../shared/meshes` that is a manifold, some also decimated, symmetric models, and mechanical shapes with
+fillets, holes and ribs, by coneflat and by what can be installed with pip: QuadriFlow (`pyquadriflow`) and Instant
+Meshes (`pynanoinstantmeshes`), each also with its options for boundaries and sharp edges. Everybody's meshes are
+written as OBJ and measured on the file by the same program, `--tool`, which is not ours. Each runs in a process of
+its own; seconds are CPU time of the call alone, without start-up. The medians over closed models come last.
 """
 
 from __future__ import annotations
@@ -28,10 +28,12 @@ from typing import Any
 import mechanical
 import numpy as np
 from common import models, shapes, stored_meshes
+from scipy.spatial import cKDTree
 
-from coneflat import check_mesh, quads
+from coneflat import check_mesh, quads, read_mesh
 from coneflat.errors import ConeflatError
 from coneflat.mesh.connectivity import TriangleMesh
+from coneflat.quadmesh.mirrored import doubled, half_of
 
 TOOL = stored_meshes.SHARED.parent / "tools" / "quads_aligned.py"
 #: Models above this number of triangles are measured decimated, too.
@@ -48,6 +50,7 @@ COLUMNS = (
     ("Hausdorff, edges", "haus_edges", "{:.2f}"),
     ("self-intersections", "self", "{:.0f}"),
     ("inverted", "J_neg", "{:.0f}"),
+    ("with a partner", "partners", "{:.0%}"),
     ("s", "seconds", "{:.1f}"),
 )
 
@@ -114,9 +117,56 @@ def chosen(names: list[str]) -> Iterator[tuple[str, TriangleMesh]]:
                 yield f"{name}, decimated", check_mesh(*small).mesh
             except ConeflatError:
                 continue
+    for name, shape in mirrored_models().items():
+        if not names or name in names:
+            yield name, check_mesh(*shape).mesh
     for name, shape in mechanical.shapes().items():
         if not names or name in names:
             yield name, check_mesh(*shape).mesh
+
+
+def mirrored_models() -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Return models that are exactly symmetric: halves of spot, and of a bumpy ellipsoid, with their mirror images."""
+    models_by_name = {}
+    if "spot.obj" in stored_meshes.at_hand("spot.obj"):
+        spot = read_mesh(stored_meshes.SHARED / "spot.obj")
+        half = half_of(check_mesh(spot.vertices, spot.triangles).mesh)
+        assert half is not None
+        whole_spot = doubled(half.mesh, half.plane).mesh
+        models_by_name["spot, mirrored"] = whole_spot.vertices, whole_spot.faces
+    vertices, faces = shapes.sphere(4, bumps=0.0)
+    x, y, z = vertices.T
+    bumps = 1 + 0.1 * np.sin(5 * y + 2 * z) * np.cos(3 * x)
+    models_by_name["ellipsoid, mirrored"] = bumps[:, None] * vertices * [0.8, 1.0, 1.6], faces
+    return models_by_name
+
+
+def share_with_partner(mesh: TriangleMesh, path: Path) -> dict[str, float]:
+    """Return the share of the irregular vertices of quads whose mirror images are near irregular vertices.
+
+    Near is a tenth of the mean edge length. The share is missing if the surface is not symmetric.
+
+    Args:
+        mesh: the surface.
+        path: the quads.
+    """
+    half = half_of(mesh)
+    if half is None:
+        return {}
+    quad_file = read_mesh(path)
+    corners, offsets = quad_file.corners, quad_file.offsets
+    after = np.arange(1, len(corners) + 1)
+    after[offsets[1:] - 1] = offsets[:-1]
+    pairs = np.sort(np.stack([corners, corners[after]], axis=1), axis=1)
+    edges, counts = np.unique(pairs, axis=0, return_counts=True)
+    valences = np.bincount(edges.ravel(), minlength=len(quad_file.vertices))
+    is_inner = ~np.isin(np.arange(len(valences)), edges[counts == 1]) & (valences > 0)
+    irregular = quad_file.vertices[is_inner & (valences != 4)]
+    if not len(irregular):
+        return {}
+    reach = 0.1 * np.linalg.norm(np.diff(quad_file.vertices[edges], axis=1), axis=2).mean()
+    gaps = cKDTree(irregular).query(half.plane.reflected(irregular))[0]
+    return {"partners": float((gaps <= reach).mean())}
 
 
 def row(measures: dict[str, float]) -> str:
@@ -134,6 +184,7 @@ def trial(mesh: TriangleMesh, count: int, make: Maker, tool: Path) -> tuple[dict
             pool.submit(be_silent).result()
             pool.submit(warm_up, make).result()
             seconds = pool.submit(write, path, mesh, count, make).result()
+            partners = share_with_partner(mesh, path)
             answer = json.loads(
                 subprocess.check_output([sys.executable, tool, surface, path], stderr=subprocess.DEVNULL)
             )
@@ -141,7 +192,7 @@ def trial(mesh: TriangleMesh, count: int, make: Maker, tool: Path) -> tuple[dict
             return {}, "crashed"
         except Exception as error:  # Other packages raise any type.
             return {}, f"{type(error).__name__}: {str(error)[:120]}"
-    return {**numbers(answer), "quads": answer["topo"]["F"], "seconds": seconds}, ""
+    return {**numbers(answer), **partners, "quads": answer["topo"]["F"], "seconds": seconds}, ""
 
 
 def numbers(row: dict[str, Any]) -> dict[str, float]:

@@ -140,7 +140,7 @@ def asymmetry_note(plane: MirrorPlane, reason: str) -> Unmet:
 
 
 @dataclass(frozen=True, eq=False)
-class _Doubled:
+class Doubled:
     """A half surface with its mirror image: vertices of the half come first, and all triangles of the half.
 
     Attributes:
@@ -151,13 +151,14 @@ class _Doubled:
     mesh: TriangleMesh
     image: IntArray
 
-    @classmethod
-    def of(cls, half: TriangleMesh, plane: MirrorPlane) -> _Doubled:
-        is_shared = mask_of(len(half.vertices), half.edges[seam_edges(half, plane)])
-        image = images_of(is_shared)
-        vertices = np.concatenate([half.vertices, plane.reflected(half.vertices[~is_shared])])
-        faces = np.concatenate([half.faces, image[half.faces[:, [0, 2, 1]]]])
-        return cls(TriangleMesh(vertices, faces), image)
+
+def doubled(half: TriangleMesh, plane: MirrorPlane) -> Doubled:
+    """Return a half surface joined to its mirror image."""
+    is_shared = mask_of(len(half.vertices), half.edges[seam_edges(half, plane)])
+    image = images_of(is_shared)
+    vertices = np.concatenate([half.vertices, plane.reflected(half.vertices[~is_shared])])
+    faces = np.concatenate([half.faces, image[half.faces[:, [0, 2, 1]]]])
+    return Doubled(TriangleMesh(vertices, faces), image)
 
 
 def images_of(is_shared: BoolArray) -> IntArray:
@@ -179,8 +180,8 @@ def doubled_grid(grid: IntegerGrid, plane: MirrorPlane, sharp_angle: float) -> I
         GridError: the seam is not on grid lines, or not straight.
     """
     half = TriangleMesh(grid.vertices, grid.faces)
-    doubled = _Doubled.of(half, plane)
-    mesh, image = doubled.mesh, doubled.image
+    whole_surface = doubled(half, plane)
+    mesh, image = whole_surface.mesh, whole_surface.image
     _require_straight(half, plane, grid)
     ends = half.edges[seam_edges(half, plane)]
     sharp = mesh.edges[sharp_edges(mesh, sharp_angle)]
@@ -224,7 +225,7 @@ def doubled_quads(quads: QuadMesh, plane: MirrorPlane, sharp_angle: float) -> Qu
         GridError: the boundary of the quads does not follow the plane.
     """
     grid = None if quads.grid is None else doubled_grid(quads.grid, plane, sharp_angle)
-    surface = _Doubled.of(quads.surface, plane)
+    surface = doubled(quads.surface, plane)
     is_shared = mask_of(
         len(quads.vertices),
         quads.edges[quads.is_boundary_edge & plane.contains(quads.vertices)[quads.edges].all(axis=1)],
