@@ -34,7 +34,7 @@ from .sizes import extended
 
 # Cost of an area distortion as large as allowed, at first, and of crosses off by 22.5 degrees, which is larger where
 # sharp edges are required on grid lines; a cone costs 1 for each quarter turn, and a missing one more than all others.
-COST_OF_AREAS, COST_OF_DIRECTIONS, TIMES_REQUIRED, COST_OF_MISSING = 15.0, 400.0, 2.5, 1e9
+COST_OF_AREAS, COST_OF_DIRECTIONS, TIMES_REQUIRED, COST_OF_MISSING = 15.0, 200.0, 5.0, 1e9
 # Radii within which cones move, relative to the distance between the centres of regions, and tried places in each.
 RADII, PLACES_NEAR = (1.0, 0.6, 0.35, 0.2), 10
 # Largest number of pairs of places that a search compares, half a second of work or more: for each vertex, and of small
