@@ -16,6 +16,7 @@ from ..options import (
     Choice,
     ConeBounds,
     ConeNumber,
+    Flag,
     Number,
     RunOptions,
     WordOrVertices,
@@ -61,6 +62,8 @@ class QuadOptions(ConeNumber, ConeBounds, RunOptions):
         size: Length of the edges of quads in model units, which replaces quads. Or relative sizes at the vertices;
             curvature makes quads smaller where the surface is more curved.
         stretch: Trade-off between equal angles (0) and also equal sizes (1) of quads.
+        loops: Prefer grid lines from irregular vertices that soon end at others: shorter loops and edge rings, and
+            fewer patches, for larger angle deviations.
         smooth: Rounds of smoothing on the surface; 0 for none.
         symmetry: auto: quads of a surface with a plane of symmetry are symmetric, too. none: they need not be.
         sharp_angle: Put edges with a larger dihedral angle, and the boundary, on grid lines, so that edges of quads
@@ -83,6 +86,7 @@ class QuadOptions(ConeNumber, ConeBounds, RunOptions):
     quads: int | None = option(None, Number(1, is_integer=True, optional=True))
     size: ArrayLike | None = option(None, Sizes(is_positive=True, optional=True))
     stretch: float = option(0.3, strength(1))
+    loops: bool = option(False, Flag())
     # Further rounds change little.
     smooth: int = option(10, Number(0, is_integer=True))
     symmetry: str = option("auto", Choice(("auto", "none")))

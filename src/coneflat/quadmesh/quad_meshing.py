@@ -57,6 +57,7 @@ def quads(
     stretch: float = QuadOptions.stretch,
     sharp_angle: float | str | None = None,
     symmetry: str = QuadOptions.symmetry,
+    loops: bool = QuadOptions.loops,
     smooth: int = QuadOptions.smooth,
     **options: Any,
 ) -> QuadMesh:
@@ -71,6 +72,7 @@ def quads(
         stretch: trade-off between equal angles (0) and also equal areas (1); see `integer_grid`.
         sharp_angle: radians; edges of quads follow edges with a larger dihedral angle; None for none.
         symmetry: "auto": quads of a surface with a plane of symmetry are symmetric about it; "none": they need not be.
+        loops: prefer short loops and few patches to angles close to 90 degrees; see `integer_grid`.
         smooth: rounds of smoothing on the surface, see `smooth_quads`; 0 for none.
         options: those of `coneflat.flatten`; by default cones have three, five or six quads.
 
@@ -102,10 +104,11 @@ def quads(
         "stretch": stretch,
         "sharp_angle": sharp_angle,
         "symmetry": symmetry,
+        "loops": loops,
         "smooth": smooth,
     }
     if isinstance(mesh, IntegerGrid):
-        has_options = any(value is not None for value in (faces, quads, size, sharp_angle))
+        has_options = loops or any(value is not None for value in (faces, quads, size, sharp_angle))
         is_default = stretch == QuadOptions.stretch and symmetry == QuadOptions.symmetry
         if has_options or not is_default or options.keys() - {"progress"}:
             raise OptionError("a grid already has faces, size, stretch and options: no others can be given")
@@ -297,6 +300,7 @@ def integer_grid(
     stretch: float = QuadOptions.stretch,
     sharp_angle: float | str | None = None,
     symmetry: str = QuadOptions.symmetry,
+    loops: bool = QuadOptions.loops,
     **options: Any,
 ) -> IntegerGrid:
     """Return a seamless map of a surface to the integer grid: unit squares become quads that match across seams.
@@ -311,6 +315,8 @@ def integer_grid(
         sharp_angle: radians; edges with a larger dihedral angle, and the boundary, are put on grid lines; None for
             none.
         symmetry: "auto": the grid of a surface with a plane of symmetry is symmetric about it; "none": it need not be.
+        loops: prefer integers for which grid lines from irregular vertices soon end at other ones, so that strips of
+            squares are short and the patches between these lines are few; angles deviate more from 90 degrees.
         options: those of `coneflat.flatten`; by default cones have three, five or six quads. Given cones need
             curvatures, multiples of pi/2; on surfaces with handles or several boundaries, a grid rarely exists for
             them. boundary may also be "auto", the default: "straight" if such a grid is found and cones are not given,
@@ -349,6 +355,7 @@ def integer_grid(
         "stretch": stretch,
         "sharp_angle": sharp_angle,
         "symmetry": symmetry,
+        "loops": loops,
     }
     request = GridRequest.of(mesh, faces, quad_options, options)
     request.stages.done = 0.0

@@ -28,15 +28,17 @@ MAX_ENERGY = 1e3
 
 @dataclass(frozen=True, eq=False)
 class GridGoal:
-    """What a grid minimises, and how many squares it may have.
+    """What a grid minimises, how many squares it may have, and which integers are preferred.
 
     Attributes:
         energy: the energy of the map.
         limit: largest number of squares.
+        loops: prefer integers for which few lines from irregular vertices go far, see `loops.py`.
     """
 
     energy: StretchEnergy
     limit: SquareLimit = NO_LIMIT
+    loops: bool = False
 
 
 def relaxed_grid(

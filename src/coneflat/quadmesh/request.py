@@ -50,6 +50,7 @@ class GridRequest:
         boundary: the option of that name of `integer_grid`.
         options: the other options, those of the flattening.
         stages: the stopwatch.
+        loops: prefer integers for short loops.
         for_quads: a grid is searched until quads can be extracted from it.
         symmetry: the option of that name of `integer_grid`.
         mirror: the plane at which the mesh, a half of a symmetric surface, continues, in model units; or None.
@@ -65,6 +66,7 @@ class GridRequest:
     boundary: Any
     options: Mapping[str, Any]
     stages: Stopwatch
+    loops: bool = False
     for_quads: bool = False
     symmetry: str = "auto"
     mirror: MirrorPlane | None = None
@@ -109,6 +111,7 @@ class GridRequest:
             options=free_options,
             stages=stages,
             symmetry=chosen.symmetry,
+            loops=chosen.loops,
         )
         return request._with_size(length, chosen.quads)
 

@@ -19,8 +19,9 @@ from .features import edge_indices, lengths_along, sharp_edges
 from .grid_layout import GridLayout, with_sides
 from .integer_map import IntegerGrid, with_note
 from .lines import LinedLayout, deviations, long_chains, with_lines
+from .loops import grid_with_loops, nearest_grid
 from .no_grid import NoGrid
-from .relaxing import GridGoal, relaxed_grid
+from .relaxing import GridGoal
 from .rounding import Rounding, find_rounding
 from .splitting import split_between_nodes
 
@@ -76,7 +77,8 @@ def rounded_grid(layout: GridLayout, rules: RoundingRules) -> IntegerGrid | NoGr
 
     See Also:
         find_rounding: the lattice and its metric.
-        relaxed_grid: the grid with given integers.
+        nearest_grid: the grid with the nearest integers.
+        grid_with_loops: the one with integers for short loops.
     """
     sided = with_sides(layout) if rules.has_sides else layout
     grid: IntegerGrid | NoGrid | None = None
@@ -117,7 +119,7 @@ def grid_about(rounding: Rounding, goal: GridGoal, doublings: int) -> IntegerGri
     """
     requested, reason = rounding.layout.area, ""
     for doubling in range(doublings + 1):
-        grid = _nearest_grid(rounding.scaled(2.0**doubling), goal)
+        grid = _rounded(rounding.scaled(2.0**doubling), goal)
         if isinstance(grid, IntegerGrid):
             return _with_note_on_size(_corrected(rounding, grid, goal) if doubling == 0 else grid, requested)
         if isinstance(grid.error, CoarseGridError):  # a finer one has even more squares
@@ -145,7 +147,7 @@ def _corrected(rounding: Rounding, grid: IntegerGrid, goal: GridGoal) -> Integer
             break
         # Later corrections are halved, because the number of squares changes by entire rows.
         factor *= (requested / last) if factor == 1.0 else math.sqrt(requested / last)
-        resized = _nearest_grid(rounding.scaled(factor), goal)
+        resized = _rounded(rounding.scaled(factor), goal)
         if isinstance(resized, NoGrid):
             break
         last = resized.squares
@@ -154,12 +156,9 @@ def _corrected(rounding: Rounding, grid: IntegerGrid, goal: GridGoal) -> Integer
     return grid
 
 
-def _nearest_grid(rounding: Rounding, goal: GridGoal) -> IntegerGrid | NoGrid:
-    """Return the grid with the nearest integers."""
-    values = rounding.nearest()
-    if values is None:
-        return NoGrid(GridError("near cones cannot be separated: use more quads"))
-    return relaxed_grid(rounding.layout, rounding.transitions, values, rounding.displaced(values), goal)
+def _rounded(rounding: Rounding, goal: GridGoal) -> IntegerGrid | NoGrid:
+    """Return the grid with the nearest integers, or with integers for short loops if these are preferred."""
+    return grid_with_loops(rounding, goal) if goal.loops else nearest_grid(rounding, goal)
 
 
 def _grid_with_lines(

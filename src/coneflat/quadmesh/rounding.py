@@ -126,6 +126,7 @@ class Rounding:
         stiffness: the energy that gives the metric.
         layout: the smooth layout.
         transitions: its seams and sides.
+        lattice: the integer coordinates that are possible: all, or those of `with_zeros`.
         attempts: how many attempts to separate cones are made; None for all.
     """
 
@@ -135,7 +136,20 @@ class Rounding:
     stiffness: Stiffness
     layout: GridLayout
     transitions: Transitions
+    lattice: ReducedLattice
     attempts: int | None = None
+
+    def with_zeros(self, rows: IntArray) -> Rounding:
+        """Return the rounding to integer values whose products with rows (j, v) are 0."""
+        solutions = integer_solutions(rows @ self.basis, np.zeros(len(rows), dtype=np.int64))
+        assert solutions is not None  # zeros are one
+        return replace(self, lattice=_lattice(solutions.basis, self.metric))
+
+    def energy(self, values: FloatArray | IntArray) -> float:
+        """Return the least energy of a displacement of the layout to integer values (v,), per square."""
+        coordinates = np.linalg.lstsq(self.basis.astype(np.float64), values, rcond=None)[0]
+        change = coordinates - self.start
+        return float(change @ self.metric @ change) / self.layout.area
 
     def scaled(self, factor: float) -> Rounding:
         """Return the rounding of the layout with the number of squares multiplied by a factor."""
@@ -151,10 +165,8 @@ class Rounding:
 
         None if cones cannot be separated.
         """
-        units = np.eye(len(self.start), dtype=np.int64)
-        lattice = Lattice(np.zeros_like(self.start, dtype=np.int64), units, self.metric).reduced()
         for attempt in SEPARATIONS[: self.attempts]:
-            if (coordinates := self._separated(lattice, *attempt)) is not None:
+            if (coordinates := self._separated(self.lattice, *attempt)) is not None:
                 return np.asarray(self.basis @ coordinates)
         return None
 
@@ -223,7 +235,13 @@ def find_rounding(layout: GridLayout) -> Rounding:
     prescribed = as_pairs(transitions.places(layout.points, basis @ start) - layout.points).reshape(-1, 1)
     shift = stiffness.displacement(prescribed)
     start -= np.linalg.solve(metric, (stiffness.pulls(basis).T @ shift)[:, 0])
-    return Rounding(basis, start, metric, stiffness, layout, transitions)
+    lattice = _lattice(np.eye(len(start), dtype=np.int64), metric)
+    return Rounding(basis, start, metric, stiffness, layout, transitions, lattice)
+
+
+def _lattice(basis: IntArray, metric: FloatArray) -> ReducedLattice:
+    """Return the combinations of the columns of a basis (d, k), with integers as coefficients."""
+    return Lattice(np.zeros(len(basis), dtype=np.int64), basis, metric).reduced()
 
 
 def _near_pairs(
