@@ -37,7 +37,7 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
     yield "quantised cones", partial(flatten, *torus, quantise=np.pi / 2)
     yield "boundaries", partial(flatten, *disk, boundary="disk")
     yield "unwrap", partial(unwrap, sample)
-    yield "quads", lambda: measure_quads(quads(*torus, quads=300))
+    yield "quads", lambda: measure_quads(quads(*torus, quads=300, loops=True))
     yield "visibility", partial(visible_share, *torus)
 
 

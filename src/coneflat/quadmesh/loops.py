@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from ..base import IntArray, Unmet
 from ..errors import GridError
 from .integer_map import IntegerGrid, with_note

@@ -12,6 +12,7 @@ from ..base import FloatArray, dots, short_repr
 from ..errors import ArrayShapeError
 from ..geometry.nearest import surface_distances
 from .quad_mesh import QuadMesh, least_jacobians
+from .strips import find_patches, find_strips
 from .surface_fit import fit_to_surface, surface_samples
 
 # Least scaled Jacobian of a quad that is not inverted: an angle of 180 degrees has 0, up to rounding.
@@ -37,6 +38,9 @@ class QuadMeasures:
         area_ratio: area of the quads over that of the surface.
         leaps: number of quads that leap to another part of the surface; see `SurfaceFit`.
         left_out, area_left_out: see `QuadMesh`.
+        strips: number of strips of quads, each of which crosses quads from one side to the opposite one; edge rings.
+        longest_strip: number of quads of the longest one, where it crosses itself twice.
+        patches: number of parts between all grid lines from irregular vertices, the faces of the base complex.
     """
 
     vertices: int
@@ -58,6 +62,9 @@ class QuadMeasures:
     leaps: int
     left_out: int
     area_left_out: float
+    strips: int
+    longest_strip: int
+    patches: int
 
     def report(self) -> dict[str, Any]:
         """Return the measures by name, ready for JSON."""
@@ -77,6 +84,9 @@ class QuadMeasures:
         yield "edge cv", f"{self.edge_cv:.3f}", spread
         jacobian = f"scaled, mean of each quad's minimum; minimum {self.jacobian_min:.3f}"
         yield "Jacobian", f"{self.jacobian_mean:.3f}", jacobian
+        strips = f"the longest has {self.longest_strip:,} quads, {self.longest_strip / self.quads**0.5:.1f} sqrt(quads)"
+        yield "strips", f"{self.strips:,}", strips
+        yield "patches", f"{self.patches:,}", "between all grid lines from irregular vertices"
         yield "inverted", f"{self.inverted:,}", "quads with an angle of 180 degrees or more"
         yield "area", f"{self.area_ratio:.3f}", "area of the quads over that of the surface"
         yield "leaps", f"{self.leaps:,}", "quads that leap to another part of the surface"
@@ -121,7 +131,7 @@ def measure_quads(quads: QuadMesh) -> QuadMeasures:
     off = np.abs(corner_angles_of(quads) - 90.0)
     length = np.linalg.norm(points[quads.edges[:, 0]] - points[quads.edges[:, 1]], axis=1)
     jacobians = least_jacobians(points, quads.quads)
-    fit = fit_to_surface(quads)
+    fit, strips = fit_to_surface(quads), find_strips(quads)
     valences, counts = np.unique(quads.valences[quads.irregular], return_counts=True)
     return QuadMeasures(
         vertices=len(points),
@@ -143,6 +153,9 @@ def measure_quads(quads: QuadMesh) -> QuadMeasures:
         leaps=fit.leaps,
         left_out=quads.left_out,
         area_left_out=quads.area_left_out,
+        strips=len(strips.lengths),
+        longest_strip=int(strips.lengths.max()),
+        patches=int(find_patches(quads).max()) + 1,
     )
 
 

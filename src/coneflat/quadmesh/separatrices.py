@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base import ComplexArray, IntArray, compiled
+from ..base import BoolArray, ComplexArray, IntArray, compiled
 from ..geometry import UNITS
 from ..mesh import NEXT
 from ..mesh.connectivity import TriangleMesh
@@ -101,7 +101,7 @@ def find_separatrices(grid: IntegerGrid) -> Separatrices:
     )  # fmt: skip
 
 
-def _starts(places: ComplexArray, faces: IntArray, is_irregular: np.ndarray) -> tuple[IntArray, IntArray]:
+def _starts(places: ComplexArray, faces: IntArray, is_irregular: BoolArray) -> tuple[IntArray, IntArray]:
     """Return the triangle corners at irregular vertices, and the directions in quarter turns, of lines that start."""
     corners = np.flatnonzero(is_irregular[faces.ravel()])
     face, corner = corners // 3, corners % 3
@@ -125,8 +125,8 @@ def _trace(
     opposite: IntArray,
     turns: IntArray,
     shifts: ComplexArray,
-    is_seam: np.ndarray,
-    is_irregular: np.ndarray,
+    is_seam: BoolArray,
+    is_irregular: BoolArray,
     longest: int,
 ) -> tuple[IntArray, IntArray, IntArray, IntArray]:
     """Return the corner at the end of each line, -1 for none, its length, and the seams it crosses with its number."""
