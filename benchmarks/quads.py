@@ -36,6 +36,8 @@ from coneflat.mesh.connectivity import TriangleMesh
 from coneflat.quadmesh.mirrored import doubled, half_of
 
 TOOL = stored_meshes.SHARED.parent / "tools" / "quads_aligned.py"
+#: Measures strips and patches of quads in an OBJ file.
+LOOP_TOOL = TOOL.with_name("quad_loops.py")
 #: Models above this number of triangles are measured decimated, too.
 DECIMATED = 20_000
 #: Columns: the name, the key in the output of the tool, and the format.
@@ -51,6 +53,9 @@ COLUMNS = (
     ("self-intersections", "self", "{:.0f}"),
     ("inverted", "J_neg", "{:.0f}"),
     ("with a partner", "partners", "{:.0%}"),
+    ("longest strip, sqrt(quads)", "strip_max", "{:.1f}"),
+    ("its share", "top_share", "{:.0%}"),
+    ("patches", "base", "{:.0f}"),
     ("s", "seconds", "{:.1f}"),
 )
 
@@ -188,11 +193,22 @@ def trial(mesh: TriangleMesh, count: int, make: Maker, tool: Path) -> tuple[dict
             answer = json.loads(
                 subprocess.check_output([sys.executable, tool, surface, path], stderr=subprocess.DEVNULL)
             )
+            answer = {**answer_of(LOOP_TOOL, path), **answer_of(tool, surface, path)}
         except BrokenProcessPool:
             return {}, "crashed"
         except Exception as error:  # Other packages raise any type.
             return {}, f"{type(error).__name__}: {str(error)[:120]}"
     return {**numbers(answer), **partners, "quads": answer["topo"]["F"], "seconds": seconds}, ""
+
+
+def answer_of(tool: Path, *paths: Path) -> dict[str, Any]:
+    """Return what a tool prints on files; nothing if it is not there."""
+    if not tool.exists():
+        return {}
+    answer: dict[str, Any] = json.loads(
+        subprocess.check_output([sys.executable, tool, *paths], stderr=subprocess.DEVNULL)
+    )
+    return answer
 
 
 def numbers(row: dict[str, Any]) -> dict[str, float]:
@@ -257,6 +273,7 @@ def by_instant_meshes(vertices: np.ndarray, faces: np.ndarray, count: int, **opt
 
 METHODS: dict[str, tuple[str, Maker]] = {
     "coneflat": ("coneflat", by_coneflat),
+    "coneflat; loops": ("coneflat", partial(by_coneflat, loops=True)),
     "coneflat; fewest cones": ("coneflat", partial(by_coneflat, cones="sparse", distortion=0.2)),
     "QuadriFlow": ("pyQuadriFlow", by_quadriflow),
     "QuadriFlow; sharp": ("pyQuadriFlow", partial(by_quadriflow, sharp=True)),
