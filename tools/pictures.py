@@ -17,7 +17,15 @@ from measured import Measured
 from palette import IMAGES, save_figure_small, save_small
 from PIL import Image
 from quad_edges import draw_quads
-from quad_pictures import BOARDS, SUBDIVIDED, boards_figure, quads_figure, subdivided_figure
+from quad_pictures import (
+    BOARDS,
+    STRIPS,
+    SUBDIVIDED,
+    boards_figure,
+    quads_figure,
+    strips_figure,
+    subdivided_figure,
+)
 from scipy.sparse import csr_matrix, identity
 from tables import ALLOWED, GALLERY, TRADED, TRADEOFF, tradeoff
 
@@ -405,5 +413,6 @@ PICTURES: dict[str, tuple[tuple[str, ...], Callable[[Measured], Any]]] = {
     "tradeoff": (TRADED, tradeoff_figure),
     "quads": (("bunny",), quads_figure),
     "quads-board": (tuple(BOARDS), boards_figure),
+    "quads-strips": (tuple(STRIPS), strips_figure),
     "quads-subdivided": (tuple(SUBDIVIDED), subdivided_figure),
 }

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from coneflat import QuadMesh
+    from coneflat.base import FloatArray
 
 #: Colours of vertices with less and with more than four quads; distinguishable in colour blindness and in grey.
 FEWER_COLOR, MORE_COLOR = "#0072b2", "#e69f00"
@@ -25,6 +26,7 @@ def draw_quads(
     eye: Eye = "front-right",
     up: str = "y",
     irregular: bool = True,
+    colors: FloatArray | None = None,
     dpi: float = DOTS_PER_INCH,
 ) -> None:
     """Draw a quad mesh with its edges and dots at irregular vertices: blue for valence below four, orange above.
@@ -33,6 +35,7 @@ def draw_quads(
         quads: the mesh.
         axes: matplotlib axes to draw in; their lines and ticks are turned off.
         irregular: draw the dots.
+        colors: (p, 3) RGB of each quad, 0 to 1; None for one light grey.
         eye, up, dpi: as in `draw_checker`.
 
     Raises:
@@ -40,8 +43,9 @@ def draw_quads(
     """
     from matplotlib.collections import LineCollection
 
-    colors = np.broadcast_to(np.array([0.94, 0.94, 0.95]), quads.triangles.shape)
-    picture = show_mesh(axes, quads.vertices, quads.triangles, eye, up, dpi, colors=colors)
+    plain = np.broadcast_to(np.array([0.94, 0.94, 0.95]), (len(quads.quads), 3))
+    of_triangle = (plain if colors is None else colors).repeat(2, axis=0)
+    picture = show_mesh(axes, quads.vertices, quads.triangles, eye, up, dpi, colors=of_triangle)
     camera = picture.camera
     ends = quads.vertices[quads.edges]
     pieces, visible = picture.split_segments(ends[:, 0], ends[:, 1])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -15,6 +16,7 @@ import coneflat
 from coneflat.apps.view import Panel, Row, compose, view_aspect
 from coneflat.apps.view.figures.cone_marks import pixels_of
 from coneflat.apps.view.figures.render import render_mesh
+from coneflat.quadmesh.strips import find_strips
 
 sys.path.insert(0, str(ROOT / "examples"))
 from catmull_clark import catmull_clark
@@ -23,6 +25,8 @@ DPI = 110.0
 TALLEST = 3.0  # inches
 #: Models with a seamless checkerboard, and their view directions.
 BOARDS = {"bunny": "front-right", "spot": "left-back", "hand": "front"}
+#: Models with their longest strip, and their view directions.
+STRIPS = {"fandisk": "front-right", "rocker-arm": "right-top", "kitten": "front-right"}
 #: Models to subdivide: number of quads, and view directions.
 SUBDIVIDED = {"rocker-arm": (400, "right-top"), "spot": (400, "left-back")}
 
@@ -60,6 +64,26 @@ def quads_figure(measured: Measured) -> Any:
         for eye in ("front-right", "back-left")
     ]
     return compose([Row(panels)], dpi=DPI, width=8.0)
+
+
+def strips_figure(measured: Measured, models: Mapping[str, str] = STRIPS) -> Any:
+    """Return a figure of models with their longest strip of quads, with default options and with short loops."""
+    rows = []
+    for loops in (False, True):
+        panels = []
+        for model, eye in models.items():
+            quads = coneflat.quads(measured.path(model), quads=6000, loops=loops)
+            drawn = partial(draw_quads, quads, eye=eye, colors=strip_colors(quads), dpi=DPI)
+            panels.append(Panel(view_aspect(quads.vertices, eye), drawn))
+        rows.append(Row(panels))
+    return compose(rows, dpi=DPI, width=8.0)
+
+
+def strip_colors(quads: coneflat.QuadMesh) -> Any:
+    """Return (p, 3) a colour of each quad: orange on the longest strip."""
+    strips = find_strips(quads)
+    is_on = (strips.across == np.argmax(strips.lengths)).any(axis=1)
+    return np.where(is_on[:, None], np.array([0.9, 0.62, 0.0]), np.array([0.94, 0.94, 0.95]))
 
 
 def subdivided_figure(measured: Measured) -> Any:

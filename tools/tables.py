@@ -306,6 +306,28 @@ def quads_table(measured: Measured, body: str) -> str:
     return _table(headings, list(_row_of_each(QUADS, body, made)))
 
 
+def loops_table(measured: Measured, body: str) -> str:
+    """Return strips and patches of quads, with default options and with short loops."""
+    made = dict[str, list[str] | None]()
+    for model in QUADS:
+        path = measured.path(model)
+        if path is None:
+            made[model] = None
+            continue
+        print(f"  loops of {model}", flush=True)
+        long, short = (coneflat.measure_quads(coneflat.quads(path, loops=loops)) for loops in (False, True))
+        pairs = [
+            [f"{m.irregular}", f"{m.angle_mean:.1f}", f"{m.longest_strip / m.quads:.1f}", f"{m.patches:,}"]
+            for m in (long, short)
+        ]
+        made[model] = [model, *(", ".join(values) for values in zip(*pairs, strict=True))]
+    headings = (
+        "model | irregular vertices: default, `--loops` | angle deviation, degrees | "
+        "quads of the longest strip, relative to all | patches"
+    )
+    return _table(headings, list(_row_of_each(QUADS, body, made)))
+
+
 #: Function for each table, of the measured models and the old table.
 TABLES: dict[str, Callable[[Measured, str], str]] = {
     "paper": paper_table,
@@ -316,4 +338,5 @@ TABLES: dict[str, Callable[[Measured, str], str]] = {
     "convergence": lambda _, was: convergence(),
     "atlases": atlases_table,
     "quads": quads_table,
+    "loops": loops_table,
 }

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from ..base import IntArray, Unmet
 from ..errors import GridError
@@ -29,15 +30,26 @@ MAX_ENERGY = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """Integer values (v,) for a layout, and the energy of the displacement to them, per square."""
+    """Integer values (v,) for a layout."""
 
     rounding: Rounding
     values: IntArray
-    energy: float
+
+    @cached_property
+    def energy(self) -> float:
+        """The energy of the displacement to them."""
+        return self.rounding.energy(self.values)
+
+    @property
+    def mean_energy(self) -> float:
+        """The same, per square."""
+        return self.energy / self.rounding.layout.area
 
     def grid(self, goal: GridGoal) -> IntegerGrid | NoGrid:
         """Return the grid with these integers, or the reason why there is none."""
-        return _grid_of(self.rounding, self.values, goal)
+        rounding = self.rounding
+        moved = rounding.displaced(self.values)
+        return relaxed_grid(rounding.layout, rounding.transitions, self.values, moved, goal)
 
 
 def nearest_grid(rounding: Rounding, goal: GridGoal) -> IntegerGrid | NoGrid:
@@ -45,11 +57,7 @@ def nearest_grid(rounding: Rounding, goal: GridGoal) -> IntegerGrid | NoGrid:
     values = rounding.nearest()
     if values is None:
         return NoGrid(GridError("near cones cannot be separated: use more quads"))
-    return _grid_of(rounding, values, goal)
-
-
-def _grid_of(rounding: Rounding, values: IntArray, goal: GridGoal) -> IntegerGrid | NoGrid:
-    return relaxed_grid(rounding.layout, rounding.transitions, values, rounding.displaced(values), goal)
+    return Candidate(rounding, values).grid(goal)
 
 
 def grid_with_loops(rounding: Rounding, goal: GridGoal) -> IntegerGrid | NoGrid:
@@ -63,9 +71,7 @@ def grid_with_loops(rounding: Rounding, goal: GridGoal) -> IntegerGrid | NoGrid:
         coarse = candidate.grid(goal)
         if isinstance(coarse, NoGrid):
             continue
-        layout, transitions = candidate.rounding.layout, candidate.rounding.transitions
-        rows = find_separatrices(coarse).offsets(transitions, layout.corners)
-        nearer = _nearest(rounding.with_zeros(rows), 1)
+        nearer = _with_separatrices(rounding, coarse)
         grid = None if nearer is None or nearer.energy >= candidate.energy else nearer.grid(goal)
         return replace(grid if isinstance(grid, IntegerGrid) else coarse, size=rounding.layout.size)
     nearest = nearest_grid(rounding, goal)
@@ -73,21 +79,33 @@ def grid_with_loops(rounding: Rounding, goal: GridGoal) -> IntegerGrid | NoGrid:
     return with_note(nearest, note) if isinstance(nearest, IntegerGrid) else nearest
 
 
+def _with_separatrices(rounding: Rounding, grid: IntegerGrid) -> Candidate | None:
+    """Return the nearest candidate that joins the same irregular vertices as a grid; None if none is found."""
+    rows = find_separatrices(grid).offsets(rounding.transitions, rounding.layout.corners)
+    try:
+        joining = rounding.with_zeros(rows)
+    except GridError:  # The equations of very long lines may overflow.
+        return None
+    return _nearest(joining, 1)
+
+
 def _multiples(rounding: Rounding) -> Iterator[Candidate]:
     """Yield the candidate for each factor, until one is too far from the layout."""
     for factor in FACTORS:
         candidate = _nearest(rounding, factor)
-        if candidate is None or candidate.energy > MAX_ENERGY:
+        if candidate is None or candidate.mean_energy > MAX_ENERGY:
             return
         yield candidate
 
 
 def _nearest(rounding: Rounding, factor: int) -> Candidate | None:
-    """Return the candidate of least energy, of several scales of a layout, in multiples of a factor."""
+    """Return the candidate of least energy, of several scales of a layout, in multiples of a factor.
+
+    The energy per square would prefer more squares.
+    """
     candidates = list[Candidate]()
     for scale in SCALES:
         values = rounding.scaled((scale / factor) ** 2).nearest()
         if values is not None:
-            scaled = rounding.scaled(scale**2)
-            candidates.append(Candidate(scaled, factor * values, scaled.energy(factor * values)))
+            candidates.append(Candidate(rounding.scaled(scale**2), factor * values))
     return min(candidates, key=lambda candidate: candidate.energy, default=None)

@@ -146,10 +146,10 @@ class Rounding:
         return replace(self, lattice=_lattice(solutions.basis, self.metric))
 
     def energy(self, values: FloatArray | IntArray) -> float:
-        """Return the least energy of a displacement of the layout to integer values (v,), per square."""
+        """Return the least energy of a displacement of the layout to integer values (v,)."""
         coordinates = np.linalg.lstsq(self.basis.astype(np.float64), values, rcond=None)[0]
         change = coordinates - self.start
-        return float(change @ self.metric @ change) / self.layout.area
+        return float(change @ self.metric @ change)
 
     def scaled(self, factor: float) -> Rounding:
         """Return the rounding of the layout with the number of squares multiplied by a factor."""
