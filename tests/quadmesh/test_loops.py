@@ -29,8 +29,8 @@ TOOLS = SHARED.parent / "tools"
 
 
 def polycube_grid(shape, cells):
-    known = on_squares(*polycube(shape), cells=cells)
-    return grid_of_corners(known.vertices, known.faces, known.corner_grid)
+    plain = on_squares(*polycube(shape), cells=cells)
+    return grid_of_corners(plain.vertices, plain.faces, plain.corner_grid)
 
 
 def lengths_in_quads(mesh):
@@ -105,8 +105,8 @@ def test_energy_is_that_of_the_displacement():
 
 def test_a_grid_with_short_loops_is_near_the_layout():
     rounding, goal = rounding_of(shapes.sphere(4), 2000), GridGoal(StretchEnergy(0.3))
-    near, short = nearest_grid(rounding, goal), grid_with_loops(rounding, goal)
-    assert find_separatrices(short).lengths.mean() < find_separatrices(near).lengths.mean() / 2
+    nearest, short = nearest_grid(rounding, goal), grid_with_loops(rounding, goal)
+    assert find_separatrices(short).lengths.mean() < find_separatrices(nearest).lengths.mean() / 2
     assert short.squares == pytest.approx(rounding.layout.area, rel=0.1)
     assert not short.notes
     assert 0 < MAX_ENERGY < 0.1
@@ -135,11 +135,13 @@ def test_patches_of_a_grid_with_a_notch():
     corner = (square + square // 7).ravel()
     quads = np.stack([corner, corner + 8, corner + 9, corner + 1], axis=1)
     quads = quads[(corner // 8 < 4) | (corner % 8 < 4)]
-    used, numbers = np.unique(quads, return_inverse=True)
+    vertices, numbers = np.unique(quads, return_inverse=True)
     triangles = np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
-    surface = coneflat.TriangleMesh(points[used], np.unique(triangles, return_inverse=True)[1].reshape(-1, 3))
-    nothing = np.zeros(len(used), dtype=int), np.zeros((len(used), 3))
-    mesh = coneflat.QuadMesh(points[used], numbers.reshape(-1, 4), *nothing, 0, 0.0, surface)
+    surface = coneflat.TriangleMesh(
+        points[vertices], np.unique(triangles, return_inverse=True)[1].reshape(-1, 3)
+    )
+    nothing = np.zeros(len(vertices), dtype=int), np.zeros((len(vertices), 3))
+    mesh = coneflat.QuadMesh(points[vertices], numbers.reshape(-1, 4), *nothing, 0, 0.0, surface)
     assert find_patches(mesh).max() + 1 == 3
     assert len(find_strips(mesh).lengths) == 14
 

@@ -37,13 +37,8 @@ class Candidate:
 
     @cached_property
     def energy(self) -> float:
-        """The energy of the displacement to them."""
-        return self.rounding.energy(self.values)
-
-    @property
-    def mean_energy(self) -> float:
-        """The same, per square."""
-        return self.energy / self.rounding.layout.area
+        """The energy of the displacement to them, per square."""
+        return self.rounding.energy(self.values) / self.rounding.layout.area
 
     def grid(self, goal: GridGoal) -> IntegerGrid | NoGrid:
         """Return the grid with these integers, or the reason why there is none."""
@@ -93,16 +88,13 @@ def _multiples(rounding: Rounding) -> Iterator[Candidate]:
     """Yield the candidate for each factor, until one is too far from the layout."""
     for factor in FACTORS:
         candidate = _nearest(rounding, factor)
-        if candidate is None or candidate.mean_energy > MAX_ENERGY:
+        if candidate is None or candidate.energy > MAX_ENERGY:
             return
         yield candidate
 
 
 def _nearest(rounding: Rounding, factor: int) -> Candidate | None:
-    """Return the candidate of least energy, of several scales of a layout, in multiples of a factor.
-
-    The energy per square would prefer more squares.
-    """
+    """Return the candidate of least energy, of several scales of a layout, in multiples of a factor."""
     candidates = list[Candidate]()
     for scale in SCALES:
         values = rounding.scaled((scale / factor) ** 2).nearest()
