@@ -176,3 +176,14 @@ def test_short_loops_do_not_depend_on_numbering_motion_and_scale():
     strips = [np.sort(find_strips(mesh).lengths) for mesh in (first, second)]
     assert np.array_equal(*strips)
     assert find_patches(first).max() == find_patches(second).max()
+
+
+def test_loops_of_a_given_grid_are_those_of_its_integers():
+    grid = polycube_grid(CUBE, 2)
+    with pytest.raises(coneflat.errors.OptionError, match="a grid already has"):
+        coneflat.quads(grid, loops=True)
+
+
+def test_few_quads_have_no_short_loops():
+    mesh = coneflat.quads(*shapes.sphere(3), quads=40, loops=True)
+    assert any("Loops are not short" in note for note in mesh.notes)

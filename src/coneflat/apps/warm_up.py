@@ -37,7 +37,8 @@ def steps() -> Iterator[tuple[str, Callable[[], object]]]:
     yield "quantised cones", partial(flatten, *torus, quantise=np.pi / 2)
     yield "boundaries", partial(flatten, *disk, boundary="disk")
     yield "unwrap", partial(unwrap, sample)
-    yield "quads", lambda: measure_quads(quads(*torus, quads=300, loops=True))
+    yield "quads", lambda: measure_quads(quads(*torus, quads=300))
+    yield "short loops", partial(quads, *torus, quads=2000, loops=True)
     yield "visibility", partial(visible_share, *torus)
 
 
