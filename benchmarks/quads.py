@@ -5,6 +5,11 @@ fillets, holes and ribs, by coneflat and by what can be installed with pip: Quad
 Meshes (`pynanoinstantmeshes`), each also with its options for boundaries and sharp edges. Everybody's meshes are
 written as OBJ and measured on the file by the same program, `--tool`, which is not ours. Each runs in a process of
 its own; seconds are CPU time of the call alone, without start-up. The medians over closed models come last.
+Every model of `../shared/meshes` that is a manifold, some also decimated, and mechanical shapes with fillets, holes and
+ribs, by coneflat and by what can be installed with pip: QuadriFlow (`pyquadriflow`) and Instant Meshes
+(`pynanoinstantmeshes`), each also with its options for boundaries and sharp edges. Everybody's meshes are written as
+OBJ and measured on the file by the same programs, `--tool` and one for strips, which are not ours. Each runs in a
+process of its own; seconds are CPU time of the call alone, without start-up. The medians over closed models come last.
 """
 
 from __future__ import annotations
