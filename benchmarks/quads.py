@@ -3,13 +3,8 @@
 Every model of `../shared/meshes` that is a manifold, some also decimated, symmetric models, and mechanical shapes with
 fillets, holes and ribs, by coneflat and by what can be installed with pip: QuadriFlow (`pyquadriflow`) and Instant
 Meshes (`pynanoinstantmeshes`), each also with its options for boundaries and sharp edges. Everybody's meshes are
-written as OBJ and measured on the file by the same program, `--tool`, which is not ours. Each runs in a process of
-its own; seconds are CPU time of the call alone, without start-up. The medians over closed models come last.
-Every model of `../shared/meshes` that is a manifold, some also decimated, and mechanical shapes with fillets, holes and
-ribs, by coneflat and by what can be installed with pip: QuadriFlow (`pyquadriflow`) and Instant Meshes
-(`pynanoinstantmeshes`), each also with its options for boundaries and sharp edges. Everybody's meshes are written as
-OBJ and measured on the file by the same programs, `--tool` and one for strips, which are not ours. Each runs in a
-process of its own; seconds are CPU time of the call alone, without start-up. The medians over closed models come last.
+written as OBJ and measured on the file by the same programs, `--tool` and one for strips, which are not ours. Each runs
+in a process of its own; seconds are CPU time of the call alone, without start-up. The medians over closed models come last.
 """
 
 from __future__ import annotations
@@ -195,9 +190,6 @@ def trial(mesh: TriangleMesh, count: int, make: Maker, tool: Path) -> tuple[dict
             pool.submit(warm_up, make).result()
             seconds = pool.submit(write, path, mesh, count, make).result()
             partners = share_with_partner(mesh, path)
-            answer = json.loads(
-                subprocess.check_output([sys.executable, tool, surface, path], stderr=subprocess.DEVNULL)
-            )
             answer = {**answer_of(LOOP_TOOL, path), **answer_of(tool, surface, path)}
         except BrokenProcessPool:
             return {}, "crashed"
