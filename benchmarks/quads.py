@@ -1,10 +1,11 @@
 """Quad meshes compared with those of other packages: `python benchmarks/quads.py` prints a Markdown table.
 
-Every model of `../shared/meshes` that is a manifold, some also decimated, symmetric models, and mechanical shapes with
-fillets, holes and ribs, by coneflat and by what can be installed with pip: QuadriFlow (`pyquadriflow`) and Instant
-Meshes (`pynanoinstantmeshes`), each also with its options for boundaries and sharp edges. Everybody's meshes are
-written as OBJ and measured on the file by the same programs, `--tool` and one for strips, which are not ours. Each runs
-in a process of its own; seconds are CPU time of the call alone, without start-up. The medians over closed models come last.
+Every model of `../shared/meshes` that is a manifold, some also decimated, symmetric models, and mechanical shapes
+with fillets, holes and ribs, by coneflat and by what can be installed with pip: QuadriFlow (`pyquadriflow`) and
+Instant Meshes (`pynanoinstantmeshes`), each also with its options for boundaries and sharp edges. Everybody's meshes
+are written as OBJ and measured on the file by the same programs, `--tool` and one for strips, which are not ours.
+Each runs in a process of its own; seconds are CPU time of the call alone, without start-up. The medians over closed
+models come last.
 """
 
 from __future__ import annotations
