@@ -84,8 +84,9 @@ def tee(radius: float = 0.5, branch: float = 0.35, length: float = 1.5, height: 
     angles = np.concatenate([up, np.linspace(up[-1], 2 * np.pi + up[0], 26)[1:-1]])
     around = radius * circle(np.pi / 2 - angles)
     low, high = (np.column_stack([np.full(len(around), x), around]) for x in (-length, length))
-    half = np.append(0.0, branch * np.cos(turns[1:-1])).tolist() + [0.0]
-    left, right = (np.column_stack([side * np.array(half), around[: len(up)]]) for side in (-1, 1))
+    half = branch * np.cos(turns)
+    half[[0, -1]] = 0.0
+    left, right = (np.column_stack([side * half, around[: len(up)]]) for side in (-1, 1))
     last, count = len(up) - 1, len(around)
     beyond = np.arange(last + 1, count)
     sides = [
@@ -180,7 +181,7 @@ def joined(polygons: list[np.ndarray]) -> Mesh:
 
 
 def region_triangles(loops: list[Loop]) -> np.ndarray:
-    """Return triangles (m, 3) of the points of loops that cover the first without the others: ears, cut off in turns."""
+    """Return triangles (m, 3) of the points of loops, that cover the first without the others, by cutting off ears."""
     points = np.concatenate(loops)
     starts = np.cumsum([0, *map(len, loops)])
     outline = list(range(len(loops[0])))
@@ -229,4 +230,3 @@ def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
     """Return twice the area of triangles, positive if they turn to the left."""
     first, second = b - a, c - a
     return first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
-

@@ -24,7 +24,7 @@ from ..mesh.connectivity import TriangleMesh
 from ..options import read_options
 from ..result import Flattening
 from .alignment import has_area
-from .cross_field import SHARP_ANGLE, directions_and_indices, sharp_ends
+from .cross_field import SHARP_ANGLE, directions_and_indices, is_mechanical, sharp_ends
 from .features import split_around, split_chords, vertex_graph
 from .limits import COARSE_TRIANGLES, NO_LIMIT, SquareLimit
 from .map_model import SAMPLES, MapModel
@@ -139,7 +139,7 @@ def aligned_cones(
         min_quarters, max_quarters: bounds of the curvature of cones.
         price: cost of a cone, 1 by default.
         sharp_angle: dihedral angle of edges that grid lines must follow, radians; None: that from which on they prefer
-            to, and other directions count as much.
+            to, and other directions count as much unless the surface is mechanical.
         log_scale: (n,) the log conformal factor from which the distortion is measured, up to a constant; None for 0.
         limit: largest number of squares of a grid.
         mirror: the plane at which a half of a symmetric surface continues; or None.
@@ -160,7 +160,8 @@ def aligned_cones(
     model = MapModel(mesh, directions.combined, min_quarters, max_quarters, degrees[origin], scale, is_seam)
     search = _Search(mesh, model, start, price, angle)
     limit.check_cones(search.fixed_quarters)
-    along = COST_OF_DIRECTIONS * (1.0 if sharp_angle is None else TIMES_REQUIRED)
+    follows_edges = sharp_angle is not None or is_mechanical(mesh, angle)
+    along = COST_OF_DIRECTIONS * (TIMES_REQUIRED if follows_edges else 1.0)
     areas = COST_OF_AREAS
     for _ in range(MAX_DOUBLINGS + 1):
         search.descend_all(_Costs(areas / distortion**2, along))

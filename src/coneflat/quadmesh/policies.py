@@ -84,14 +84,18 @@ def on_coarse_mesh(request: GridRequest) -> tuple[GridRequest, SimplerMesh | Non
     """Return the request for the grid of a simpler mesh, and this mesh.
 
     The request is the given one if its options name vertices, or if the mesh has few triangles, holes and components.
+    With an angle of sharp edges, the mesh is simplified only if many triangles are thin, since other edges may be sharp
+    on a coarse mesh.
 
     Raises:
         MeshError: the mesh cannot be flattened.
         OptionError: sizes are not positive numbers.
     """
-    if names_vertices(request) or request.sharp_angle is not None or request.flattening:
+    if names_vertices(request) or request.flattening:
         return request, None
     checked, mesh = request.checked, request.mesh
+    if request.sharp_angle is not None and not _has_many_thin(mesh):
+        return request, None
     side = float(np.ldexp(request.size, checked.exponent))
     is_manageable, walks, is_jagged = manageable_parts(mesh, side)
     walks, is_jagged = (walks, is_jagged) if request.boundary == "auto" else ([], False)
@@ -129,7 +133,7 @@ def _with_few_triangles(mesh: TriangleMesh, side: float) -> tuple[TriangleMesh, 
     quads = area_of(mesh) / side**2
     count = COARSE_TRIANGLES * max(1.0, quads / QUADS)
     simple, vertex_origin, face_origin = mesh, np.arange(len(mesh.vertices)), np.arange(len(mesh.faces))
-    if is_thin(mesh).mean() > MAX_THIN_SHARE and len(without_pillows(mesh).faces) == len(mesh.faces):
+    if _has_many_thin(mesh):
         finest = min(count, max(COARSE_TRIANGLES, MAX_REFINEMENT * len(mesh.faces)))
         simple, vertex_origin, face_origin = remeshed(
             mesh, int(np.clip(4 * quads, COARSE_TRIANGLES // 6, finest))
@@ -138,6 +142,11 @@ def _with_few_triangles(mesh: TriangleMesh, side: float) -> tuple[TriangleMesh, 
         coarse = coarse_mesh(mesh, int(count))
         simple, vertex_origin, face_origin = coarse.mesh, coarse.vertices, coarse.faces
     return simple, vertex_origin, face_origin
+
+
+def _has_many_thin(mesh: TriangleMesh) -> bool:
+    """Return whether so many triangles of a mesh are thin that it is remeshed."""
+    return bool(is_thin(mesh).mean() > MAX_THIN_SHARE) and len(without_pillows(mesh).faces) == len(mesh.faces)
 
 
 # -- 2. a finer grid

@@ -245,7 +245,7 @@ def _meshed(request: GridRequest, rounds: int) -> _Meshed:
             quad_mesh = smooth_quads(quad_mesh, rounds, grid.features)
         else:
             moved = simpler.moved(quad_mesh)
-            quad_mesh = simpler.completed(smooth_quads(moved, rounds, sharp_ends(simpler.surface)))
+            quad_mesh = simpler.completed(smooth_quads(moved, rounds, sharp_ends(simpler.surface, request.angle)))
     notes = *(() if simpler is None else simpler.notes), *grid.notes, *quad_mesh.notes
     quad_mesh = replace(quad_mesh, notes=notes, grid=grid, source=source)
     if simpler is None:

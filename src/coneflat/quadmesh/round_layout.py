@@ -14,7 +14,7 @@ import numpy as np
 
 from ..base import FloatArray, IntArray, Unmet, plural
 from ..errors import CoarseGridError, GridError
-from .cross_field import sharp_ends
+from .cross_field import is_mechanical, sharp_ends
 from .features import edge_indices, lengths_along, sharp_edges
 from .grid_layout import GridLayout, with_sides
 from .integer_map import IntegerGrid, with_note
@@ -33,8 +33,9 @@ MAX_CORRECTIONS = 4
 DOUBLINGS_BEFORE_OTHER_CONES, MAX_DOUBLINGS = 1, 2
 # Preferred edges are put on a line if their direction differs from an axis by less, radians.
 MAX_TURN = np.deg2rad(20.0)
-# Largest cost of a preferred chain: the energy of the triangles near it, over its length and the root of the area.
-MAX_COST = 5e-4
+# Largest cost of a preferred chain: the energy of the triangles near it, over its length and the root of the area; on
+# mechanical surfaces and others.
+MAX_COST_ON_MECHANICAL, MAX_COST = 3e-3, 5e-4
 # Attempts to find a grid with preferred edges on lines, and attempts of `SEPARATIONS` in each: one cone at a time takes
 # long.
 LINE_ATTEMPTS, LINE_SEPARATIONS = 6, 2
@@ -178,6 +179,7 @@ def _grid_with_lines(
     sharp = sharp_edges(mesh, angle) if is_required else edge_indices(mesh, sharp_ends(mesh, angle))
     edges = long_chains(layout, sharp if is_required else sharp[np.abs(off[sharp]) < MAX_TURN])
     grid, reason = None, "too short for quads of this size"
+    highest = MAX_COST_ON_MECHANICAL if is_mechanical(mesh, angle) else MAX_COST
     for attempt in count() if is_required else range(LINE_ATTEMPTS):
         lined = with_lines(layout, edges, off)
         if not len(lined.edges):
@@ -185,7 +187,7 @@ def _grid_with_lines(
         separations = None if is_required else LINE_SEPARATIONS
         rounding = replace(find_rounding(lined.layout), attempts=separations)
         costs, is_folded = lined.costs(layout, rounding.displaced(rounding.basis @ rounding.start))
-        max_cost = np.inf if is_required else MAX_COST * np.sqrt(layout.area)
+        max_cost = np.inf if is_required else highest * np.sqrt(layout.area)
         is_costly = costs.max() > max_cost
         if not is_costly and (not is_folded or (is_required and attempt == 0)):
             nearest = grid_about(rounding, goal, 0)
@@ -211,10 +213,8 @@ def _cheaper_chains(
     """
     if costs.max() > max_cost:
         bound = 0.7**attempt * max_cost
-    elif np.isinf(max_cost):
-        bound = 0.5 ** (1 + attempt / 4) * costs.max()
     else:
-        bound = np.median(costs)
+        bound = 0.5 ** (1 + attempt / 4) * costs.max()
     return long_chains(layout, lined.edges[costs[lined.chain] < bound])
 
 
