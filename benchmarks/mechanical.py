@@ -127,6 +127,50 @@ def pierced_shell(thickness: float = 0.04) -> Mesh:
     return blocks(is_solid, (places, places, places))
 
 
+def boot(thickness: float = 0.03, around: int = 120) -> Mesh:
+    """Return a boot with an inside and twelve eyelets, a curved surface with a dozen handles."""
+    along = np.linspace(0, 1, around)[:-1]
+    # The middle line bends from the leg to the toes.
+    bend = np.pi / 2 / (1 + np.exp(-14 * (along - 0.5)))
+    middle = 2.5 / around * np.cumsum(np.stack([np.sin(bend), -np.cos(bend)], axis=1), axis=0)
+    radius = (0.4 + 0.06 * np.cos(7 * along)) * np.sqrt(1 - along**8)
+    angle = 2 * np.pi * np.arange(around) / around
+    front, side = radius[:, None] * np.cos(angle), radius[:, None] * np.sin(angle)
+    x = middle[:, :1] + np.cos(bend)[:, None] * front
+    z = middle[:, 1:] + np.sin(bend)[:, None] * front
+    sheet = np.stack([x, side, z], axis=2).reshape(-1, 3)
+    tip = np.array([[middle[-1, 0] + 0.02, 0.0, middle[-1, 1]]])
+    row, column = (index.ravel() for index in np.indices((len(along) - 1, around)))
+    turned = np.minimum(column, around - column) / around
+    rows, places = 0.1 + 0.06 * np.arange(6), 0.06
+    is_eyelet = (np.abs(row[:, None] / around - rows).min(axis=1) < 0.015) & (np.abs(turned - places) < 0.015)
+    row, column = row[~is_eyelet], column[~is_eyelet]
+    after = (column + 1) % around
+    first = np.stack([row * around + column, (row + 1) * around + column, (row + 1) * around + after], axis=1)
+    second = np.stack([row * around + column, (row + 1) * around + after, row * around + after], axis=1)
+    last = (len(along) - 1) * around + np.arange(around)
+    fan = np.stack([last, np.full(around, len(sheet)), np.roll(last, -1)], axis=1)
+    return thickened(np.concatenate([sheet, tip]), np.concatenate([first, second, fan]), thickness)
+
+
+def thickened(vertices: np.ndarray, faces: np.ndarray, thickness: float) -> Mesh:
+    """Return the closed surface of a sheet with a thickness; each boundary after the first makes a handle."""
+    at, corners = np.unique(faces, return_inverse=True)
+    points, faces = vertices[at], corners.reshape(-1, 3)
+    normals = np.zeros_like(points)
+    steps = points[faces[:, 1:]] - points[faces[:, :1]]
+    np.add.at(normals, faces.ravel(), np.cross(steps[:, 0], steps[:, 1]).repeat(3, axis=0))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    sides = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    keys, back = sides @ (len(points), 1), sides[:, ::-1] @ (len(points), 1)
+    a, b = sides[~np.isin(keys, back)].T
+    inner = len(points)
+    rims = np.concatenate([np.stack([b, a, a + inner], axis=1), np.stack([b, a + inner, b + inner], axis=1)])
+    return np.concatenate([points, points - thickness * normals]), np.concatenate(
+        [faces, faces[:, ::-1] + inner, rims]
+    )
+
+
 def small_blocks(count: int = 60) -> Mesh:
     """Return separate blocks of different sizes."""
     rng, parts = np.random.default_rng(1), []
@@ -145,7 +189,7 @@ SHAPES: dict[str, Callable[[], Mesh]] = {
 }
 #: Shapes that need many quads: thin walls, narrow corridors, handles, components.
 NARROW_SHAPES: dict[str, Callable[[], Mesh]] = {
-    maker.__name__: maker for maker in (cut_maze, maze, open_box, pierced_shell, small_blocks, thin_box)
+    maker.__name__: maker for maker in (boot, cut_maze, maze, open_box, pierced_shell, small_blocks, thin_box)
 }
 CORNERS = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
 #: Edge length of the meshes.

@@ -42,9 +42,9 @@ SHARP_WEIGHT = 100.0
 # length is at least half the square root of the area.
 SHARP_SHARE = 3.0
 # Surfaces are mechanical if their sharp edges are long, relative to the square root of the area, and the mean of their
-# squared dihedral angles, at most right angles, is large, relative to that of right angles. These are 3 to 15 and 0.8 to
-# 1 on parts of machines, at most 1.2 and 0.95 on animals, hands and heads, 5 and 0.4 on a dressed person, and 13 and
-# 0.54 on an aeroplane.
+# squared dihedral angles, at most right angles, is large, relative to that of right angles. These are 3 to 15 and 0.8
+# to 1 on parts of machines, at most 1.2 and 0.95 on animals, hands and heads, 5 and 0.4 on a dressed person, and 13
+# and 0.54 on an aeroplane.
 MECHANICAL_LENGTH, MECHANICAL_SHARPNESS = 2.0, 0.65
 
 
