@@ -59,8 +59,9 @@ MAX_SIZES, GROWTH, MIN_GROWTH, MIN_SQUARES = 3, 1.6, 1.2, 32.0
 SQUARES_OF_CUBE = 6
 # Factors of the price of cones that are tried, the latter on meshes of few triangles, which are split for it.
 PRICE_FACTORS, MAX_SPLIT_TRIANGLES = (1.0, 4.0), COARSE_TRIANGLES // 6
-# With a lower Euler characteristic, so many holes and handles, costlier cones hardly ever help.
-MIN_EULER_FOR_OTHER_CONES = -24
+# With a lower Euler characteristic, so more holes and handles, other cones hardly ever help: rotations along handles are
+# not reached, which takes long. On a boot with twelve handles, they took 60% of the time.
+MIN_EULER_FOR_OTHER_CONES = -8
 
 
 def find_grid(request: GridRequest) -> Outcome:
@@ -255,7 +256,8 @@ def other_cones(request: GridRequest, flattening_of: AlignedFlattenings) -> Outc
     """Return a grid of a connected mesh whose cones are aligned; if there is none, one with other cones.
 
     On a coarse mesh that is split, costlier cones are different ones, for which there may be a grid. Where rotations
-    are not reached, other cones hardly ever help, and each metric takes long.
+    are not reached, other cones hardly ever help, and each metric takes long. With many holes and handles, or requested
+    sizes, a coarse grid is made finer instead.
     """
     failures = list[NoGrid]()
     has_many_loops = request.mesh.euler_characteristic < MIN_EULER_FOR_OTHER_CONES
@@ -264,11 +266,10 @@ def other_cones(request: GridRequest, flattening_of: AlignedFlattenings) -> Outc
         outcome = grid_of_map(request, aligned_map(request, price_factor, flattening_of))
         if isinstance(outcome, GridWithQuads):
             return outcome
-        is_far = isinstance(outcome.error, ConvergenceError)
-        if (outcome.coarse_grid is not None and request.sizes is not None) or (is_far and has_many_loops):
+        if has_many_loops or (outcome.coarse_grid is not None and request.sizes is not None):
             return outcome
         failures.append(outcome)
-        if is_far:
+        if isinstance(outcome.error, ConvergenceError):
             break
     if request.mirror is not None:
         return _most_helpful(failures)
