@@ -39,8 +39,9 @@ MAX_COST_ON_MECHANICAL, MAX_COST = 3e-3, 5e-4
 # Attempts to find a grid with preferred edges on lines, and attempts of `SEPARATIONS` in each: one cone at a time takes
 # long.
 LINE_ATTEMPTS, LINE_SEPARATIONS = 6, 2
-# Largest number of squares of a grid with lines, relative to that of the layout.
-MAX_GROWTH = 2.0
+# Largest number of squares of a grid with lines, relative to that of the layout. Of larger ones, fewer lines must
+# leave less than this fraction of the squares: else these are not due to the lines.
+MAX_GROWTH, MIN_SHRINKAGE = 2.0, 0.95
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +179,7 @@ def _grid_with_lines(
     mesh, off = layout.mesh, deviations(layout)
     sharp = sharp_edges(mesh, angle) if is_required else edge_indices(mesh, sharp_ends(mesh, angle))
     edges = long_chains(layout, sharp if is_required else sharp[np.abs(off[sharp]) < MAX_TURN])
-    grid, reason = None, "too short for quads of this size"
+    grid, reason, fewest = None, "too short for quads of this size", np.inf
     highest = MAX_COST_ON_MECHANICAL if is_mechanical(mesh, angle) else MAX_COST
     for attempt in count() if is_required else range(LINE_ATTEMPTS):
         lined = with_lines(layout, edges, off)
@@ -193,8 +194,9 @@ def _grid_with_lines(
             nearest = grid_about(rounding, goal, 0)
             if isinstance(nearest, NoGrid):
                 reason = nearest.reason
-            elif nearest.squares > MAX_GROWTH * layout.area:
-                reason = f"squares would be {nearest.squares:,.0f}, not {layout.area:,.0f}"
+            elif MAX_GROWTH * layout.area < nearest.squares < MIN_SHRINKAGE * fewest:
+                fewest = nearest.squares
+                reason = f"squares would be {fewest:,.0f}, not {layout.area:,.0f}"
             else:
                 grid = replace(nearest, features=mesh.edges[lined.edges])
                 break
