@@ -59,8 +59,8 @@ MAX_SIZES, GROWTH, MIN_GROWTH, MIN_SQUARES = 3, 1.6, 1.2, 32.0
 SQUARES_OF_CUBE = 6
 # Factors of the price of cones that are tried, the latter on meshes of few triangles, which are split for it.
 PRICE_FACTORS, MAX_SPLIT_TRIANGLES = (1.0, 4.0), COARSE_TRIANGLES // 6
-# With a lower Euler characteristic, so more holes and handles, other cones hardly ever help: rotations along handles are
-# not reached, which takes long. On a boot with twelve handles, they took 60% of the time.
+# With a lower Euler characteristic, so more holes and handles, other cones hardly ever help: rotations along handles
+# are not reached, which takes long. On a boot with twelve handles, they took 60% of the time.
 MIN_EULER_FOR_OTHER_CONES = -8
 
 

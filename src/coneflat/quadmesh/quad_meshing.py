@@ -10,16 +10,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base import Stopwatch, Unmet, plural, warns
-from ..errors import CoarseGridError, GridError, OptionError
+from ..errors import CoarseGridError, ConeflatError, GridError, OptionError
 from ..options import read_options
 from .attempt import GridWithQuads, Outcome
 from .borders import with_borders
+from .crease_fit import crease_fit
 from .cross_field import sharp_ends
 from .extract import DegenerateQuads, extract_quads, find_quads
 from .integer_map import IntegerGrid
@@ -43,6 +44,8 @@ from .simpler_mesh import SimplerMesh
 from .smooth import smooth_quads
 from .surface_fit import fit_to_surface
 
+#: Quads, and how they fail to follow the surface.
+Attempt: TypeAlias = tuple[QuadMesh, tuple[str, ...]]
 # Numbers of quads, relative to the requested one, that are tried to find one for which quads follow the surface.
 TRIED_FACTORS = (2, 4, 8)
 
@@ -143,7 +146,7 @@ def _quads_of_request(request: GridRequest, rounds: int) -> QuadMesh:
     Raises:
         CoarseGridError: they do not follow the surface; the message has a number of quads that do, if one is found.
     """
-    quad_mesh, problems = _attempt(request, rounds)
+    quad_mesh, problems = _better_attempt(request, rounds)
     if not problems:
         return quad_mesh
     requested = round(request.limit.requested)
@@ -151,7 +154,7 @@ def _quads_of_request(request: GridRequest, rounds: int) -> QuadMesh:
     largest = requested
     for count in [factor * requested for factor in TRIED_FACTORS]:
         try:
-            finer, failures = _attempt(request.with_quads(count), rounds)
+            finer, failures = _better_attempt(request.with_quads(count), rounds)
         except REASONS:
             break
         if not failures:
@@ -163,7 +166,46 @@ def _quads_of_request(request: GridRequest, rounds: int) -> QuadMesh:
     )
 
 
-def _attempt(request: GridRequest, rounds: int) -> tuple[QuadMesh, tuple[str, ...]]:
+def _better_attempt(request: GridRequest, rounds: int) -> Attempt:
+    """Return quads; those without required sharp edges if these follow them better, see `CreaseFit`.
+
+    They are compared only if the quads with required sharp edges do not follow all of them.
+    """
+    if request.sharp_angle is None:
+        return _attempt(request, rounds)
+    required = _attempt_or_error(request, rounds)
+    reason = str(required)
+    if isinstance(required, tuple):
+        fit = crease_fit(required[0], request.sharp_angle)
+        if fit.is_complete and not required[1]:
+            return required
+        reason = f"{100 * fit.share:.0f} %, and {fit.angle:.1f} degrees"
+    preferred = _attempt_or_error(replace(request, sharp_angle=None), rounds)
+    if not isinstance(preferred, tuple):
+        if isinstance(required, tuple):
+            return required
+        raise required
+    quad_mesh, problems = preferred
+    preferred_fit = crease_fit(quad_mesh, request.sharp_angle)
+    if isinstance(required, tuple) and (not required[1], fit.score) >= (not problems, preferred_fit.score):
+        return required
+    note = Unmet(
+        f"Sharp edges are not required on grid lines, because quads are better: {100 * preferred_fit.share:.0f} % of "
+        f"their length is on edges of quads, and angles are off by {preferred_fit.angle:.1f} degrees. If required: "
+        f"{reason}."
+    )
+    return replace(quad_mesh, notes=(*quad_mesh.notes, note)), problems
+
+
+def _attempt_or_error(request: GridRequest, rounds: int) -> Attempt | ConeflatError:
+    """Return quads, or the error of a reason why there are none."""
+    try:
+        return _attempt(request, rounds)
+    except REASONS as error:
+        return error.with_traceback(None)
+
+
+def _attempt(request: GridRequest, rounds: int) -> Attempt:
     """Return smoothed quads and how they fail to follow the surface; symmetric ones if the surface is symmetric."""
     with request.stages("symmetry"):
         half = half_request(request)
