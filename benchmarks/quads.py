@@ -1,11 +1,12 @@
 """Quad meshes compared with those of other packages: `python benchmarks/quads.py` prints a Markdown table.
 
-Every model of `../shared/meshes` that is a manifold, some also decimated, symmetric models, and mechanical shapes
-with fillets, holes and ribs, by coneflat and by what can be installed with pip: QuadriFlow (`pyquadriflow`) and
-Instant Meshes (`pynanoinstantmeshes`), each also with its options for boundaries and sharp edges. Everybody's meshes
-are written as OBJ and measured on the file by the same programs, `--tool` and one for strips, which are not ours.
-Each runs in a process of its own; seconds are CPU time of the call alone, without start-up. The medians over closed
-models come last.
+Every model of `../shared/meshes` that is a manifold, some also decimated, symmetric models, mechanical shapes with
+fillets, holes and ribs, the same in long thin triangles as CAD programs export them (`cad_parts.py`), and shapes with
+thin walls, by coneflat and by what can be installed with pip: QuadriFlow (`pyquadriflow`) and Instant Meshes
+(`pynanoinstantmeshes`), each also with its options for boundaries and sharp edges; those that are not installed are
+named and left out. Everybody's meshes are written as OBJ and measured on the file by the same programs, `--tool` and
+one for strips, which are not ours. Each runs in a process of its own; seconds are CPU time of the call alone, without
+start-up. The medians over closed models come last.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import cad_parts
 import mechanical
 import numpy as np
 from common import models, shapes, stored_meshes
@@ -41,6 +43,8 @@ TOOL = stored_meshes.SHARED.parent / "tools" / "quads_aligned.py"
 LOOP_TOOL = TOOL.with_name("quad_loops.py")
 #: Models above this number of triangles are measured decimated, too.
 DECIMATED = 20_000
+#: Dihedral angle of sharp edges, radians.
+SHARP_ANGLE = np.deg2rad(40)
 #: Columns: the name, the key in the output of the tool, and the format.
 COLUMNS = (
     ("irregular", "irregular", "{:.0f}"),
@@ -49,6 +53,7 @@ COLUMNS = (
     ("worst", "off_max", "{:.0f}"),
     ("area 95/5", "area_95_5", "{:.2f}"),
     ("creases within 10 degrees", "crease_angle_lt10", "{:.0%}"),
+    ("creases within 0.15 edges", "crease_on_edge", "{:.0%}"),
     ("off curvature", "curv_off", "{:.1f}"),
     ("Hausdorff, edges", "haus_edges", "{:.2f}"),
     ("self-intersections", "self", "{:.0f}"),
@@ -66,7 +71,11 @@ Maker = Callable[[np.ndarray, np.ndarray, int], Polygons]
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--models", default="", help="of all, those whose names are given; with commas")
+    parser.add_argument(
+        "--models",
+        default="",
+        help="of all, those whose names, or kinds, as CAD or thin walls, are given; with commas",
+    )
     parser.add_argument("--quads", default="1000,3000,10000", help="how many are asked for; with commas")
     parser.add_argument("--methods", default=",".join(METHODS), help="with commas")
     parser.add_argument(
@@ -78,6 +87,9 @@ def main() -> None:
     methods = [name for name in arguments.methods.split(",") if find_spec(METHODS[name][0])]
     rows_of: dict[tuple[int, str], list[dict[str, float]]] = defaultdict(list)
     failed: dict[tuple[int, str], int] = defaultdict(int)
+    for name in arguments.methods.split(","):
+        if name not in methods:
+            print(f"{name} is not installed.", file=sys.stderr)
     names = [name for name, _, _ in COLUMNS]
     print("| model | asked | method | quads | " + " | ".join(names) + " |")
     print("| --- " * (4 + len(names)) + "|")
@@ -126,9 +138,14 @@ def chosen(names: list[str]) -> Iterator[tuple[str, TriangleMesh]]:
     for name, shape in mirrored_models().items():
         if not names or name in names:
             yield name, check_mesh(*shape).mesh
-    for name, shape in mechanical.shapes().items():
-        if not names or name in names:
-            yield name, check_mesh(*shape).mesh
+    generated = {
+        **mechanical.SHAPES,
+        **{f"{name}, CAD": make for name, make in cad_parts.SHAPES.items()},
+        **{f"{name}, thin walls": make for name, make in mechanical.NARROW_SHAPES.items()},
+    }
+    for name, make in generated.items():
+        if not names or name in names or name.partition(", ")[2] in names:
+            yield name, check_mesh(*make()).mesh
 
 
 def mirrored_models() -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -272,6 +289,7 @@ def by_instant_meshes(vertices: np.ndarray, faces: np.ndarray, count: int, **opt
 METHODS: dict[str, tuple[str, Maker]] = {
     "coneflat": ("coneflat", by_coneflat),
     "coneflat; loops": ("coneflat", partial(by_coneflat, loops=True)),
+    "coneflat; sharp": ("coneflat", partial(by_coneflat, sharp_angle=SHARP_ANGLE)),
     "coneflat; fewest cones": ("coneflat", partial(by_coneflat, cones="sparse", distortion=0.2)),
     "QuadriFlow": ("pyQuadriFlow", by_quadriflow),
     "QuadriFlow; sharp": ("pyQuadriFlow", partial(by_quadriflow, sharp=True)),
