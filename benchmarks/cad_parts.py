@@ -220,9 +220,10 @@ def _crosses(start: np.ndarray, end: np.ndarray, loop: Loop) -> bool:
 def _is_ear(points: np.ndarray, outline: list[int], k: int) -> bool:
     """Return whether the corner k is convex and no other one is in its triangle."""
     a, b, c = (points[outline[i % len(outline)]] for i in (k - 1, k, k + 1))
-    rest = points[outline]
-    rest = rest[~((rest == a).all(axis=1) | (rest == b).all(axis=1) | (rest == c).all(axis=1))]
-    inside = [_turn(p, q, rest) >= -1e-12 for p, q in ((a, b), (b, c), (c, a))]
+    corners = points[outline]
+    is_tip = [(corners == tip).all(axis=1) for tip in (a, b, c)]
+    corners = corners[~np.any(is_tip, axis=0)]
+    inside = [_turn(p, q, corners) >= -1e-12 for p, q in ((a, b), (b, c), (c, a))]
     return bool(_turn(a, b, c) > 1e-12) and not np.all(inside, axis=0).any()
 
 

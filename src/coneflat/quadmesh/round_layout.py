@@ -210,8 +210,7 @@ def _cheaper_chains(
 ) -> IntArray:
     """Return the edges of the chains that remain after an attempt: each leaves out the costliest ones.
 
-    Of preferred edges these are half of the chains, or those above a bound that decreases so that the attempts end; of
-    required ones fewer.
+    These are chains above a bound that decreases so that the attempts end.
     """
     if costs.max() > max_cost:
         bound = 0.7**attempt * max_cost
