@@ -127,7 +127,14 @@ def test_surface_without_sharp_edges():
     check_laws(grid)
 
 
-@pytest.mark.parametrize("angle", [0.0, -1.0, 4.0, np.nan])
+def test_angles_as_texts():
+    grids = [
+        integer_grid(*SHAPES["cube"], quads=100, sharp_angle=angle) for angle in ("40deg", np.deg2rad(40))
+    ]
+    np.testing.assert_array_equal(grids[0].corner_grid, grids[1].corner_grid)
+
+
+@pytest.mark.parametrize("angle", [0.0, -1.0, 4.0, np.nan, "40 degrees", "0deg"])
 def test_impossible_angles(angle):
     with pytest.raises(errors.OptionError, match=r"angle|number"):
         integer_grid(*SHAPES["cube"], quads=100, sharp_angle=angle)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..base.text import short_repr
 from ..errors import OptionError
+from .texts import parse_curvature
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -68,7 +69,9 @@ class Flag(Kind):
 
 @dataclass(frozen=True)
 class Number(Kind):
-    """A number; an angle is in radians, a strength is from 0 and also accepts True (1) and False (0).
+    """A number; a strength is from 0 and also accepts True (1) and False (0).
+
+    An angle is in radians, and may be a text such as "40deg" or "pi/2".
 
     Attributes:
         minimum, maximum: inclusive bounds.
@@ -91,6 +94,8 @@ class Number(Kind):
             return None
         if self.is_strength and type(value).__name__ in ("bool", "bool_"):
             value = float(value)
+        if self.is_angle and isinstance(value, str):
+            value = parse_curvature(value, name, "angle")
         number = as_integer(name, value) if self.is_integer else as_number(name, value)
         if not self.minimum <= number <= self.maximum or (self.is_positive and not 0 < number < math.inf):
             raise OptionError(f"{name} must be {self.text}, got {number:,{'' if self.is_integer else '.6g'}}")

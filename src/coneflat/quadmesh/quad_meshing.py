@@ -73,7 +73,8 @@ def quads(
         size: length of the edges of quads in model units, which replaces `quads`; or relative sizes of quads, see
             `integer_grid`.
         stretch: trade-off between equal angles (0) and also equal areas (1); see `integer_grid`.
-        sharp_angle: radians; edges of quads follow edges with a larger dihedral angle; None for none.
+        sharp_angle: radians, or a text such as "40deg"; edges of quads follow edges with a larger dihedral angle; None
+            for none.
         symmetry: "auto": quads of a surface with a plane of symmetry are symmetric about it; "none": they need not be.
         loops: prefer short loops and few patches to angles close to 90 degrees; see `integer_grid`.
         smooth: rounds of smoothing on the surface, see `smooth_quads`; 0 for none.
@@ -287,7 +288,9 @@ def _meshed(request: GridRequest, rounds: int) -> _Meshed:
             quad_mesh = smooth_quads(quad_mesh, rounds, grid.features)
         else:
             moved = simpler.moved(quad_mesh)
-            quad_mesh = simpler.completed(smooth_quads(moved, rounds, sharp_ends(simpler.surface, request.angle)))
+            quad_mesh = simpler.completed(
+                smooth_quads(moved, rounds, sharp_ends(simpler.surface, request.angle))
+            )
     notes = *(() if simpler is None else simpler.notes), *grid.notes, *quad_mesh.notes
     quad_mesh = replace(quad_mesh, notes=notes, grid=grid, source=source)
     if simpler is None:
@@ -354,8 +357,8 @@ def integer_grid(
             numbers, the name of a vertex property of the file, or "curvature", for squares up to four times smaller
             where the surface is more curved.
         stretch: trade-off between angles (0) and areas (1); see `StretchEnergy`.
-        sharp_angle: radians; edges with a larger dihedral angle, and the boundary, are put on grid lines; None for
-            none.
+        sharp_angle: radians, or a text such as "40deg"; edges with a larger dihedral angle, and the boundary, are put
+            on grid lines; None for none.
         symmetry: "auto": the grid of a surface with a plane of symmetry is symmetric about it; "none": it need not be.
         loops: prefer integers for which grid lines from irregular vertices soon end at other ones, so that strips of
             squares are short and the patches between these lines are few; angles deviate more from 90 degrees.
