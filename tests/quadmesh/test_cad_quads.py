@@ -10,6 +10,7 @@ import shapes
 from coneflat import check_mesh, measure_quads, quads
 from coneflat.quadmesh.crease_fit import FOLLOWED, crease_fit
 from coneflat.quadmesh.cross_field import SHARP_ANGLE, is_mechanical
+from coneflat.quadmesh.mirrored import MAX_UNFOLLOWED
 from coneflat.quadmesh.remesh import is_thin, remeshed
 
 SHARP = np.deg2rad(40)
@@ -60,6 +61,15 @@ def test_required_edges_are_not_worse(name, count):
     # With few quads the teeth of the gear are as narrow as some quads.
     assert preferred.share >= (LEAST_SHARE if count >= 3000 else 0.7)
     assert required.is_complete or required.score >= preferred.score
+
+
+@pytest.mark.slow
+def test_symmetric_quads_follow_as_many_sharp_edges():
+    """Symmetric quads of the gear, of about as many irregular vertices, leave out a sixth of its sharp edges."""
+    auto, plain = (quads(*cad_parts.gear(), quads=3000, symmetry=symmetry) for symmetry in ("auto", "none"))
+    shares = [crease_fit(mesh, SHARP).share for mesh in (auto, plain)]
+    assert shares[0] >= shares[1] - MAX_UNFOLLOWED
+    assert "of the length of sharp edges would be on edges of quads instead of" in auto.notes[-1]
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1e6])

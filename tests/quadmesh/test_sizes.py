@@ -15,7 +15,7 @@ from coneflat.quadmesh import policies
 from coneflat.quadmesh.alignment import has_area
 from coneflat.quadmesh.features import split_around
 from coneflat.quadmesh.no_grid import NoGrid
-from coneflat.quadmesh.sizes import extended
+from coneflat.quadmesh.sizes import _scales_of_curvature, extended
 
 
 def edges_and_places(mesh):
@@ -65,6 +65,17 @@ def test_quads_are_smaller_where_the_surface_bends():
 
     # The curvature is 3 at the tips, and 1 around the middle.
     assert ratio("curvature") < 0.9 * ratio(None)
+
+
+def test_sizes_are_inverse_to_the_root_of_the_curvature():
+    vertices, faces = shapes.sphere(4, bumps=0.0)
+    # Two balls of radius 1 and 3 / 2.
+    mesh = TriangleMesh(
+        np.concatenate([vertices, 1.5 * vertices + [9, 0, 0]]), np.concatenate([faces, faces + len(vertices)])
+    )
+    scales = _scales_of_curvature(mesh)
+    small, large = np.median(scales[: len(vertices)]), np.median(scales[len(vertices) :])
+    assert small - large == pytest.approx(np.log(1.5) / 2, rel=0.1)
 
 
 def test_new_vertices_get_the_mean_of_their_neighbours():

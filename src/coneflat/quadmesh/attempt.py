@@ -26,7 +26,7 @@ from .quad_mesh import QuadMesh
 from .relaxing import GridGoal
 from .request import GridRequest
 from .round_layout import DOUBLINGS_BEFORE_OTHER_CONES, MAX_DOUBLINGS, RoundingRules, rounded_grid
-from .sizes import note_on_sizes
+from .sizes import note_on_sizes, with_target_lengths
 
 # With fewer quads, a cone costs more than 1, in proportion. Of a half, each stands for two.
 QUADS_AT_UNIT_PRICE = 2_000
@@ -116,6 +116,8 @@ def rounded_map(request: GridRequest, seamless: SeamlessMap) -> IntegerGrid | No
     request.stages.done = 1.0
     with request.stages("grid"), limit_threads(flattening.settings.get("threads", THREADS)):
         layout = aligned(flattening, request.size, request.angle)
+        if seamless.is_aligned and request.scales is not None:
+            layout = with_target_lengths(layout, request.scales)
         request.limit.check_cones(layout.node_quarters)
         follows_lines = seamless.is_aligned or request.sharp_angle is not None
         # Rather than many more squares than requested, a grid with other cones is searched.

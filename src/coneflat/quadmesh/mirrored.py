@@ -13,6 +13,8 @@ from ..geometry import quarters_around, sides_between
 from ..io import as_input
 from ..mesh.connectivity import TriangleMesh, are_among
 from ..source import Source
+from .crease_fit import crease_fit
+from .cross_field import is_mechanical
 from .features import lengths_along, sharp_edges, split_edges
 from .integer_map import IntegerGrid, grid_of_corners, on_lines
 from .mirror_planes import SAME_PLACE, MirrorPlane, mirror_planes, on_seam, seam_edges
@@ -25,6 +27,8 @@ from .smooth import blocked, is_on_feature, smooth_quads, square_corners
 # Largest ratio of the number of irregular vertices of symmetric quads to that of others, and of the factors by which
 # the numbers of quads differ from the requested one.
 MAX_WORSE = 1.1
+# Largest share of the length of sharp edges that others follow and symmetric quads do not.
+MAX_UNFOLLOWED = 0.02
 # Rounds of smoothing between those of the vertices on the plane.
 ROUNDS_AT_ONCE = 2
 
@@ -117,21 +121,30 @@ def are_symmetric(quads: QuadMesh, plane: MirrorPlane) -> bool:
     return bool((gaps <= SAME_PLACE * plane.size).all()) and len(np.unique(images)) == len(images)
 
 
-def fault(symmetric: QuadMesh, quads: QuadMesh, requested: float) -> str:
-    """Return why symmetric quads of a surface are worse than those without symmetry, "" if they are not.
-
-    requested: number of quads that is requested.
-    """
+def fault(symmetric: QuadMesh, quads: QuadMesh, request: GridRequest) -> str:
+    """Return why symmetric quads of a surface are worse than those without symmetry, "" if they are not."""
     counts, numbers = (
         [len(mesh.irregular) for mesh in (symmetric, quads)],
         [len(symmetric.quads), len(quads.quads)],
     )
     if counts[0] > MAX_WORSE * counts[1]:
         return f"they would have {plural(counts[0], 'irregular vertex', 'irregular vertices')} instead of {counts[1]:,}"
+    requested = request.limit.requested
     ratios = [max(number / requested, requested / number) for number in numbers]
     if ratios[0] > MAX_WORSE * ratios[1]:
         return f"they would be {numbers[0]:,} instead of {numbers[1]:,}"
-    return ""
+    return _fault_at_creases(symmetric, quads, request)
+
+
+def _fault_at_creases(symmetric: QuadMesh, quads: QuadMesh, request: GridRequest) -> str:
+    """Return how much less symmetric quads follow sharp edges, "" if not, or if these need not be followed."""
+    if request.sharp_angle is None and not is_mechanical(request.mesh):
+        return ""
+    shares = [crease_fit(mesh, request.angle).share for mesh in (symmetric, quads)]
+    if shares[0] >= shares[1] - MAX_UNFOLLOWED:
+        return ""
+    percents = [f"{100 * share:.0f} %" for share in shares]
+    return f"{percents[0]} of the length of sharp edges would be on edges of quads instead of {percents[1]}"
 
 
 def asymmetry_note(plane: MirrorPlane, reason: str) -> Unmet:

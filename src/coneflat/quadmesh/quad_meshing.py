@@ -224,7 +224,7 @@ def _attempt(request: GridRequest, rounds: int) -> Attempt:
     if isinstance(symmetric, NoGrid):
         reason = symmetric.reason
     else:
-        reason = "" if problems else fault(symmetric, quad_mesh, request.limit.requested)
+        reason = "" if problems else fault(symmetric, quad_mesh, request)
         if not reason:
             return symmetric, ()
     return replace(quad_mesh, notes=(*quad_mesh.notes, asymmetry_note(half.mirror, reason))), problems
@@ -423,7 +423,7 @@ def _symmetric_grid(request: GridRequest, half: GridRequest) -> Outcome:
     meshes = [mesh for mesh in quads if isinstance(mesh, QuadMesh)]
     if len(meshes) < len(quads) or are_symmetric(meshes[0], half.mirror):
         return plain
-    reason = fault(meshes[1], meshes[0], request.limit.requested)
+    reason = fault(meshes[1], meshes[0], request)
     return plain.with_note(asymmetry_note(half.mirror, reason)) if reason else symmetric
 
 

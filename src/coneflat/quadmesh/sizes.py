@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,12 @@ from ..base import FloatArray
 from ..errors import OptionError
 from ..geometry import double_areas, edge_lengths, mollify, signed_double_areas
 from ..measures import quantile
-from ..mesh import CheckedMesh
+from ..mesh import NEXT, PREVIOUS, CheckedMesh
 from ..mesh.connectivity import TriangleMesh
 from ..source import Source, vertex_numbers
 from .cross_field import CURVATURE_SCALE, curvature_tensors, diffused
 from .features import vertex_graph
+from .grid_layout import GridLayout
 from .integer_map import IntegerGrid
 
 
@@ -53,10 +55,25 @@ def _scales_of_curvature(mesh: TriangleMesh, ratio: float = 4.0) -> FloatArray:
     squared = np.maximum((tensors**2).sum(axis=(1, 2)), np.finfo(float).tiny)
     corners = mesh.faces.ravel()
     share = np.asarray(np.bincount(corners, areas.repeat(3) / 3, count), dtype=np.float64)
-    mean = np.bincount(corners, (areas * np.log(squared) / 8).repeat(3) / 3, count) / share
+    mean = np.bincount(corners, (areas * np.log(squared) / 4).repeat(3) / 3, count) / share
     middle = quantile(mean, share, 0.5)
     bound = np.log(ratio) / 2
     return diffused(mesh, np.clip(mean - middle, -bound, bound)[:, None], 2 * CURVATURE_SCALE)[:, 0]
+
+
+def with_target_lengths(layout: GridLayout, log_scale: FloatArray) -> GridLayout:
+    """Return a layout whose triangles have the lengths at which all squares have the same size, and its area.
+
+    The grid is relaxed towards isometry; with the lengths of the surface, this would even out the requested sizes.
+
+    log_scale: (k,) the target log conformal factor at the first vertices of its mesh.
+    """
+    mesh = layout.mesh
+    scale = extended(log_scale, mesh)[mesh.faces]
+    longer = layout.lengths * np.exp((scale[:, NEXT] + scale[:, PREVIOUS]) / 2)
+    lengths, _ = mollify(longer, mesh)
+    areas = [double_areas(sides).sum() for sides in (layout.lengths, lengths)]
+    return replace(layout, lengths=lengths * np.sqrt(areas[0] / areas[1]))
 
 
 def extended(values: FloatArray, mesh: TriangleMesh) -> FloatArray:
