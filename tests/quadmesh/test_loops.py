@@ -186,4 +186,4 @@ def test_loops_of_a_given_grid_are_those_of_its_integers():
 
 def test_few_quads_have_no_short_loops():
     mesh = coneflat.quads(*shapes.sphere(3), quads=40, loops=True)
-    assert any("Loops are not short" in note for note in mesh.notes)
+    assert any("Loops are as by default" in note for note in mesh.notes)

@@ -28,7 +28,7 @@ from .cross_field import SHARP_ANGLE, directions_and_indices, is_mechanical, sha
 from .features import split_around, split_chords, vertex_graph
 from .limits import COARSE_TRIANGLES, NO_LIMIT, SquareLimit
 from .map_model import SAMPLES, MapModel
-from .mirror_planes import MirrorPlane, on_seam
+from .mirror_planes import MirrorPlane, at_seam_ends, on_seam
 from .options import FLATTENING_OPTIONS, GRID_TOLERANCE, QuadOptions, flattening_defaults
 from .sizes import extended
 
@@ -156,8 +156,10 @@ def aligned_cones(
         mesh, origin = coarse.mesh, coarse.vertices
     directions, start = directions_and_indices(mesh, angle)
     scale = None if log_scale is None else log_scale[origin]
-    is_seam = None if mirror is None else on_seam(mesh, mirror)
-    model = MapModel(mesh, directions.combined, min_quarters, max_quarters, degrees[origin], scale, is_seam)
+    seam_masks = () if mirror is None else (on_seam(mesh, mirror), at_seam_ends(mesh, mirror))
+    model = MapModel(
+        mesh, directions.combined, min_quarters, max_quarters, degrees[origin], scale, *seam_masks
+    )
     search = _Search(mesh, model, start, price, angle)
     limit.check_cones(search.fixed_quarters)
     follows_edges = sharp_angle is not None or is_mechanical(mesh, angle)

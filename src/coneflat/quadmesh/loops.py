@@ -70,7 +70,7 @@ def grid_with_loops(rounding: Rounding, goal: GridGoal) -> IntegerGrid | NoGrid:
         grid = None if nearer is None or nearer.energy >= candidate.energy else nearer.grid(goal)
         return replace(grid if isinstance(grid, IntegerGrid) else coarse, size=rounding.layout.size)
     nearest = nearest_grid(rounding, goal)
-    note = Unmet("Loops are not short: no such grid was found.")
+    note = Unmet("Loops are as by default: no grid with shorter ones was found.")
     return with_note(nearest, note) if isinstance(nearest, IntegerGrid) else nearest
 
 

@@ -58,6 +58,7 @@ class MapModel:
         triangles: IntArray,
         log_scale: FloatArray | None = None,
         is_seam: BoolArray | None = None,
+        is_seam_end: BoolArray | None = None,
     ) -> None:
         """Set up the model.
 
@@ -69,6 +70,7 @@ class MapModel:
             log_scale: (n,) the target log conformal factor, up to a constant; None for 0.
             is_seam: (n,) boundary vertices at which the mesh continues as its mirror image, with twice their curvature;
                 None for none.
+            is_seam_end: (n,) boundary vertices at which the mesh and its image have a common boundary; None for none.
         """
         lengths, _ = mollify(edge_lengths(mesh.vertices, mesh.faces), mesh)
         angles, count = corner_angles(lengths), len(mesh.vertices)
@@ -105,6 +107,9 @@ class MapModel:
             # Where a corner of one quad meets its image, a vertex would have two.
             low = np.where(is_seam[self.places], np.maximum(low, -(-min_quarters // 2)), low)
             high = np.where(is_seam[self.places], 0, high)
+        if is_seam_end is not None:
+            # Corners of one quad and its image form a straight boundary. With two, the boundary would fold back.
+            low, high = (np.where(is_seam_end[self.places], 1, bounds) for bounds in (low, high))
         self.min_quarters, self.max_quarters = np.append(low, -(10**9)), np.append(high, 10**9)
 
     def _functional(self, rows: csr_matrix) -> FloatArray:

@@ -151,10 +151,22 @@ def seam_edges(half: TriangleMesh, plane: MirrorPlane) -> IntArray:
 
 def on_seam(half: TriangleMesh, plane: MirrorPlane) -> BoolArray:
     """Return (n,) whether each vertex of a half is on the plane and not on the boundary of the whole surface."""
+    is_seam, is_outer = _on_boundaries(half, plane)
+    return is_seam & ~is_outer
+
+
+def at_seam_ends(half: TriangleMesh, plane: MirrorPlane) -> BoolArray:
+    """Return (n,) whether each vertex of a half is where the boundary of the whole surface meets the plane."""
+    is_seam, is_outer = _on_boundaries(half, plane)
+    return is_seam & is_outer
+
+
+def _on_boundaries(half: TriangleMesh, plane: MirrorPlane) -> tuple[BoolArray, BoolArray]:
+    """Return (n,) whether each vertex is on an edge of the seam, and on one of the boundary of the whole surface."""
     seam = seam_edges(half, plane)
     outer = np.setdiff1d(np.flatnonzero(half.is_boundary_edge), seam)
     count = len(half.vertices)
-    return mask_of(count, half.edges[seam]) & ~mask_of(count, half.edges[outer])
+    return mask_of(count, half.edges[seam]), mask_of(count, half.edges[outer])
 
 
 class _Images:

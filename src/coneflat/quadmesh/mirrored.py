@@ -17,7 +17,7 @@ from .crease_fit import crease_fit
 from .cross_field import is_mechanical
 from .features import lengths_along, sharp_edges, split_edges
 from .integer_map import IntegerGrid, grid_of_corners, on_lines
-from .mirror_planes import SAME_PLACE, MirrorPlane, mirror_planes, on_seam, seam_edges
+from .mirror_planes import SAME_PLACE, MirrorPlane, at_seam_ends, mirror_planes, on_seam, seam_edges
 from .quad_mesh import QuadMesh
 from .remesh import part_of
 from .request import GridRequest, names_vertices
@@ -210,22 +210,21 @@ def doubled_grid(grid: IntegerGrid, plane: MirrorPlane, sharp_angle: float) -> I
             ),
             axis=0,
         ),
-        corners=_corners_of(grid, mesh, image),
+        corners=_corners_of(grid, image),
     )
     return replace(joined_grid, seconds=grid.seconds)
 
 
-def _corners_of(grid: IntegerGrid, mesh: TriangleMesh, image: IntArray) -> IntArray:
-    """Return the corners of a doubled grid: those of the half, except those on the plane inside the whole surface."""
-    corners = grid.corners
-    is_inside = (image[corners] == corners) & ~mesh.is_boundary_vertex[corners]
-    return np.unique([corners[~is_inside], image[corners[~is_inside]]])
+def _corners_of(grid: IntegerGrid, image: IntArray) -> IntArray:
+    """Return the corners of a doubled grid: those of the half that are not on the plane, and their images."""
+    corners = grid.corners[image[grid.corners] != grid.corners]
+    return np.union1d(corners, image[corners])
 
 
 def _require_straight(half: TriangleMesh, plane: MirrorPlane, grid: IntegerGrid) -> None:
-    """Raise GridError unless the seam is on grid lines and has no corner of a single quad."""
+    """Raise GridError unless the seam is on grid lines, with corners of a single quad at its ends alone."""
     quarters = quarters_around(half, sides_between(grid.corner_grid))
-    is_bent = on_seam(half, plane) & (quarters < 2)
+    is_bent = (on_seam(half, plane) & (quarters < 2)) | (at_seam_ends(half, plane) & (quarters > 1))
     is_off = ~on_lines(half, grid.corner_grid)[seam_edges(half, plane)]
     if is_off.any() or is_bent.any():
         raise GridError(f"grid lines do not follow {plane}")
